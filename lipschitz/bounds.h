@@ -1,0 +1,46 @@
+/// @file Numbers that say what they guarantee. The types do not convert into one another.
+#pragma once
+
+namespace swarmcert::lipschitz {
+
+namespace detail {
+/// A double with a meaning; `Tag` makes each meaning a type of its own.
+template <class Tag>
+class Guaranteed {
+ public:
+  constexpr explicit Guaranteed(double value) : value_(value) {}
+  constexpr double value() const { return value_; }
+  friend constexpr bool operator==(Guaranteed a, Guaranteed b) { return a.value_ == b.value_; }
+
+ private:
+  double value_;
+};
+}  // namespace detail
+
+/// At least the true value, in exact arithmetic for the weights as stored.
+using UpperBound = detail::Guaranteed<struct UpperBoundTag>;
+/// At most the true value, in exact arithmetic for the weights as stored.
+using LowerBound = detail::Guaranteed<struct LowerBoundTag>;
+/// Near the true value as far as anybody knows; proves nothing.
+using Estimate = detail::Guaranteed<struct EstimateTag>;
+
+/// lower <= true value <= upper.
+struct Enclosure {
+  LowerBound lower;
+  UpperBound upper;
+};
+
+/// The smaller of two upper bounds on the same quantity is an upper bound.
+constexpr UpperBound tighter(UpperBound a, UpperBound b) { return a.value() <= b.value() ? a : b; }
+/// The larger of two lower bounds on the same quantity is a lower bound.
+constexpr LowerBound tighter(LowerBound a, LowerBound b) { return a.value() >= b.value() ? a : b; }
+
+/// What can be said of a claim. Anything that was not settled is inconclusive.
+enum class Verdict { kProved, kRefuted, kInconclusive };
+
+/// "proved", "refuted" or "inconclusive".
+constexpr const char* name(Verdict verdict) {
+  return verdict == Verdict::kProved ? "proved" : verdict == Verdict::kRefuted ? "refuted" : "inconclusive";
+}
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,37 @@
+/// @file The arithmetic that all flight code of this project uses, and a detector for compilers that change it.
+///
+/// Every product is rounded to the scalar's precision before it enters a sum. A fused multiply-add rounds once
+/// instead of twice and gives other bits; contraction is on by default in GCC for targets that have the
+/// instruction. `-ffp-contract=off` is an interface option of swarmcert::nn; `rounded()` holds the line where a
+/// build system dropped that option, and `arithmetic_is_fused()` tells at run time whether both failed.
+#pragma once
+
+#if defined(__FAST_MATH__)
+#error "swarmcert::nn analyses IEEE arithmetic: build without -ffast-math"
+#endif
+
+namespace swarmcert::nn {
+
+/// Returns `product`, and keeps the compiler from fusing it with a following addition.
+template <typename Scalar>
+[[gnu::always_inline]] inline Scalar rounded(Scalar product) {
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12
+  return __builtin_assoc_barrier(product);
+#else
+  return product;
+#endif
+}
+
+/// True if this translation unit's `a * b + c` is rounded once (fused) instead of twice.
+///
+/// With a = b = 1 + 2^-23 and c = -(1 + 2^-22), the rounded product cancels c exactly; a fused one leaves 2^-46.
+inline bool arithmetic_is_fused() {
+  volatile float a = 1.00000012f;
+  volatile float c = -1.00000024f;
+  const float x = a;
+  const float y = a;
+  const float z = c;
+  return rounded(x * y) + z != 0.0f;
+}
+
+}  // namespace swarmcert::nn

@@ -1,0 +1,29 @@
+/// @file The one error that a user's file can cause. The command line turns it into exit code 3.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace swarmcert::files {
+
+/// What is wrong with an input, in the parts a user needs to mend it. Empty parts are left out of the message.
+struct InputFault {
+  std::string file;   ///< path as the user gave it
+  std::string where;  ///< "offset 132" in a binary file, "line 7" in a text file
+  std::string field;  ///< tensor name, archive entry or key, e.g. "fc2.weight" or "gamma.value"
+  std::string value;  ///< the offending value as text
+  std::string what;   ///< the rule that it breaks
+  std::string mend;   ///< what the user can do
+};
+
+/// Thrown by every reader. what() is one line: "FILE: WHERE: FIELD = VALUE: WHAT; MEND".
+class InputError : public std::runtime_error {
+ public:
+  explicit InputError(InputFault fault);
+  const InputFault& fault() const { return fault_; }
+
+ private:
+  InputFault fault_;
+};
+
+}  // namespace swarmcert::files

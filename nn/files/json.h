@@ -1,0 +1,25 @@
+/// @file JSON as this project writes and reads it: keys in the order written, floats exact.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace swarmcert::files {
+
+using Json = nlohmann::ordered_json;
+
+/// `value` as C99 hex float ("0x1.8p+1"): exact, and the same on every platform. "inf", "-inf", "nan" otherwise.
+std::string hex_float(double value);
+
+/// Inverse of hex_float() for finite values.
+/// @throws std::invalid_argument if `text` is not one complete, finite C99 hex float that a double holds exactly.
+double parse_hex_float(const std::string& text);
+
+/// Parses a JSON file and checks `schema`.
+/// @throws InputError with line and column if it is not JSON, not an object, or has another schema.
+Json read_json(const std::string& path, const std::string& schema);
+
+/// Text of a JSON document, two-space indents, final newline.
+std::string to_text(const Json& document);
+
+}  // namespace swarmcert::files

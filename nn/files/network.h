@@ -1,0 +1,59 @@
+/// @file What the command line calls NET: one plain network, or a deep set with its kinds, units and clamp.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nn/files/weights.h"
+
+namespace swarmcert::files {
+
+/// What the networks were declared to satisfy: `gamma = { value, scope, mode }`.
+struct GammaStatement {
+  enum class Scope { kLayer, kNetwork };
+  enum class Mode { kClip, kEqual };
+  double value = 0;  ///< spectral norm per layer, or product of the norms over a network's layers
+  Scope scope = Scope::kLayer;
+  Mode mode = Mode::kClip;  ///< kClip: at most `value`; kEqual: equal to it up to the stored precision
+};
+
+/// Inputs are clamped to [lower, upper] before phi sees them; part of the function.
+struct InputClamp {
+  std::vector<double> lower, upper;
+};
+
+/// NET. Either `plain` is set, or `phi` and `rho` hold at least one kind each.
+///
+/// Deep set of a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n:
+///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
+/// where the ground term is present iff phi has the kind "ground".
+/// Class invariant after load: every phi but "ground" has `input_order.size()` inputs (where an order is given),
+/// all phi have the same number of outputs, which is every rho's number of inputs.
+struct Network {
+  std::string path;    ///< of network.toml; empty where weight files were named directly
+  std::string sha256;  ///< of network.toml; empty likewise
+  std::optional<Weights> plain;
+  std::map<std::string, Weights> phi;  ///< by the neighbour's kind
+  std::map<std::string, Weights> rho;  ///< by the vehicle's own kind
+
+  std::string output_quantity;           ///< "force_z"; empty if not stated
+  std::string output_unit;               ///< "gf" or "N"; empty if not stated
+  std::vector<std::string> input_order;  ///< "dp_x_m", ...; empty if not stated
+  std::optional<InputClamp> clamp;
+  std::optional<GammaStatement> gamma;
+};
+
+/// Which files make up NET: exactly one of `file`, or `phi` with `rho`.
+struct NetworkArguments {
+  std::string file;      ///< network.toml or one plain weight file
+  std::string phi, rho;  ///< weight files; their kind is "default"
+  std::string key;       ///< see load_weights()
+};
+
+/// Loads NET. Weight files named in a network.toml are relative to its folder.
+/// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean.
+Network load_network(const NetworkArguments& arguments);
+
+}  // namespace swarmcert::files

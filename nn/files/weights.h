@@ -1,0 +1,78 @@
+/// @file A network as its weight file holds it: every weight exactly, in double.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "nn/mlp.h"
+
+namespace swarmcert::files {
+
+/// The format in which the file stores its weights. Both convert to double without rounding.
+enum class Precision { kFloat32, kFloat64 };
+
+/// "float32" or "float64".
+const char* name(Precision precision);
+
+/// One affine layer y = W x + b.
+struct Layer {
+  std::string name;             ///< as in the file, without ".weight": "fc1"
+  int outputs = 0;
+  int inputs = 0;
+  std::vector<double> weights;  ///< W, [outputs x inputs], row-major
+  std::vector<double> biases;   ///< b, [outputs]; zeros where the file has none
+};
+
+/// A ReLU multilayer perceptron: ReLU after every layer but the last.
+/// Class invariant after load_weights(): at least one layer, every size positive, layers[k].inputs ==
+/// layers[k - 1].outputs, all entries finite.
+struct Weights {
+  std::string path;    ///< as the user gave it
+  std::string sha256;  ///< of the file's bytes, lower-case hex
+  Precision precision = Precision::kFloat32;
+  std::vector<Layer> layers;
+
+  int inputs() const { return layers.front().inputs; }
+  int outputs() const { return layers.back().outputs; }
+};
+
+/// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
+/// and legacy pickle, float32 and float64, strided views), safetensors.
+/// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`; layers follow one another in the
+/// file's own order (by natural order of names in safetensors, which has none).
+/// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top.
+/// @throws InputError for anything that is not such a network: it names offset, field, value and mend.
+Weights load_weights(const std::string& path, const std::string& key = "");
+
+/// As load_weights(), from memory. `path` is used in messages only.
+Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key = "");
+
+/// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
+/// @throws InputError if the file exists and `overwrite` is false.
+void save_safetensors(const Weights& weights, const std::string& path, bool overwrite);
+
+/// The evaluator's view of a network, with the arrays it points to.
+/// In float each weight is rounded to nearest: for a float32 file that is exact.
+template <typename Scalar>
+class Evaluator {
+ public:
+  explicit Evaluator(const Weights& weights);
+  Evaluator(const Evaluator&) = delete;
+  Evaluator& operator=(const Evaluator&) = delete;
+  Evaluator(Evaluator&&) = default;
+
+  nn::Mlp<Scalar> mlp() const { return {layers_.data(), static_cast<int>(layers_.size())}; }
+
+  /// f(x); `input` has mlp().inputs() entries, the result mlp().outputs().
+  std::vector<Scalar> operator()(const std::vector<Scalar>& input) const;
+
+ private:
+  std::vector<std::vector<Scalar>> arrays_;
+  std::vector<nn::DenseLayer<Scalar>> layers_;
+};
+
+extern template class Evaluator<float>;
+extern template class Evaluator<double>;
+
+}  // namespace swarmcert::files
