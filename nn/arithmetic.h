@@ -9,15 +9,28 @@
 #if defined(__FAST_MATH__)
 #error "swarmcert::nn analyses IEEE arithmetic: build without -ffast-math"
 #endif
+#if __FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16
+#error "swarmcert::nn rounds every operation to its own type: on 32-bit x86 build with -msse2 -mfpmath=sse"
+#endif
 
 namespace swarmcert::nn {
 
 /// Returns `product`, and keeps the compiler from fusing it with a following addition.
+///
+/// GCC 12 has a builtin for that. Elsewhere the product passes through an empty assembler statement, which no
+/// optimiser looks into: clang-14 ignores its own `#pragma clang fp contract(off)` under -ffp-contract=fast.
 template <typename Scalar>
 [[gnu::always_inline]] inline Scalar rounded(Scalar product) {
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12
   return __builtin_assoc_barrier(product);
+#elif defined(__SSE2__)
+  asm("" : "+x"(product));
+  return product;
+#elif defined(__aarch64__)
+  asm("" : "+w"(product));
+  return product;
 #else
+  asm("" : "+m"(product));
   return product;
 #endif
 }

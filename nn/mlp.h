@@ -45,9 +45,6 @@ template <typename Scalar>
 /// rounded before the sum. Changing the order changes bits.
 template <typename Scalar>
 inline void apply(const DenseLayer<Scalar>& layer, const Scalar* x, Scalar* y) {
-#if defined(__clang__)
-#pragma clang fp contract(off)
-#endif
   for (int i = 0; i < layer.outputs; ++i) {
     const Scalar* row = layer.weights + static_cast<long>(i) * layer.inputs;
     Scalar sum = layer.biases[i];
