@@ -1,5 +1,7 @@
 #include "nn/files/input_error.h"
 
+#include <utility>
+
 namespace swarmcert::files {
 namespace {
 
@@ -14,11 +16,23 @@ std::string one_line(const InputFault& fault) {
   part(fault.value.empty() ? fault.field : fault.field + " = " + fault.value);
   part(fault.what);
   if (!fault.mend.empty()) text += "; " + fault.mend;
+  for (char& c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f) c = '?';
+  }
   return text;
 }
 
 }  // namespace
 
 InputError::InputError(InputFault fault) : std::runtime_error(one_line(fault)), fault_(std::move(fault)) {}
+
+std::string in_quotes(std::string_view text) {
+  constexpr std::size_t kLongest = 80;
+  std::string result = "\"";
+  result += text.substr(0, kLongest);
+  result += text.size() > kLongest ? "...\"" : "\"";
+  return result;
+}
 
 }  // namespace swarmcert::files

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace swarmcert::files {
 
@@ -16,7 +17,8 @@ struct InputFault {
   std::string mend;   ///< what the user can do
 };
 
-/// Thrown by every reader. what() is one line: "FILE: WHERE: FIELD = VALUE: WHAT; MEND".
+/// Thrown by every reader. what() is one line: "FILE: WHERE: FIELD = VALUE: WHAT; MEND"; control characters, which
+/// a hostile file could put into a name, appear as "?".
 class InputError : public std::runtime_error {
  public:
   explicit InputError(InputFault fault);
@@ -25,5 +27,8 @@ class InputError : public std::runtime_error {
  private:
   InputFault fault_;
 };
+
+/// `text` in double quotes, cut with "..." after 80 bytes: for text that comes from a file of unknown origin.
+std::string in_quotes(std::string_view text);
 
 }  // namespace swarmcert::files

@@ -19,6 +19,13 @@ double parse_hex_float(const std::string& text);
 /// @throws InputError with line and column if it is not JSON, not an object, or has another schema.
 Json read_json(const std::string& path, const std::string& schema);
 
+/// As read_json(), from memory; `path` is used in messages only.
+Json parse_json(const std::string& text, const std::string& path, const std::string& schema);
+
+/// Any JSON value, without a schema.
+/// @throws InputError with line and column if it is not JSON, has a key twice or is nested more than 64 deep.
+Json parse_json(const std::string& text, const std::string& path);
+
 /// Text of a JSON document, two-space indents, final newline.
 std::string to_text(const Json& document);
 

@@ -1,6 +1,7 @@
 /// @file What the command line calls NET: one plain network, or a deep set with its kinds, units and clamp.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,18 +20,23 @@ struct GammaStatement {
   Mode mode = Mode::kClip;  ///< kClip: at most `value`; kEqual: equal to it up to the stored precision
 };
 
-/// Inputs are clamped to [lower, upper] before phi sees them; part of the function.
+/// A neighbour's inputs are clamped to [lower, upper] before phi sees them; part of the function. The ground's
+/// phi, which sees the vehicle's own state, has no clamp.
 struct InputClamp {
   std::vector<double> lower, upper;
 };
+
+/// Inputs of the phi of kind "ground": the vehicle's own -z and -v.
+inline constexpr int kGroundInputs = 4;
 
 /// NET. Either `plain` is set, or `phi` and `rho` hold at least one kind each.
 ///
 /// Deep set of a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n:
 ///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
 /// where the ground term is present iff phi has the kind "ground".
-/// Class invariant after load: every phi but "ground" has `input_order.size()` inputs (where an order is given),
-/// all phi have the same number of outputs, which is every rho's number of inputs.
+/// Class invariant after load: every phi but "ground" has the same number of inputs, which is the length of
+/// `input_order` and of the clamp where they are given; "ground" has kGroundInputs; all phi have the same number of
+/// outputs, which is every rho's number of inputs; all rho have the same number of outputs, one for "force_z".
 struct Network {
   std::string path;    ///< of network.toml; empty where weight files were named directly
   std::string sha256;  ///< of network.toml; empty likewise
@@ -49,11 +55,18 @@ struct Network {
 struct NetworkArguments {
   std::string file;      ///< network.toml or one plain weight file
   std::string phi, rho;  ///< weight files; their kind is "default"
-  std::string key;       ///< see load_weights()
+  std::string key;       ///< see load_weights(); holds for every weight file
 };
 
-/// Loads NET. Weight files named in a network.toml are relative to its folder.
+/// Loads NET. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files named in a network.toml are relative to its folder.
 /// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean.
 Network load_network(const NetworkArguments& arguments);
+
+/// Reads the weight file at a path.
+using WeightsLoader = std::function<Weights(const std::string& path)>;
+
+/// A network.toml from memory: `path` gives its folder and the name in messages, `load` reads the weight files.
+/// @throws InputError as load_network().
+Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load);
 
 }  // namespace swarmcert::files

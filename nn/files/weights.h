@@ -17,7 +17,7 @@ const char* name(Precision precision);
 
 /// One affine layer y = W x + b.
 struct Layer {
-  std::string name;             ///< as in the file, without ".weight": "fc1"
+  std::string name;  ///< as in the file, without ".weight": "fc1"
   int outputs = 0;
   int inputs = 0;
   std::vector<double> weights;  ///< W, [outputs x inputs], row-major

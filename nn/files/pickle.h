@@ -1,0 +1,72 @@
+/// @file Pickled state dicts as plain data. Nothing is ever called: a pickle is read as a list of declarations.
+///
+/// Python's unpickler runs whatever a file names. This one knows a few opcodes and a handful of names; anything else
+/// is refused at its offset. It has no recursion, and its memory is bounded by kMostPickleOperations.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace swarmcert::files {
+
+/// Opcodes executed before a pickle is refused: a four-layer network needs two hundred.
+inline constexpr std::size_t kMostPickleOperations = 1'000'000;
+
+/// Raw numbers that tensors look into. The views point into the parsed bytes.
+struct PickledStorage {
+  std::string_view type;  ///< torch's name: "FloatStorage"
+  std::string_view key;   ///< which raw data of the file: an archive entry, or an entry of the legacy list
+  std::uint64_t elements;
+};
+
+/// A strided view: entry (i, j, ...) is storage[offset + i strides[0] + j strides[1] + ...]. Only declared: neither
+/// the sizes nor the offset have been compared with the storage.
+struct PickledTensor {
+  std::size_t storage;  ///< index into Pickle::storages
+  std::uint64_t offset;
+  std::vector<std::uint64_t> sizes, strides;
+};
+
+struct PickledValue {
+  enum class Kind : std::uint8_t {
+    kNone,
+    kBool,
+    kInteger,
+    kReal,
+    kText,
+    kTuple,
+    kList,
+    kDict,
+    kGlobal,
+    kStorageType,
+    kStorage,
+    kTensor
+  };
+  Kind kind = Kind::kNone;
+  std::int64_t integer = 0;  ///< kBool, kInteger: the value; kStorage, kTensor: index into Pickle's tables
+  std::string_view text;     ///< kText, kStorageType; points into the parsed bytes
+  std::vector<std::uint32_t>
+      items;  ///< kTuple, kList: indices into Pickle::values; kDict: key, value, key, ...
+};
+
+/// One pickle. Values refer to one another by index and may form cycles: do not recurse over them.
+struct Pickle {
+  std::vector<PickledValue> values;
+  std::vector<PickledStorage> storages;
+  std::vector<PickledTensor> tensors;
+  std::uint32_t root = 0;
+  std::size_t end = 0;  ///< offset in the parsed bytes behind the STOP opcode
+};
+
+/// Reads the pickle that starts at `begin`.
+/// @param path, entry  for messages: the file, and the archive entry or part of it that `bytes` holds.
+/// @throws InputError with the offset for anything but a state dict's opcodes and names.
+Pickle parse_pickle(std::string_view bytes, std::size_t begin, const std::string& path,
+                    const std::string& entry);
+
+/// "an integer", "a dict", ...: for messages.
+const char* name(PickledValue::Kind kind);
+
+}  // namespace swarmcert::files

@@ -1,0 +1,53 @@
+#include "nn/files/weights.h"
+
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/pth.h"
+#include "nn/files/safetensors.h"
+
+namespace swarmcert::files {
+namespace {
+
+[[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
+  std::string what = "is neither a PyTorch state dict (.pth) nor safetensors";
+  std::string mend = "save one with torch.save(model.state_dict(), ...)";
+  if (bytes.empty()) {
+    what = "is empty";
+    mend = "copy it again";
+  } else if (bytes[0] == '\x80') {
+    what = "is a bare pickle, which torch.save does not write";
+  } else if (bytes.compare(0, 24, "version https://git-lfs.") == 0) {
+    what = "is a Git LFS pointer, not the file itself";
+    mend = "fetch it: git lfs pull";
+  }
+  throw InputError({path, "offset 0", "", "", what, mend});
+}
+
+}  // namespace
+
+const char* name(Precision precision) { return precision == Precision::kFloat32 ? "float32" : "float64"; }
+
+Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key) {
+  Weights weights;
+  if (looks_like_pth_zip(bytes)) {
+    weights = parse_pth_zip(bytes, path, key);
+  } else if (looks_like_pth_legacy(bytes)) {
+    weights = parse_pth_legacy(bytes, path, key);
+  } else if (looks_like_safetensors(bytes)) {
+    if (!key.empty()) {
+      throw InputError(
+          {path, "", "--key", in_quotes(key), "safetensors files are not nested", "leave --key out"});
+    }
+    weights = parse_safetensors(bytes, path);
+  } else {
+    refuse_format(bytes, path);
+  }
+  weights.sha256 = sha256(bytes);
+  return weights;
+}
+
+Weights load_weights(const std::string& path, const std::string& key) {
+  return parse_weights(read_file(path), path, key);
+}
+
+}  // namespace swarmcert::files
