@@ -1,0 +1,102 @@
+#include "lipschitz/checker/lipschitz_lmi.h"
+
+#include <algorithm>
+
+namespace swarmcert::check {
+namespace {
+
+Matrix transposed(const Matrix& a) {
+  Matrix result(a.cols, a.rows);
+  for (int i = 0; i < a.rows; ++i) {
+    for (int j = 0; j < a.cols; ++j) result(j, i) = a(i, j);
+  }
+  return result;
+}
+
+bool fits(const Factor& factor, int n) {
+  const auto size = static_cast<std::size_t>(n);
+  if (factor.rows.size() != size || factor.first.size() != size || factor.scale.size() != size) return false;
+  for (int i = 0; i < n; ++i) {
+    const int first = factor.first[i];
+    if (first < 0 || first > i || factor.rows[i].size() != static_cast<std::size_t>(i - first + 1))
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix c(a.rows, b.cols);
+  for (int i = 0; i < a.rows; ++i) {
+    for (int k = 0; k < a.cols; ++k) {
+      if (a(i, k).sign() == 0) continue;
+      for (int j = 0; j < b.cols; ++j) c(i, j) += a(i, k) * b(k, j);
+    }
+  }
+  return c;
+}
+
+Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const std::vector<Dyadic>& t) {
+  const std::size_t hidden = stages.size() - 1;
+  const Matrix& first = stages.front();
+  const Matrix& last = stages.back();
+  if (hidden == 0) {
+    Matrix p =
+        first.rows <= first.cols ? product(first, transposed(first)) : product(transposed(first), first);
+    for (Dyadic& entry : p.entries) entry = -entry;
+    for (int i = 0; i < p.rows; ++i) p(i, i) += rho;
+    return p;
+  }
+  Matrix p(static_cast<int>(t.size()), static_cast<int>(t.size()));
+  for (int i = 0; i < p.rows; ++i) p(i, i) = Dyadic(2.0) * rho * t[i];
+
+  const Matrix first_gram = product(first, transposed(first));
+  for (int i = 0; i < first.rows; ++i) {
+    for (int j = 0; j < first.rows; ++j) p(i, j) += -(t[i] * first_gram(i, j) * t[j]);
+  }
+  int before = 0;  // index of the first neuron of layer k - 1
+  for (std::size_t k = 1; k < hidden; ++k) {
+    const Matrix& m = stages[k];
+    const int begin = before + m.cols;
+    for (int i = 0; i < m.rows; ++i) {
+      for (int j = 0; j < m.cols; ++j) {
+        p(begin + i, before + j) = -(rho * t[begin + i] * m(i, j));
+        p(before + j, begin + i) = p(begin + i, before + j);
+      }
+    }
+    before = begin;
+  }
+  const Matrix last_gram = product(transposed(last), last);
+  for (int i = 0; i < last.cols; ++i) {
+    for (int j = 0; j < last.cols; ++j) p(before + i, before + j) += -(rho * last_gram(i, j));
+  }
+  return p;
+}
+
+bool shows_positive_semidefinite(const Matrix& p, const Factor& factor) {
+  if (!fits(factor, p.rows)) return false;
+  std::vector<Dyadic> slack(factor.rows.size());  // E_ii - sum_{j != i} |E_ij|
+  mpz_class gram;
+  for (int i = 0; i < p.rows; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      gram = 0;
+      for (int k = std::max(factor.first[i], factor.first[j]); k <= j; ++k) {
+        gram += factor.rows[i][k - factor.first[i]] * factor.rows[j][k - factor.first[j]];
+      }
+      Dyadic e = p(i, j);
+      e.exponent += factor.scale[i] + factor.scale[j];
+      e += Dyadic(-gram, 2 * factor.unit_exponent);
+      if (i == j) {
+        slack[i] += e;
+      } else if (e.sign() != 0) {
+        e.mantissa = -abs(e.mantissa);
+        slack[i] += e;
+        slack[j] += e;
+      }
+    }
+  }
+  return std::all_of(slack.begin(), slack.end(), [](const Dyadic& s) { return s.sign() >= 0; });
+}
+
+}  // namespace swarmcert::check

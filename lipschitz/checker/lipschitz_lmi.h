@@ -1,0 +1,44 @@
+/// @file The one matrix inequality that every upper bound rests on, and how a factor shows it.
+#pragma once
+
+#include <vector>
+
+#include "lipschitz/checker/dyadic.h"
+
+namespace swarmcert::check {
+
+/// Lower triangular R with the envelope of a banded Cholesky factor: row i holds columns first[i] .. i, as integers
+/// in units of 2^unit_exponent. scale[i] is the exponent of the power of two that D has at (i, i).
+struct Factor {
+  long unit_exponent = 0;
+  std::vector<long> scale;
+  std::vector<int> first;
+  std::vector<std::vector<mpz_class>> rows;
+};
+
+/// A B.
+Matrix product(const Matrix& a, const Matrix& b);
+
+/// The symmetric matrix whose positive semidefiniteness proves |f(x) - f(y)|_2 <= sqrt(rho) |x - y|_2 for the ReLU
+/// chain f = M_K relu( ... relu(M_1 x + b_1) ... ) + b_K with any biases (LipSDP-Neuron, Fazlyab et al. 2019).
+///
+/// For increments dx, dz_k of the activations and dy_k = M_k dz_{k-1}, ReLU gives dz (dy - dz) >= 0 for each neuron.
+/// So |df|^2 <= rho |dx|^2 follows if, with multipliers t >= 0, for all (dx, dz_1, ..., dz_{K-1}),
+///   rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_k sum_i t_ki dz_ki (dy_ki - dz_ki) >= 0.
+/// Minimising this form over dx (its block is rho I, rho > 0) and multiplying by rho leaves a form in dz alone; with
+/// T_k = diag(t_k) its matrix, which this returns, has the blocks
+///   (1, 1)      2 rho T_1 - T_1 M_1 M_1' T_1
+///   (k, k)      2 rho T_k, and - rho M_K' M_K in the last one
+///   (k, k - 1)  - rho T_k M_k.
+/// Without hidden layers the claim is rho I - M M' >= 0 or, equivalently, rho I - M' M >= 0: the smaller one.
+/// @param stages M_1 .. M_K, at least one, each with as many columns as its predecessor has rows.
+/// @param rho    positive.
+/// @param t      one nonnegative multiplier per hidden neuron, first layer first.
+Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const std::vector<Dyadic>& t);
+
+/// True only if P is positive semidefinite, shown by E = D P D - R R' being diagonally dominant with a nonnegative
+/// diagonal: then E >= 0 (Gershgorin), D P D = R R' + E >= 0, and P >= 0 since D is invertible. False means that
+/// this factor does not show it, or has another shape than P; not that P is indefinite.
+bool shows_positive_semidefinite(const Matrix& p, const Factor& factor);
+
+}  // namespace swarmcert::check

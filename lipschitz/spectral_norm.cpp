@@ -1,0 +1,86 @@
+#include "lipschitz/spectral_norm.h"
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "lipschitz/witness.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// sqrt(|W v|^2 / |v|^2), rounded down; v is not zero.
+LowerBound rayleigh_root(const files::Layer& layer, const std::vector<double>& v) {
+  mpq_class image = 0;
+  mpq_class length = 0;
+  for (int i = 0; i < layer.outputs; ++i) {
+    mpq_class sum = 0;
+    for (int j = 0; j < layer.inputs; ++j) {
+      sum += mpq_class(layer.weights[static_cast<std::size_t>(i) * layer.inputs + j]) * mpq_class(v[j]);
+    }
+    image += sum * sum;
+  }
+  for (const double x : v) length += mpq_class(x) * mpq_class(x);
+  return LowerBound(sqrt_down(image / length));
+}
+
+}  // namespace
+
+SpectralNorm spectral_norm(const files::Layer& layer, std::optional<double> limit) {
+  for (const double weight : layer.weights) {
+    if (!std::isfinite(weight))
+      throw std::invalid_argument("spectral_norm: " + layer.name + " has a non-finite weight");
+  }
+  Eigen::MatrixXd w = Eigen::Map<const RowMajor>(layer.weights.data(), layer.outputs, layer.inputs);
+  // Squares of very large or small weights would leave the range of double: work near one.
+  const double magnitude = w.cwiseAbs().maxCoeff();
+  const int exponent = magnitude > 0 ? std::ilogb(magnitude) : 0;
+  w *= std::ldexp(1.0, -exponent);
+
+  const bool wide = w.cols() > w.rows();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(wide ? Eigen::MatrixXd(w * w.transpose())
+                                                                  : Eigen::MatrixXd(w.transpose() * w));
+  const double estimate = std::max(0.0, eigen.eigenvalues().maxCoeff());
+  Eigen::VectorXd v = eigen.eigenvectors().rightCols<1>();
+  if (wide) v = w.transpose() * v;
+  if (!(v.norm() > 0)) v = Eigen::VectorXd::Unit(w.cols(), 0);
+  v.normalize();
+
+  SpectralNorm result;
+  result.lower_vector.assign(v.data(), v.data() + v.size());
+  const LowerBound lower = rayleigh_root(layer, result.lower_vector);
+
+  // rho from the estimate, then wider until the proof goes through; a zero matrix is covered by the smallest rho.
+  std::vector<double> candidates;
+  const double in_units = std::ldexp(estimate, 2 * exponent);
+  if (limit && std::abs(*limit * *limit - in_units) < 1e-9 * in_units) candidates.push_back(*limit * *limit);
+  for (double slack = 0x1p-52 * static_cast<double>(4 + std::min(w.rows(), w.cols())); slack < 1;
+       slack *= 2) {
+    candidates.push_back(std::max(in_units * (1 + slack), std::numeric_limits<double>::min()));
+  }
+  const std::vector<check::Matrix> stage = {check::Matrix(layer.outputs, layer.inputs, layer.weights)};
+  for (const double rho : candidates) {
+    std::optional<UpperProof> proof = prove(stage, rho, {});
+    if (!proof) continue;
+    result.upper_proof = std::move(*proof);
+    result.norm = {lower, result.upper_proof.upper};
+    return result;
+  }
+  throw std::runtime_error("spectral_norm: no proof found for layer " + layer.name);
+}
+
+UpperBound product_up(const std::vector<UpperBound>& factors) {
+  check::Dyadic exact(1.0);
+  for (const UpperBound factor : factors) exact = exact * check::Dyadic(factor.value());
+  double rounded = to_double(exact);
+  while (!(check::Dyadic(rounded) >= exact))
+    rounded = std::nextafter(rounded, std::numeric_limits<double>::infinity());
+  return UpperBound(rounded);
+}
+
+}  // namespace swarmcert::lipschitz

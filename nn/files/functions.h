@@ -1,0 +1,33 @@
+/// @file Names of the functions that NET contains, and of the stored networks that they are made of.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "nn/files/network.h"
+
+namespace swarmcert::files {
+
+/// The kind of phi that models the ground: its input is the vehicle's own state, and it always enters the sum.
+inline constexpr const char* kGroundKind = "ground";
+
+/// The stored networks under the names that commands print: "network", or "phi:<kind>" and "rho:<kind>".
+std::map<std::string, const Weights*> parts(const Network& network);
+
+/// The networks that `function` passes through, first to last: itself for "network", "phi:<kind>" and "rho:<kind>";
+/// {"phi:<c>", "rho:<r>"} for "set:<c>:<r>", the composition of rho_r with a sum that contains phi_c.
+/// @throws std::invalid_argument if `function` is not of one of these forms.
+std::vector<std::string> networks_of(const std::string& function);
+
+/// Every function of NET: its parts, then every set function, in order of names.
+std::vector<std::string> functions(const Network& network);
+
+/// True if NET's input clamp acts on the input of part `name`: on every phi but the ground's, and on a plain network.
+bool is_clamped(const std::string& name);
+
+/// Unit of a Lipschitz constant of `function`, as far as NET states units: "gf/(m, m/s)", "gf/m" where all inputs
+/// are metres, "hidden/input" where nothing is stated.
+std::string unit(const Network& network, const std::string& function);
+
+}  // namespace swarmcert::files
