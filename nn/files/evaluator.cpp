@@ -11,15 +11,15 @@ namespace {
 template <typename Scalar>
 std::vector<Scalar> converted(const std::vector<double>& values, const std::string& path,
                               const std::string& field) {
-  // The first double that no longer rounds to a finite Scalar: half a unit above the largest one.
-  constexpr double kLargest = static_cast<double>(std::numeric_limits<Scalar>::max());
-  constexpr bool kNarrow = sizeof(Scalar) < sizeof(double);
-  constexpr double kOverflow = kNarrow ? kLargest * (1.0 + 0x1p-25) : std::numeric_limits<double>::infinity();
+  // The first double that no longer rounds to a finite float: halfway between the largest float and 2^128.
+  constexpr bool kIsNarrow = sizeof(Scalar) < sizeof(double);
+  constexpr double kOverflow = kIsNarrow ? 0x1.ffffffp127 : std::numeric_limits<double>::infinity();
   std::vector<Scalar> result;
   result.reserve(values.size());
   for (const double value : values) {
     if (!(std::abs(value) < kOverflow)) {
-      throw InputError({path, "", field, std::to_string(value), "is beyond the range of float32",
+      throw InputError({path, "", field, std::to_string(value),
+                        kIsNarrow ? "is beyond the range of float32" : "is not finite",
                         "evaluate this network in float64"});
     }
     result.push_back(static_cast<Scalar>(value));

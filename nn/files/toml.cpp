@@ -11,6 +11,9 @@ namespace swarmcert::files {
 namespace {
 
 constexpr std::size_t kLargestToml_bytes = std::size_t{64} << 10;
+/// Every dot of a key "a.b.c" opens a table, and toml++ destroys nested tables recursively: 30 000 overflow the stack.
+/// Dots in numbers and file names count as well, of which our files have a few hundred.
+constexpr std::ptrdiff_t kMostDots = 4000;
 
 std::string line(const toml::source_region& source) {
   return source.begin.line == 0 ? "" : "line " + std::to_string(source.begin.line);
@@ -20,6 +23,7 @@ std::string line(const toml::source_region& source) {
 std::string text_of(const toml::node& node) {
   if (node.is_table()) return "a table";
   if (node.is_array()) return "a list";
+  if (const auto* const string = node.as_string()) return in_quotes(string->get());
   std::ostringstream text;
   node.visit([&text](const auto& value) {
     if constexpr (toml::is_value<decltype(value)>) text << value;
@@ -31,6 +35,9 @@ std::string text_of(const toml::node& node) {
 
 toml::table parse_toml(const std::string& text, const std::string& path) {
   if (text.size() > kLargestToml_bytes) throw InputError({path, "", "", "", "is larger than 64 KiB", ""});
+  if (std::count(text.begin(), text.end(), '.') > kMostDots) {
+    throw InputError({path, "", "", "", "has more than " + std::to_string(kMostDots) + " dots", ""});
+  }
   try {
     return toml::parse(std::string_view(text), path);
   } catch (const toml::parse_error& error) {

@@ -9,7 +9,7 @@
 namespace swarmcert::files {
 
 /// Parses a TOML document.
-/// @throws InputError with line and column if it is not TOML or is larger than 64 KiB: ours fit on a screen.
+/// @throws InputError with line and column if it is not TOML, is larger than 64 KiB or nests thousands of keys.
 toml::table parse_toml(const std::string& text, const std::string& path);
 
 /// One table of a document. All readers throw InputError with line, dotted key, value and what is expected.

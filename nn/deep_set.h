@@ -1,0 +1,196 @@
+/// @file A deep set over neighbours of several kinds; its bits do not depend on the order in which they arrive.
+///
+///   f(own, {x_j, c_j}) = rho(phi_ground(own) + sum_j phi_{c_j}(clamp(x_j)))
+///
+/// Addition of floats is not associative: the same neighbours, summed in another order, give other bits. The order in
+/// which radio packets arrive would then be an input of the controller, one that no certificate covers and no log
+/// replays. So the sum has one order, a function of the set alone: first the ground, then the kinds by index, and
+/// within a kind by the clamped inputs, compared number by number as unsigned bit patterns. Any total order would do;
+/// this one needs no case for zeros of either sign. Neighbours that compare equal have equal inputs and are
+/// interchangeable.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "nn/mlp.h"
+
+namespace swarmcert::nn {
+
+/// The caller owns the arrays.
+/// Precondition: all phi have the same number of inputs; phi and ground have rho.inputs() outputs; lower <= upper.
+template <typename Scalar>
+struct DeepSet {
+  const Mlp<Scalar>* ground;  ///< sees the vehicle's own state; nullptr: no such term
+  const Mlp<Scalar>* phi;     ///< [num_kinds], by the neighbour's kind
+  int num_kinds;
+  Mlp<Scalar> rho;      ///< of the vehicle's own kind
+  const Scalar* lower;  ///< [inputs()] each; nullptr: no clamp. The ground's input is not clamped.
+  const Scalar* upper;
+
+  int inputs() const { return phi[0].inputs(); }
+  int hidden() const { return rho.inputs(); }
+  int outputs() const { return rho.outputs(); }
+};
+
+/// One neighbour as the vehicle sees it.
+template <typename Scalar>
+struct Neighbour {
+  const Scalar* input;  ///< [DeepSet::inputs()]
+  int kind;             ///< index into DeepSet::phi
+};
+
+/// Why an evaluation has no result.
+enum class DeepSetStatus : std::uint8_t {
+  kOk,
+  kTooManyNeighbours,  ///< more than the workspace holds, or a negative number
+  kUnknownKind,
+  kInputNotFinite,
+  kOutputNotFinite  ///< an overflow inside reached the output
+};
+
+/// Memory for one evaluation; the caller owns it and need not clear it.
+template <typename Scalar>
+struct DeepSetWorkspace {
+  Scalar* inputs;      ///< [capacity x DeepSet::inputs()], copies of the clamped inputs
+  int* order;          ///< [capacity]
+  int capacity;        ///< most neighbours
+  Scalar* hidden_sum;  ///< [DeepSet::hidden()]
+  Scalar* hidden;      ///< [DeepSet::hidden()]
+  Scalar* scratch;     ///< [scratch_size(set)]
+};
+
+/// Elements that evaluate() needs in DeepSetWorkspace::scratch.
+template <typename Scalar>
+constexpr int scratch_size(const DeepSet<Scalar>& set) {
+  int largest = scratch_size(set.rho);
+  for (int kind = 0; kind < set.num_kinds; ++kind) {
+    if (scratch_size(set.phi[kind]) > largest) largest = scratch_size(set.phi[kind]);
+  }
+  if (set.ground != nullptr && scratch_size(*set.ground) > largest) largest = scratch_size(*set.ground);
+  return largest;
+}
+
+namespace detail {
+
+template <typename Scalar>
+struct Bits;
+template <>
+struct Bits<float> {
+  using Type = std::uint32_t;
+  static constexpr Type kExponent = 0x7f800000u;
+};
+template <>
+struct Bits<double> {
+  using Type = std::uint64_t;
+  static constexpr Type kExponent = 0x7ff0000000000000u;
+};
+
+template <typename Scalar>
+inline typename Bits<Scalar>::Type bits(Scalar x) {
+  typename Bits<Scalar>::Type pattern;
+  std::memcpy(&pattern, &x, sizeof pattern);
+  return pattern;
+}
+
+/// By bits, because a compiler told that there are no NaNs (-ffinite-math-only) folds the library's test to true.
+template <typename Scalar>
+inline bool is_finite(Scalar x) {
+  return (bits(x) & Bits<Scalar>::kExponent) != Bits<Scalar>::kExponent;
+}
+
+template <typename Scalar>
+inline bool comes_before(const Scalar* a, const Scalar* b, int size) {
+  for (int i = 0; i < size; ++i) {
+    if (bits(a[i]) != bits(b[i])) return bits(a[i]) < bits(b[i]);
+  }
+  return false;
+}
+
+/// Copies the clamped inputs: a position that another task updates between sort and sum cannot break the order.
+template <typename Scalar>
+inline DeepSetStatus take_inputs(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
+                                 int num_neighbours, Scalar* copies) {
+  for (int j = 0; j < num_neighbours; ++j) {
+    if (neighbours[j].kind < 0 || neighbours[j].kind >= set.num_kinds) return DeepSetStatus::kUnknownKind;
+    Scalar* const copy = copies + static_cast<long>(j) * set.inputs();
+    for (int i = 0; i < set.inputs(); ++i) {
+      Scalar x = neighbours[j].input[i];
+      if (!is_finite(x)) return DeepSetStatus::kInputNotFinite;
+      if (set.lower != nullptr) x = x < set.lower[i] ? set.lower[i] : x > set.upper[i] ? set.upper[i] : x;
+      copy[i] = x;
+    }
+  }
+  return DeepSetStatus::kOk;
+}
+
+/// order = the neighbours in the canonical order of this file's head. Insertion sort: short, in place, and the number
+/// of neighbours is small.
+template <typename Scalar>
+inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>* neighbours,
+                             int num_neighbours, const Scalar* copies, int* order) {
+  const int size = set.inputs();
+  for (int j = 0; j < num_neighbours; ++j) {
+    int at = j;
+    for (; at > 0; --at) {
+      const int other = order[at - 1];
+      const int kind = neighbours[j].kind;
+      const int other_kind = neighbours[other].kind;
+      const bool stays = kind != other_kind ? other_kind < kind
+                                            : !comes_before(copies + static_cast<long>(j) * size,
+                                                            copies + static_cast<long>(other) * size, size);
+      if (stays) break;
+      order[at] = other;
+    }
+    order[at] = j;
+  }
+}
+
+template <typename Scalar>
+inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* own,
+                                      const Neighbour<Scalar>* neighbours, int num_neighbours, Scalar* output,
+                                      const DeepSetWorkspace<Scalar>& workspace) {
+  if (num_neighbours < 0 || num_neighbours > workspace.capacity) return DeepSetStatus::kTooManyNeighbours;
+  const DeepSetStatus status = take_inputs(set, neighbours, num_neighbours, workspace.inputs);
+  if (status != DeepSetStatus::kOk) return status;
+  sort_canonically(set, neighbours, num_neighbours, workspace.inputs, workspace.order);
+
+  for (int i = 0; i < set.hidden(); ++i) workspace.hidden_sum[i] = Scalar(0);
+  if (set.ground != nullptr) {
+    for (int i = 0; i < set.ground->inputs(); ++i) {
+      if (!is_finite(own[i])) return DeepSetStatus::kInputNotFinite;
+    }
+    evaluate(*set.ground, own, workspace.hidden_sum, workspace.scratch);
+  }
+  for (int position = 0; position < num_neighbours; ++position) {
+    const int j = workspace.order[position];
+    const Scalar* const x = workspace.inputs + static_cast<long>(j) * set.inputs();
+    evaluate(set.phi[neighbours[j].kind], x, workspace.hidden, workspace.scratch);
+    for (int i = 0; i < set.hidden(); ++i) workspace.hidden_sum[i] += workspace.hidden[i];
+  }
+  evaluate(set.rho, workspace.hidden_sum, output, workspace.scratch);
+  for (int i = 0; i < set.outputs(); ++i) {
+    if (!is_finite(output[i])) return DeepSetStatus::kOutputNotFinite;
+  }
+  return DeepSetStatus::kOk;
+}
+
+}  // namespace detail
+
+/// Evaluates `set`.
+/// @param own        [set.ground->inputs()]; ignored where there is no ground term.
+/// @param neighbours [num_neighbours], in any order: every order gives the same bits.
+/// @param output     [set.outputs()]; zeros unless the status is kOk: no compensation rather than a wrong one.
+template <typename Scalar>
+inline DeepSetStatus evaluate(const DeepSet<Scalar>& set, const Scalar* own,
+                              const Neighbour<Scalar>* neighbours, int num_neighbours, Scalar* output,
+                              const DeepSetWorkspace<Scalar>& workspace) {
+  const DeepSetStatus status =
+      detail::evaluate_checked(set, own, neighbours, num_neighbours, output, workspace);
+  if (status != DeepSetStatus::kOk) {
+    for (int i = 0; i < set.outputs(); ++i) output[i] = Scalar(0);
+  }
+  return status;
+}
+
+}  // namespace swarmcert::nn

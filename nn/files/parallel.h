@@ -1,0 +1,15 @@
+/// @file Independent pieces of work on several threads.
+#pragma once
+
+#include <functional>
+
+namespace swarmcert::files {
+
+/// Calls work(0) .. work(count - 1), each once, on up to `jobs` threads; returns when all have ended. Results must
+/// not depend on which thread runs a piece or when.
+/// @param jobs threads; 0: as many as the machine has.
+/// @throws what a piece threw, of the lowest such index, after all running pieces ended; pieces not yet begun are
+///   then left out.
+void parallel_for(int count, int jobs, const std::function<void(int)>& work);
+
+}  // namespace swarmcert::files

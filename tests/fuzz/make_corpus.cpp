@@ -1,0 +1,113 @@
+/// make_corpus OUT [DATA]: seed files for the fuzz targets below OUT; the published networks of DATA join them.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <random>
+
+#include "nn/files/safetensors.h"
+#include "nn/files/weights.h"
+#include "nn/pth_writer.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace swarmcert::tests;
+
+class Corpus {
+ public:
+  explicit Corpus(fs::path folder) : folder_(std::move(folder)) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+
+  /// `bytes`, and a few copies of it with one byte changed, one cut short and one with a piece repeated.
+  void add(const std::string& bytes) {
+    write(bytes);
+    for (int i = 0; i < 4 && !bytes.empty(); ++i) {
+      std::string changed = bytes;
+      changed[random() % bytes.size()] = static_cast<char>(random());
+      write(changed);
+    }
+    write(bytes.substr(0, bytes.size() / 2 + random() % (bytes.size() / 2 + 1)));
+    const std::size_t at = random() % (bytes.size() + 1);
+    write(bytes.substr(0, at) + bytes.substr(at / 2));
+  }
+
+ private:
+  std::size_t random() { return generator_(); }
+  void write(const std::string& bytes) {
+    std::ofstream(folder_ / std::to_string(count_++), std::ios::binary) << bytes;
+  }
+
+  fs::path folder_;
+  std::mt19937 generator_{1};
+  int count_ = 0;
+};
+
+/// The first byte is the fuzz target's choice of key.
+std::string with_key(char choice, const std::string& bytes) { return choice + bytes; }
+
+void add_weights(Corpus& corpus, const std::string& data) {
+  corpus.add(with_key(0, small_zip()));
+  corpus.add(with_key(0, small_legacy()));
+  const swarmcert::files::Weights weights = swarmcert::files::parse_weights(small_zip(), "small");
+  corpus.add(with_key(0, swarmcert::files::safetensors_bytes(weights)));
+
+  std::vector<TensorSpec> tensors = small_tensors();
+  for (TensorSpec& tensor : tensors) tensor.is_parameter = true;
+  tensors[0].strides = {1, 3};  // transposed
+  const std::string state = state_dict_op(tensors, false);
+  corpus.add(
+      with_key(0, zip_file(pickle(state), small_storages<float>(), {{"archive/byteorder", "little"}})));
+  const std::string nested = "}(" + text_op("epoch") + "K\7" + text_op("model") + state + "u";
+  corpus.add(with_key(1, zip_file(pickle(nested), small_storages<float>())));
+  const std::string deeper = "}(" + text_op("model") + "}(" + text_op("net") + state + "uu";
+  corpus.add(with_key(2, zip_file(pickle(deeper), small_storages<float>())));
+
+  if (data.empty() || !fs::exists(data)) return;
+  for (const char* const folder : {"zip_f32", "legacy_f64"}) {
+    for (const auto& entry : fs::directory_iterator(fs::path(data) / "weights" / folder)) {
+      std::ifstream file(entry.path(), std::ios::binary);
+      corpus.add(with_key(0, std::string(std::istreambuf_iterator<char>(file), {})));
+    }
+  }
+}
+
+void add_networks(Corpus& corpus) {
+  const std::string minimal =
+      "schema = \"swarmcert/network/1\"\n[phi.small]\nweights = \"6x20\"\n[rho.small]\nweights = \"20x1\"\n";
+  corpus.add(minimal);
+  corpus.add(minimal + "[phi.ground]\nweights = \"4x20\"\n[phi.large]\nweights = \"6x20\"\n");
+  corpus.add(
+      "schema = \"swarmcert/network/1\"\n"
+      "output = { quantity = \"force_z\", unit = \"gf\" }\n"
+      "gamma = { value = 3.0, scope = \"layer\", mode = \"clip\" }\n"
+      "[input]\norder = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\"]\n"
+      "clamp = { lower = [-1,-1,-1,-2,-2,-2.5], upper = [1,1,1,2,2,2e0] }\n"
+      "[phi.small]\nweights = \"6x20\"\n[rho.small]\nweights = \"20x1\"\n");
+}
+
+void add_json(Corpus& corpus) {
+  corpus.add(
+      "{\"schema\": \"swarmcert/certificate/1\", \"list\": [1, -2.5e3, true, null, {\"x\": \"\\u00e9\"}]}");
+  corpus.add("[[[[]]], {}, \"a\\n\", 18446744073709551615, 1e-400]");
+  corpus.add("0x1.91eb851eb851fp+1");
+  corpus.add("-0x0.0000000000001p-1022");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::cerr << "usage: make_corpus OUT [DATA]\n";
+    return 2;
+  }
+  const fs::path out = argv[1];
+  Corpus weights(out / "weights");
+  add_weights(weights, argc > 2 ? argv[2] : "");
+  Corpus networks(out / "network");
+  add_networks(networks);
+  Corpus json(out / "json");
+  add_json(json);
+  return 0;
+}

@@ -1,0 +1,270 @@
+#include "nn/files/network.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "data.h"
+#include "nn/files/file_io.h"
+#include "random_network.h"
+#include "refusal.h"
+
+namespace swarmcert::files {
+namespace {
+
+using tests::refuses;
+
+constexpr char kFull[] = R"(schema = "swarmcert/network/1"
+output = { quantity = "force_z", unit = "gf" }
+gamma = { value = 3.0, scope = "layer", mode = "clip" }
+[input]
+order = ["dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"]
+clamp = { lower = [-1, -1, -1, -2, -2, -2], upper = [1, 1, 1, 2, 2, 2] }
+[phi.small]
+weights = "6x20"
+[phi.ground]
+weights = "4x20"
+[rho.small]
+weights = "20x1"
+[rho.large]
+weights = "20x1"
+)";
+
+/// A network of the size that its file name states.
+Weights sized(const std::string& path) {
+  std::mt19937 generator(1);
+  const std::string name = std::filesystem::path(path).filename().string();
+  const std::size_t cross = name.find('x');
+  Weights weights = tests::random_network({std::stoi(name), std::stoi(name.substr(cross + 1))}, generator);
+  weights.path = path;
+  return weights;
+}
+Network parse(const std::string& text) { return parse_network(text, "nets/network.toml", sized); }
+testing::AssertionResult refused(const std::string& text, const std::vector<std::string>& pieces) {
+  return refuses([&] { parse(text); }, pieces);
+}
+
+/// kFull with `from` replaced by `to`.
+std::string with(const std::string& from, const std::string& to) {
+  std::string text = kFull;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(NetworkToml, EveryKeyIsRead) {
+  const Network network = parse(kFull);
+  EXPECT_EQ(network.path, "nets/network.toml");
+  EXPECT_EQ(network.sha256, sha256(kFull));
+  EXPECT_FALSE(network.plain);
+  ASSERT_EQ(network.phi.size(), 2u);
+  EXPECT_EQ(network.phi.at("small").path, "nets/6x20");
+  EXPECT_EQ(network.phi.at("ground").inputs(), kGroundInputs);
+  EXPECT_EQ(network.rho.size(), 2u);
+  EXPECT_EQ(network.output_quantity, "force_z");
+  EXPECT_EQ(network.output_unit, "gf");
+  EXPECT_EQ(network.input_order.size(), 6u);
+  EXPECT_EQ(network.input_order[3], "dv_x_m_s");
+  EXPECT_EQ(network.clamp->lower, (std::vector<double>{-1, -1, -1, -2, -2, -2}));
+  EXPECT_EQ(network.clamp->upper, (std::vector<double>{1, 1, 1, 2, 2, 2}));
+  EXPECT_EQ(network.gamma->value, 3.0);
+  EXPECT_EQ(network.gamma->scope, GammaStatement::Scope::kLayer);
+  EXPECT_EQ(network.gamma->mode, GammaStatement::Mode::kClip);
+}
+
+TEST(NetworkToml, OnlySchemaPhiAndRhoAreNeeded) {
+  const Network network =
+      parse("schema = \"swarmcert/network/1\"\nphi.a.weights = \"3x5\"\nrho.b.weights = \"5x2\"\n");
+  EXPECT_EQ(network.output_quantity, "");
+  EXPECT_EQ(network.output_unit, "");
+  EXPECT_TRUE(network.input_order.empty());
+  EXPECT_FALSE(network.clamp);
+  EXPECT_FALSE(network.gamma);
+}
+
+TEST(NetworkToml, OtherStatementsAreRead) {
+  const Network network = parse(with("value = 3.0, scope = \"layer\", mode = \"clip\"",
+                                     "value = 2, scope = \"network\", mode = \"equal\""));
+  EXPECT_EQ(network.gamma->value, 2.0);
+  EXPECT_EQ(network.gamma->scope, GammaStatement::Scope::kNetwork);
+  EXPECT_EQ(network.gamma->mode, GammaStatement::Mode::kEqual);
+  EXPECT_EQ(parse(with("\"gf\"", "\"N\"")).output_unit, "N");
+}
+
+TEST(NetworkToml, UnknownKeysAreRefusedWithLineAndSuggestion) {
+  EXPECT_TRUE(refused(with("gamma = {", "gama = {"), {"nets/network.toml: line 3: gama", "\"gamma\"?"}));
+  EXPECT_TRUE(refused(with("unit =", "units ="), {"line 2: output.units", "did you mean \"unit\"?"}));
+  EXPECT_TRUE(refused(with("scope =", "zzz ="), {"line 3: gamma.zzz", "allowed: value, scope, mode"}));
+  EXPECT_TRUE(refused(with("order =", "ordr ="), {"line 5: input.ordr", "\"order\"?"}));
+  EXPECT_TRUE(refused(with("lower =", "low ="), {"line 6: input.clamp.low"}));
+  EXPECT_TRUE(refused(with("weights = \"4x20\"", "wieghts = \"4x20\""),
+                      {"line 10: phi.ground.wieghts", "\"weights\"?"}));
+}
+
+TEST(NetworkToml, MissingKeysAreRefused) {
+  EXPECT_TRUE(refused(with("schema = \"swarmcert/network/1\"", ""), {"schema: is missing"}));
+  EXPECT_TRUE(refused(with("network/1", "network/2"), {"line 1: schema", "must be \"swarmcert/network/1\""}));
+  EXPECT_TRUE(refused(with(", unit = \"gf\"", ""), {"line 2: output.unit: is missing"}));
+  EXPECT_TRUE(refused(with("value = 3.0, ", ""), {"line 3: gamma.value: is missing"}));
+  EXPECT_TRUE(
+      refused(with("lower = [-1, -1, -1, -2, -2, -2], ", ""), {"line 6: input.clamp.lower: is missing"}));
+  EXPECT_TRUE(refused(with("weights = \"6x20\"", ""), {"line 7: phi.small.weights: is missing"}));
+  EXPECT_TRUE(refused("schema = \"swarmcert/network/1\"\nphi.a.weights = \"3x5\"\n", {"rho: is missing"}));
+  EXPECT_TRUE(
+      refused("schema = \"swarmcert/network/1\"\n[phi]\n[rho]\n", {"line 2: phi", "no kind of vehicle"}));
+}
+
+TEST(NetworkToml, ValuesOfAnotherTypeAreRefused) {
+  EXPECT_TRUE(
+      refused(with("value = 3.0", "value = \"3\""), {"line 3: gamma.value = \"3\": must be a number"}));
+  EXPECT_TRUE(refused(with("value = 3.0", "value = inf"), {"gamma.value = inf: must be finite"}));
+  EXPECT_TRUE(refused(with("value = 3.0", "value = nan"), {"gamma.value = nan: must be finite"}));
+  EXPECT_TRUE(refused(with("value = 3.0", "value = -3"), {"gamma.value", "positive"}));
+  EXPECT_TRUE(
+      refused(with("value = 3.0", "value = 2020-01-01"), {"gamma.value = 2020-01-01: must be a number"}));
+  EXPECT_TRUE(refused(with("\"layer\"", "\"layers\""), {"line 3: gamma.scope = \"layers\"", "\"layer\"?"}));
+  EXPECT_TRUE(refused(with("\"clip\"", "true"), {"gamma.mode = true: must be text"}));
+  EXPECT_TRUE(refused(with("\"gf\"", "\"kg\""), {"output.unit = \"kg\"", "allowed: gf, N"}));
+  EXPECT_TRUE(refused(with("\"force_z\"", "\"force\""), {"output.quantity = \"force\"", "allowed: force_z"}));
+  EXPECT_TRUE(
+      refused(with("{ quantity = \"force_z\", unit = \"gf\" }", "[]"), {"output = a list: must be a table"}));
+  EXPECT_TRUE(refused(with("\"dp_x_m\",", "7,"), {"line 5: input.order = 7: must be a list of texts"}));
+  EXPECT_TRUE(
+      refused(with("[-1, -1, -1, -2", "[\"-1\", -1, -1, -2"), {"input.clamp.lower", "list of numbers"}));
+  EXPECT_TRUE(
+      refused(with("[-1, -1, -1, -2", "[-inf, -1, -1, -2"), {"input.clamp.lower = -inf: must be finite"}));
+  EXPECT_TRUE(refused(with("lower = [-1, -1, -1, -2, -2, -2]", "lower = -1"), {"input.clamp.lower = -1"}));
+  EXPECT_TRUE(
+      refused(with("weights = \"6x20\"", "weights = {}"), {"phi.small.weights = a table: must be text"}));
+  EXPECT_TRUE(refused(with("weights = \"6x20\"", "weights = \"\""), {"phi.small.weights: is empty"}));
+}
+
+TEST(NetworkToml, InputsMustFitTogether) {
+  EXPECT_TRUE(
+      refused(with(", \"dv_z_m_s\"", ""), {"line 6: input.clamp.lower = 6 numbers", "there are 5 inputs"}));
+  EXPECT_TRUE(
+      refused(with("2, 2, 2]", "2, 2]"), {"line 6: input.clamp.upper = 5 numbers", "there are 6 inputs"}));
+  EXPECT_TRUE(refused(with("\"dp_y_m\"", "\"dp_x_m\""), {"line 5: input.order = \"dp_x_m\": appears twice"}));
+  EXPECT_TRUE(refused(with("upper = [1, 1,", "upper = [1, -3,"), {"line 6", "entry 1 is above upper"}));
+  EXPECT_NO_THROW(parse(with("upper = [1, 1,", "upper = [1, -1,")));
+}
+
+TEST(NetworkToml, NetworksMustFitTogether) {
+  EXPECT_TRUE(
+      refused(with("6x20", "5x20"), {"line 8: phi.small.weights = 5 inputs", "must be 6", "input.order"}));
+  EXPECT_TRUE(refused(with("4x20", "6x20"), {"line 10: phi.ground.weights = 6 inputs", "must be 4", "own"}));
+  EXPECT_TRUE(
+      refused(with("6x20", "6x19"), {"line 8: phi.small.weights = 19 outputs", "must be 20", "phi.ground"}));
+  EXPECT_TRUE(refused(with("20x1", "19x1"), {"line 12: rho.small.weights = 19 inputs", "must be 20"}));
+  EXPECT_TRUE(refused(with("20x1", "20x3"), {"line 12: rho.small.weights = 3 outputs", "must be 1"}));
+  const std::string without_order =
+      "schema = \"swarmcert/network/1\"\nphi.a.weights = \"3x5\"\nphi.b.weights = \"4x5\"\nrho.b.weights = "
+      "\"5x2\"\n";
+  EXPECT_TRUE(refused(without_order, {"line 3: phi.b.weights = 4 inputs", "must be 3", "phi.a has as many"}));
+  EXPECT_TRUE(refused(without_order + "[input]\nclamp = { lower = [0, 0], upper = [1, 1] }\n",
+                      {"phi.a.weights = 3 inputs", "must be 2", "input.clamp"}));
+}
+
+TEST(NetworkToml, TextThatIsNotTomlIsRefusedWithLineAndColumn) {
+  EXPECT_TRUE(refused("schema = \n", {"nets/network.toml: line 1, column", "is not TOML"}));
+  EXPECT_TRUE(refused("a = 1\na = 2\n", {"line 2", "is not TOML"}));
+  EXPECT_TRUE(refused(std::string(70'000, '\n'), {"larger than 64 KiB"}));
+}
+
+TEST(NetworkToml, DeepNestingIsRefused) {
+  for (const int depth : {3'990, 4'010, 30'000}) {  // toml++ would overflow the stack on the last
+    std::string keys = "a";
+    for (int i = 0; i < depth; ++i) keys += ".a";
+    EXPECT_TRUE(refused(keys + " = 1\n", {"nets/network.toml"}));
+    EXPECT_TRUE(refused("[" + keys + "]\n", {"nets/network.toml"}));
+  }
+  EXPECT_TRUE(refused("a = " + std::string(60'000, '[') + "\n", {"is not TOML"}));
+  std::string tables = "a = ";
+  for (int i = 0; i < 10'000; ++i) tables += "{a=";
+  EXPECT_TRUE(refused(tables, {"is not TOML"}));
+}
+
+/// Weight files and a network.toml on disk.
+class LoadNetwork : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = testing::TempDir() + "/load_network";
+    std::filesystem::create_directories(folder_ + "/weights");
+    for (const char* const size : {"6x20", "4x20", "20x1", "19x1"}) {
+      save_safetensors(sized(size), folder_ + "/weights/" + size, true);
+    }
+    write_file(folder_ + "/network.toml",
+               "schema = \"swarmcert/network/1\"\n[phi.small]\nweights = \"weights/6x20\"\n"
+               "[rho.small]\nweights = \"weights/20x1\"\n",
+               true);
+  }
+  std::string folder_;
+};
+
+TEST_F(LoadNetwork, WeightsAreRelativeToTheToml) {
+  const Network network = load_network({folder_ + "/network.toml", "", "", ""});
+  EXPECT_EQ(network.phi.at("small").path, folder_ + "/weights/6x20");
+  EXPECT_EQ(network.sha256, sha256(read_file(folder_ + "/network.toml")));
+}
+
+TEST_F(LoadNetwork, ATomlUnderAnotherNameIsRecognised) {
+  write_file(folder_ + "/renamed", read_file(folder_ + "/network.toml"), true);
+  EXPECT_EQ(load_network({folder_ + "/renamed", "", "", ""}).phi.size(), 1u);
+}
+
+TEST_F(LoadNetwork, OneWeightFileIsAPlainNetwork) {
+  const Network network = load_network({folder_ + "/weights/6x20", "", "", ""});
+  ASSERT_TRUE(network.plain);
+  EXPECT_EQ(network.plain->outputs(), 20);
+  EXPECT_TRUE(network.phi.empty() && network.rho.empty() && network.path.empty());
+}
+
+TEST_F(LoadNetwork, PhiAndRhoHaveTheDefaultKind) {
+  const Network network = load_network({"", folder_ + "/weights/6x20", folder_ + "/weights/20x1", ""});
+  EXPECT_EQ(network.phi.at("default").inputs(), 6);
+  EXPECT_EQ(network.rho.at("default").outputs(), 1);
+  EXPECT_TRUE(refuses(
+      [&] {
+        load_network({"", folder_ + "/weights/6x20", folder_ + "/weights/19x1", ""});
+      },
+      {"19x1: fc1.weight = 19 inputs", "must be 20"}));
+}
+
+TEST_F(LoadNetwork, ErrorsInAWeightFileNameThatFile) {
+  write_file(folder_ + "/broken.toml",
+             "schema = \"swarmcert/network/1\"\nphi.a.weights = \"nowhere\"\nrho.a.weights = \"nowhere\"\n",
+             true);
+  EXPECT_TRUE(refuses(
+      [&] {
+        load_network({folder_ + "/broken.toml", "", "", ""});
+      },
+      {folder_ + "/nowhere: cannot be opened"}));
+}
+
+TEST_F(LoadNetwork, AmbiguousArgumentsAreAProgrammingError) {
+  EXPECT_THROW(load_network({"", "", "", ""}), std::invalid_argument);
+  EXPECT_THROW(load_network({"", "a", "", ""}), std::invalid_argument);
+  EXPECT_THROW(load_network({"a", "b", "", ""}), std::invalid_argument);
+}
+
+TEST_F(LoadNetwork, ThePublishedNetworksFitTogether) {
+  SWARMCERT_NEEDS_DATA();
+  const auto path = [](const char* name) {
+    return "'" +
+           std::filesystem::absolute(tests::data_path(std::string("weights/zip_f32/") + name)).string() + "'";
+  };
+  write_file(folder_ + "/published.toml",
+             "schema = \"swarmcert/network/1\"\noutput = { quantity = \"force_z\", unit = \"gf\" }\n"
+             "phi.small.weights = " +
+                 path("phi_S.pth") + "\nphi.large.weights = " + path("phi_L.pth") +
+                 "\nphi.ground.weights = " + path("phi_G.pth") + "\nrho.small.weights = " +
+                 path("rho_S.pth") + "\nrho.large.weights = " + path("rho_L.pth") + "\n",
+             true);
+  const Network network = load_network({folder_ + "/published.toml", "", "", ""});
+  EXPECT_EQ(network.phi.size(), 3u);
+  EXPECT_EQ(network.rho.at("large").inputs(), 20);
+}
+
+}  // namespace
+}  // namespace swarmcert::files
