@@ -174,6 +174,7 @@ class Reader {
       return naturally_before(entries_[a].tensor.name, entries_[b].tensor.name);
     });
     std::vector<Entry> sorted;
+    sorted.reserve(entries_.size());
     for (const std::size_t i : indices) sorted.push_back(entries_[i]);
     entries_ = std::move(sorted);
   }

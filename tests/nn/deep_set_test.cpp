@@ -53,7 +53,7 @@ class Fixture {
   files::Evaluator<Scalar> ground_, small_, large_, rho_;
   Mlp<Scalar> ground_mlp_ = ground_.mlp();
   std::array<Mlp<Scalar>, 2> phi_ = {small_.mlp(), large_.mlp()};
-  std::array<Scalar, kCapacity * kInputs> inputs_{};
+  std::array<Scalar, std::size_t{kCapacity} * kInputs> inputs_{};
   std::array<int, kCapacity> order_{};
   std::array<Scalar, kHidden> sum_{}, hidden_{};
   std::vector<Scalar> scratch_;
@@ -75,8 +75,8 @@ class DeepSetTest : public testing::Test {
     return x;
   }
   std::vector<Input> random_inputs(int count) {
-    std::vector<Input> inputs;
-    for (int j = 0; j < count; ++j) inputs.push_back(random_input());
+    std::vector<Input> inputs(static_cast<std::size_t>(count));
+    for (Input& x : inputs) x = random_input();
     return inputs;
   }
   /// Kinds alternate: 0, 1, 0, 1, ...
@@ -109,6 +109,7 @@ TEST_F(DeepSetTest, EveryOrderOfArrivalGivesTheSameBits) {
     int permutations = 0;
     do {
       std::vector<Neighbour<float>> arrived;
+      arrived.reserve(order.size());
       for (const int j : order) arrived.push_back(original[static_cast<std::size_t>(j)]);
       results.insert(detail::bits(f_(arrived)));
       results_without.insert(detail::bits(in_order_of_arrival(arrived)));

@@ -9,6 +9,7 @@
 
 #include "nn/files/suggest.h"
 #include "refusal.h"
+#include "temp_folder.h"
 
 namespace swarmcert::files {
 namespace {
@@ -16,21 +17,14 @@ namespace {
 namespace fs = std::filesystem;
 using tests::refuses;
 
-/// A folder of its own for each test.
 class FileIo : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) /
-              (std::string("file_io_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path(const char* name) const { return (folder_ / name).string(); }
+  std::string path(const char* name) const { return folder_ / name; }
   std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}));
+    return static_cast<std::size_t>(
+        std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator{}));
   }
-  fs::path folder_;
+  tests::TempFolder folder_;
 };
 
 TEST_F(FileIo, WhatIsWrittenIsRead) {
@@ -44,7 +38,7 @@ TEST_F(FileIo, WhatIsWrittenIsRead) {
 
 TEST_F(FileIo, FilesThatCannotBeReadAreNamedWithTheReason) {
   EXPECT_TRUE(refuses([&] { read_file(path("none")); }, {path("none"), "No such file"}));
-  EXPECT_TRUE(refuses([&] { read_file(folder_.string()); }, {"is a folder"}));
+  EXPECT_TRUE(refuses([&] { read_file(folder_.path()); }, {"is a folder"}));
 }
 
 TEST_F(FileIo, TheLimitIsExact) {
@@ -77,7 +71,7 @@ TEST_F(FileIo, AnOpenFileKeepsItsOldContents) {
 
 TEST_F(FileIo, PlacesThatCannotBeWrittenAreNamed) {
   EXPECT_TRUE(refuses([&] { write_file(path("no/x"), "", false); }, {path("no/x"), "No such file"}));
-  EXPECT_TRUE(refuses([&] { write_file(folder_.string(), "", true); }, {"is a folder"}));
+  EXPECT_TRUE(refuses([&] { write_file(folder_.path(), "", true); }, {"is a folder"}));
   EXPECT_TRUE(refuses([&] { write_file("/dev/full", "x", true); }, {"/dev/full", "No space"}));
   EXPECT_EQ(files(), 0u);
 }

@@ -26,8 +26,8 @@ std::string repeated(const std::string& text, std::size_t times) {
   return result;
 }
 
-/// Most memory that this process has held so far, in bytes.
-std::size_t peak_memory_bytes() {
+/// Most memory that this process has held so far, in bytes. The sanitizers' own needs would be counted as well.
+[[maybe_unused]] std::size_t peak_memory_bytes() {
   rusage usage = {};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<std::size_t>(usage.ru_maxrss) << 10;
@@ -143,8 +143,9 @@ TEST(HostileFile, ADirectoryThatDeclaresABillionEntriesIsRefused) {
                                good.substr(end + 12, 4) + little_endian(0, 4) + good.substr(end + 16, 4) +
                                little_endian(0, 4);
     const std::string locator = "PK\6\7" + little_endian(0, 4) + little_endian(end, 8) + little_endian(1, 4);
-    EXPECT_TRUE(
-        refused(good.substr(0, end) + record + locator + good.substr(end), {"more than 10000 entries"}));
+    std::string bytes = good;
+    bytes.insert(end, record + locator);
+    EXPECT_TRUE(refused(bytes, {"more than 10000 entries"}));
   }
 }
 

@@ -9,6 +9,7 @@
 #include "nn/files/file_io.h"
 #include "random_network.h"
 #include "refusal.h"
+#include "temp_folder.h"
 
 namespace swarmcert::files {
 namespace {
@@ -189,7 +190,6 @@ TEST(NetworkToml, DeepNestingIsRefused) {
 class LoadNetwork : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = testing::TempDir() + "/load_network";
     std::filesystem::create_directories(folder_ + "/weights");
     for (const char* const size : {"6x20", "4x20", "20x1", "19x1"}) {
       save_safetensors(sized(size), folder_ + "/weights/" + size, true);
@@ -199,7 +199,8 @@ class LoadNetwork : public testing::Test {
                "[rho.small]\nweights = \"weights/20x1\"\n",
                true);
   }
-  std::string folder_;
+  tests::TempFolder temporary_;
+  const std::string folder_ = temporary_.path();
 };
 
 TEST_F(LoadNetwork, WeightsAreRelativeToTheToml) {

@@ -29,11 +29,11 @@ TEST(PthRefusal, NamesThePlaceOfANumberThatIsNotFinite) {
                              -std::numeric_limits<float>::infinity()}) {
     const std::string text = std::isnan(number) ? "nan" : number > 0 ? "inf" : "-inf";
     Storages storages = small_storages<float>();
-    storages[0].second.replace(3 * 4, 4, raw_numbers<float>({number}));
+    storages[0].second.replace(12, 4, raw_numbers<float>({number}));
     EXPECT_TRUE(refused(zip_file(small_tensors(), storages),
                         {"phi.pth: fc1.weight[1,1] = " + text + ": not finite; "}));
     storages = small_storages<float>();
-    storages[1].second.replace(2 * 4, 4, raw_numbers<float>({number}));
+    storages[1].second.replace(8, 4, raw_numbers<float>({number}));
     EXPECT_TRUE(refused(zip_file(small_tensors(), storages), {"fc1.bias[2] = " + text + ": not finite"}));
   }
 }

@@ -5,6 +5,7 @@
 #include "nn/files/weights.h"
 #include "pth_writer.h"
 #include "refusal.h"
+#include "temp_folder.h"
 
 namespace swarmcert::files {
 namespace {
@@ -130,6 +131,30 @@ TEST(Pth, NestedCheckpointsAreReachedByKey) {
   EXPECT_TRUE(refuses([&] { parse_weights(bytes, "nested", "epoch.x"); }, {"no such key"}));
 }
 
+TEST(Pth, LegacyStoragesOfOtherTypesBesideTheNetworkAreSkipped) {
+  // An optimizer's integer counter, whose raw data lie between the network's.
+  const TensorSpec counter = {"", "step", 2, {2}, {1}, 0, "LongStorage"};
+  const std::string checkpoint = "}(" + text_op("optimizer") + tensor_op(counter, true) + text_op("model") +
+                                 state_dict_op(small_tensors(), true) + "u";
+  Storages storages = small_storages<float>();
+  storages.insert(storages.begin() + 1, {"step", std::string(16, '\1')});
+  std::string bytes = legacy_file(pickle(checkpoint), storages, sizeof(float));
+  const std::string counted_as_floats = little_endian(4, 8) + std::string(16, '\1');
+  bytes.replace(bytes.find(counted_as_floats), 8, little_endian(2, 8));
+  expect_small_network(parse_weights(bytes, "nested", "model"));
+}
+
+TEST(Pth, StringsOfPython2AreRead) {
+  std::string state = state_dict_op(small_tensors(), false);
+  const std::string name = text_op("fc1.weight");
+  state.replace(state.find(name), name.size(),
+                "U\x0a"
+                "fc1.weight");
+  const std::string bias = text_op("fc1.bias");
+  state.replace(state.find(bias), bias.size(), "T" + little_endian(8, 4) + "fc1.bias");
+  expect_small_network(parse_weights(zip_file(pickle(state), small_storages<float>()), "python 2"));
+}
+
 TEST(Pth, MetadataAndNewerPicklesAreRead) {
   // What torch hangs onto a state dict, and the opcodes of pickle protocol 4.
   const std::string metadata =
@@ -157,11 +182,11 @@ TEST(Pth, LittleEndianArchivesSayingSoAreRead) {
 }
 
 TEST(Pth, TheFormatIsFoundInTheContentNotTheName) {
-  const std::string folder = testing::TempDir();
-  write_file(folder + "/zip.txt", small_zip(), true);
-  write_file(folder + "/legacy.safetensors", small_legacy(), true);
-  expect_small_network(load_weights(folder + "/zip.txt"));
-  expect_small_network(load_weights(folder + "/legacy.safetensors"));
+  const tests::TempFolder folder;
+  write_file(folder / "zip.txt", small_zip(), true);
+  write_file(folder / "legacy.safetensors", small_legacy(), true);
+  expect_small_network(load_weights(folder / "zip.txt"));
+  expect_small_network(load_weights(folder / "legacy.safetensors"));
 }
 
 }  // namespace

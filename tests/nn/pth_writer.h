@@ -59,14 +59,15 @@ inline std::string storage_op(const TensorSpec& tensor, bool legacy) {
 }
 inline std::string tensor_op(const TensorSpec& tensor, bool legacy) {
   const std::string hooks = ordered_dict_op({});
-  const std::string ops = global_op("torch._utils", "_rebuild_tensor_v2") + "(" + storage_op(tensor, legacy) +
-                          integer_op(tensor.offset) + tuple_op(tensor.sizes) + tuple_op(tensor.strides) +
-                          "\x89" + hooks + "tR";
+  std::string ops = global_op("torch._utils", "_rebuild_tensor_v2") + "(" + storage_op(tensor, legacy) +
+                    integer_op(tensor.offset) + tuple_op(tensor.sizes) + tuple_op(tensor.strides) + "\x89" +
+                    hooks + "tR";
   if (!tensor.is_parameter) return ops;
   return global_op("torch._utils", "_rebuild_parameter") + "(" + ops + "\x88" + hooks + "tR";
 }
 inline std::string state_dict_op(const std::vector<TensorSpec>& tensors, bool legacy) {
   std::vector<std::pair<std::string, std::string>> items;
+  items.reserve(tensors.size());
   for (const TensorSpec& tensor : tensors) items.emplace_back(tensor.name, tensor_op(tensor, legacy));
   return ordered_dict_op(items);
 }

@@ -8,6 +8,7 @@
 #include "pth_writer.h"
 #include "random_network.h"
 #include "refusal.h"
+#include "temp_folder.h"
 
 namespace swarmcert::files {
 namespace {
@@ -40,10 +41,11 @@ TEST(Safetensors, RoundTripIsExactInBothPrecisions) {
   Weights weights = tests::random_network({6, 25, 40, 20}, generator);
   weights.layers[0].weights[0] = -0.0;
   weights.layers[0].weights[1] = 0x1p-149;  // the least float
+  const tests::TempFolder folder;
   for (const Precision precision : {Precision::kFloat32, Precision::kFloat64}) {
     weights.precision = precision;
     if (precision == Precision::kFloat64) weights.layers[1].weights[7] = 0x1.23456789abcdep-1000;
-    const std::string path = testing::TempDir() + "/round_trip.safetensors";
+    const std::string path = folder / "round_trip.safetensors";
     save_safetensors(weights, path, true);
     const Weights again = load_weights(path);
     expect_equal(again, weights);
@@ -150,7 +152,8 @@ TEST(Safetensors, NamesThatAreNotUtf8AreNotWritten) {
 TEST(Safetensors, AnExistingFileIsKeptUnlessToldOtherwise) {
   std::mt19937 generator(4);
   const Weights weights = tests::random_network({2, 1}, generator);
-  const std::string path = testing::TempDir() + "/existing.safetensors";
+  const tests::TempFolder folder;
+  const std::string path = folder / "existing.safetensors";
   write_file(path, "mine", true);
   EXPECT_TRUE(refuses([&] { save_safetensors(weights, path, false); }, {path, "exists", "--force"}));
   EXPECT_EQ(read_file(path), "mine");
