@@ -1,0 +1,55 @@
+/// @file The function whose slope is searched, as one dense ReLU chain in normalised coordinates.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "lipschitz/box.h"
+#include "lipschitz/witness.h"
+
+namespace swarmcert::lipschitz {
+
+/// One stage y = W z + b of the chain. A neuron with `passes[i]` hands y_i on unchanged: it carries a value past the
+/// stages of deeper neighbours and has no kink.
+struct SearchStage {
+  Eigen::MatrixXd weights;
+  Eigen::VectorXd biases;
+  std::vector<char> passes;
+};
+
+/// What a search works on: the value before the last stage's output is not rounded in any proven way, for a search
+/// only proposes points.
+///
+/// The variables z are the input coordinates that the domain leaves free, of the moved vector first and then of the
+/// other neighbours, one by one: x = centre + scale * z, coordinate by coordinate. A coordinate in an interval has
+/// -1 <= z <= 1; for an open one, centre and scale follow from where the first stage has its kinks, so that the
+/// search does not depend on the inputs' units.
+struct SearchNetwork {
+  std::vector<SearchStage> stages;
+  Eigen::VectorXd centre, scale;
+  std::vector<char> boxed;  ///< per variable: -1 <= z <= 1
+  std::vector<int>
+      block;  ///< variables (a subset of the moved vector's) with respect to which f is differentiated
+  std::vector<int>
+      coordinate;  ///< per variable: its index in (x, x_1, x_2, ...), the inputs one after the other
+  Eigen::VectorXd
+      fixed_inputs;  ///< (x, x_1, x_2, ...) with the values of the coordinates that are not variables
+
+  int variables() const { return static_cast<int>(coordinate.size()); }
+  int outputs() const { return static_cast<int>(stages.back().weights.rows()); }
+  int neurons() const;  ///< in hidden stages, those that pass included
+
+  /// (x, x_1, x_2, ...) at z.
+  Eigen::VectorXd inputs(const Eigen::VectorXd& z) const;
+};
+
+/// Builds the chain: the networks of a deep set side by side, their last layers and rho's first one multiplied out.
+/// Where a clamp acts, the domain is what it lets through: f is constant beyond.
+/// @param boxes one per vector (x, x_1, x_2, ...); nothing: all of R^n.
+/// @param block coordinates of x; empty: all.
+/// Precondition: check_function(f) accepts f, and boxes and block fit it.
+SearchNetwork search_network(const SlopeFunction& f, const std::vector<std::optional<Box>>& boxes,
+                             const std::vector<int>& block);
+
+}  // namespace swarmcert::lipschitz
