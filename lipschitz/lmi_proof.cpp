@@ -47,6 +47,7 @@ std::optional<Factor> find_factor(const Matrix& p) {
     if (p(i, i).sign() < 0) return std::nullopt;
     factor.scale.push_back(p(i, i).sign() == 0 ? 0 : scale_exponent(p(i, i)));
   }
+  std::vector<int> first_column;
   double widest_row = 0;
   for (int i = 0; i < n; ++i) {
     int first = i;
@@ -59,7 +60,7 @@ std::optional<Factor> find_factor(const Matrix& p) {
       scaled(i, j) = to_double(entry);
       row_sum += std::abs(scaled(i, j));
     }
-    factor.first.push_back(first);
+    first_column.push_back(first);
     widest_row = std::max(widest_row, row_sum);
   }
   if (!std::isfinite(widest_row)) return std::nullopt;
@@ -77,7 +78,7 @@ std::optional<Factor> find_factor(const Matrix& p) {
     const Eigen::MatrixXd& l = llt.matrixLLT();
     factor.rows.assign(static_cast<std::size_t>(n), {});
     for (int i = 0; i < n; ++i) {
-      for (int j = factor.first[i]; j <= i; ++j) {
+      for (int j = first_column[i]; j <= i; ++j) {
         const double entry = p(i, i).sign() == 0 ? 0.0 : std::nearbyint(std::ldexp(l(i, j), -kUnitExponent));
         factor.rows[i].emplace_back(entry);
       }

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "lipschitz/checker/lipschitz_lmi.h"
+#include "lipschitz/witness.h"
 #include "nn/files/content_hash.h"
 #include "nn/files/functions.h"
 
@@ -27,35 +28,24 @@ void require_keys(const Json& object, const std::set<std::string>& keys, const s
   for (const std::string& key : keys) require(object.contains(key), where + " lacks field " + key);
 }
 
-/// A number that stands once in decimal and once in hex: both must be the same double.
+/// A nonnegative number that stands once in decimal and once in hex: both must be the same double.
 double number(const Json& decimal, const Json& hex, const std::string& where) {
   const double value = files::parse_hex_float(hex.get<std::string>());
   require(decimal.is_number() && decimal.get<double>() == value, where + ": decimal and hex notation differ");
+  require(value >= 0, where + ": negative");
   return value;
 }
 
-std::vector<Dyadic> hex_floats(const Json& array) {
-  std::vector<Dyadic> values;
-  for (const Json& text : array) values.emplace_back(files::parse_hex_float(text.get<std::string>()));
+std::vector<double> hex_floats(const Json& array) {
+  std::vector<double> values;
+  for (const Json& text : array) values.push_back(files::parse_hex_float(text.get<std::string>()));
   return values;
 }
 
-Matrix column(const std::vector<Dyadic>& entries) {
-  Matrix result(static_cast<int>(entries.size()), 1);
-  result.entries = entries;
-  return result;
-}
-
-Dyadic squared_norm(const std::vector<Dyadic>& v) {
+Dyadic squared_norm(const Matrix& m) {
   Dyadic sum;
-  for (const Dyadic& x : v) sum += x * x;
+  for (const Dyadic& x : m.entries) sum += x * x;
   return sum;
-}
-
-Dyadic power(const Dyadic& base, std::size_t exponent) {
-  Dyadic result(1.0);
-  for (std::size_t i = 0; i < exponent; ++i) result = result * base;
-  return result;
 }
 
 Factor parse_factor(const Json& json, const std::string& where) {
@@ -68,9 +58,6 @@ Factor parse_factor(const Json& json, const std::string& where) {
           where + ": exponent out of range");
   for (const Json& row : json["rows"]) {
     std::istringstream text(row.get<std::string>());
-    int first = -1;
-    text >> first;
-    factor.first.push_back(first);
     factor.rows.emplace_back();
     for (std::string word; text >> word;) {
       require(word.size() <= 40, where + ": integer too long");
@@ -85,29 +72,24 @@ void check_upper(const std::vector<Matrix>& chain, const Json& proof, double upp
                  const std::string& where) {
   require_keys(proof, {"rho", "t", "factor"}, where + ".proof");
   const Dyadic rho = files::parse_hex_float(proof["rho"].get<std::string>());
-  const std::vector<Dyadic> t = hex_floats(proof["t"]);
+  const std::vector<double> t = hex_floats(proof["t"]);
   std::size_t neurons = 0;
   for (std::size_t k = 0; k + 1 < chain.size(); ++k) neurons += static_cast<std::size_t>(chain[k].rows);
   require(rho.sign() > 0, where + ": rho is not positive");
   require(t.size() == neurons, where + ": needs one multiplier t per hidden neuron");
-  require(std::all_of(t.begin(), t.end(), [](const Dyadic& x) { return x.sign() >= 0; }),
-          where + ": a t is negative");
-  require(upper >= 0 && Dyadic(upper) * upper >= rho, where + ": claims less than sqrt(rho)");
-  require(shows_positive_semidefinite(lipschitz_lmi(chain, rho, t),
+  require(std::all_of(t.begin(), t.end(), [](double x) { return x >= 0; }), where + ": a t is negative");
+  require(Dyadic(upper) * upper >= rho, where + ": claims less than sqrt(rho)");
+  require(shows_positive_semidefinite(lipschitz_lmi(chain, rho, {t.begin(), t.end()}),
                                       parse_factor(proof["factor"], where + ".factor")),
           where + ": the factor does not show that the matrix inequality holds");
 }
 
-/// f(x), exactly; `x` is a column.
-Matrix evaluate(const Weights& f, Matrix x) {
-  for (const files::Layer& layer : f.layers) {
-    x = product(Matrix(layer.outputs, layer.inputs, layer.weights), x);
-    for (int i = 0; i < layer.outputs; ++i) {
-      x(i, 0) += layer.biases[i];
-      if (&layer != &f.layers.back() && x(i, 0).sign() < 0) x(i, 0) = Dyadic();
-    }
-  }
-  return x;
+std::vector<float> floats(const Json& array, const std::string& where) {
+  const std::vector<double> values = hex_floats(array);
+  const std::vector<float> result(values.begin(), values.end());
+  require(std::equal(values.begin(), values.end(), result.begin()),
+          where + ": a coordinate is not a float32");
+  return result;
 }
 
 class Checker {
@@ -117,18 +99,18 @@ class Checker {
 
   CheckResult run() {
     require_keys(certificate_,
-                 {"schema", "tool", "statement", "network", "gamma", "layers", "bounds", "content_sha256"},
+                 {"schema", "tool", "statement", "network", "layers", "bounds", "content_sha256"},
                  "certificate");
     require(certificate_["schema"] == kCertificateSchema, "schema is not " + std::string(kCertificateSchema));
+    require(certificate_["statement"] == kStatement, "statement is not the one that is checked");
     require(certificate_["content_sha256"] == files::content_sha256(certificate_),
             "content_sha256 does not match: the certificate was changed after it was written");
     check_weights(certificate_["network"]);
     check_layers();
     require(!certificate_["bounds"].empty(), "bounds is empty");
     for (const Json& bound : certificate_["bounds"]) check_bound(bound);
-    result_.accepted = true;
-    result_.reason = "every statement verified in exact arithmetic";
-    return result_;
+    return {true, "every statement verified in exact arithmetic", spectral_norms_, upper_bounds_,
+            lower_bounds_};
   }
 
  private:
@@ -138,66 +120,39 @@ class Checker {
             "network.description_sha256 is of another network.toml");
     require(named["weights"].size() == parts_.size(), "network.weights lists another number of networks");
     for (const auto& [name, weights] : parts_) {
-      require(named["weights"].contains(name), "network.weights lacks " + name);
-      const Json& entry = named["weights"][name];
+      const Json& entry = named["weights"].at(name);
       require_keys(entry, {"sha256", "precision"}, "network.weights." + name);
-      require(entry["sha256"] == weights->sha256,
-              "sha256 of " + name + " is of another file than " + weights->path);
-      require(entry["precision"] == files::name(weights->precision), "precision of " + name + " is wrong");
+      require(entry["sha256"] == weights->sha256 && entry["precision"] == files::name(weights->precision),
+              "network.weights." + name + " is of another file than " + weights->path);
     }
   }
 
   void check_layers() {
-    const Json& gamma = certificate_["gamma"];
-    if (!gamma.is_null()) {
-      require_keys(gamma, {"value", "value_hex", "scope", "mode"}, "gamma");
-      require(gamma["mode"] == "clip" && (gamma["scope"] == "layer" || gamma["scope"] == "network"),
-              "gamma has an unknown mode or scope");
-      number(gamma["value"], gamma["value_hex"], "gamma.value");
+    std::size_t next = 0;
+    for (const auto& [name, weights] : parts_) {
+      for (const files::Layer& layer : weights->layers)
+        check_layer(certificate_["layers"].at(next++), name, layer);
     }
-    std::size_t expected = 0;
-    for (const auto& [name, weights] : parts_) expected += weights->layers.size();
-    for (const Json& layer : certificate_["layers"]) check_layer(layer, gamma);
-    require(norms_.size() == expected && certificate_["layers"].size() == expected,
-            "layers does not list every layer once");
+    require(certificate_["layers"].size() == next, "layers lists more layers than the networks have");
   }
 
-  void check_layer(const Json& entry, const Json& gamma) {
-    require_keys(entry, {"network", "name", "spectral_norm", "spectral_norm_hex", "respects_gamma", "proof"},
-                 "layer");
-    const std::string network = entry["network"].get<std::string>();
-    const std::string name = entry["name"].get<std::string>();
-    const std::string where = "layer " + network + " " + name;
-    require(parts_.count(network) == 1, where + ": no such network");
-    const std::vector<files::Layer>& layers = parts_.at(network)->layers;
-    const auto layer =
-        std::find_if(layers.begin(), layers.end(), [&](const auto& l) { return l.name == name; });
-    require(layer != layers.end(), where + ": no such layer");
-    const double lower =
-        number(entry["spectral_norm"].at(0), entry["spectral_norm_hex"].at(0), where + " lower");
-    const double upper =
-        number(entry["spectral_norm"].at(1), entry["spectral_norm_hex"].at(1), where + " upper");
+  void check_layer(const Json& entry, const std::string& network, const files::Layer& layer) {
+    const std::string where = "layer " + network + " " + layer.name;
+    require_keys(entry, {"network", "name", "spectral_norm", "spectral_norm_hex", "proof"}, where);
+    require(entry["network"] == network && entry["name"] == layer.name,
+            where + " is not where it is expected");
+    const double lower = number(entry["spectral_norm"].at(0), entry["spectral_norm_hex"].at(0), where);
+    const double upper = number(entry["spectral_norm"].at(1), entry["spectral_norm_hex"].at(1), where);
     require_keys(entry["proof"], {"lower_vector", "upper"}, where + ".proof");
-    const Matrix w(layer->outputs, layer->inputs, layer->weights);
-    const std::vector<Dyadic> v = hex_floats(entry["proof"]["lower_vector"]);
-    require(static_cast<int>(v.size()) == w.cols && squared_norm(v).sign() > 0,
-            where + ": unusable lower_vector");
-    require(
-        lower >= 0 && squared_norm(product(w, column(v)).entries) >= Dyadic(lower) * lower * squared_norm(v),
-        where + ": claims more than |W v| / |v|");
+    const Matrix w(layer.outputs, layer.inputs, layer.weights);
+    const std::vector<double> vector = hex_floats(entry["proof"]["lower_vector"]);
+    const Matrix v(static_cast<int>(vector.size()), 1, vector);
+    require(v.rows == w.cols && squared_norm(v).sign() > 0, where + ": unusable lower_vector");
+    require(squared_norm(product(w, v)) >= Dyadic(lower) * lower * squared_norm(v),
+            where + ": claims more than |W v| / |v|");
     check_upper({w}, entry["proof"]["upper"], upper, where);
-    Json respects;  // null: nothing stated, or the enclosure does not decide
-    if (!gamma.is_null()) {
-      const Dyadic limit = gamma["value"].get<double>();
-      const std::size_t exponent =
-          gamma["scope"] == "layer" ? 1 : layers.size();  // norm <= gamma^(1 / layers)
-      if (limit >= power(upper, exponent)) respects = true;
-      if ((power(lower, exponent) - limit).sign() > 0) respects = false;
-    }
-    require(entry["respects_gamma"] == respects,
-            where + ": respects_gamma does not follow from its spectral norm");
-    norms_[network + " " + name] = upper;
-    ++result_.spectral_norms;
+    norms_[network + " " + layer.name] = upper;
+    ++spectral_norms_;
   }
 
   void check_bound(const Json& bound) {
@@ -208,85 +163,61 @@ class Checker {
     const std::string function = bound["function"].get<std::string>();
     const std::string where = "bound " + function;
     const std::vector<Matrix> chain = stages(network_, function);
-    require(bound["domain"] == "global" && bound["block"] == "all" && bound["norm"] == "l2",
-            where + ": domain, block or norm is none that this checker knows");
-    require(bound["law"] == (function.rfind("set:", 0) == 0 ? "one_neighbour" : "none"),
-            where + ": wrong law");
-    require(bound["unit"] == files::unit(network_, function),
-            where + ": unit is not " + files::unit(network_, function));
+    const std::map<std::string, std::string> meaning = {
+        {"domain", "global"},
+        {"block", "all"},
+        {"norm", "l2"},
+        {"unit", files::unit(network_, function)},
+        {"law", files::networks_of(function).size() == 2 ? "one_neighbour" : "none"}};
+    for (const auto& [key, text] : meaning)
+      require(bound[key] == text, where + ": " + key + " is not " + text);
     const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
     if (bound["upper_method"] == "sdp") {
       check_upper(chain, bound["proof"], upper, where);
     } else {
       require(bound["upper_method"] == "product" && bound["proof"].is_null(),
               where + ": unknown upper_method");
-      require(Dyadic(upper) >= product_of_norms(function),
-              where + ": claims less than the product of the norms");
+      Dyadic total = 1.0;
+      for (const std::string& name : files::networks_of(function)) {
+        for (const files::Layer& layer : parts_.at(name)->layers)
+          total = total * norms_.at(name + " " + layer.name);
+      }
+      require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
     }
-    ++result_.upper_bounds;
+    ++upper_bounds_;
     if (bound["lower"].is_null()) {
       require(bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
               where + ": lower has no value");
       return;
     }
-    check_lower(bound["lower_witness"], function,
-                number(bound["lower"], bound["lower_hex"], where + " lower"), where + ": lower_witness");
-    ++result_.lower_bounds;
+    const double lower = number(bound["lower"], bound["lower_hex"], where + " lower");
+    check_lower(bound["lower_witness"], files::networks_of(function), lower, where + ": lower_witness");
+    ++lower_bounds_;
   }
 
-  Dyadic product_of_norms(const std::string& function) const {
-    Dyadic total(1.0);
-    for (const std::string& name : files::networks_of(function)) {
-      for (const files::Layer& layer : parts_.at(name)->layers)
-        total = total * norms_.at(name + " " + layer.name);
-    }
-    return total;
+  lipschitz::Term term(const std::string& name) const {
+    const bool clamped = network_.clamp && files::is_clamped(name);
+    return {parts_.at(name), clamped ? &*network_.clamp : nullptr};
   }
 
-  /// The input column of network `name`, clamped as NET says.
-  Matrix input(const std::string& name, const Json& point, const std::string& where) const {
-    Matrix x = column(hex_floats(point));
-    require(x.rows == parts_.at(name)->inputs(),
-            where + ": a point has another length than the input of " + name);
-    for (int i = 0; network_.clamp && files::is_clamped(name) && i < x.rows; ++i) {
-      const Dyadic lower = network_.clamp->lower.at(i);
-      const Dyadic upper = network_.clamp->upper.at(i);
-      x(i, 0) = lower >= x(i, 0) ? lower : x(i, 0) >= upper ? upper : x(i, 0);
-    }
-    return x;
-  }
-
-  /// |f(x) - f(y)| >= lower |x - y|. In a set function one neighbour moves from x to y, the others stay.
-  void check_lower(const Json& witness, const std::string& function, double lower,
+  /// |f(x) - f(y)| >= lower |x - y|. In a set function (two names) one neighbour moves from x to y, the others stay.
+  void check_lower(const Json& witness, const std::vector<std::string>& names, double lower,
                    const std::string& where) const {
     require_keys(witness, {"x", "y", "others"}, where);
-    const std::vector<std::string> names = files::networks_of(function);
-    std::vector<Matrix> images = {evaluate(*parts_.at(names[0]), input(names[0], witness["x"], where)),
-                                  evaluate(*parts_.at(names[0]), input(names[0], witness["y"], where))};
-    int grounds = names[0] == "phi:ground" ? 1 : 0;
+    lipschitz::SlopeFunction f{term(names[0]), {}, names.size() == 2 ? parts_.at(names[1]) : nullptr};
+    lipschitz::SlopePoints points{floats(witness["x"], where), floats(witness["y"], where), {}};
+    std::size_t grounds = names[0] == "phi:ground" ? 1 : 0;
     for (const Json& other : witness["others"]) {
       require_keys(other, {"network", "x"}, where + ".others");
       const std::string name = other["network"].get<std::string>();
-      require(names.size() == 2 && name.rfind("phi:", 0) == 0,
-              where + ".others: not a neighbour in a set function");
+      require(name.rfind("phi:", 0) == 0, where + ".others: " + name + " is no neighbour");
       grounds += name == "phi:ground" ? 1 : 0;
-      const Matrix fixed = evaluate(*parts_.at(name), input(name, other["x"], where));
-      for (Matrix& image : images) {
-        for (int i = 0; i < image.rows; ++i) image(i, 0) += fixed(i, 0);
-      }
+      f.others.push_back(term(name));
+      points.others.push_back(floats(other["x"], where));
     }
-    require(names.size() == 1 || grounds == static_cast<int>(parts_.count("phi:ground")),
+    require(names.size() == 1 || grounds == parts_.count("phi:ground"),
             where + ": the ground network enters the sum exactly once");
-    if (names.size() == 2) {
-      for (Matrix& image : images) image = evaluate(*parts_.at(names[1]), image);
-    }
-    const auto distance = [](Matrix a, const Matrix& b) {
-      for (int i = 0; i < a.rows; ++i) a(i, 0) += -b(i, 0);
-      return squared_norm(a.entries);
-    };
-    const Dyadic moved = distance(column(hex_floats(witness["x"])), column(hex_floats(witness["y"])));
-    require(moved.sign() > 0, where + ": x equals y");
-    require(lower >= 0 && distance(images[0], images[1]) >= Dyadic(lower) * lower * moved,
+    require(mpq_class(lower) * mpq_class(lower) <= lipschitz::slope_squared(f, points),
             where + ": claims more than the slope between x and y");
   }
 
@@ -294,7 +225,7 @@ class Checker {
   const files::Network& network_;
   std::map<std::string, const Weights*> parts_;
   std::map<std::string, Dyadic> norms_;  ///< verified upper ends, by "<network> <layer>"
-  CheckResult result_;
+  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0;
 };
 
 }  // namespace
@@ -321,9 +252,7 @@ CheckResult check(const Json& certificate, const files::Network& network) {
   try {
     return Checker(certificate, network).run();
   } catch (const std::exception& fault) {
-    CheckResult rejected;
-    rejected.reason = fault.what();
-    return rejected;
+    return {false, fault.what(), 0, 0, 0};
   }
 }
 

@@ -1,7 +1,7 @@
 /// @file The independent checker: does this certificate prove its statements for these weights?
 ///
-/// It shares no code with what wrote the certificate, trusts no optimiser and never rounds. What it relies on: the
-/// readers of weight files, SHA-256, GMP's integers, and the two short files beside this one.
+/// It trusts no optimiser and never rounds. What it relies on: the readers of weight files, SHA-256, GMP's integers,
+/// the two short files beside this one and, for lower bounds, the exact slope of lipschitz/witness.h.
 #pragma once
 
 #include <string>
@@ -15,16 +15,24 @@ namespace swarmcert::check {
 
 inline constexpr const char* kCertificateSchema = "swarmcert/certificate/1";
 
+/// What a certificate of this schema states, in words.
+inline constexpr const char* kStatement =
+    "ReLU networks with the weights stored in the files named by sha256. Every bound holds in exact "
+    "arithmetic: "
+    "|f(x) - f(y)| <= upper |x - y| for all x and y, and |f(x) - f(y)| >= lower |x - y| at the witness. In a "
+    "set "
+    "function one neighbour moves from x to y, whatever the number and the places of the others.";
+
 struct CheckResult {
   bool accepted = false;
   std::string reason;  ///< why not, naming the field; or what was verified
+  int spectral_norms = 0;
   int upper_bounds = 0;
   int lower_bounds = 0;
-  int spectral_norms = 0;
 };
 
 /// Verifies every statement of `certificate` against the weights of `network`: content hash; no unknown field; the
-/// named weights; each spectral norm from both sides, and what is said of gamma; each upper bound by its linear
+/// named weights; each spectral norm from both sides; each upper bound by its linear
 /// matrix inequality (lipschitz_lmi.h) or as product of norms verified before; each lower bound by the exact slope
 /// between its two witness points. A malformed certificate is answered with a reason, not with an exception.
 CheckResult check(const files::Json& certificate, const files::Network& network);

@@ -13,17 +13,6 @@ Matrix transposed(const Matrix& a) {
   return result;
 }
 
-bool fits(const Factor& factor, int n) {
-  const auto size = static_cast<std::size_t>(n);
-  if (factor.rows.size() != size || factor.first.size() != size || factor.scale.size() != size) return false;
-  for (int i = 0; i < n; ++i) {
-    const int first = factor.first[i];
-    if (first < 0 || first > i || factor.rows[i].size() != static_cast<std::size_t>(i - first + 1))
-      return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 Matrix product(const Matrix& a, const Matrix& b) {
@@ -75,25 +64,24 @@ Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const
 }
 
 bool shows_positive_semidefinite(const Matrix& p, const Factor& factor) {
-  if (!fits(factor, p.rows)) return false;
-  std::vector<Dyadic> slack(factor.rows.size());  // E_ii - sum_{j != i} |E_ij|
-  mpz_class gram;
+  const auto size = static_cast<std::size_t>(p.rows);
+  if (factor.rows.size() != size || factor.scale.size() != size) return false;
+  std::vector<int> first;  // column of the first entry of each row
+  for (int i = 0; i < p.rows; ++i) first.push_back(i + 1 - static_cast<int>(factor.rows[i].size()));
+  if (!std::all_of(first.begin(), first.end(), [](int column) { return column >= 0; })) return false;
+  std::vector<Dyadic> slack(size);  // E_ii - sum_{j != i} |E_ij|
   for (int i = 0; i < p.rows; ++i) {
     for (int j = 0; j <= i; ++j) {
-      gram = 0;
-      for (int k = std::max(factor.first[i], factor.first[j]); k <= j; ++k) {
-        gram += factor.rows[i][k - factor.first[i]] * factor.rows[j][k - factor.first[j]];
+      mpz_class gram = 0;
+      for (int k = std::max(first[i], first[j]); k <= j; ++k) {
+        gram += factor.rows[i][k - first[i]] * factor.rows[j][k - first[j]];
       }
       Dyadic e = p(i, j);
       e.exponent += factor.scale[i] + factor.scale[j];
       e += Dyadic(-gram, 2 * factor.unit_exponent);
-      if (i == j) {
-        slack[i] += e;
-      } else if (e.sign() != 0) {
-        e.mantissa = -abs(e.mantissa);
-        slack[i] += e;
-        slack[j] += e;
-      }
+      if (i != j) e.mantissa = -abs(e.mantissa);
+      slack[i] += e;
+      if (i != j) slack[j] += e;
     }
   }
   return std::all_of(slack.begin(), slack.end(), [](const Dyadic& s) { return s.sign() >= 0; });

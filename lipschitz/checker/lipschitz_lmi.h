@@ -7,12 +7,11 @@
 
 namespace swarmcert::check {
 
-/// Lower triangular R with the envelope of a banded Cholesky factor: row i holds columns first[i] .. i, as integers
-/// in units of 2^unit_exponent. scale[i] is the exponent of the power of two that D has at (i, i).
+/// Lower triangular R with the envelope of a banded Cholesky factor: rows[i] holds the columns that end with column i,
+/// as integers in units of 2^unit_exponent. scale[i] is the exponent of the power of two that D has at (i, i).
 struct Factor {
   long unit_exponent = 0;
   std::vector<long> scale;
-  std::vector<int> first;
   std::vector<std::vector<mpz_class>> rows;
 };
 

@@ -1,0 +1,68 @@
+/// @file What every command of the tool shares: options, exit codes, result files.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "nn/files/json.h"
+#include "nn/files/network.h"
+
+namespace swarmcert::analysis {
+
+/// The exit codes of the command line.
+enum ExitCode : int {
+  kDone = 0,          ///< done, or the claim holds
+  kViolated = 1,      ///< a limit that the user gave is violated, or something is refuted or rejected
+  kUsage = 2,         ///< the command line cannot be understood
+  kBadInput = 3,      ///< a file is wrong
+  kInconclusive = 4,  ///< neither proved nor refuted
+  kInternal = 70,     ///< a fault of the tool
+};
+
+/// Options that every command takes.
+struct CommonOptions {
+  std::string json;  ///< where the result goes as JSON; "-": standard output, which silences the text
+  bool force = false;
+  bool quiet = false;
+  int jobs = 0;
+
+  bool prints_text() const { return json != "-"; }
+};
+
+/// One command: declares its options on a CLI::App, then runs.
+struct Command {
+  std::string name;
+  std::string summary;  ///< one line for the list of commands
+  std::string details;  ///< for its own --help: what it does, an example
+  /// Declares options; returns what to run once they are parsed, which returns an exit code.
+  std::function<std::function<int(const CommonOptions&)>(CLI::App&)> declare;
+};
+
+/// Every command, in the order in which --help lists them.
+const std::vector<Command>& commands();
+
+/// Declares NET: a positional FILE, or --phi with --rho, and --key.
+void declare_network(CLI::App& app, files::NetworkArguments& arguments);
+
+/// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line
+/// without what may not change the result (--jobs, -q, --json, -o, --report, --force).
+files::Json result_head(const std::string& command, const std::vector<std::string>& input_files);
+
+/// Remembers the command line for result_head().
+void remember_command_line(int argc, const char* const* argv);
+
+/// Writes `result` where --json says, if it says.
+void write_result(const CommonOptions& common, const files::Json& result);
+
+/// Files that NET was read from.
+std::vector<std::string> input_files(const files::Network& network);
+
+Command certify_command();
+Command check_command();
+Command demo_command();
+Command inspect_command();
+
+}  // namespace swarmcert::analysis

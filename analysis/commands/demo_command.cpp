@@ -1,0 +1,73 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "analysis/commands/command.h"
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
+#include "nn/files/file_io.h"
+#include "nn/files/functions.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+struct Options {
+  std::string output = "swarmcert-demo";
+};
+
+/// The folder of the bundled networks: beside an installed tool, else in the source tree it was built from.
+std::filesystem::path bundled_networks() {
+  std::error_code none;
+  const std::filesystem::path tool = std::filesystem::read_symlink("/proc/self/exe", none);
+  const std::filesystem::path installed = tool.parent_path().parent_path() / "share/swarmcert/networks";
+  if (std::filesystem::exists(installed, none)) return installed;
+  return std::filesystem::path(SWARMCERT_SOURCE_DIR) / "nn/networks";
+}
+
+int run(const Options& options, const CommonOptions& common) {
+  files::NetworkArguments arguments;
+  arguments.file = (bundled_networks() / "demo/network.toml").string();
+  const std::filesystem::path folder = options.output;
+  std::filesystem::create_directories(folder);
+  const std::string certificate_path = (folder / "cert.json").string();
+
+  fmt::print("1. Certify the bundled network: swarmcert certify {} -o {}\n", arguments.file,
+             certificate_path);
+  const files::Network network = files::load_network(arguments);
+  lipschitz::CertifyOptions certify_options;
+  certify_options.jobs = common.jobs;
+  const lipschitz::Certification found = certify(network, certify_options);
+  files::write_file(certificate_path, files::to_text(certificate(network, found)), true);
+  for (const lipschitz::CertifiedBound& bound : found.bounds) {
+    fmt::print("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}\n", bound.function,
+               bound.upper.value(), bound.witness ? bound.witness->slope.value() : 0.0,
+               files::unit(network, bound.function));
+  }
+
+  fmt::print("2. Check the certificate: swarmcert check {} {}\n", certificate_path, arguments.file);
+  const check::CheckResult checked =
+      check::check(files::read_json(certificate_path, check::kCertificateSchema), network);
+  fmt::print("   {}: {}\n", checked.accepted ? "accepted" : "rejected", checked.reason);
+
+  files::Json result = result_head("demo", input_files(network));
+  result["certificate"] = certificate_path;
+  result["accepted"] = checked.accepted;
+  write_result(common, result);
+  return checked.accepted ? kDone : kViolated;
+}
+
+}  // namespace
+
+Command demo_command() {
+  return {
+      "demo", "The main job end to end on bundled data",
+      "Certifies a network that ships with the tool and checks the certificate.\n\nExample: swarmcert demo",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<Options>();
+        app.add_option("-o,--output", options->output, "Folder for the results")->capture_default_str();
+        return [options](const CommonOptions& common) { return run(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,93 @@
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "analysis/commands/command.h"
+#include "nn/files/input_error.h"
+#include "nn/files/suggest.h"
+
+namespace {
+
+using swarmcert::analysis::Command;
+using swarmcert::analysis::CommonOptions;
+
+/// What the parser did not understand, with the option or command that was perhaps meant.
+std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
+  const auto* extras = dynamic_cast<const CLI::ExtrasError*>(&error);
+  const CLI::App* scope = &app;
+  for (const CLI::App* sub : app.get_subcommands()) scope = sub;
+  std::vector<std::string> known;
+  if (scope == &app) {
+    for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
+      known.push_back(sub->get_name());
+    }
+    if (argc > 1) {
+      return fmt::format("unknown command {}: {}", argv[1], swarmcert::files::did_you_mean(argv[1], known));
+    }
+  }
+  for (const CLI::Option* option : scope->get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  if (extras == nullptr) return error.what();
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const std::string name = word.substr(0, word.find('='));
+    const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+    if (word.rfind("--", 0) == 0 && !is_known) {
+      return fmt::format("unknown option {}: {}", name, swarmcert::files::did_you_mean(name, known));
+    }
+  }
+  return error.what();
+}
+
+void declare_common(CLI::App& app, CommonOptions& common) {
+  app.add_option("--json", common.json, "Write the result as JSON to this file; - for standard output");
+  app.add_option("-j,--jobs", common.jobs, "Threads; results do not depend on it (default: all)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--force", common.force, "Replace files that exist");
+  app.add_flag("-q,--quiet", common.quiet, "No progress on standard error");
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Formal verification and analysis for learned multirotor controllers.", "swarmcert");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "swarmcert " SWARMCERT_VERSION);
+  app.footer(
+      "Exit codes: 0 done or holds; 1 a limit is violated, or something is refuted or rejected; 2 usage; 3 "
+      "bad input;\n"
+      "4 inconclusive; 70 a fault of this tool.  'swarmcert COMMAND --help' shows options and an example.");
+  CommonOptions common;
+  std::function<int(const CommonOptions&)> action;
+  for (const Command& command : swarmcert::analysis::commands()) {
+    CLI::App* sub = app.add_subcommand(command.name, command.summary);
+    sub->footer(command.details);
+    declare_common(*sub, common);
+    auto to_run = command.declare(*sub);
+    sub->callback([&action, to_run] { action = to_run; });
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "swarmcert: {}\n", explain(app, error, argc, argv));
+    return swarmcert::analysis::kUsage;
+  }
+  swarmcert::analysis::remember_command_line(argc, argv);
+  return action(common);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const swarmcert::files::InputError& error) {
+    fmt::print(stderr, "swarmcert: {}\n", error.what());
+    return swarmcert::analysis::kBadInput;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "swarmcert: internal error: {}\n", error.what());
+    return swarmcert::analysis::kInternal;
+  }
+}

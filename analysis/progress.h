@@ -1,0 +1,42 @@
+/// @file Progress of long work on standard error.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <string>
+
+namespace swarmcert::analysis {
+
+/// Shows how far work is: a bar that redraws itself on a terminal, else a line for every tenth of it. Silent where
+/// `quiet`, and for work that ends within two seconds. Safe to call from several threads.
+class Progress {
+ public:
+  explicit Progress(bool quiet);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void show(int done, int total, const std::string& what);
+
+ private:
+  const bool quiet_;
+  const bool terminal_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::mutex mutex_;
+  int last_tenth_ = 0;
+  bool drawn_ = false;
+};
+
+/// Set by Ctrl-C while an instance exists; a second Ctrl-C ends the process.
+class CancelOnInterrupt {
+ public:
+  CancelOnInterrupt();
+  ~CancelOnInterrupt();
+  CancelOnInterrupt(const CancelOnInterrupt&) = delete;
+  CancelOnInterrupt& operator=(const CancelOnInterrupt&) = delete;
+
+  const std::atomic<bool>* flag() const;
+};
+
+}  // namespace swarmcert::analysis
