@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <Eigen/SVD>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
