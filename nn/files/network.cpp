@@ -97,7 +97,9 @@ class NetworkReader {
       const TomlTable entry = kinds.table(kind);
       entry.allow_only({"weights"});
       const std::string file = entry.text("weights");
-      if (file.empty()) entry.refuse("weights", "", "is empty");
+      if (file.empty() || file.find('\0') != std::string::npos) {
+        entry.refuse("weights", in_quotes(file), "is not the name of a file");
+      }
       const std::filesystem::path folder = std::filesystem::path(path_).parent_path();
       weights.emplace(kind, load_((folder / file).string()));
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <string_view>
 
 #include "nn/files/input_error.h"
 #include "nn/files/suggest.h"
@@ -14,6 +15,58 @@ constexpr std::size_t kLargestToml_bytes = std::size_t{64} << 10;
 /// Every dot of a key "a.b.c" opens a table, and toml++ destroys nested tables recursively: 30 000 overflow the stack.
 /// Dots in numbers and file names count as well, of which our files have a few hundred.
 constexpr std::ptrdiff_t kMostDots = 4000;
+
+/// Refuses what toml++ 3.3 reads in undefined ways: letters beyond ASCII outside of quotes and comments run into its
+/// __builtin_unreachable(). TOML allows them nowhere else.
+class Guard {
+ public:
+  Guard(const std::string& text, const std::string& path) : text_(text), path_(path) {}
+
+  void run() {
+    if (text_.compare(0, 3, "\xef\xbb\xbf") == 0) at_ = 3;  // a byte order mark
+    for (; at_ < text_.size(); ++at_) {
+      const char c = text_[at_];
+      if (c == '#') {
+        skip_comment();
+      } else if (c == '"' || c == '\'') {
+        skip_string(c);
+      } else if (!is_of_bare_key(c) &&
+                 std::string_view(" \t\r\n=[]{},.+:").find(c) == std::string_view::npos) {
+        refuse("this character may stand in quotes only");
+      }
+    }
+  }
+
+ private:
+  static bool is_of_bare_key(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  }
+
+  void skip_comment() {
+    while (at_ + 1 < text_.size() && text_[at_ + 1] != '\n') ++at_;
+  }
+
+  void skip_string(char quote) {
+    if (text_.compare(at_, 3, std::string(3, quote)) == 0) refuse("texts of several lines are not read");
+    for (++at_; at_ < text_.size() && text_[at_] != quote; ++at_) {
+      if (text_[at_] == '\n') refuse("the text has no closing quote");
+      if (quote == '"' && text_[at_] == '\\') ++at_;
+    }
+  }
+
+  [[noreturn]] void refuse(const std::string& what) const {
+    const std::string before = text_.substr(0, std::min(at_, text_.size()));
+    const std::size_t newline = before.rfind('\n');  // npos + 1 is 0
+    throw InputError({path_,
+                      "line " + std::to_string(std::count(before.begin(), before.end(), '\n') + 1) +
+                          ", column " + std::to_string(before.size() - (newline + 1) + 1),
+                      "", "", "is not TOML (" + what + ")", ""});
+  }
+
+  const std::string& text_;
+  const std::string& path_;
+  std::size_t at_ = 0;
+};
 
 std::string line(const toml::source_region& source) {
   return source.begin.line == 0 ? "" : "line " + std::to_string(source.begin.line);
@@ -38,6 +91,7 @@ toml::table parse_toml(const std::string& text, const std::string& path) {
   if (std::count(text.begin(), text.end(), '.') > kMostDots) {
     throw InputError({path, "", "", "", "has more than " + std::to_string(kMostDots) + " dots", ""});
   }
+  Guard(text, path).run();
   try {
     return toml::parse(std::string_view(text), path);
   } catch (const toml::parse_error& error) {

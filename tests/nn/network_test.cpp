@@ -138,7 +138,9 @@ TEST(NetworkToml, ValuesOfAnotherTypeAreRefused) {
   EXPECT_TRUE(refused(with("lower = [-1, -1, -1, -2, -2, -2]", "lower = -1"), {"input.clamp.lower = -1"}));
   EXPECT_TRUE(
       refused(with("weights = \"6x20\"", "weights = {}"), {"phi.small.weights = a table: must be text"}));
-  EXPECT_TRUE(refused(with("weights = \"6x20\"", "weights = \"\""), {"phi.small.weights: is empty"}));
+  EXPECT_TRUE(
+      refused(with("weights = \"6x20\"", "weights = \"\""), {"phi.small.weights", "not the name of a file"}));
+  EXPECT_TRUE(refused(with("6x20", "6x20\\u0000"), {"phi.small.weights", "not the name of a file"}));
 }
 
 TEST(NetworkToml, InputsMustFitTogether) {
@@ -171,6 +173,31 @@ TEST(NetworkToml, TextThatIsNotTomlIsRefusedWithLineAndColumn) {
   EXPECT_TRUE(refused("schema = \n", {"nets/network.toml: line 1, column", "is not TOML"}));
   EXPECT_TRUE(refused("a = 1\na = 2\n", {"line 2", "is not TOML"}));
   EXPECT_TRUE(refused(std::string(70'000, '\n'), {"larger than 64 KiB"}));
+}
+
+TEST(NetworkToml, TextThatTomlPlusPlusReadsInUndefinedWaysIsRefusedBefore) {
+  // Found by fuzzing toml++ 3.3 under the sanitizers: letters beyond ASCII.
+  EXPECT_TRUE(refused("\xc5\xb0", {"nets/network.toml: line 1, column 1", "in quotes only"}));
+  EXPECT_TRUE(refused("a = 1\n\xc3\xa4 = 2\n", {"line 2, column 1", "in quotes only"}));
+  EXPECT_TRUE(refused("a = \"\"\"x\"\"\"", {"line 1, column 5", "several lines"}));
+  EXPECT_TRUE(refused("a = 'x\nb'", {"no closing quote"}));
+  EXPECT_TRUE(refused("a = \"x\\", {"is not TOML"}));
+}
+
+TEST(NetworkToml, WhatUsersWriteIsRead) {
+  std::string text =
+      "\xef\xbb\xbf# Gr\xc3\xb6\xc3\x9f"
+      "e\r\n" +
+      std::string(kFull);  // byte order mark, comment, CR LF
+  EXPECT_EQ(parse(text).phi.size(), 2u);
+  text = with("\"6x20\"", "'6x20'  # \"quotes' in a comment");
+  EXPECT_EQ(parse(text).phi.size(), 2u);
+  text = with("[-1, -1, -1, -2, -2, -2]", "[\n-1.0, # first\n  -1e0, -1, -2,\n-2, -2,]");
+  EXPECT_EQ(parse(text).clamp->lower.size(), 6u);
+  EXPECT_EQ(parse(with("[phi.small]", "[ phi . \"sm\\u00e4ll\\\"\" ]")).phi.count("sm\xc3\xa4ll\""), 1u);
+  const std::string list = "[input]\norder = [\n\"a\", # one\n  \"b\",\n]\n";
+  const std::string networks = "[phi.x]\nweights = \"2x5\"\n[rho.x]\nweights = \"5x1\"\n";
+  EXPECT_EQ(parse("schema = \"swarmcert/network/1\"\n" + list + networks).input_order.size(), 2u);
 }
 
 TEST(NetworkToml, DeepNestingIsRefused) {
