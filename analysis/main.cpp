@@ -86,6 +86,9 @@ int main(int argc, char** argv) {
   } catch (const swarmcert::files::InputError& error) {
     fmt::print(stderr, "swarmcert: {}\n", error.what());
     return swarmcert::analysis::kBadInput;
+  } catch (const swarmcert::analysis::UsageError& error) {
+    fmt::print(stderr, "swarmcert: {}\n", error.what());
+    return swarmcert::analysis::kUsage;
   } catch (const std::exception& error) {
     fmt::print(stderr, "swarmcert: internal error: {}\n", error.what());
     return swarmcert::analysis::kInternal;

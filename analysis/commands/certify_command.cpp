@@ -1,7 +1,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 
 #include "analysis/commands/command.h"
@@ -9,7 +8,6 @@
 #include "lipschitz/certify.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
-#include "nn/files/input_error.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -161,10 +159,9 @@ void print_bounds(const files::Network& network, const Certification& found) {
 }
 
 int run(Options options, const CommonOptions& common) {
-  if (!options.output.empty() && !common.force && std::filesystem::exists(options.output)) {
-    throw files::InputError({options.output, "", "-o", "", "the file exists", "--force replaces it"});
-  }
-  const files::Network network = files::load_network(options.network);
+  refuse_to_replace(common, options.output);
+  refuse_to_replace(common, common.json);
+  const files::Network network = load_network(options.network);
   if (options.gamma != 0) options.certify.gamma = files::GammaStatement{options.gamma};
   options.certify.method = options.method == "sdp"       ? lipschitz::UpperMethod::kSdp
                            : options.method == "product" ? lipschitz::UpperMethod::kProduct

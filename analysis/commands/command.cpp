@@ -2,10 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <set>
 
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
+#include "nn/files/input_error.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -35,6 +37,13 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   app.add_option("--key", arguments.key, "Where the state dict lies inside a nested checkpoint, e.g. model");
 }
 
+files::Network load_network(const files::NetworkArguments& arguments) {
+  if (arguments.file.empty() && arguments.phi.empty()) {
+    throw UsageError("no network: name a network.toml, one weight file, or --phi F --rho F");
+  }
+  return files::load_network(arguments);
+}
+
 void remember_command_line(int argc, const char* const* argv) {
   static const std::set<std::string> with_value = {"--jobs", "-j", "--json", "-o", "--output", "--report"};
   static const std::set<std::string> flags = {"-q", "--quiet", "--force"};
@@ -62,6 +71,11 @@ files::Json result_head(const std::string& command, const std::vector<std::strin
           {"tool", "swarmcert " SWARMCERT_VERSION},
           {"command_line", command_line()},
           {"inputs", std::move(inputs)}};
+}
+
+void refuse_to_replace(const CommonOptions& common, const std::string& path) {
+  if (path.empty() || path == "-" || common.force || !std::filesystem::exists(path)) return;
+  throw files::InputError({path, "", "", "", "the file exists", "--force replaces it"});
 }
 
 void write_result(const CommonOptions& common, const files::Json& result) {

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -44,8 +45,16 @@ struct Command {
 /// Every command, in the order in which --help lists them.
 const std::vector<Command>& commands();
 
+/// Options that make no sense together, found after parsing: exit code kUsage.
+struct UsageError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Declares NET: a positional FILE, or --phi with --rho, and --key.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
+
+/// Loads NET. @throws UsageError if nothing was named; files::InputError as files::load_network() does.
+files::Network load_network(const files::NetworkArguments& arguments);
 
 /// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line
 /// without what may not change the result (--jobs, -q, --json, -o, --report, --force).
@@ -53,6 +62,9 @@ files::Json result_head(const std::string& command, const std::vector<std::strin
 
 /// Remembers the command line for result_head().
 void remember_command_line(int argc, const char* const* argv);
+
+/// Refuses early, before work that would be lost: throws InputError if `path` exists and --force is not given.
+void refuse_to_replace(const CommonOptions& common, const std::string& path);
 
 /// Writes `result` where --json says, if it says.
 void write_result(const CommonOptions& common, const files::Json& result);

@@ -1,0 +1,185 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <limits>
+
+#include "analysis/run.h"
+#include "data.h"
+#include "nn/files/json.h"
+#include "nn/files/weights.h"
+
+namespace swarmcert {
+namespace {
+
+using files::Json;
+using tests::Outcome;
+using tests::read_text;
+using tests::ScratchFolder;
+using tests::write_text;
+
+class CommandLine : public testing::Test {
+ protected:
+  Outcome run(const std::string& arguments) {
+    return tests::run_shell("swarmcert " + arguments, folder_.path());
+  }
+
+  /// Expects `arguments` to end with `exit_code` and to say each of `words`.
+  void expect(const std::string& arguments, int exit_code, const std::vector<std::string>& words) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << "swarmcert " << arguments << "\n" << outcome.output;
+    for (const std::string& word : words) {
+      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no \"" << word << "\" in\n"
+                                                              << outcome.output;
+    }
+  }
+
+  /// A 2-2-1 network f(x) = relu(3 x1) + relu(-3 x1 + x2): its Lipschitz constant is sqrt(10), its product bound larger.
+  files::Weights small_network() {
+    files::Weights weights;
+    weights.layers = {{"fc1", 2, 2, {3, 0, -3, 1}, {0, 0}}, {"fc2", 1, 2, {1, 1}, {0}}};
+    return weights;
+  }
+
+  std::string saved(const files::Weights& weights, const std::string& name) {
+    files::save_safetensors(weights, folder_ / name, true);
+    return name;
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(CommandLine, HelpShowsEveryCommandAndEachHasAnExample) {
+  expect("--help", 0, {"certify", "check", "inspect", "demo", "Exit codes"});
+  for (const std::string command : {"certify", "check", "inspect", "demo"}) {
+    expect(command + " --help", 0, {"Example: swarmcert " + command, "--json", "--force"});
+  }
+  expect("--version", 0, {"swarmcert"});
+}
+
+TEST_F(CommandLine, MisspeltCommandsAndOptionsAreUsageErrorsWithASuggestion) {
+  expect("certfy x", 2, {"certfy", "did you mean", "certify"});
+  expect("certify x --gama 3", 2, {"--gama", "did you mean", "--gamma"});
+  expect("certify x --max-lipschtz=3", 2, {"--max-lipschtz", "--max-lipschitz"});
+  expect("", 2, {"subcommand"});
+  expect("certify x --gamma minus", 2, {"--gamma", "minus"});
+  expect("certify x --gamma -1", 2, {"--gamma", "-1"});
+  expect("certify --phi a", 2, {"--rho"});
+}
+
+TEST_F(CommandLine, NoNetworkIsAUsageErrorThatSaysWhatToGive) { expect("certify", 2, {"--phi", "network.toml"}); }
+
+TEST_F(CommandLine, BadInputNamesFileFieldValueAndMend) {
+  expect("certify nowhere.pth", 3, {"nowhere.pth"});
+  write_text(folder_ / "empty.pth", "");
+  expect("certify empty.pth", 3, {"empty.pth", "empty"});
+  write_text(folder_ / "noise.pth", "this is no weight file");
+  expect("inspect noise.pth", 3, {"noise.pth"});
+  // The writer refuses such weights as the reader does, so the file is made from a sound one.
+  saved(small_network(), "nan.safetensors");
+  std::string bytes = read_text(folder_ / "nan.safetensors");
+  const float one = 1;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::size_t at = bytes.rfind(std::string(reinterpret_cast<const char*>(&one), 4));
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 4, reinterpret_cast<const char*>(&nan), 4);
+  write_text(folder_ / "nan.safetensors", bytes);
+  expect("certify nan.safetensors", 3, {"nan.safetensors", "fc2.weight", "nan"});
+}
+
+TEST_F(CommandLine, TyposInNetworkTomlNameTheLineAndTheKeyThatWasMeant) {
+  saved(small_network(), "net.safetensors");
+  write_text(folder_ / "network.toml",
+             "schema = \"swarmcert/network/1\"\n\n[phi.small]\nwieghts = \"net.safetensors\"\n");
+  expect("certify network.toml", 3, {"network.toml", "line 4", "wieghts", "weights"});
+}
+
+TEST_F(CommandLine, CertifyThenCheckAcceptsAndEveryLimitHasItsVerdict) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  expect("certify " + net + " -o cert.json", 0, {"verdict: proved", "network", "sdp"});
+  expect("check cert.json " + net, 0, {"accepted"});
+  expect("certify " + net + " --max-lipschitz 20", 0, {"proved"});
+  expect("certify " + net + " --max-lipschitz 2", 1, {"refuted"});
+  expect("certify " + net + " --max-lipschitz 5 --method product --nodes 0", 4, {"inconclusive"});
+  expect("certify " + net + " --gamma 5", 0, {"within gamma 5"});
+  expect("certify " + net + " --gamma 2", 1, {"VIOLATES gamma 2"});
+}
+
+TEST_F(CommandLine, CheckRejectsAnotherNetworkAndADamagedCertificate) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  ASSERT_EQ(run("certify " + net + " -o cert.json").exit_code, 0);
+  files::Weights other = small_network();
+  other.layers[0].weights[0] = 3.0000002384185791;  // one bit further
+  saved(other, "other.safetensors");
+  expect("check cert.json other.safetensors", 1, {"rejected", "other.safetensors"});
+  std::string text = read_text(folder_ / "cert.json");
+  text.replace(text.find("\"upper_method\": \"sdp\""), 21, "\"upper_method\": \"xdp\"");
+  write_text(folder_ / "damaged.json", text);
+  expect("check damaged.json " + net, 1, {"rejected", "content_sha256"});
+  write_text(folder_ / "half.json", text.substr(0, text.size() / 2));
+  expect("check half.json " + net, 3, {"half.json", "line"});
+  expect("check " + net + " " + net, 3, {net});
+}
+
+TEST_F(CommandLine, NothingIsReplacedWithoutForce) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  write_text(folder_ / "cert.json", "precious");
+  expect("certify " + net + " -o cert.json", 3, {"cert.json", "--force"});
+  EXPECT_EQ(read_text(folder_ / "cert.json"), "precious");
+  expect("certify " + net + " -o cert.json --force", 0, {"proved"});
+  write_text(folder_ / "result.json", "precious");
+  expect("certify " + net + " --json result.json", 3, {"result.json", "--force"});
+  EXPECT_EQ(read_text(folder_ / "result.json"), "precious");
+}
+
+TEST_F(CommandLine, JsonHasTheAgreedFieldsAndTheSameBytesForAnyNumberOfJobs) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  ASSERT_EQ(run("certify " + net + " --gamma 5 --json a.json -j 1 -q").exit_code, 0);
+  ASSERT_EQ(run("certify " + net + " --gamma 5 --json b.json --jobs=3").exit_code, 0);
+  EXPECT_EQ(read_text(folder_ / "a.json"), read_text(folder_ / "b.json"));
+  const Json result = Json::parse(read_text(folder_ / "a.json"));
+  EXPECT_EQ(result["schema"], "swarmcert/certify/1");
+  EXPECT_EQ(result["verdict"], "proved");
+  EXPECT_EQ(result["inputs"][0]["sha256"].get<std::string>().size(), 64U);
+  EXPECT_EQ(result["layers"][0]["network"], "network");
+  EXPECT_EQ(result["layers"][0]["name"], "fc1");
+  EXPECT_LE(result["layers"][0]["spectral_norm"][0], result["layers"][0]["spectral_norm"][1]);
+  EXPECT_EQ(result["layers"][0]["respects_gamma"], true);
+  const Json& bound = result["bounds"][0];
+  for (const char* key : {"function", "domain", "block", "law", "norm", "unit", "upper", "upper_method",
+                          "lower", "lower_witness"}) {
+    EXPECT_TRUE(bound.contains(key)) << key;
+  }
+  EXPECT_GE(bound["upper"].get<double>(), std::sqrt(10.0));
+  EXPECT_NEAR(bound["lower"].get<double>(), std::sqrt(10.0), 1e-6);
+}
+
+TEST_F(CommandLine, JsonOnStandardOutputSilencesTheText) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  const Outcome outcome = run("certify " + net + " --json -");
+  EXPECT_TRUE(Json::accept(outcome.output)) << outcome.output;
+}
+
+TEST_F(CommandLine, InspectDescribesNetworksAndCertificates) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  expect("inspect " + net, 0, {"float32", "fc1", "2 -> 2", "sha256"});
+  ASSERT_EQ(run("certify " + net + " -o cert.json").exit_code, 0);
+  expect("inspect cert.json " + net, 0, {"certificate", "upper"});
+}
+
+TEST_F(CommandLine, PublishedFloat32NetworksExceedGammaThreeInTwoLayers) {
+  SWARMCERT_NEEDS_DATA();
+  const std::string weights = tests::data_path("weights/zip_f32/");
+  int exceeded = 0;
+  for (const std::string kind : {"L", "S"}) {
+    const Outcome outcome =
+        run("certify --phi " + weights + "phi_" + kind + ".pth --rho " + weights + "rho_" + kind +
+            ".pth --gamma 3 --nodes 0 --method product --json out.json --force");
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+    const Json result = Json::parse(read_text(folder_ / "out.json"));
+    for (const Json& layer : result["layers"]) exceeded += layer["respects_gamma"] == false ? 1 : 0;
+  }
+  EXPECT_EQ(exceeded, 2);
+}
+
+}  // namespace
+}  // namespace swarmcert
