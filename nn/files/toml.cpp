@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <sstream>
 #include <string_view>
 
@@ -16,46 +18,71 @@ constexpr std::size_t kLargestToml_bytes = std::size_t{64} << 10;
 /// Dots in numbers and file names count as well, of which our files have a few hundred.
 constexpr std::ptrdiff_t kMostDots = 4000;
 
-/// Refuses what toml++ 3.3 reads in undefined ways: letters beyond ASCII outside of quotes and comments run into its
-/// __builtin_unreachable(). TOML allows them nowhere else.
-class Guard {
+/// The same document in ASCII alone. Letters beyond ASCII that toml++ 3.3 meets outside of quotes and comments run
+/// into its __builtin_unreachable(), and it disagrees with any simple rule about where a broken text has its quotes.
+/// So it gets none: they become "\UXXXXXXXX" in double quotes, "?" in comments, and are refused elsewhere.
+class AsciiWriter {
  public:
-  Guard(const std::string& text, const std::string& path) : text_(text), path_(path) {}
+  AsciiWriter(const std::string& text, const std::string& path) : text_(text), path_(path) {}
 
-  void run() {
+  std::string run() {
     if (text_.compare(0, 3, "\xef\xbb\xbf") == 0) at_ = 3;  // a byte order mark
-    for (; at_ < text_.size(); ++at_) {
+    char inside = '\0';                                     // the quote or '#' that opened what we are in
+    while (at_ < text_.size()) {
       const char c = text_[at_];
-      if (c == '#') {
-        skip_comment();
-      } else if (c == '"' || c == '\'') {
-        skip_string(c);
-      } else if (!is_of_bare_key(c) &&
-                 std::string_view(" \t\r\n=[]{},.+:").find(c) == std::string_view::npos) {
-        refuse("this character may stand in quotes only");
+      if (static_cast<unsigned char>(c) >= 0x80) {
+        write_letter(inside);
+        continue;
+      }
+      result_ += c;
+      ++at_;
+      if (inside == '"' && c == '\\' && at_ < text_.size() && static_cast<unsigned char>(text_[at_]) < 0x80) {
+        result_ += text_[at_++];
+      } else if (inside == '\0' && (c == '"' || c == '\'' || c == '#')) {
+        inside = c;
+      } else if (inside == '#' ? c == '\n' : c == inside) {
+        inside = '\0';
       }
     }
+    return result_;
   }
 
  private:
-  static bool is_of_bare_key(char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-  }
-
-  void skip_comment() {
-    while (at_ + 1 < text_.size() && text_[at_ + 1] != '\n') ++at_;
-  }
-
-  void skip_string(char quote) {
-    if (text_.compare(at_, 3, std::string(3, quote)) == 0) refuse("texts of several lines are not read");
-    for (++at_; at_ < text_.size() && text_[at_] != quote; ++at_) {
-      if (text_[at_] == '\n') refuse("the text has no closing quote");
-      if (quote == '"' && text_[at_] == '\\') ++at_;
+  void write_letter(char inside) {
+    if (inside == '#') {
+      result_ += '?';
+      ++at_;
+      return;
     }
+    if (inside != '"') refuse("this letter may stand in double quotes only");
+    char escape[16];
+    std::snprintf(escape, sizeof escape, "\\U%08X", static_cast<unsigned>(code_point()));
+    result_ += escape;
+  }
+
+  /// Reads one letter of two to four bytes (RFC 3629).
+  std::uint32_t code_point() {
+    const auto byte = [this](std::size_t i) {
+      return at_ + i < text_.size() ? static_cast<std::uint32_t>(static_cast<unsigned char>(text_[at_ + i]))
+                                    : 0;
+    };
+    const std::uint32_t first = byte(0);
+    const std::size_t size = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
+    std::uint32_t code = first & (0x7fu >> size);
+    bool is_valid = first >= 0xc2 && first < 0xf5;
+    for (std::size_t i = 1; i < size; ++i) {
+      is_valid = is_valid && (byte(i) & 0xc0u) == 0x80;
+      code = code << 6 | (byte(i) & 0x3fu);
+    }
+    const std::uint32_t least = size == 4 ? 0x10000 : size == 3 ? 0x800 : 0x80;
+    if (!is_valid || code < least || code > 0x10ffff || (code >= 0xd800 && code < 0xe000))
+      refuse("is not UTF-8");
+    at_ += size;
+    return code;
   }
 
   [[noreturn]] void refuse(const std::string& what) const {
-    const std::string before = text_.substr(0, std::min(at_, text_.size()));
+    const std::string before = text_.substr(0, at_);
     const std::size_t newline = before.rfind('\n');  // npos + 1 is 0
     throw InputError({path_,
                       "line " + std::to_string(std::count(before.begin(), before.end(), '\n') + 1) +
@@ -66,6 +93,7 @@ class Guard {
   const std::string& text_;
   const std::string& path_;
   std::size_t at_ = 0;
+  std::string result_;
 };
 
 std::string line(const toml::source_region& source) {
@@ -91,9 +119,9 @@ toml::table parse_toml(const std::string& text, const std::string& path) {
   if (std::count(text.begin(), text.end(), '.') > kMostDots) {
     throw InputError({path, "", "", "", "has more than " + std::to_string(kMostDots) + " dots", ""});
   }
-  Guard(text, path).run();
+  const std::string ascii = AsciiWriter(text, path).run();
   try {
-    return toml::parse(std::string_view(text), path);
+    return toml::parse(std::string_view(ascii), path);
   } catch (const toml::parse_error& error) {
     const toml::source_position& at = error.source().begin;
     throw InputError({path, "line " + std::to_string(at.line) + ", column " + std::to_string(at.column), "",

@@ -8,7 +8,7 @@
 
 namespace swarmcert::files {
 
-/// Parses a TOML document, without texts of several lines: no key of ours holds one.
+/// Parses a TOML document. Letters beyond ASCII may stand in comments and in texts in double quotes.
 /// @throws InputError with line and column if it is not TOML, is larger than 64 KiB or nests thousands of keys.
 toml::table parse_toml(const std::string& text, const std::string& path);
 

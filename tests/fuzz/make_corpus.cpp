@@ -77,6 +77,7 @@ void add_networks(Corpus& corpus) {
   const std::string minimal =
       "schema = \"swarmcert/network/1\"\n[phi.small]\nweights = \"6x20\"\n[rho.small]\nweights = \"20x1\"\n";
   corpus.add(minimal);
+  corpus.add("# \xc3\xa4\n" + minimal + "[phi.\"\xe2\x82\xac\"]\nweights = \"\xc3\xbc/6x20\"\n");
   corpus.add(minimal + "[phi.ground]\nweights = \"4x20\"\n[phi.large]\nweights = \"6x20\"\n");
   corpus.add(
       "schema = \"swarmcert/network/1\"\n"
