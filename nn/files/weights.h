@@ -40,7 +40,7 @@ struct Weights {
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
 /// and legacy pickle, float32 and float64, strided views), safetensors.
 /// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`; layers follow one another in the
-/// file's own order (by natural order of names in safetensors, which has none).
+/// file's own order. Safetensors has no order: ours state theirs, those of others are taken by natural order of the names.
 /// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top.
 /// @throws InputError for anything that is not such a network: it names offset, field, value and mend.
 Weights load_weights(const std::string& path, const std::string& key = "");
@@ -49,7 +49,7 @@ Weights load_weights(const std::string& path, const std::string& key = "");
 Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key = "");
 
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
-/// @throws InputError if the file exists and `overwrite` is false.
+/// @throws InputError if the file exists and `overwrite` is false, or if the name of a layer is not UTF-8.
 void save_safetensors(const Weights& weights, const std::string& path, bool overwrite);
 
 /// The evaluator's view of a network, with the arrays it points to.
@@ -57,6 +57,7 @@ void save_safetensors(const Weights& weights, const std::string& path, bool over
 template <typename Scalar>
 class Evaluator {
  public:
+  /// @throws InputError if a weight is beyond the range of Scalar.
   explicit Evaluator(const Weights& weights);
   Evaluator(const Evaluator&) = delete;
   Evaluator& operator=(const Evaluator&) = delete;
@@ -65,6 +66,7 @@ class Evaluator {
   nn::Mlp<Scalar> mlp() const { return {layers_.data(), static_cast<int>(layers_.size())}; }
 
   /// f(x); `input` has mlp().inputs() entries, the result mlp().outputs().
+  /// @throws std::invalid_argument if `input` has another length.
   std::vector<Scalar> operator()(const std::vector<Scalar>& input) const;
 
  private:
