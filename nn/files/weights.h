@@ -40,7 +40,7 @@ struct Weights {
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
 /// and legacy pickle, float32 and float64, strided views), safetensors.
 /// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`; layers follow one another in the
-/// file's own order. Safetensors has no order: ours state theirs, those of others are taken by natural order of the names.
+/// file's own order. Safetensors has none: ours state it, those of others are taken by natural order of names.
 /// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top.
 /// @throws InputError for anything that is not such a network: it names offset, field, value and mend.
 Weights load_weights(const std::string& path, const std::string& key = "");
