@@ -58,7 +58,8 @@ struct NetworkArguments {
   std::string key;       ///< see load_weights(); holds for every weight file
 };
 
-/// Loads NET. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files named in a network.toml are relative to its folder.
+/// Loads NET. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files
+/// named in a network.toml are relative to its folder.
 /// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean.
 Network load_network(const NetworkArguments& arguments);
 

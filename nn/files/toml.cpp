@@ -14,8 +14,8 @@ namespace swarmcert::files {
 namespace {
 
 constexpr std::size_t kLargestToml_bytes = std::size_t{64} << 10;
-/// Every dot of a key "a.b.c" opens a table, and toml++ destroys nested tables recursively: 30 000 overflow the stack.
-/// Dots in numbers and file names count as well, of which our files have a few hundred.
+/// Every dot of a key "a.b.c" opens a table, and toml++ destroys nested tables recursively: 30 000 overflow the
+/// stack. Dots in numbers and file names count as well, of which our files have a few hundred.
 constexpr std::ptrdiff_t kMostDots = 4000;
 
 /// The same document in ASCII alone. Letters beyond ASCII that toml++ 3.3 meets outside of quotes and comments run
