@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "analysis/certify_report.h"
 #include "analysis/commands/command.h"
 #include "analysis/progress.h"
 #include "lipschitz/certify.h"
@@ -22,6 +23,7 @@ struct Options {
   files::NetworkArguments network;
   std::string method = "auto";
   std::string output;
+  std::string report;
   double gamma = 0;
   double max_lipschitz = 0;
   lipschitz::CertifyOptions certify;
@@ -161,7 +163,7 @@ void print_bounds(const files::Network& network, const Certification& found) {
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   refuse_to_replace(common, common.json);
-  const files::Network network = load_network(options.network);
+  const files::Network network = load_net(options.network);
   if (options.gamma != 0) options.certify.gamma = files::GammaStatement{options.gamma};
   options.certify.method = options.method == "sdp"       ? lipschitz::UpperMethod::kSdp
                            : options.method == "product" ? lipschitz::UpperMethod::kProduct
@@ -187,6 +189,10 @@ int run(Options options, const CommonOptions& common) {
       fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
     if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
     fmt::print("verdict: {}\n", name(verdict));
+  }
+  if (!options.report.empty()) {
+    const std::string path = write_certify_report(network, found, verdict, options.report, common.force);
+    if (common.prints_text()) fmt::print("report: {}\n", path);
   }
   return verdict == Verdict::kProved ? kDone : verdict == Verdict::kRefuted ? kViolated : kInconclusive;
 }
@@ -226,6 +232,7 @@ Command certify_command() {
             app.add_option("--seed", options->certify.seed, "Of the search for lower bounds")
                 ->capture_default_str();
             app.add_option("-o,--output", options->output, "Where the certificate goes");
+            app.add_option("--report", options->report, "Folder for an HTML report with its plots");
             return [options](const CommonOptions& common) { return run(*options, common); };
           }};
 }

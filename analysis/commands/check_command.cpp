@@ -15,7 +15,7 @@ struct Options {
 
 int run(const Options& options, const CommonOptions& common) {
   const files::Json certificate = files::read_json(options.certificate, check::kCertificateSchema);
-  const files::Network network = load_network(options.network);
+  const files::Network network = load_net(options.network);
   const check::CheckResult verdict = check::check(certificate, network);
 
   std::vector<std::string> inputs = {options.certificate};

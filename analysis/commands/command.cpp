@@ -37,7 +37,7 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   app.add_option("--key", arguments.key, "Where the state dict lies inside a nested checkpoint, e.g. model");
 }
 
-files::Network load_network(const files::NetworkArguments& arguments) {
+files::Network load_net(const files::NetworkArguments& arguments) {
   if (arguments.file.empty() && arguments.phi.empty()) {
     throw UsageError("no network: name a network.toml, one weight file, or --phi F --rho F");
   }

@@ -54,7 +54,7 @@ struct UsageError : std::runtime_error {
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
 /// Loads NET. @throws UsageError if nothing was named; files::InputError as files::load_network() does.
-files::Network load_network(const files::NetworkArguments& arguments);
+files::Network load_net(const files::NetworkArguments& arguments);
 
 /// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line
 /// without what may not change the result (--jobs, -q, --json, -o, --report, --force).

@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <memory>
 
+#include "analysis/certify_report.h"
 #include "analysis/commands/command.h"
+#include "analysis/progress.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
 #include "nn/files/file_io.h"
@@ -29,16 +31,21 @@ int run(const Options& options, const CommonOptions& common) {
   files::NetworkArguments arguments;
   arguments.file = (bundled_networks() / "demo/network.toml").string();
   const std::filesystem::path folder = options.output;
-  std::filesystem::create_directories(folder);
   const std::string certificate_path = (folder / "cert.json").string();
+  refuse_to_replace(common, certificate_path);
+  std::filesystem::create_directories(folder);
 
   fmt::print("1. Certify the bundled network: swarmcert certify {} -o {}\n", arguments.file,
              certificate_path);
   const files::Network network = files::load_network(arguments);
   lipschitz::CertifyOptions certify_options;
   certify_options.jobs = common.jobs;
+  Progress progress(common.quiet);
+  certify_options.progress = [&progress](int done, int total, const std::string& what) {
+    progress.show(done, total, what);
+  };
   const lipschitz::Certification found = certify(network, certify_options);
-  files::write_file(certificate_path, files::to_text(certificate(network, found)), true);
+  files::write_file(certificate_path, files::to_text(certificate(network, found)), common.force);
   for (const lipschitz::CertifiedBound& bound : found.bounds) {
     fmt::print("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}\n", bound.function,
                bound.upper.value(), bound.witness ? bound.witness->slope.value() : 0.0,
@@ -49,6 +56,10 @@ int run(const Options& options, const CommonOptions& common) {
   const check::CheckResult checked =
       check::check(files::read_json(certificate_path, check::kCertificateSchema), network);
   fmt::print("   {}: {}\n", checked.accepted ? "accepted" : "rejected", checked.reason);
+
+  const std::string report = write_certify_report(network, found, lipschitz::Verdict::kProved,
+                                                  (folder / "report").string(), common.force);
+  fmt::print("3. Look at the report: {}\n", report);
 
   files::Json result = result_head("demo", input_files(network));
   result["certificate"] = certificate_path;

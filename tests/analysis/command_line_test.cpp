@@ -66,7 +66,9 @@ TEST_F(CommandLine, MisspeltCommandsAndOptionsAreUsageErrorsWithASuggestion) {
   expect("certify --phi a", 2, {"--rho"});
 }
 
-TEST_F(CommandLine, NoNetworkIsAUsageErrorThatSaysWhatToGive) { expect("certify", 2, {"--phi", "network.toml"}); }
+TEST_F(CommandLine, NoNetworkIsAUsageErrorThatSaysWhatToGive) {
+  expect("certify", 2, {"--phi", "network.toml"});
+}
 
 TEST_F(CommandLine, BadInputNamesFileFieldValueAndMend) {
   expect("certify nowhere.pth", 3, {"nowhere.pth"});
@@ -157,6 +159,16 @@ TEST_F(CommandLine, JsonOnStandardOutputSilencesTheText) {
   const std::string net = saved(small_network(), "net.safetensors");
   const Outcome outcome = run("certify " + net + " --json -");
   EXPECT_TRUE(Json::accept(outcome.output)) << outcome.output;
+}
+
+TEST_F(CommandLine, ReportIsOneFileThatNeedsNothingElse) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  expect("certify " + net + " --report report", 0, {"report/report.html"});
+  const std::string html = read_text(folder_ / "report/report.html");
+  EXPECT_NE(html.find("<svg"), std::string::npos) << "gnuplot drew nothing";
+  EXPECT_EQ(html.find("src="), std::string::npos) << "refers to another file";
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "report/bounds.dat"));
+  expect("certify " + net + " --report report", 3, {"report", "--force"});
 }
 
 TEST_F(CommandLine, InspectDescribesNetworksAndCertificates) {

@@ -1,0 +1,10 @@
+# Makes the bundled networks again and compares every byte: cmake -DGENERATE=tool -DEXPECTED=folder -DSCRATCH=folder -P ...
+file(REMOVE_RECURSE ${SCRATCH})
+execute_process(COMMAND ${GENERATE} ${SCRATCH} COMMAND_ERROR_IS_FATAL ANY)
+foreach(name phi.safetensors rho.safetensors)
+  file(SHA256 ${EXPECTED}/${name} expected)
+  file(SHA256 ${SCRATCH}/${name} made)
+  if(NOT expected STREQUAL made)
+    message(FATAL_ERROR "${name}: generate.cpp makes other bytes than those in ${EXPECTED}")
+  endif()
+endforeach()
