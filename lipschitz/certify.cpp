@@ -59,12 +59,13 @@ constexpr int kMostNeighbours = 3;
 void search_lower(const Network& network, const CertifyOptions& options, std::uint64_t seed,
                   CertifiedBound& bound) {
   const bool is_set = files::networks_of(bound.function).size() == 2;
-  for (int neighbours = 1; neighbours <= (is_set ? kMostNeighbours : 1); ++neighbours) {
+  const int cases = is_set ? kMostNeighbours : 1;  // they share the rounds and the seconds
+  for (int neighbours = 1; neighbours <= cases; ++neighbours) {
     SearchTarget target = search_target(network, bound.function, neighbours);
     SlopeSearchOptions search;
     search.seed = seed + static_cast<std::uint64_t>(neighbours) * 1000003;
-    search.rounds = options.search_rounds;
-    search.seconds = options.search_seconds;
+    search.rounds = (options.search_rounds + cases - 1) / cases;
+    search.seconds = options.search_seconds / cases;
     search.cancelled = options.cancelled;
     SlopeWitness found = search_slope(target.function, search);
     if (!bound.witness || found.slope.value() > bound.witness->slope.value()) {
