@@ -8,60 +8,28 @@
 #include <unordered_set>
 #include <vector>
 
+#include "lipschitz/linear_region.h"
 #include "lipschitz/search_network.h"
+#include "lipschitz/search_random.h"
 
 namespace swarmcert::lipschitz {
 
-/// Pseudo-random numbers with the same bits everywhere (splitmix64, Steele et al. 2014).
-class SearchRandom {
- public:
-  explicit SearchRandom(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t bits();
-  /// Uniform in [0, 1).
-  double uniform();
-  /// Sum of twelve uniform numbers, minus 6: variance 1, near enough to a normal distribution, and no libm in it.
-  double bell();
-
- private:
-  std::uint64_t state_;
-};
-
-/// The network around a point z: on its linear region, f(z') = f(z) + J (z' - z).
-struct LinearRegion {
-  Eigen::VectorXd
-      distances;  ///< [neurons] y_i / |dy_i/dz|: signed distance to neuron i's kink; 0 where it has none
-  Eigen::MatrixXd
-      normals;  ///< [variables x neurons] dy_i/dz, normalised; zero columns where there is no kink
-  Eigen::VectorXd lengths;  ///< [neurons] |dy_i/dz|
-  Eigen::MatrixXd effects;  ///< [outputs x neurons] df/dh_i of the neuron's output h_i
-  Eigen::MatrixXd
-      jacobian;           ///< [outputs x block] with respect to the inputs in the block, in their own units
-  std::vector<char> on;   ///< [neurons]
-  std::uint64_t pattern;  ///< hash of `on`
-};
-
-/// The linear region that z lies in (at a kink, the neuron counts as off).
-LinearRegion linear_region(const SearchNetwork& network, const Eigen::VectorXd& z);
-
-/// The largest singular value of the Jacobian at z with respect to the block (an estimate, not proven).
-double local_slope(const SearchNetwork& network, const Eigen::VectorXd& z);
-
-/// How far z + t * direction stays in the region and, where variables have bounds, within them: lower < 0 < upper.
-struct Chord {
-  double lower, upper;
-};
-Chord chord(const SearchNetwork& network, const LinearRegion& region, const Eigen::VectorXd& z,
-            const Eigen::VectorXd& direction);
-
 /// Maximises the local slope by walking from linear region to linear region.
 ///
-/// A walk starts at the steepest of some random points. It keeps the regions that it has seen but not entered in a
-/// queue and enters the steepest one: it moves to the analytic centre of that region (the minimiser of
-/// -sum_i log|y_i| minus the logarithms of the distances to the bounds, or plus |z|^2 / R^2 where there are none),
-/// and from there shoots a ray at every kink, along H^-1 dy_i/dz with the Hessian H of that barrier, which sees
-/// narrow regions as round. The first kink on a ray is a facet; crossing it switches one neuron i, so that the
-/// Jacobian behind it is J +- df/dh_i (dy_i/dz)', without another evaluation of the network. A walk ends when
-/// kPatience regions in a row were no steeper than the best one; regions once entered are not entered again.
+/// A walk starts at the steepest of some random points. It keeps what it has seen but not entered in a queue and
+/// enters the steepest: it moves to the analytic centre of that region (the minimiser of -sum_i log|y_i| minus the
+/// logarithms of the distances to the bounds, or plus |z|^2 / R^2 where there are none), and from there shoots a ray
+/// at every kink, along H^-1 dy_i/dz with the Hessian H of that barrier, which sees narrow regions as round. The
+/// first kink on a ray is a facet; crossing it switches one neuron i, so that the Jacobian behind it is
+/// J +- df/dh_i (dy_i/dz)', without another evaluation of the network.
+///
+/// Kinks of neighbours that do not move leave the Jacobian as it is. Rays pass through them, and regions that differ
+/// in them alone count as one; otherwise a walk would drown in regions of equal slope. Behind such kinks the estimate
+/// is rough, so every region's slope is evaluated before it is entered, and it goes back into the queue where that
+/// is not the steepest after all.
+///
+/// A walk ends when kPatience regions in a row were no steeper than its best one; regions once entered are not
+/// entered again.
 ///
 /// The slope found is an estimate, not a bound; nothing limits how far it is from the maximum.
 class RegionWalk {
@@ -84,19 +52,28 @@ class RegionWalk {
 
  private:
   struct Candidate {
-    double slope;  ///< estimate from the region next to it
+    double slope;
     Eigen::VectorXd z;
+    bool evaluated;  ///< whether `slope` is the slope at z, or an estimate from the region next to it
     bool operator<(const Candidate& other) const { return slope < other.slope; }
   };
 
   Eigen::VectorXd random_point();
   void start_walk();
-  void enter_steepest();
+  /// Takes the steepest candidate from the queue, once evaluated; false where it was entered before.
+  bool take_steepest(Eigen::VectorXd& z);
+  void enter(Eigen::VectorXd z);
   void keep(const Eigen::VectorXd& z, double slope);
   void queue_neighbours(const LinearRegion& region, const Eigen::VectorXd& z);
+  struct Hit;
+  Hit first_hit(const Eigen::VectorXd& rates, const Eigen::VectorXd& ray, const Eigen::VectorXd& z) const;
+  /// Slope behind the facet of `neuron`, from the Gram matrix here and its top eigenvector: at most the true one.
+  double slope_behind(const LinearRegion& region, Eigen::Index neuron, const Eigen::MatrixXd& square,
+                      const Eigen::VectorXd& top) const;
 
   const SearchNetwork& network_;
   SearchRandom random_;
+  bool all_move_;     ///< every neuron depends on the moved vector, so that what lies behind a facet is exact
   double reach_ = 1;  ///< R of the current walk
   std::priority_queue<Candidate> queue_;
   std::unordered_set<std::uint64_t> queued_;   ///< in the current walk

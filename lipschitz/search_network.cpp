@@ -22,7 +22,8 @@ VectorXd biases(const files::Layer& layer) {
 }
 
 SearchStage stage(const files::Layer& layer) {
-  return {matrix(layer), biases(layer), std::vector<char>(static_cast<std::size_t>(layer.outputs), 0)};
+  return {matrix(layer), biases(layer), std::vector<char>(static_cast<std::size_t>(layer.outputs), 0),
+          layer.outputs};
 }
 
 /// Stage k of the terms side by side. A term that has no hidden layer k passes its values on.
@@ -36,7 +37,7 @@ SearchStage side_by_side(const std::vector<Term>& terms, std::size_t k, std::vec
     } else {
       const int width = widths[j];
       parts.push_back({MatrixXd::Identity(width, width), VectorXd::Zero(width),
-                       std::vector<char>(static_cast<std::size_t>(width), 1)});
+                       std::vector<char>(static_cast<std::size_t>(width), 1), width});
     }
   }
   Eigen::Index rows = 0;
@@ -45,7 +46,7 @@ SearchStage side_by_side(const std::vector<Term>& terms, std::size_t k, std::vec
     rows += part.weights.rows();
     cols += part.weights.cols();
   }
-  SearchStage result{MatrixXd::Zero(rows, cols), VectorXd(rows), {}};
+  SearchStage result{MatrixXd::Zero(rows, cols), VectorXd(rows), {}, parts.front().moved};
   rows = cols = 0;
   for (std::size_t j = 0; j < parts.size(); ++j) {
     const SearchStage& part = parts[j];
@@ -167,6 +168,11 @@ int SearchNetwork::neurons() const {
   return static_cast<int>(count);
 }
 
+int SearchNetwork::moved_variables() const {
+  const auto end = std::lower_bound(coordinate.begin(), coordinate.end(), moved_inputs);
+  return static_cast<int>(end - coordinate.begin());
+}
+
 VectorXd SearchNetwork::inputs(const VectorXd& z) const {
   VectorXd result = fixed_inputs;
   for (int v = 0; v < variables(); ++v) result[coordinate[v]] = centre[v] + scale[v] * z[v];
@@ -179,6 +185,7 @@ SearchNetwork search_network(const SlopeFunction& f, const std::vector<std::opti
   terms.insert(terms.end(), f.others.begin(), f.others.end());
   SearchNetwork result;
   result.stages = chain(f, terms);
+  result.moved_inputs = f.moved.network->inputs();
 
   std::vector<double> inputs;
   const std::vector<Interval> intervals = reachable(terms, boxes, inputs);
@@ -191,7 +198,7 @@ SearchNetwork search_network(const SlopeFunction& f, const std::vector<std::opti
     seen[k] = lower;
     if (!(lower < upper)) continue;
     seen[k] = 0;
-    if (k < f.moved.network->inputs() && (block.empty() || std::count(block.begin(), block.end(), k) > 0)) {
+    if (k < result.moved_inputs && (block.empty() || std::count(block.begin(), block.end(), k) > 0)) {
       result.block.push_back(result.variables());
     }
     const bool bounded = std::isfinite(lower) && std::isfinite(upper);

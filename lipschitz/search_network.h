@@ -10,16 +10,17 @@
 
 namespace swarmcert::lipschitz {
 
-/// One stage y = W z + b of the chain. A neuron with `passes[i]` hands y_i on unchanged: it carries a value past the
-/// stages of deeper neighbours and has no kink.
+/// One stage y = W z + b of the chain.
 struct SearchStage {
   Eigen::MatrixXd weights;
   Eigen::VectorXd biases;
+  /// Per neuron: hands y_i on unchanged. It carries a value past the stages of deeper neighbours, without a kink.
   std::vector<char> passes;
+  /// The first `moved` neurons depend on the moved vector. The others cannot, nor can their kinks change the slope.
+  int moved = 0;
 };
 
-/// What a search works on: the value before the last stage's output is not rounded in any proven way, for a search
-/// only proposes points.
+/// What a search works on. Its weights were multiplied out in double: a search only proposes points.
 ///
 /// The variables z are the input coordinates that the domain leaves free, of the moved vector first and then of the
 /// other neighbours, one by one: x = centre + scale * z, coordinate by coordinate. A coordinate in an interval has
@@ -29,14 +30,15 @@ struct SearchNetwork {
   std::vector<SearchStage> stages;
   Eigen::VectorXd centre, scale;
   std::vector<char> boxed;  ///< per variable: -1 <= z <= 1
-  std::vector<int>
-      block;  ///< variables (a subset of the moved vector's) with respect to which f is differentiated
+  /// Variables with respect to which f is differentiated, ascending; they belong to the moved vector.
+  std::vector<int> block;
   std::vector<int>
       coordinate;  ///< per variable: its index in (x, x_1, x_2, ...), the inputs one after the other
-  Eigen::VectorXd
-      fixed_inputs;  ///< (x, x_1, x_2, ...) with the values of the coordinates that are not variables
+  Eigen::VectorXd fixed_inputs;  ///< (x, x_1, x_2, ...), with values where a coordinate is not a variable
+  int moved_inputs = 0;          ///< length of x
 
   int variables() const { return static_cast<int>(coordinate.size()); }
+  int moved_variables() const;
   int outputs() const { return static_cast<int>(stages.back().weights.rows()); }
   int neurons() const;  ///< in hidden stages, those that pass included
 

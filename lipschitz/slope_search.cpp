@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "lipschitz/linear_region.h"
 #include "lipschitz/region_walk.h"
 #include "lipschitz/search_network.h"
 

@@ -1,9 +1,8 @@
-#include "lipschitz/checker/check.h"
-
 #include <cctype>
 #include <functional>
 
 #include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
 #include "lipschitz/networks.h"
 #include "nn/files/content_hash.h"
 #include "nn/files/file_io.h"
@@ -30,7 +29,8 @@ const Network& network() {
     net.clamp = files::InputClamp{{-1, -1, -1, -2, -2, -2}, {1, 1, 1, 2, 2, 2}};
     int number = 0;
     for (auto* kinds : {&net.phi, &net.rho}) {
-      for (auto& [kind, weights] : *kinds) weights.sha256 = files::sha256("weights " + std::to_string(number++));
+      for (auto& [kind, weights] : *kinds)
+        weights.sha256 = files::sha256("weights " + std::to_string(number++));
     }
     return net;
   }();
@@ -113,14 +113,16 @@ TEST(Checker, RejectsEveryChangedField) {
 TEST(Checker, RejectsEveryChangedFieldEvenWithAForgedContentHash) {
   int tried = 0;
   for (const std::string& pointer : leaves(certificate())) {
-    if (pointer == "/tool" || pointer == "/content_sha256") continue;  // the one states nothing, the other is forged
+    if (pointer == "/tool" || pointer == "/content_sha256")
+      continue;  // the one states nothing, the other is forged
     if (certificate()[Json::json_pointer(pointer)].is_null()) continue;
     if (certificate()[Json::json_pointer(pointer)].is_structured()) continue;
     Json changed = certificate();
     Json& value = changed[Json::json_pointer(pointer)];
     value = altered(value, pointer);
     const std::string::size_type rows = pointer.find("/factor/rows/");
-    if (rows != std::string::npos) {  // one digit in the last place may stay within the proof's slack: change many
+    if (rows !=
+        std::string::npos) {  // one digit in the last place may stay within the proof's slack: change many
       value = certificate()[Json::json_pointer(pointer)].get<std::string>() + "7";
     }
     const check::CheckResult result = check(rehashed(changed), network());
@@ -188,7 +190,8 @@ TEST(Checker, RejectsOtherWeightsPhiForRhoAndAnotherDescription) {
     EXPECT_NE(result.reason.find(because), std::string::npos) << result.reason;
   };
   rejects([](Network& net) { net.phi["small"].sha256[5] ^= 1; }, "network.weights.phi:small");
-  rejects([](Network& net) { net.rho["large"].precision = files::Precision::kFloat64; }, "network.weights.rho:large");
+  rejects([](Network& net) { net.rho["large"].precision = files::Precision::kFloat64; },
+          "network.weights.rho:large");
   rejects([](Network& net) { std::swap(net.rho["small"], net.rho["large"]); }, "network.weights.rho");
   rejects([](Network& net) { net.sha256[0] ^= 1; }, "description_sha256");
   rejects([](Network& net) { net.rho.erase("large"); }, "another number of networks");
@@ -233,7 +236,8 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c["bounds"].back()["proof"]["rho"] = "0x0p+0"; });
   rejects([](Json& c) { c["bounds"].back()["proof"]["rho"] = "1e5"; });
   rejects([](Json& c) { c["bounds"].back()["lower"] = nullptr; });
-  rejects([](Json& c) { c["bounds"].back()["lower_witness"]["y"] = c["bounds"].back()["lower_witness"]["x"]; });
+  rejects(
+      [](Json& c) { c["bounds"].back()["lower_witness"]["y"] = c["bounds"].back()["lower_witness"]["x"]; });
   rejects([](Json& c) { c["bounds"].back()["lower_witness"]["others"] = Json::array(); });
   rejects([](Json& c) { c["bounds"].back()["lower_witness"]["others"][0]["network"] = "rho:small"; });
   rejects([](Json& c) { c["layers"][0]["proof"]["lower_vector"].erase(0); });
@@ -259,7 +263,8 @@ TEST(Checker, CertificateBytesAreTheSameForAnyNumberOfJobs) {
   for (const int jobs : {1, 2, 5}) {
     lipschitz::CertifyOptions options = quick();
     options.jobs = jobs;
-    const std::string text = files::to_text(lipschitz::certificate(network(), lipschitz::certify(network(), options)));
+    const std::string text =
+        files::to_text(lipschitz::certificate(network(), lipschitz::certify(network(), options)));
     if (first.empty()) first = text;
     EXPECT_EQ(text, first) << jobs << " jobs";
   }

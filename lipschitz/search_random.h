@@ -1,0 +1,47 @@
+/// @file Pseudo-random numbers of the searches, with the same bits on every platform.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace swarmcert::lipschitz {
+
+/// splitmix64 (Steele, Lea, Flood 2014).
+class SearchRandom {
+ public:
+  explicit SearchRandom(std::uint64_t seed) : state_(seed) {}
+
+  std::uint64_t bits() {
+    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+  }
+
+  /// Uniform in [0, 1).
+  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+
+  /// Sum of twelve uniform numbers, minus 6: variance 1, near enough to a normal distribution, and no libm in it.
+  double bell() {
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) sum += uniform();
+    return sum;
+  }
+
+  /// low * (high / low)^u for a uniform u, 0 < low <= high; the power by the binary digits of u and square roots.
+  double log_uniform(double low, double high) {
+    double value = low;
+    double ratio = high / low;
+    const std::uint64_t digits = bits();
+    for (int i = 0; i < 24; ++i) {
+      ratio = std::sqrt(ratio);
+      if ((digits >> i & 1) != 0) value *= ratio;
+    }
+    return value;
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+}  // namespace swarmcert::lipschitz
