@@ -56,18 +56,36 @@ SearchTarget search_target(const Network& network, const std::string& function, 
 /// Numbers of neighbours at which a set function is searched: more rarely steepen it further.
 constexpr int kMostNeighbours = 3;
 
+/// Rounds that keep the search of a function to seconds: a region costs about (weights) x (moving inputs).
+int default_rounds(const Network& network, const std::string& function) {
+  const std::map<std::string, const Weights*> parts = files::parts(network);
+  const std::vector<std::string> names = files::networks_of(function);
+  double weights = 0;
+  for (const std::string& name : names) {
+    for (const files::Layer& layer : parts.at(name)->layers)
+      weights += static_cast<double>(layer.weights.size());
+  }
+  constexpr double kPapersCost = 4.3e3 * 40;  // rho 40-40-40-40-1
+  const double cost = weights * parts.at(names[0])->inputs();
+  return static_cast<int>(
+      std::clamp(kDefaultSearchRounds * kPapersCost / cost, 2.0, 1.0 * kDefaultSearchRounds));
+}
+
 void search_lower(const Network& network, const CertifyOptions& options, std::uint64_t seed,
                   CertifiedBound& bound) {
   const bool is_set = files::networks_of(bound.function).size() == 2;
+  const int rounds = options.search_rounds.value_or(default_rounds(network, bound.function));
+  if (rounds == 0) return;
   const int cases = is_set ? kMostNeighbours : 1;  // they share the rounds and the seconds
   for (int neighbours = 1; neighbours <= cases; ++neighbours) {
     SearchTarget target = search_target(network, bound.function, neighbours);
     SlopeSearchOptions search;
     search.seed = seed + static_cast<std::uint64_t>(neighbours) * 1000003;
-    search.rounds = (options.search_rounds + cases - 1) / cases;
+    search.rounds = (rounds + cases - 1) / cases;
     search.seconds = options.search_seconds / cases;
     search.cancelled = options.cancelled;
     SlopeWitness found = search_slope(target.function, search);
+    bound.search_rounds += found.rounds_done;
     if (!bound.witness || found.slope.value() > bound.witness->slope.value()) {
       bound.witness = std::move(found);
       bound.other_networks = std::move(target.other_networks);
@@ -157,7 +175,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
       }
       report("upper bound of " + bound.function);
     } else {
-      if (options.search_rounds > 0) search_lower(network, options, options.seed, bound);
+      search_lower(network, options, options.seed, bound);
       report("lower bound of " + bound.function);
     }
   });

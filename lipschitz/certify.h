@@ -25,9 +25,11 @@ enum class UpperMethod {
 
 struct CertifyOptions {
   UpperMethod method = UpperMethod::kAuto;
-  std::optional<files::GammaStatement> gamma;    ///< overrides what network.toml states
-  std::uint64_t seed = 1;                        ///< of the search for lower bounds
-  int search_rounds = kDefaultSearchRounds;      ///< per function; 0: no lower bounds
+  std::optional<files::GammaStatement> gamma;  ///< overrides what network.toml states
+  std::uint64_t seed = 1;                      ///< of the search for lower bounds
+  /// Per function; 0: no lower bounds. Nothing: kDefaultSearchRounds, fewer for networks much larger than the paper's,
+  /// for which a round takes longer.
+  std::optional<int> search_rounds;
   double search_seconds = 0;                     ///< per function; stops at the end of a round; 0: no limit
   int jobs = 0;                                  ///< threads; 0: all. Results do not depend on it.
   const std::atomic<bool>* cancelled = nullptr;  ///< upper bounds found so far are kept
@@ -51,6 +53,7 @@ struct CertifiedBound {
   UpperBound product{0};                ///< product of spectral norms, for comparison
   SdpBound sdp;                         ///< how the semidefinite program went; its proof is moved to `proof`
   std::optional<SlopeWitness> witness;  ///< proves the lower bound
+  int search_rounds = 0;                ///< that the search for it ran
   std::vector<std::string> other_networks;  ///< of witness->others, "phi:<kind>" each
 };
 

@@ -92,7 +92,8 @@ Json result_json(const Options& options, const files::Network& network, const Ce
                  {"upper_method", name(bound.method)},
                  {"lower", nullptr},
                  {"lower_witness", witness_json(bound)},
-                 {"product_upper", bound.product.value()}};
+                 {"product_upper", bound.product.value()},
+                 {"search_rounds", bound.search_rounds}};
     if (bound.witness) json["lower"] = bound.witness->slope.value();
     if (bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) json["sdp_stop"] = name(bound.sdp.stop);
     bounds.push_back(std::move(json));
@@ -151,13 +152,15 @@ void print_bounds(const files::Network& network, const Certification& found) {
                bound.witness ? fmt::format("{:.8g}", lower) : "-",
                lower > 0 ? fmt::format("{:.3f}", bound.upper.value() / lower) : "-",
                files::unit(network, bound.function));
-    if (bound.method == lipschitz::UpperMethod::kProduct &&
-        bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) {
-      fmt::print("    the semidefinite program gave no smaller bound that could be proved: {}\n",
+    const bool unproved = !bound.proof && !bound.sdp.proof;
+    if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) {
+      fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
                  name(bound.sdp.stop));
     }
   }
-  fmt::print("  set: per neighbour that moves, whatever the number and the places of the others\n");
+  if (!network.rho.empty()) {
+    fmt::print("  set: per neighbour that moves, whatever the number and the places of the others\n");
+  }
 }
 
 int run(Options options, const CommonOptions& common) {
@@ -200,41 +203,43 @@ int run(Options options, const CommonOptions& common) {
 }  // namespace
 
 Command certify_command() {
-  return {"certify", "Spectral norms and Lipschitz bounds of a network that hold in exact arithmetic",
-          "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
-          "the proofs\n"
-          "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
-          "float32 points.\n"
-          "Verdict: proved (exit 0), refuted (1) or inconclusive (4), of --gamma and --max-lipschitz where "
-          "given, and of\n"
-          "the gamma that a network.toml states.\n\n"
-          "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
-          [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
-            declare_network(app, options->network);
-            app.add_option(
-                   "--method", options->method,
-                   "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), or auto, the smaller one")
-                ->check(CLI::IsMember({"auto", "product", "sdp"}))
-                ->capture_default_str();
-            app.add_option("--gamma", options->gamma, "Limit that every layer's spectral norm must keep")
-                ->check(CLI::PositiveNumber);
-            app.add_option("--max-lipschitz", options->max_lipschitz,
-                           "Limit on the Lipschitz constant of the network, or of every set function")
-                ->check(CLI::PositiveNumber);
-            app.add_option("--nodes", options->certify.search_rounds,
-                           "Rounds of the search for lower bounds, per function; 0: none")
-                ->check(CLI::NonNegativeNumber)
-                ->capture_default_str();
-            app.add_option("--time", options->certify.search_seconds,
-                           "End the search for a lower bound after the round in which this many seconds pass")
-                ->check(CLI::PositiveNumber);
-            app.add_option("--seed", options->certify.seed, "Of the search for lower bounds")
-                ->capture_default_str();
-            app.add_option("-o,--output", options->output, "Where the certificate goes");
-            app.add_option("--report", options->report, "Folder for an HTML report with its plots");
-            return [options](const CommonOptions& common) { return run(*options, common); };
-          }};
+  return {
+      "certify", "Spectral norms and Lipschitz bounds of a network that hold in exact arithmetic",
+      "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
+      "the proofs\n"
+      "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
+      "float32 points.\n"
+      "Verdict: proved (exit 0), refuted (1) or inconclusive (4), of --gamma and --max-lipschitz where "
+      "given, and of\n"
+      "the gamma that a network.toml states.\n\n"
+      "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<Options>();
+        declare_network(app, options->network);
+        app.add_option(
+               "--method", options->method,
+               "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), or auto, the smaller one")
+            ->check(CLI::IsMember({"auto", "product", "sdp"}))
+            ->capture_default_str();
+        app.add_option("--gamma", options->gamma, "Limit that every layer's spectral norm must keep")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--max-lipschitz", options->max_lipschitz,
+                       "Limit on the Lipschitz constant of the network, or of every set function")
+            ->check(CLI::PositiveNumber);
+        app.add_option(
+               "--nodes", options->certify.search_rounds,
+               "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
+               "networks)")
+            ->check(CLI::NonNegativeNumber);
+        app.add_option("--time", options->certify.search_seconds,
+                       "End the search for a lower bound after the round in which this many seconds pass")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--seed", options->certify.seed, "Of the search for lower bounds")
+            ->capture_default_str();
+        app.add_option("-o,--output", options->output, "Where the certificate goes");
+        app.add_option("--report", options->report, "Folder for an HTML report with its plots");
+        return [options](const CommonOptions& common) { return run(*options, common); };
+      }};
 }
 
 }  // namespace swarmcert::analysis
