@@ -196,6 +196,33 @@ std::vector<std::string> TomlTable::texts(const std::string& key) const {
   return result;
 }
 
+std::vector<std::vector<double>> TomlTable::rows(const std::string& key) const {
+  constexpr char kWhat[] = "must be a list of lists of numbers";
+  const toml::node& found = node(key);
+  if (!found.is_array()) refuse(key, text_of(found), kWhat);
+  std::vector<std::vector<double>> result;
+  for (const toml::node& row : *found.as_array()) {
+    if (!row.is_array()) refuse(key, text_of(row), kWhat);
+    std::vector<double>& numbers = result.emplace_back();
+    for (const toml::node& item : *row.as_array()) {
+      if (!item.is_number()) refuse(key, text_of(item), kWhat);
+      numbers.push_back(*item.value<double>());
+      if (!std::isfinite(numbers.back())) refuse(key, text_of(item), "must be finite");
+    }
+  }
+  return result;
+}
+
+bool TomlTable::is_list(const std::string& key) const {
+  const toml::node* const found = table_->get(key);
+  return found != nullptr && found->is_array();
+}
+
+bool TomlTable::is_list_of_lists(const std::string& key) const {
+  return is_list(key) && !table_->get(key)->as_array()->empty() &&
+         table_->get(key)->as_array()->front().is_array();
+}
+
 TomlTable TomlTable::table(const std::string& key) const {
   const toml::node& found = node(key);
   if (!found.is_table()) refuse(key, text_of(found), "must be a table");

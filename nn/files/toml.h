@@ -30,6 +30,11 @@ class TomlTable {
   double number(const std::string& key) const;
   std::vector<double> numbers(const std::string& key) const;
   std::vector<std::string> texts(const std::string& key) const;
+  /// A list of lists of numbers; the inner lists may have different lengths.
+  std::vector<std::vector<double>> rows(const std::string& key) const;
+  /// Whether `key` holds a list; whether one whose first element is a list. False where it is missing.
+  bool is_list(const std::string& key) const;
+  bool is_list_of_lists(const std::string& key) const;
   TomlTable table(const std::string& key) const;
 
   /// A text that is one of `allowed`; its index in that list.

@@ -1,0 +1,151 @@
+#include "stability/gains.h"
+
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using files::TomlTable;
+
+constexpr char kSchema[] = "swarmcert/gains/1";
+
+std::string text_of(double value) {
+  std::string text = std::to_string(value);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+double non_negative(const TomlTable& table, const std::string& key) {
+  const double value = table.number(key);
+  if (value < 0) table.refuse(key, text_of(value), "must not be negative");
+  return value;
+}
+
+double positive(const TomlTable& table, const std::string& key) {
+  const double value = table.number(key);
+  if (!(value > 0)) table.refuse(key, text_of(value), "must be positive", "leave the key out for none");
+  return value;
+}
+
+/// Three numbers, or one that stands for all axes; none negative.
+PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zero) {
+  PerAxis result{};
+  if (!table.is_list(key)) {
+    result.fill(table.number(key));
+  } else {
+    const std::vector<double> numbers = table.numbers(key);
+    if (numbers.size() != 3) {
+      table.refuse(key, std::to_string(numbers.size()) + " numbers", "must be three numbers, for x, y and z",
+                   "or one number for all axes");
+    }
+    for (std::size_t i = 0; i < 3; ++i) result[i] = numbers[i];
+  }
+  for (const double value : result) {
+    if (value < 0)
+      table.refuse(key, text_of(value), "must not be negative", "the loop has its signs built in");
+    if (value == 0 && !may_be_zero) table.refuse(key, text_of(value), "must be positive");
+  }
+  return result;
+}
+
+/// A matrix of three rows, three numbers for the diagonal, or one number for a multiple of the identity.
+Matrix3 matrix(const TomlTable& table, const std::string& key) {
+  Matrix3 result{};
+  if (!table.is_list(key)) {
+    for (std::size_t i = 0; i < 3; ++i) result[4 * i] = table.number(key);
+    return result;
+  }
+  if (!table.is_list_of_lists(key)) {
+    const std::vector<double> diagonal = table.numbers(key);
+    if (diagonal.size() != 3) {
+      table.refuse(key, std::to_string(diagonal.size()) + " numbers", "must be three numbers, the diagonal",
+                   "or three rows of three, or one number");
+    }
+    for (std::size_t i = 0; i < 3; ++i) result[4 * i] = diagonal[i];
+    return result;
+  }
+  const std::vector<std::vector<double>> rows = table.rows(key);
+  if (rows.size() != 3) table.refuse(key, std::to_string(rows.size()) + " rows", "must have three rows");
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (rows[i].size() != 3) {
+      table.refuse(key, std::to_string(rows[i].size()) + " numbers in row " + std::to_string(i + 1),
+                   "must have three numbers in each row");
+    }
+    for (std::size_t j = 0; j < 3; ++j) result[3 * i + j] = rows[i][j];
+  }
+  return result;
+}
+
+void read_position(const TomlTable& position, Gains& gains) {
+  position.allow_only({"Kp", "Kd", "Ki", "Lambda", "K", "integrator_limit", "rate_hz", "integrator_step_s"});
+  const bool is_pid = position.has("Kp") || position.has("Kd") || position.has("Ki");
+  const bool is_composite = position.has("Lambda") || position.has("K");
+  if (is_pid && is_composite) {
+    position.refuse(position.has("Lambda") ? "Lambda" : "K", "", "stands beside Kp, Kd or Ki",
+                    "give Kp, Kd, Ki or Lambda, K");
+  }
+  if (!is_pid && !is_composite) position.refuse("", "", "has no gains", "give Kp, Kd, Ki or Lambda, K");
+  if (is_pid) {
+    gains.pid = PidGains{per_axis(position, "Kp", false), per_axis(position, "Kd", false),
+                         per_axis(position, "Ki", true)};
+  } else {
+    gains.composite = CompositeGains{matrix(position, "Lambda"), matrix(position, "K")};
+  }
+  if (position.has("integrator_limit")) {
+    gains.integrator_limit_m_s = per_axis(position, "integrator_limit", true);
+  }
+  if (position.has("rate_hz")) {
+    gains.rate_hz = positive(position, "rate_hz");
+    gains.integrator_step_s = 1 / gains.rate_hz;
+  }
+  if (position.has("integrator_step_s")) {
+    if (gains.rate_hz == 0) {
+      position.refuse("integrator_step_s", text_of(position.number("integrator_step_s")),
+                      "has a meaning only for a sampled loop", "add rate_hz");
+    }
+    gains.integrator_step_s = positive(position, "integrator_step_s");
+  }
+}
+
+}  // namespace
+
+Gains parse_gains(const std::string& text, const std::string& path) {
+  const toml::table document = files::parse_toml(text, path);
+  const TomlTable top(document, path);
+  if (top.text("schema") != kSchema) {
+    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema),
+               "is this the right file?");
+  }
+  top.allow_only({"schema", "position", "attitude", "lag", "network"});
+  Gains gains;
+  gains.path = path;
+  gains.sha256 = files::sha256(text);
+  read_position(top.table("position"), gains);
+  if (top.has("attitude")) {
+    const TomlTable attitude = top.table("attitude");
+    attitude.allow_only({"law"});
+    gains.attitude_law =
+        attitude.choice("law", {"lee", "robust"}) == 0 ? AttitudeLaw::kLee : AttitudeLaw::kRobust;
+  }
+  if (top.has("lag")) {
+    const TomlTable lag = top.table("lag");
+    lag.allow_only({"motor_s", "attitude_s", "delay_s"});
+    if (lag.has("motor_s")) gains.motor_lag_s = non_negative(lag, "motor_s");
+    if (lag.has("attitude_s")) gains.attitude_lag_s = non_negative(lag, "attitude_s");
+    if (lag.has("delay_s")) gains.delay_s = non_negative(lag, "delay_s");
+  }
+  if (top.has("network")) {
+    const TomlTable network = top.table("network");
+    network.allow_only({"rate_hz", "latency_s"});
+    if (network.has("rate_hz")) gains.network_rate_hz = positive(network, "rate_hz");
+    if (network.has("latency_s")) gains.network_latency_s = non_negative(network, "latency_s");
+  }
+  return gains;
+}
+
+Gains load_gains(const std::string& path) { return parse_gains(files::read_file(path), path); }
+
+}  // namespace swarmcert::stability

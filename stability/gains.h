@@ -1,0 +1,63 @@
+/// @file gains.toml: the position gains that fly, the loop that runs them, and the lags behind it.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace swarmcert::stability {
+
+/// One number per world axis x, y, z.
+using PerAxis = std::array<double, 3>;
+/// A 3x3 matrix, row by row.
+using Matrix3 = std::array<double, 9>;
+
+/// PID gains as firmware has them: accelerations, u = -(Kp e + Kd e' + Ki int e), so force is mass times u.
+struct PidGains {
+  PerAxis Kp;  ///< 1/s^2
+  PerAxis Kd;  ///< 1/s
+  PerAxis Ki;  ///< 1/s^3
+};
+
+/// Gains of the composite variable s = e' + 2 Lambda e + Lambda^2 int e, force -K s.
+struct CompositeGains {
+  Matrix3 Lambda;  ///< 1/s
+  Matrix3 K;       ///< kg/s
+};
+
+enum class AttitudeLaw { kLee, kRobust };
+
+/// Everything gains.toml says. Exactly one of `pid` and `composite` is present.
+struct Gains {
+  std::string path;    ///< of the file, for messages and hashes
+  std::string sha256;  ///< of its text
+  std::optional<PidGains> pid;
+  std::optional<CompositeGains> composite;
+  /// Largest |int e dt| that the integrator keeps, in m s; infinite where the file has no limit.
+  PerAxis integrator_limit_m_s = {std::numeric_limits<double>::infinity(),
+                                  std::numeric_limits<double>::infinity(),
+                                  std::numeric_limits<double>::infinity()};
+  double rate_hz = 0;            ///< of the position loop; 0: the law is analysed in continuous time only
+  double integrator_step_s = 0;  ///< added per cycle: I += step * e; 1/rate_hz unless the file says otherwise
+  AttitudeLaw attitude_law = AttitudeLaw::kLee;
+  double motor_lag_s = 0;        ///< time constant of thrust, all axes
+  double attitude_lag_s = 0;     ///< time constant of the thrust's direction: x and y only
+  double delay_s = 0;            ///< from state to force
+  double network_rate_hz = 0;    ///< of the learned force's staircase; 0: continuous
+  double network_latency_s = 0;  ///< age of what the network sees when its output is applied
+};
+
+/// Reads gains.toml (schema swarmcert/gains/1).
+///   [position] Kp, Kd, Ki: three numbers, or one for all axes; or Lambda, K: 3x3, three (diagonal), or one number.
+///              integrator_limit (m s), rate_hz, integrator_step_s: optional.
+///   [attitude] law = "lee" | "robust";  [lag] motor_s, attitude_s, delay_s;  [network] rate_hz, latency_s: optional.
+/// Whether Lambda and K fit the theorem is not asked here.
+/// @throws files::InputError with line, key, value and mend: unknown keys, both forms or neither, negative or
+///   non-finite numbers, an integrator step without a rate.
+Gains load_gains(const std::string& path);
+
+/// As load_gains(), from memory; `path` is used in messages only.
+Gains parse_gains(const std::string& text, const std::string& path);
+
+}  // namespace swarmcert::stability

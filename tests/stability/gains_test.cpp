@@ -1,0 +1,93 @@
+#include "stability/gains.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "nn/refusal.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using tests::refuses;
+
+constexpr char kHead[] = "schema = \"swarmcert/gains/1\"\n";
+
+testing::AssertionResult refused(const std::string& body, const std::vector<std::string>& pieces) {
+  return refuses([&] { parse_gains(kHead + body, "gains.toml"); }, pieces);
+}
+
+TEST(Gains, ReadsPidGainsLoopAndLags) {
+  const Gains gains = parse_gains(std::string(kHead) + R"(
+[position]
+Kp = [20, 21, 10]
+Kd = 5.5
+Ki = [3, 3, 0]
+integrator_limit = [0.1, 0.2, 0.3]
+rate_hz = 100
+integrator_step_s = 0.002
+[attitude]
+law = "robust"
+[lag]
+motor_s = 0.0575
+attitude_s = 0.1
+delay_s = 0.004
+[network]
+rate_hz = 50
+latency_s = 0.01
+)",
+                                  "gains.toml");
+  ASSERT_TRUE(gains.pid.has_value());
+  EXPECT_FALSE(gains.composite.has_value());
+  EXPECT_EQ(gains.pid->Kp, (PerAxis{20, 21, 10}));
+  EXPECT_EQ(gains.pid->Kd, (PerAxis{5.5, 5.5, 5.5}));
+  EXPECT_EQ(gains.pid->Ki, (PerAxis{3, 3, 0}));
+  EXPECT_EQ(gains.integrator_limit_m_s, (PerAxis{0.1, 0.2, 0.3}));
+  EXPECT_EQ(gains.rate_hz, 100);
+  EXPECT_EQ(gains.integrator_step_s, 0.002);
+  EXPECT_EQ(gains.attitude_law, AttitudeLaw::kRobust);
+  EXPECT_EQ(gains.motor_lag_s, 0.0575);
+  EXPECT_EQ(gains.attitude_lag_s, 0.1);
+  EXPECT_EQ(gains.delay_s, 0.004);
+  EXPECT_EQ(gains.network_rate_hz, 50);
+  EXPECT_EQ(gains.network_latency_s, 0.01);
+}
+
+TEST(Gains, ReadsCompositeGainsAsMatrixDiagonalOrNumber) {
+  const Gains gains = parse_gains(
+      std::string(kHead) + "[position]\nLambda = [[4, 1, 0], [1, 4, 0], [0, 0, 2]]\nK = [0.1, 0.2, 0.3]\n",
+      "g");
+  ASSERT_TRUE(gains.composite.has_value());
+  EXPECT_EQ(gains.composite->Lambda, (Matrix3{4, 1, 0, 1, 4, 0, 0, 0, 2}));
+  EXPECT_EQ(gains.composite->K, (Matrix3{0.1, 0, 0, 0, 0.2, 0, 0, 0, 0.3}));
+  const Gains isotropic = parse_gains(std::string(kHead) + "[position]\nLambda = 4\nK = 0.136\n", "g");
+  EXPECT_EQ(isotropic.composite->Lambda, (Matrix3{4, 0, 0, 0, 4, 0, 0, 0, 4}));
+}
+
+TEST(Gains, WhatTheFileLeavesOutIsNoneOrWhatFirmwareWouldDo) {
+  const Gains gains =
+      parse_gains(std::string(kHead) + "[position]\nKp = 1\nKd = 1\nKi = 0\nrate_hz = 250\n", "g");
+  EXPECT_EQ(gains.integrator_step_s, 1.0 / 250);
+  EXPECT_TRUE(std::isinf(gains.integrator_limit_m_s[2]));
+  EXPECT_EQ(gains.motor_lag_s, 0);
+  EXPECT_EQ(gains.network_rate_hz, 0);
+}
+
+TEST(Gains, RefusalsNameLineKeyValueAndMend) {
+  EXPECT_TRUE(
+      refused("[position]\nKp = 1\nKd = 1\nKi = 1\nKii = 2\n", {"line 6", "position.Kii", "did you mean"}));
+  EXPECT_TRUE(
+      refused("[position]\nKp = [1, 2]\nKd = 1\nKi = 1\n", {"line 3", "position.Kp", "three numbers"}));
+  EXPECT_TRUE(refused("[position]\nKp = -1\nKd = 1\nKi = 1\n", {"position.Kp", "-1", "negative"}));
+  EXPECT_TRUE(refused("[position]\nKp = 1\nKd = 1\n", {"position.Ki", "missing"}));
+  EXPECT_TRUE(refused("[position]\nKp = 1\nKd = 1\nKi = 1\nK = 1\n", {"position.K", "Lambda, K"}));
+  EXPECT_TRUE(refused("[position]\nrate_hz = 100\n", {"position", "no gains"}));
+  EXPECT_TRUE(refused("[position]\nLambda = [[1,0],[0,1]]\nK = 1\n", {"position.Lambda", "2 rows"}));
+  EXPECT_TRUE(refused("[position]\nLambda = 1\nK = 1\nintegrator_step_s = 0.002\n", {"rate_hz"}));
+  EXPECT_TRUE(refused("[position]\nLambda = 1\nK = 1\n[lag]\nmotor_s = -0.1\n", {"lag.motor_s", "-0.1"}));
+  EXPECT_TRUE(refused("[position]\nLambda = 1\nK = inf\n", {"position.K", "finite"}));
+  EXPECT_TRUE(refuses([] { parse_gains("schema = \"swarmcert/model/1\"\n", "g"); }, {"schema", "gains/1"}));
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
