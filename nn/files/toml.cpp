@@ -229,6 +229,24 @@ TomlTable TomlTable::table(const std::string& key) const {
   return TomlTable(*found.as_table(), path_, prefix_ + key + ".");
 }
 
+std::vector<TomlTable> TomlTable::tables(const std::string& key) const {
+  const toml::node& found = node(key);
+  if (!found.is_array()) refuse(key, text_of(found), "must be a list of tables", "write [[" + key + "]]");
+  std::vector<TomlTable> result;
+  for (const toml::node& item : *found.as_array()) {
+    if (!item.is_table()) refuse(key, text_of(item), "must be a list of tables", "write [[" + key + "]]");
+    const std::string number = std::to_string(result.size() + 1);
+    result.push_back(TomlTable(*item.as_table(), path_, prefix_ + key + "[" + number + "]."));
+  }
+  return result;
+}
+
+bool TomlTable::flag(const std::string& key) const {
+  const toml::node& found = node(key);
+  if (!found.is_boolean()) refuse(key, text_of(found), "must be true or false");
+  return found.as_boolean()->get();
+}
+
 std::size_t TomlTable::choice(const std::string& key, const std::vector<std::string>& allowed) const {
   const std::string word = text(key);
   const auto found = std::find(allowed.begin(), allowed.end(), word);

@@ -36,6 +36,9 @@ class TomlTable {
   bool is_list(const std::string& key) const;
   bool is_list_of_lists(const std::string& key) const;
   TomlTable table(const std::string& key) const;
+  /// A list of tables, [[key]]; in messages the second is `key[2]`.
+  std::vector<TomlTable> tables(const std::string& key) const;
+  bool flag(const std::string& key) const;
 
   /// A text that is one of `allowed`; its index in that list.
   std::size_t choice(const std::string& key, const std::vector<std::string>& allowed) const;

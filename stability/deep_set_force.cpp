@@ -1,0 +1,123 @@
+#include "stability/deep_set_force.h"
+
+#include <algorithm>
+
+#include "nn/files/functions.h"
+#include "nn/files/input_error.h"
+
+namespace swarmcert::stability {
+namespace {
+
+const std::vector<std::string> kInputs = {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
+
+[[noreturn]] void refuse(const files::Network& network, const std::string& field, const std::string& value,
+                         const std::string& what, const std::string& mend) {
+  throw files::InputError({network.path, "", field, value, what, mend});
+}
+
+/// Which component of (dp, dv) each input of phi is.
+std::vector<int> read_order(const files::Network& network, int inputs) {
+  std::vector<int> order;
+  for (int i = 0; i < inputs; ++i) {
+    if (network.input_order.empty()) {
+      order.push_back(i);  // published networks: dp, then dv
+      continue;
+    }
+    const std::string& name = network.input_order[static_cast<std::size_t>(i)];
+    const auto found = std::find(kInputs.begin(), kInputs.end(), name);
+    if (found == kInputs.end()) {
+      refuse(network, "input.order", files::in_quotes(name), "is not an input that a simulation knows",
+             "use dp_x_m .. dv_z_m_s");
+    }
+    order.push_back(static_cast<int>(found - kInputs.begin()));
+  }
+  return order;
+}
+
+}  // namespace
+
+DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
+                           const std::vector<std::string>& kinds)
+    : network_(std::move(network)) {
+  if (network_.plain) {
+    refuse(network_, "", "", "is one plain network, and a force among vehicles needs a deep set",
+           "name a network.toml with phi and rho");
+  }
+  // Evaluators own arrays that the views below point to: no reallocation after this.
+  evaluators_.reserve(network_.phi.size() + 1);
+  std::vector<std::string> names;
+  for (const auto& [name, weights] : network_.phi) {
+    evaluators_.emplace_back(weights);
+    if (name == files::kGroundKind) {
+      ground_ = evaluators_.back().mlp();
+      set_.ground = &ground_;
+    } else {
+      phi_.push_back(evaluators_.back().mlp());
+      names.push_back(name);
+    }
+  }
+  if (phi_.empty()) refuse(network_, "phi", "", "has only the ground", "add the phi of a neighbour's kind");
+  for (const std::string& wanted : kinds) {
+    const auto found = std::find(names.begin(), names.end(), wanted);
+    if (found == names.end() && names.size() > 1) {
+      refuse(network_, "phi", "", "has no kind " + files::in_quotes(wanted), "add [phi." + wanted + "]");
+    }
+    phi_of_kind_.push_back(found == names.end() ? 0 : static_cast<int>(found - names.begin()));
+  }
+  auto rho = network_.rho.find(kind);
+  if (rho == network_.rho.end() && network_.rho.size() == 1) rho = network_.rho.begin();
+  if (rho == network_.rho.end()) {
+    refuse(network_, "rho", "", "has no kind " + files::in_quotes(kind), "add [rho." + kind + "]");
+  }
+  evaluators_.emplace_back(rho->second);
+  if (rho->second.outputs() != 1) {
+    refuse(network_, "rho." + rho->first, std::to_string(rho->second.outputs()) + " outputs",
+           "must be 1: the force along z", "");
+  }
+  set_.rho = evaluators_.back().mlp();
+  set_.phi = phi_.data();
+  set_.num_kinds = static_cast<int>(phi_.size());
+  if (network_.clamp) {
+    set_.lower = network_.clamp->lower.data();
+    set_.upper = network_.clamp->upper.data();
+  }
+  if (set_.inputs() > static_cast<int>(kInputs.size())) {
+    refuse(network_, "phi." + names.front(), std::to_string(set_.inputs()) + " inputs",
+           "must be at most 6: relative position and velocity", "");
+  }
+  input_ = read_order(network_, set_.inputs());
+  newton_per_unit_ = network_.output_unit == "N" ? 1 : kGramForce_N;
+  own_.resize(files::kGroundInputs);
+  hidden_sum_.resize(static_cast<std::size_t>(set_.hidden()));
+  hidden_.resize(static_cast<std::size_t>(set_.hidden()));
+  scratch_.resize(static_cast<std::size_t>(nn::scratch_size(set_)));
+  reserve(16);
+}
+
+void DeepSetForce::reserve(int neighbours) {
+  const auto count = static_cast<std::size_t>(neighbours);
+  inputs_.resize(count * input_.size());
+  clamped_.resize(count * input_.size());
+  order_.resize(count);
+  neighbours_.resize(count);
+}
+
+double DeepSetForce::force_z_N(const Instant& now) {
+  if (now.num_neighbours > static_cast<int>(order_.size())) reserve(2 * now.num_neighbours);
+  own_ = {-now.p_W_m.z(), -now.v_W_m_s.x(), -now.v_W_m_s.y(), -now.v_W_m_s.z()};
+  for (int j = 0; j < now.num_neighbours; ++j) {
+    const Neighbour& neighbour = now.neighbours[j];
+    double* const x = inputs_.data() + static_cast<std::size_t>(j) * input_.size();
+    for (std::size_t i = 0; i < input_.size(); ++i) {
+      x[i] = input_[i] < 3 ? neighbour.dp_W_m[input_[i]] : neighbour.dv_W_m_s[input_[i] - 3];
+    }
+    neighbours_[static_cast<std::size_t>(j)] = {x, phi_of_kind_[static_cast<std::size_t>(neighbour.kind)]};
+  }
+  double force = 0;
+  nn::evaluate(set_, own_.data(), neighbours_.data(), now.num_neighbours, &force,
+               {clamped_.data(), order_.data(), static_cast<int>(order_.size()), hidden_sum_.data(),
+                hidden_.data(), scratch_.data()});
+  return newton_per_unit_ * force;
+}
+
+}  // namespace swarmcert::stability

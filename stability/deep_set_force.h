@@ -1,0 +1,43 @@
+/// @file The force that a trained deep set predicts for a vehicle among neighbours, in double.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "nn/deep_set.h"
+#include "nn/files/network.h"
+#include "stability/effects/effect.h"
+
+namespace swarmcert::stability {
+
+/// f_hat_z of one vehicle. Not for several threads at once: it keeps the evaluation's memory.
+class DeepSetForce {
+ public:
+  /// @param kind  of the vehicle; its rho is used, or the only rho where `network` has a single one.
+  /// @param kinds Neighbour::kind is an index into this; each must have a phi, or phi must be one for all.
+  /// @throws files::InputError if `network` is a plain one, lacks a kind, or states inputs that it does not know.
+  DeepSetForce(files::Network network, const std::string& kind, const std::vector<std::string>& kinds);
+
+  /// The prediction in newton, upwards; networks that state no unit are in gram-force, as the published ones.
+  /// 0 where the evaluation has no finite result.
+  double force_z_N(const Instant& now);
+
+ private:
+  void reserve(int neighbours);
+
+  files::Network network_;
+  std::vector<files::Evaluator<double>> evaluators_;
+  std::vector<nn::Mlp<double>> phi_;  ///< by index in network_.phi without the ground
+  nn::Mlp<double> ground_{};
+  nn::DeepSet<double> set_{};
+  std::vector<int> phi_of_kind_;
+  std::vector<int> input_;  ///< 0..2: component of dp, 3..5: of dv
+  double newton_per_unit_ = 0;
+
+  std::vector<double> own_, inputs_, hidden_sum_, hidden_, scratch_, clamped_;
+  std::vector<int> order_;
+  std::vector<nn::Neighbour<double>> neighbours_;
+};
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,48 @@
+#include "stability/effects/deep_set.h"
+
+#include <filesystem>
+#include <limits>
+
+#include "nn/files/input_error.h"
+#include "nn/files/network.h"
+#include "stability/deep_set_force.h"
+
+namespace swarmcert::stability {
+namespace {
+
+files::Network load(const EffectSpec& spec, const EffectContext& context) {
+  if (spec.network.empty()) {
+    throw files::InputError({"", "", "effect.network", "", "the effect deep_set names no network",
+                             "add network = \"network.toml\""});
+  }
+  return files::load_network(
+      {(std::filesystem::path(context.path).parent_path() / spec.network).string(), "", "", ""});
+}
+
+}  // namespace
+
+EffectInfo DeepSetEffect::describe() {
+  return {"deep_set",
+          "f_z = c f_hat(own state, neighbours)",
+          "the learned model of this project: a flexible candidate, to be tried after the physical ones",
+          "deep_set",
+          "the flights that the network was trained for",
+          {{"gain", "1 is the network itself", 1, 0, 1.5}},
+          {},
+          false,
+          true};
+}
+
+DeepSetEffect::DeepSetEffect(const EffectSpec& spec, const EffectContext& context)
+    : Effect(describe()),
+      force_(std::make_unique<DeepSetForce>(load(spec, context), context.kind, context.kinds)) {}
+
+DeepSetEffect::~DeepSetEffect() = default;
+
+void DeepSetEffect::columns(const Instant& now, const double*, Wrench* columns) const {
+  columns[0] = {Eigen::Vector3d(0, 0, force_->force_z_N(now)), Eigen::Vector3d::Zero()};
+}
+
+double DeepSetEffect::reach_m(double, const double*) const { return std::numeric_limits<double>::infinity(); }
+
+}  // namespace swarmcert::stability

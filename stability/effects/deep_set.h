@@ -1,0 +1,23 @@
+/// @file A learned deep set as an effect: f_z = c f_hat(own, neighbours).
+#pragma once
+
+#include "stability/effects/effect.h"
+
+namespace swarmcert::stability {
+
+class DeepSetForce;
+
+class DeepSetEffect : public Effect {
+ public:
+  /// @throws files::InputError if `spec` names no network, or one that is no deep set with a rho of context.kind.
+  DeepSetEffect(const EffectSpec& spec, const EffectContext& context);
+  ~DeepSetEffect() override;
+  static EffectInfo describe();
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override;
+  double reach_m(double height_m, const double* shape) const override;
+
+ private:
+  std::unique_ptr<DeepSetForce> force_;
+};
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,113 @@
+#include "stability/effects/downwash.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kReference_m = 0.3;
+constexpr double kReferenceMass_kg = 0.034;
+constexpr double kNearest_m = 0.12;  ///< no fit reaches nearer
+constexpr double kTouching_m = 0.05;
+/// Beyond this many spreads the Gaussian, 2e-11, is taken as zero.
+constexpr double kReachInSpreads = 7;
+
+/// ln g_j without the fade u. Returns false where the neighbour does nothing.
+bool log_strength(const Neighbour& neighbour, const double* shape, double* result) {
+  const double dz = neighbour.dp_W_m.z();
+  if (dz <= kTouching_m) return false;
+  const double delay_s = shape[Downwash::kConvection] * dz;
+  const double rx = neighbour.dp_W_m.x() - delay_s * neighbour.v_W_m_s.x();
+  const double ry = neighbour.dp_W_m.y() - delay_s * neighbour.v_W_m_s.y();
+  const double height_m = std::max(dz, kNearest_m);
+  const double spread_m = shape[Downwash::kSpread0] + shape[Downwash::kSpreadSlope] * height_m;
+  const double in_spreads2 = (rx * rx + ry * ry) / (spread_m * spread_m);
+  if (in_spreads2 > kReachInSpreads * kReachInSpreads) return false;
+  *result = shape[Downwash::kDecay] * std::log(kReference_m / height_m) - 0.5 * in_spreads2;
+  if (neighbour.mass_kg != kReferenceMass_kg) {
+    *result += shape[Downwash::kMassExponent] * std::log(neighbour.mass_kg / kReferenceMass_kg);
+  }
+  return true;
+}
+
+/// 0 where vehicles touch, 1 from kNearest_m on, smooth between.
+double fade(double dz) {
+  if (dz >= kNearest_m) return 1;
+  const double x = (dz - kTouching_m) / (kNearest_m - kTouching_m);
+  return x * x * (3 - 2 * x);
+}
+
+}  // namespace
+
+EffectInfo Downwash::describe() {
+  return {"downwash",
+          "f_z = -A (sum_j g_j^p)^(1/p), g_j = (m_j / 0.034)^e (0.3 / dz)^n exp(-|r - k dz v_j|^2 / (2 (s0 + "
+          "s1 dz)^2))",
+          "least squares on 103 230 samples of two published Crazyflies; composition from flights of three",
+          "downwash",
+          "pass and stay below another vehicle, 0.2 .. 0.6 m, and fly alone in the same flights",
+          {{"amplitude_N", "force 0.3 m straight below a vehicle of 0.034 kg", 10.03299049 * kGramForce_N, 0,
+            0.6}},
+          {{"decay_exponent", "n", 0.44084819, 0, 4},
+           {"spread_m", "s0", 0.0259477, 0.005, 0.3},
+           {"spread_slope", "s1", 0.08181592, 0, 1},
+           {"norm_exponent", "p: 1 adds forces, 2 adds momentum flux", 1.3, 1, 10},
+           {"convection_s_m", "k: 1 / speed of the wake", 0, 0, 1},
+           {"mass_exponent", "e: 0.5 is momentum theory at equal rotor area", 0.5, 0, 2}},
+          false,
+          true};
+}
+
+void Downwash::columns(const Instant& now, const double* shape, Wrench* columns) const {
+  columns[0] = {};
+  double sum = 0;
+  double single = 0;
+  int count = 0;
+  for (int j = 0; j < now.num_neighbours; ++j) {
+    double strength;
+    if (!log_strength(now.neighbours[j], shape, &strength)) continue;
+    const double faded = fade(now.neighbours[j].dp_W_m.z());
+    if (++count == 1) {  // the common case needs no power: (g^p)^(1/p) = g
+      single = faded * std::exp(strength);
+      continue;
+    }
+    if (count == 2) sum = std::pow(single, shape[kNorm]);
+    sum += std::pow(faded * std::exp(strength), shape[kNorm]);
+  }
+  if (count > 0) columns[0].force_W_N.z() = count == 1 ? -single : -std::pow(sum, 1 / shape[kNorm]);
+}
+
+bool Downwash::in_support(const Instant& now, const double* shape) const {
+  for (int j = 0; j < now.num_neighbours; ++j) {
+    const Eigen::Vector3d& dp = now.neighbours[j].dp_W_m;
+    const double spread_m = shape[kSpread0] + shape[kSpreadSlope] * dp.z();
+    if (dp.z() > kTouching_m && dp.z() < 1 && dp.head<2>().norm() < 2 * spread_m) return true;
+  }
+  return false;
+}
+
+std::vector<std::vector<double>> Downwash::grid(const FlightRange&) const {
+  // Spreads that go together, from narrow and opening to wide and parallel; the product of six grids would be
+  // thousands of columns.
+  const double spreads[][2] = {
+      {0.0259477, 0.08181592}, {0.035, 0.1}, {0.04, 0.055}, {0.052, 0.028}, {0.06, 0.06}};
+  std::vector<std::vector<double>> thetas;
+  for (const auto& spread : spreads) {
+    for (const double norm : {1.3, 1.85}) {
+      for (const double convection_s_m : {0.0, 0.15}) {
+        thetas.push_back({info().shape[kDecay].value, spread[0], spread[1], norm, convection_s_m,
+                          info().shape[kMassExponent].value});
+      }
+    }
+  }
+  return thetas;
+}
+
+double Downwash::reach_m(double height_m, const double* shape) const {
+  // The wake lags by k dz |v|; 20 m/s is faster than anything this project flies.
+  const double lag_m = shape[kConvection] * height_m * 20;
+  return kReachInSpreads * (shape[kSpread0] + shape[kSpreadSlope] * std::max(height_m, kNearest_m)) + lag_m;
+}
+
+}  // namespace swarmcert::stability

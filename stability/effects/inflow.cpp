@@ -1,0 +1,26 @@
+#include "stability/effects/inflow.h"
+
+#include <cmath>
+
+namespace swarmcert::stability {
+
+EffectInfo Inflow::describe() {
+  return {"inflow",
+          "f = -k T (b3' v) b3",
+          "momentum theory of a rotor in axial flow, to first order in the climb speed",
+          "inflow",
+          "climbs and descents of more than 0.5 m/s",
+          {{"loss_s_m", "relative thrust lost per climb speed", 0, 0, 0.3}},
+          {}};
+}
+
+void Inflow::columns(const Instant& now, const double*, Wrench* columns) const {
+  const Eigen::Vector3d b3 = now.b3_W();
+  columns[0] = {-now.thrust_N * b3.dot(now.v_W_m_s) * b3, Eigen::Vector3d::Zero()};
+}
+
+bool Inflow::in_support(const Instant& now, const double*) const {
+  return std::abs(now.b3_W().dot(now.v_W_m_s)) > 0.1;
+}
+
+}  // namespace swarmcert::stability

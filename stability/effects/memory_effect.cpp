@@ -1,0 +1,11 @@
+#include "stability/effects/memory_effect.h"
+
+#include <stdexcept>
+
+namespace swarmcert::stability {
+
+void MemoryEffect::columns(const Instant&, const double*, Wrench*) const {
+  throw std::logic_error("Effect::columns: " + info().name + " remembers: use stream()");
+}
+
+}  // namespace swarmcert::stability

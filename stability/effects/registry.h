@@ -1,0 +1,30 @@
+/// @file Every effect by name.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stability/effects/effect.h"
+
+namespace swarmcert::stability {
+
+/// Names of the effects that this library knows, in the order of the documentation.
+std::vector<std::string> effect_names();
+
+/// What is known of a built-in effect.
+/// @throws std::invalid_argument if there is none of that name.
+const EffectInfo& effect_info(const std::string& name);
+
+/// The effect that `spec` names or, where it has formulas, defines.
+/// @throws files::InputError if a network or a formula cannot be read; std::invalid_argument for an unknown name.
+std::unique_ptr<Effect> make_effect(const EffectSpec& spec, const EffectContext& context);
+
+/// Coefficients and theta of `spec`: its parameters where it names them, else the effect's defaults; in the order of
+/// the effect's info.
+struct EffectValues {
+  std::vector<double> linear, shape;
+};
+EffectValues effect_values(const EffectInfo& info, const EffectSpec& spec);
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,47 @@
+#include "stability/effects/sensor_delay.h"
+
+#include "stability/effects/signal_path.h"
+
+namespace swarmcert::stability {
+namespace {
+
+class SensorDelayStream : public ColumnStream {
+ public:
+  explicit SensorDelayStream(double delay_s) : delay_s_(delay_s) {}
+
+  void restart() override { past_.restart(); }
+
+  void advance(const Instant& now, Wrench* columns) override {
+    const Eigen::Vector3d force_W_N = now.thrust_N * now.b3_W();
+    past_.push(now.time_s, force_W_N);
+    columns[0] = {past_.at(now.time_s - delay_s_) - force_W_N, Eigen::Vector3d::Zero()};
+  }
+
+ private:
+  const double delay_s_;
+  DelayLine<3> past_;
+};
+
+}  // namespace
+
+EffectInfo SensorDelay::describe() {
+  return {"sensor_delay",
+          "r = c ((T b3)(t - d) - T b3)",
+          "group delay of the accelerometer's filter: 7.5 ms for two poles at 30 Hz",
+          "sensor_delay",
+          "tilt of more than 5 degrees at more than 1 Hz: a motor lag does not delay the thrust axis",
+          {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
+          {{"delay_s", "d", 0.0075, 0, 0.5, {0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.04}}},
+          true};
+}
+
+std::unique_ptr<ColumnStream> SensorDelay::stream(const double* shape) const {
+  return std::make_unique<SensorDelayStream>(shape[0]);
+}
+
+void SensorDelay::add_to(SignalPath& path, const double* coefficients, const double* shape) const {
+  path.sensor_delay_s = shape[0];
+  path.sensor_delay_gain = coefficients[0];
+}
+
+}  // namespace swarmcert::stability

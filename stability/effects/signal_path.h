@@ -1,0 +1,15 @@
+/// @file What lies between a command and the force, and between the truth and the log.
+#pragma once
+
+namespace swarmcert::stability {
+
+/// Each stage takes the signal u of the stage before it and gives u + gain (stage(u) - u), so that gain 1 is the
+/// stage itself and the difference from u is `gain` times the effect's column.
+/// Order: command -> delay -> motor lag -> rotors; true specific force -> sensor delay -> accelerometer filter.
+struct SignalPath {
+  double delay_s = 0, delay_gain = 0;
+  double motor_lag_s = 0, motor_lag_gain = 0;
+  double sensor_delay_s = 0, sensor_delay_gain = 0;
+};
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,55 @@
+#include "stability/effects/upper_lift.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmcert::stability {
+namespace {
+
+enum Shape { kSpread, kExponent };
+
+constexpr double kReference_m = 0.3;
+constexpr double kNearest_m = 0.12;
+/// Beyond this many spreads the Gaussian, 2e-11, is taken as zero.
+constexpr double kReachInSpreads = 7;
+
+/// Lift per newton of amplitude from one neighbour; 0 for those that are not below.
+double lift(const Neighbour& neighbour, const double* shape) {
+  const double below_m = -neighbour.dp_W_m.z();
+  const double r2 = neighbour.dp_W_m.head<2>().squaredNorm();
+  const double s2 = shape[kSpread] * shape[kSpread];
+  if (below_m <= 0.05 || r2 > kReachInSpreads * kReachInSpreads * s2) return 0;
+  return std::pow(kReference_m / std::max(below_m, kNearest_m), shape[kExponent]) * std::exp(-r2 / (2 * s2));
+}
+
+}  // namespace
+
+EffectInfo UpperLift::describe() {
+  return {"upper_lift",
+          "f_z = A sum_j (0.3 / -dz_j)^n exp(-r_j^2 / (2 s^2)), over neighbours below",
+          "maps of published flights: +0.15 gf (small) and +1.9 gf (large) at 0.3 .. 0.6 m above another",
+          "upper_lift",
+          "stay 0.2 .. 0.6 m above another vehicle, and pass over it",
+          {{"amplitude_N", "lift 0.3 m straight above a neighbour", 0, 0, 0.1}},
+          {{"spread_m", "s", 0.1, 0.02, 0.5, {0.06, 0.1, 0.15}}, {"decay_exponent", "n", 0.5, 0, 3}},
+          false,
+          true};
+}
+
+void UpperLift::columns(const Instant& now, const double* shape, Wrench* columns) const {
+  double sum = 0;
+  for (int j = 0; j < now.num_neighbours; ++j) sum += lift(now.neighbours[j], shape);
+  columns[0] = {Eigen::Vector3d(0, 0, sum), Eigen::Vector3d::Zero()};
+}
+
+bool UpperLift::in_support(const Instant& now, const double* shape) const {
+  for (int j = 0; j < now.num_neighbours; ++j) {
+    const Eigen::Vector3d& dp = now.neighbours[j].dp_W_m;
+    if (dp.z() < -0.05 && dp.z() > -0.8 && dp.head<2>().norm() < 2 * shape[kSpread]) return true;
+  }
+  return false;
+}
+
+double UpperLift::reach_m(double, const double* shape) const { return kReachInSpreads * shape[kSpread]; }
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,211 @@
+#include "stability/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/suggest.h"
+#include "nn/files/toml.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using files::TomlTable;
+
+constexpr char kSchema[] = "swarmcert/model/1";
+
+double positive(const TomlTable& table, const std::string& key) {
+  const double value = table.number(key);
+  if (!(value > 0)) table.refuse(key, std::to_string(value), "must be positive");
+  return value;
+}
+
+double not_negative(const TomlTable& table, const std::string& key, double otherwise) {
+  if (!table.has(key)) return otherwise;
+  const double value = table.number(key);
+  if (value < 0) table.refuse(key, std::to_string(value), "must not be negative");
+  return value;
+}
+
+std::pair<double, double> interval(const TomlTable& table, const std::string& key) {
+  const std::vector<double> numbers = table.numbers(key);
+  if (numbers.size() != 2 || numbers[0] > numbers[1]) {
+    table.refuse(key, "", "must be [lower, upper]");
+  }
+  return {numbers[0], numbers[1]};
+}
+
+void read_vehicle(const TomlTable& vehicle, Model* model) {
+  vehicle.allow_only({"kind", "mass_kg", "inertia_kg_m2", "arm_m", "torque_per_thrust_m", "thrust"});
+  model->kind = vehicle.text("kind");
+  if (model->kind.empty()) vehicle.refuse("kind", "", "is empty", "name it, e.g. \"small\"");
+  model->mass_kg = positive(vehicle, "mass_kg");
+  const std::vector<double> inertia = vehicle.numbers("inertia_kg_m2");
+  if (inertia.size() != 3 || *std::min_element(inertia.begin(), inertia.end()) <= 0) {
+    vehicle.refuse("inertia_kg_m2", "", "must be three positive numbers, [Jxx, Jyy, Jzz]");
+  }
+  std::copy(inertia.begin(), inertia.end(), model->inertia_kg_m2.begin());
+  model->arm_m = positive(vehicle, "arm_m");
+  model->torque_per_thrust_m = positive(vehicle, "torque_per_thrust_m");
+  const TomlTable thrust = vehicle.table("thrust");
+  thrust.allow_only({"c00", "c10", "c01", "c20", "c11"});
+  model->thrust = {thrust.number("c00"), thrust.number("c10"), thrust.number("c01"), thrust.number("c20"),
+                   thrust.number("c11")};
+  const double largest_N = model->thrust.largest_N(kFullBattery_V);
+  if (4 * largest_N <= model->weight_N()) {
+    thrust.refuse("", "",
+                  "four rotors give " + std::to_string(4 * largest_N) +
+                      " N at 4.2 V, and the vehicle weighs " + std::to_string(model->weight_N()) + " N",
+                  "the polynomial is in gram-force of p = PWM / 65536 and v = V / 4.2");
+  }
+}
+
+void read_sensor(const TomlTable& sensor, SensorModel* model) {
+  sensor.allow_only({"accelerometer_cutoff_hz", "accelerometer_noise_m_s2", "position_noise_m",
+                     "velocity_noise_m_s", "attitude_noise_rad", "log_rate_hz"});
+  if (sensor.has("accelerometer_cutoff_hz")) {
+    model->accelerometer_cutoff_hz = positive(sensor, "accelerometer_cutoff_hz");
+  }
+  if (sensor.has("log_rate_hz")) model->log_rate_hz = positive(sensor, "log_rate_hz");
+  model->accelerometer_noise_m_s2 =
+      not_negative(sensor, "accelerometer_noise_m_s2", model->accelerometer_noise_m_s2);
+  model->position_noise_m = not_negative(sensor, "position_noise_m", model->position_noise_m);
+  model->velocity_noise_m_s = not_negative(sensor, "velocity_noise_m_s", model->velocity_noise_m_s);
+  model->attitude_noise_rad = not_negative(sensor, "attitude_noise_rad", model->attitude_noise_rad);
+}
+
+EffectExpression read_expression(const TomlTable& table) {
+  EffectExpression expression;
+  for (const std::string& key : table.keys()) {
+    if (key == "linear") {
+      expression.linear = table.texts(key);
+    } else if (key == "per_neighbour") {
+      expression.per_neighbour = table.flag(key);
+    } else if (key == "bounds") {
+      const TomlTable bounds = table.table(key);
+      for (const std::string& name : bounds.keys()) expression.bounds[name] = interval(bounds, name);
+    } else if (key == "grid") {
+      const TomlTable grid = table.table(key);
+      for (const std::string& name : grid.keys()) expression.grid[name] = grid.numbers(name);
+    } else {
+      expression.formulas[key] = table.text(key);
+    }
+  }
+  if (expression.formulas.empty()) {
+    table.refuse("", "", "holds no formula", "add e.g. force_z_N = \"a * T\"");
+  }
+  return expression;
+}
+
+FitProvenance read_fit(const TomlTable& table) {
+  table.allow_only(
+      {"flights", "interval", "select_rmse_before_N", "select_rmse_after_N", "test_looks", "note"});
+  FitProvenance fit;
+  if (table.has("flights")) fit.flights = table.texts("flights");
+  if (table.has("interval")) {
+    const TomlTable intervals = table.table("interval");
+    for (const std::string& name : intervals.keys()) fit.interval[name] = interval(intervals, name);
+  }
+  fit.select_rmse_before_N = not_negative(table, "select_rmse_before_N", 0);
+  fit.select_rmse_after_N = not_negative(table, "select_rmse_after_N", 0);
+  fit.test_looks = static_cast<int>(std::min(not_negative(table, "test_looks", 0), 1e6));
+  if (table.has("note")) fit.note = table.text("note");
+  return fit;
+}
+
+/// Names and bounds of the parameters that `spec` states.
+void check_parameters(const TomlTable& effect, const EffectSpec& spec, const EffectInfo& info) {
+  if (!effect.has("parameters")) return;
+  const TomlTable table = effect.table("parameters");
+  std::vector<std::string> known;
+  for (const std::vector<Parameter>* parameters : {&info.linear, &info.shape}) {
+    for (const Parameter& parameter : *parameters) {
+      known.push_back(parameter.name);
+      const auto stated = spec.parameters.find(parameter.name);
+      if (stated == spec.parameters.end()) continue;
+      if (stated->second < parameter.lower || stated->second > parameter.upper) {
+        table.refuse(
+            parameter.name, std::to_string(stated->second),
+            "must lie in [" + std::to_string(parameter.lower) + ", " + std::to_string(parameter.upper) + "]");
+      }
+    }
+  }
+  table.allow_only(known);
+}
+
+EffectSpec read_effect(const TomlTable& effect, const std::string& path) {
+  effect.allow_only({"name", "parameters", "network", "expression", "fit"});
+  EffectSpec spec;
+  spec.name = effect.text("name");
+  if (effect.has("parameters")) {
+    const TomlTable parameters = effect.table("parameters");
+    for (const std::string& key : parameters.keys()) spec.parameters[key] = parameters.number(key);
+  }
+  if (effect.has("network")) spec.network = effect.text("network");
+  if (effect.has("fit")) spec.fit = read_fit(effect.table("fit"));
+  const std::vector<std::string> names = effect_names();
+  const bool is_known = std::find(names.begin(), names.end(), spec.name) != names.end();
+  if (effect.has("expression")) {
+    if (is_known || spec.name.empty()) {
+      effect.refuse("name", files::in_quotes(spec.name), "cannot name a user-defined effect",
+                    "choose a name of your own");
+    }
+    spec.expression = read_expression(effect.table("expression"));
+    check_parameters(effect, spec, make_effect(spec, {"", {}, path})->info());
+    return spec;
+  }
+  if (!is_known) {
+    effect.refuse("name", files::in_quotes(spec.name), "is not a known effect",
+                  files::did_you_mean(spec.name, names) + ", or add [effect.expression]");
+  }
+  if (!spec.network.empty() && spec.name != "deep_set") {
+    effect.refuse("network", files::in_quotes(spec.network), "belongs to the effect deep_set only");
+  }
+  check_parameters(effect, spec, effect_info(spec.name));
+  return spec;
+}
+
+}  // namespace
+
+double ThrustMap::pwm(double force_N, double battery_V) const {
+  const double v = battery_V / kFullBattery_V;
+  const double b = c10 + c11 * v;
+  const double c = c00 + c01 * v - force_N / kGramForce_N;
+  if (c20 == 0) return std::clamp(-c / b, 0.0, 1.0);
+  const double discriminant = b * b - 4 * c20 * c;
+  const double vertex = -b / (2 * c20);
+  if (discriminant <= 0) return std::clamp(vertex, 0.0, 1.0);
+  return std::clamp(vertex + std::sqrt(discriminant) / (2 * std::abs(c20)) * (c20 > 0 ? 1 : -1), 0.0, 1.0);
+}
+
+Model parse_model(const std::string& text, const std::string& path) {
+  const toml::table document = files::parse_toml(text, path);
+  const TomlTable top(document, path);
+  if (top.text("schema") != kSchema) {
+    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema),
+               "is this the right file?");
+  }
+  top.allow_only({"schema", "vehicle", "sensor", "effect"});
+  Model model;
+  model.path = path;
+  model.sha256 = files::sha256(text);
+  read_vehicle(top.table("vehicle"), &model);
+  if (top.has("sensor")) read_sensor(top.table("sensor"), &model.sensor);
+  if (!top.has("effect")) return model;
+  for (const TomlTable& effect : top.tables("effect")) {
+    EffectSpec spec = read_effect(effect, path);
+    for (const EffectSpec& other : model.effects) {
+      if (other.name == spec.name) {
+        effect.refuse("name", files::in_quotes(spec.name), "appears twice", "keep one of the two");
+      }
+    }
+    model.effects.push_back(std::move(spec));
+  }
+  return model;
+}
+
+Model read_model(const std::string& path) { return parse_model(files::read_file(path), path); }
+
+}  // namespace swarmcert::stability

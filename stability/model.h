@@ -1,0 +1,107 @@
+/// @file model.toml: what the project believes of one kind of vehicle.
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace swarmcert::stability {
+
+inline constexpr double kGravity_m_s2 = 9.81;
+/// One gram-force: the unit of the thrust map and of the published networks.
+inline constexpr double kGramForce_N = 1e-3 * kGravity_m_s2;
+/// The battery voltage to which the thrust map and the effect `battery` refer.
+inline constexpr double kFullBattery_V = 4.2;
+
+/// Force of one rotor: g = c00 + c10 p + c01 v + c20 p^2 + c11 p v in gram-force, with p = PWM / 65536 in [0, 1]
+/// and v = battery voltage / 4.2 V. Increasing in p where the calibration holds; read_model() checks that at full
+/// battery.
+struct ThrustMap {
+  double c00 = 0, c10 = 0, c01 = 0, c20 = 0, c11 = 0;
+
+  double force_N(double pwm, double battery_V) const {
+    const double v = battery_V / kFullBattery_V;
+    return kGramForce_N * (c00 + c01 * v + pwm * (c10 + c11 * v + c20 * pwm));
+  }
+
+  /// The p in [0, 1] whose force is nearest to `force_N`: the root of the quadratic on its increasing branch, or the
+  /// end of the range where the force cannot be reached.
+  double pwm(double force_N, double battery_V) const;
+
+  /// Largest force of one rotor, in newton.
+  double largest_N(double battery_V) const { return force_N(1, battery_V); }
+};
+
+/// What the logs' sensors do to the truth. Defaults: the published flights (BMI088 accelerometer behind a two-pole
+/// low-pass of 30 Hz, logged at about 100 Hz; positions from motion capture).
+struct SensorModel {
+  double accelerometer_cutoff_hz = 30;
+  double accelerometer_noise_m_s2 = 0.12;  ///< standard deviation per logged sample, after the filter
+  double position_noise_m = 2e-4;
+  double velocity_noise_m_s = 5e-3;
+  double attitude_noise_rad = 1e-3;
+  double log_rate_hz = 100;
+};
+
+/// An effect written in the model file as expressions instead of C++; see effects/expression.h for the variables.
+struct EffectExpression {
+  std::map<std::string, std::string> formulas;  ///< "force_z_N" -> "a * T * exp(-z / b)"
+  std::vector<std::string> linear;              ///< parameters in which the formulas are linear, e.g. {"a"}
+  std::map<std::string, std::pair<double, double>> bounds;  ///< of any parameter
+  std::map<std::string, std::vector<double>> grid;  ///< values that identification tries, of the others
+  bool per_neighbour = false;                       ///< evaluated for each neighbour and summed
+};
+
+/// Where an effect's numbers come from. Written by identification, kept by everyone.
+struct FitProvenance {
+  std::vector<std::string> flights;                           ///< that the fit used
+  std::map<std::string, std::pair<double, double>> interval;  ///< by parameter, 90 %
+  double select_rmse_before_N = 0, select_rmse_after_N = 0;   ///< on flights not used by the fit
+  int test_looks = 0;  ///< how often the test flights had been scored when this was written
+  std::string note;
+
+  bool is_empty() const { return flights.empty() && interval.empty() && note.empty() && test_looks == 0; }
+};
+
+/// One [[effect]] of a model file. Parameters that are not named have the effect's defaults.
+struct EffectSpec {
+  std::string name;
+  std::map<std::string, double> parameters;
+  std::string network;          ///< of `deep_set`: path as stated, relative to the model's folder
+  EffectExpression expression;  ///< of user-defined effects
+  FitProvenance fit;
+
+  bool is_expression() const { return !expression.formulas.empty(); }
+};
+
+/// One kind of vehicle. Invariant after read_model(): all numbers finite, mass, inertia and arm positive, every
+/// effect known and within its parameters' bounds.
+struct Model {
+  std::string path;    ///< as the user gave it; empty if made in memory
+  std::string sha256;  ///< of the file
+  std::string kind;    ///< "small", "large", ...: which phi and rho of a network belong to it
+  double mass_kg = 0;
+  std::array<double, 3> inertia_kg_m2 = {0, 0, 0};  ///< diagonal, body axes x forward, y left, z up
+  double arm_m = 0;                                 ///< from the centre to each of the four rotors, in X
+  double torque_per_thrust_m = 0;                   ///< yaw torque of a rotor per newton of its thrust
+  ThrustMap thrust;
+  SensorModel sensor;
+  std::vector<EffectSpec> effects;
+
+  double weight_N() const { return mass_kg * kGravity_m_s2; }
+};
+
+/// Reads a model file.
+/// @throws files::InputError with line, key, value and mend; unknown keys, effects and parameters get a did-you-mean.
+Model read_model(const std::string& path);
+
+/// As read_model(), from memory; `path` gives the folder for networks, and the name in messages.
+Model parse_model(const std::string& text, const std::string& path);
+
+/// The file that reads back as `model`: numbers in the shortest form that gives the same double.
+/// @param comments lines to put at the head, without '#'.
+std::string to_toml(const Model& model, const std::vector<std::string>& comments = {});
+
+}  // namespace swarmcert::stability
