@@ -1,0 +1,244 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "data.h"
+#include "nn/files/input_error.h"
+#include "random_instant.h"
+#include "stability/effects/downwash.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using tests::RandomInstant;
+
+const EffectContext kContext = {"small", {"small"}, SWARMCERT_SOURCE_DIR "/nn/networks/demo/model.toml"};
+
+EffectSpec spec_of(const std::string& name) {
+  EffectSpec spec;
+  spec.name = name;
+  if (name == "deep_set") spec.network = "network.toml";
+  return spec;
+}
+
+double default_of(const std::string& effect, const std::string& parameter) {
+  for (const Parameter& p : effect_info(effect).shape) {
+    if (p.name == parameter) return p.value;
+  }
+  throw std::logic_error(parameter);
+}
+
+TEST(Effects, HaveTheNamesOfTheCommandLine) {
+  const std::set<std::string> wanted = {"motor_lag",  "delay",          "sensor_delay",   "thrust_ratio",
+                                        "battery",    "drag_linear",    "drag_quadratic", "drag_rotor",
+                                        "inflow",     "ground",         "ceiling",        "downwash",
+                                        "upper_lift", "constant_force", "torque_bias",    "deep_set"};
+  const std::vector<std::string> names = effect_names();
+  EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), wanted);
+}
+
+TEST(Effects, DescribeThemselvesWithBoundsThatHoldTheirDefaults) {
+  for (const std::string& name : effect_names()) {
+    SCOPED_TRACE(name);
+    const EffectInfo& info = effect_info(name);
+    EXPECT_FALSE(info.equation.empty());
+    EXPECT_FALSE(info.source.empty());
+    EXPECT_FALSE(info.excitation.empty());
+    EXPECT_FALSE(info.equivalence_class.empty());
+    ASSERT_FALSE(info.linear.empty());
+    EXPECT_LE(info.linear.size(), static_cast<std::size_t>(kMostColumns));
+    EXPECT_LE(info.shape.size(), static_cast<std::size_t>(kMostShape));
+    for (const auto* parameters : {&info.linear, &info.shape}) {
+      for (const Parameter& p : *parameters) {
+        EXPECT_LE(p.lower, p.value) << p.name;
+        EXPECT_GE(p.upper, p.value) << p.name;
+        for (const double value : p.grid) EXPECT_TRUE(p.lower <= value && value <= p.upper) << p.name;
+      }
+    }
+  }
+  EXPECT_EQ(effect_info("thrust_ratio").equivalence_class, "mass / payload / thrust scale");
+  EXPECT_EQ(effect_info("constant_force").equivalence_class, "wind / tilt / IMU bias");
+}
+
+TEST(Effects, ForceIsColumnsTimesCoefficientsAtRandomStates) {
+  std::mt19937_64 random(7);
+  int acting = 0;
+  for (const std::string& name : effect_names()) {
+    if (effect_info(name).remembers) continue;
+    SCOPED_TRACE(name);
+    EffectSpec spec = spec_of(name);
+    std::vector<double> coefficients;
+    for (const Parameter& p : effect_info(name).linear) {
+      coefficients.push_back(p.lower + 0.3 * (p.upper - p.lower));
+      spec.parameters[p.name] = coefficients.back();
+    }
+    const AppliedEffect applied(spec, kContext);
+    const std::unique_ptr<Effect> effect = make_effect(spec_of(name), kContext);
+    for (const std::vector<double>& shape : effect->grid({0.05, 1.2})) {
+      EXPECT_EQ(shape.size(), effect->info().shape.size());
+    }
+    const std::vector<double>& shape = applied.shape();
+    const std::unique_ptr<ColumnStream> stream = effect->stream(shape.data());
+    for (int trial = 0; trial < 200; ++trial) {
+      const RandomInstant state(random, trial % 5);
+      std::vector<Wrench> columns(coefficients.size());
+      stream->advance(state.now, columns.data());
+      Eigen::Vector3d force = Eigen::Vector3d::Zero();
+      Eigen::Vector3d torque = Eigen::Vector3d::Zero();
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        force += coefficients[k] * columns[k].force_W_N;
+        torque += coefficients[k] * columns[k].torque_B_Nm;
+      }
+      const Wrench wrench = applied.wrench(state.now);
+      ASSERT_LT((wrench.force_W_N - force).norm(), 1e-12 * (1 + force.norm()));
+      ASSERT_LT((wrench.torque_B_Nm - torque).norm(), 1e-12);
+      if (force.norm() + torque.norm() > 1e-6) ++acting;
+    }
+  }
+  EXPECT_GT(acting, 1500) << "the states must reach the effects";
+}
+
+/// Force in gram-force on a vehicle `dz_m` below another at horizontal distance `r_m`.
+double downwash_gf(double r_m, double dz_m, double norm_exponent = 1.3, int copies = 1) {
+  EffectSpec spec = spec_of("downwash");
+  spec.parameters["norm_exponent"] = norm_exponent;
+  const AppliedEffect downwash(spec, kContext);
+  const std::vector<Neighbour> above(
+      static_cast<std::size_t>(copies),
+      {{r_m, 0, dz_m}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.034, 0});
+  Instant now;
+  now.mass_kg = 0.034;
+  now.neighbours = above.data();
+  now.num_neighbours = copies;
+  return downwash.wrench(now).force_W_N.z() / kGramForce_N;
+}
+
+TEST(Downwash, HasThePublishedValuesOfItsFit) {
+  const double r[] = {0, 0.05, 0.1, 0.15};
+  const double dz[] = {0.2, 0.3, 0.5};
+  const double expected_gf[3][4] = {{-11.996648, -5.967843, -0.734666, -0.022381},
+                                    {-10.032990, -6.144667, -1.411570, -0.121630},
+                                    {-8.009931, -6.055821, -2.617013, -0.646439}};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 4; ++j)
+      EXPECT_NEAR(downwash_gf(r[j], dz[i]), expected_gf[i][j], 1e-6) << dz[i] << " " << r[j];
+  }
+}
+
+TEST(Downwash, ComposesByThePNormAndActsDownwardsOnly) {
+  const double one = downwash_gf(0.02, 0.3);
+  for (const double p : {1.0, 1.3, 1.85, 2.0}) {
+    EXPECT_NEAR(downwash_gf(0.02, 0.3, p, 3), one * std::pow(3, 1 / p), 1e-9);
+    EXPECT_NEAR(downwash_gf(0.02, 0.3, p, 1), one, 1e-12);
+  }
+  EXPECT_EQ(downwash_gf(0, -0.3), 0);
+  EXPECT_EQ(downwash_gf(0, 0.05), 0);
+  EXPECT_EQ(downwash_gf(1, 0.3), 0) << "beyond its reach";
+  for (double dz = 0.05; dz < 0.13; dz += 1e-3)
+    EXPECT_LT(std::abs(downwash_gf(0, dz + 1e-6) - downwash_gf(0, dz)), 1e-3);
+}
+
+TEST(Downwash, IsZeroBeyondItsReach) {
+  const std::unique_ptr<Effect> effect = make_effect(spec_of("downwash"), kContext);
+  const EffectValues values = effect_values(effect->info(), spec_of("downwash"));
+  for (const double dz : {0.1, 0.3, 0.8}) {
+    const double reach_m = effect->reach_m(dz, values.shape.data());
+    EXPECT_EQ(downwash_gf(reach_m * 1.0001, dz), 0);
+    EXPECT_LT(downwash_gf(reach_m * 0.95, dz), 0);
+  }
+}
+
+TEST(MotorLag, StreamIsTheExactResponseToARamp) {
+  // tau x' = u - x, u = t, x(0) = 0: x = t - tau (1 - exp(-t / tau)).
+  const std::unique_ptr<Effect> lag = make_effect(spec_of("motor_lag"), kContext);
+  const double tau_s = default_of("motor_lag", "tau_s");
+  const auto stream = lag->stream(&tau_s);
+  Instant now;
+  for (const double t : {0.0, 0.01, 0.0195, 0.03, 0.1, 0.11}) {
+    now.time_s = t;
+    now.thrust_N = t;
+    Wrench column;
+    stream->advance(now, &column);
+    EXPECT_NEAR(column.force_W_N.z(), -tau_s * (1 - std::exp(-t / tau_s)), 1e-15) << t;
+  }
+  stream->restart();
+  Wrench column;
+  stream->advance(now, &column);
+  EXPECT_EQ(column.force_W_N.z(), 0) << "no past";
+}
+
+TEST(Delay, StreamReadsThePastOfIrregularSamples) {
+  for (const std::string name : {"delay", "sensor_delay"}) {
+    SCOPED_TRACE(name);
+    const std::unique_ptr<Effect> delay = make_effect(spec_of(name), kContext);
+    const double delay_s = 0.023;
+    const auto stream = delay->stream(&delay_s);
+    std::mt19937_64 random(3);
+    Instant now;
+    double t = 0;
+    for (int k = 0; k < 500; ++k) {
+      t += std::uniform_real_distribution<double>(0.008, 0.012)(random);
+      now.time_s = t;
+      now.thrust_N = 2 * t + 1;
+      Wrench column;
+      stream->advance(now, &column);
+      if (k <= 5) continue;
+      ASSERT_NEAR(column.force_W_N.z(), -2 * delay_s, 1e-12);
+    }
+  }
+}
+
+TEST(DeepSetEffect, EqualsTheNetworkAndDoesNotDependOnTheOrderOfNeighbours) {
+  const std::unique_ptr<Effect> effect = make_effect(spec_of("deep_set"), kContext);
+  std::mt19937_64 random(5);
+  for (int trial = 0; trial < 50; ++trial) {
+    RandomInstant state(random, 4);
+    Wrench column, shuffled;
+    effect->columns(state.now, nullptr, &column);
+    std::swap(state.neighbours[0], state.neighbours[3]);
+    std::swap(state.neighbours[1], state.neighbours[2]);
+    effect->columns(state.now, nullptr, &shuffled);
+    EXPECT_EQ(column.force_W_N.z(), shuffled.force_W_N.z());
+    EXPECT_TRUE(std::isfinite(column.force_W_N.z()));
+  }
+}
+
+TEST(ExpressionEffect, EqualsTheBuiltInEffectThatItSpells) {
+  EffectSpec spelled;
+  spelled.name = "my_drag";
+  spelled.parameters = {{"D", 0.02}};
+  spelled.expression.formulas = {
+      {"force_x_N", "-D * vx"}, {"force_y_N", "-D * vy"}, {"force_z_N", "-D * vz"}};
+  spelled.expression.linear = {"D"};
+  EffectSpec built_in = spec_of("drag_linear");
+  built_in.parameters = {{"drag_N_s_m", 0.02}};
+  const AppliedEffect a(spelled, kContext), b(built_in, kContext);
+  std::mt19937_64 random(9);
+  for (int trial = 0; trial < 100; ++trial) {
+    const RandomInstant state(random, 2);
+    EXPECT_LT((a.wrench(state.now).force_W_N - b.wrench(state.now).force_W_N).norm(), 1e-15);
+  }
+}
+
+TEST(ExpressionEffect, SumsOverNeighbours) {
+  EffectSpec spec;
+  spec.name = "mine";
+  spec.parameters = {{"a", 2.0}};
+  spec.expression.formulas = {{"force_z_N", "-a * (dz > 0 ? exp(-(dx^2 + dy^2)) * mj : 0)"}};
+  spec.expression.linear = {"a"};
+  spec.expression.per_neighbour = true;
+  const AppliedEffect effect(spec, kContext);
+  std::mt19937_64 random(11);
+  const RandomInstant state(random, 5);
+  double expected = 0;
+  for (const Neighbour& n : state.neighbours) {
+    if (n.dp_W_m.z() > 0) expected -= 2 * std::exp(-n.dp_W_m.head<2>().squaredNorm()) * n.mass_kg;
+  }
+  EXPECT_NE(expected, 0);
+  EXPECT_NEAR(effect.wrench(state.now).force_W_N.z(), expected, 1e-15);
+}
+
+}  // namespace
+}  // namespace swarmcert::stability

@@ -1,0 +1,150 @@
+#include "stability/model.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "data.h"
+#include "nn/files/input_error.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::stability {
+namespace {
+
+const std::string kVehicle = R"(schema = "swarmcert/model/1"
+[vehicle]
+kind = "small"
+mass_kg = 0.034
+inertia_kg_m2 = [16e-6, 16e-6, 29e-6]
+arm_m = 0.046
+torque_per_thrust_m = 0.006
+[vehicle.thrust]
+c00 = 0.0
+c10 = 20.0
+c01 = 0.0
+c20 = 0.0
+c11 = 0.0
+)";
+
+/// The refusal of `text`, or "" if it is read.
+std::string refusal(const std::string& text) {
+  try {
+    parse_model(text, "m.toml");
+  } catch (const files::InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(Model, ReadsTheShippedCrazyflies) {
+  const Model small = read_model(tests::source_path("stability/models/crazyflie-small.toml"));
+  const Model large = read_model(tests::source_path("stability/models/crazyflie-large.toml"));
+  EXPECT_EQ(small.mass_kg, 0.034);
+  EXPECT_EQ(large.mass_kg, 0.067);
+  EXPECT_EQ(small.kind, "small");
+  EXPECT_TRUE(small.effects.empty());
+  EXPECT_TRUE(large.effects.empty());
+  // Hover at a full battery: the mapped thrust of four rotors equals the weight at a plausible PWM.
+  for (const Model& model : {small, large}) {
+    const double pwm = model.thrust.pwm(model.weight_N() / 4, kFullBattery_V);
+    EXPECT_GT(pwm, 0.4);
+    EXPECT_LT(pwm, 0.9);
+    EXPECT_NEAR(4 * model.thrust.force_N(pwm, kFullBattery_V), model.weight_N(), 1e-12);
+  }
+}
+
+TEST(Model, PwmInvertsTheThrustMapWhereItReachesAndSaturatesElsewhere) {
+  const ThrustMap map = read_model(tests::source_path("stability/models/crazyflie-small.toml")).thrust;
+  int inside = 0;
+  for (double battery_V = 3.3; battery_V < 4.21; battery_V += 0.1) {
+    for (double force_N = 0; force_N < 0.3; force_N += 0.01) {
+      const double pwm = map.pwm(force_N, battery_V);
+      ASSERT_GE(pwm, 0);
+      ASSERT_LE(pwm, 1);
+      // Below the parabola's lowest point no PWM gives so little.
+      const double vertex = -(map.c10 + map.c11 * battery_V / 4.2) / (2 * map.c20);
+      if (pwm > std::max(vertex, 0.0) + 1e-9 && pwm < 1) {
+        EXPECT_NEAR(map.force_N(pwm, battery_V), force_N, 1e-12);
+        ++inside;
+      }
+      if (pwm == 1) {
+        EXPECT_LE(map.largest_N(battery_V), force_N + 1e-12);
+      }
+    }
+  }
+  EXPECT_GT(inside, 100);
+}
+
+TEST(Model, ReadsBackWhatItWrites) {
+  Model model = parse_model(kVehicle + R"toml(
+[sensor]
+accelerometer_cutoff_hz = 42.5
+[[effect]]
+name = "ground"
+parameters = { amplitude = 0.164, decay_m = 0.0268 }
+[effect.fit]
+flights = ["a/\"b\"_00", "c"]
+interval = { amplitude = [0.15, 0.18] }
+select_rmse_before_N = 0.01
+select_rmse_after_N = 0.006
+test_looks = 2
+note = "line\nbreak"
+[[effect]]
+name = "dip"
+parameters = { a = -0.01, w = 0.05 }
+[effect.expression]
+force_b3_N = "a * T * exp(-((z - 0.18) / w)^2 / 2)"
+linear = ["a"]
+bounds = { a = [-0.05, 0.0] }
+grid = { w = [0.03, 0.05] }
+)toml",
+                            "m.toml");
+  const std::string text = to_toml(model, {"a comment"});
+  const Model again = parse_model(text, "n.toml");
+  EXPECT_EQ(to_toml(again, {"a comment"}), text);
+  EXPECT_EQ(again.effects[0].fit.flights, model.effects[0].fit.flights);
+  EXPECT_EQ(again.effects[0].fit.note, "line\nbreak");
+  EXPECT_EQ(again.effects[1].expression.formulas, model.effects[1].expression.formulas);
+  EXPECT_EQ(again.sensor.accelerometer_cutoff_hz, 42.5);
+  EXPECT_EQ(again.inertia_kg_m2, model.inertia_kg_m2);
+}
+
+TEST(Model, RefusesWhatCannotBeWithLineAndMend) {
+  ASSERT_EQ(refusal(kVehicle), "");
+  const auto has = [](const std::string& message, const std::string& words) {
+    EXPECT_NE(message.find(words), std::string::npos) << message << "\nlacks: " << words;
+  };
+  has(refusal(replaced(kVehicle, "mass_kg = 0.034", "mass_kg = 0.0")), "line 4: vehicle.mass_kg = 0");
+  has(refusal(replaced(kVehicle, "mass_kg", "mass_g")), "did you mean \"mass_kg\"?");
+  has(refusal(replaced(kVehicle, "model/1", "network/1")), "is this the right file?");
+  has(refusal(replaced(kVehicle, "c10 = 20.0", "c10 = 0.2")), "the vehicle weighs");
+  has(refusal(kVehicle + "[[effect]]\nname = \"grund\"\n"), "did you mean \"ground\"?");
+  has(refusal(kVehicle + "[[effect]]\nname = \"ground\"\nparameters = { amplitud = 0.1 }\n"),
+      "did you mean \"amplitude\"?");
+  has(refusal(kVehicle + "[[effect]]\nname = \"drag_linear\"\nparameters = { drag_N_s_m = -0.1 }\n"),
+      "must lie in");
+  has(refusal(kVehicle + "[[effect]]\nname = \"ground\"\n[[effect]]\nname = \"ground\"\n"), "appears twice");
+  has(refusal(kVehicle + "[[effect]]\nname = \"mine\"\n"), "add [effect.expression]");
+}
+
+TEST(Model, RefusesFormulasThatAreWrongOrNotLinearWhereTheySaySo) {
+  const auto message = [](const std::string& formula, const std::string& linear) {
+    return refusal(kVehicle +
+                   "[[effect]]\nname = \"mine\"\nparameters = { a = 0.1, b = 0.2 }\n[effect.expression]\n" +
+                   "force_z_N = \"" + formula + "\"\nlinear = [" + linear + "]\n");
+  };
+  EXPECT_EQ(message("a * z * exp(-b * z)", "\"a\""), "");
+  EXPECT_EQ(message("a * z + b * vx", "\"a\", \"b\""), "");
+  EXPECT_NE(message("a * z + b", "\"a\"").find("not linear"), std::string::npos);
+  EXPECT_NE(message("a * z * exp(-b * z)", "\"a\", \"b\"").find("not linear"), std::string::npos);
+  EXPECT_NE(message("a * (z", "\"a\"").find("is not a formula"), std::string::npos);
+  EXPECT_NE(message("a * zz", "\"a\"").find("zz"), std::string::npos);
+  EXPECT_NE(message("a * dz", "\"a\"").find("dz"), std::string::npos) << "dz needs per_neighbour";
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
