@@ -13,6 +13,9 @@
 #error "swarmcert::nn rounds every operation to its own type: on 32-bit x86 build with -msse2 -mfpmath=sse"
 #endif
 
+#include <cstdint>
+#include <cstring>
+
 namespace swarmcert::nn {
 
 /// Returns `product`, and keeps the compiler from fusing it with a following addition.
@@ -45,6 +48,38 @@ inline bool arithmetic_is_fused() {
   const float y = a;
   const float z = c;
   return rounded(x * y) + z != 0.0f;
+}
+
+namespace detail {
+
+template <typename Scalar>
+struct Bits;
+template <>
+struct Bits<float> {
+  using Type = std::uint32_t;
+  static constexpr Type kExponent = 0x7f800000u;
+};
+template <>
+struct Bits<double> {
+  using Type = std::uint64_t;
+  static constexpr Type kExponent = 0x7ff0000000000000u;
+};
+
+}  // namespace detail
+
+/// The bit pattern of `x`.
+template <typename Scalar>
+inline typename detail::Bits<Scalar>::Type bits(Scalar x) {
+  typename detail::Bits<Scalar>::Type pattern;
+  std::memcpy(&pattern, &x, sizeof pattern);
+  return pattern;
+}
+
+/// True unless `x` is infinite or not a number. By bits, because a compiler told that there are no NaNs
+/// (-ffinite-math-only) folds the library's test to true.
+template <typename Scalar>
+inline bool is_finite(Scalar x) {
+  return (bits(x) & detail::Bits<Scalar>::kExponent) != detail::Bits<Scalar>::kExponent;
 }
 
 }  // namespace swarmcert::nn

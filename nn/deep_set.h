@@ -11,8 +11,8 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 
+#include "nn/arithmetic.h"
 #include "nn/mlp.h"
 
 namespace swarmcert::nn {
@@ -72,32 +72,6 @@ constexpr int scratch_size(const DeepSet<Scalar>& set) {
 }
 
 namespace detail {
-
-template <typename Scalar>
-struct Bits;
-template <>
-struct Bits<float> {
-  using Type = std::uint32_t;
-  static constexpr Type kExponent = 0x7f800000u;
-};
-template <>
-struct Bits<double> {
-  using Type = std::uint64_t;
-  static constexpr Type kExponent = 0x7ff0000000000000u;
-};
-
-template <typename Scalar>
-inline typename Bits<Scalar>::Type bits(Scalar x) {
-  typename Bits<Scalar>::Type pattern;
-  std::memcpy(&pattern, &x, sizeof pattern);
-  return pattern;
-}
-
-/// By bits, because a compiler told that there are no NaNs (-ffinite-math-only) folds the library's test to true.
-template <typename Scalar>
-inline bool is_finite(Scalar x) {
-  return (bits(x) & Bits<Scalar>::kExponent) != Bits<Scalar>::kExponent;
-}
 
 template <typename Scalar>
 inline bool comes_before(const Scalar* a, const Scalar* b, int size) {

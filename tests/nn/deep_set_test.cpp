@@ -111,8 +111,8 @@ TEST_F(DeepSetTest, EveryOrderOfArrivalGivesTheSameBits) {
       std::vector<Neighbour<float>> arrived;
       arrived.reserve(order.size());
       for (const int j : order) arrived.push_back(original[static_cast<std::size_t>(j)]);
-      results.insert(detail::bits(f_(arrived)));
-      results_without.insert(detail::bits(in_order_of_arrival(arrived)));
+      results.insert(bits(f_(arrived)));
+      results_without.insert(bits(in_order_of_arrival(arrived)));
       ++permutations;
     } while (std::next_permutation(order.begin(), order.end()));
     EXPECT_EQ(results.size(), 1u) << count << " neighbours, " << permutations << " orders";
@@ -126,7 +126,7 @@ TEST_F(DeepSetTest, EveryOrderOfArrivalGivesTheSameBits) {
 TEST_F(DeepSetTest, TheGroundIsSummedFirstThenKindsByIndex) {
   const std::vector<Input> inputs = random_inputs(2);
   const std::vector<Neighbour<float>> by_kind = {{inputs[0].data(), 0}, {inputs[1].data(), 1}};
-  EXPECT_EQ(detail::bits(f_({by_kind[1], by_kind[0]})), detail::bits(in_order_of_arrival(by_kind)));
+  EXPECT_EQ(bits(f_({by_kind[1], by_kind[0]})), bits(in_order_of_arrival(by_kind)));
 }
 
 TEST_F(DeepSetTest, EqualNeighboursAreInterchangeable) {
@@ -134,7 +134,7 @@ TEST_F(DeepSetTest, EqualNeighboursAreInterchangeable) {
   const Input same = a;
   const Input b = random_input();
   const float y = f_({{a.data(), 0}, {b.data(), 0}, {same.data(), 0}});
-  EXPECT_EQ(detail::bits(f_({{same.data(), 0}, {a.data(), 0}, {b.data(), 0}})), detail::bits(y));
+  EXPECT_EQ(bits(f_({{same.data(), 0}, {a.data(), 0}, {b.data(), 0}})), bits(y));
 }
 
 TEST_F(DeepSetTest, ZerosOfBothSignsHaveAnOrder) {
@@ -143,11 +143,11 @@ TEST_F(DeepSetTest, ZerosOfBothSignsHaveAnOrder) {
   Input minus = plus;
   minus[0] = -0.0f;
   const float y = f_({{plus.data(), 0}, {minus.data(), 0}});
-  EXPECT_EQ(detail::bits(f_({{minus.data(), 0}, {plus.data(), 0}})), detail::bits(y));
+  EXPECT_EQ(bits(f_({{minus.data(), 0}, {plus.data(), 0}})), bits(y));
 }
 
 TEST_F(DeepSetTest, WithoutNeighboursOnlyTheGroundActs) {
-  EXPECT_EQ(detail::bits(f_({})), detail::bits(in_order_of_arrival({})));
+  EXPECT_EQ(bits(f_({})), bits(in_order_of_arrival({})));
 }
 
 TEST_F(DeepSetTest, WithoutNeighboursAndGroundItIsRhoOfZero) {
@@ -166,7 +166,7 @@ TEST_F(DeepSetTest, ClampIsAppliedBeforePhi) {
   clamped.upper = upper.data();
   const Input far = {-3, 9, 0.125f, 1e30f, -1e30f, 0.25f};
   const Input near = {-0.5f, 0.25f, 0.125f, 0.25f, -0.5f, 0.25f};
-  EXPECT_EQ(detail::bits(f_(clamped, {{far.data(), 0}})), detail::bits(f_({{near.data(), 0}})));
+  EXPECT_EQ(bits(f_(clamped, {{far.data(), 0}})), bits(f_({{near.data(), 0}})));
 }
 
 TEST_F(DeepSetTest, OrderIsThatOfClampedInputs) {
@@ -182,7 +182,7 @@ TEST_F(DeepSetTest, OrderIsThatOfClampedInputs) {
     for (Input& x : inputs) x[0] = std::abs(x[0]) + 0.25f;
     std::vector<Input> already = inputs;
     for (Input& x : already) x[0] = std::min(x[0], 0.5f);
-    EXPECT_EQ(detail::bits(f_(clamped, neighbours(inputs))), detail::bits(f_(neighbours(already))));
+    EXPECT_EQ(bits(f_(clamped, neighbours(inputs))), bits(f_(neighbours(already))));
     compared += inputs != already ? 1 : 0;
   }
   EXPECT_GT(compared, 100);

@@ -1,0 +1,83 @@
+/// @file How fast the attitude laws decay, as their proofs say it. For analysis and tests, not for flight.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmcert::controller {
+
+/// Smallest and largest principal moment of inertia.
+struct InertiaRange {
+  double smallest_kg_m2, largest_kg_m2;
+};
+
+/// The decay of lee_torque(): Psi(t) <= initial e^(-rate t) with Psi = 1 - cos(theta).
+struct LeeDecay {
+  bool applies = false;  ///< false: too close to half a turn, or turning too fast, for the theorem
+  double initial = 0.0;
+  double rate_1_s = 0.0;
+};
+
+/// Stated for equal k_R in all axes and K_omega's smallest and largest entry w_min, w_max.
+///
+/// Derivation (after Lee, Leok and McClamroch 2010, proposition 1, with j, J the extreme moments of inertia). The law
+/// leaves J e_w' = -k e_R - W e_w, and Psi' = e_R . e_w. So k Psi + e_w.J e_w / 2 does not grow, and Psi stays at or
+/// below psi = Psi(0) + J |e_w(0)|^2 / (2 k); psi < 2 is needed. There |e_R|^2 = Psi (2 - Psi) gives
+/// |e_R|^2 / 2 <= Psi <= |e_R|^2 / (2 - psi). Let V = k Psi + e_w.J e_w / 2 + c e_R.e_w. Since |e_R'| <= |e_w|,
+///   V  <= [k / (2 - psi)] r^2 + c r w + (J / 2) w^2,               r = |e_R|, w = |e_w|,
+///   V' <= -(c k / J) r^2 + (c w_max / j) r w - (w_min - c) w^2,
+///   V  >= (k - c^2 / j) Psi, from r^2 <= 2 Psi and completing the square.
+/// So V' <= -b V for every b for which the first quadratic form times b stays below the second one negated. For each
+/// c of a grid b is found by bisection; the best c wins.
+inline LeeDecay lee_decay(double k_R_N_m, double w_min, double w_max, const InertiaRange& inertia,
+                          double angle_rad, double rate_error_rad_s) {
+  const double j = inertia.smallest_kg_m2, big_j = inertia.largest_kg_m2, k = k_R_N_m;
+  const double psi_0 = 1.0 - std::cos(angle_rad);
+  const double psi = psi_0 + 0.5 * big_j * rate_error_rad_s * rate_error_rad_s / k;
+  LeeDecay best;
+  if (!(psi < 2.0)) return best;
+  constexpr int kSteps = 400;
+  const double c_end = std::min(w_min, std::sqrt(k * j));
+  for (int i = 1; i < kSteps; ++i) {
+    const double c = c_end * i / kSteps;
+    const auto decays_at = [&](double b) {
+      const double rr = c * k / big_j - b * k / (2.0 - psi);
+      const double rw = c * w_max / j + b * c;  // the sign that hurts
+      const double ww = w_min - c - 0.5 * b * big_j;
+      return rr >= 0.0 && ww >= 0.0 && 4.0 * rr * ww >= rw * rw;
+    };
+    if (!decays_at(0.0)) continue;
+    double low = 0.0, high = c * (2.0 - psi) / big_j;
+    for (int n = 0; n < 60; ++n) {
+      const double middle = 0.5 * (low + high);
+      (decays_at(middle) ? low : high) = middle;
+    }
+    if (low <= best.rate_1_s) continue;
+    const double v_0 = k * psi_0 + 0.5 * big_j * rate_error_rad_s * rate_error_rad_s +
+                       c * std::abs(std::sin(angle_rad)) * rate_error_rad_s;
+    best = {true, v_0 / (k - c * c / j), low};
+  }
+  return best;
+}
+
+/// Bound on |sigma(t)| = tan(theta / 4) under robust_torque() without integral.
+///
+/// With q = omega - omega_r the law leaves J q' = (J omega) x q - K_omega q. The first term does no work on q, so
+/// q.J q decays at least at rate 2 k / J (k the smallest entry of K_omega, j and J the extreme moments of inertia):
+/// |q(t)| <= sqrt(J / j) |q(0)| e^(-k t / J).
+/// Attitude: omega_e = q - 4 Lambda sigma, and |sigma|' = (1 + |sigma|^2) / 4 (sigma / |sigma|) . omega_e
+/// <= -l |sigma| + |q| / 2 with l the smallest entry of Lambda, because |sigma| <= 1. At half a turn sigma changes
+/// sign and keeps its norm. Hence, everywhere on SO(3),
+///   |sigma(t)| <= e^(-l t) |sigma(0)| + sqrt(J / j) |q(0)| / 2 * integral_0^t e^(-l (t - u)) e^(-k u / J) du.
+inline double robust_decay(double lambda_1_s, double k_omega_N_m_s, const InertiaRange& inertia,
+                           double sigma_0, double rate_error_0_rad_s, double time_s) {
+  const double a = k_omega_N_m_s / inertia.largest_kg_m2, l = lambda_1_s;
+  const double start = std::sqrt(inertia.largest_kg_m2 / inertia.smallest_kg_m2) * rate_error_0_rad_s / 2.0;
+  // (e^(-a t) - e^(-l t)) / (l - a), written so that nearly equal rates do not cancel.
+  const double gap = (l - a) * time_s;
+  const double convolution =
+      gap == 0.0 ? time_s * std::exp(-l * time_s) : time_s * std::exp(-l * time_s) * std::expm1(gap) / gap;
+  return std::exp(-l * time_s) * sigma_0 + start * convolution;
+}
+
+}  // namespace swarmcert::controller

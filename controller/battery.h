@@ -1,0 +1,102 @@
+/// @file Between rotor force, PWM and battery voltage: the calibration polynomials of a load cell.
+///
+/// p = PWM / 65536, v = battery voltage / 4.2 V, g = force of one rotor in gram-force.
+#pragma once
+
+#include <cstdint>
+
+#include "controller/scalar.h"
+
+namespace swarmcert::controller {
+
+/// Newton per gram-force, with the gravity of position_law.h.
+inline constexpr double kNewtonPerGramForce = 9.81e-3;
+/// Voltage of a full cell: v = 1.
+inline constexpr double kReferenceVoltage_V = 4.2;
+/// Voltages outside are readings that cannot be: the sensor has failed.
+inline constexpr double kLowestVoltage_V = 2.0, kHighestVoltage_V = 5.0;
+
+/// g = c00 + c10 p + c01 v + c20 p^2 + c11 p v.
+template <typename Scalar>
+struct ThrustMap {
+  Scalar c00, c10, c01, c20, c11;
+};
+
+/// p = d00 + d10 g + d01 v + d20 g^2 + d11 g v.
+template <typename Scalar>
+struct PwmMap {
+  Scalar d00, d10, d01, d20, d11;
+};
+
+/// Largest g = e00 + e10 p + e01 v, where p is the mean over the motors: under load the voltage sags.
+template <typename Scalar>
+struct LargestForceMap {
+  Scalar e00, e10, e01;
+  Scalar lower_gf, upper_gf;  ///< the result is held between these, whatever the voltage reads
+};
+
+/// a00 + a10 x + a01 y + a20 x^2 + a11 x y, the form of the first two maps.
+template <typename Scalar>
+inline Scalar quadratic(const Scalar& a00, const Scalar& a10, const Scalar& a01, const Scalar& a20,
+                        const Scalar& a11, const Scalar& x, const Scalar& y) {
+  return a00 + product(a10, x) + product(a01, y) + product(a20, product(x, x)) + product(a11, product(x, y));
+}
+
+/// Force of one rotor in newton, never negative: outside the calibrated range the polynomial may turn below zero.
+template <typename Scalar>
+inline Scalar force_of_pwm(const ThrustMap<Scalar>& map, const Scalar& p, const Scalar& voltage_V) {
+  const Scalar v = voltage_V / Scalar(kReferenceVoltage_V);
+  const Scalar g = quadratic(map.c00, map.c10, map.c01, map.c20, map.c11, p, v);
+  return g < Scalar(0) ? Scalar(0) : product(g, Scalar(kNewtonPerGramForce));
+}
+
+/// p in [0, 1] for a rotor's force. Forces at or below zero, and NaN, give 0.
+template <typename Scalar>
+inline Scalar pwm_of_force(const PwmMap<Scalar>& map, const Scalar& force_N, const Scalar& voltage_V) {
+  if (!(force_N > Scalar(0))) return Scalar(0);
+  const Scalar g = force_N / Scalar(kNewtonPerGramForce);
+  const Scalar v = voltage_V / Scalar(kReferenceVoltage_V);
+  const Scalar p = quadratic(map.d00, map.d10, map.d01, map.d20, map.d11, g, v);
+  return p > Scalar(0) ? (p < Scalar(1) ? p : Scalar(1)) : Scalar(0);
+}
+
+/// p in [0, 1] at which `map` gives the force: the exact inverse of force_of_pwm() on its rising branch, by the
+/// quadratic formula, where a fitted PwmMap only comes close. 0 where no p gives so little, 1 where none gives so
+/// much.
+template <typename Scalar>
+inline Scalar pwm_of_force(const ThrustMap<Scalar>& map, const Scalar& force_N, const Scalar& voltage_V) {
+  const Scalar zero(0), one(1), two(2), four(4);
+  if (!(force_N > zero)) return zero;
+  const Scalar v = voltage_V / Scalar(kReferenceVoltage_V);
+  const Scalar a = map.c20;
+  const Scalar b = map.c10 + product(map.c11, v);
+  const Scalar c = map.c00 + product(map.c01, v) - force_N / Scalar(kNewtonPerGramForce);
+  const Scalar discriminant = product(b, b) - product(four, product(a, c));
+  // Below the parabola's lowest point (a > 0), or above its highest (a < 0).
+  if (discriminant < zero) return a > zero ? zero : one;
+  // The root with slope 2 a p + b = +sqrt(discriminant), in the form that does not cancel.
+  const Scalar root = square_root(discriminant);
+  const Scalar p = b > zero ? product(-two, c) / (b + root) : (root - b) / product(two, a);
+  return p > zero ? (p < one ? p : one) : zero;
+}
+
+/// Largest force of one rotor in newton at this battery voltage, while the motors run at `mean_p`.
+template <typename Scalar>
+inline Scalar largest_force(const LargestForceMap<Scalar>& map, const Scalar& mean_p,
+                            const Scalar& voltage_V) {
+  const Scalar v = voltage_V / Scalar(kReferenceVoltage_V);
+  const Scalar g = map.e00 + product(map.e10, mean_p) + product(map.e01, v);
+  return product(clamp(g, map.lower_gf, map.upper_gf), Scalar(kNewtonPerGramForce));
+}
+
+/// PWM register value of p: the nearest of 0 to 65535, ties up; 0 for NaN. Casting a float that is out of range has
+/// no defined result, and hosts and targets do differ there, so nothing out of range is cast.
+template <typename Scalar>
+inline std::uint16_t pwm_register(const Scalar& p) {
+  const Scalar value = product(p, Scalar(65536)) + Scalar(0.5);
+  if (!(value > Scalar(0))) return 0;
+  if (value >= Scalar(65535)) return 65535;
+  return static_cast<std::uint16_t>(value);
+}
+
+}  // namespace swarmcert::controller

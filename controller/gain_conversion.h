@@ -1,0 +1,164 @@
+/// @file Between the paper's gains (Lambda, K) and PID gains, where both forms describe the same law.
+///
+/// Per axis, with a = k / m: Kd = a + 2 l, Kp = 2 a l + l^2, Ki = a l^2, that is
+/// s^3 + Kd s^2 + Kp s + Ki = (s + a)(s + l)^2. A PID law has this form only if its characteristic polynomial has a
+/// real double root -l with 0 < l < Kd / 2: then l solves the derivative 3 l^2 - 2 Kd l + Kp = 0, and
+/// Ki = (Kd - 2 l) l^2. Gains that firmware ships need not have it, and then the tracking theorem says nothing
+/// about them.
+#pragma once
+
+#include <cstdint>
+
+#include "controller/position_law.h"
+
+namespace swarmcert::controller {
+
+/// Why a conversion has no result.
+enum class ConversionStatus : std::uint8_t {
+  kOk,
+  kMassNotPositive,
+  kNotDiagonal,        ///< Lambda or K couples axes, which per-axis PID gains cannot
+  kNotPositive,        ///< a gain is zero, negative or not a number
+  kNoDoubleRoot,       ///< Kd^2 < 3 Kp: no real l exists for any Ki
+  kOtherIntegralGain,  ///< a real l exists, but needs another Ki
+};
+
+/// The status in words.
+inline const char* to_text(ConversionStatus status) {
+  switch (status) {
+    case ConversionStatus::kOk:
+      return "the gains have both forms";
+    case ConversionStatus::kMassNotPositive:
+      return "the mass is not positive";
+    case ConversionStatus::kNotDiagonal:
+      return "Lambda or K couples axes, which PID gains per axis cannot";
+    case ConversionStatus::kNotPositive:
+      return "a gain is not positive";
+    case ConversionStatus::kNoDoubleRoot:
+      return "Kd^2 < 3 Kp: no Lambda exists, whatever Ki";
+    case ConversionStatus::kOtherIntegralGain:
+      return "Lambda exists for another Ki only";
+  }
+  return "unknown status";
+}
+
+/// PID gains of one axis.
+template <typename Scalar>
+struct AxisPid {
+  Scalar Kp_1_s2, Kd_1_s, Ki_1_s3;
+};
+
+/// Composite gains of one axis, or why there are none.
+template <typename Scalar>
+struct AxisComposite {
+  ConversionStatus status = ConversionStatus::kNotPositive;
+  Scalar lambda_1_s{}, k_kg_s{};
+  /// With kOtherIntegralGain: the Ki that would fit Kp and Kd, nearest to the given one, and its Lambda above.
+  Scalar needed_Ki_1_s3{};
+};
+
+template <typename Scalar>
+inline AxisPid<Scalar> to_pid(const Scalar& lambda_1_s, const Scalar& k_kg_s, const Scalar& mass_kg) {
+  const Scalar a = k_kg_s / mass_kg;
+  const Scalar square = product(lambda_1_s, lambda_1_s);
+  return {product(Scalar(2), product(a, lambda_1_s)) + square, a + product(Scalar(2), lambda_1_s),
+          product(a, square)};
+}
+
+/// @param relative_tolerance how far Ki may be from (Kd - 2 l) l^2, relative to the latter: gains are printed with
+///                           few digits. The bounds of a law converted with a tolerance hold for the converted law.
+template <typename Scalar>
+inline AxisComposite<Scalar> to_composite(const AxisPid<Scalar>& pid, const Scalar& mass_kg,
+                                          const Scalar& relative_tolerance) {
+  const Scalar zero(0), two(2), three(3);
+  AxisComposite<Scalar> result;
+  if (!(mass_kg > zero)) {
+    result.status = ConversionStatus::kMassNotPositive;
+    return result;
+  }
+  const Scalar kp = pid.Kp_1_s2, kd = pid.Kd_1_s, ki = pid.Ki_1_s3;
+  if (!(kp > zero && kd > zero && ki > zero)) return result;
+  Scalar discriminant = product(kd, kd) - product(three, kp);
+  // A triple root has discriminant 0, which rounding may turn negative.
+  if (discriminant < zero && -discriminant <= product(relative_tolerance, product(kd, kd)))
+    discriminant = zero;
+  if (discriminant < zero) {
+    result.status = ConversionStatus::kNoDoubleRoot;
+    return result;
+  }
+  const Scalar root = square_root(discriminant);
+  Scalar smallest_misfit = zero;
+  for (const Scalar& lambda : {(kd - root) / three, (kd + root) / three}) {
+    const Scalar a = kd - product(two, lambda);
+    if (!(lambda > zero && a > zero)) continue;
+    const Scalar needed = product(a, product(lambda, lambda));
+    const Scalar misfit = absolute(ki - needed) / needed;
+    if (result.lambda_1_s > zero && !(misfit < smallest_misfit)) continue;
+    smallest_misfit = misfit;
+    result.lambda_1_s = lambda;
+    result.k_kg_s = product(mass_kg, a);
+    result.needed_Ki_1_s3 = needed;
+  }
+  if (!(result.lambda_1_s > zero)) {
+    result.status = ConversionStatus::kNoDoubleRoot;
+    return result;
+  }
+  result.status =
+      smallest_misfit <= relative_tolerance ? ConversionStatus::kOk : ConversionStatus::kOtherIntegralGain;
+  return result;
+}
+
+/// PID gains of the whole law; meaningful only with kOk.
+template <typename Scalar>
+struct PidConversion {
+  ConversionStatus status;
+  PidGains<Scalar> gains;
+};
+
+template <typename Scalar>
+inline PidConversion<Scalar> to_pid(const CompositeGains<Scalar>& gains, const Scalar& mass_kg) {
+  const Scalar zero(0);
+  if (!(mass_kg > zero)) return {ConversionStatus::kMassNotPositive, {}};
+  for (const Matrix3<Scalar>* m : {&gains.Lambda_1_s, &gains.K_kg_s}) {
+    const bool is_diagonal = m->x.y == zero && m->x.z == zero && m->y.x == zero && m->y.z == zero &&
+                             m->z.x == zero && m->z.y == zero;
+    if (!is_diagonal) return {ConversionStatus::kNotDiagonal, {}};
+    if (!(m->x.x > zero && m->y.y > zero && m->z.z > zero)) return {ConversionStatus::kNotPositive, {}};
+  }
+  const AxisPid<Scalar> x = to_pid(gains.Lambda_1_s.x.x, gains.K_kg_s.x.x, mass_kg);
+  const AxisPid<Scalar> y = to_pid(gains.Lambda_1_s.y.y, gains.K_kg_s.y.y, mass_kg);
+  const AxisPid<Scalar> z = to_pid(gains.Lambda_1_s.z.z, gains.K_kg_s.z.z, mass_kg);
+  return {
+      ConversionStatus::kOk,
+      {{x.Kp_1_s2, y.Kp_1_s2, z.Kp_1_s2}, {x.Kd_1_s, y.Kd_1_s, z.Kd_1_s}, {x.Ki_1_s3, y.Ki_1_s3, z.Ki_1_s3}}};
+}
+
+/// Composite gains of the whole law, axis by axis.
+template <typename Scalar>
+struct CompositeConversion {
+  AxisComposite<Scalar> x, y, z;
+
+  bool ok() const {
+    return x.status == ConversionStatus::kOk && y.status == ConversionStatus::kOk &&
+           z.status == ConversionStatus::kOk;
+  }
+  /// Meaningful only where ok().
+  CompositeGains<Scalar> gains() const {
+    return {diagonal(Vector3<Scalar>{x.lambda_1_s, y.lambda_1_s, z.lambda_1_s}),
+            diagonal(Vector3<Scalar>{x.k_kg_s, y.k_kg_s, z.k_kg_s})};
+  }
+};
+
+/// @param relative_tolerance as for one axis.
+template <typename Scalar>
+inline CompositeConversion<Scalar> to_composite(const PidGains<Scalar>& gains, const Scalar& mass_kg,
+                                                const Scalar& relative_tolerance) {
+  const auto axis = [&](const Scalar& kp, const Scalar& kd, const Scalar& ki) {
+    return to_composite(AxisPid<Scalar>{kp, kd, ki}, mass_kg, relative_tolerance);
+  };
+  return {axis(gains.Kp_1_s2.x, gains.Kd_1_s.x, gains.Ki_1_s3.x),
+          axis(gains.Kp_1_s2.y, gains.Kd_1_s.y, gains.Ki_1_s3.y),
+          axis(gains.Kp_1_s2.z, gains.Kd_1_s.z, gains.Ki_1_s3.z)};
+}
+
+}  // namespace swarmcert::controller

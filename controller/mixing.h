@@ -1,0 +1,299 @@
+/// @file From thrust and torque to rotor forces: the actuation matrix, its pseudo-inverse, and mixing that knows what
+/// to give up when rotors saturate. Body frame: x forward, y left, z up.
+#pragma once
+
+#include <cstdint>
+
+#include "controller/linear_algebra.h"
+#include "controller/trigonometry.h"
+
+namespace swarmcert::controller {
+
+inline constexpr int kMostRotors = 8;
+
+/// One rotor, which pushes along the body's z axis.
+template <typename Scalar>
+struct Rotor {
+  Scalar x_m, y_m;
+  Scalar
+      torque_per_thrust_m;  ///< about z, with sign: positive if the reaction turns the body from x towards y
+};
+
+template <typename Scalar>
+struct Rotors {
+  int count = 0;
+  Rotor<Scalar> at[kMostRotors] = {};
+};
+
+/// A wrench eta = (T, tau_x, tau_y, tau_z).
+template <typename Scalar>
+struct Wrench {
+  Scalar thrust_N{};
+  Vector3<Scalar> torque_N_m{};
+};
+
+/// Forces of the rotors, in their order.
+template <typename Scalar>
+struct RotorForces {
+  Scalar at_N[kMostRotors] = {};
+};
+
+/// `count` rotors on a circle, the first at `first_angle_rad` from x towards y, the others following in that
+/// direction, their torques alternating from +torque_per_thrust_m. For three rotors that is what remains of a
+/// tricopter without its tilting rotor: yaw is not controlled. No rotors for a count outside 3 to kMostRotors.
+template <typename Scalar>
+inline Rotors<Scalar> rotors_on_circle(int count, Scalar arm_m, Scalar first_angle_rad,
+                                       Scalar torque_per_thrust_m) {
+  Rotors<Scalar> rotors;
+  if (count < 3 || count > kMostRotors) return rotors;
+  rotors.count = count;
+  for (int i = 0; i < count; ++i) {
+    const Scalar angle = first_angle_rad + product(static_cast<Scalar>(i),
+                                                   Scalar(6.28318530717958648) / static_cast<Scalar>(count));
+    const SineCosine<Scalar> s = sin_cos(angle);
+    rotors.at[i] = {product(arm_m, s.cosine), product(arm_m, s.sine),
+                    i % 2 == 0 ? torque_per_thrust_m : -torque_per_thrust_m};
+  }
+  return rotors;
+}
+
+/// The four rotors of a Crazyflie in the order of its motors: front right, back right, back left, front left, each
+/// arm_m / sqrt(2) from the axes; the first turns the body clockwise as seen from above.
+template <typename Scalar>
+inline Rotors<Scalar> crazyflie_rotors(Scalar arm_m, Scalar torque_per_thrust_m) {
+  const Scalar d = product(arm_m, Scalar(0.707106781186547524));
+  const Scalar c = torque_per_thrust_m;
+  Rotors<Scalar> rotors;
+  rotors.count = 4;
+  rotors.at[0] = {d, -d, -c};
+  rotors.at[1] = {-d, -d, c};
+  rotors.at[2] = {-d, d, -c};
+  rotors.at[3] = {d, d, c};
+  return rotors;
+}
+
+/// Entry (row, rotor) of the actuation matrix B_0, eta = B_0 f: rows T, tau_x, tau_y, tau_z in newton and newton
+/// metre per newton. (The paper writes squared motor speeds for f; the constant between them lies in battery.h's
+/// calibration.)
+template <typename Scalar>
+inline Scalar actuation(const Rotor<Scalar>& rotor, int row) {
+  switch (row) {
+    case 0:
+      return Scalar(1);
+    case 1:
+      return rotor.y_m;
+    case 2:
+      return -rotor.x_m;
+    default:
+      return rotor.torque_per_thrust_m;
+  }
+}
+
+/// eta = B_0 f.
+template <typename Scalar>
+inline Wrench<Scalar> wrench(const Rotors<Scalar>& rotors, const RotorForces<Scalar>& forces) {
+  Scalar eta[4] = {};
+  for (int row = 0; row < 4; ++row) {
+    for (int i = 0; i < rotors.count; ++i) {
+      eta[row] = eta[row] + product(actuation(rotors.at[i], row), forces.at_N[i]);
+    }
+  }
+  return {eta[0], {eta[1], eta[2], eta[3]}};
+}
+
+/// Right inverse of the controlled rows of B_0.
+template <typename Scalar>
+struct Allocation {
+  /// 4: the full wrench is controlled. 3: all but the yaw torque is (three rotors, or no reaction torque), and the
+  /// last column of `inverse` is 0. 0: the rotors control less than thrust, roll and pitch (on one line, fewer than
+  /// three, numbers that are not finite): unusable, `inverse` is 0.
+  int rank = 0;
+  int count = 0;
+  Scalar inverse[kMostRotors][4] = {};  ///< rotor by row of B_0, N per N or per N m
+};
+
+namespace detail {
+
+/// B' (B B')^-1 for the first `rows` rows of B_0, by a Cholesky factorisation of B B' with rows scaled to norm 1.
+/// False if a row, once the rows before it are taken out, keeps less than 1 % of its norm, or something overflows.
+template <typename Scalar>
+inline bool right_inverse(const Rotors<Scalar>& rotors, int rows, Allocation<Scalar>& result) {
+  const Scalar zero(0), smallest_pivot = Scalar(1e-4);
+  Scalar scale[4], factor[4][4];
+  for (int r = 0; r < rows; ++r) {
+    Scalar sum = zero;
+    for (int i = 0; i < rotors.count; ++i) {
+      sum = sum + product(actuation(rotors.at[i], r), actuation(rotors.at[i], r));
+    }
+    if (!(sum > zero) || !is_finite(sum)) return false;
+    scale[r] = Scalar(1) / square_root(sum);
+    for (int c = 0; c <= r; ++c) {
+      Scalar entry = zero;
+      for (int i = 0; i < rotors.count; ++i) {
+        entry = entry + product(product(scale[r], actuation(rotors.at[i], r)),
+                                product(scale[c], actuation(rotors.at[i], c)));
+      }
+      for (int k = 0; k < c; ++k) entry = entry - product(factor[r][k], factor[c][k]);
+      if (c < r) {
+        factor[r][c] = entry / factor[c][c];
+      } else {
+        if (!(entry > smallest_pivot)) return false;
+        factor[r][r] = square_root(entry);
+      }
+    }
+  }
+  // Solve (scaled B)(scaled B)' y = unit vector, row by row of the inverse's transpose.
+  for (int column = 0; column < rows; ++column) {
+    Scalar y[4];
+    for (int r = 0; r < rows; ++r) {
+      y[r] = r == column ? Scalar(1) : zero;
+      for (int k = 0; k < r; ++k) y[r] = y[r] - product(factor[r][k], y[k]);
+      y[r] = y[r] / factor[r][r];
+    }
+    for (int r = rows - 1; r >= 0; --r) {
+      for (int k = r + 1; k < rows; ++k) y[r] = y[r] - product(factor[k][r], y[k]);
+      y[r] = y[r] / factor[r][r];
+    }
+    for (int i = 0; i < rotors.count; ++i) {
+      Scalar entry = zero;
+      for (int r = 0; r < rows; ++r) {
+        entry = entry + product(product(scale[r], actuation(rotors.at[i], r)), y[r]);
+      }
+      result.inverse[i][column] = product(entry, scale[column]);
+      if (!is_finite(result.inverse[i][column])) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace detail
+
+/// The Moore-Penrose inverse of B_0, or of its first three rows where yaw cannot be controlled; its rank says which.
+template <typename Scalar>
+inline Allocation<Scalar> allocation(const Rotors<Scalar>& rotors) {
+  Allocation<Scalar> result;
+  if (rotors.count < 3 || rotors.count > kMostRotors) return result;
+  result.count = rotors.count;
+  for (int rows = 4; rows >= 3; --rows) {
+    Allocation<Scalar> attempt;
+    attempt.count = rotors.count;
+    if (!detail::right_inverse(rotors, rows, attempt)) continue;
+    attempt.rank = rows;
+    return attempt;
+  }
+  return result;
+}
+
+/// Range of every rotor's force.
+template <typename Scalar>
+struct ForceLimits {
+  Scalar lower_N{};
+  Scalar upper_N{};
+};
+
+/// Rotor forces, and how much of the wanted wrench they give.
+template <typename Scalar>
+struct Mixed {
+  RotorForces<Scalar> forces;  ///< each within the limits
+  bool valid = false;  ///< false: bad allocation, limits or wrench; all forces at the lower limit, or 0
+  bool thrust_limited = false;
+  Scalar thrust_N{};  ///< collective thrust that the forces were made for
+  Scalar roll_pitch_share =
+      Scalar(1);                 ///< share of (tau_x, tau_y) kept, 0 to 1; its direction is kept always
+  Scalar yaw_share = Scalar(1);  ///< share of tau_z kept
+};
+
+namespace detail {
+
+/// Largest share in [0, 1] of `added` that keeps base + share * added within the limits, for every rotor.
+template <typename Scalar>
+inline Scalar largest_share(int count, const Scalar* base, const Scalar* added,
+                            const ForceLimits<Scalar>& limits) {
+  const Scalar zero(0);
+  Scalar share(1);
+  for (int i = 0; i < count; ++i) {
+    const Scalar end = base[i] + added[i];
+    Scalar room = zero;
+    if (end > limits.upper_N) {
+      room = limits.upper_N - base[i];
+    } else if (end < limits.lower_N) {
+      room = limits.lower_N - base[i];
+    } else {
+      continue;
+    }
+    const Scalar own = clamp(room / added[i], zero, Scalar(1));
+    if (own < share) share = own;
+  }
+  return share;
+}
+
+}  // namespace detail
+
+/// Thrust mixing by priority: yaw torque is given up first, then roll and pitch torque (both by the same share), and
+/// thrust last, only where the rotors together cannot push that much or that little.
+///
+/// f = B^+ (T, 0) + a B^+ (0, tau_x, tau_y, 0) + b B^+ (0, 0, 0, tau_z) with T the nearest feasible thrust, then the
+/// largest a in [0, 1], then the largest b in [0, 1] with all forces within the limits. Mixing by priority with the
+/// motors' limits at the present battery voltage follows Faessler, Falanga and Scaramuzza, "Thrust mixing,
+/// saturation, and body-rate control for accurate aggressive quadrotor flight", RA-L 2017; the order is that of this
+/// project: the tracking bounds rest on the thrust. Keep the thrust that you ask for below all rotors' limit, or
+/// nothing is left to turn with.
+template <typename Scalar>
+inline Mixed<Scalar> mix(const Allocation<Scalar>& allocation, const ForceLimits<Scalar>& limits,
+                         const Wrench<Scalar>& wanted) {
+  const Scalar zero(0);
+  Mixed<Scalar> result;
+  result.roll_pitch_share = result.yaw_share = zero;
+  const bool limits_hold =
+      limits.lower_N <= limits.upper_N && is_finite(limits.lower_N) && is_finite(limits.upper_N);
+  if (limits_hold) {
+    for (int i = 0; i < kMostRotors; ++i)
+      result.forces.at_N[i] = i < allocation.count ? limits.lower_N : zero;
+  }
+  if (!limits_hold || allocation.rank < 3 || !is_finite(wanted.thrust_N) || !is_finite(wanted.torque_N_m)) {
+    return result;
+  }
+
+  // Thrust alone: every force is proportional to T.
+  result.thrust_N = wanted.thrust_N;
+  for (int i = 0; i < allocation.count; ++i) {
+    const Scalar per_N = allocation.inverse[i][0];
+    const Scalar force = product(per_N, result.thrust_N);
+    if (force > limits.upper_N && per_N > zero) result.thrust_N = limits.upper_N / per_N;
+  }
+  for (int i = 0; i < allocation.count; ++i) {
+    const Scalar per_N = allocation.inverse[i][0];
+    if (product(per_N, result.thrust_N) < limits.lower_N && per_N > zero)
+      result.thrust_N = limits.lower_N / per_N;
+  }
+  result.thrust_limited = result.thrust_N < wanted.thrust_N || result.thrust_N > wanted.thrust_N;
+
+  Scalar force[kMostRotors], added[kMostRotors], yaw[kMostRotors];
+  for (int i = 0; i < allocation.count; ++i) force[i] = product(allocation.inverse[i][0], result.thrust_N);
+
+  for (int i = 0; i < allocation.count; ++i) {
+    added[i] = product(allocation.inverse[i][1], wanted.torque_N_m.x) +
+               product(allocation.inverse[i][2], wanted.torque_N_m.y);
+  }
+  for (int i = 0; i < allocation.count; ++i) {
+    yaw[i] = product(allocation.inverse[i][3], wanted.torque_N_m.z);
+    if (!is_finite(force[i]) || !is_finite(added[i]) || !is_finite(yaw[i])) return result;
+  }
+  result.valid = true;
+
+  result.roll_pitch_share = detail::largest_share(allocation.count, force, added, limits);
+  for (int i = 0; i < allocation.count; ++i) {
+    force[i] = clamp(force[i] + product(result.roll_pitch_share, added[i]), limits.lower_N, limits.upper_N);
+  }
+
+  result.yaw_share = allocation.rank == 4 || wanted.torque_N_m.z == zero
+                         ? detail::largest_share(allocation.count, force, yaw, limits)
+                         : zero;
+  for (int i = 0; i < allocation.count; ++i) {
+    result.forces.at_N[i] =
+        clamp(force[i] + product(result.yaw_share, yaw[i]), limits.lower_N, limits.upper_N);
+  }
+  return result;
+}
+
+}  // namespace swarmcert::controller

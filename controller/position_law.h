@@ -1,0 +1,122 @@
+/// @file From tracking error to desired force: the paper's position law, and the PID law that firmware ships.
+///
+/// World frame W: z up, gravity (0, 0, -g). Tracking error p~ = p - p_d. I is the integral of p~.
+#pragma once
+
+#include "controller/linear_algebra.h"
+
+namespace swarmcert::controller {
+
+/// Standard gravity as the analysed firmware has it, in m/s^2.
+inline constexpr double kGravity_m_s2 = 9.81;
+
+/// p~ and its derivative, in W.
+template <typename Scalar>
+struct TrackingError {
+  Vector3<Scalar> position_m;
+  Vector3<Scalar> velocity_m_s;
+};
+
+/// What both laws add to the feedback, in W.
+template <typename Scalar>
+struct FeedForward {
+  Vector3<Scalar> acceleration_m_s2;  ///< p_d''
+  Vector3<Scalar>
+      predicted_effect_N;  ///< f_a_hat: what other vehicles' air does to this one; 0 where unknown
+};
+
+/// Gains of the paper, equations (8) and (9). The tracking theorem needs both symmetric positive definite.
+template <typename Scalar>
+struct CompositeGains {
+  Matrix3<Scalar> Lambda_1_s;
+  Matrix3<Scalar> K_kg_s;
+};
+
+/// Gains as firmware has them: accelerations, per axis.
+template <typename Scalar>
+struct PidGains {
+  Vector3<Scalar> Kp_1_s2;
+  Vector3<Scalar> Kd_1_s;
+  Vector3<Scalar> Ki_1_s3;
+};
+
+/// f_d = m v_r_dot - K s - m g - f_a_hat in newton, in W, with the composite variable s = p~' + 2 Lambda p~ +
+/// Lambda^2 I and the reference acceleration v_r_dot = p_d'' - 2 Lambda p~' - Lambda^2 p~ (paper, section IV-A).
+template <typename Scalar>
+inline Vector3<Scalar> desired_force(const CompositeGains<Scalar>& gains, const Scalar& mass_kg,
+                                     const TrackingError<Scalar>& error, const Vector3<Scalar>& integral_m_s,
+                                     const FeedForward<Scalar>& feed_forward) {
+  const Matrix3<Scalar>& lambda = gains.Lambda_1_s;
+  const Scalar two(2);
+  const Vector3<Scalar> lambda_p = lambda * error.position_m;
+  const Vector3<Scalar> s = error.velocity_m_s + scaled(two, lambda_p) + lambda * (lambda * integral_m_s);
+  const Vector3<Scalar> v_r_dot =
+      feed_forward.acceleration_m_s2 - scaled(two, lambda * error.velocity_m_s) - lambda * lambda_p;
+  Vector3<Scalar> force = scaled(mass_kg, v_r_dot) - gains.K_kg_s * s;
+  force.z = force.z + product(mass_kg, Scalar(kGravity_m_s2));
+  return force - feed_forward.predicted_effect_N;
+}
+
+/// f_d = m (p_d'' - Kd p~' - Kp p~ - Ki I) - m g - f_a_hat in newton, in W.
+template <typename Scalar>
+inline Vector3<Scalar> desired_force(const PidGains<Scalar>& gains, const Scalar& mass_kg,
+                                     const TrackingError<Scalar>& error, const Vector3<Scalar>& integral_m_s,
+                                     const FeedForward<Scalar>& feed_forward) {
+  const Vector3<Scalar> acceleration =
+      feed_forward.acceleration_m_s2 - diagonal_product(gains.Kd_1_s, error.velocity_m_s) -
+      diagonal_product(gains.Kp_1_s2, error.position_m) - diagonal_product(gains.Ki_1_s3, integral_m_s);
+  Vector3<Scalar> force = scaled(mass_kg, acceleration);
+  force.z = force.z + product(mass_kg, Scalar(kGravity_m_s2));
+  return force - feed_forward.predicted_effect_N;
+}
+
+/// How the integral of p~ is formed.
+template <typename Scalar>
+struct Integrator {
+  /// Largest |I| per axis; infinite: none. A clamped integral cancels a constant force of m Ki limit at most.
+  Vector3<Scalar> limit_m_s;
+  /// What one execution of the position loop adds p~ times: the loop's period. Public firmware has a 100 Hz loop
+  /// with 1/500 s here, which makes Ki five times weaker than it reads.
+  Scalar step_s;
+};
+
+/// Axes on which the integral keeps its value.
+struct HeldAxes {
+  bool x = false, y = false, z = false;
+};
+
+/// Anti-windup (conditional integration): while the thrust is at its upper limit, axes stand still on which the next
+/// step of the integral would push `force_N` further out. Without saturation: none.
+template <typename Scalar>
+inline HeldAxes held_axes(const PidGains<Scalar>& gains, const Vector3<Scalar>& position_error_m,
+                          const Vector3<Scalar>& force_N, bool thrust_saturated) {
+  if (!thrust_saturated) return {};
+  const Vector3<Scalar> push = -diagonal_product(gains.Ki_1_s3, position_error_m);
+  const Scalar zero(0);
+  return {product(push.x, force_N.x) > zero, product(push.y, force_N.y) > zero,
+          product(push.z, force_N.z) > zero};
+}
+
+/// As above; where Lambda and K couple the axes, all stand still if the whole step would push further out.
+template <typename Scalar>
+inline HeldAxes held_axes(const CompositeGains<Scalar>& gains, const Vector3<Scalar>& position_error_m,
+                          const Vector3<Scalar>& force_N, bool thrust_saturated) {
+  if (!thrust_saturated) return {};
+  const Vector3<Scalar> push = -(gains.K_kg_s * (gains.Lambda_1_s * (gains.Lambda_1_s * position_error_m)));
+  const bool outward = dot(push, force_N) > Scalar(0);
+  return {outward, outward, outward};
+}
+
+/// The integral after one more execution: I + step p~, clamped, on the axes that are not held. Use the result in the
+/// same execution: that is the sampled loop which the bounds analyse.
+template <typename Scalar>
+inline Vector3<Scalar> integrate(const Integrator<Scalar>& integrator, const Vector3<Scalar>& integral_m_s,
+                                 const Vector3<Scalar>& position_error_m, const HeldAxes& held = {}) {
+  const Vector3<Scalar> next = integral_m_s + scaled(integrator.step_s, position_error_m);
+  const Vector3<Scalar>& limit = integrator.limit_m_s;
+  return {held.x ? integral_m_s.x : clamp(next.x, -limit.x, limit.x),
+          held.y ? integral_m_s.y : clamp(next.y, -limit.y, limit.y),
+          held.z ? integral_m_s.z : clamp(next.z, -limit.z, limit.z)};
+}
+
+}  // namespace swarmcert::controller

@@ -1,0 +1,87 @@
+#include "controller/gain_conversion.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "random_vectors.h"
+
+namespace swarmcert::controller {
+namespace {
+
+constexpr double kMass_kg = 0.034;
+
+AxisComposite<double> convert(double kp, double kd, double ki) {
+  return to_composite(AxisPid<double>{kp, kd, ki}, kMass_kg, 1e-6);
+}
+
+TEST(GainConversion, ThereAndBackReturnsTheGains) {
+  std::mt19937 generator(3);
+  for (int i = 0; i < 1000; ++i) {
+    const double lambda = tests::uniform(generator, 0.1, 10), k = tests::uniform(generator, 0.01, 1);
+    const AxisPid<double> pid = to_pid(lambda, k, kMass_kg);
+    const AxisComposite<double> back = to_composite(pid, kMass_kg, 1e-9);
+    ASSERT_EQ(back.status, ConversionStatus::kOk) << lambda << " " << k;
+    EXPECT_NEAR(back.lambda_1_s, lambda, 1e-7 * lambda);
+    EXPECT_NEAR(back.k_kg_s, k, 1e-6 * k);
+  }
+}
+
+TEST(GainConversion, BothFormsGiveTheSameForce) {
+  std::mt19937 generator(4);
+  for (int i = 0; i < 200; ++i) {
+    const CompositeGains<double> composite{
+        diagonal(Vector3<double>{1, 1, 1} + scaled(0.5, tests::random_vector(generator, 1))),
+        diagonal(Vector3<double>{.2, .2, .2} + scaled(0.1, tests::random_vector(generator, 1)))};
+    const PidConversion<double> pid = to_pid(composite, kMass_kg);
+    ASSERT_EQ(pid.status, ConversionStatus::kOk);
+    const TrackingError<double> error{tests::random_vector(generator, 0.5),
+                                      tests::random_vector(generator, 1)};
+    const Vector3<double> integral = tests::random_vector(generator, 0.2);
+    const FeedForward<double> forward{tests::random_vector(generator, 2),
+                                      tests::random_vector(generator, 0.1)};
+    const Vector3<double> gap = desired_force(composite, kMass_kg, error, integral, forward) -
+                                desired_force(pid.gains, kMass_kg, error, integral, forward);
+    EXPECT_LE(norm(gap), 1e-14);
+  }
+}
+
+// s^3 + Kd s^2 + Kp s + Ki = (s + a)(s + l)^2 has a triple root for l = a; then both candidates for Lambda coincide.
+TEST(GainConversion, TripleRootConverts) {
+  const AxisPid<double> pid = to_pid(4.0, 4.0 * kMass_kg, kMass_kg);
+  EXPECT_DOUBLE_EQ(pid.Kp_1_s2, 48.0);
+  EXPECT_DOUBLE_EQ(pid.Kd_1_s, 12.0);
+  EXPECT_DOUBLE_EQ(pid.Ki_1_s3, 64.0);
+  const AxisComposite<double> back = to_composite(pid, kMass_kg, 1e-9);
+  EXPECT_EQ(back.status, ConversionStatus::kOk);
+  EXPECT_NEAR(back.lambda_1_s, 4.0, 1e-4);
+}
+
+// Expected numbers: stability.md, section 1, for the gains published with the paper and the firmware's defaults.
+TEST(GainConversion, PublishedGainsAreNotOfTheTheoremsForm) {
+  EXPECT_EQ(convert(10, 5, 10).status, ConversionStatus::kNoDoubleRoot);
+  const AxisComposite<double> xy = convert(20, 10, 3);
+  EXPECT_EQ(xy.status, ConversionStatus::kOtherIntegralGain);
+  EXPECT_NEAR(xy.lambda_1_s, 1.2251, 5e-5);
+  EXPECT_NEAR(xy.needed_Ki_1_s3, 11.33, 5e-3);
+  const AxisComposite<double> firmware = convert(12, 8, 8);
+  EXPECT_EQ(firmware.status, ConversionStatus::kOtherIntegralGain);
+  EXPECT_NEAR(firmware.lambda_1_s, 0.9028, 5e-5);
+  EXPECT_NEAR(firmware.needed_Ki_1_s3, 5.05, 5e-3);
+}
+
+TEST(GainConversion, RefusesWhatHasNoSuchForm) {
+  EXPECT_EQ(convert(10, 5, 0).status, ConversionStatus::kNotPositive);
+  EXPECT_EQ(convert(-10, 5, 1).status, ConversionStatus::kNotPositive);
+  EXPECT_EQ(convert(std::nan(""), 5, 1).status, ConversionStatus::kNotPositive);
+  EXPECT_EQ(to_composite(AxisPid<double>{10, 10, 1}, 0.0, 1e-6).status, ConversionStatus::kMassNotPositive);
+  const Matrix3<double> coupled{{1, 0.1, 0}, {0.1, 1, 0}, {0, 0, 1}};
+  EXPECT_EQ(to_pid(CompositeGains<double>{coupled, identity<double>()}, kMass_kg).status,
+            ConversionStatus::kNotDiagonal);
+  EXPECT_EQ(
+      to_pid(CompositeGains<double>{identity<double>(), diagonal(Vector3<double>{1, 0, 1})}, kMass_kg).status,
+      ConversionStatus::kNotPositive);
+}
+
+}  // namespace
+}  // namespace swarmcert::controller
