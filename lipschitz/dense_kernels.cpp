@@ -12,6 +12,10 @@ namespace swarmcert::lipschitz {
 namespace {
 
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Below this size LAPACK's unblocked inversion is as fast as anything.
+constexpr int kSmallTriangle = 32;
 
 void multiply(CBLAS_TRANSPOSE transpose_b, Eigen::Ref<MatrixXd> c, const Eigen::Ref<const MatrixXd>& a,
               const Eigen::Ref<const MatrixXd>& b) {
@@ -20,6 +24,27 @@ void multiply(CBLAS_TRANSPOSE transpose_b, Eigen::Ref<MatrixXd> c, const Eigen::
               static_cast<int>(c.cols()), static_cast<int>(a.cols()), 1.0, a.data(),
               static_cast<int>(a.outerStride()), b.data(), static_cast<int>(b.outerStride()), 1.0, c.data(),
               static_cast<int>(c.outerStride()));
+}
+
+/// Replaces a lower triangular L = [A 0; B C] by its inverse [A^-1 0; -C^-1 B A^-1 C^-1].
+void invert_lower(Eigen::Ref<MatrixXd> l) {
+  const int n = static_cast<int>(l.rows());
+  const int stride = static_cast<int>(l.outerStride());
+  if (n <= kSmallTriangle) {
+    int info = 0;
+    dtrtri_("L", "N", &n, l.data(), &stride, &info);
+    return;
+  }
+  const int half = n / 2;
+  Eigen::Ref<MatrixXd> a = l.topLeftCorner(half, half);
+  Eigen::Ref<MatrixXd> b = l.bottomLeftCorner(n - half, half);
+  Eigen::Ref<MatrixXd> c = l.bottomRightCorner(n - half, n - half);
+  cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n - half, half, -1.0,
+              c.data(), stride, b.data(), stride);
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, n - half, half, 1.0,
+              a.data(), stride, b.data(), stride);
+  invert_lower(a);
+  invert_lower(c);
 }
 
 }  // namespace
@@ -36,24 +61,44 @@ void add_product_transposed(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const Matri
   multiply(CblasTrans, c, a, b);
 }
 
-MatrixXd inverse_cholesky(const MatrixXd& x) {
+MatrixXd cholesky(const MatrixXd& x) {
   const int n = static_cast<int>(x.rows());
   int info = 0;
   MatrixXd l = x.triangularView<Eigen::Lower>();
   dpotrf_("L", &n, l.data(), &n, &info);
-  if (info != 0) return {};
-  dtrtri_("L", "N", &n, l.data(), &n, &info);
   if (info != 0 || !l.allFinite()) return {};
   return l;
 }
 
-MatrixXd lower_gram(const MatrixXd& l) {
+MatrixXd inverse_from_cholesky(const MatrixXd& l) {
+  MatrixXd product = l;
+  invert_lower(product);
   const int n = static_cast<int>(l.rows());
   int info = 0;
-  MatrixXd product = l;
   dlauum_("L", &n, product.data(), &n, &info);
   product.triangularView<Eigen::StrictlyUpper>() = product.transpose();
   return product;
+}
+
+VectorXd congruence_times(const MatrixXd& l, const MatrixXd& d, const VectorXd& v) {
+  const int n = static_cast<int>(l.rows());
+  VectorXd u = v;
+  cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, n, l.data(), n, u.data(), 1);
+  VectorXd w = VectorXd::Zero(n);
+  add_symmetric_product(w, 1.0, d, u);
+  cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, l.data(), n, w.data(), 1);
+  return w;
+}
+
+void solve_cholesky(const MatrixXd& l, VectorXd& b) {
+  const int n = static_cast<int>(l.rows());
+  cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, l.data(), n, b.data(), 1);
+  cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, n, l.data(), n, b.data(), 1);
+}
+
+void add_symmetric_product(VectorXd& y, double factor, const MatrixXd& x, const VectorXd& v) {
+  const int n = static_cast<int>(x.rows());
+  cblas_dsymv(CblasColMajor, CblasLower, n, factor, x.data(), n, v.data(), 1, 1.0, y.data(), 1);
 }
 
 }  // namespace swarmcert::lipschitz

@@ -9,8 +9,8 @@
 
 namespace swarmcert::lipschitz {
 
-/// Keeps OpenBLAS to one thread in this process: callers parallelise over whole problems, and the solver's bits stay
-/// the same for any number of them.
+/// Keeps a threaded OpenBLAS to one thread in this process: callers parallelise over whole problems, and the solver's
+/// bits stay the same for any number of them.
 void use_one_blas_thread();
 
 /// C += A B.
@@ -21,11 +21,22 @@ void add_product(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::Ma
 void add_product_transposed(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::MatrixXd>& a,
                             const Eigen::Ref<const Eigen::MatrixXd>& b);
 
-/// For a symmetric X = L L' (its lower triangle is read): L^-1, with zeros above the diagonal. Empty if the Cholesky
+/// L with X = L L' for a symmetric X (its lower triangle is read), zeros above the diagonal. Empty if the
 /// factorisation breaks down, so X is not safely positive definite.
-Eigen::MatrixXd inverse_cholesky(const Eigen::MatrixXd& x);
+Eigen::MatrixXd cholesky(const Eigen::MatrixXd& x);
 
-/// L' L for a lower triangular L; with L = inverse_cholesky(X) that is X^-1.
-Eigen::MatrixXd lower_gram(const Eigen::MatrixXd& l);
+/// X^-1 for X = L L'. Halves recursively, so that nearly all work is products of matrices.
+Eigen::MatrixXd inverse_from_cholesky(const Eigen::MatrixXd& l);
+
+/// L^-1 D L^-T v, symmetric D (its lower triangle is read).
+Eigen::VectorXd congruence_times(const Eigen::MatrixXd& l, const Eigen::MatrixXd& d,
+                                 const Eigen::VectorXd& v);
+
+/// Solves L L' v = b in place.
+void solve_cholesky(const Eigen::MatrixXd& l, Eigen::VectorXd& b);
+
+/// y += factor X v, symmetric X (its lower triangle is read).
+void add_symmetric_product(Eigen::VectorXd& y, double factor, const Eigen::MatrixXd& x,
+                           const Eigen::VectorXd& v);
 
 }  // namespace swarmcert::lipschitz

@@ -1,6 +1,5 @@
 #include "lipschitz/lipsdp_solver.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -19,6 +18,8 @@ using Eigen::VectorXd;
 
 /// Step lengths come from Lanczos, which can miss the least eigenvalue: shorten until Cholesky agrees.
 constexpr double kBacktrack = 0.8;
+/// Relative accuracy of that eigenvalue: for the centring parameter, which is a heuristic, and for the step.
+constexpr double kRough = 0.1, kFine = 0.02;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The chain scaled by a power of two per stage, and where each block lies.
@@ -157,17 +158,16 @@ class Iteration {
 };
 
 /// Largest alpha <= 1 with X + alpha D >= 0 kept at a distance, from the least eigenvalue of L^-1 D L^-T by Lanczos
-/// with full reorthogonalisation. `inverse_factor` is L^-1.
-double step_length(const MatrixXd& inverse_factor, const MatrixXd& direction, double fraction) {
+/// with full reorthogonalisation, stopped at a relative accuracy. `factor` is L with X = L L'.
+double step_length(const MatrixXd& factor, const MatrixXd& direction, double fraction, double accuracy) {
   const Index n = direction.rows();
   const int steps = static_cast<int>(std::min<Index>(n, 30));
   MatrixXd basis(n, steps + 1);
   VectorXd alpha(steps), beta(steps);
   basis.col(0) = VectorXd::LinSpaced(n, 1.0, 1.7).normalized();
   double least = 0;
-  const auto lower = inverse_factor.triangularView<Eigen::Lower>();
   for (int k = 0; k < steps; ++k) {
-    VectorXd w = lower * (direction.selfadjointView<Eigen::Lower>() * (lower.transpose() * basis.col(k)));
+    VectorXd w = congruence_times(factor, direction, basis.col(k));
     alpha(k) = basis.col(k).dot(w);
     w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
     w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
@@ -178,7 +178,7 @@ double step_length(const MatrixXd& inverse_factor, const MatrixXd& direction, do
       eigen.computeFromTridiagonal(alpha.head(k + 1), beta.head(k), Eigen::ComputeEigenvectors);
       const double residual = std::abs(beta(k) * eigen.eigenvectors()(k, 0));
       least = eigen.eigenvalues()(0) - residual;
-      if (last || residual < 0.02 * std::abs(eigen.eigenvalues()(0))) break;
+      if (last || residual < accuracy * std::abs(eigen.eigenvalues()(0))) break;
     }
     basis.col(k + 1) = w / beta(k);
   }
@@ -228,22 +228,28 @@ class SchurSolver {
     for (double regularisation = 1e-15; regularisation < 1e-6; regularisation *= 100) {
       MatrixXd shifted = scaled_;
       shifted.diagonal().array() += regularisation;
-      llt_.compute(shifted);
-      if (llt_.info() == Eigen::Success) break;
+      factor_ = cholesky(shifted);
+      if (factor_.size() > 0) break;
     }
   }
-  bool good() const { return llt_.info() == Eigen::Success && scale_.allFinite(); }
+  bool good() const { return factor_.size() > 0 && scale_.allFinite(); }
   VectorXd solve(const VectorXd& rhs) const {
     const VectorXd b = scale_.cwiseProduct(rhs);
-    VectorXd v = llt_.solve(b);
-    for (int i = 0; i < 2; ++i) v += llt_.solve(b - scaled_ * v);  // undoes the regularisation
+    VectorXd v = b;
+    solve_cholesky(factor_, v);
+    for (int i = 0; i < 2; ++i) {  // undoes the regularisation
+      VectorXd residual = b;
+      add_symmetric_product(residual, -1.0, scaled_, v);
+      solve_cholesky(factor_, residual);
+      v += residual;
+    }
     return scale_.cwiseProduct(v);
   }
 
  private:
   VectorXd scale_;
   MatrixXd scaled_;
-  Eigen::LLT<MatrixXd> llt_;
+  MatrixXd factor_;
 };
 
 }  // namespace
@@ -265,6 +271,7 @@ const char* name(LipSdpStop stop) {
 }
 
 LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) {
+  use_one_blas_thread();
   const ScaledProblem problem = scale(chain);
   const Iteration it(problem);
   const Index n = problem.size();
@@ -272,8 +279,8 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
 
   // Within rounding to powers of two all-ones is feasible or nearly so; scaling (rho, t) up moves inside the cone.
   VectorXd y = VectorXd::Ones(m + 1);
-  MatrixXd s, s_inverse_factor;
-  for (double shrink = 0.5; s_inverse_factor.size() == 0; shrink *= 0.5) {
+  MatrixXd s, s_factor;
+  for (double shrink = 0.5; s_factor.size() == 0; shrink *= 0.5) {
     y.setOnes();
     double level = 4;
     for (std::size_t k = problem.layers(); k-- > 0; level /= shrink) {
@@ -281,13 +288,13 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
     }
     y(0) = level;
     s = it.slack(y);
-    s_inverse_factor = inverse_cholesky(s);
+    s_factor = cholesky(s);
   }
   // Z = mu S^-1 with trace 1 over the inputs: on the central path but for the constraints of the neurons.
-  MatrixXd z = lower_gram(s_inverse_factor);
+  MatrixXd z = inverse_from_cholesky(s_factor);
   const double trace = z.diagonal().head(problem.inputs()).sum();
   z /= trace;
-  MatrixXd z_inverse_factor = inverse_cholesky(z);
+  MatrixXd z_factor = cholesky(z);
 
   // z_k of the scaled chain is z_k of the chain over 2^(e_1 + ... + e_k), and its output over 2^(sum of all e).
   int total = 0;
@@ -314,12 +321,17 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
   result.points.push_back(unscaled(kInfinity));
   result.stop = LipSdpStop::kIterationLimit;
   double best_dual = 0;
+  if (z_factor.size() == 0) {
+    result.stop = LipSdpStop::kNumericalLimit;
+    result.optimum_upper = Estimate(std::sqrt(std::ldexp(y(0), 2 * total)));
+    return result;
+  }
   for (; result.iterations < options.max_iterations; ++result.iterations) {
     if (options.cancelled != nullptr && *options.cancelled) {
       result.stop = LipSdpStop::kCancelled;
       break;
     }
-    const MatrixXd s_inverse = lower_gram(s_inverse_factor);
+    const MatrixXd s_inverse = inverse_from_cholesky(s_factor);
     const MatrixXd z_a = it.times_a(z);
     const MatrixXd y_a = it.times_a(s_inverse);
     const VectorXd residual = b - it.functionals(z, z_a);
@@ -346,8 +358,8 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
     MatrixXd dz_a = -z;
     add_product(dz_a, it.times_banded(-z, ds_a), s_inverse);
     symmetrise(dz_a);
-    const double primal_a = step_length(z_inverse_factor, dz_a, 1.0);
-    const double dual_a = step_length(s_inverse_factor, ds_a, 1.0);
+    const double primal_a = step_length(z_factor, dz_a, 1.0, kRough);
+    const double dual_a = step_length(s_factor, ds_a, 1.0, kRough);
     const double mu_a = (z + primal_a * dz_a).cwiseProduct(s + dual_a * ds_a).sum() / static_cast<double>(n);
     const double ratio = std::clamp(mu_a / mu, 0.0, 1.0);
     const double sigma = std::max(1e-6, ratio * ratio * (primal_a > 0.1 && dual_a > 0.1 ? ratio : 1.0));
@@ -365,27 +377,25 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
     add_product(dz, it.times_banded(-z, ds) - q, s_inverse);
     symmetrise(dz);
     const double fraction = std::min(0.98, 0.9 + 0.09 * std::min(primal_a, dual_a));
-    const double primal = step_length(z_inverse_factor, dz, fraction);
-    const double dual = step_length(s_inverse_factor, ds, fraction);
+    const double primal = step_length(z_factor, dz, fraction, kFine);
+    const double dual = step_length(s_factor, ds, fraction, kFine);
 
     const VectorXd y_before = y;
-    MatrixXd s_factor = backtrack(dual, [&](double step) {
+    s_factor = backtrack(dual, [&](double step) {
       y = y_before + step * dy;
       s = it.slack(y);
-      return inverse_cholesky(s);
+      return cholesky(s);
     });
     const MatrixXd z_before = z;
-    MatrixXd z_factor = backtrack(primal, [&](double step) {
+    z_factor = backtrack(primal, [&](double step) {
       z = z_before + step * dz;
-      return inverse_cholesky(z);
+      return cholesky(z);
     });
     if (s_factor.size() == 0 || z_factor.size() == 0 || !y.allFinite()) {
       y = y_before;
       result.stop = LipSdpStop::kNumericalLimit;
       break;
     }
-    s_inverse_factor = std::move(s_factor);
-    z_inverse_factor = std::move(z_factor);
     result.points.push_back(unscaled(gap));
   }
   result.optimum_upper = Estimate(std::sqrt(std::ldexp(y(0), 2 * total)));
