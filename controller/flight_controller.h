@@ -1,0 +1,243 @@
+/// @file One control period from measured state to PWM, with a defined answer to every bad input.
+///
+/// The pieces (position law, attitude law, mixing, battery) stand in their own headers; this composes them, decides
+/// what is safe when an input cannot be trusted, and says so.
+#pragma once
+
+#include <cstdint>
+
+#include "controller/attitude_law.h"
+#include "controller/battery.h"
+#include "controller/desired_attitude.h"
+#include "controller/mixing.h"
+#include "controller/neighbours.h"
+#include "controller/position_law.h"
+
+namespace swarmcert::controller {
+
+enum class AttitudeLaw : std::uint8_t { kLee, kRobust };
+
+/// All that stays the same in flight. `Gains` is PidGains or CompositeGains.
+template <typename Scalar, typename Gains>
+struct FlightSettings {
+  Scalar mass_kg;
+  Matrix3<Scalar> inertia_kg_m2;
+  Gains position;
+  Integrator<Scalar> integrator;
+  ThrustRule thrust_rule = ThrustRule::kProjected;
+  AttitudeLaw attitude_law = AttitudeLaw::kRobust;
+  LeeGains<Scalar> lee;
+  RobustGains<Scalar> robust;
+  Scalar attitude_step_s;  ///< period of flight_step()
+  Allocation<Scalar> allocation;
+  ThrustMap<Scalar> thrust_map;
+  LargestForceMap<Scalar> largest_force;
+  Scalar idle_force_N;  ///< of each rotor: below, motors may stop
+};
+
+/// What is measured, with the time of each measurement.
+template <typename Scalar>
+struct Measured {
+  Vector3<Scalar> position_W_m;
+  Vector3<Scalar> velocity_W_m_s;
+  std::uint32_t position_stamp_ms;
+  AttitudeState<Scalar> attitude;
+  std::uint32_t attitude_stamp_ms;
+  Scalar battery_V;
+};
+
+/// What to follow.
+template <typename Scalar>
+struct FlightReference {
+  Vector3<Scalar> position_W_m;
+  Vector3<Scalar> velocity_W_m_s;
+  Vector3<Scalar> acceleration_W_m_s2;
+  Heading<Scalar> heading;
+  Vector3<Scalar> omega_R_rad_s;
+  Vector3<Scalar> omega_dot_R_rad_s2;
+};
+
+/// Inputs that were not used; values add up.
+enum Fault : std::uint8_t {
+  kNoFault = 0,
+  kPositionFault = 1,    ///< position or velocity: not finite, out of range or stale. Answer: level descent
+  kAttitudeFault = 2,    ///< attitude or rate: as above, or not a rotation. Answer: motors off
+  kReferenceFault = 4,   ///< not finite or out of range. Answer: stay at the last position that was asked for
+  kBatteryFault = 8,     ///< outside kLowestVoltage_V to kHighestVoltage_V. Answer: kAssumedVoltage_V
+  kPredictionFault = 16  ///< f_a_hat not finite or out of range. Answer: f_a_hat = 0
+};
+
+/// Ages beyond which a measurement no longer describes the vehicle: three losses in a row at 30 Hz, ten at 500 Hz.
+inline constexpr std::uint32_t kMaxPositionAge_ms = 100, kMaxAttitudeAge_ms = 20;
+/// Larger numbers are broken, not flown.
+inline constexpr int kLargestSpeed_m_s = 50, kLargestAcceleration_m_s2 = 50, kLargestRate_rad_s = 100;
+inline constexpr int kLargestRateDerivative_rad_s2 = 10000;
+/// Largest |f_a_hat| per weight of the vehicle.
+inline constexpr int kLargestEffectPerWeight = 2;
+/// Taken when the sensor has failed: low, so that the motors get rather more than less.
+inline constexpr double kAssumedVoltage_V = 3.4;
+/// Thrust of the level descent over weight: drag and the ground end it at a few m/s.
+inline constexpr double kDescentThrust = 0.9;
+
+/// What one period leaves for the next.
+template <typename Scalar>
+struct FlightMemory {
+  Vector3<Scalar> integral_m_s;
+  Vector3<Scalar> rate_integral_rad;
+  Vector3<Scalar> force_W_N;
+  Matrix3<Scalar> R_WR = identity<Scalar>();
+  FlightReference<Scalar> last_reference{};
+  bool has_reference = false;
+  bool thrust_saturated = false;
+  Scalar mean_p{};
+};
+
+template <typename Scalar>
+struct FlightCommand {
+  std::uint8_t faults = kNoFault;  ///< sum of Fault
+  bool motors_off = false;
+  Vector3<Scalar> force_W_N;  ///< f_d
+  AttitudeCase attitude_case = AttitudeCase::kRegular;
+  Wrench<Scalar> wanted;
+  Mixed<Scalar> mixed;
+  std::uint16_t pwm[kMostRotors] = {};
+};
+
+namespace detail {
+
+template <typename Scalar>
+inline bool is_usable(const FlightReference<Scalar>& r) {
+  const Scalar length = product(r.heading.cosine, r.heading.cosine) + product(r.heading.sine, r.heading.sine);
+  return is_within(r.position_W_m, Scalar(kFarthestPosition_m)) &&
+         is_within(r.velocity_W_m_s, Scalar(kLargestSpeed_m_s)) &&
+         is_within(r.acceleration_W_m_s2, Scalar(kLargestAcceleration_m_s2)) &&
+         absolute(length - Scalar(1)) <= Scalar(0.01) &&
+         is_within(r.omega_R_rad_s, Scalar(kLargestRate_rad_s)) &&
+         is_within(r.omega_dot_R_rad_s2, Scalar(kLargestRateDerivative_rad_s2));
+}
+
+template <typename Scalar>
+inline std::uint8_t faults(const Measured<Scalar>& m, std::uint32_t now_ms) {
+  unsigned result = kNoFault;
+  if (!is_within(m.position_W_m, Scalar(kFarthestPosition_m)) ||
+      !is_within(m.velocity_W_m_s, Scalar(kLargestSpeed_m_s)) ||
+      age_ms(now_ms, m.position_stamp_ms) > kMaxPositionAge_ms) {
+    result |= kPositionFault;
+  }
+  if (!is_rotation(m.attitude.R_WB, Scalar(0.01)) ||
+      !is_within(m.attitude.omega_B_rad_s, Scalar(kLargestRate_rad_s)) ||
+      age_ms(now_ms, m.attitude_stamp_ms) > kMaxAttitudeAge_ms) {
+    result |= kAttitudeFault;
+  }
+  if (!(m.battery_V >= Scalar(kLowestVoltage_V) && m.battery_V <= Scalar(kHighestVoltage_V)))
+    result |= kBatteryFault;
+  return static_cast<std::uint8_t>(result);
+}
+
+/// The position loop: f_d and the desired attitude into `memory`.
+template <typename Scalar, typename Gains>
+inline AttitudeCase position_step(const FlightSettings<Scalar, Gains>& settings, FlightMemory<Scalar>& memory,
+                                  const Measured<Scalar>& measured, const FlightReference<Scalar>& reference,
+                                  const Vector3<Scalar>& effect_W_N, bool descend) {
+  const Scalar weight_N = product(settings.mass_kg, Scalar(kGravity_m_s2));
+  if (descend) {
+    memory.force_W_N = {Scalar(0), Scalar(0), product(Scalar(kDescentThrust), weight_N)};
+  } else {
+    const TrackingError<Scalar> error{measured.position_W_m - reference.position_W_m,
+                                      measured.velocity_W_m_s - reference.velocity_W_m_s};
+    const HeldAxes held =
+        held_axes(settings.position, error.position_m, memory.force_W_N, memory.thrust_saturated);
+    memory.integral_m_s = integrate(settings.integrator, memory.integral_m_s, error.position_m, held);
+    memory.force_W_N = desired_force(settings.position, settings.mass_kg, error, memory.integral_m_s,
+                                     {reference.acceleration_W_m_s2, effect_W_N});
+  }
+  const DesiredAttitude<Scalar> desired =
+      desired_attitude(memory.force_W_N, reference.heading, memory.R_WR, product(Scalar(0.05), weight_N));
+  memory.R_WR = desired.R_WR;
+  return desired.which;
+}
+
+template <typename Scalar, typename Gains>
+inline Vector3<Scalar> attitude_torque(const FlightSettings<Scalar, Gains>& settings,
+                                       FlightMemory<Scalar>& memory, const AttitudeState<Scalar>& state,
+                                       const FlightReference<Scalar>& reference) {
+  const AttitudeError<Scalar> error =
+      attitude_error(state, {memory.R_WR, reference.omega_R_rad_s, reference.omega_dot_R_rad_s2});
+  if (settings.attitude_law == AttitudeLaw::kLee) {
+    return lee_torque(settings.lee, settings.inertia_kg_m2, state, error);
+  }
+  const ReferenceRate<Scalar> rate =
+      reference_rate(settings.robust.Lambda_1_s, modified_rodrigues(error.R_RB), error);
+  memory.rate_integral_rad = integrate_rate(settings.robust, memory.rate_integral_rad, state.omega_B_rad_s,
+                                            rate.omega_r_rad_s, settings.attitude_step_s);
+  return robust_torque(settings.robust, settings.inertia_kg_m2, state.omega_B_rad_s, rate,
+                       memory.rate_integral_rad);
+}
+
+}  // namespace detail
+
+/// One period of the attitude loop, with one of the position loop in it where `position_is_due`.
+/// @param effect_W_N f_a_hat; zero where there is no network.
+template <typename Scalar, typename Gains>
+inline FlightCommand<Scalar> flight_step(const FlightSettings<Scalar, Gains>& settings,
+                                         FlightMemory<Scalar>& memory, const Measured<Scalar>& measured,
+                                         const FlightReference<Scalar>& wanted,
+                                         const Vector3<Scalar>& effect_W_N, std::uint32_t now_ms,
+                                         bool position_is_due) {
+  FlightCommand<Scalar> command;
+  unsigned faults = detail::faults(measured, now_ms);
+
+  FlightReference<Scalar> reference = wanted;
+  if (detail::is_usable(wanted)) {
+    memory.last_reference = wanted;
+    memory.has_reference = true;
+  } else {
+    faults |= kReferenceFault;
+    reference = {};
+    reference.heading = memory.last_reference.heading;
+    reference.position_W_m = memory.last_reference.position_W_m;
+    // Nothing was ever asked for: nowhere to stay.
+    if (!memory.has_reference) faults |= kPositionFault;
+  }
+  Vector3<Scalar> effect = effect_W_N;
+  const Scalar weight_N = product(settings.mass_kg, Scalar(kGravity_m_s2));
+  if (!is_within(effect, product(Scalar(kLargestEffectPerWeight), weight_N))) {
+    faults |= kPredictionFault;
+    effect = {};
+  }
+  command.faults = static_cast<std::uint8_t>(faults);
+  if ((faults & kAttitudeFault) != 0) {
+    command.motors_off = true;
+    memory.rate_integral_rad = {};
+    memory.mean_p = Scalar(0);
+    return command;
+  }
+
+  if (position_is_due) {
+    command.attitude_case =
+        detail::position_step(settings, memory, measured, reference, effect, (faults & kPositionFault) != 0);
+  }
+  command.force_W_N = memory.force_W_N;
+  command.wanted.thrust_N = collective_thrust(settings.thrust_rule, memory.force_W_N, measured.attitude.R_WB);
+  command.wanted.torque_N_m = detail::attitude_torque(settings, memory, measured.attitude, reference);
+
+  const Scalar volts = (faults & kBatteryFault) != 0 ? Scalar(kAssumedVoltage_V) : measured.battery_V;
+  const ForceLimits<Scalar> limits{settings.idle_force_N,
+                                   largest_force(settings.largest_force, memory.mean_p, volts)};
+  command.mixed = mix(settings.allocation, limits, command.wanted);
+  if (!command.mixed.valid) {
+    command.motors_off = true;
+    return command;
+  }
+  memory.thrust_saturated = command.mixed.thrust_limited && command.mixed.thrust_N < command.wanted.thrust_N;
+  Scalar sum(0);
+  for (int i = 0; i < settings.allocation.count; ++i) {
+    const Scalar p = pwm_of_force(settings.thrust_map, command.mixed.forces.at_N[i], volts);
+    command.pwm[i] = pwm_register(p);
+    sum = sum + p;
+  }
+  memory.mean_p = sum / static_cast<Scalar>(settings.allocation.count);
+  return command;
+}
+
+}  // namespace swarmcert::controller
