@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "lipschitz/search_random.h"
+#include "nn/files/random.h"
 
 namespace swarmcert::lipschitz {
 
@@ -13,7 +13,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 std::uint64_t pattern_key(int neuron) {
-  return SearchRandom(0x5bd1e995u + static_cast<std::uint64_t>(neuron)).bits();
+  return files::Random(0x5bd1e995u + static_cast<std::uint64_t>(neuron)).bits();
 }
 
 MatrixXd gram(const MatrixXd& jacobian) {

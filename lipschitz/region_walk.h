@@ -10,7 +10,7 @@
 
 #include "lipschitz/linear_region.h"
 #include "lipschitz/search_network.h"
-#include "lipschitz/search_random.h"
+#include "nn/files/random.h"
 
 namespace swarmcert::lipschitz {
 
@@ -72,7 +72,7 @@ class RegionWalk {
                       const Eigen::VectorXd& top) const;
 
   const SearchNetwork& network_;
-  SearchRandom random_;
+  files::Random random_;
   bool all_move_;     ///< every neuron depends on the moved vector, so that what lies behind a facet is exact
   double reach_ = 1;  ///< R of the current walk
   std::priority_queue<Candidate> queue_;

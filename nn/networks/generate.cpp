@@ -19,12 +19,14 @@
 #include <string>
 #include <vector>
 
+#include "nn/files/random.h"
 #include "nn/files/weights.h"
 
 namespace {
 
 using swarmcert::files::Layer;
 using swarmcert::files::Precision;
+using swarmcert::files::Random;
 using swarmcert::files::Weights;
 
 constexpr double kGamma = 3.0;  ///< limit of every layer's spectral norm
@@ -32,24 +34,6 @@ constexpr double kGamma = 3.0;  ///< limit of every layer's spectral norm
 constexpr double kHeadroom = 1 - 4e-6;
 constexpr int kSteps = 4000;
 constexpr int kBatch = 48;
-
-/// SplitMix64 (Steele et al. 2014).
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  /// Uniform in [-1, 1).
-  double next() { return static_cast<double>(bits() >> 11) * 0x1p-52 - 1; }
-  int below(int n) { return static_cast<int>(bits() % static_cast<std::uint64_t>(n)); }
-
- private:
-  std::uint64_t bits() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-  std::uint64_t state_;
-};
 
 /// Relative position in m, then relative velocity in m/s, of a neighbour.
 using Input = std::array<double, 6>;
@@ -62,13 +46,13 @@ struct Sample {
 Sample draw(Random& random) {
   Sample sample;
   double squares = 0;
-  for (int j = 1 + random.below(3); j > 0; --j) {
+  for (int j = 1 + static_cast<int>(random.below(3)); j > 0; --j) {
     Input x{};
     const double spread = random.below(2) == 0 ? 0.15 : 0.5;  // half of the neighbours near the wake
-    x[0] = spread * random.next();
-    x[1] = spread * random.next();
-    x[2] = 0.8 * random.next();
-    for (int k = 3; k < 6; ++k) x[k] = random.next();
+    x[0] = spread * random.symmetric();
+    x[1] = spread * random.symmetric();
+    x[2] = 0.8 * random.symmetric();
+    for (int k = 3; k < 6; ++k) x[k] = random.symmetric();
     sample.neighbours.push_back(x);
     const double z = x[2];
     const double ramp = std::clamp((z - 0.05) / 0.1, 0.0, 1.0);
@@ -94,13 +78,13 @@ struct Trained {
     layer.inputs = inputs;
     layer.outputs = outputs;
     const double bound = std::sqrt(3.0 / inputs);
-    for (int i = 0; i < inputs * outputs; ++i) layer.weights.push_back(bound * random.next());
-    for (int i = 0; i < outputs; ++i) layer.biases.push_back(0.1 * random.next());
+    for (int i = 0; i < inputs * outputs; ++i) layer.weights.push_back(bound * random.symmetric());
+    for (int i = 0; i < outputs; ++i) layer.biases.push_back(0.1 * random.symmetric());
     const std::size_t size = layer.weights.size() + layer.biases.size();
     gradient.assign(size, 0);
     first_moment.assign(size, 0);
     second_moment.assign(size, 0);
-    for (int i = 0; i < inputs; ++i) right.push_back(random.next());
+    for (int i = 0; i < inputs; ++i) right.push_back(random.symmetric());
   }
 };
 

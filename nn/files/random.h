@@ -1,15 +1,15 @@
-/// @file Pseudo-random numbers of the searches, with the same bits on every platform.
+/// @file Pseudo-random numbers with the same bits on every platform.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 
-namespace swarmcert::lipschitz {
+namespace swarmcert::files {
 
 /// splitmix64 (Steele, Lea, Flood 2014).
-class SearchRandom {
+class Random {
  public:
-  explicit SearchRandom(std::uint64_t seed) : state_(seed) {}
+  explicit Random(std::uint64_t seed) : state_(seed) {}
 
   std::uint64_t bits() {
     std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
@@ -20,6 +20,12 @@ class SearchRandom {
 
   /// Uniform in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+
+  /// Uniform in [-1, 1).
+  double symmetric() { return static_cast<double>(bits() >> 11) * 0x1p-52 - 1; }
+
+  /// One of 0 .. n - 1, n > 0; the bias of the remainder is below n / 2^64.
+  std::uint64_t below(std::uint64_t n) { return bits() % n; }
 
   /// Sum of twelve uniform numbers, minus 6: variance 1, near enough to a normal distribution, and no libm in it.
   double bell() {
@@ -44,4 +50,4 @@ class SearchRandom {
   std::uint64_t state_;
 };
 
-}  // namespace swarmcert::lipschitz
+}  // namespace swarmcert::files
