@@ -1,0 +1,43 @@
+/// @file Loss of a deep set over recorded samples, and its gradient.
+#pragma once
+
+#include <cstdint>
+
+#include "nn/training/layout.h"
+
+namespace swarmcert::training {
+
+/// Samples of the interaction force, of all vehicles of all flights. Sample s has the inputs first[s] .. first[s + 1]
+/// - 1; input i passes through part phi[i], the sum through part rho[s].
+struct Dataset {
+  int width = 6;    ///< numbers stored per input: the largest number of inputs of any phi
+  int outputs = 1;  ///< components of the force per sample
+
+  std::vector<float> x;                   ///< `width` per input; what a part does not read is 0
+  std::vector<int> phi;                   ///< per input
+  std::vector<Eigen::Index> first = {0};  ///< samples + 1, ascending
+  std::vector<int> rho;                   ///< per sample
+  std::vector<float> target;              ///< `outputs` per sample, in the unit of the network's output
+  std::vector<float> weight;              ///< per sample, at least 0: how much it counts
+
+  Eigen::Index samples() const { return static_cast<Eigen::Index>(rho.size()); }
+  /// Adds an input to the sample that the next add_sample() ends.
+  void add_input(int phi_part, const std::vector<float>& values);
+  void add_sample(int rho_part, const std::vector<float>& force, float sample_weight = 1);
+};
+
+/// Weighted sum of squared errors over some samples,
+///   sum_s w_s |rho(sum_i phi(x_i)) - y_s|^2,
+/// which is the paper's loss (section V-B) for w = 1.
+///
+/// @param samples  indices into the dataset.
+/// @param gradient if not null, [layout.size()]: the gradient with respect to theta is added to it.
+/// @returns the sum, in the target's unit squared, accumulated in double. An estimate: float32 products.
+double deep_set_loss(const Layout& layout, const Vector& theta, const Dataset& data,
+                     const Eigen::Index* samples, Eigen::Index count, Vector* gradient);
+
+/// Outputs [outputs x count] for some samples.
+Matrix predict(const Layout& layout, const Vector& theta, const Dataset& data, const Eigen::Index* samples,
+               Eigen::Index count);
+
+}  // namespace swarmcert::training

@@ -1,0 +1,61 @@
+/// @file Epochs of stochastic gradient descent over a dataset.
+#pragma once
+
+#include <optional>
+
+#include "nn/files/random.h"
+#include "nn/training/adam.h"
+#include "nn/training/deep_set_loss.h"
+#include "nn/training/spectral_normalization.h"
+
+namespace swarmcert::training {
+
+struct TrainerOptions {
+  files::GammaStatement gamma;
+  double learning_rate = 1e-3;
+  int batch = 1024;  ///< samples per step
+  std::uint64_t seed = 1;
+  int jobs = 0;  ///< threads; 0: all. The bits of the result do not depend on it.
+};
+
+/// Minimises deep_set_loss() / (sum of weights) with Adam and spectral normalisation after every step.
+///
+/// A batch is cut into pieces of kPiece samples, whose gradients are summed in their order: the same bits for any
+/// number of threads. Everything that a step depends on is in theta, adam, the norms' vectors and the epoch's number,
+/// so that a run can be taken up again at the end of any epoch.
+class Trainer {
+ public:
+  /// @param layout, data must outlive the trainer.
+  Trainer(const Layout& layout, const Dataset& data, std::vector<Eigen::Index> samples, Vector theta,
+          const TrainerOptions& options);
+
+  /// One pass over the samples in an order drawn from seed and `epoch`.
+  /// @returns the mean weighted squared error met on the way, before each step's update.
+  double run_epoch(int epoch, double learning_rate);
+
+  const Vector& theta() const { return theta_; }
+  const SpectralNormalization& normalization() const { return normalization_; }
+
+  /// What a checkpoint must hold, as one vector: theta, both moments, the number of steps.
+  Vector state() const;
+  /// @throws std::invalid_argument if `state` is not of this layout.
+  void restore(const Vector& state);
+
+ private:
+  double step(const Eigen::Index* samples, Eigen::Index count, double learning_rate);
+
+  const Layout& layout_;
+  const Dataset& data_;
+  std::vector<Eigen::Index> samples_;
+  TrainerOptions options_;
+  Vector theta_;
+  Adam adam_;
+  SpectralNormalization normalization_;
+  std::vector<Vector> gradients_;  ///< per piece of a batch
+};
+
+/// Mean weighted squared error of some samples, without a gradient; the same bits for any number of threads.
+double mean_loss(const Layout& layout, const Vector& theta, const Dataset& data,
+                 const std::vector<Eigen::Index>& samples, int jobs);
+
+}  // namespace swarmcert::training

@@ -1,0 +1,238 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <numeric>
+
+#include "nn/training/trainer.h"
+
+namespace swarmcert::training {
+namespace {
+
+using Eigen::Index;
+
+/// Two kinds of neighbours, a ground term with four inputs, two kinds of vehicles, two outputs.
+Layout mixed_layout() {
+  return Layout({{"phi:ground", {4, 9, 5}, 0},
+                 {"phi:large", {6, 8, 7, 5}, 0},
+                 {"phi:small", {6, 10, 5}, 0},
+                 {"rho:large", {5, 8, 2}, 0},
+                 {"rho:small", {5, 6, 6, 2}, 0}});
+}
+
+std::vector<float> random_values(int count, files::Random& random) {
+  std::vector<float> values;
+  for (int i = 0; i < count; ++i) values.push_back(static_cast<float>(random.symmetric()));
+  return values;
+}
+
+/// Samples with 0 to 3 neighbours of either kind, most with a ground term, weights in [0, 2].
+Dataset mixed_dataset(int samples, std::uint64_t seed) {
+  files::Random random(seed);
+  Dataset data;
+  data.outputs = 2;
+  for (int s = 0; s < samples; ++s) {
+    if (s % 5 != 0) data.add_input(0, random_values(4, random));
+    for (std::uint64_t j = random.below(4); j > 0; --j)
+      data.add_input(1 + static_cast<int>(random.below(2)), random_values(6, random));
+    data.add_sample(3 + s % 2, random_values(2, random), static_cast<float>(1 + random.symmetric()));
+  }
+  return data;
+}
+
+std::vector<Index> all_samples(const Dataset& data) {
+  std::vector<Index> samples(static_cast<std::size_t>(data.samples()));
+  std::iota(samples.begin(), samples.end(), Index{0});
+  return samples;
+}
+
+/// The loss in double by the evaluator that is certified and flown: shares no code with training.
+double evaluator_loss(const std::vector<files::Weights>& parts, const Dataset& data) {
+  std::vector<files::Evaluator<double>> evaluators;
+  for (const files::Weights& part : parts) evaluators.emplace_back(part);
+  double loss = 0;
+  for (Index s = 0; s < data.samples(); ++s) {
+    std::vector<double> sum(static_cast<std::size_t>(parts[data.rho[s]].inputs()), 0.0);
+    for (Index i = data.first[s]; i < data.first[s + 1]; ++i) {
+      const float* x = data.x.data() + i * data.width;
+      const std::vector<double> feature = evaluators[data.phi[i]]({x, x + parts[data.phi[i]].inputs()});
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += feature[k];
+    }
+    const std::vector<double> output = evaluators[data.rho[s]](sum);
+    for (int k = 0; k < data.outputs; ++k) {
+      const double error = output[k] - static_cast<double>(data.target[s * data.outputs + k]);
+      loss += static_cast<double>(data.weight[s]) * error * error;
+    }
+  }
+  return loss;
+}
+
+std::vector<files::Weights> stored_parts(const Layout& layout, const Vector& theta) {
+  std::vector<files::Weights> parts;
+  for (std::size_t p = 0; p < layout.parts().size(); ++p)
+    parts.push_back(layout.stored(theta, static_cast<int>(p)));
+  return parts;
+}
+
+TEST(DeepSetLoss, IsThatOfTheEvaluator) {
+  const Layout layout = mixed_layout();
+  const Vector theta = initial_parameters(layout, 7);
+  const Dataset data = mixed_dataset(300, 1);
+  const double expected = evaluator_loss(stored_parts(layout, theta), data);
+  const std::vector<Index> samples = all_samples(data);
+  EXPECT_NEAR(deep_set_loss(layout, theta, data, samples.data(), 300, nullptr), expected, 1e-5 * expected);
+}
+
+TEST(DeepSetLoss, GradientIsTheDerivativeInEveryParameter) {
+  const Layout layout = mixed_layout();
+  const Vector theta = initial_parameters(layout, 11);
+  const Dataset data = mixed_dataset(40, 2);
+  const std::vector<Index> samples = all_samples(data);
+  Vector gradient = Vector::Zero(layout.size());
+  deep_set_loss(layout, theta, data, samples.data(), data.samples(), &gradient);
+
+  std::vector<files::Weights> parts = stored_parts(layout, theta);
+  const double step = 1e-6;
+  const double tolerance = 1e-4 * static_cast<double>(gradient.cwiseAbs().maxCoeff());
+  int compared = 0;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    for (std::size_t k = 0; k < parts[p].layers.size(); ++k) {
+      files::Layer& layer = parts[p].layers[k];
+      const auto derivative = [&](double& parameter) {
+        const double before = parameter;
+        parameter = before + step;
+        const double above = evaluator_loss(parts, data);
+        parameter = before - step;
+        const double below = evaluator_loss(parts, data);
+        parameter = before;
+        ++compared;
+        return (above - below) / (2 * step);
+      };
+      const auto w = layout.weights(gradient, static_cast<int>(p), static_cast<int>(k));
+      const auto b = layout.biases(gradient, static_cast<int>(p), static_cast<int>(k));
+      for (int i = 0; i < layer.outputs; ++i) {
+        for (int j = 0; j < layer.inputs; ++j) {
+          const std::size_t at = static_cast<std::size_t>(i) * layer.inputs + j;
+          ASSERT_NEAR(static_cast<double>(w(i, j)), derivative(layer.weights[at]), tolerance)
+              << layout.parts()[p].name << " layer " << k << " weight " << i << ", " << j;
+        }
+        ASSERT_NEAR(static_cast<double>(b(i)), derivative(layer.biases[i]), tolerance)
+            << layout.parts()[p].name << " layer " << k << " bias " << i;
+      }
+    }
+  }
+  EXPECT_EQ(compared, layout.size());
+}
+
+TEST(Layout, LoadsWhatItStored) {
+  const Layout layout = mixed_layout();
+  const Vector theta = initial_parameters(layout, 5);
+  Vector again = Vector::Zero(layout.size());
+  const std::vector<files::Weights> parts = stored_parts(layout, theta);
+  for (std::size_t p = 0; p < parts.size(); ++p) layout.load(again, static_cast<int>(p), parts[p]);
+  EXPECT_EQ(again, theta);
+  EXPECT_THROW(layout.load(again, 0, parts[1]), std::invalid_argument);
+}
+
+TrainerOptions options_with(double gamma, files::GammaStatement::Scope scope,
+                            files::GammaStatement::Mode mode) {
+  TrainerOptions options;
+  options.gamma = {gamma, scope, mode};
+  options.batch = 256;
+  options.jobs = 1;
+  return options;
+}
+
+using Scope = files::GammaStatement::Scope;
+using Mode = files::GammaStatement::Mode;
+
+double norm_of(const Layout& layout, const Vector& theta, int part, int layer) {
+  return layout.weights(theta, part, layer).cast<double>().eval().jacobiSvd().singularValues()(0);
+}
+
+TEST(SpectralNormalization, ClipKeepsEveryLayerBelowGamma) {
+  const Layout layout = mixed_layout();
+  const Dataset data = mixed_dataset(600, 3);
+  Trainer trainer(layout, data, all_samples(data), 3 * initial_parameters(layout, 1),
+                  options_with(0.8, Scope::kLayer, Mode::kClip));
+  for (int epoch = 0; epoch < 20; ++epoch) trainer.run_epoch(epoch, 1e-3);
+  int at_limit = 0;
+  for (int p = 0; p < 5; ++p) {
+    for (int k = 0; k < layout.parts()[p].layers(); ++k) {
+      const double norm = norm_of(layout, trainer.theta(), p, k);
+      EXPECT_LE(norm, 0.8 * 1.01) << layout.parts()[p].name << " layer " << k;
+      at_limit += norm > 0.8 * 0.99;
+    }
+  }
+  EXPECT_GT(at_limit, 0);
+}
+
+TEST(SpectralNormalization, EqualMakesTheProductOfTheNormsGamma) {
+  const Layout layout = mixed_layout();
+  const Dataset data = mixed_dataset(600, 3);
+  Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1),
+                  options_with(2.0, Scope::kNetwork, Mode::kEqual));
+  for (int epoch = 0; epoch < 5; ++epoch) trainer.run_epoch(epoch, 1e-3);
+  for (int p = 0; p < 5; ++p) {
+    const int layers = layout.parts()[p].layers();
+    for (int k = 0; k < layers; ++k) {
+      EXPECT_NEAR(norm_of(layout, trainer.theta(), p, k), std::pow(2.0, 1.0 / layers), 0.01)
+          << layout.parts()[p].name << " layer " << k;
+    }
+  }
+}
+
+TEST(Trainer, SameBitsForAnyNumberOfThreads) {
+  const Layout layout = mixed_layout();
+  const Dataset data = mixed_dataset(900, 4);
+  std::vector<Vector> results;
+  for (const int jobs : {1, 2, 5}) {
+    TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
+    options.batch = 700;
+    options.jobs = jobs;
+    Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+    for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
+    results.push_back(trainer.theta());
+  }
+  EXPECT_EQ(results[0], results[1]);
+  EXPECT_EQ(results[0], results[2]);
+}
+
+TEST(Trainer, ARunThatWasTakenUpAgainEndsWithTheSameBits) {
+  const Layout layout = mixed_layout();
+  const Dataset data = mixed_dataset(500, 4);
+  const TrainerOptions options = options_with(2, Scope::kLayer, Mode::kClip);
+  Trainer whole(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+  for (int epoch = 0; epoch < 4; ++epoch) whole.run_epoch(epoch, 1e-2);
+
+  Trainer first(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+  for (int epoch = 0; epoch < 2; ++epoch) first.run_epoch(epoch, 1e-2);
+  Trainer second(layout, data, all_samples(data), initial_parameters(layout, 99), options);
+  second.restore(first.state());
+  for (int epoch = 2; epoch < 4; ++epoch) second.run_epoch(epoch, 1e-2);
+  EXPECT_EQ(second.theta(), whole.theta());
+  EXPECT_THROW(second.restore(Vector::Zero(3)), std::invalid_argument);
+}
+
+TEST(Trainer, LearnsTheForceOfAnotherDeepSet) {
+  const Layout layout({{"phi:default", {6, 16, 8}, 0}, {"rho:default", {8, 16, 1}, 0}});
+  const Vector truth = 2 * initial_parameters(layout, 1);
+  files::Random random(5);
+  Dataset data;
+  for (int s = 0; s < 4000; ++s) {
+    for (std::uint64_t j = 1 + random.below(2); j > 0; --j) data.add_input(0, random_values(6, random));
+    data.add_sample(1, {0.0f});
+  }
+  const std::vector<Index> samples = all_samples(data);
+  const Matrix force = predict(layout, truth, data, samples.data(), data.samples());
+  for (Index s = 0; s < data.samples(); ++s) data.target[s] = force(0, s);
+  const double variance = static_cast<double>((force.array() - force.mean()).square().mean());
+
+  Trainer trainer(layout, data, samples, initial_parameters(layout, 2),
+                  options_with(10, Scope::kLayer, Mode::kClip));
+  for (int epoch = 0; epoch < 60; ++epoch) trainer.run_epoch(epoch, 1e-2);
+  EXPECT_LT(mean_loss(layout, trainer.theta(), data, samples, 1), 0.05 * variance);
+}
+
+}  // namespace
+}  // namespace swarmcert::training
