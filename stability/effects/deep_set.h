@@ -14,7 +14,7 @@ class DeepSetEffect : public Effect {
   ~DeepSetEffect() override;
   static EffectInfo describe();
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
-  double reach_m(double height_m, const double* shape) const override;
+  double reach_m(double dz_m, const double* shape) const override;
 
  private:
   std::unique_ptr<DeepSetForce> force_;

@@ -104,10 +104,11 @@ std::vector<std::vector<double>> Downwash::grid(const FlightRange&) const {
   return thetas;
 }
 
-double Downwash::reach_m(double height_m, const double* shape) const {
+double Downwash::reach_m(double dz_m, const double* shape) const {
+  if (dz_m <= kTouching_m) return 0;
   // The wake lags by k dz |v|; 20 m/s is faster than anything this project flies.
-  const double lag_m = shape[kConvection] * height_m * 20;
-  return kReachInSpreads * (shape[kSpread0] + shape[kSpreadSlope] * std::max(height_m, kNearest_m)) + lag_m;
+  const double lag_m = shape[kConvection] * dz_m * 20;
+  return kReachInSpreads * (shape[kSpread0] + shape[kSpreadSlope] * std::max(dz_m, kNearest_m)) + lag_m;
 }
 
 }  // namespace swarmcert::stability

@@ -23,7 +23,7 @@ class Downwash : public Effect {
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
   bool in_support(const Instant& now, const double* shape) const override;
   std::vector<std::vector<double>> grid(const FlightRange& range) const override;
-  double reach_m(double height_m, const double* shape) const override;
+  double reach_m(double dz_m, const double* shape) const override;
 };
 
 }  // namespace swarmcert::stability

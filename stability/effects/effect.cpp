@@ -51,15 +51,15 @@ AppliedEffect::AppliedEffect(const EffectSpec& spec, const EffectContext& contex
   EffectValues values = effect_values(effect_->info(), spec);
   coefficients_ = std::move(values.linear);
   shape_ = std::move(values.shape);
+  columns_.resize(coefficients_.size());
 }
 
 Wrench AppliedEffect::wrench(const Instant& now) const {
-  Wrench columns[kMostColumns];
-  effect_->columns(now, shape_.data(), columns);
+  effect_->columns(now, shape_.data(), columns_.data());
   Wrench sum;
   for (std::size_t k = 0; k < coefficients_.size(); ++k) {
-    sum.force_W_N += coefficients_[k] * columns[k].force_W_N;
-    sum.torque_B_Nm += coefficients_[k] * columns[k].torque_B_Nm;
+    sum.force_W_N += coefficients_[k] * columns_[k].force_W_N;
+    sum.torque_B_Nm += coefficients_[k] * columns_[k].torque_B_Nm;
   }
   return sum;
 }

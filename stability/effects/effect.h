@@ -137,10 +137,9 @@ class Effect {
   /// Effects that remember enter simulation here, with their coefficients and theta.
   virtual void add_to(SignalPath& path, const double* coefficients, const double* shape) const;
 
-  /// Distance between centres, in the horizontal plane, beyond which a neighbour does nothing at all: infinite where
-  /// the effect has no such distance, zero where it looks at no neighbour.
-  /// @param height_m largest difference of heights in question.
-  virtual double reach_m(double height_m, const double* shape) const;
+  /// Horizontal distance beyond which a neighbour that is `dz_m` higher does nothing at all: infinite where the effect
+  /// has no such distance, zero where it looks at no such neighbour. Monotone in dz_m.
+  virtual double reach_m(double dz_m, const double* shape) const;
 
  private:
   EffectInfo info_;
@@ -162,6 +161,7 @@ class AppliedEffect {
  private:
   std::unique_ptr<Effect> effect_;
   std::vector<double> coefficients_, shape_;
+  mutable std::vector<Wrench> columns_;  ///< scratch
 };
 
 }  // namespace swarmcert::stability

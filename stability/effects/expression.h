@@ -28,7 +28,7 @@ class ExpressionEffect : public Effect {
   ~ExpressionEffect() override;
   /// @throws files::InputError if a formula gives a number that is not finite; the message says where.
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
-  double reach_m(double height_m, const double* shape) const override;
+  double reach_m(double dz_m, const double* shape) const override;
 
  private:
   struct Formulas;

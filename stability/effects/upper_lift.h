@@ -11,7 +11,7 @@ class UpperLift : public Effect {
   static EffectInfo describe();
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
   bool in_support(const Instant& now, const double* shape) const override;
-  double reach_m(double height_m, const double* shape) const override;
+  double reach_m(double dz_m, const double* shape) const override;
 };
 
 }  // namespace swarmcert::stability

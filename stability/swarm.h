@@ -1,0 +1,89 @@
+/// @file Equations of motion of a swarm of vehicles, of one kind or several, with their effects on each other.
+///
+///   p' = v,  m v' = m g + R f_u + f_a,  R' = R S(omega),  J omega' = J omega x omega + tau_u + tau_a
+/// (paper, equations (1) to (3)); f_u and tau_u come from four rotors behind the motor lag, f_a and tau_a from the
+/// models' effects. Nothing is saturated here, and no time passes: integrators call derivative().
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "stability/effects/effect.h"
+#include "stability/effects/signal_path.h"
+#include "stability/model.h"
+#include "stability/vehicle_state.h"
+
+namespace swarmcert::stability {
+
+/// What acts on one vehicle from outside its state.
+struct VehicleInput {
+  double rotor_command_N[kNumRotors] = {0, 0, 0, 0};  ///< behind the command delay
+  double battery_V = kFullBattery_V;
+  Eigen::Vector3d disturbance_W_N = Eigen::Vector3d::Zero();  ///< added to f_a
+  bool resting = false;  ///< stands on the ground: nothing moves but the rotors
+};
+
+/// The plant. Keeps scratch memory: one per thread.
+class Swarm {
+ public:
+  /// @param models  of the kinds of vehicles.
+  /// @param kind_of index into `models` for each vehicle.
+  /// @throws files::InputError if an effect cannot be made.
+  Swarm(std::vector<Model> models, std::vector<int> kind_of);
+  /// One model for all.
+  Swarm(Model model, int vehicles);
+  ~Swarm();
+
+  int size() const { return static_cast<int>(kind_of_.size()); }
+  int state_size() const { return size() * kVehicleStateSize; }
+  const Model& model(int vehicle) const { return models_[static_cast<std::size_t>(kind_of_[vehicle])]; }
+  int kind_of(int vehicle) const { return kind_of_[static_cast<std::size_t>(vehicle)]; }
+  const std::vector<Model>& models() const { return models_; }
+  /// Delays and lags that the model's effects put into the vehicle's signals.
+  const SignalPath& path(int vehicle) const;
+  /// Replaces a vehicle kind's motor lag and delay, where its model names none.
+  void assume_lag(double motor_lag_s, double delay_s);
+
+  /// d state / dt.
+  /// @param state      [state_size()], see StateIndex.
+  /// @param inputs     [size()].
+  /// @param derivative [state_size()], overwritten.
+  /// @param stabilise  rate in 1/s at which |q| is drawn to 1, for integrators that never normalise; else 0.
+  void derivative(double time_s, const double* state, const VehicleInput* inputs, double* derivative,
+                  double stabilise = 0);
+
+  /// f_a and tau_a of one vehicle at `state`.
+  Wrench effects_on(int vehicle, double time_s, const double* state, const VehicleInput& input);
+
+  /// Everything effects know of one vehicle; its neighbours are all others. Valid until the next call on this object.
+  const Instant& instant(int vehicle, double time_s, const double* state, const VehicleInput& input);
+
+  /// Remembers who can reach whom within `horizon_s`, so that derivative() looks at few pairs. Without a call, and
+  /// after forget_neighbours(), it looks at all of them. Assumes accelerations below 50 m/s^2.
+  void find_neighbours(const double* state, double horizon_s);
+  void forget_neighbours();
+
+ private:
+  struct Kind;
+  void fill(int vehicle, const double* state, const VehicleInput& input, double thrust_N,
+            const Eigen::Vector3d& torque_B_Nm, const Eigen::Matrix3d& R_WB);
+  void add_neighbour(int vehicle, int other, const double* state);
+  void gather(int vehicle, const double* state, bool all);
+  void rotor_wrench(const Kind& kind, const double* x, const VehicleInput& input, double* thrust_N,
+                    Eigen::Vector3d* torque_B_Nm) const;
+
+  std::vector<Model> models_;
+  std::vector<int> kind_of_;
+  std::vector<Kind> kinds_;
+  bool interacts_ = false;  ///< some effect looks at neighbours
+  bool listed_ = false;
+  std::vector<std::vector<int>> near_;  ///< by vehicle, if listed_
+  Instant instant_;
+  std::vector<Neighbour> neighbours_;
+};
+
+/// Initial state: at `p_W_m`, with velocity `v_W_m_s`, level, heading +x, rotors at hover force.
+void set_hover(const Model& model, const Eigen::Vector3d& p_W_m, const Eigen::Vector3d& v_W_m_s,
+               double* state);
+
+}  // namespace swarmcert::stability

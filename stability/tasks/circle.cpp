@@ -1,0 +1,48 @@
+#include "stability/tasks/circle.h"
+
+#include <cmath>
+
+#include "stability/tasks/polynomial.h"
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kTurn_s = 6;
+constexpr double kRadius_m = 0.5;
+constexpr double kHeight_m = 0.6;
+/// The speed rises from zero over this time; the angle follows the integral of a rest-to-rest ramp.
+constexpr double kRamp_s = 2;
+constexpr double kTwoPi = 6.28318530717958647692;
+
+/// Integral of s(x) from RestToRest over [0, x].
+double ramp_integral(double x) {
+  const double x5 = x * x * x * x * x;
+  return x5 * (7 + x * (-14 + x * (10 - 2.5 * x)));
+}
+
+}  // namespace
+
+Circle::Circle(const TaskOptions& options)
+    : vehicles_(options.vehicles), duration_s_(options.duration_s > 0 ? options.duration_s : 20) {}
+
+Setpoint Circle::at(int vehicle, double time_s) const {
+  const double full_rad_s = kTwoPi / kTurn_s;
+  const RestToRest ramp(time_s / kRamp_s);
+  const double progress_s = time_s < kRamp_s ? kRamp_s * ramp_integral(time_s / kRamp_s)
+                                             : kRamp_s * ramp_integral(1) + time_s - kRamp_s;
+  const double angle_rad = kTwoPi * vehicle / vehicles_ + full_rad_s * progress_s;
+  const double rate_rad_s = full_rad_s * ramp.s;
+  const double acceleration_rad_s2 = full_rad_s * ramp.ds / kRamp_s;
+  const Eigen::Vector3d outward(std::cos(angle_rad), std::sin(angle_rad), 0);
+  const Eigen::Vector3d along(-outward.y(), outward.x(), 0);
+  Setpoint setpoint;
+  setpoint.p_W_m = kRadius_m * outward;
+  setpoint.p_W_m.z() = kHeight_m;
+  setpoint.v_W_m_s = kRadius_m * rate_rad_s * along;
+  setpoint.a_W_m_s2 = kRadius_m * (acceleration_rad_s2 * along - rate_rad_s * rate_rad_s * outward);
+  return setpoint;
+}
+
+std::vector<double> Circle::knots_s() const { return {kRamp_s}; }
+
+}  // namespace swarmcert::stability

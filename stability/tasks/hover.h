@@ -1,0 +1,20 @@
+/// @file Vehicles hover side by side, 0.5 m apart, 0.6 m high.
+#pragma once
+
+#include "stability/tasks/task.h"
+
+namespace swarmcert::stability {
+
+class Hover : public Task {
+ public:
+  static constexpr char kName[] = "hover";
+  static constexpr char kSummary[] = "stay in place, 0.5 m apart";
+  explicit Hover(const TaskOptions& options);
+  Setpoint at(int vehicle, double time_s) const override;
+  double duration_s() const override { return duration_s_; }
+
+ private:
+  double duration_s_;
+};
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,47 @@
+/// @file A flight task: where each vehicle should be at each time.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace swarmcert::stability {
+
+/// What a controller is asked to follow at one instant, in the world.
+struct Setpoint {
+  Eigen::Vector3d p_W_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_W_m_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d a_W_m_s2 = Eigen::Vector3d::Zero();
+};
+
+/// Trajectories of a number of vehicles. Positions are continuous; velocities jump at most at knots().
+class Task {
+ public:
+  virtual ~Task() = default;
+  virtual Setpoint at(int vehicle, double time_s) const = 0;
+  virtual double duration_s() const = 0;
+  /// Times at which some vehicle's acceleration or its derivative jumps: integrators should stop there.
+  virtual std::vector<double> knots_s() const { return {}; }
+  /// Vehicles stand on the ground at the start, below their first set point.
+  virtual bool starts_on_ground() const { return false; }
+};
+
+struct TaskOptions {
+  int vehicles = 1;
+  double duration_s = 0;  ///< 0: the task's own
+  std::uint64_t seed = 0;
+};
+
+/// Names of the tasks, in the order of the documentation.
+std::vector<std::string> task_names();
+
+/// One line about a task.
+/// @throws std::invalid_argument for an unknown name.
+std::string task_summary(const std::string& name);
+
+/// @throws std::invalid_argument for an unknown name, no vehicles, or a negative duration.
+std::unique_ptr<Task> make_task(const std::string& name, const TaskOptions& options);
+
+}  // namespace swarmcert::stability
