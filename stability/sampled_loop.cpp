@@ -1,0 +1,296 @@
+#include "stability/sampled_loop.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace swarmcert::stability {
+namespace {
+
+using Vector3Map = Eigen::Map<Eigen::Vector3d>;
+
+/// How many control periods make one period of a slower loop.
+int periods(double control_hz, double slow_hz, const char* what) {
+  const double ratio = control_hz / slow_hz;
+  const double whole = std::round(ratio);
+  if (whole < 1 || std::abs(ratio - whole) > 1e-6 * whole) {
+    throw std::invalid_argument(std::string("the ") + what + " loop at " + std::to_string(slow_hz) +
+                                " Hz is no whole fraction of the attitude loop's " +
+                                std::to_string(control_hz) + " Hz");
+  }
+  return static_cast<int>(whole);
+}
+
+template <typename Scalar>
+controller::Vector3<Scalar> narrow(const Eigen::Vector3d& v) {
+  return {static_cast<Scalar>(v.x()), static_cast<Scalar>(v.y()), static_cast<Scalar>(v.z())};
+}
+
+template <typename Scalar>
+Eigen::Vector3d wide(const controller::Vector3<Scalar>& v) {
+  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+}
+
+template <typename Scalar>
+controller::Matrix3<Scalar> narrow_matrix(const Eigen::Matrix3d& m) {
+  return {narrow<Scalar>(Eigen::Vector3d(m.row(0))), narrow<Scalar>(Eigen::Vector3d(m.row(1))),
+          narrow<Scalar>(Eigen::Vector3d(m.row(2)))};
+}
+
+}  // namespace
+
+/// The controllers of all vehicles, with what they remember.
+template <typename Scalar>
+struct SampledLoop::Controllers {
+  struct Vehicle {
+    controller::Vector3<Scalar> integral{}, rate_integral{}, force{};
+    controller::Matrix3<Scalar> desired = controller::identity<Scalar>();
+    bool saturated = false;
+  };
+  std::vector<ControlLaw<Scalar>> laws;  ///< by kind
+  std::vector<Vehicle> vehicles;
+
+  Controllers(const Swarm& swarm, const Gains& gains) : vehicles(static_cast<std::size_t>(swarm.size())) {
+    for (const Model& model : swarm.models()) laws.emplace_back(gains, model);
+  }
+};
+
+SampledLoop::SampledLoop(Swarm& swarm, const Gains& given, const Task& task,
+                         const SampledLoopOptions& options, const files::Network* network)
+    : swarm_(swarm), task_(task), options_(options), random_(options.seed, 1) {
+  Gains gains = given;
+  const double control_hz = std::max(options.attitude_rate_hz, gains.rate_hz);
+  if (gains.rate_hz == 0) gains.rate_hz = control_hz;
+  if (gains.integrator_step_s == 0) gains.integrator_step_s = 1 / gains.rate_hz;
+  period_s_ = 1 / control_hz;
+  position_every_ = periods(control_hz, gains.rate_hz, "position");
+  network_every_ = periods(control_hz, gains.network_rate_hz > 0 ? gains.network_rate_hz : 100, "network");
+  network_late_ = static_cast<int>(std::ceil(gains.network_latency_s * control_hz - 1e-9));
+
+  const auto size = static_cast<std::size_t>(swarm.state_size());
+  for (std::vector<double>* vector : {&state_, &k1_, &k2_, &k3_, &k4_, &stage_}) vector->resize(size);
+  inputs_.resize(static_cast<std::size_t>(swarm.size()));
+  records_.resize(inputs_.size());
+  for (int i = 0; i < swarm.size(); ++i) {
+    const Setpoint start = task.at(i, 0);
+    set_hover(swarm.model(i), start.p_W_m, start.v_W_m_s,
+              &state_[static_cast<std::size_t>(i) * kVehicleStateSize]);
+    input(i).resting = task.starts_on_ground();
+    double* const rotors = &state_[static_cast<std::size_t>(i) * kVehicleStateSize + kRotors];
+    if (input(i).resting) std::fill(rotors, rotors + kNumRotors, 0.0);
+    std::copy(rotors, rotors + kNumRotors, input(i).rotor_command_N);
+    std::copy(rotors, rotors + kNumRotors, records_[static_cast<std::size_t>(i)].rotor_N.begin());
+  }
+  if (options.flies_float) {
+    float_ = std::make_unique<Controllers<float>>(swarm, gains);
+  } else {
+    double_ = std::make_unique<Controllers<double>>(swarm, gains);
+  }
+  if (network != nullptr) {
+    std::vector<std::string> kinds;
+    for (const Model& model : swarm.models()) kinds.push_back(model.kind);
+    for (const Model& model : swarm.models()) {
+      networks_.push_back(std::make_unique<DeepSetForce>(*network, model.kind, kinds));
+    }
+    predictions_.assign(inputs_.size(), std::vector<double>(static_cast<std::size_t>(network_late_ + 1)));
+  }
+  int longest = 0;
+  for (int i = 0; i < swarm.size(); ++i) {
+    longest = std::max(longest, static_cast<int>(std::ceil(swarm.path(i).delay_s / period_s_)) + 1);
+  }
+  delayed_.resize(inputs_.size());
+  for (int i = 0; i < swarm.size(); ++i) {
+    const auto& start = records_[static_cast<std::size_t>(i)].rotor_N;
+    for (int age = 0; age <= longest; ++age) {
+      delayed_[static_cast<std::size_t>(i)].insert(delayed_[static_cast<std::size_t>(i)].end(), start.begin(),
+                                                   start.end());
+    }
+  }
+}
+
+SampledLoop::~SampledLoop() = default;
+
+double SampledLoop::battery_V() const {
+  return std::max(options_.battery_start_V - options_.battery_drop_V_s * time_s(), 3.2);
+}
+
+/// The staircase: predictions are made from the states now, and applied network_late_ periods later.
+void SampledLoop::predict() {
+  const auto slots = static_cast<std::int64_t>(network_late_) + 1;
+  for (int i = 0; i < swarm_.size(); ++i) {
+    std::vector<double>& ring = predictions_[static_cast<std::size_t>(i)];
+    double& now = ring[static_cast<std::size_t>(period_ % slots)];
+    if (period_ % network_every_ == 0) {
+      now = networks_[static_cast<std::size_t>(swarm_.kind_of(i))]->force_z_N(
+          swarm_.instant(i, time_s(), state_.data(), input(i)));
+    } else {
+      now = ring[static_cast<std::size_t>((period_ + slots - 1) % slots)];
+    }
+    const std::int64_t applied = period_ - network_late_;
+    records_[static_cast<std::size_t>(i)].prediction_N =
+        applied < 0 ? 0 : ring[static_cast<std::size_t>(applied % slots)];
+  }
+}
+
+template <typename Scalar>
+void SampledLoop::control(Controllers<Scalar>& controllers) {
+  using Law = ControlLaw<Scalar>;
+  const double battery = battery_V();
+  for (int i = 0; i < swarm_.size(); ++i) {
+    const auto index = static_cast<std::size_t>(i);
+    double* const x = &state_[index * kVehicleStateSize];
+    const Model& model = swarm_.model(i);
+    const Law& law = controllers.laws[static_cast<std::size_t>(swarm_.kind_of(i))];
+    typename Controllers<Scalar>::Vehicle& vehicle = controllers.vehicles[index];
+    ControlRecord& record = records_[index];
+    inputs_[index].battery_V = battery;
+    if (ran_position_) {
+      record.setpoint = task_.at(i, time_s());
+      Eigen::Vector3d p = Vector3Map(x + kPosition), v = Vector3Map(x + kVelocity);
+      if (options_.noise) {
+        for (int axis = 0; axis < 3; ++axis) {
+          p[axis] += model.sensor.position_noise_m * random_.normal();
+          v[axis] += model.sensor.velocity_noise_m_s * random_.normal();
+        }
+      }
+      const controller::TrackingError<Scalar> error = {narrow<Scalar>(p - record.setpoint.p_W_m),
+                                                       narrow<Scalar>(v - record.setpoint.v_W_m_s)};
+      if (!inputs_[index].resting) {
+        vehicle.integral = integrate(law.integrator(), vehicle.integral, error.position_m,
+                                     law.held(error.position_m, vehicle.force, vehicle.saturated));
+      }
+      const Eigen::Vector3d prediction(0, 0, record.prediction_N);
+      vehicle.force = law.force(error, vehicle.integral,
+                                {narrow<Scalar>(record.setpoint.a_W_m_s2), narrow<Scalar>(prediction)});
+      record.force_W_N = wide(vehicle.force);
+      record.integral_m_s = wide(vehicle.integral);
+    }
+    Eigen::Matrix3d R_WB;
+    rotation_of(x + kQuaternion, &R_WB);
+    const auto output = law.rotors(vehicle.force, narrow_matrix<Scalar>(R_WB),
+                                   narrow<Scalar>(Eigen::Vector3d(Vector3Map(x + kOmega))), vehicle.desired,
+                                   vehicle.rate_integral, force_limits<Scalar>(model, battery));
+    vehicle.desired = output.R_WR;
+    vehicle.saturated = output.mixed.thrust_limited && output.mixed.thrust_N < output.thrust_N;
+    if (law.is_robust() && !inputs_[index].resting) {
+      const auto next =
+          vehicle.rate_integral + scaled(static_cast<Scalar>(period_s_), output.rate_error_B_rad_s);
+      const auto& limit = law.rate_integral_limit_rad();
+      vehicle.rate_integral = {controller::clamp(next.x, -limit.x, limit.x),
+                               controller::clamp(next.y, -limit.y, limit.y),
+                               controller::clamp(next.z, -limit.z, limit.z)};
+    }
+    // On the ground the motors are off until the task leaves it.
+    const bool off = inputs_[index].resting && record.setpoint.p_W_m.z() <= options_.ground_m + 1e-3;
+    record.thrust_N = off ? 0 : static_cast<double>(output.thrust_N);
+    record.torque_B_Nm = wide(output.torque_B_N_m);
+    record.saturated = vehicle.saturated;
+    for (int r = 0; r < kNumRotors; ++r) {
+      record.rotor_N[static_cast<std::size_t>(r)] =
+          off ? 0 : static_cast<double>(output.mixed.forces.at_N[r]);
+    }
+  }
+}
+
+void SampledLoop::advance(double h_s) {
+  const auto size = static_cast<int>(state_.size());
+  const double start_s = time_s();
+  const double h = h_s / options_.substeps;
+  double* const x = state_.data();
+  for (int step = 0; step < options_.substeps; ++step) {
+    const double t = start_s + step * h;
+    swarm_.derivative(t, x, inputs_.data(), k1_.data());
+    for (int i = 0; i < size; ++i)
+      stage_[static_cast<std::size_t>(i)] = x[i] + 0.5 * h * k1_[static_cast<std::size_t>(i)];
+    swarm_.derivative(t + 0.5 * h, stage_.data(), inputs_.data(), k2_.data());
+    for (int i = 0; i < size; ++i)
+      stage_[static_cast<std::size_t>(i)] = x[i] + 0.5 * h * k2_[static_cast<std::size_t>(i)];
+    swarm_.derivative(t + 0.5 * h, stage_.data(), inputs_.data(), k3_.data());
+    for (int i = 0; i < size; ++i)
+      stage_[static_cast<std::size_t>(i)] = x[i] + h * k3_[static_cast<std::size_t>(i)];
+    swarm_.derivative(t + h, stage_.data(), inputs_.data(), k4_.data());
+    for (std::size_t i = 0; i < state_.size(); ++i) {
+      x[i] += h / 6 * (k1_[i] + 2 * (k2_[i] + k3_[i]) + k4_[i]);
+    }
+  }
+}
+
+/// Moves the plant by one period. A command delay of k + r periods holds the command of k + 1 periods ago for the
+/// first r of it, that of k periods ago for the rest. Where kinds have different r, all switch at the largest.
+void SampledLoop::move() {
+  double switch_s = 0;
+  const auto slots = static_cast<std::int64_t>(delayed_.front().size() / kNumRotors);
+  for (int i = 0; i < swarm_.size(); ++i) {
+    const auto& now = records_[static_cast<std::size_t>(i)].rotor_N;
+    std::copy(now.begin(), now.end(),
+              &delayed_[static_cast<std::size_t>(i)][static_cast<std::size_t>(period_ % slots) * kNumRotors]);
+    const double whole = std::floor(swarm_.path(i).delay_s / period_s_ + 1e-9);
+    switch_s = std::max(switch_s, swarm_.path(i).delay_s - whole * period_s_);
+  }
+  if (switch_s < 1e-9 * period_s_) switch_s = 0;
+  const auto apply = [&](bool late) {
+    for (int i = 0; i < swarm_.size(); ++i) {
+      const SignalPath& path = swarm_.path(i);
+      const auto& now = records_[static_cast<std::size_t>(i)].rotor_N;
+      const auto whole = static_cast<std::int64_t>(std::floor(path.delay_s / period_s_ + 1e-9));
+      const bool has_rest = path.delay_s - static_cast<double>(whole) * period_s_ > 1e-9 * period_s_;
+      const std::int64_t age = whole + (has_rest && !late ? 1 : 0);
+      const double* const then =
+          &delayed_[static_cast<std::size_t>(i)]
+                   [static_cast<std::size_t>((period_ + slots - age) % slots) * kNumRotors];
+      for (int r = 0; r < kNumRotors; ++r) {
+        const double u = now[static_cast<std::size_t>(r)];
+        input(i).rotor_command_N[r] = u + path.delay_gain * (then[r] - u);
+      }
+    }
+  };
+  apply(switch_s == 0);
+  if (switch_s > 0) {
+    advance(switch_s);
+    apply(true);
+  }
+  advance(period_s_ - switch_s);
+}
+
+/// Inelastic ground: a vehicle that sinks to it stands level until thrust lifts it.
+void SampledLoop::touch_ground() {
+  for (int i = 0; i < swarm_.size(); ++i) {
+    double* const x = &state_[static_cast<std::size_t>(i) * kVehicleStateSize];
+    const Model& model = swarm_.model(i);
+    if (input(i).resting) {
+      const double thrust_N = swarm_.instant(i, time_s(), state_.data(), input(i)).thrust_N;
+      const double lift_N = thrust_N + swarm_.effects_on(i, time_s(), state_.data(), input(i)).force_W_N.z();
+      input(i).resting = lift_N <= model.weight_N();
+      continue;
+    }
+    if (x[kPosition + 2] > options_.ground_m || x[kVelocity + 2] >= 0) continue;
+    input(i).resting = true;
+    x[kPosition + 2] = options_.ground_m;
+    std::fill(x + kVelocity, x + kVelocity + 3, 0.0);
+    std::fill(x + kOmega, x + kOmega + 3, 0.0);
+    std::fill(x + kQuaternion, x + kQuaternion + 4, 0.0);
+    x[kQuaternion] = 1;
+  }
+}
+
+void SampledLoop::step() {
+  constexpr int kListEvery = 5;
+  if (period_ % kListEvery == 0) swarm_.find_neighbours(state_.data(), kListEvery * period_s_);
+  ran_position_ = period_ % position_every_ == 0;
+  if (!networks_.empty()) predict();
+  if (float_) {
+    control(*float_);
+  } else {
+    control(*double_);
+  }
+  move();
+  ++period_;
+  for (int i = 0; i < swarm_.size(); ++i) {
+    double* const q = &state_[static_cast<std::size_t>(i) * kVehicleStateSize + kQuaternion];
+    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int k = 0; k < 4; ++k) q[k] /= length;
+  }
+  touch_ground();
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,103 @@
+/// @file The sampled closed loop: controllers at their own rates, forces held between, the plant by Runge-Kutta.
+///
+/// Every control period (the attitude loop's, 2 ms): the position loop where it is due, the network's prediction where
+/// it is due (a staircase, applied late by its latency), the attitude law and mixing; then the plant moves by classical
+/// Runge-Kutta under held commands, which change inside a period only where a command delay says so. Quaternions are
+/// normalised between periods, never inside one.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "nn/files/network.h"
+#include "stability/control_law.h"
+#include "stability/deep_set_force.h"
+#include "stability/gains.h"
+#include "stability/random_numbers.h"
+#include "stability/swarm.h"
+#include "stability/tasks/task.h"
+
+namespace swarmcert::stability {
+
+struct SampledLoopOptions {
+  double attitude_rate_hz = 500;
+  int substeps = 1;         ///< Runge-Kutta steps per control period
+  bool flies_float = true;  ///< controllers in float32, as they fly; false: the same code in double
+  bool noise = false;       ///< measured positions and velocities, by the model's [sensor]
+  std::uint64_t seed = 0;
+  double battery_start_V = 4.1;
+  double battery_drop_V_s = 1.5e-3;  ///< a Crazyflie's cell lasts about five minutes
+  double ground_m = 0.05;            ///< vehicles cannot be lower
+};
+
+/// What one vehicle's controller did last.
+struct ControlRecord {
+  Setpoint setpoint;
+  Eigen::Vector3d force_W_N = Eigen::Vector3d::Zero();  ///< f_d
+  double thrust_N = 0;
+  Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
+  std::array<double, kNumRotors> rotor_N = {};  ///< commands before the delay
+  double prediction_N = 0;                      ///< f_a_hat along z, as applied
+  Eigen::Vector3d integral_m_s = Eigen::Vector3d::Zero();
+  bool saturated = false;
+};
+
+class SampledLoop {
+ public:
+  /// @param swarm, task must outlive this.
+  /// @param network adds its prediction to the control law; nullptr: none.
+  /// @throws std::invalid_argument if the position or network loop is not a whole number of control periods;
+  ///   files::InputError if the network lacks a kind.
+  SampledLoop(Swarm& swarm, const Gains& gains, const Task& task, const SampledLoopOptions& options,
+              const files::Network* network = nullptr);
+  ~SampledLoop();
+
+  /// One control period.
+  void step();
+
+  double time_s() const { return static_cast<double>(period_) * period_s_; }
+  double period_s() const { return period_s_; }
+  /// Periods since the start.
+  std::int64_t period() const { return period_; }
+  /// True if the position loop ran in the last step().
+  bool ran_position() const { return ran_position_; }
+  const double* state() const { return state_.data(); }
+  double* state() { return state_.data(); }
+  const VehicleInput& input(int vehicle) const { return inputs_[static_cast<std::size_t>(vehicle)]; }
+  VehicleInput& input(int vehicle) { return inputs_[static_cast<std::size_t>(vehicle)]; }
+  const ControlRecord& record(int vehicle) const { return records_[static_cast<std::size_t>(vehicle)]; }
+  Swarm& swarm() { return swarm_; }
+  double battery_V() const;
+
+ private:
+  template <typename Scalar>
+  struct Controllers;
+
+  template <typename Scalar>
+  void control(Controllers<Scalar>& controllers);
+  void predict();
+  void move();
+  void advance(double h_s);
+  void touch_ground();
+
+  Swarm& swarm_;
+  const Task& task_;
+  const SampledLoopOptions options_;
+  double period_s_;
+  int position_every_, network_every_, network_late_;
+  std::int64_t period_ = 0;
+  bool ran_position_ = false;
+  std::vector<double> state_, k1_, k2_, k3_, k4_, stage_;
+  std::vector<VehicleInput> inputs_;
+  std::vector<ControlRecord> records_;
+  std::unique_ptr<Controllers<float>> float_;
+  std::unique_ptr<Controllers<double>> double_;
+  std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
+  std::vector<std::vector<double>> predictions_;         ///< ring by age in network_every_ periods
+  std::vector<std::vector<double>> delayed_;             ///< ring of rotor commands, by age in periods
+  RandomNumbers random_;
+};
+
+}  // namespace swarmcert::stability
