@@ -63,9 +63,9 @@ void append(std::string* bytes, const LogRecord& record) {
 }
 
 /// `q` turned by a small random rotation vector.
-void disturb(RandomNumbers& random, double angle_rad, double* q) {
-  const double x = 0.5 * angle_rad * random.normal(), y = 0.5 * angle_rad * random.normal(),
-               z = 0.5 * angle_rad * random.normal();
+void disturb(files::Random& random, double angle_rad, double* q) {
+  const double x = 0.5 * angle_rad * random.bell(), y = 0.5 * angle_rad * random.bell(),
+               z = 0.5 * angle_rad * random.bell();
   const double w[4] = {q[0] - q[1] * x - q[2] * y - q[3] * z, q[1] + q[0] * x + q[2] * z - q[3] * y,
                        q[2] + q[0] * y - q[1] * z + q[3] * x, q[3] + q[0] * z + q[1] * y - q[2] * x};
   const double length = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
@@ -88,14 +88,14 @@ std::string to_usd_log(const std::vector<LogRecord>& records) {
   return bytes;
 }
 
-FlightRecorder::FlightRecorder(SampledLoop& loop, std::uint64_t seed) : loop_(loop) {
+FlightRecorder::FlightRecorder(SampledFlight& loop, std::uint64_t seed) : loop_(loop) {
   Swarm& swarm = loop.swarm();
   const double rate_hz = 1 / loop.period_s();
   every_ = std::max(1, static_cast<int>(std::lround(rate_hz / swarm.model(0).sensor.log_rate_hz)));
   derivative_.resize(static_cast<std::size_t>(swarm.state_size()));
   for (int i = 0; i < swarm.size(); ++i) {
-    RandomNumbers random(seed, 100 + static_cast<std::uint64_t>(i));
-    const double start_s = random.uniform(0, 0.03);
+    files::Random random(files::Random(seed + 1000 + static_cast<std::uint64_t>(i)).bits());
+    const double start_s = 0.03 * random.uniform();
     const double cutoff_hz = std::min(swarm.model(i).sensor.accelerometer_cutoff_hz, 0.45 * rate_hz);
     vehicles_.push_back({LowPass(cutoff_hz, rate_hz), random, start_s, {}});
     inputs_.push_back(loop.input(i));
@@ -125,11 +125,11 @@ LogRecord FlightRecorder::record(int index, Vehicle& vehicle, const Eigen::Vecto
   const SensorModel& sensor = model.sensor;
   const double* const x = loop_.state() + index * kVehicleStateSize;
   const ControlRecord& control = loop_.record(index);
-  RandomNumbers& random = vehicle.random;
+  files::Random& random = vehicle.random;
   constexpr double kJitter_s = 1e-4;
 
   LogRecord record;
-  const double tick_us = 1e6 * (loop_.time_s() - vehicle.start_s + kJitter_s * random.normal());
+  const double tick_us = 1e6 * (loop_.time_s() - vehicle.start_s + kJitter_s * random.bell());
   record.tick_us = static_cast<std::uint32_t>(std::max(tick_us, 0.0));
   if (!vehicle.records.empty()) record.tick_us = std::max(record.tick_us, vehicle.records.back().tick_us + 1);
 
@@ -139,12 +139,12 @@ LogRecord FlightRecorder::record(int index, Vehicle& vehicle, const Eigen::Vecto
   Eigen::Matrix3d R_WB;
   rotation_of(q, &R_WB);
   Eigen::Vector3d acceleration_B = specific_force_B;
-  for (int i = 0; i < 3; ++i) acceleration_B[i] += sensor.accelerometer_noise_m_s2 * random.normal();
+  for (int i = 0; i < 3; ++i) acceleration_B[i] += sensor.accelerometer_noise_m_s2 * random.bell();
   const Eigen::Vector3d acceleration_W = R_WB * acceleration_B;
   auto& kinematics = record.position_mm_velocity_mm_s_acceleration_mm_s2;
   for (std::size_t i = 0; i < 3; ++i) {
-    kinematics[i] = milli(x[kPosition + i] + sensor.position_noise_m * random.normal());
-    kinematics[3 + i] = milli(x[kVelocity + i] + sensor.velocity_noise_m_s * random.normal());
+    kinematics[i] = milli(x[kPosition + i] + sensor.position_noise_m * random.bell());
+    kinematics[3 + i] = milli(x[kVelocity + i] + sensor.velocity_noise_m_s * random.bell());
     kinematics[6 + i] = milli(acceleration_W[static_cast<int>(i)]);
     record.rates_mrad_s[i] = milli(x[kOmega + i]);
     record.target_mm_mm_s[i] = milli(control.setpoint.p_W_m[static_cast<int>(i)]);
@@ -155,8 +155,7 @@ LogRecord FlightRecorder::record(int index, Vehicle& vehicle, const Eigen::Vecto
   const double battery_V = loop_.input(index).battery_V;
   for (std::size_t r = 0; r < kNumRotors; ++r) {
     record.motor_N[r] = static_cast<float>(control.rotor_N[r]);
-    const double pwm = control.rotor_N[r] > 0 ? model.thrust.pwm(control.rotor_N[r], battery_V) : 0;
-    record.pwm[r] = static_cast<std::uint32_t>(std::min(std::lround(pwm * 65536), 65535L));
+    record.pwm[r] = control.pwm[r];
   }
   record.largest_thrust_gf = static_cast<float>(model.thrust.largest_N(battery_V) / kGramForce_N);
   record.battery_mV = static_cast<std::uint16_t>(std::lround(1000 * battery_V));

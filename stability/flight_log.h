@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "stability/random_numbers.h"
-#include "stability/sampled_loop.h"
+#include "nn/files/random.h"
+#include "stability/sampled_flight.h"
 #include "stability/sensors.h"
 
 namespace swarmcert::stability {
@@ -39,7 +39,7 @@ class FlightRecorder {
  public:
   /// @param seed of noise and clocks. Each vehicle's clock starts up to 30 ms after the simulation, ticks in
   ///             microseconds, and jitters by 0.1 ms.
-  FlightRecorder(SampledLoop& loop, std::uint64_t seed);
+  FlightRecorder(SampledFlight& loop, std::uint64_t seed);
 
   /// Call after every step of the loop.
   void listen();
@@ -51,13 +51,13 @@ class FlightRecorder {
  private:
   struct Vehicle {
     LowPass accelerometer;
-    RandomNumbers random;
+    files::Random random;
     double start_s;
     std::vector<LogRecord> records;
   };
   LogRecord record(int index, Vehicle& vehicle, const Eigen::Vector3d& specific_force_B);
 
-  SampledLoop& loop_;
+  SampledFlight& loop_;
   int every_;
   std::vector<double> derivative_;
   std::vector<VehicleInput> inputs_;

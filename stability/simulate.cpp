@@ -36,7 +36,7 @@ struct Sums {
 Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const SimulationOptions& options,
                     const files::Network* network) {
   constexpr double kLost_m = 100;
-  SampledLoop loop(swarm, gains, task, options.loop, network);
+  SampledFlight loop(swarm, gains, task, options.loop, network);
   FlightRecorder recorder(loop, options.loop.seed);
   const auto vehicles = static_cast<std::size_t>(swarm.size());
   std::vector<Sums> sums(vehicles);

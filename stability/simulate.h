@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "stability/flight_log.h"
-#include "stability/sampled_loop.h"
+#include "stability/sampled_flight.h"
 
 namespace swarmcert::stability {
 
@@ -34,13 +34,13 @@ struct Simulation {
 };
 
 struct SimulationOptions {
-  SampledLoopOptions loop;
+  SampledFlightOptions loop;
   bool keep_logs = true;
   bool keep_errors = true;
   std::function<void(double time_s, double duration_s)> progress;
 };
 
-/// Flies `task` with the vehicles of `swarm`. @throws as SampledLoop.
+/// Flies `task` with the vehicles of `swarm`. @throws as SampledFlight.
 Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const SimulationOptions& options,
                     const files::Network* network = nullptr);
 

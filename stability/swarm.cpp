@@ -1,5 +1,6 @@
 #include "stability/swarm.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>

@@ -21,7 +21,7 @@ std::vector<std::string>& command_line() {
 
 const std::vector<Command>& commands() {
   static const std::vector<Command> all = {inspect_command(), certify_command(), check_command(),
-                                           demo_command()};
+                                           simulate_command(), demo_command()};
   return all;
 }
 

@@ -76,5 +76,6 @@ Command certify_command();
 Command check_command();
 Command demo_command();
 Command inspect_command();
+Command simulate_command();
 
 }  // namespace swarmcert::analysis

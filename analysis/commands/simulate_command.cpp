@@ -40,11 +40,12 @@ void refuse_folder(const CommonOptions& common, const std::string& folder) {
   std::error_code ignored;
   if (common.force || !std::filesystem::exists(folder, ignored)) return;
   if (std::filesystem::is_directory(folder, ignored) && std::filesystem::is_empty(folder, ignored)) return;
-  throw files::InputError({folder, "", "", "", "exists and is not an empty folder", "--force writes into it"});
+  throw files::InputError(
+      {folder, "", "", "", "exists and is not an empty folder", "--force writes into it"});
 }
 
-Json result_json(const Options& options, const std::vector<std::string>& inputs, const stability::Simulation& flown,
-                 const stability::Task& task) {
+Json result_json(const Options& options, const std::vector<std::string>& inputs,
+                 const stability::Simulation& flown, const stability::Task& task) {
   Json result = result_head("simulate", inputs);
   result["seed"] = options.seed;
   result["task"] = options.task;
@@ -69,10 +70,11 @@ Json result_json(const Options& options, const std::vector<std::string>& inputs,
 }
 
 void print(const Options& options, const stability::Simulation& flown, const stability::Task& task) {
-  fmt::print("{}: {} vehicles, {:g} s in the sampled loop (Runge-Kutta per control period, float32 control)\n",
-             options.task, flown.vehicles.size(), task.duration_s());
-  fmt::print("  {:<8} {:<8} {:>27}   {:>27}   {}\n", "vehicle", "kind", "largest error x, y, z [m]", "rms error x, y, z [m]",
-             "thrust at its limit");
+  fmt::print(
+      "{}: {} vehicles, {:g} s in the sampled loop (Runge-Kutta per control period, float32 control)\n",
+      options.task, flown.vehicles.size(), task.duration_s());
+  fmt::print("  {:<8} {:<8} {:>27}   {:>27}   {}\n", "vehicle", "kind", "largest error x, y, z [m]",
+             "rms error x, y, z [m]", "thrust at its limit");
   for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
     const stability::SimulatedVehicle& vehicle = flown.vehicles[i];
     const auto& max = vehicle.error.max_m;
@@ -87,7 +89,8 @@ void print(const Options& options, const stability::Simulation& flown, const sta
 void write_report(const Options& options, const CommonOptions& common, const stability::Simulation& flown) {
   Report report(fmt::format("{} with {} vehicles", options.task, flown.vehicles.size()));
   report.paragraph(
-      "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per control "
+      "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per "
+      "control "
       "period. One run shows what happened in it, not what is the largest error possible.");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
@@ -98,11 +101,14 @@ void write_report(const Options& options, const CommonOptions& common, const sta
     }
     rows.push_back(std::move(row));
   }
-  report.table({"vehicle", "kind", "max x [m]", "max y [m]", "max z [m]", "rms x [m]", "rms y [m]", "rms z [m]"}, rows);
+  report.table(
+      {"vehicle", "kind", "max x [m]", "max y [m]", "max z [m]", "rms x [m]", "rms y [m]", "rms z [m]"},
+      rows);
   std::string data;
   for (const auto& errors : flown.errors) {
     for (const auto& e : errors) {
-      data += fmt::format("{:.3f} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g}\n", e[0], e[1], e[2], e[3], e[4], e[5], e[6]);
+      data += fmt::format("{:.3f} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g}\n", e[0], e[1], e[2], e[3], e[4],
+                          e[5], e[6]);
     }
     data += "\n\n";
   }
@@ -110,10 +116,11 @@ void write_report(const Options& options, const CommonOptions& common, const sta
   const auto script = [&](const std::string& name, const std::string& columns) {
     std::string plot = each;
     plot.replace(plot.find("NAME"), 4, name);
-    return "set grid\nset xlabel 'time [s]'\nset ylabel 'height error [m]'\nset key outside\nplot " + plot + " using " +
-           columns + " with lines title sprintf('cf%d', i + 1)\n";
+    return "set grid\nset xlabel 'time [s]'\nset ylabel 'height error [m]'\nset key outside\nplot " + plot +
+           " using " + columns + " with lines title sprintf('cf%d', i + 1)\n";
   };
-  report.figure("height_error", data, script("height_error", "1:4"), "Height error p_z - p_d,z of each vehicle.");
+  report.figure("height_error", data, script("height_error", "1:4"),
+                "Height error p_z - p_d,z of each vehicle.");
   report.write(options.report, common.force);
 }
 
@@ -124,8 +131,8 @@ int run(Options options, const CommonOptions& common) {
   }
   const bool one_each = static_cast<int>(options.models.size()) == options.vehicles;
   if (!one_each && options.models.size() != 1) {
-    throw UsageError(fmt::format("{} models for {} vehicles: give one for all, or one for each", options.models.size(),
-                                 options.vehicles));
+    throw UsageError(fmt::format("{} models for {} vehicles: give one for all, or one for each",
+                                 options.models.size(), options.vehicles));
   }
   refuse_folder(common, options.output);
   refuse_to_replace(common, common.json);
@@ -163,7 +170,8 @@ int run(Options options, const CommonOptions& common) {
   try {
     flown = stability::simulate(swarm, gains, *task, how, network.get());
   } catch (const std::invalid_argument& error) {
-    throw files::InputError({options.gains, "", "rate_hz", "", error.what(), "choose rates that divide 500 Hz"});
+    throw files::InputError(
+        {options.gains, "", "rate_hz", "", error.what(), "choose rates that divide 500 Hz"});
   }
 
   std::filesystem::create_directories(options.output);
@@ -189,19 +197,24 @@ Command simulate_command() {
   }
   return {"simulate", "Fly a task in simulation and write flight logs",
           "Tasks\n" + tasks +
-              "\nWrites one log per vehicle, DIR/cf<vehicle>_<run>, in the binary format of the published flights.\n"
+              "\nWrites one log per vehicle, DIR/cf<vehicle>_<run>, in the binary format of the published "
+              "flights.\n"
               "Example\n"
               "  swarmcert simulate swap --vehicles 2 --model stability/models/crazyflie-small.toml \\\n"
-              "      --gains controller/gains/crazyflie.toml -o flights",
+              "      --gains controller/gains/crazyflie-small.toml -o flights",
           [](CLI::App& app) {
             auto options = std::make_shared<Options>();
             app.add_option("TASK", options->task, "hover, swap, random-walk, circle or takeoff")->required();
             app.add_option("--vehicles", options->vehicles, "How many")->check(CLI::Range(1, 1000));
-            app.add_option("--model", options->models, "model.toml: one for all vehicles, or one for each")->required();
+            app.add_option("--model", options->models, "model.toml: one for all vehicles, or one for each")
+                ->required();
             app.add_option("--gains", options->gains, "gains.toml")->required();
-            app.add_option("--network", options->network.file, "network.toml whose prediction the controller uses");
-            auto* phi = app.add_option("--phi", options->network.phi, "Weight file of phi, in place of --network");
-            auto* rho = app.add_option("--rho", options->network.rho, "Weight file of rho, in place of --network");
+            app.add_option("--network", options->network.file,
+                           "network.toml whose prediction the controller uses");
+            auto* phi =
+                app.add_option("--phi", options->network.phi, "Weight file of phi, in place of --network");
+            auto* rho =
+                app.add_option("--rho", options->network.rho, "Weight file of rho, in place of --network");
             phi->needs(rho);
             rho->needs(phi);
             app.add_option("-o,--output", options->output, "Folder for the logs")->required();

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stability/random_numbers.h"
+#include "nn/files/random.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -27,9 +27,9 @@ struct Walker {
   double next_goal_s = 0;
 };
 
-Eigen::Vector3d random_place(RandomNumbers& random, double side_m) {
-  return {random.uniform(-side_m / 2, side_m / 2), random.uniform(-side_m / 2, side_m / 2),
-          kLowest_m + random.uniform(0, kHeight_m)};
+Eigen::Vector3d random_place(files::Random& random, double side_m) {
+  const double x_m = side_m / 2 * random.symmetric(), y_m = side_m / 2 * random.symmetric();
+  return {x_m, y_m, kLowest_m + kHeight_m * random.uniform()};
 }
 
 /// Repulsion of a vehicle at `p` from one at `q`.
@@ -46,15 +46,15 @@ Eigen::Vector3d repulsion(const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
 RandomWalk::RandomWalk(const TaskOptions& options)
     : duration_s_(options.duration_s > 0 ? options.duration_s : 60) {
   const double side_m = options.vehicles <= 2 ? 0.2 : 0.3;
-  std::vector<RandomNumbers> random;
+  std::vector<files::Random> random;
   std::vector<Walker> walkers;
   for (int i = 0; i < options.vehicles; ++i) {
-    random.emplace_back(options.seed, 1000 + static_cast<std::uint64_t>(i));
+    random.emplace_back(files::Random(options.seed + static_cast<std::uint64_t>(i)).bits());
     // They start apart, stacked over the box.
     const double share = (i + 0.5) / options.vehicles;
     Walker walker;
-    walker.p = {random.back().uniform(-side_m / 2, side_m / 2),
-                random.back().uniform(-side_m / 2, side_m / 2), kLowest_m + kHeight_m * share};
+    walker.p = random_place(random.back(), side_m);
+    walker.p.z() = kLowest_m + kHeight_m * share;
     walker.v = Eigen::Vector3d::Zero();
     walker.goal = walker.p;
     walkers.push_back(walker);

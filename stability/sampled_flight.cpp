@@ -1,13 +1,13 @@
-#include "stability/sampled_loop.h"
+#include "stability/sampled_flight.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "stability/pilot.h"
+
 namespace swarmcert::stability {
 namespace {
-
-using Vector3Map = Eigen::Map<Eigen::Vector3d>;
 
 /// How many control periods make one period of a slower loop.
 int periods(double control_hz, double slow_hz, const char* what) {
@@ -41,23 +41,23 @@ controller::Matrix3<Scalar> narrow_matrix(const Eigen::Matrix3d& m) {
 
 /// The controllers of all vehicles, with what they remember.
 template <typename Scalar>
-struct SampledLoop::Controllers {
-  struct Vehicle {
-    controller::Vector3<Scalar> integral{}, rate_integral{}, force{};
-    controller::Matrix3<Scalar> desired = controller::identity<Scalar>();
-    bool saturated = false;
-  };
-  std::vector<ControlLaw<Scalar>> laws;  ///< by kind
-  std::vector<Vehicle> vehicles;
+struct SampledFlight::Controllers {
+  std::vector<Pilot<Scalar>> pilots;  ///< by kind
+  std::vector<controller::FlightMemory<Scalar>> memories;
+  std::vector<controller::Measured<Scalar>> measured;
+  std::vector<controller::FlightReference<Scalar>> references;
 
-  Controllers(const Swarm& swarm, const Gains& gains) : vehicles(static_cast<std::size_t>(swarm.size())) {
-    for (const Model& model : swarm.models()) laws.emplace_back(gains, model);
+  Controllers(const Swarm& swarm, const Gains& gains, double period_s) {
+    for (const Model& model : swarm.models()) pilots.emplace_back(gains, model, period_s);
+    memories.resize(static_cast<std::size_t>(swarm.size()));
+    measured.resize(memories.size());
+    references.resize(memories.size());
   }
 };
 
-SampledLoop::SampledLoop(Swarm& swarm, const Gains& given, const Task& task,
-                         const SampledLoopOptions& options, const files::Network* network)
-    : swarm_(swarm), task_(task), options_(options), random_(options.seed, 1) {
+SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
+                             const SampledFlightOptions& options, const files::Network* network)
+    : swarm_(swarm), task_(task), options_(options), random_(options.seed) {
   Gains gains = given;
   const double control_hz = std::max(options.attitude_rate_hz, gains.rate_hz);
   if (gains.rate_hz == 0) gains.rate_hz = control_hz;
@@ -82,9 +82,9 @@ SampledLoop::SampledLoop(Swarm& swarm, const Gains& given, const Task& task,
     std::copy(rotors, rotors + kNumRotors, records_[static_cast<std::size_t>(i)].rotor_N.begin());
   }
   if (options.flies_float) {
-    float_ = std::make_unique<Controllers<float>>(swarm, gains);
+    float_ = std::make_unique<Controllers<float>>(swarm, gains, period_s_);
   } else {
-    double_ = std::make_unique<Controllers<double>>(swarm, gains);
+    double_ = std::make_unique<Controllers<double>>(swarm, gains, period_s_);
   }
   if (network != nullptr) {
     std::vector<std::string> kinds;
@@ -108,14 +108,14 @@ SampledLoop::SampledLoop(Swarm& swarm, const Gains& given, const Task& task,
   }
 }
 
-SampledLoop::~SampledLoop() = default;
+SampledFlight::~SampledFlight() = default;
 
-double SampledLoop::battery_V() const {
+double SampledFlight::battery_V() const {
   return std::max(options_.battery_start_V - options_.battery_drop_V_s * time_s(), 3.2);
 }
 
 /// The staircase: predictions are made from the states now, and applied network_late_ periods later.
-void SampledLoop::predict() {
+void SampledFlight::predict() {
   const auto slots = static_cast<std::int64_t>(network_late_) + 1;
   for (int i = 0; i < swarm_.size(); ++i) {
     std::vector<double>& ring = predictions_[static_cast<std::size_t>(i)];
@@ -133,66 +133,69 @@ void SampledLoop::predict() {
 }
 
 template <typename Scalar>
-void SampledLoop::control(Controllers<Scalar>& controllers) {
-  using Law = ControlLaw<Scalar>;
+void SampledFlight::control(Controllers<Scalar>& controllers) {
   const double battery = battery_V();
+  const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
   for (int i = 0; i < swarm_.size(); ++i) {
     const auto index = static_cast<std::size_t>(i);
-    double* const x = &state_[index * kVehicleStateSize];
-    const Model& model = swarm_.model(i);
-    const Law& law = controllers.laws[static_cast<std::size_t>(swarm_.kind_of(i))];
-    typename Controllers<Scalar>::Vehicle& vehicle = controllers.vehicles[index];
+    const double* const x = &state_[index * kVehicleStateSize];
+    VehicleInput& input = inputs_[index];
     ControlRecord& record = records_[index];
-    inputs_[index].battery_V = battery;
+    controller::Measured<Scalar>& measured = controllers.measured[index];
+    controller::FlightReference<Scalar>& reference = controllers.references[index];
+    input.battery_V = battery;
     if (ran_position_) {
       record.setpoint = task_.at(i, time_s());
-      Eigen::Vector3d p = Vector3Map(x + kPosition), v = Vector3Map(x + kVelocity);
+      Eigen::Vector3d p(x[0], x[1], x[2]), v(x[3], x[4], x[5]);
       if (options_.noise) {
+        const SensorModel& sensor = swarm_.model(i).sensor;
         for (int axis = 0; axis < 3; ++axis) {
-          p[axis] += model.sensor.position_noise_m * random_.normal();
-          v[axis] += model.sensor.velocity_noise_m_s * random_.normal();
+          p[axis] += sensor.position_noise_m * random_.bell();
+          v[axis] += sensor.velocity_noise_m_s * random_.bell();
         }
       }
-      const controller::TrackingError<Scalar> error = {narrow<Scalar>(p - record.setpoint.p_W_m),
-                                                       narrow<Scalar>(v - record.setpoint.v_W_m_s)};
-      if (!inputs_[index].resting) {
-        vehicle.integral = integrate(law.integrator(), vehicle.integral, error.position_m,
-                                     law.held(error.position_m, vehicle.force, vehicle.saturated));
-      }
-      const Eigen::Vector3d prediction(0, 0, record.prediction_N);
-      vehicle.force = law.force(error, vehicle.integral,
-                                {narrow<Scalar>(record.setpoint.a_W_m_s2), narrow<Scalar>(prediction)});
-      record.force_W_N = wide(vehicle.force);
-      record.integral_m_s = wide(vehicle.integral);
+      measured.position_W_m = narrow<Scalar>(p);
+      measured.velocity_W_m_s = narrow<Scalar>(v);
+      measured.position_stamp_ms = now_ms;
+      reference = {narrow<Scalar>(record.setpoint.p_W_m),
+                   narrow<Scalar>(record.setpoint.v_W_m_s),
+                   narrow<Scalar>(record.setpoint.a_W_m_s2),
+                   {},
+                   {},
+                   {}};
     }
     Eigen::Matrix3d R_WB;
     rotation_of(x + kQuaternion, &R_WB);
-    const auto output = law.rotors(vehicle.force, narrow_matrix<Scalar>(R_WB),
-                                   narrow<Scalar>(Eigen::Vector3d(Vector3Map(x + kOmega))), vehicle.desired,
-                                   vehicle.rate_integral, force_limits<Scalar>(model, battery));
-    vehicle.desired = output.R_WR;
-    vehicle.saturated = output.mixed.thrust_limited && output.mixed.thrust_N < output.thrust_N;
-    if (law.is_robust() && !inputs_[index].resting) {
-      const auto next =
-          vehicle.rate_integral + scaled(static_cast<Scalar>(period_s_), output.rate_error_B_rad_s);
-      const auto& limit = law.rate_integral_limit_rad();
-      vehicle.rate_integral = {controller::clamp(next.x, -limit.x, limit.x),
-                               controller::clamp(next.y, -limit.y, limit.y),
-                               controller::clamp(next.z, -limit.z, limit.z)};
+    measured.attitude = {narrow_matrix<Scalar>(R_WB),
+                         {static_cast<Scalar>(x[kOmega]), static_cast<Scalar>(x[kOmega + 1]),
+                          static_cast<Scalar>(x[kOmega + 2])}};
+    measured.attitude_stamp_ms = now_ms;
+    measured.battery_V = static_cast<Scalar>(battery);
+    controller::FlightMemory<Scalar>& memory = controllers.memories[index];
+    const controller::FlightCommand<Scalar> command =
+        controllers.pilots[static_cast<std::size_t>(swarm_.kind_of(i))].step(
+            memory, measured, reference, static_cast<Scalar>(record.prediction_N), now_ms, ran_position_);
+    // On the ground the motors are off until the task leaves it, and no integral grows.
+    const bool off =
+        command.motors_off || (input.resting && record.setpoint.p_W_m.z() <= options_.ground_m + 1e-3);
+    if (input.resting) {
+      memory.integral_m_s = {};
+      memory.rate_integral_rad = {};
     }
-    // On the ground the motors are off until the task leaves it.
-    const bool off = inputs_[index].resting && record.setpoint.p_W_m.z() <= options_.ground_m + 1e-3;
-    record.thrust_N = off ? 0 : static_cast<double>(output.thrust_N);
-    record.torque_B_Nm = wide(output.torque_B_N_m);
-    record.saturated = vehicle.saturated;
-    for (int r = 0; r < kNumRotors; ++r) {
-      record.rotor_N[static_cast<std::size_t>(r)] =
-          off ? 0 : static_cast<double>(output.mixed.forces.at_N[r]);
+    record.force_W_N = wide(command.force_W_N);
+    record.integral_m_s = wide(memory.integral_m_s);
+    record.thrust_N = off ? 0 : static_cast<double>(command.wanted.thrust_N);
+    record.torque_B_Nm = wide(command.wanted.torque_N_m);
+    record.saturated = memory.thrust_saturated;
+    record.faults = command.faults;
+    for (std::size_t r = 0; r < kNumRotors; ++r) {
+      record.rotor_N[r] = off ? 0 : static_cast<double>(command.mixed.forces.at_N[r]);
+      record.pwm[r] = off ? std::uint16_t{0} : command.pwm[r];
     }
   }
 }
 
-void SampledLoop::advance(double h_s) {
+void SampledFlight::advance(double h_s) {
   const auto size = static_cast<int>(state_.size());
   const double start_s = time_s();
   const double h = h_s / options_.substeps;
@@ -217,7 +220,7 @@ void SampledLoop::advance(double h_s) {
 
 /// Moves the plant by one period. A command delay of k + r periods holds the command of k + 1 periods ago for the
 /// first r of it, that of k periods ago for the rest. Where kinds have different r, all switch at the largest.
-void SampledLoop::move() {
+void SampledFlight::move() {
   double switch_s = 0;
   const auto slots = static_cast<std::int64_t>(delayed_.front().size() / kNumRotors);
   for (int i = 0; i < swarm_.size(); ++i) {
@@ -253,7 +256,7 @@ void SampledLoop::move() {
 }
 
 /// Inelastic ground: a vehicle that sinks to it stands level until thrust lifts it.
-void SampledLoop::touch_ground() {
+void SampledFlight::touch_ground() {
   for (int i = 0; i < swarm_.size(); ++i) {
     double* const x = &state_[static_cast<std::size_t>(i) * kVehicleStateSize];
     const Model& model = swarm_.model(i);
@@ -273,7 +276,7 @@ void SampledLoop::touch_ground() {
   }
 }
 
-void SampledLoop::step() {
+void SampledFlight::step() {
   constexpr int kListEvery = 5;
   if (period_ % kListEvery == 0) swarm_.find_neighbours(state_.data(), kListEvery * period_s_);
   ran_position_ = period_ % position_every_ == 0;

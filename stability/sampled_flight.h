@@ -12,16 +12,15 @@
 #include <vector>
 
 #include "nn/files/network.h"
-#include "stability/control_law.h"
+#include "nn/files/random.h"
 #include "stability/deep_set_force.h"
 #include "stability/gains.h"
-#include "stability/random_numbers.h"
 #include "stability/swarm.h"
 #include "stability/tasks/task.h"
 
 namespace swarmcert::stability {
 
-struct SampledLoopOptions {
+struct SampledFlightOptions {
   double attitude_rate_hz = 500;
   int substeps = 1;         ///< Runge-Kutta steps per control period
   bool flies_float = true;  ///< controllers in float32, as they fly; false: the same code in double
@@ -39,20 +38,22 @@ struct ControlRecord {
   double thrust_N = 0;
   Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
   std::array<double, kNumRotors> rotor_N = {};  ///< commands before the delay
-  double prediction_N = 0;                      ///< f_a_hat along z, as applied
+  std::array<std::uint16_t, kNumRotors> pwm = {};
+  double prediction_N = 0;  ///< f_a_hat along z, as applied
   Eigen::Vector3d integral_m_s = Eigen::Vector3d::Zero();
-  bool saturated = false;
+  bool saturated = false;   ///< thrust was held at its upper limit
+  std::uint8_t faults = 0;  ///< sum of controller::Fault
 };
 
-class SampledLoop {
+class SampledFlight {
  public:
   /// @param swarm, task must outlive this.
   /// @param network adds its prediction to the control law; nullptr: none.
   /// @throws std::invalid_argument if the position or network loop is not a whole number of control periods;
   ///   files::InputError if the network lacks a kind.
-  SampledLoop(Swarm& swarm, const Gains& gains, const Task& task, const SampledLoopOptions& options,
-              const files::Network* network = nullptr);
-  ~SampledLoop();
+  SampledFlight(Swarm& swarm, const Gains& gains, const Task& task, const SampledFlightOptions& options,
+                const files::Network* network = nullptr);
+  ~SampledFlight();
 
   /// One control period.
   void step();
@@ -84,7 +85,7 @@ class SampledLoop {
 
   Swarm& swarm_;
   const Task& task_;
-  const SampledLoopOptions options_;
+  const SampledFlightOptions options_;
   double period_s_;
   int position_every_, network_every_, network_late_;
   std::int64_t period_ = 0;
@@ -97,7 +98,7 @@ class SampledLoop {
   std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
   std::vector<std::vector<double>> predictions_;         ///< ring by age in network_every_ periods
   std::vector<std::vector<double>> delayed_;             ///< ring of rotor commands, by age in periods
-  RandomNumbers random_;
+  files::Random random_;
 };
 
 }  // namespace swarmcert::stability

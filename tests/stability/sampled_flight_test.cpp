@@ -1,0 +1,251 @@
+#include "stability/sampled_flight.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data.h"
+#include "stability/effects/registry.h"
+#include "stability/simulate.h"
+
+namespace swarmcert::stability {
+namespace {
+
+Model small() { return read_model(tests::source_path("stability/models/crazyflie-small.toml")); }
+
+Model with_effects(const std::vector<std::pair<std::string, std::map<std::string, double>>>& effects) {
+  Model model = small();
+  for (const auto& [name, parameters] : effects) {
+    EffectSpec spec;
+    spec.name = name;
+    spec.parameters = parameters;
+    model.effects.push_back(spec);
+  }
+  return model;
+}
+
+Gains gains(const std::string& position = "Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\n") {
+  return parse_gains(
+      "schema = \"swarmcert/gains/1\"\n[position]\n" + position + "[attitude]\nlaw = \"lee\"\n",
+      "gains.toml");
+}
+
+SampledFlightOptions exact() {
+  SampledFlightOptions options;
+  options.flies_float = false;
+  return options;
+}
+
+TEST(SampledFlight, KeepsRotationsOrthogonalFor60s) {
+  Swarm swarm(with_effects({{"downwash", {}}, {"motor_lag", {}}}), 3);
+  const auto task = make_task("swap", {3, 60, 0});
+  SampledFlight loop(swarm, gains(), *task, exact());
+  double drift = 0, turned = 0;
+  while (loop.time_s() < 60) {
+    loop.step();
+    for (int i = 0; i < swarm.size(); ++i) {
+      const double* const q = loop.state() + i * kVehicleStateSize + kQuaternion;
+      Eigen::Matrix3d R;
+      rotation_of(q, &R);
+      drift = std::max(drift, std::abs(std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) - 1));
+      drift = std::max(drift, (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff());
+      turned = std::max(turned, std::acos(std::min(R(2, 2), 1.0)));
+    }
+  }
+  EXPECT_LT(drift, 1e-9);
+  EXPECT_GT(turned, 0.05) << "the flight must turn the vehicles";
+}
+
+TEST(SampledFlight, OneAndFourSubstepsAgree) {
+  Eigen::VectorXd states[2];
+  bool saturated = false;
+  for (const int substeps : {1, 4}) {
+    Swarm swarm(with_effects({{"downwash", {}}, {"motor_lag", {}}, {"drag_linear", {{"drag_N_s_m", 0.013}}}}),
+                2);
+    const auto task = make_task("swap", {2, 9, 0});
+    SampledFlightOptions options = exact();
+    options.substeps = substeps;
+    SampledFlight loop(swarm, gains(), *task, options);
+    Eigen::VectorXd path((swarm.size()) * 3 * 900);
+    int k = 0;
+    while (loop.time_s() < 9 - 1e-9) {
+      loop.step();
+      saturated = saturated || loop.record(0).saturated || loop.record(1).saturated;
+      if (loop.period() % 5 != 0) continue;
+      for (int i = 0; i < swarm.size(); ++i) {
+        for (int axis = 0; axis < 3; ++axis) path[k++] = loop.state()[i * kVehicleStateSize + axis];
+      }
+    }
+    ASSERT_EQ(k, path.size());
+    states[substeps == 1 ? 0 : 1] = path;
+  }
+  EXPECT_FALSE(saturated);
+  EXPECT_LT((states[0] - states[1]).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_GT((states[0] - states[1]).cwiseAbs().maxCoeff(), 0)
+      << "the two must differ for the test to say something";
+}
+
+TEST(SampledFlight, HoversWhereItShouldAndFloatFliesLikeDouble) {
+  for (const bool flies_float : {true, false}) {
+    Swarm swarm(small(), 2);
+    const auto task = make_task("hover", {2, 5, 0});
+    SampledFlightOptions options;
+    options.flies_float = flies_float;
+    SampledFlight loop(swarm, gains(), *task, options);
+    while (loop.time_s() < 5) loop.step();
+    for (int i = 0; i < 2; ++i) {
+      const Eigen::Map<const Eigen::Vector3d> p(loop.state() + i * kVehicleStateSize);
+      EXPECT_LT((p - task->at(i, 5).p_W_m).norm(), 1e-5) << flies_float;
+      EXPECT_EQ(loop.record(i).faults, 0);
+    }
+  }
+}
+
+TEST(SampledFlight, SteadyForceIsCancelledByTheIntegralUpToItsClamp) {
+  // Reference: residual max(0, |f| / m - Ki I_lim) / Kp for f = 9 gf = 0.0883 N: 0.1597 m.
+  Swarm swarm(with_effects({{"constant_force", {{"force_z_N", -0.0883}}}}), 1);
+  const auto task = make_task("hover", {1, 40, 0});
+  SampledFlight loop(
+      swarm,
+      gains("Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\nintegrator_limit = [0.1, 0.1, 0.1]\n"),
+      *task, exact());
+  while (loop.time_s() < 40) loop.step();
+  EXPECT_NEAR(0.6 - loop.state()[2], (0.0883 / 0.034 - 10 * 0.1) / 10, 1e-6);
+}
+
+TEST(SampledFlight, ADelayOfOneAndAHalfPeriodsHoldsCommandsThatLong) {
+  Swarm swarm(with_effects({{"delay", {{"delay_s", 0.003}}}}), 1);
+  const auto task = make_task("circle", {1, 20, 0});
+  SampledFlight loop(swarm, gains(), *task, exact());
+  std::vector<double> commands;
+  for (int k = 0; k < 2000; ++k) {
+    loop.step();
+    commands.push_back(loop.record(0).rotor_N[0]);
+    // What acts at the end of period k is the command of one period ago.
+    if (k > 3) {
+      EXPECT_EQ(loop.input(0).rotor_command_N[0], commands[static_cast<std::size_t>(k - 1)]);
+    }
+  }
+}
+
+TEST(SampledFlight, MotorLagAddsWhatItsColumnSays) {
+  // The defining property for effects that remember: applied thrust minus command = gain times the stream's column.
+  Swarm swarm(with_effects({{"motor_lag", {{"gain", 0.8}, {"tau_s", 0.05}}}}), 1);
+  const auto task = make_task("takeoff", {1, 12, 0});
+  SampledFlight loop(swarm, gains(), *task, exact());
+  // The rotors see a staircase; the stream is exact for lines between samples, so it is given both ends of each step.
+  const auto lag = make_effect(swarm.model(0).effects[0], {"small", {"small"}, ""});
+  const double tau_s = 0.05;
+  const auto stream = lag->stream(&tau_s);
+  double largest = 0;
+  Instant command;
+  for (int k = 0; k < 3000; ++k) {
+    loop.step();
+    VehicleInput input = loop.input(0);
+    double thrust_N = 0;
+    for (const double f : input.rotor_command_N) thrust_N += f;
+    Wrench column;
+    command.thrust_N = thrust_N;
+    command.time_s = (k + 1e-9) * loop.period_s();
+    stream->advance(command, &column);
+    command.time_s = (k + 1) * loop.period_s();
+    stream->advance(command, &column);
+    const double applied_N = swarm.instant(0, loop.time_s(), loop.state(), input).thrust_N;
+    if (k == 0) continue;
+    EXPECT_NEAR(applied_N - thrust_N, 0.8 * column.force_W_N.z(), 1e-6 * 0.33) << k;
+    largest = std::max(largest, std::abs(applied_N - thrust_N));
+  }
+  EXPECT_GT(largest, 0.01);
+}
+
+TEST(SampledFlight, LinearConvolutionPredictsTheSwap) {
+  // Reference 3.6: e = h' * f_a predicts the unsaturated swap to 0.5 %; 2 vehicles, Ki in effect 2, tau 1/17.4, no
+  // noise: simulation 0.0893 m, convolution 0.0896 m.
+  Swarm swarm(with_effects({{"downwash", {{"norm_exponent", 1.2}}}, {"motor_lag", {{"tau_s", 1 / 17.4}}}}),
+              2);
+  const auto task = make_task("swap", {2, 27, 0});
+  SampledFlight loop(
+      swarm,
+      gains("Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\nintegrator_limit = [0.1, 0.1, "
+            "0.1]\nrate_hz = 100\nintegrator_step_s = 0.002\n"),
+      *task, exact());
+  // m Delta e = s (tau s + 1) f, Delta = (tau s + 1) s^3 + Kd s^2 + Kp s + Ki: states of its controllable form.
+  const double tau = 1 / 17.4, m = 0.034, Kp = 10, Kd = 5, Ki = 2;
+  double z[4] = {0, 0, 0, 0};
+  const auto derivative = [&](const double* x, double f, double* dx) {
+    dx[0] = x[1];
+    dx[1] = x[2];
+    dx[2] = x[3];
+    dx[3] = (f / m - Ki * x[0] - Kp * x[1] - Kd * x[2] - x[3]) / tau;
+  };
+  double worst_simulated = 0, worst_linear = 0;
+  std::vector<VehicleInput> inputs(2);
+  while (loop.time_s() < 27) {
+    for (int i = 0; i < 2; ++i) inputs[static_cast<std::size_t>(i)] = loop.input(i);
+    const double f = swarm.effects_on(0, loop.time_s(), loop.state(), inputs[0]).force_W_N.z();
+    loop.step();
+    const double h = loop.period_s();
+    double k1[4], k2[4], k3[4], k4[4], x[4];
+    derivative(z, f, k1);
+    for (int i = 0; i < 4; ++i) x[i] = z[i] + h / 2 * k1[i];
+    derivative(x, f, k2);
+    for (int i = 0; i < 4; ++i) x[i] = z[i] + h / 2 * k2[i];
+    derivative(x, f, k3);
+    for (int i = 0; i < 4; ++i) x[i] = z[i] + h * k3[i];
+    derivative(x, f, k4);
+    for (int i = 0; i < 4; ++i) z[i] += h / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
+    worst_linear = std::max(worst_linear, std::abs(z[1] + tau * z[2]));
+    worst_simulated = std::max(worst_simulated, std::abs(loop.state()[2] - 0.6));
+    ASSERT_FALSE(loop.record(0).saturated);
+  }
+  EXPECT_NEAR(worst_simulated, 0.0893, 0.002);
+  EXPECT_NEAR(worst_linear, worst_simulated, 0.02 * worst_simulated);
+}
+
+TEST(SampledFlight, PredictedForceIsAStaircaseThatComesLate) {
+  Gains slow = gains();
+  slow.network_rate_hz = 50;
+  slow.network_latency_s = 0.03;
+  const auto network = files::load_network({tests::source_path("nn/networks/demo/network.toml"), "", "", ""});
+  Swarm swarm(with_effects({{"downwash", {}}}), 2);
+  const auto task = make_task("swap", {2, 9, 0});
+  SampledFlight loop(swarm, slow, *task, exact(), &network);
+  std::vector<double> predictions;
+  int changes = 0;
+  for (int k = 0; k < 4500; ++k) {
+    loop.step();
+    predictions.push_back(loop.record(0).prediction_N);
+    if (k > 0 && predictions[static_cast<std::size_t>(k)] != predictions[static_cast<std::size_t>(k - 1)]) {
+      EXPECT_EQ((k - 15) % 10, 0) << "every 20 ms, 30 ms late";
+      ++changes;
+    }
+  }
+  EXPECT_EQ(predictions[10], 0);
+  EXPECT_GT(changes, 200);
+}
+
+TEST(Simulation, TakesOffFromTheGroundAndLands) {
+  Swarm swarm(with_effects({{"ground", {{"amplitude", 0.164}}}}), 1);
+  const auto task = make_task("takeoff", {1, 0, 0});
+  const Simulation flown = simulate(swarm, gains(), *task, {});
+  EXPECT_FALSE(flown.diverged);
+  EXPECT_LT(flown.vehicles[0].error.max_m[2], 0.1);
+  EXPECT_GE(flown.vehicles[0].smallest_height_m, 0.05 - 1e-9);
+}
+
+TEST(Simulation, SameSeedGivesTheSameLogsAndAnotherSeedOthers) {
+  const auto logs = [](std::uint64_t seed) {
+    Swarm swarm(with_effects({{"downwash", {}}}), 2);
+    const auto task = make_task("random-walk", {2, 3, seed});
+    SimulationOptions options;
+    options.loop.seed = seed;
+    options.loop.noise = true;
+    const Simulation flown = simulate(swarm, gains(), *task, options);
+    return to_usd_log(flown.logs[0]) + to_usd_log(flown.logs[1]);
+  };
+  EXPECT_EQ(logs(1), logs(1));
+  EXPECT_NE(logs(1), logs(2));
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
