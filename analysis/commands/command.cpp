@@ -20,8 +20,15 @@ std::vector<std::string>& command_line() {
 }  // namespace
 
 const std::vector<Command>& commands() {
-  static const std::vector<Command> all = {inspect_command(), certify_command(), check_command(),
-                                           simulate_command(), demo_command()};
+  static const std::vector<Command> all = {
+      inspect_command(),   //
+      certify_command(),   //
+      check_command(),     //
+      simulate_command(),  //
+      export_command(),    //
+      match_command(),     //
+      demo_command(),
+  };
   return all;
 }
 

@@ -75,7 +75,9 @@ std::vector<std::string> input_files(const files::Network& network);
 Command certify_command();
 Command check_command();
 Command demo_command();
+Command export_command();
 Command inspect_command();
+Command match_command();
 Command simulate_command();
 
 }  // namespace swarmcert::analysis

@@ -1,0 +1,91 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "analysis/commands/command.h"
+#include "analysis/firmware/export_source.h"
+#include "nn/files/file_io.h"
+#include "nn/files/functions.h"
+#include "nn/files/input_error.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  files::NetworkArguments network;
+  std::string output, certificate;
+  firmware::ExportOptions source;
+};
+
+int run(Options options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  files::Network network = load_net(options.network);
+  for (const auto& [part, weights] : files::parts(network)) {
+    if (weights->precision == files::Precision::kFloat32) continue;
+    throw files::InputError({weights->path, "", part, "float64",
+                             "flight code is float32: rounding would change the function",
+                             "certify with --as float32 and store that network"});
+  }
+  std::vector<std::string> inputs = input_files(network);
+  if (!options.certificate.empty()) {
+    inputs.push_back(options.certificate);
+    const files::Json certificate =
+        files::parse_json(files::read_file(options.certificate), options.certificate);
+    if (!certificate.contains("content_sha256") || !certificate["content_sha256"].is_string())
+      throw files::InputError(
+          {options.certificate, "", "content_sha256", "", "no certificate", "name what certify -o wrote"});
+    options.source.certificate_sha256 = certificate["content_sha256"].get<std::string>();
+  }
+  const std::vector<firmware::SourceFile> sources = firmware::export_source(network, options.source);
+  for (const firmware::SourceFile& source : sources) {
+    if (fs::exists(fs::path(options.output) / source.name))
+      refuse_to_replace(common, (fs::path(options.output) / source.name).string());
+  }
+  files::Json list = files::Json::array();
+  for (const firmware::SourceFile& source : sources) {
+    const fs::path path = fs::path(options.output) / source.name;
+    fs::create_directories(path.parent_path());
+    files::write_file(path.string(), source.contents, common.force);
+    list.push_back({{"name", source.name}, {"sha256", files::sha256(source.contents)}});
+  }
+  files::Json result = result_head("export", inputs);
+  result["seed"] = options.source.seed;
+  result["files"] = std::move(list);
+  result["golden_vectors"] = options.source.golden_vectors * static_cast<int>(network.rho.size());
+  write_result(common, result);
+  if (common.prints_text()) {
+    for (const firmware::SourceFile& source : sources)
+      fmt::print("written: {}/{}\n", options.output, source.name);
+    fmt::print("compile swarmcert_network.cpp with -std=c++17 -O2 -ffp-contract=off -I{}\n", options.output);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Command export_command() {
+  return {
+      "export", "Firmware source of a network, with golden vectors and a self-test",
+      "Weights as hexadecimal floats, the clamp, the scale to newton, the evaluator, and golden vectors "
+      "which the "
+      "firmware\nchecks at start. 'swarmcert match' proves that a source file or an ELF still holds these "
+      "weights.\n\n"
+      "Example: swarmcert export nn/networks/demo/network.toml -o firmware",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<Options>();
+        declare_network(app, options->network);
+        app.add_option("-o,--output", options->output, "Folder for the source")->required();
+        app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source")
+            ->check(CLI::ExistingFile);
+        app.add_option("--most-neighbours", options->source.most_neighbours, "Neighbours of one evaluation")
+            ->check(CLI::Range(1, 64))
+            ->capture_default_str();
+        app.add_option("--seed", options->source.seed, "Of the golden vectors")->capture_default_str();
+        return [options](const CommonOptions& common) { return run(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

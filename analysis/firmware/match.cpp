@@ -1,0 +1,186 @@
+#include "analysis/firmware/match.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "nn/files/functions.h"
+
+namespace swarmcert::firmware {
+namespace {
+
+using Bits = std::vector<std::uint32_t>;
+
+Bits bits_of(const std::vector<double>& values) {
+  Bits bits;
+  for (const double value : values) {
+    const float narrow = static_cast<float>(value);
+    bits.emplace_back();
+    std::memcpy(&bits.back(), &narrow, sizeof narrow);
+  }
+  return bits;
+}
+
+float float_of(std::uint32_t bits) {
+  float value = 0;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+Bits transposed(const Bits& matrix, int rows, int cols) {
+  Bits result(matrix.size());
+  for (int i = 0; i < rows; ++i) {
+    for (int j = 0; j < cols; ++j)
+      result[static_cast<std::size_t>(j) * rows + i] = matrix[static_cast<std::size_t>(i) * cols + j];
+  }
+  return result;
+}
+
+struct Place {
+  const FloatBlock* block = nullptr;
+  std::size_t begin = 0;
+  std::size_t equal = 0;  ///< numbers that agree
+};
+
+/// The place in `block` where most numbers agree with `expected`. Only places are tried where one of a few numbers
+/// spread over the array agrees and is not zero.
+Place best_place(const Bits& expected, const FloatBlock& block) {
+  Place best;
+  const std::size_t size = expected.size();
+  if (block.bits.size() < size) return best;
+  constexpr std::size_t kProbes = 16;
+  for (std::size_t begin = 0; begin + size <= block.bits.size(); ++begin) {
+    bool is_candidate = false;
+    for (std::size_t p = 0; p < kProbes && !is_candidate; ++p) {
+      const std::size_t i = p * size / kProbes;
+      is_candidate = expected[i] == block.bits[begin + i] && expected[i] != 0;
+    }
+    if (!is_candidate && block.bits.size() != size) continue;
+    std::size_t equal = 0;
+    for (std::size_t i = 0; i < size; ++i) equal += expected[i] == block.bits[begin + i];
+    if (best.block == nullptr || equal > best.equal) best = {&block, begin, equal};
+    if (equal == size) break;
+  }
+  return best;
+}
+
+Place best_place(const Bits& expected, const std::vector<FloatBlock>& blocks) {
+  Place best;
+  for (const FloatBlock& block : blocks) {
+    const Place place = best_place(expected, block);
+    if (place.block != nullptr && (best.block == nullptr || place.equal > best.equal)) best = place;
+    if (best.equal == expected.size()) break;
+  }
+  return best;
+}
+
+/// Numbers that a linker may put between a matrix and its bias.
+constexpr std::size_t kPadding = 16;
+/// A run of this many equal numbers is no coincidence.
+constexpr std::size_t kTelling = 4;
+
+/// The bias that belongs to a matrix found at `matrix`.
+Place bias_place(const Bits& expected, const Place& matrix, std::size_t matrix_size,
+                 const std::vector<FloatBlock>& blocks) {
+  const auto at = [&](const FloatBlock& block, std::size_t begin) {
+    Place place = {&block, begin, 0};
+    for (std::size_t i = 0; i < expected.size(); ++i) place.equal += expected[i] == block.bits[begin + i];
+    return place;
+  };
+  std::string name = matrix.block->name;
+  const std::size_t word = name.rfind("weight");
+  if (word != std::string::npos) {
+    name.replace(word, 6, "bias");
+    for (const FloatBlock& block : blocks) {
+      if (block.name == name && block.bits.size() >= expected.size()) return at(block, 0);
+    }
+  }
+  Place best;
+  const std::size_t behind = matrix.begin + matrix_size;
+  for (std::size_t begin = behind; begin <= behind + kPadding; ++begin) {
+    if (begin + expected.size() > matrix.block->bits.size()) break;
+    const Place place = at(*matrix.block, begin);
+    if (best.block == nullptr || place.equal > best.equal) best = place;
+  }
+  if (best.equal == expected.size() || expected.size() < kTelling) return best;
+  const Place elsewhere = best_place(expected, *matrix.block);
+  return elsewhere.block != nullptr && elsewhere.equal > best.equal ? elsewhere : best;
+}
+
+Difference first_difference(const Bits& expected, const Place& place) {
+  std::size_t i = 0;
+  while (expected[i] == place.block->bits[place.begin + i]) ++i;
+  Difference difference;
+  difference.entry = std::to_string(i);
+  difference.expected = float_of(expected[i]);
+  difference.found = float_of(place.block->bits[place.begin + i]);
+  difference.name = place.block->name;
+  difference.place = place.block->place(place.begin + i);
+  return difference;
+}
+
+/// Fewer than half of the numbers: not the array, changed, but something else.
+bool resembles(const Place& place, const Bits& expected) {
+  return place.block != nullptr && 2 * place.equal >= expected.size();
+}
+
+}  // namespace
+
+MatchResult match(const files::Network& network, const std::vector<FloatBlock>& blocks) {
+  MatchResult result;
+  const auto note = [&](const std::string& part, const std::string& layer, Difference difference) {
+    if (result.first_difference) return;
+    difference.part = part;
+    difference.layer = layer;
+    result.first_difference = std::move(difference);
+  };
+  for (const auto& [part, weights] : files::parts(network)) {
+    for (const files::Layer& layer : weights->layers) {
+      result.arrays += 2;
+      result.numbers += layer.weights.size() + layer.biases.size();
+      const Bits rows = bits_of(layer.weights);
+      const Bits columns = transposed(rows, layer.outputs, layer.inputs);
+      Place matrix = best_place(rows, blocks);
+      bool is_transposed = false;
+      if (matrix.equal < rows.size()) {
+        const Place other = best_place(columns, blocks);
+        is_transposed = other.equal > matrix.equal;
+        if (is_transposed) matrix = other;
+      }
+      const Bits& expected = is_transposed ? columns : rows;
+      if (!resembles(matrix, expected)) {
+        Difference difference;
+        difference.entry = "weight";
+        difference.expected = float_of(rows.front());
+        note(part, layer.name, difference);
+        continue;
+      }
+      if (matrix.equal < expected.size()) {
+        Difference difference = first_difference(expected, matrix);
+        const std::size_t i = std::stoul(difference.entry);
+        const std::size_t width = static_cast<std::size_t>(is_transposed ? layer.outputs : layer.inputs);
+        difference.entry = is_transposed ? fmt::format("weight[{}][{}]", i % width, i / width)
+                                         : fmt::format("weight[{}][{}]", i / width, i % width);
+        note(part, layer.name, difference);
+        continue;
+      }
+      const Bits biases = bits_of(layer.biases);
+      const Place bias = bias_place(biases, matrix, rows.size(), blocks);
+      if (bias.block == nullptr) {
+        Difference difference;
+        difference.entry = "bias";
+        difference.expected = float_of(biases.front());
+        note(part, layer.name, difference);
+      } else if (bias.equal < biases.size()) {
+        Difference difference = first_difference(biases, bias);
+        difference.entry = "bias[" + difference.entry + "]";
+        note(part, layer.name, difference);
+      }
+    }
+  }
+  result.equal = !result.first_difference.has_value();
+  return result;
+}
+
+}  // namespace swarmcert::firmware

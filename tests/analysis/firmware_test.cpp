@@ -1,0 +1,184 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstring>
+
+#include "analysis/run.h"
+#include "nn/files/json.h"
+#include "nn/files/network.h"
+#include "nn/files/random.h"
+
+namespace swarmcert {
+namespace {
+
+using tests::Outcome;
+using tests::read_text;
+using tests::write_text;
+
+/// Exports a network of two kinds with ground and clamp, and compiles what came out.
+class Firmware : public testing::Test {
+ protected:
+  void SetUp() override {
+    files::Random random(3);
+    std::string toml =
+        "schema = \"swarmcert/network/1\"\noutput = { quantity = \"force_z\", unit = \"gf\" }\n[input]\n"
+        "order = [\"dp_x_m\",\"dp_y_m\",\"dp_z_m\",\"dv_x_m_s\",\"dv_y_m_s\",\"dv_z_m_s\"]\n"
+        "clamp = { lower = [-1,-1,-1,-2,-2,-2], upper = [1,1,1,2,2,2] }\n";
+    const std::vector<std::pair<std::string, std::vector<int>>> parts = {{"phi.ground", {4, 9, 5}},
+                                                                         {"phi.small", {6, 11, 5}},
+                                                                         {"phi.large", {6, 8, 5}},
+                                                                         {"rho.small", {5, 12, 1}},
+                                                                         {"rho.large", {5, 7, 1}}};
+    for (const auto& [part, sizes] : parts) {
+      files::Weights weights;
+      for (std::size_t k = 1; k < sizes.size(); ++k) {
+        files::Layer layer{"fc" + std::to_string(k), sizes[k], sizes[k - 1], {}, {}};
+        const auto number = [&] { return static_cast<double>(static_cast<float>(random.symmetric())); };
+        for (int i = 0; i < layer.outputs * layer.inputs; ++i) layer.weights.push_back(number());
+        for (int i = 0; i < layer.outputs; ++i) layer.biases.push_back(number());
+        weights.layers.push_back(layer);
+      }
+      files::save_safetensors(weights, folder_ / (part + ".safetensors"), true);
+      toml += "[" + part + "]\nweights = \"" + part + ".safetensors\"\n";
+    }
+    write_text(folder_ / "network.toml", toml);
+    write_text(folder_ / "main.cpp",
+               "#include \"swarmcert_network.h\"\n"
+               "int main() { return static_cast<int>(swarmcert_network::self_test(nullptr)); }\n");
+    const Outcome outcome = run("swarmcert export network.toml -o out");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  }
+
+  Outcome run(const std::string& command) { return tests::run_shell(command, folder_.path()); }
+
+  /// "swarmcert match network.toml FILE", its exit code, and whether the text holds each of `words`.
+  void expect_match(const std::string& file, int exit_code, const std::vector<std::string>& words) {
+    const Outcome outcome = run("swarmcert match network.toml " + file);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.output;
+    for (const std::string& word : words)
+      EXPECT_NE(outcome.output.find(word), std::string::npos) << word << " in\n" << outcome.output;
+  }
+
+  files::Weights weights(const std::string& part) {
+    return files::load_weights(folder_ / (part + ".safetensors"));
+  }
+
+  /// Writes `file` again with one bit of a stored float flipped. False if the float is not in it.
+  bool flip_last_bit(const std::string& file, const std::string& changed, double value) {
+    std::string bytes = read_text(folder_ / file);
+    const float narrow = static_cast<float>(value);
+    std::string pattern(4, '\0');
+    std::memcpy(pattern.data(), &narrow, 4);
+    const std::size_t at = bytes.find(pattern);
+    if (at == std::string::npos) return false;
+    bytes[at] = static_cast<char>(bytes[at] ^ 1);
+    write_text(folder_ / changed, bytes);
+    return true;
+  }
+
+  tests::ScratchFolder folder_;
+};
+
+TEST_F(Firmware, ExportPassesItsOwnSelfTestWhateverTheCompilerMayContract) {
+  for (const std::string compiler : {"g++ -O0", "g++ -O3 -march=native -ffp-contract=fast"}) {
+    const Outcome built =
+        run(compiler + " -std=c++17 -Wall -Wextra -Werror -Iout out/swarmcert_network.cpp main.cpp -o flown");
+    ASSERT_EQ(built.exit_code, 0) << built.output;
+    EXPECT_EQ(run("./flown").exit_code, 0) << compiler;
+  }
+}
+
+TEST_F(Firmware, SelfTestFailsForAChangedWeight) {
+  std::string source = read_text(folder_ / "out/swarmcert_network.cpp");
+  const std::size_t array = source.find("swarmcert_rho_small_2_weight[12]");
+  const std::size_t digit = source.find("p-", array) - 1;
+  source[digit] = source[digit] == '2' ? '4' : '2';
+  write_text(folder_ / "out/swarmcert_network.cpp", source);
+  ASSERT_EQ(run("g++ -std=c++17 -Iout out/swarmcert_network.cpp main.cpp -o flown").exit_code, 0);
+  EXPECT_EQ(run("./flown").exit_code, 2);
+  expect_match("out/swarmcert_network.cpp", 1, {"different", "rho:small", "weight[0][0]", "line"});
+}
+
+TEST_F(Firmware, MatchFindsEveryWeightInSourceObjectAndStrippedProgram) {
+  expect_match("out/swarmcert_network.cpp", 0, {"equal", "all 468 weights and biases", "20 arrays"});
+  ASSERT_EQ(run("g++ -std=c++17 -Iout -c out/swarmcert_network.cpp -o object.o && "
+                "g++ -std=c++17 -Iout out/swarmcert_network.cpp main.cpp -o flown && strip -o stripped flown")
+                .exit_code,
+            0);
+  for (const std::string file : {"object.o", "flown", "stripped"}) expect_match(file, 0, {"equal"});
+}
+
+TEST_F(Firmware, MatchFindsOneFlippedBitOfAnyMatrixInAnElf) {
+  ASSERT_EQ(run("g++ -std=c++17 -Iout -c out/swarmcert_network.cpp -o object.o").exit_code, 0);
+  int tried = 0;
+  for (const std::string part : {"phi.ground", "phi.small", "phi.large", "rho.small", "rho.large"}) {
+    for (const files::Layer& layer : weights(part).layers) {
+      ASSERT_TRUE(flip_last_bit("object.o", "changed.o", layer.weights.back()));
+      expect_match("changed.o", 1, {"different", layer.name, "_weight", "address"});
+      ASSERT_TRUE(flip_last_bit("object.o", "changed.o", layer.biases.back()));
+      expect_match("changed.o", 1, {"different", layer.name, "_bias", "address"});
+      tried += 2;
+    }
+  }
+  EXPECT_EQ(tried, 20);
+}
+
+/// Nine decimal digits give a float back.
+std::string decimal(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g, ", value);
+  return text;
+}
+
+TEST_F(Firmware, MatchReadsTransposedMatricesInMembersOfAnObject) {
+  std::string text =
+      "struct rho { float fc1_weight[5][12]; /* ... */ };\nstatic const struct rho weights_rho = {\n";
+  for (const files::Layer& layer : weights("rho.small").layers) {
+    text += "." + layer.name + "_weight = {";
+    for (int j = 0; j < layer.inputs; ++j) {
+      text += "{";
+      for (int i = 0; i < layer.outputs; ++i) text += decimal(layer.weights[i * layer.inputs + j]);
+      text += "},\n";
+    }
+    text += "},\n." + layer.name + "_bias = {";
+    for (const double bias : layer.biases) text += decimal(bias);
+    text += "},\n";
+  }
+  write_text(folder_ / "generated.c", text + "};\n");
+  const Outcome same = run("swarmcert match rho.small.safetensors generated.c");
+  EXPECT_EQ(same.exit_code, 0) << same.output;
+  EXPECT_NE(same.output.find("4 arrays"), std::string::npos) << same.output;
+
+  const std::size_t bias = text.find("fc2_bias = {") + 12;
+  text.replace(bias, 3, "0.5");
+  write_text(folder_ / "changed.c", text + "};\n");
+  const Outcome changed = run("swarmcert match rho.small.safetensors changed.c");
+  EXPECT_EQ(changed.exit_code, 1);
+  EXPECT_NE(changed.output.find("fc2 bias[0]"), std::string::npos) << changed.output;
+}
+
+TEST_F(Firmware, DamagedElfsAreBadInputAndNeverACrash) {
+  ASSERT_EQ(run("g++ -std=c++17 -Iout -c out/swarmcert_network.cpp -o object.o").exit_code, 0);
+  const std::string whole = read_text(folder_ / "object.o");
+  int refused = 0;
+  for (std::size_t size = 4; size < whole.size(); size += whole.size() / 40) {
+    write_text(folder_ / "cut.o", whole.substr(0, size));
+    const Outcome outcome = run("swarmcert match network.toml cut.o");
+    EXPECT_EQ(outcome.exit_code, 3) << size << "\n" << outcome.output;
+    ++refused;
+  }
+  EXPECT_GE(refused, 40);
+  write_text(folder_ / "empty.c", "int x;\n");
+  expect_match("empty.c", 3, {"empty.c", "no initialiser with numbers"});
+}
+
+TEST_F(Firmware, ExportReplacesNothingWithoutForce) {
+  const Outcome outcome = run("swarmcert export network.toml -o out");
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.output.find("--force"), std::string::npos);
+  EXPECT_EQ(run("swarmcert export network.toml -o out --force").exit_code, 0);
+}
+
+}  // namespace
+}  // namespace swarmcert
