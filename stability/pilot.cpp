@@ -51,8 +51,7 @@ void fill(const Gains& gains, const Model& model, double attitude_step_s,
 }  // namespace
 
 template <typename Scalar>
-Pilot<Scalar>::Pilot(const Gains& gains, const Model& model, double attitude_step_s)
-    : integrator_limit_(vector<Scalar>(gains.integrator_limit_m_s)) {
+Pilot<Scalar>::Pilot(const Gains& gains, const Model& model, double attitude_step_s) {
   if (gains.composite) {
     Settings<controller::CompositeGains<Scalar>> settings;
     settings.position = {matrix<Scalar>(gains.composite->Lambda), matrix<Scalar>(gains.composite->K)};
@@ -78,6 +77,21 @@ controller::FlightCommand<Scalar> Pilot<Scalar>::step(controller::FlightMemory<S
       [&](const auto& settings) {
         return controller::flight_step(settings, memory, measured, reference, effect, now_ms,
                                        position_is_due);
+      },
+      settings_);
+}
+
+template <typename Scalar>
+controller::Vector3<Scalar> Pilot<Scalar>::rate_error(const controller::FlightMemory<Scalar>& memory,
+                                                      const controller::Measured<Scalar>& measured) const {
+  return std::visit(
+      [&](const auto& settings) -> controller::Vector3<Scalar> {
+        if (settings.attitude_law == controller::AttitudeLaw::kLee) return {};
+        const auto error =
+            attitude_error(measured.attitude, controller::AttitudeReference<Scalar>{memory.R_WR, {}, {}});
+        return measured.attitude.omega_B_rad_s -
+               reference_rate(settings.robust.Lambda_1_s, controller::modified_rodrigues(error.R_RB), error)
+                   .omega_r_rad_s;
       },
       settings_);
 }

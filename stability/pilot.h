@@ -27,14 +27,15 @@ class Pilot {
                                          Scalar prediction_N, std::uint32_t now_ms,
                                          bool position_is_due) const;
 
-  const controller::Vector3<Scalar>& integrator_limit_m_s() const { return integrator_limit_; }
+  /// omega - omega_r, which the robust law integrates, after a step() with the same `measured`; 0 for the other law.
+  controller::Vector3<Scalar> rate_error(const controller::FlightMemory<Scalar>& memory,
+                                         const controller::Measured<Scalar>& measured) const;
 
  private:
   template <typename Position>
   using Settings = controller::FlightSettings<Scalar, Position>;
   std::variant<Settings<controller::PidGains<Scalar>>, Settings<controller::CompositeGains<Scalar>>>
       settings_;
-  controller::Vector3<Scalar> integrator_limit_;
 };
 
 extern template class Pilot<float>;

@@ -1,0 +1,159 @@
+// Speed of the closed loops, beside a plain Boost odeint loop on the same equations.
+//   cmake --build --preset release --target benchmark_closed_loops && build/release/tests/benchmarks/benchmark_closed_loops
+#include <fmt/core.h>
+
+#include <boost/numeric/odeint.hpp>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "data.h"
+#include "stability/continuous_flight.h"
+#include "stability/pilot.h"
+#include "stability/sampled_flight.h"
+
+namespace {
+
+using namespace swarmcert::stability;
+
+double seconds(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Best of three, in simulated seconds per second.
+double speed(double simulated_s, const std::function<void()>& work) {
+  double best = 1e300;
+  for (int i = 0; i < 3; ++i) best = std::min(best, seconds(work));
+  return simulated_s / best;
+}
+
+Model vehicle() {
+  Model model = read_model(swarmcert::tests::source_path("stability/models/crazyflie-small.toml"));
+  EffectSpec downwash;
+  downwash.name = "downwash";
+  model.effects.push_back(downwash);
+  return model;
+}
+
+Gains gains() {
+  return parse_gains(
+      "schema = \"swarmcert/gains/1\"\n[position]\nKp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, "
+      "10]\nrate_hz = "
+      "100\n[attitude]\nlaw = \"lee\"\n",
+      "gains.toml");
+}
+
+Gains continuous_gains() {
+  Gains result = gains();
+  result.rate_hz = 0;
+  return result;
+}
+
+/// What one would write without this project: the sampled loop's plant under odeint's fixed-step RK4, every pair of
+/// vehicles in every evaluation, the same flight code in the same float.
+double odeint_sampled(int vehicles, double end_s) {
+  return speed(end_s, [=] {
+    using State = std::vector<double>;
+    Swarm swarm(vehicle(), vehicles);
+    const auto task = make_task("circle", {vehicles, end_s, 0});
+    const Pilot<float> pilot(
+        [] {
+          Gains g = gains();
+          g.integrator_step_s = 0.01;
+          return g;
+        }(),
+        vehicle(), 0.002);
+    std::vector<swarmcert::controller::FlightMemory<float>> memory(static_cast<std::size_t>(vehicles));
+    std::vector<VehicleInput> inputs(static_cast<std::size_t>(vehicles));
+    State x(static_cast<std::size_t>(swarm.state_size()));
+    for (int i = 0; i < vehicles; ++i) {
+      set_hover(swarm.model(i), task->at(i, 0).p_W_m, {0, 0, 0},
+                &x[static_cast<std::size_t>(i) * kVehicleStateSize]);
+    }
+    boost::numeric::odeint::runge_kutta4<State> stepper;
+    const auto f = [&](const State& y, State& dy, double t) {
+      swarm.derivative(t, y.data(), inputs.data(), dy.data());
+    };
+    const auto narrow = [](const double* v) {
+      return swarmcert::controller::Vector3<float>{static_cast<float>(v[0]), static_cast<float>(v[1]),
+                                                   static_cast<float>(v[2])};
+    };
+    for (int k = 0; k * 0.002 < end_s; ++k) {
+      const auto now_ms = static_cast<std::uint32_t>(2 * k);
+      for (int i = 0; i < vehicles; ++i) {
+        const double* const s = &x[static_cast<std::size_t>(i) * kVehicleStateSize];
+        const Setpoint to = task->at(i, 0.002 * k);
+        Eigen::Matrix3d R;
+        rotation_of(s + kQuaternion, &R);
+        swarmcert::controller::Measured<float> measured;
+        measured.position_W_m = narrow(s);
+        measured.velocity_W_m_s = narrow(s + 3);
+        const Eigen::Matrix3d Rt = R.transpose();  // column-major: rows of R
+        measured.attitude = {{narrow(Rt.data()), narrow(Rt.data() + 3), narrow(Rt.data() + 6)},
+                             narrow(s + kOmega)};
+        measured.position_stamp_ms = measured.attitude_stamp_ms = now_ms;
+        measured.battery_V = 4.1F;
+        const auto command = pilot.step(
+            memory[static_cast<std::size_t>(i)], measured,
+            {narrow(to.p_W_m.data()), narrow(to.v_W_m_s.data()), narrow(to.a_W_m_s2.data()), {}, {}, {}},
+            0.0F, now_ms, k % 5 == 0);
+        for (int r = 0; r < kNumRotors; ++r) {
+          inputs[static_cast<std::size_t>(i)].rotor_command_N[r] =
+              static_cast<double>(command.mixed.forces.at_N[r]);
+        }
+      }
+      stepper.do_step(f, x, 0.002 * k, 0.002);
+    }
+  });
+}
+
+double sampled(int vehicles, double end_s) {
+  return speed(end_s, [=] {
+    Swarm swarm(vehicle(), vehicles);
+    const auto task = make_task("circle", {vehicles, end_s, 0});
+    SampledFlight flight(swarm, gains(), *task, {});
+    while (flight.time_s() < end_s) flight.step();
+  });
+}
+
+double continuous(int vehicles, double end_s, OdeMethod method, long* evaluations) {
+  return speed(end_s, [=] {
+    Swarm swarm(vehicle(), vehicles);
+    const auto task = make_task("circle", {vehicles, end_s, 0});
+    ContinuousFlightOptions options;
+    options.method = method;
+    options.relative = 1e-6;
+    options.absolute_scale = 100;
+    ContinuousFlight flight(swarm, continuous_gains(), *task, options);
+    flight.advance(end_s);
+    *evaluations = flight.evaluations();
+  });
+}
+
+}  // namespace
+
+int main() {
+  fmt::print("Simulated seconds per second, one core, best of three; task: circle, downwash between all\n");
+  fmt::print("{:<34} {:>10} {:>10} {:>10}\n", "", "1", "5", "16");
+  fmt::print("{:<34} {:>10.0f} {:>10.0f} {:>10.0f}\n", "sampled, 500 Hz, RK4", sampled(1, 40), sampled(5, 40),
+             sampled(16, 20));
+  fmt::print("{:<34} {:>10.0f} {:>10.0f} {:>10.0f}\n", "the same by a plain odeint loop",
+             odeint_sampled(1, 40), odeint_sampled(5, 40), odeint_sampled(16, 20));
+  const std::pair<const char*, OdeMethod> methods[] = {
+      {"continuous, CVODE BDF 1e-6", OdeMethod::kBdf},
+      {"continuous, CVODE Adams 1e-6", OdeMethod::kAdams},
+      {"continuous, ARKODE DP5 1e-6", OdeMethod::kRungeKutta}};
+  for (const auto& [name, method] : methods) {
+    fmt::print("{:<34}", name);
+    for (const int vehicles : {1, 5, 16}) {
+      long evaluations = 0;
+      const double s = continuous(vehicles, 20, method, &evaluations);
+      fmt::print(" {:>10.0f}", s);
+      if (vehicles == 1) fmt::print(" ({} evaluations)", evaluations);
+    }
+    fmt::print("\n");
+  }
+}
