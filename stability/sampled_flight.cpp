@@ -96,7 +96,11 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
   }
   int longest = 0;
   for (int i = 0; i < swarm.size(); ++i) {
-    longest = std::max(longest, static_cast<int>(std::ceil(swarm.path(i).delay_s / period_s_)) + 1);
+    const double delay_s = swarm.path(i).delay_s;
+    longest = std::max(longest, static_cast<int>(std::ceil(delay_s / period_s_)) + 1);
+    has_delay_ = has_delay_ || delay_s > 0;
+    const double rest_s = delay_s - std::floor(delay_s / period_s_ + 1e-9) * period_s_;
+    if (rest_s > 1e-9 * period_s_) switch_s_ = std::max(switch_s_, rest_s);
   }
   delayed_.resize(inputs_.size());
   for (int i = 0; i < swarm.size(); ++i) {
@@ -196,24 +200,43 @@ void SampledFlight::control(Controllers<Scalar>& controllers) {
 }
 
 void SampledFlight::advance(double h_s) {
-  const auto size = static_cast<int>(state_.size());
+  const std::size_t size = state_.size();
   const double start_s = time_s();
   const double h = h_s / options_.substeps;
   double* const x = state_.data();
+  double* const stage = stage_.data();
+  const VehicleInput* const inputs = inputs_.data();
+  double *const k1 = k1_.data(), *const k2 = k2_.data(), *const k3 = k3_.data(), *const k4 = k4_.data();
+  const auto to_stage = [&](double step_s, const double* k) {
+    for (std::size_t i = 0; i < size; ++i) stage[i] = x[i] + step_s * k[i];
+  };
   for (int step = 0; step < options_.substeps; ++step) {
     const double t = start_s + step * h;
-    swarm_.derivative(t, x, inputs_.data(), k1_.data());
-    for (int i = 0; i < size; ++i)
-      stage_[static_cast<std::size_t>(i)] = x[i] + 0.5 * h * k1_[static_cast<std::size_t>(i)];
-    swarm_.derivative(t + 0.5 * h, stage_.data(), inputs_.data(), k2_.data());
-    for (int i = 0; i < size; ++i)
-      stage_[static_cast<std::size_t>(i)] = x[i] + 0.5 * h * k2_[static_cast<std::size_t>(i)];
-    swarm_.derivative(t + 0.5 * h, stage_.data(), inputs_.data(), k3_.data());
-    for (int i = 0; i < size; ++i)
-      stage_[static_cast<std::size_t>(i)] = x[i] + h * k3_[static_cast<std::size_t>(i)];
-    swarm_.derivative(t + h, stage_.data(), inputs_.data(), k4_.data());
-    for (std::size_t i = 0; i < state_.size(); ++i) {
-      x[i] += h / 6 * (k1_[i] + 2 * (k2_[i] + k3_[i]) + k4_[i]);
+    swarm_.derivative(t, x, inputs, k1);
+    to_stage(0.5 * h, k1);
+    swarm_.derivative(t + 0.5 * h, stage, inputs, k2);
+    to_stage(0.5 * h, k2);
+    swarm_.derivative(t + 0.5 * h, stage, inputs, k3);
+    to_stage(h, k3);
+    swarm_.derivative(t + h, stage, inputs, k4);
+    for (std::size_t i = 0; i < size; ++i) x[i] += h / 6 * (k1[i] + 2 * (k2[i] + k3[i]) + k4[i]);
+  }
+}
+
+/// Puts the commands that delays let through into the inputs: those of `late` part of the period, or of the early one.
+void SampledFlight::apply_delayed(bool late) {
+  const auto slots = static_cast<std::int64_t>(delayed_.front().size() / kNumRotors);
+  for (int i = 0; i < swarm_.size(); ++i) {
+    const SignalPath& path = swarm_.path(i);
+    const auto& now = records_[static_cast<std::size_t>(i)].rotor_N;
+    const auto whole = static_cast<std::int64_t>(std::floor(path.delay_s / period_s_ + 1e-9));
+    const bool has_rest = path.delay_s - static_cast<double>(whole) * period_s_ > 1e-9 * period_s_;
+    const std::int64_t age = whole + (has_rest && !late ? 1 : 0);
+    const double* const then =
+        &delayed_[static_cast<std::size_t>(i)]
+                 [static_cast<std::size_t>((period_ + slots - age) % slots) * kNumRotors];
+    for (std::size_t r = 0; r < kNumRotors; ++r) {
+      input(i).rotor_command_N[r] = now[r] + path.delay_gain * (then[r] - now[r]);
     }
   }
 }
@@ -221,38 +244,24 @@ void SampledFlight::advance(double h_s) {
 /// Moves the plant by one period. A command delay of k + r periods holds the command of k + 1 periods ago for the
 /// first r of it, that of k periods ago for the rest. Where kinds have different r, all switch at the largest.
 void SampledFlight::move() {
-  double switch_s = 0;
-  const auto slots = static_cast<std::int64_t>(delayed_.front().size() / kNumRotors);
-  for (int i = 0; i < swarm_.size(); ++i) {
-    const auto& now = records_[static_cast<std::size_t>(i)].rotor_N;
-    std::copy(now.begin(), now.end(),
-              &delayed_[static_cast<std::size_t>(i)][static_cast<std::size_t>(period_ % slots) * kNumRotors]);
-    const double whole = std::floor(swarm_.path(i).delay_s / period_s_ + 1e-9);
-    switch_s = std::max(switch_s, swarm_.path(i).delay_s - whole * period_s_);
-  }
-  if (switch_s < 1e-9 * period_s_) switch_s = 0;
-  const auto apply = [&](bool late) {
-    for (int i = 0; i < swarm_.size(); ++i) {
-      const SignalPath& path = swarm_.path(i);
-      const auto& now = records_[static_cast<std::size_t>(i)].rotor_N;
-      const auto whole = static_cast<std::int64_t>(std::floor(path.delay_s / period_s_ + 1e-9));
-      const bool has_rest = path.delay_s - static_cast<double>(whole) * period_s_ > 1e-9 * period_s_;
-      const std::int64_t age = whole + (has_rest && !late ? 1 : 0);
-      const double* const then =
-          &delayed_[static_cast<std::size_t>(i)]
-                   [static_cast<std::size_t>((period_ + slots - age) % slots) * kNumRotors];
-      for (int r = 0; r < kNumRotors; ++r) {
-        const double u = now[static_cast<std::size_t>(r)];
-        input(i).rotor_command_N[r] = u + path.delay_gain * (then[r] - u);
-      }
+  if (!has_delay_) {
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      std::copy(records_[i].rotor_N.begin(), records_[i].rotor_N.end(), inputs_[i].rotor_command_N);
     }
-  };
-  apply(switch_s == 0);
-  if (switch_s > 0) {
-    advance(switch_s);
-    apply(true);
+    advance(period_s_);
+    return;
   }
-  advance(period_s_ - switch_s);
+  const auto slots = static_cast<std::int64_t>(delayed_.front().size() / kNumRotors);
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    std::copy(records_[i].rotor_N.begin(), records_[i].rotor_N.end(),
+              &delayed_[i][static_cast<std::size_t>(period_ % slots) * kNumRotors]);
+  }
+  if (switch_s_ > 0) {
+    apply_delayed(false);
+    advance(switch_s_);
+  }
+  apply_delayed(true);
+  advance(period_s_ - switch_s_);
 }
 
 /// Inelastic ground: a vehicle that sinks to it stands level until thrust lifts it.

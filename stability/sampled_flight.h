@@ -80,6 +80,7 @@ class SampledFlight {
   void control(Controllers<Scalar>& controllers);
   void predict();
   void move();
+  void apply_delayed(bool late);
   void advance(double h_s);
   void touch_ground();
 
@@ -98,6 +99,8 @@ class SampledFlight {
   std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
   std::vector<std::vector<double>> predictions_;         ///< ring by age in network_every_ periods
   std::vector<std::vector<double>> delayed_;             ///< ring of rotor commands, by age in periods
+  double switch_s_ = 0;                                  ///< when, inside a period, delayed commands change
+  bool has_delay_ = false;
   files::Random random_;
 };
 

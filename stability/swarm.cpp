@@ -8,12 +8,18 @@
 namespace swarmcert::stability {
 
 struct Swarm::Kind {
-  double mass_kg = 0, offset_m = 0, yaw_m = 0;
+  double mass_kg = 0, inverse_mass_1_kg = 0, offset_m = 0, yaw_m = 0;
+  double lag_rate_1_s = 0, lag_share = 0;  ///< 1 / tau and gain of the motor lag, 0 without
   Eigen::Vector3d inertia = Eigen::Vector3d::Zero(), inverse_inertia = Eigen::Vector3d::Zero();
   SignalPath path;
   std::vector<AppliedEffect> effects;      ///< without those that live in `path`
   std::vector<const AppliedEffect*> wide;  ///< that look at neighbours
 };
+
+void Swarm::set_lag(Kind* kind) {
+  kind->lag_rate_1_s = kind->path.motor_lag_s > 0 ? 1 / kind->path.motor_lag_s : 0;
+  kind->lag_share = kind->path.motor_lag_s > 0 ? kind->path.motor_lag_gain : 0;
+}
 
 namespace {
 
@@ -44,6 +50,7 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
     const Model& model = models_[i];
     Kind& kind = kinds_[i];
     kind.mass_kg = model.mass_kg;
+    kind.inverse_mass_1_kg = 1 / model.mass_kg;
     kind.offset_m = model.arm_m * std::sqrt(0.5);
     kind.yaw_m = model.torque_per_thrust_m;
     kind.inertia = Vector3Map(model.inertia_kg_m2.data());
@@ -60,6 +67,7 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
       if (applied.effect().info().needs_neighbours) kind.wide.push_back(&applied);
     }
     interacts_ = interacts_ || !kind.wide.empty();
+    set_lag(&kind);
   }
   near_.resize(kind_of_.size());
   neighbours_.resize(kind_of_.size());
@@ -84,15 +92,15 @@ void Swarm::assume_lag(double motor_lag_s, double delay_s) {
       kind.path.delay_s = delay_s;
       kind.path.delay_gain = 1;
     }
+    set_lag(&kind);
   }
 }
 
-void Swarm::rotor_wrench(const Kind& kind, const double* x, const VehicleInput& input, double* thrust_N,
-                         Eigen::Vector3d* torque_B_Nm) const {
+inline void Swarm::rotor_wrench(const Kind& kind, const double* x, const VehicleInput& input,
+                                double* thrust_N, Eigen::Vector3d* torque_B_Nm) const {
   double f[kNumRotors];
-  const double share = kind.path.motor_lag_s > 0 ? kind.path.motor_lag_gain : 0;
   for (int r = 0; r < kNumRotors; ++r) {
-    f[r] = input.rotor_command_N[r] + share * (x[kRotors + r] - input.rotor_command_N[r]);
+    f[r] = input.rotor_command_N[r] + kind.lag_share * (x[kRotors + r] - input.rotor_command_N[r]);
   }
   // Rotors: front right, back right, back left, front left; the first turns the body clockwise seen from above.
   *thrust_N = f[0] + f[1] + f[2] + f[3];
@@ -171,9 +179,8 @@ void Swarm::derivative(double time_s, const double* state, const VehicleInput* i
     const VehicleInput& input = inputs[vehicle];
     const Kind& kind = kinds_[static_cast<std::size_t>(kind_of(vehicle))];
 
-    const double rate_1_s = kind.path.motor_lag_s > 0 ? 1 / kind.path.motor_lag_s : 0;
     for (int r = 0; r < kNumRotors; ++r) {
-      dx[kRotors + r] = rate_1_s * (input.rotor_command_N[r] - x[kRotors + r]);
+      dx[kRotors + r] = kind.lag_rate_1_s * (input.rotor_command_N[r] - x[kRotors + r]);
     }
     if (input.resting) {
       std::fill(dx, dx + kRotors, 0.0);
@@ -181,14 +188,21 @@ void Swarm::derivative(double time_s, const double* state, const VehicleInput* i
     }
     double thrust_N;
     Eigen::Vector3d torque_B_Nm;
-    Eigen::Matrix3d R_WB;
     rotor_wrench(kind, x, input, &thrust_N, &torque_B_Nm);
-    rotation_of(x + kQuaternion, &R_WB);
-    Eigen::Vector3d force_W_N = thrust_N * R_WB.col(2) + input.disturbance_W_N;
+    const double* const q = x + kQuaternion;
+    const double length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    const double s = 2 / length2;
+    Eigen::Vector3d force_W_N(s * (q[1] * q[3] + q[0] * q[2]), s * (q[2] * q[3] - q[0] * q[1]),
+                              1 - s * (q[1] * q[1] + q[2] * q[2]));  // b3
+    force_W_N = thrust_N * force_W_N + input.disturbance_W_N;
     const Vector3Map omega(x + kOmega);
     Eigen::Vector3d moment_B_Nm = torque_B_Nm;
 
-    if (!kind.effects.empty()) {
+    // Where only neighbours matter and none is near, there is nothing to add.
+    const bool alone = listed_ && near_[static_cast<std::size_t>(vehicle)].empty();
+    if (!(kind.effects.empty() || (alone && kind.wide.size() == kind.effects.size()))) {
+      Eigen::Matrix3d R_WB;
+      rotation_of(q, &R_WB);
       fill(vehicle, state, input, thrust_N, torque_B_Nm, R_WB);
       instant_.num_neighbours = 0;
       if (!kind.wide.empty()) gather(vehicle, state, false);
@@ -201,12 +215,11 @@ void Swarm::derivative(double time_s, const double* state, const VehicleInput* i
 
     for (int i = 0; i < 3; ++i) {
       dx[kPosition + i] = x[kVelocity + i];
-      dx[kVelocity + i] = force_W_N[i] / kind.mass_kg;
+      dx[kVelocity + i] = force_W_N[i] * kind.inverse_mass_1_kg;
     }
     dx[kVelocity + 2] -= kGravity_m_s2;
     // q' = q (0, omega) / 2, plus a pull to |q| = 1.
-    const double* const q = x + kQuaternion;
-    const double pull = stabilise * (1 - q[0] * q[0] - q[1] * q[1] - q[2] * q[2] - q[3] * q[3]);
+    const double pull = stabilise * (1 - length2);
     const double wx = omega[0], wy = omega[1], wz = omega[2];
     dx[kQuaternion] = 0.5 * (-q[1] * wx - q[2] * wy - q[3] * wz) + pull * q[0];
     dx[kQuaternion + 1] = 0.5 * (q[0] * wx + q[2] * wz - q[3] * wy) + pull * q[1];

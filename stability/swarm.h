@@ -65,6 +65,7 @@ class Swarm {
 
  private:
   struct Kind;
+  static void set_lag(Kind* kind);
   void fill(int vehicle, const double* state, const VehicleInput& input, double thrust_N,
             const Eigen::Vector3d& torque_B_Nm, const Eigen::Matrix3d& R_WB);
   void add_neighbour(int vehicle, int other, const double* state);
