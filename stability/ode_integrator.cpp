@@ -9,6 +9,7 @@
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace swarmcert::stability {
 namespace {
@@ -128,7 +129,7 @@ void OdeIntegrator::start(double t, const double* y) {
     solver.set_up();
     solver.is_set_up = true;
   } else if (solver.method == OdeMethod::kRungeKutta) {
-    check(ERKStepReInit(solver.memory, Solver::evaluate, t, solver.y), "ERKStepReInit");
+    check(ERKStepReset(solver.memory, t, solver.y), "ERKStepReset");  // keeps its step size
   } else {
     check(CVodeReInit(solver.memory, t, solver.y), "CVodeReInit");
   }
@@ -136,7 +137,8 @@ void OdeIntegrator::start(double t, const double* y) {
 
 std::vector<int> OdeIntegrator::advance(double target, double limit) {
   Solver& solver = *solver_;
-  if (target <= solver.t) return {};
+  // SUNDIALS refuses to start over less than a rounding error: there is nothing to integrate.
+  if (target - solver.t <= 1e-13 * (1 + std::abs(target))) return {};
   int status;
   if (solver.method == OdeMethod::kRungeKutta) {
     check(ERKStepSetStopTime(solver.memory, limit), "ERKStepSetStopTime");
