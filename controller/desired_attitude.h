@@ -87,8 +87,7 @@ template <typename Scalar>
 inline Scalar collective_thrust(ThrustRule rule, const Vector3<Scalar>& force_W_N,
                                 const Matrix3<Scalar>& R_WB) {
   if (rule == ThrustRule::kMagnitude) return norm(force_W_N);
-  const Scalar projected = dot(force_W_N, z_axis(R_WB));
-  return projected < Scalar(0) ? Scalar(0) : projected;
+  return positive_part(dot(force_W_N, z_axis(R_WB)));
 }
 
 }  // namespace swarmcert::controller

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 
 #include "controller/linear_algebra.h"
 #include "nn/deep_set.h"

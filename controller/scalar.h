@@ -35,6 +35,12 @@ inline Scalar clamp(Scalar x, Scalar lower, Scalar upper) {
   return x < lower ? lower : x > upper ? upper : x;
 }
 
+/// max(x, 0). A NaN stays a NaN.
+template <typename Scalar>
+inline Scalar positive_part(Scalar x) {
+  return x < Scalar(0) ? Scalar(0) : x;
+}
+
 using nn::is_finite;
 
 }  // namespace swarmcert::controller

@@ -20,18 +20,19 @@ namespace swarmcert::nn {
 
 /// Returns `product`, and keeps the compiler from fusing it with a following addition.
 ///
-/// GCC 12 has a builtin for that. Elsewhere the product passes through an empty assembler statement, which no
-/// optimiser looks into: clang-14 ignores its own `#pragma clang fp contract(off)` under -ffp-contract=fast.
+/// The product passes through an empty assembler statement, which no optimiser looks into: clang-14 ignores its own
+/// `#pragma clang fp contract(off)` under -ffp-contract=fast, and the vectoriser of GCC 12 drops GCC's own
+/// __builtin_assoc_barrier, after which what it vectorised is fused. The builtin serves where there are no vectors.
 template <typename Scalar>
 [[gnu::always_inline]] inline Scalar rounded(Scalar product) {
-#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12
-  return __builtin_assoc_barrier(product);
-#elif defined(__SSE2__)
+#if defined(__SSE2__)
   asm("" : "+x"(product));
   return product;
 #elif defined(__aarch64__)
   asm("" : "+w"(product));
   return product;
+#elif defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12
+  return __builtin_assoc_barrier(product);
 #else
   asm("" : "+m"(product));
   return product;

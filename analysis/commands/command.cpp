@@ -21,12 +21,13 @@ std::vector<std::string>& command_line() {
 
 const std::vector<Command>& commands() {
   static const std::vector<Command> all = {
-      inspect_command(),   //
-      certify_command(),   //
-      check_command(),     //
-      simulate_command(),  //
-      export_command(),    //
-      match_command(),     //
+      inspect_command(),          //
+      certify_command(),          //
+      check_command(),            //
+      simulate_command(),         //
+      identify_thrust_command(),  //
+      export_command(),           //
+      match_command(),            //
       demo_command(),
   };
   return all;

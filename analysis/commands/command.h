@@ -76,6 +76,7 @@ Command certify_command();
 Command check_command();
 Command demo_command();
 Command export_command();
+Command identify_thrust_command();
 Command inspect_command();
 Command match_command();
 Command simulate_command();
