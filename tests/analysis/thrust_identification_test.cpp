@@ -107,7 +107,7 @@ TEST(ThrustIdentification, SaysWhatPoorDataLack) {
   EXPECT_NE(why({400, 3.99, 4.01}).find("battery spans"), std::string::npos);
   EXPECT_NE(why({400, 3.2, 4.2, 0.5, 0.55}).find("PWM spans 0.050"), std::string::npos);
   EXPECT_NE(why({5}).find("5 rows for 5 coefficients"), std::string::npos);
-  EXPECT_NE(why({12, 3.7, 3.85, 0.4, 0.65, 8.0}).find("too noisy"), std::string::npos);
+  EXPECT_NE(why({12, 3.3, 4.2, 0.3, 1.0, 8.0}).find("too noisy"), std::string::npos);
 
   // Battery and PWM that move together: rich in each, but not in both.
   ThrustData together = measured({}, 4);
