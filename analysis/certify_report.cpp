@@ -24,7 +24,7 @@ std::string write_certify_report(const files::Network& network, const Certificat
   std::vector<std::vector<std::string>> rows;
   std::string data;
   for (const CertifiedBound& bound : found.bounds) {
-    const double lower = bound.witness ? bound.witness->slope.value() : 0;
+    const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
     rows.push_back({bound.function, fmt::format("{:.10g}", bound.upper.value()), name(bound.method),
                     fmt::format("{:.8g}", bound.product.value()), fmt::format("{:.8g}", lower),
                     files::unit(network, bound.function)});

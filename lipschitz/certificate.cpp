@@ -1,5 +1,5 @@
 #include "lipschitz/certify.h"
-#include "lipschitz/checker/check.h"
+#include "lipschitz/statement.h"
 #include "nn/files/content_hash.h"
 #include "nn/files/functions.h"
 
@@ -46,35 +46,61 @@ Json layer_json(const CertifiedLayer& layer) {
 }
 
 Json bound_json(const files::Network& network, const CertifiedBound& bound) {
-  Json json = {{"function", bound.function},
-               {"domain", "global"},
-               {"block", "all"},
-               {"law", bound.function.rfind("set:", 0) == 0 ? "one_neighbour" : "none"},
-               {"norm", "l2"},
-               {"unit", files::unit(network, bound.function)},
-               {"upper", bound.upper.value()},
+  Json json = summary(network, bound);
+  json.update({{"scale", hex_floats(bound.scale)},
                {"upper_hex", hex_float(bound.upper.value())},
-               {"upper_method", name(bound.method)},
-               {"lower", nullptr},
                {"lower_hex", nullptr},
                {"lower_witness", nullptr},
-               {"proof", nullptr}};
+               {"proof", nullptr}});
   if (bound.proof) json["proof"] = upper_json(*bound.proof);
-  if (bound.witness) {
-    Json others = Json::array();
-    for (std::size_t j = 0; j < bound.witness->others.size(); ++j) {
-      others.push_back({{"network", bound.other_networks[j]}, {"x", hex_floats(bound.witness->others[j])}});
-    }
-    json["lower"] = bound.witness->slope.value();
-    json["lower_hex"] = hex_float(bound.witness->slope.value());
-    json["lower_witness"] = {{"x", hex_floats(bound.witness->x)},
-                             {"y", hex_floats(bound.witness->y)},
-                             {"others", std::move(others)}};
-  }
+  if (!bound.lower.witness) return json;
+  const SlopeWitness& witness = *bound.lower.witness;
+  Json others = Json::array();
+  for (std::size_t j = 0; j < witness.others.size(); ++j)
+    others.push_back({{"network", bound.lower.other_networks[j]}, {"x", hex_floats(witness.others[j])}});
+  json["lower_hex"] = hex_float(witness.slope.value());
+  json["lower_witness"] = {
+      {"x", hex_floats(witness.x)}, {"y", hex_floats(witness.y)}, {"others", std::move(others)}};
   return json;
 }
 
+Json law_json(const CertifiedLaw& law) {
+  return {
+      {"rho", law.rho},       {"neighbours", law.neighbours}, {"block", law.block},
+      {"law", name(law.law)}, {"upper", law.upper.value()},   {"upper_hex", hex_float(law.upper.value())}};
+}
+
 }  // namespace
+
+Json summary(const files::Network& network, const CertifiedBound& bound) {
+  Json json = {{"function", bound.function},
+               {"domain", bound.domain},
+               {"block", bound.block},
+               {"law", bound.function.rfind("set:", 0) == 0 ? "one_neighbour" : "none"},
+               {"norm", bound.scale.empty() ? "l2" : "weighted_l2"},
+               {"scale", bound.scale},
+               {"unit", files::unit(network, bound.function, bound.block)},
+               {"upper", bound.upper.value()},
+               {"upper_method", name(bound.method)},
+               {"lower", nullptr}};
+  if (bound.lower.witness) json["lower"] = bound.lower.witness->slope.value();
+  return json;
+}
+
+Json summary(const files::Network& network, const CertifiedLaw& law) {
+  const std::string kind = law.neighbours.begin()->first;
+  const std::string shown = law.neighbours.size() == 1 ? kind : "mixed";
+  return {{"function", "set:" + shown + ":" + law.rho},
+          {"domain", "global"},
+          {"block", law.block},
+          {"law", name(law.law)},
+          {"neighbours", law.neighbours},
+          {"norm", "l2"},
+          {"unit", files::unit(network, "set:" + kind + ":" + law.rho, law.block)},
+          {"upper", law.upper.value()},
+          {"upper_method", "law"},
+          {"lower", nullptr}};
+}
 
 Json certificate(const files::Network& network, const Certification& certification) {
   Json weights = Json::object();
@@ -85,12 +111,22 @@ Json certificate(const files::Network& network, const Certification& certificati
   for (const CertifiedLayer& layer : certification.layers) layers.push_back(layer_json(layer));
   Json bounds = Json::array();
   for (const CertifiedBound& bound : certification.bounds) bounds.push_back(bound_json(network, bound));
-  Json result = {{"schema", check::kCertificateSchema},
-                 {"tool", "swarmcert " SWARMCERT_VERSION},
-                 {"statement", check::kStatement},
-                 {"network", {{"description_sha256", network.sha256}, {"weights", std::move(weights)}}},
-                 {"layers", std::move(layers)},
-                 {"bounds", std::move(bounds)}};
+  Json laws = Json::array();
+  for (const CertifiedLaw& law : certification.laws) laws.push_back(law_json(law));
+  Json box;
+  for (const auto& [part, sides] : certification.domain)
+    box[part] = {{"lower", hex_floats(sides.lower)}, {"upper", hex_floats(sides.upper)}};
+  Json as = certification.as_float32 ? Json("float32") : Json();
+  Json result = {
+      {"schema", check::kCertificateSchema},
+      {"tool", "swarmcert " SWARMCERT_VERSION},
+      {"statement", check::kStatement},
+      {"network",
+       {{"description_sha256", network.sha256}, {"as", std::move(as)}, {"weights", std::move(weights)}}},
+      {"box", std::move(box)},
+      {"layers", std::move(layers)},
+      {"bounds", std::move(bounds)},
+      {"laws", std::move(laws)}};
   result["content_sha256"] = files::content_sha256(result);
   return result;
 }

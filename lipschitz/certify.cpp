@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <mutex>
 #include <stdexcept>
 
-#include "lipschitz/checker/check.h"
+#include "lipschitz/stages.h"
 #include "nn/files/functions.h"
 #include "nn/files/parallel.h"
 
@@ -22,75 +24,20 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
-/// The function whose slope is searched, with `neighbours` neighbours in all, and the networks of the fixed ones.
-struct SearchTarget {
-  SlopeFunction function;
-  std::vector<std::string> other_networks;
-};
-
-SearchTarget search_target(const Network& network, const std::string& function, int neighbours) {
-  const std::map<std::string, const Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
-  const auto term = [&](const std::string& name) {
-    return Term{parts.at(name), network.clamp && files::is_clamped(name) ? &*network.clamp : nullptr};
-  };
-  SearchTarget target;
-  target.function.moved = term(names[0]);
-  if (names.size() == 1) return target;
-  target.function.rho = parts.at(names[1]);
-  const std::string ground = std::string("phi:") + files::kGroundKind;
-  if (names[0] != ground && parts.count(ground) == 1) target.other_networks.push_back(ground);
-  const bool ground_moves = names[0] == ground;
-  std::vector<std::string> kinds;  // the moving neighbour's own kind first
-  if (!ground_moves) kinds.push_back(names[0]);
-  for (const auto& [name, weights] : parts) {
-    if (name.rfind("phi:", 0) == 0 && name != ground && name != names[0]) kinds.push_back(name);
-  }
-  for (int j = ground_moves ? 0 : 1; j < neighbours && !kinds.empty(); ++j) {
-    target.other_networks.push_back(kinds[static_cast<std::size_t>(j) % kinds.size()]);
-  }
-  for (const std::string& name : target.other_networks) target.function.others.push_back(term(name));
-  return target;
-}
-
-/// Numbers of neighbours at which a set function is searched: more rarely steepen it further.
-constexpr int kMostNeighbours = 3;
-
-/// Rounds that keep the search of a function to seconds: a region costs about (weights) x (moving inputs).
-int default_rounds(const Network& network, const std::string& function) {
-  const std::map<std::string, const Weights*> parts = files::parts(network);
-  const std::vector<std::string> names = files::networks_of(function);
-  double weights = 0;
-  for (const std::string& name : names) {
-    for (const files::Layer& layer : parts.at(name)->layers)
-      weights += static_cast<double>(layer.weights.size());
-  }
-  constexpr double kPapersCost = 4.3e3 * 40;  // rho 40-40-40-40-1
-  const double cost = weights * parts.at(names[0])->inputs();
-  return static_cast<int>(
-      std::clamp(kDefaultSearchRounds * kPapersCost / cost, 2.0, 1.0 * kDefaultSearchRounds));
-}
-
-void search_lower(const Network& network, const CertifyOptions& options, std::uint64_t seed,
-                  CertifiedBound& bound) {
-  const bool is_set = files::networks_of(bound.function).size() == 2;
-  const int rounds = options.search_rounds.value_or(default_rounds(network, bound.function));
-  if (rounds == 0) return;
-  const int cases = is_set ? kMostNeighbours : 1;  // they share the rounds and the seconds
-  for (int neighbours = 1; neighbours <= cases; ++neighbours) {
-    SearchTarget target = search_target(network, bound.function, neighbours);
-    SlopeSearchOptions search;
-    search.seed = seed + static_cast<std::uint64_t>(neighbours) * 1000003;
-    search.rounds = (rounds + cases - 1) / cases;
-    search.seconds = options.search_seconds / cases;
-    search.cancelled = options.cancelled;
-    SlopeWitness found = search_slope(target.function, search);
-    bound.search_rounds += found.rounds_done;
-    if (!bound.witness || found.slope.value() > bound.witness->slope.value()) {
-      bound.witness = std::move(found);
-      bound.other_networks = std::move(target.other_networks);
+/// The law's bound from those of its terms.
+UpperBound bound_of(const Network& network, const LawClaim& law, const std::vector<CertifiedBound>& bounds) {
+  Neighbours neighbours = law.neighbours;
+  if (network.phi.count(files::kGroundKind) == 1) neighbours[files::kGroundKind] = 1;
+  std::vector<std::pair<UpperBound, int>> terms;
+  for (const auto& [kind, count] : neighbours) {
+    for (const CertifiedBound& bound : bounds) {
+      if (bound.function == "set:" + kind + ":" + law.rho && bound.block == law.block && bound.scale.empty())
+        terms.emplace_back(bound.upper, count);
     }
   }
+  if (terms.size() != neighbours.size())
+    throw std::logic_error("certify: a law lacks the bound of one of its terms");
+  return law_bound(law.law, terms);
 }
 
 }  // namespace
@@ -124,9 +71,14 @@ Certification certify(const Network& network, const CertifyOptions& options) {
       result.layers.push_back({name, layer.name, {}, std::nullopt});
     }
   }
-  for (const std::string& function : files::functions(network)) {
+  result.domain = options.domain;
+  for (Claim& claim : claims(network, options)) {
     result.bounds.emplace_back();
-    result.bounds.back().function = function;
+    static_cast<Claim&>(result.bounds.back()) = std::move(claim);
+  }
+  for (LawClaim& claim : law_claims(network, options)) {
+    result.laws.emplace_back();
+    static_cast<LawClaim&>(result.laws.back()) = std::move(claim);
   }
 
   const int total = static_cast<int>(layers.size() + 2 * result.bounds.size());
@@ -150,6 +102,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
 
   for (CertifiedBound& bound : result.bounds) {
     std::vector<UpperBound> norms;
+    if (!bound.scale.empty()) norms.emplace_back(*std::max_element(bound.scale.begin(), bound.scale.end()));
     for (const std::string& name : files::networks_of(bound.function)) {
       for (const CertifiedLayer& layer : result.layers) {
         if (layer.network == name) norms.push_back(layer.norm.norm.upper);
@@ -164,7 +117,8 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     CertifiedBound& bound = result.bounds[static_cast<std::size_t>(i % count)];
     if (i < count) {
       if (options.method != UpperMethod::kProduct) {
-        bound.sdp = sdp_bound(check::stages(network, bound.function), options.cancelled);
+        bound.sdp =
+            sdp_bound(check::stages(network, bound.function, bound.block, bound.scale), options.cancelled);
         const bool smaller = bound.sdp.proof && bound.sdp.proof->upper.value() < bound.product.value();
         if (bound.sdp.proof && (smaller || options.method == UpperMethod::kSdp)) {
           bound.upper = bound.sdp.proof->upper;
@@ -173,13 +127,33 @@ Certification certify(const Network& network, const CertifyOptions& options) {
           bound.sdp.proof.reset();
         }
       }
-      report("upper bound of " + bound.function);
+      report("upper bound of " + bound.function + " " + bound.block);
     } else {
-      search_lower(network, options, options.seed, bound);
-      report("lower bound of " + bound.function);
+      LowerBoundOptions lower = options.lower;
+      lower.cancelled = options.cancelled;
+      bound.lower = lower_bound(network, bound, options.domain, lower);
+      report("lower bound of " + bound.function + " " + bound.block);
     }
   });
+
+  for (CertifiedLaw& law : result.laws) law.upper = bound_of(network, law, result.bounds);
   return result;
+}
+
+UpperBound law_bound(LawKind law, const std::vector<std::pair<UpperBound, int>>& terms) {
+  check::Dyadic sum, sum_of_squares;
+  for (const auto& [bound, count] : terms) {
+    const check::Dyadic n = static_cast<double>(count), k = bound.value();
+    sum += n * k;
+    sum_of_squares += n * k * k;
+  }
+  const bool stacked = law == LawKind::kAllStacked;
+  double result = stacked ? std::sqrt(to_double(sum_of_squares)) : to_double(sum);
+  const auto is_enough = [&](double x) {
+    return stacked ? check::Dyadic(x) * x >= sum_of_squares : check::Dyadic(x) >= sum;
+  };
+  while (!is_enough(result)) result = std::nextafter(result, std::numeric_limits<double>::infinity());
+  return UpperBound(result);
 }
 
 }  // namespace swarmcert::lipschitz

@@ -2,15 +2,17 @@
 #pragma once
 
 #include <atomic>
-#include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lipschitz/bounds.h"
+#include "lipschitz/claims.h"
+#include "lipschitz/lower_bound.h"
 #include "lipschitz/sdp_bound.h"
-#include "lipschitz/slope_search.h"
 #include "lipschitz/spectral_norm.h"
 #include "nn/files/json.h"
 #include "nn/files/network.h"
@@ -23,14 +25,10 @@ enum class UpperMethod {
   kSdp,      ///< LipSDP-Neuron
 };
 
-struct CertifyOptions {
+struct CertifyOptions : ClaimOptions {
   UpperMethod method = UpperMethod::kAuto;
-  std::optional<files::GammaStatement> gamma;  ///< overrides what network.toml states
-  std::uint64_t seed = 1;                      ///< of the search for lower bounds
-  /// Per function; 0: no lower bounds. Nothing: kDefaultSearchRounds, fewer for networks much larger than the paper's,
-  /// for which a round takes longer.
-  std::optional<int> search_rounds;
-  double search_seconds = 0;                     ///< per function; stops at the end of a round; 0: no limit
+  std::optional<files::GammaStatement> gamma;    ///< overrides what network.toml states
+  LowerBoundOptions lower;                       ///< its `cancelled` is taken from here below
   int jobs = 0;                                  ///< threads; 0: all. Results do not depend on it.
   const std::atomic<bool>* cancelled = nullptr;  ///< upper bounds found so far are kept
   std::function<void(int done, int total, const std::string& what)> progress;  ///< called from any thread
@@ -44,23 +42,26 @@ struct CertifiedLayer {
   std::optional<Verdict> respects_gamma;
 };
 
-struct CertifiedBound {
-  std::string function;  ///< "network", "phi:<kind>", "rho:<kind>" or "set:<phi kind>:<rho kind>"
-  UpperBound upper{
-      0};  ///< over all inputs, Euclidean norms; for a set: per neighbour that moves, any number of them
+struct CertifiedBound : Claim {
+  UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
-  std::optional<UpperProof> proof;      ///< where method is kSdp
-  UpperBound product{0};                ///< product of spectral norms, for comparison
-  SdpBound sdp;                         ///< how the semidefinite program went; its proof is moved to `proof`
-  std::optional<SlopeWitness> witness;  ///< proves the lower bound
-  int search_rounds = 0;                ///< that the search for it ran
-  std::vector<std::string> other_networks;  ///< of witness->others, "phi:<kind>" each
+  std::optional<UpperProof> proof;  ///< where method is kSdp
+  UpperBound product{0};            ///< product of spectral norms, for comparison
+  SdpBound sdp;                     ///< how the semidefinite program went; its proof is moved to `proof`
+  FoundSlope lower;                 ///< proves the lower bound
+};
+
+struct CertifiedLaw : LawClaim {
+  UpperBound upper{0};
 };
 
 struct Certification {
   std::optional<files::GammaStatement> gamma;
+  bool as_float32 = false;  ///< the network was rounded to float32 before; for the certificate
+  std::map<std::string, Box> domain;
   std::vector<CertifiedLayer> layers;
   std::vector<CertifiedBound> bounds;
+  std::vector<CertifiedLaw> laws;
 };
 
 /// How far from gamma a norm may lie, relatively, to count as equal to it: what float32 storage costs, and a little.
@@ -72,11 +73,19 @@ inline constexpr double kEqualTolerance = 0x1p-20;
 /// @param layers of the network that the layer belongs to.
 Verdict respects_gamma(const files::GammaStatement& gamma, const Enclosure& norm, std::size_t layers);
 
-/// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs; lower
-/// bounds are exact slopes between two float32 points. The clamp of NET, which never increases a distance, leaves the
-/// upper bounds valid.
-/// @throws std::invalid_argument if gamma is not positive.
+/// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
+/// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
+/// a distance, leaves the upper bounds valid.
+/// @throws std::invalid_argument if gamma is not positive, or as claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
+
+/// What the law gives from verified bounds of its terms, rounded up.
+/// @param terms bound of one neighbour and number of such neighbours.
+UpperBound law_bound(LawKind law, const std::vector<std::pair<UpperBound, int>>& terms);
+
+/// What a claim and a law say, without proofs: the fields that JSON results and certificates share.
+files::Json summary(const files::Network& network, const CertifiedBound& bound);
+files::Json summary(const files::Network& network, const CertifiedLaw& law);
 
 /// The certificate of what was found: everything that check::check() needs besides the weights.
 files::Json certificate(const files::Network& network, const Certification& certification);

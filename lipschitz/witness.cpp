@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 #include <string>
+
+#include "nn/files/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -198,7 +201,30 @@ double sqrt_down(const mpq_class& square) {
   return result;
 }
 
-mpq_class slope_squared(const SlopeFunction& f, const SlopePoints& points, const std::vector<int>& block) {
+SlopeFunction slope_function(const files::Network& network, const std::string& function,
+                             const std::vector<std::string>& others) {
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<std::string> names = files::networks_of(function);
+  const auto term = [&](const std::string& name) {
+    const bool clamped = network.clamp && files::is_clamped(name);
+    return Term{parts.at(name), clamped ? &*network.clamp : nullptr};
+  };
+  SlopeFunction f{term(names[0]), {}, names.size() == 2 ? parts.at(names[1]) : nullptr};
+  const std::string ground = std::string("phi:") + files::kGroundKind;
+  std::size_t grounds = names[0] == ground ? 1 : 0;
+  for (const std::string& name : others) {
+    if (name.rfind("phi:", 0) != 0) refuse(name + " is no neighbour");
+    grounds += name == ground ? 1 : 0;
+    f.others.push_back(term(name));
+  }
+  if (names.size() == 2 && grounds != parts.count(ground)) {
+    refuse("the ground network enters the sum exactly once");
+  }
+  return f;
+}
+
+mpq_class slope_squared(const SlopeFunction& f, const SlopePoints& points, const std::vector<int>& block,
+                        const std::vector<double>& scale) {
   check_function(f);
   check_point(points.x, f.moved, "x");
   check_point(points.y, f.moved, "y");
@@ -231,13 +257,23 @@ mpq_class slope_squared(const SlopeFunction& f, const SlopePoints& points, const
   }
   const DyadicVector* const sum = f.others.empty() ? nullptr : &others_sum;
   const mpq_class rise = squared_distance(evaluate(f, points.x, sum), evaluate(f, points.y, sum));
-  const mpq_class run = squared_distance(exactly({points.x.begin(), points.x.end()}),
-                                         exactly({points.y.begin(), points.y.end()}));
+  if (!scale.empty() && scale.size() != points.x.size()) refuse("scale needs one number per input");
+  mpq_class run = 0;
+  for (std::size_t k = 0; k < points.x.size(); ++k) {
+    mpq_class step =
+        mpq_class(static_cast<double>(points.x[k])) - mpq_class(static_cast<double>(points.y[k]));
+    if (!scale.empty()) {
+      if (!(scale[k] > 0) || std::isinf(scale[k])) refuse("scale is not positive");
+      step /= mpq_class(scale[k]);
+    }
+    run += step * step;
+  }
   return rise / run;
 }
 
-LowerBound slope(const SlopeFunction& f, const SlopePoints& points, const std::vector<int>& block) {
-  return LowerBound(sqrt_down(slope_squared(f, points, block)));
+LowerBound slope(const SlopeFunction& f, const SlopePoints& points, const std::vector<int>& block,
+                 const std::vector<double>& scale) {
+  return LowerBound(sqrt_down(slope_squared(f, points, block, scale)));
 }
 
 }  // namespace swarmcert::lipschitz

@@ -48,7 +48,7 @@ int run(const Options& options, const CommonOptions& common) {
   files::write_file(certificate_path, files::to_text(certificate(network, found)), common.force);
   for (const lipschitz::CertifiedBound& bound : found.bounds) {
     fmt::print("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}\n", bound.function,
-               bound.upper.value(), bound.witness ? bound.witness->slope.value() : 0.0,
+               bound.upper.value(), bound.lower.witness ? bound.lower.witness->slope.value() : 0.0,
                files::unit(network, bound.function));
   }
 

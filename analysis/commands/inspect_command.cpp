@@ -38,7 +38,7 @@ files::Json inspect_certificate(const std::string& path, bool print) {
   for (const files::Json& bound : certificate.value("bounds", files::Json::array())) {
     files::Json line = files::Json::object();
     for (const char* key :
-         {"function", "domain", "block", "law", "norm", "unit", "upper", "upper_method", "lower"}) {
+         {"function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_method", "lower"}) {
       if (bound.contains(key)) line[key] = bound[key];
     }
     if (print) fmt::print("  {}\n", line.dump());

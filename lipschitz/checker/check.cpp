@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "lipschitz/checker/lipschitz_lmi.h"
+#include "lipschitz/stages.h"
 #include "lipschitz/witness.h"
 #include "nn/files/content_hash.h"
 #include "nn/files/functions.h"
@@ -31,15 +32,9 @@ void require_keys(const Json& object, const std::set<std::string>& keys, const s
 /// A nonnegative number that stands once in decimal and once in hex: both must be the same double.
 double number(const Json& decimal, const Json& hex, const std::string& where) {
   const double value = files::parse_hex_float(hex.get<std::string>());
-  require(decimal.is_number() && decimal.get<double>() == value, where + ": decimal and hex notation differ");
-  require(value >= 0, where + ": negative");
+  require(decimal.is_number() && decimal.get<double>() == value && value >= 0,
+          where + ": negative, or decimal and hex notation differ");
   return value;
-}
-
-std::vector<double> hex_floats(const Json& array) {
-  std::vector<double> values;
-  for (const Json& text : array) values.push_back(files::parse_hex_float(text.get<std::string>()));
-  return values;
 }
 
 Dyadic squared_norm(const Matrix& m) {
@@ -72,50 +67,49 @@ void check_upper(const std::vector<Matrix>& chain, const Json& proof, double upp
                  const std::string& where) {
   require_keys(proof, {"rho", "t", "factor"}, where + ".proof");
   const Dyadic rho = files::parse_hex_float(proof["rho"].get<std::string>());
-  const std::vector<double> t = hex_floats(proof["t"]);
-  std::size_t neurons = 0;
-  for (std::size_t k = 0; k + 1 < chain.size(); ++k) neurons += static_cast<std::size_t>(chain[k].rows);
-  require(rho.sign() > 0, where + ": rho is not positive");
-  require(t.size() == neurons, where + ": needs one multiplier t per hidden neuron");
-  require(std::all_of(t.begin(), t.end(), [](double x) { return x >= 0; }), where + ": a t is negative");
+  const std::vector<double> t = files::parse_hex_floats(proof["t"]);
+  require(t.size() == hidden_neurons(chain), where + ": needs one multiplier t per hidden neuron");
+  require(rho.sign() > 0 && std::all_of(t.begin(), t.end(), [](double x) { return x >= 0; }),
+          where + ": rho is not positive, or a t negative");
   require(Dyadic(upper) * upper >= rho, where + ": claims less than sqrt(rho)");
   require(shows_positive_semidefinite(lipschitz_lmi(chain, rho, {t.begin(), t.end()}),
                                       parse_factor(proof["factor"], where + ".factor")),
           where + ": the factor does not show that the matrix inequality holds");
 }
 
-std::vector<float> floats(const Json& array, const std::string& where) {
-  const std::vector<double> values = hex_floats(array);
-  const std::vector<float> result(values.begin(), values.end());
-  require(std::equal(values.begin(), values.end(), result.begin()),
-          where + ": a coordinate is not a float32");
-  return result;
-}
-
 class Checker {
  public:
   Checker(const Json& certificate, const files::Network& network)
-      : certificate_(certificate), network_(network), parts_(files::parts(network)) {}
+      : certificate_(certificate),
+        network_(certificate.at("network").at("as") == "float32" ? files::as_float32(network) : network),
+        parts_(files::parts(network_)) {}
 
   CheckResult run() {
-    require_keys(certificate_,
-                 {"schema", "tool", "statement", "network", "layers", "bounds", "content_sha256"},
-                 "certificate");
+    require_keys(
+        certificate_,
+        {"schema", "tool", "statement", "network", "box", "layers", "bounds", "laws", "content_sha256"},
+        "certificate");
     require(certificate_["schema"] == kCertificateSchema, "schema is not " + std::string(kCertificateSchema));
     require(certificate_["statement"] == kStatement, "statement is not the one that is checked");
     require(certificate_["content_sha256"] == files::content_sha256(certificate_),
             "content_sha256 does not match: the certificate was changed after it was written");
     check_weights(certificate_["network"]);
-    check_layers();
+    for (const auto& [name, weights] : parts_)
+      for (const files::Layer& layer : weights->layers)
+        check_layer(certificate_["layers"].at(spectral_norms_), name, layer);
+    require(certificate_["layers"].size() == static_cast<std::size_t>(spectral_norms_),
+            "layers lists more than the networks have");
     require(!certificate_["bounds"].empty(), "bounds is empty");
     for (const Json& bound : certificate_["bounds"]) check_bound(bound);
+    for (const Json& law : certificate_["laws"]) check_law(law);
     return {true, "every statement verified in exact arithmetic", spectral_norms_, upper_bounds_,
             lower_bounds_};
   }
 
  private:
   void check_weights(const Json& named) {
-    require_keys(named, {"description_sha256", "weights"}, "network");
+    require_keys(named, {"description_sha256", "weights", "as"}, "network");
+    require(named["as"].is_null() || named["as"] == "float32", "network.as is unknown");
     require(named["description_sha256"] == network_.sha256,
             "network.description_sha256 is of another network.toml");
     require(named["weights"].size() == parts_.size(), "network.weights lists another number of networks");
@@ -127,15 +121,6 @@ class Checker {
     }
   }
 
-  void check_layers() {
-    std::size_t next = 0;
-    for (const auto& [name, weights] : parts_) {
-      for (const files::Layer& layer : weights->layers)
-        check_layer(certificate_["layers"].at(next++), name, layer);
-    }
-    require(certificate_["layers"].size() == next, "layers lists more layers than the networks have");
-  }
-
   void check_layer(const Json& entry, const std::string& network, const files::Layer& layer) {
     const std::string where = "layer " + network + " " + layer.name;
     require_keys(entry, {"network", "name", "spectral_norm", "spectral_norm_hex", "proof"}, where);
@@ -145,108 +130,128 @@ class Checker {
     const double upper = number(entry["spectral_norm"].at(1), entry["spectral_norm_hex"].at(1), where);
     require_keys(entry["proof"], {"lower_vector", "upper"}, where + ".proof");
     const Matrix w(layer.outputs, layer.inputs, layer.weights);
-    const std::vector<double> vector = hex_floats(entry["proof"]["lower_vector"]);
+    const std::vector<double> vector = files::parse_hex_floats(entry["proof"]["lower_vector"]);
     const Matrix v(static_cast<int>(vector.size()), 1, vector);
     require(v.rows == w.cols && squared_norm(v).sign() > 0, where + ": unusable lower_vector");
     require(squared_norm(product(w, v)) >= Dyadic(lower) * lower * squared_norm(v),
             where + ": claims more than |W v| / |v|");
     check_upper({w}, entry["proof"]["upper"], upper, where);
-    norms_[network + " " + layer.name] = upper;
+    norms_[network] = norms_.emplace(network, 1.0).first->second * upper;
     ++spectral_norms_;
   }
 
   void check_bound(const Json& bound) {
     require_keys(bound,
-                 {"function", "domain", "block", "law", "norm", "unit", "upper", "upper_hex", "upper_method",
-                  "lower", "lower_hex", "lower_witness", "proof"},
+                 {"function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_hex",
+                  "upper_method", "lower", "lower_hex", "lower_witness", "proof"},
                  "bound");
     const std::string function = bound["function"].get<std::string>();
-    const std::string where = "bound " + function;
-    const std::vector<Matrix> chain = stages(network_, function);
+    const std::string block = bound["block"].get<std::string>();
+    const std::string where = "bound " + function + " " + block;
+    const std::vector<std::string> names = files::networks_of(function);
+    const std::vector<double> scale = files::parse_hex_floats(bound["scale"]);
+    require(std::all_of(scale.begin(), scale.end(), [](double x) { return x > 0; }),
+            where + ": scale is not positive");
     const std::map<std::string, std::string> meaning = {
-        {"domain", "global"},
-        {"block", "all"},
-        {"norm", "l2"},
-        {"unit", files::unit(network_, function)},
-        {"law", files::networks_of(function).size() == 2 ? "one_neighbour" : "none"}};
+        {"domain", bound["domain"] == "box" && certificate_["box"].is_object() ? "box" : "global"},
+        {"norm", scale.empty() ? "l2" : "weighted_l2"},
+        {"unit", files::unit(network_, function, block)},
+        {"law", names.size() == 2 ? "one_neighbour" : "none"}};
     for (const auto& [key, text] : meaning)
       require(bound[key] == text, where + ": " + key + " is not " + text);
     const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
     if (bound["upper_method"] == "sdp") {
-      check_upper(chain, bound["proof"], upper, where);
+      check_upper(stages(network_, function, block, scale), bound["proof"], upper, where);
     } else {
       require(bound["upper_method"] == "product" && bound["proof"].is_null(),
               where + ": unknown upper_method");
-      Dyadic total = 1.0;
-      for (const std::string& name : files::networks_of(function)) {
-        for (const files::Layer& layer : parts_.at(name)->layers)
-          total = total * norms_.at(name + " " + layer.name);
-      }
+      Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
+      for (const std::string& name : names) total = total * norms_.at(name);
       require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
     }
+    if (scale.empty()) proved_[function + " " + block] = upper;
     ++upper_bounds_;
-    if (bound["lower"].is_null()) {
-      require(bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
-              where + ": lower has no value");
-      return;
-    }
+    if (bound["lower_witness"].is_null())
+      return require(bound["lower"].is_null() && bound["lower_hex"].is_null(),
+                     where + ": lower without a witness");
     const double lower = number(bound["lower"], bound["lower_hex"], where + " lower");
-    check_lower(bound["lower_witness"], files::networks_of(function), lower, where + ": lower_witness");
+    check_lower(bound, lower, scale, where + ": lower_witness");
     ++lower_bounds_;
   }
 
-  lipschitz::Term term(const std::string& name) const {
-    const bool clamped = network_.clamp && files::is_clamped(name);
-    return {parts_.at(name), clamped ? &*network_.clamp : nullptr};
-  }
-
-  /// |f(x) - f(y)| >= lower |x - y|. In a set function (two names) one neighbour moves from x to y, the others stay.
-  void check_lower(const Json& witness, const std::vector<std::string>& names, double lower,
+  /// |f(x) - f(y)| >= lower |x - y|. In a set function one neighbour moves from x to y, the others stay.
+  void check_lower(const Json& bound, double lower, const std::vector<double>& scale,
                    const std::string& where) const {
+    const Json& witness = bound["lower_witness"];
     require_keys(witness, {"x", "y", "others"}, where);
-    lipschitz::SlopeFunction f{term(names[0]), {}, names.size() == 2 ? parts_.at(names[1]) : nullptr};
-    lipschitz::SlopePoints points{floats(witness["x"], where), floats(witness["y"], where), {}};
-    std::size_t grounds = names[0] == "phi:ground" ? 1 : 0;
+    const std::string function = bound["function"].get<std::string>();
+    const auto point = [&](const Json& array, const std::string& part) {
+      const std::vector<double> values = files::parse_hex_floats(array);
+      const std::vector<float> result(values.begin(), values.end());
+      require(std::equal(values.begin(), values.end(), result.begin()),
+              where + ": a coordinate is not a float32");
+      if (bound["domain"] == "box") {
+        const std::vector<double> lower_end =
+            files::parse_hex_floats(certificate_["box"].at(part).at("lower"));
+        const std::vector<double> upper_end =
+            files::parse_hex_floats(certificate_["box"].at(part).at("upper"));
+        for (std::size_t k = 0; k < values.size(); ++k)
+          require(lower_end.at(k) <= values[k] && values[k] <= upper_end.at(k),
+                  where + ": a point is outside of the box");
+      }
+      return result;
+    };
+    const std::string moved = files::networks_of(function).front();
+    lipschitz::SlopePoints points{point(witness["x"], moved), point(witness["y"], moved), {}};
+    std::vector<std::string> others;
     for (const Json& other : witness["others"]) {
       require_keys(other, {"network", "x"}, where + ".others");
-      const std::string name = other["network"].get<std::string>();
-      require(name.rfind("phi:", 0) == 0, where + ".others: " + name + " is no neighbour");
-      grounds += name == "phi:ground" ? 1 : 0;
-      f.others.push_back(term(name));
-      points.others.push_back(floats(other["x"], where));
+      others.push_back(other["network"].get<std::string>());
+      points.others.push_back(point(other["x"], others.back()));
     }
-    require(names.size() == 1 || grounds == parts_.count("phi:ground"),
-            where + ": the ground network enters the sum exactly once");
-    require(mpq_class(lower) * mpq_class(lower) <= lipschitz::slope_squared(f, points),
+    const mpq_class square = lipschitz::slope_squared(
+        lipschitz::slope_function(network_, function, others), points,
+        files::block_coordinates(network_, function, bound["block"].get<std::string>()), scale);
+    require(mpq_class(lower) * mpq_class(lower) <= square,
             where + ": claims more than the slope between x and y");
   }
 
+  /// Several terms of the sum move: by the triangle inequality one after the other, each by its one_neighbour bound.
+  /// Not by single coordinates: those of the ground are others than those of a neighbour.
+  void check_law(const Json& law) {
+    require_keys(law, {"rho", "neighbours", "block", "law", "upper", "upper_hex"}, "law");
+    const std::string rho = law["rho"].get<std::string>(), block = law["block"].get<std::string>();
+    const std::string where = "law of " + rho + " " + block;
+    const double upper = number(law["upper"], law["upper_hex"], where + " upper");
+    std::map<std::string, long> terms = law["neighbours"].get<std::map<std::string, long>>();
+    require(terms.count(files::kGroundKind) == 0, where + ": the ground is no neighbour");
+    if (parts_.count(std::string("phi:") + files::kGroundKind) == 1) terms[files::kGroundKind] = 1;
+    Dyadic sum, sum_of_squares;
+    for (const auto& [kind, count] : terms) {
+      require(1 <= count && count <= 1000000, where + ": impossible number of neighbours");
+      const Dyadic n = static_cast<double>(count);
+      const Dyadic& k = proved_.at("set:" + kind + ":" + rho + " " + block);
+      sum += n * k;
+      sum_of_squares += n * k * k;
+    }
+    require(law["block"] == "all" || law["block"] == "position" || law["block"] == "velocity",
+            where + ": no law for this block");
+    const bool stacked = law["law"] == "all_stacked";
+    require(stacked || law["law"] == "all_max" || law["law"] == "own_state", where + ": unknown law");
+    require(stacked ? Dyadic(upper) * upper >= sum_of_squares : Dyadic(upper) >= sum,
+            where + ": claims less than the law gives");
+    ++upper_bounds_;
+  }
+
   const Json& certificate_;
-  const files::Network& network_;
+  const files::Network network_;
   std::map<std::string, const Weights*> parts_;
-  std::map<std::string, Dyadic> norms_;  ///< verified upper ends, by "<network> <layer>"
+  std::map<std::string, Dyadic> norms_;   ///< product of the verified norms, by network
+  std::map<std::string, Dyadic> proved_;  ///< verified upper bounds, by "<function> <block>"
   int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0;
 };
 
 }  // namespace
-
-std::vector<Matrix> stages(const files::Network& network, const std::string& function) {
-  const std::map<std::string, const Weights*> parts = files::parts(network);
-  std::vector<Matrix> chain;
-  for (const std::string& name : files::networks_of(function)) {
-    bool joins = !chain.empty();  // the first layer of rho acts on the last of phi
-    for (const files::Layer& layer : parts.at(name)->layers) {
-      const Matrix w(layer.outputs, layer.inputs, layer.weights);
-      if (joins) {
-        chain.back() = product(w, chain.back());
-      } else {
-        chain.push_back(w);
-      }
-      joins = false;
-    }
-  }
-  return chain;
-}
 
 CheckResult check(const Json& certificate, const files::Network& network) {
   try {

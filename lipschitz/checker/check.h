@@ -5,23 +5,12 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
-#include "lipschitz/checker/dyadic.h"
+#include "lipschitz/statement.h"
 #include "nn/files/json.h"
 #include "nn/files/network.h"
 
 namespace swarmcert::check {
-
-inline constexpr const char* kCertificateSchema = "swarmcert/certificate/1";
-
-/// What a certificate of this schema states, in words.
-inline constexpr const char* kStatement =
-    "ReLU networks with the weights stored in the files named by sha256. Every bound holds in exact "
-    "arithmetic: "
-    "|f(x) - f(y)| <= upper |x - y| for all x and y, and |f(x) - f(y)| >= lower |x - y| at the witness. In a "
-    "set "
-    "function one neighbour moves from x to y, whatever the number and the places of the others.";
 
 struct CheckResult {
   bool accepted = false;
@@ -32,14 +21,9 @@ struct CheckResult {
 };
 
 /// Verifies every statement of `certificate` against the weights of `network`: content hash; no unknown field; the
-/// named weights; each spectral norm from both sides; each upper bound by its linear
-/// matrix inequality (lipschitz_lmi.h) or as product of norms verified before; each lower bound by the exact slope
-/// between its two witness points. A malformed certificate is answered with a reason, not with an exception.
+/// named weights; each spectral norm from both sides; each upper bound by its linear matrix inequality
+/// (lipschitz_lmi.h), as product of norms, or by a law from bounds verified before; each lower bound by the exact
+/// slope between its two witness points. A malformed certificate is answered with a reason, not with an exception.
 CheckResult check(const files::Json& certificate, const files::Network& network);
-
-/// M_1 .. M_K of `function` ("network", "phi:<kind>", "rho:<kind>", "set:<phi kind>:<rho kind>"), exactly. In a set
-/// function the last layer of phi and the first of rho, which no ReLU separates, are one stage: their product.
-/// @throws std::out_of_range if NET has no such function.
-std::vector<Matrix> stages(const files::Network& network, const std::string& function);
 
 }  // namespace swarmcert::check

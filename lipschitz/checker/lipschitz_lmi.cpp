@@ -26,6 +26,12 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return c;
 }
 
+std::size_t hidden_neurons(const std::vector<Matrix>& stages) {
+  std::size_t neurons = 0;
+  for (std::size_t k = 0; k + 1 < stages.size(); ++k) neurons += static_cast<std::size_t>(stages[k].rows);
+  return neurons;
+}
+
 Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const std::vector<Dyadic>& t) {
   const std::size_t hidden = stages.size() - 1;
   const Matrix& first = stages.front();

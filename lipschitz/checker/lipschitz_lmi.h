@@ -18,6 +18,9 @@ struct Factor {
 /// A B.
 Matrix product(const Matrix& a, const Matrix& b);
 
+/// Neurons between the stages: the multipliers that lipschitz_lmi() needs.
+std::size_t hidden_neurons(const std::vector<Matrix>& stages);
+
 /// The symmetric matrix whose positive semidefiniteness proves |f(x) - f(y)|_2 <= sqrt(rho) |x - y|_2 for the ReLU
 /// chain f = M_K relu( ... relu(M_1 x + b_1) ... ) + b_K with any biases (LipSDP-Neuron, Fazlyab et al. 2019).
 ///

@@ -29,6 +29,17 @@ std::vector<Scalar> converted(const std::vector<double>& values, const std::stri
 
 }  // namespace
 
+Weights as_float32(Weights weights) {
+  for (Layer& layer : weights.layers) {
+    const auto weight = converted<float>(layer.weights, weights.path, layer.name + ".weight");
+    const auto bias = converted<float>(layer.biases, weights.path, layer.name + ".bias");
+    layer.weights.assign(weight.begin(), weight.end());
+    layer.biases.assign(bias.begin(), bias.end());
+  }
+  weights.precision = Precision::kFloat32;
+  return weights;
+}
+
 template <typename Scalar>
 Evaluator<Scalar>::Evaluator(const Weights& weights) {
   arrays_.reserve(2 * weights.layers.size());

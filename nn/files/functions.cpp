@@ -25,6 +25,19 @@ std::string input_unit(const std::vector<std::string>& order) {
   return "(m, m/s)";
 }
 
+std::vector<std::string> ground_names() {
+  return {"minus_z_m", "minus_v_x_m_s", "minus_v_y_m_s", "minus_v_z_m_s"};
+}
+
+/// Names that show which inputs are positions and which velocities; empty where nobody knows.
+std::vector<std::string> input_names(const Network& network, const std::string& part, int inputs) {
+  if (part == std::string("phi:") + kGroundKind) return ground_names();
+  if (starts_with(part, "rho:")) return {};
+  if (!network.input_order.empty()) return network.input_order;
+  if (inputs != 6) return {};
+  return {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
+}
+
 }  // namespace
 
 std::map<std::string, const Weights*> parts(const Network& network) {
@@ -58,9 +71,51 @@ bool is_clamped(const std::string& name) {
   return name == "network" || (starts_with(name, "phi:") && name != std::string("phi:") + kGroundKind);
 }
 
-std::string unit(const Network& network, const std::string& function) {
+std::vector<int> block_coordinates(const Network& network, const std::string& function,
+                                   const std::string& block) {
+  const std::string first = networks_of(function).front();
+  const int inputs = parts(network).at(first)->inputs();
+  const std::vector<std::string> names = input_names(network, first, inputs);
+  std::vector<int> result;
+  for (int k = 0; k < inputs; ++k) {
+    const bool named = static_cast<std::size_t>(k) < names.size();
+    const bool is_velocity = named && ends_with(names[k], "_m_s");
+    const bool is_position = named && ends_with(names[k], "_m");
+    if (block == "all" || block == "x" + std::to_string(k) || (block == "position" && is_position) ||
+        (block == "velocity" && is_velocity)) {
+      result.push_back(k);
+    }
+  }
+  if (result.empty())
+    throw std::invalid_argument("block_coordinates: " + function + " has no block \"" + block + "\"");
+  return result;
+}
+
+std::vector<std::string> blocks(const Network& network, const std::string& function) {
+  const std::string first = networks_of(function).front();
+  const int inputs = parts(network).at(first)->inputs();
+  if (starts_with(first, "rho:") || inputs == 1) return {};
+  std::vector<std::string> result;
+  const std::vector<std::string> names = input_names(network, first, inputs);
+  const auto has = [&names](const char* suffix) {
+    return std::any_of(names.begin(), names.end(), [&](const auto& n) { return ends_with(n, suffix); });
+  };
+  if (has("_m") && has("_m_s")) result = {"position", "velocity"};
+  for (int k = 0; k < inputs; ++k) result.push_back("x" + std::to_string(k));
+  return result;
+}
+
+std::string unit(const Network& network, const std::string& function, const std::string& block) {
   const std::string output = network.output_unit.empty() ? "output" : network.output_unit;
-  const std::string input = input_unit(network.input_order);
+  const std::string first = networks_of(function).front();
+  std::vector<std::string> moved;  // stays empty where NET states no names: then their units are unknown
+  if (!network.input_order.empty()) moved = input_names(network, first, parts(network).at(first)->inputs());
+  if (block != "all" && !moved.empty()) {
+    std::vector<std::string> names;
+    for (const int k : block_coordinates(network, function, block)) names.push_back(moved.at(k));
+    moved = names;
+  }
+  const std::string input = input_unit(moved);
   if (starts_with(function, "phi:")) return "hidden/" + input;
   if (starts_with(function, "rho:")) return output + "/hidden";
   return output + "/" + input;

@@ -26,8 +26,19 @@ std::vector<std::string> functions(const Network& network);
 /// True if NET's input clamp acts on the input of part `name`: on every phi but the ground's, and on a plain network.
 bool is_clamped(const std::string& name);
 
-/// Unit of a Lipschitz constant of `function`, as far as NET states units: "gf/(m, m/s)", "gf/m" where all inputs
-/// are metres, "hidden/input" where nothing is stated.
-std::string unit(const Network& network, const std::string& function);
+/// Input coordinates of `function` that belong to `block`, ascending: "all"; "x<k>", the k-th alone, counted from 0;
+/// "position" and "velocity", the inputs whose names end in "_m" and "_m_s". Where NET does not name its inputs, six
+/// are taken as three of each; the ground's four are one position (-z) and three velocities.
+/// @throws std::invalid_argument if the function has no such block.
+std::vector<int> block_coordinates(const Network& network, const std::string& function,
+                                   const std::string& block);
+
+/// Every block of `function` besides "all": "position" and "velocity" where it has both, then each coordinate; none
+/// for a rho, whose inputs have no names, and for a function of one input.
+std::vector<std::string> blocks(const Network& network, const std::string& function);
+
+/// Unit of a Lipschitz constant of `function` with respect to `block`, as far as NET states units: "gf/(m, m/s)",
+/// "gf/m" where all inputs are metres, "hidden/input" where nothing is stated.
+std::string unit(const Network& network, const std::string& function, const std::string& block = "all");
 
 }  // namespace swarmcert::files

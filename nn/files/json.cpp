@@ -131,6 +131,12 @@ double parse_hex_float(const std::string& text) {
   return is_negative ? -value : value;
 }
 
+std::vector<double> parse_hex_floats(const Json& array) {
+  std::vector<double> values;
+  for (const Json& text : array) values.push_back(parse_hex_float(text.get<std::string>()));
+  return values;
+}
+
 Json parse_json(const std::string& text, const std::string& path) {
   const char* position = text.data();
   const auto here = [&] { return line_and_column(text, static_cast<std::size_t>(position - text.data())); };

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 namespace swarmcert::files {
 
@@ -14,6 +15,10 @@ std::string hex_float(double value);
 /// Inverse of hex_float() for finite values.
 /// @throws std::invalid_argument if `text` is not one complete, finite C99 hex float that a double holds exactly.
 double parse_hex_float(const std::string& text);
+
+/// The numbers of an array of hex floats.
+/// @throws std::invalid_argument as parse_hex_float(), Json::exception if an element is not text.
+std::vector<double> parse_hex_floats(const Json& array);
 
 /// Parses a JSON file and checks `schema`.
 /// @throws InputError with line and column if it is not JSON, not an object, or has another schema.

@@ -193,12 +193,26 @@ Network parse_network(const std::string& text, const std::string& path, const We
   return network;
 }
 
+Network as_float32(Network network) {
+  if (network.plain) network.plain = as_float32(std::move(*network.plain));
+  for (auto& [kind, weights] : network.phi) weights = as_float32(std::move(weights));
+  for (auto& [kind, weights] : network.rho) weights = as_float32(std::move(weights));
+  return network;
+}
+
 Network load_network(const NetworkArguments& arguments) {
   const bool is_pair = !arguments.phi.empty() && !arguments.rho.empty();
   if (arguments.file.empty() ? !is_pair : !(arguments.phi.empty() && arguments.rho.empty())) {
     throw std::invalid_argument("load_network: name one file, or a phi and a rho");
   }
   if (is_pair) return load_pair(arguments);
+  const bool names_a_key =
+      arguments.file.find('#') != std::string::npos && !std::filesystem::exists(arguments.file);
+  if (names_a_key) {
+    Network network;
+    network.plain = load_weights(arguments.file, arguments.key);
+    return network;
+  }
   const std::string bytes = read_file(arguments.file);
   if (is_network_toml(arguments.file, bytes)) {
     const WeightsLoader load = [&](const std::string& path) { return load_weights(path, arguments.key); };

@@ -63,6 +63,9 @@ struct NetworkArguments {
 /// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean.
 Network load_network(const NetworkArguments& arguments);
 
+/// as_float32() of every part.
+Network as_float32(Network network);
+
 /// Reads the weight file at a path.
 using WeightsLoader = std::function<Weights(const std::string& path)>;
 

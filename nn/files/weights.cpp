@@ -1,7 +1,11 @@
 #include "nn/files/weights.h"
 
+#include <filesystem>
+
+#include "nn/files/c_source.h"
 #include "nn/files/file_io.h"
 #include "nn/files/input_error.h"
+#include "nn/files/onnx.h"
 #include "nn/files/pth.h"
 #include "nn/files/safetensors.h"
 
@@ -9,7 +13,7 @@ namespace swarmcert::files {
 namespace {
 
 [[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
-  std::string what = "is neither a PyTorch state dict (.pth) nor safetensors";
+  std::string what = "is neither a PyTorch state dict (.pth), safetensors, ONNX nor generated C weights";
   std::string mend = "save one with torch.save(model.state_dict(), ...)";
   if (bytes.empty()) {
     what = "is empty";
@@ -23,6 +27,11 @@ namespace {
   throw InputError({path, "offset 0", "", "", what, mend});
 }
 
+void refuse_key(const std::string& key, const std::string& path, const std::string& format) {
+  if (key.empty()) return;
+  throw InputError({path, "", "--key", in_quotes(key), format + " files are not nested", "leave --key out"});
+}
+
 }  // namespace
 
 const char* name(Precision precision) { return precision == Precision::kFloat32 ? "float32" : "float64"; }
@@ -34,11 +43,13 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
   } else if (looks_like_pth_legacy(bytes)) {
     weights = parse_pth_legacy(bytes, path, key);
   } else if (looks_like_safetensors(bytes)) {
-    if (!key.empty()) {
-      throw InputError(
-          {path, "", "--key", in_quotes(key), "safetensors files are not nested", "leave --key out"});
-    }
+    refuse_key(key, path, "safetensors");
     weights = parse_safetensors(bytes, path);
+  } else if (looks_like_onnx(bytes)) {
+    refuse_key(key, path, "ONNX");
+    weights = parse_onnx(bytes, path);
+  } else if (looks_like_c_source(bytes)) {
+    weights = parse_c_source(bytes, path, key);
   } else {
     refuse_format(bytes, path);
   }
@@ -47,7 +58,14 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
 }
 
 Weights load_weights(const std::string& path, const std::string& key) {
-  return parse_weights(read_file(path), path, key);
+  const std::size_t mark = path.rfind('#');
+  if (mark == std::string::npos || mark + 1 == path.size() || std::filesystem::exists(path))
+    return parse_weights(read_file(path), path, key);
+  const std::string file = path.substr(0, mark);
+  if (!key.empty())
+    throw InputError(
+        {file, "", "--key", in_quotes(key), "the name of the file already names a key", "name one key"});
+  return parse_weights(read_file(file), file, path.substr(mark + 1));
 }
 
 }  // namespace swarmcert::files

@@ -38,10 +38,13 @@ struct Weights {
 };
 
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
-/// and legacy pickle, float32 and float64, strided views), safetensors.
+/// and legacy pickle, float32 and float64, strided views), safetensors, ONNX models that are a chain of linear layers,
+/// and the C source that the networks' authors generate.
 /// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`; layers follow one another in the
 /// file's own order. Safetensors has none: ours state it, those of others are taken by natural order of names.
-/// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top.
+/// @param path where no such file exists, "FILE#KEY" is FILE with the key KEY.
+/// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top. For C
+///   source: the name of one of its networks.
 /// @throws InputError for anything that is not such a network: it names offset, field, value and mend.
 Weights load_weights(const std::string& path, const std::string& key = "");
 
@@ -51,6 +54,11 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
 /// @throws InputError if the file exists and `overwrite` is false, or if the name of a layer is not UTF-8.
 void save_safetensors(const Weights& weights, const std::string& path, bool overwrite);
+
+/// Every number rounded to the nearest float32, ties to even: what a C compiler makes of a float64 file's numbers.
+/// A float32 network stays as it is.
+/// @throws InputError if a number is beyond the range of float32.
+Weights as_float32(Weights weights);
 
 /// The evaluator's view of a network, with the arrays it points to.
 /// In float each weight is rounded to nearest: for a float32 file that is exact.

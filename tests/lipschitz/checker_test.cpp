@@ -39,7 +39,7 @@ const Network& network() {
 
 lipschitz::CertifyOptions quick() {
   lipschitz::CertifyOptions options;
-  options.search_rounds = 1;
+  options.lower.rounds = 1;
   return options;
 }
 
@@ -248,7 +248,7 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
 TEST(Checker, AcceptsProductsAndRejectsThemBelowTheNorms) {
   lipschitz::CertifyOptions options = quick();
   options.method = lipschitz::UpperMethod::kProduct;
-  options.search_rounds = 0;
+  options.lower.rounds = 0;
   const Json products = lipschitz::certificate(network(), lipschitz::certify(network(), options));
   EXPECT_TRUE(check(products, network()).accepted) << check(products, network()).reason;
   Json changed = products;

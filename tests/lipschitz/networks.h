@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "lipschitz/checker/check.h"
+#include "lipschitz/stages.h"
 #include "lipschitz/sdp_bound.h"
 #include "nn/files/network.h"
 #include "nn/random_network.h"

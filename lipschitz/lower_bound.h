@@ -1,0 +1,39 @@
+/// @file Lower bounds for the claims about NET: which function is searched, with how many neighbours and for how long.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lipschitz/claims.h"
+#include "lipschitz/slope_search.h"
+#include "nn/files/network.h"
+
+namespace swarmcert::lipschitz {
+
+struct LowerBoundOptions {
+  std::uint64_t seed = 1;
+  /// Per claim; 0: no lower bounds. Nothing: kDefaultSearchRounds, fewer for networks much larger than the paper's,
+  /// for which a round takes longer.
+  std::optional<int> rounds;
+  double seconds = 0;  ///< per claim; stops at the end of a round; 0: no limit
+  const std::atomic<bool>* cancelled = nullptr;
+};
+
+/// Two points that prove a lower bound for a claim.
+struct FoundSlope {
+  std::optional<SlopeWitness> witness;      ///< nothing where no search ran or no two points exist
+  std::vector<std::string> other_networks;  ///< of witness->others, "phi:<kind>" each
+  int rounds = 0;
+};
+
+/// Searches for the steepest pair of points within the claim's block and domain, exactly as steep in the claim's norm
+/// as `slope` says. A set function is tried with one to three neighbours, of every kind and with the ground.
+/// @param domain the boxes of a claim whose domain is "box", by part.
+FoundSlope lower_bound(const files::Network& network, const Claim& claim,
+                       const std::map<std::string, Box>& domain, const LowerBoundOptions& options);
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,19 @@
+/// @file What a certificate of this schema states, in words: certify writes it, the checker insists on it.
+#pragma once
+
+namespace swarmcert::check {
+
+inline constexpr const char* kCertificateSchema = "swarmcert/certificate/1";
+
+inline constexpr const char* kStatement =
+    "ReLU networks with the weights stored in the files named by sha256, rounded to float32 where "
+    "`as` says so, and the input clamp of network.toml. Every bound holds in exact arithmetic: "
+    "|f(x) - f(y)| <= upper |x - y| for all x and y that differ in the block only, and "
+    "|f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x and y in the box. "
+    "So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
+    "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x "
+    "to y, whatever the number and the places of the others. Laws hold for the neighbours listed and "
+    "the ground's input where there is one: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, "
+    "|df| <= upper max |dx_j|; own_state, |df| <= upper |dx| where the vehicle's own state moves by dx.";
+
+}  // namespace swarmcert::check
