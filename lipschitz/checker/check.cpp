@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -16,17 +15,11 @@ namespace swarmcert::check {
 namespace {
 
 using files::Json;
+using files::require_keys;
 using files::Weights;
 
 void require(bool condition, const std::string& reason) {
   if (!condition) throw std::runtime_error(reason);
-}
-
-void require_keys(const Json& object, const std::set<std::string>& keys, const std::string& where) {
-  require(object.is_object(), where + " is not an object");
-  for (const auto& [key, value] : object.items())
-    require(keys.count(key) == 1, where + " has unknown field " + key);
-  for (const std::string& key : keys) require(object.contains(key), where + " lacks field " + key);
 }
 
 /// A nonnegative number that stands once in decimal and once in hex: both must be the same double.
@@ -51,8 +44,8 @@ Factor parse_factor(const Json& json, const std::string& where) {
   const auto small = [](long e) { return -8192 <= e && e <= 8192; };  // bounds the length of every integer
   require(small(factor.unit_exponent) && std::all_of(factor.scale.begin(), factor.scale.end(), small),
           where + ": exponent out of range");
-  for (const Json& row : json["rows"]) {
-    std::istringstream text(row.get<std::string>());
+  for (const std::string& row : json["rows"].get<std::vector<std::string>>()) {
+    std::istringstream text(row);
     factor.rows.emplace_back();
     for (std::string word; text >> word;) {
       require(word.size() <= 40, where + ": integer too long");
@@ -99,7 +92,8 @@ class Checker {
         check_layer(certificate_["layers"].at(spectral_norms_), name, layer);
     require(certificate_["layers"].size() == static_cast<std::size_t>(spectral_norms_),
             "layers lists more than the networks have");
-    require(!certificate_["bounds"].empty(), "bounds is empty");
+    require(certificate_["bounds"].is_array() && !certificate_["bounds"].empty(), "bounds is empty");
+    require(certificate_["laws"].is_array(), "laws is not an array");
     for (const Json& bound : certificate_["bounds"]) check_bound(bound);
     for (const Json& law : certificate_["laws"]) check_law(law);
     return {true, "every statement verified in exact arithmetic", spectral_norms_, upper_bounds_,
@@ -204,6 +198,7 @@ class Checker {
     const std::string moved = files::networks_of(function).front();
     lipschitz::SlopePoints points{point(witness["x"], moved), point(witness["y"], moved), {}};
     std::vector<std::string> others;
+    require(witness["others"].is_array(), where + ": others is not an array");
     for (const Json& other : witness["others"]) {
       require_keys(other, {"network", "x"}, where + ".others");
       others.push_back(other["network"].get<std::string>());

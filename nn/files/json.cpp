@@ -131,7 +131,18 @@ double parse_hex_float(const std::string& text) {
   return is_negative ? -value : value;
 }
 
+void require_keys(const Json& object, const std::set<std::string>& keys, const std::string& where) {
+  if (!object.is_object()) throw std::invalid_argument(where + " is not an object");
+  for (const auto& [key, value] : object.items()) {
+    if (keys.count(key) == 0) throw std::invalid_argument(where + " has unknown field " + key);
+  }
+  for (const std::string& key : keys) {
+    if (!object.contains(key)) throw std::invalid_argument(where + " lacks field " + key);
+  }
+}
+
 std::vector<double> parse_hex_floats(const Json& array) {
+  if (!array.is_array()) throw std::invalid_argument("parse_hex_floats: not an array");
   std::vector<double> values;
   for (const Json& text : array) values.push_back(parse_hex_float(text.get<std::string>()));
   return values;

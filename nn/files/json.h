@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,11 @@ std::string hex_float(double value);
 double parse_hex_float(const std::string& text);
 
 /// The numbers of an array of hex floats.
-/// @throws std::invalid_argument as parse_hex_float(), Json::exception if an element is not text.
+/// @throws std::invalid_argument if it is no array or as parse_hex_float(), Json::exception if an element is not text.
 std::vector<double> parse_hex_floats(const Json& array);
+
+/// @throws std::invalid_argument, with `where` in front, unless `object` is an object with exactly these keys.
+void require_keys(const Json& object, const std::set<std::string>& keys, const std::string& where);
 
 /// Parses a JSON file and checks `schema`.
 /// @throws InputError with line and column if it is not JSON, not an object, or has another schema.

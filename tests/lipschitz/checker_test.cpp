@@ -40,6 +40,11 @@ const Network& network() {
 lipschitz::CertifyOptions quick() {
   lipschitz::CertifyOptions options;
   options.lower.rounds = 1;
+  options.blocks = {"position"};
+  options.scale = {1, 1, 1, 2, 2, 2};
+  options.neighbours = 2;
+  options.domain["phi:small"] = {{-1, -1, -1, -2, -2, -2}, {1, 1, 1, 2, 2, 2}};
+  options.domain["phi:ground"] = {{-1, -2, -2, -2}, {1, 2, 2, 2}};
   return options;
 }
 
@@ -66,7 +71,7 @@ std::vector<std::string> leaves(const Json& document) {
 /// makes the factor too large.
 Json altered(const Json& value, const std::string& pointer) {
   if (value.is_null() || value.is_structured()) return 1;
-  if (pointer.find("/scale/") != std::string::npos) return value.get<long>() - 1;
+  if (pointer.find("/factor/scale/") != std::string::npos) return value.get<long>() - 1;
   if (value.is_boolean()) return !value.get<bool>();
   if (value.is_number_integer()) return value.get<long>() + 1;
   if (value.is_number()) return value.get<double>() * (1 - 1e-3);
@@ -85,8 +90,9 @@ TEST(Checker, AcceptsWhatCertifyWrote) {
   const check::CheckResult result = check(certificate(), network());
   EXPECT_TRUE(result.accepted) << result.reason;
   EXPECT_EQ(result.spectral_norms, 9);
-  EXPECT_EQ(result.upper_bounds, 8);  // 2 phi, 2 rho, 4 set functions
-  EXPECT_EQ(result.lower_bounds, 8);
+  EXPECT_EQ(result.upper_bounds,
+            29);  // 2 phi, 2 rho, 4 sets; position of 6; scaled 3; 2 rho x 2 blocks x 3 laws
+  EXPECT_EQ(result.lower_bounds, 17);
 }
 
 TEST(Checker, AcceptsItWhateverTheWhiteSpaceAndTheOrderOfMembers) {
@@ -117,6 +123,8 @@ TEST(Checker, RejectsEveryChangedFieldEvenWithAForgedContentHash) {
       continue;  // the one states nothing, the other is forged
     if (certificate()[Json::json_pointer(pointer)].is_null()) continue;
     if (certificate()[Json::json_pointer(pointer)].is_structured()) continue;
+    if (pointer.rfind("/box/", 0) == 0)
+      continue;  // a smaller box that holds the witnesses makes a true statement
     Json changed = certificate();
     Json& value = changed[Json::json_pointer(pointer)];
     value = altered(value, pointer);
@@ -147,7 +155,16 @@ TEST(Checker, RejectsAnyClaimBelowWhatIsProved) {
       ++tried;
     }
   }
-  EXPECT_EQ(tried, 32);
+  for (std::size_t i = 0; i < certificate()["laws"].size(); ++i) {
+    Json changed = certificate();
+    Json& law = changed["laws"][i];
+    const double claim = law["upper"].get<double>() * (1 - 1e-15);
+    law["upper"] = claim;
+    law["upper_hex"] = files::hex_float(claim);
+    EXPECT_FALSE(check(rehashed(changed), network()).accepted) << law["law"];
+    ++tried;
+  }
+  EXPECT_EQ(tried, 17 * 4 + 12);
 }
 
 TEST(Checker, RejectsASmallerRhoWithTheFactorAsItWas) {
@@ -208,14 +225,43 @@ TEST(Checker, RejectsHeavierWeightsUnderTheOldHash) {
 
 TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   int tried = 0;
-  const auto rejects = [&tried](const std::function<void(Json&)>& change) {
+  const auto rejects = [&tried](const std::function<void(Json&)>& change, const std::string& because = "") {
     Json changed = certificate();
     change(changed);
     const check::CheckResult result = check(rehashed(changed), network());
     EXPECT_FALSE(result.accepted) << "change number " << tried;
     EXPECT_FALSE(result.reason.empty());
+    EXPECT_NE(result.reason.find(because), std::string::npos) << result.reason;
     ++tried;
   };
+  const auto bound = [](Json& c, const char* block, bool scaled) -> Json& {
+    for (Json& one : c["bounds"])
+      if (one["function"] == "set:small:small" && one["block"] == block && one["scale"].empty() != scaled)
+        return one;
+    throw std::logic_error("no such bound");
+  };
+  rejects([](Json& c) { c["network"]["as"] = "float16"; }, "network.as is unknown");
+  rejects([](Json& c) { c["box"] = nullptr; }, "domain is not global");
+  rejects([](Json& c) { c["box"]["phi:small"]["upper"] = Json::array(); });
+  rejects(
+      [](Json& c) {
+        for (Json& x : c["box"]["phi:small"]["upper"]) x = "-0x1p+0";
+      },
+      "outside of the box");
+  rejects([&](Json& c) { bound(c, "position", false)["block"] = "all"; });
+  rejects([&](Json& c) { bound(c, "position", false)["block"] = "x7"; }, "has no block");
+  rejects([&](Json& c) { bound(c, "all", true)["scale"] = Json::array(); }, "norm is not l2");
+  rejects([&](Json& c) { bound(c, "all", true)["scale"].erase(0); }, "scale");
+  rejects([&](Json& c) { bound(c, "all", true)["scale"][0] = "0x0p+0"; }, "scale is not positive");
+  rejects([&](Json& c) { bound(c, "all", false)["law"] = "own_state"; }, "law is not one_neighbour");
+  rejects([](Json& c) { c["laws"][0]["law"] = "any"; }, "unknown law");
+  rejects([](Json& c) { c["laws"][0]["block"] = "x1"; });
+  rejects([](Json& c) { c["laws"][0]["neighbours"] = Json{{"nobody", 2}}; });
+  rejects([](Json& c) { c["laws"][0]["neighbours"] = Json{{"small", 0}}; }, "impossible number");
+  rejects([](Json& c) { c["laws"][0]["neighbours"] = Json{{"small", -2}}; }, "impossible number");
+  rejects([](Json& c) { c["laws"][0]["neighbours"]["ground"] = 1; }, "the ground is no neighbour");
+  rejects([](Json& c) { c["laws"][0]["rho"] = "nobody"; });
+  rejects([](Json& c) { c["laws"][0].erase("rho"); }, "lacks field rho");
   rejects([](Json& c) { c["extra"] = 1; });
   rejects([](Json& c) { c.erase("statement"); });
   rejects([](Json& c) { c["layers"] = Json::array(); });
@@ -242,7 +288,23 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c["bounds"].back()["lower_witness"]["others"][0]["network"] = "rho:small"; });
   rejects([](Json& c) { c["layers"][0]["proof"]["lower_vector"].erase(0); });
   rejects([](Json& c) { c["schema"] = "swarmcert/certificate/2"; });
-  EXPECT_EQ(tried, 25);
+  EXPECT_EQ(tried, 43);
+}
+
+TEST(Checker, RoundsToFloat32WhereTheCertificateSaysSo) {
+  Network wide = network();
+  for (auto& [kind, weights] : wide.phi) {
+    weights.precision = files::Precision::kFloat64;
+    for (files::Layer& layer : weights.layers)
+      for (double& weight : layer.weights) weight *= 1 + 1e-9;  // more digits than float32 holds
+  }
+  lipschitz::Certification found = lipschitz::certify(files::as_float32(wide), quick());
+  found.as_float32 = true;
+  const Json as_float32 = lipschitz::certificate(files::as_float32(wide), found);
+  EXPECT_TRUE(check(as_float32, wide).accepted) << check(as_float32, wide).reason;
+  Json stored = as_float32;
+  stored["network"]["as"] = nullptr;
+  EXPECT_FALSE(check(rehashed(stored), wide).accepted);
 }
 
 TEST(Checker, AcceptsProductsAndRejectsThemBelowTheNorms) {

@@ -1,0 +1,807 @@
+#!/usr/bin/env python3
+"""A second checker of certificates, in another language and written from the mathematics: exact integers, standard
+library only. It shares no line with the C++ checker, reads the weight files itself, and must accept and reject the
+same certificates.
+
+    check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY]
+
+Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a weight file or network.toml that cannot be read.
+
+Every finite double is an integer times a power of two. A matrix is held as rows of integers with one exponent for all
+of them, so that sums and products of matrices are exact.
+"""
+import hashlib
+import json
+import math
+import pickle
+import re
+import struct
+import sys
+import tomllib
+import zipfile
+from collections import OrderedDict
+from fractions import Fraction
+from io import BytesIO
+from operator import mul
+from pathlib import Path
+
+STATEMENT = (
+    "ReLU networks with the weights stored in the files named by sha256, rounded to float32 where `as` says so, and the "
+    "input clamp of network.toml. Every bound holds in exact arithmetic: |f(x) - f(y)| <= upper |x - y| for all x and y "
+    "that differ in the block only, and |f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x "
+    "and y in the box. So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
+    "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x to y, whatever the "
+    "number and the places of the others. Laws hold for the neighbours listed and the ground's input where there is "
+    "one: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, |df| <= upper max |dx_j|; own_state, |df| <= upper "
+    "|dx| where the vehicle's own state moves by dx.")
+
+
+class Rejected(Exception):
+    pass
+
+
+def require(condition, reason):
+    if not condition:
+        raise Rejected(reason)
+
+
+def f32(x):
+    return struct.unpack("<f", struct.pack("<f", x))[0]
+
+
+# --- exact numbers -------------------------------------------------------------------------------------------------
+
+def dyadics(values):
+    """Doubles as integers over one power of two: (integers, exponent)."""
+    ratios = [x.as_integer_ratio() for x in values]
+    exponent = -max((d.bit_length() - 1 for _, d in ratios), default=0)
+    return [n << (-exponent - d.bit_length() + 1) for n, d in ratios], exponent
+
+
+class Matrix:
+    """rows[i][j] * 2^exponent."""
+
+    def __init__(self, rows, exponent):
+        self.rows, self.exponent = rows, exponent
+
+    @staticmethod
+    def of(values, columns):
+        integers, exponent = dyadics(values)
+        return Matrix([integers[i:i + columns] for i in range(0, len(integers), columns)], exponent)
+
+    def transposed(self):
+        return Matrix([list(c) for c in zip(*self.rows)], self.exponent)
+
+    def __matmul__(self, other):
+        columns = list(zip(*other.rows))
+        return Matrix([[sum(map(mul, r, c)) for c in columns] for r in self.rows], self.exponent + other.exponent)
+
+    def fraction(self, i, j):
+        return self.rows[i][j] * power(self.exponent)
+
+
+def power(exponent):
+    return Fraction(2) ** exponent
+
+
+def shifted(integer, by):
+    """integer * 2^by, which must be an integer."""
+    return integer << by if by >= 0 else integer >> -by
+
+
+# --- JSON ----------------------------------------------------------------------------------------------------------
+
+HEX_FLOAT = re.compile(r"-?0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,6})")
+
+
+def hex_float(text):
+    require(isinstance(text, str), "a hex float is not text")
+    match = HEX_FLOAT.fullmatch(text)
+    require(match is not None, f"{text!r} is not a hex float")
+    whole, fraction, exponent = match.groups()
+    mantissa = int(whole + (fraction or ""), 16)
+    if mantissa == 0:
+        return 0.0
+    require(abs(int(exponent)) < 5000 and len(whole + (fraction or "")) < 1000, f"{text!r} is not finite")
+    exact = mantissa * power(int(exponent) - 4 * len(fraction or ""))
+    try:
+        value = exact.numerator / exact.denominator
+    except OverflowError:
+        raise Rejected(f"{text!r} is not finite") from None
+    require(Fraction(value) == exact, f"{text!r} is not a double")
+    return -value if text[0] == "-" else value
+
+
+def listed(array):
+    require(isinstance(array, list), "an array is missing")
+    return array
+
+
+def hex_floats(array):
+    return [hex_float(text) for text in listed(array)]
+
+
+def is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def integer(value):
+    require(is_number(value), "a number is missing")
+    return int(value)
+
+
+def number(decimal, text, where):
+    value = hex_float(text)
+    require(is_number(decimal) and float(decimal) == value, f"{where}: decimal and hex notation differ")
+    require(value >= 0, f"{where}: negative")
+    return value
+
+
+def require_keys(value, keys, where):
+    require(isinstance(value, dict), f"{where} is not an object")
+    require(set(value) == set(keys), f"{where} has other fields: {sorted(set(value) ^ set(keys))}")
+
+
+def encode(value):
+    """The bytes that content_sha256 hashes: independent of white space and of the order of members."""
+    if value is None:
+        return b"n"
+    if isinstance(value, bool):
+        return b"t" if value else b"f"
+    if is_number(value):
+        return b"d%016x" % struct.unpack("<Q", struct.pack("<d", float(value)))[0]
+    if isinstance(value, str):
+        raw = value.encode()
+        return b"s%d:" % len(raw) + raw
+    if isinstance(value, list):
+        return b"[" + b"".join(map(encode, value)) + b"]"
+    members = sorted((key.encode(), member) for key, member in value.items())
+    return b"{" + b"".join(b"s%d:" % len(k) + k + encode(m) for k, m in members) + b"}"
+
+
+def content_sha256(document):
+    return hashlib.sha256(encode({k: v for k, v in document.items() if k != "content_sha256"})).hexdigest()
+
+
+# --- weight files --------------------------------------------------------------------------------------------------
+
+class Layer:
+    def __init__(self, name, outputs, inputs, weights, biases):
+        self.name, self.outputs, self.inputs, self.weights, self.biases = name, outputs, inputs, weights, biases
+
+    def rounded(self):
+        return Layer(self.name, self.outputs, self.inputs, list(map(f32, self.weights)), list(map(f32, self.biases)))
+
+
+class Weights:
+    def __init__(self, tensors, precision, data):
+        """tensors: (name, shape, numbers) in order, W as [outputs x inputs]."""
+        biases = {name[:-5].rstrip("."): numbers for name, shape, numbers in tensors if name.split(".")[-1] == "bias"}
+        self.layers = []
+        for name, shape, numbers in tensors:
+            if name.split(".")[-1] == "weight":
+                layer = name[:-7] if "." in name else ""
+                self.layers.append(Layer(layer, shape[0], shape[1], numbers, biases.get(layer, [0.0] * shape[0])))
+        assert self.layers and all(math.isfinite(x) for layer in self.layers for x in layer.weights + layer.biases)
+        assert all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:]))
+        self.precision, self.sha256 = precision, hashlib.sha256(data).hexdigest()
+
+    def round_to_float32(self):
+        self.layers = [layer.rounded() for layer in self.layers]
+        self.precision = "float32"
+
+
+def unpack(precision, data):
+    return list(struct.unpack(f"<{len(data) // (4 if precision == 'float32' else 8)}"
+                              f"{'f' if precision == 'float32' else 'd'}", data))
+
+
+class StorageType:
+    def __init__(self, name):
+        self.precision = {"FloatStorage": "float32", "DoubleStorage": "float64"}[name]
+
+
+class Tensor:
+    def __init__(self, storage, offset, shape, strides, *_):
+        self.storage, self.offset, self.shape, self.strides = storage, offset, shape, strides
+
+    def numbers(self, data):
+        """Row-major, from the storage's bytes."""
+        flat = unpack(self.storage[0].precision, data)
+        indices = [self.offset]
+        for size, stride in zip(self.shape, self.strides):
+            indices = [i + k * stride for i in indices for k in range(size)]
+        return [flat[i] for i in indices]
+
+
+class TorchUnpickler(pickle.Unpickler):
+    """An allow-list: nothing of the file is executed."""
+
+    def find_class(self, module, name):
+        if (module, name) == ("collections", "OrderedDict"):
+            return OrderedDict
+        if module == "torch._utils" and name == "_rebuild_tensor_v2":
+            return Tensor
+        if module == "torch._utils" and name == "_rebuild_parameter":
+            return lambda tensor, *_: tensor
+        if module == "torch" and name.endswith("Storage"):
+            return StorageType(name)
+        raise pickle.UnpicklingError(f"{module}.{name}")
+
+    def persistent_load(self, pid):
+        return pid[1], str(pid[2])
+
+
+def from_state_dict(state, key, storages, data):
+    for part in filter(None, key.split(".")):
+        state = state[part]
+    tensors = [(name, tensor.shape, tensor.numbers(storages(tensor.storage))) for name, tensor in state.items()]
+    return Weights(tensors, next(iter(state.values())).storage[0].precision, data)
+
+
+def read_zip(data, key):
+    archive = zipfile.ZipFile(BytesIO(data))
+    root = next(n for n in archive.namelist() if n.endswith("/data.pkl"))[:-8]
+    state = TorchUnpickler(BytesIO(archive.read(root + "data.pkl"))).load()
+    return from_state_dict(state, key, lambda storage: archive.read(f"{root}data/{storage[1]}"), data)
+
+
+def read_legacy(data, key):
+    file = BytesIO(data)
+    for _ in range(3):  # magic number, protocol, system
+        pickle.load(file)
+    state = TorchUnpickler(file).load()
+    names = pickle.load(file)
+    widths = {}
+
+    def collect(value):
+        for tensor in value.values():
+            if isinstance(tensor, dict):
+                collect(tensor)
+            else:
+                widths[tensor.storage[1]] = 4 if tensor.storage[0].precision == "float32" else 8
+    collect(state)
+    storages = {}
+    for name in names:
+        count = struct.unpack("<q", file.read(8))[0]
+        storages[str(name)] = file.read(count * widths[str(name)])
+    return from_state_dict(state, key, lambda storage: storages[storage[1]], data)
+
+
+def natural(text):
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", text)]
+
+
+def read_safetensors(data):
+    length = struct.unpack("<Q", data[:8])[0]
+    header = json.loads(data[8:8 + length])
+    order = json.loads(header.get("__metadata__", {}).get("swarmcert.layers", "null"))
+    names = [name for name in header if name != "__metadata__"]
+    layer = lambda name: name.rpartition(".")[0]
+    names.sort(key=(lambda n: order.index(layer(n))) if order is not None else (lambda n: natural(layer(n))))
+    tensors = []
+    for name in names:
+        begin, end = header[name]["data_offsets"]
+        precision = {"F32": "float32", "F64": "float64"}[header[name]["dtype"]]
+        tensors.append((name, header[name]["shape"], unpack(precision, data[8 + length + begin:8 + length + end])))
+    return Weights(tensors, precision, data)
+
+
+def varint(data, at):
+    value = shift = 0
+    while True:
+        byte = data[at]
+        at += 1
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            return value, at
+
+
+def protobuf(data):
+    """(field number, value) of a message; values of length-delimited and fixed fields are bytes."""
+    at = 0
+    while at < len(data):
+        tag, at = varint(data, at)
+        if tag & 7 == 0:
+            value, at = varint(data, at)
+            yield tag >> 3, value
+        else:
+            length, at = {1: (8, at), 5: (4, at)}.get(tag & 7) or varint(data, at)
+            yield tag >> 3, data[at:at + length]
+            at += length
+
+
+def integers_of(value):
+    """Of a repeated field, whether it came as one number or packed."""
+    if isinstance(value, int):
+        return [value]
+    result, at = [], 0
+    while at < len(value):
+        number_, at = varint(value, at)
+        result.append(number_)
+    return result
+
+
+def read_onnx(data):
+    def tensor(message):
+        fields = list(protobuf(message))
+        shape = [d for n, v in fields if n == 1 for d in integers_of(v)]
+        kind = next(v for n, v in fields if n == 2)
+        name = next((v.decode() for n, v in fields if n == 8), "")
+        raw = next((v for n, v in fields if n in (4, 9, 10)), b"")
+        return name, shape, kind, raw
+    graph = next(v for n, v in protobuf(data) if n == 7)
+    stored, tensors, transposed_of, names = {}, [], {}, set()
+    precision = None
+
+    def add(name, part, source, is_transposed):
+        nonlocal precision
+        _, shape, kind, raw = source
+        precision = {1: "float32", 11: "float64"}[kind]
+        numbers = unpack(precision, raw)
+        if is_transposed:
+            rows, columns = shape
+            shape, numbers = [columns, rows], [numbers[i * columns + j] for j in range(columns) for i in range(rows)]
+        if part == "bias" and len(shape) == 2:
+            shape = shape[1:]
+        tensors.append((f"{name}.{part}", shape, numbers))
+
+    def layer_name(weight):
+        name = weight[:-7] if weight.endswith(".weight") and len(weight) > 7 else weight
+        while not name or name in names:
+            name = f"layer{len(names) + 1}" + (f"_{name}" if name else "")
+        names.add(name)
+        return name
+    for number_, value in protobuf(graph):
+        if number_ == 5:
+            t = tensor(value)
+            stored[t[0]] = t
+    for number_, value in protobuf(graph):
+        if number_ != 1:
+            continue
+        fields = list(protobuf(value))
+        inputs = [v.decode() for n, v in fields if n == 1]
+        output = next(v.decode() for n, v in fields if n == 2)
+        kind = next(v.decode() for n, v in fields if n == 4)
+        attributes = {}
+        for n, v in fields:
+            if n == 5:
+                a = dict(protobuf(v))
+                attributes[a[1].decode()] = a
+        if kind == "Constant":
+            stored[output] = (output,) + tensor(attributes["value"][5])[1:]
+        elif kind == "Identity" and inputs[0] in stored:
+            stored[output] = (output,) + stored[inputs[0]][1:]
+        elif kind in ("Gemm", "MatMul"):
+            current = layer_name(stored[inputs[1]][0])
+            add(current, "weight", stored[inputs[1]], kind == "MatMul" or attributes.get("transB", {}).get(3, 0) == 0)
+            if len(inputs) == 3 and inputs[2]:
+                add(current, "bias", stored[inputs[2]], False)
+        elif kind == "Add":
+            add(current, "bias", stored[inputs[0] if inputs[0] in stored else inputs[1]], False)
+    return Weights(tensors, precision, data)
+
+
+def read_c_source(data, key):
+    text = re.sub(r"/\*.*?\*/|//[^\n]*|^\s*#[^\n]*", " ", data.decode("latin-1"), flags=re.S | re.M)
+    types = {m[1]: re.findall(r"(float|double)\s+(\w+)((?:\s*\[\s*\d+\s*\])+)\s*;", m[2])
+             for m in re.finditer(r"struct\s+(\w+)\s*\{([^{}]*)\}\s*;", text)}
+    objects = {m[2].removeprefix("weights_"): (m[1], m[3])
+               for m in re.finditer(r"struct\s+(\w+)\s+(\w+)\s*=\s*\{(.*?)\}\s*;", text, flags=re.S)}
+    tag, body = objects[key] if key else next(iter(objects.values()))
+    values = {m[1]: m[2] for m in re.finditer(r"\.(\w+)\s*=\s*([^.]*(?:\.(?![A-Za-z_])[^.]*)*)", body)}
+    tensors = []
+    for kind, member, dims in types[tag]:
+        shape = [int(d) for d in re.findall(r"\d+", dims)]
+        precision = "float32" if kind == "float" else "float64"
+        numbers = []
+        for literal, suffix in re.findall(r"(-?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)([fF]?)", values[member]):
+            # The suffix f rounds once: for the literals that programs print that gives the same float.
+            numbers.append(f32(float(literal)) if suffix or kind == "float" else float(literal))
+        if len(shape) == 2:
+            numbers = [numbers[i * shape[1] + j] for j in range(shape[1]) for i in range(shape[0])]
+            shape.reverse()
+        tensors.append((re.sub(r"_(weight|bias)$", r".\1", member), shape, numbers))
+    return Weights(tensors, precision, data)
+
+
+def read_weights(path, key=""):
+    path = str(path)
+    if "#" in path and not Path(path).exists():
+        path, key = path.rsplit("#", 1)
+    data = Path(path).read_bytes()
+    if data[:2] == b"PK":
+        return read_zip(data, key)
+    if data[:1] == b"\x80":
+        return read_legacy(data, key)
+    if data[8:9] == b"{":
+        return read_safetensors(data)
+    if data[:1] == b"\x08":
+        return read_onnx(data)
+    return read_c_source(data, key)
+
+
+class Network:
+    """parts by name ("network", "phi:<kind>", "rho:<kind>"), and what network.toml states."""
+
+    def __init__(self, net="", phi="", rho="", key=""):
+        self.sha256, self.unit, self.order, self.clamp = "", "", [], None
+        if phi:
+            self.parts = {"phi:default": read_weights(phi, key), "rho:default": read_weights(rho, key)}
+        elif net.endswith(".toml"):
+            data = Path(net).read_bytes()
+            document = tomllib.loads(data.decode())
+            self.sha256 = hashlib.sha256(data).hexdigest()
+            self.unit = document.get("output", {}).get("unit", "")
+            self.order = document.get("input", {}).get("order", [])
+            clamp = document.get("input", {}).get("clamp")
+            self.clamp = clamp and (clamp["lower"], clamp["upper"])
+            self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key)
+                          for role in ("phi", "rho") for kind, entry in sorted(document[role].items())}
+        else:
+            self.parts = {"network": read_weights(net, key)}
+
+    def input_names(self, part):
+        if part == "phi:ground":
+            return ["minus_z_m", "minus_v_x_m_s", "minus_v_y_m_s", "minus_v_z_m_s"]
+        if part.startswith("rho:"):
+            return []
+        six = ["dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"]
+        return self.order or (six if self.parts[part].layers[0].inputs == 6 else [])
+
+
+def networks_of(function):
+    if function == "network" or function[:4] in ("phi:", "rho:"):
+        return [function]
+    match = re.fullmatch(r"set:([^:]*):(.*)", function, flags=re.S)
+    require(match is not None, f"no function is called {function!r}")
+    return ["phi:" + match[1], "rho:" + match[2]]
+
+
+def block_coordinates(network, function, block):
+    part = networks_of(function)[0]
+    require(part in network.parts, f"there is no {part}")
+    names = network.input_names(part)
+    result = []
+    for k in range(network.parts[part].layers[0].inputs):
+        name = names[k] if k < len(names) else ""
+        if block in ("all", f"x{k}") or (block == "position" and name.endswith("_m")) or \
+                (block == "velocity" and name.endswith("_m_s")):
+            result.append(k)
+    require(result, f"{function} has no block {block!r}")
+    return result
+
+
+def unit_of(network, function, block):
+    part = networks_of(function)[0]
+    require(part in network.parts, f"there is no {part}")
+    names = network.input_names(part) if network.order else []
+    if names and block != "all":
+        names = [names[k] for k in block_coordinates(network, function, block)]
+    inputs = "input" if not names else "(m/s)" if all(n.endswith("_m_s") for n in names) else \
+        "m" if all(n.endswith("_m") for n in names) else "(m, m/s)"
+    output = network.unit or "output"
+    return f"hidden/{inputs}" if function.startswith("phi:") else \
+        f"{output}/hidden" if function.startswith("rho:") else f"{output}/{inputs}"
+
+
+# --- the mathematics -----------------------------------------------------------------------------------------------
+
+def stages(network, function, block, scale):
+    """The matrices between the ReLUs, from the block's inputs in units of their scale to the output."""
+    names = networks_of(function)
+    require(all(name in network.parts for name in names), f"there is no {function}")
+    inputs = network.parts[names[0]].layers[0].inputs
+    coordinates = block_coordinates(network, function, block)
+    require(not scale or len(scale) == inputs, "scale has another size")
+    selector = [0.0] * (inputs * len(coordinates))
+    for j, k in enumerate(coordinates):
+        selector[k * len(coordinates) + j] = scale[k] if scale else 1.0
+    chain = [Matrix.of(selector, len(coordinates))]
+    for name in names:
+        for index, layer in enumerate(network.parts[name].layers):
+            w = Matrix.of(layer.weights, layer.inputs)
+            if index == 0:
+                chain[-1] = w @ chain[-1]
+            else:
+                chain.append(w)
+    return chain
+
+
+def lmi(chain, rho, t):
+    """The matrix P(rho, t) over the hidden increments dz whose positive semidefiniteness gives |df|^2 <= rho |dx|^2:
+    from rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i dz_i (dy_i - dz_i) >= 0, minimised over dx and multiplied by rho."""
+    (rho_integer,), rho_exponent = dyadics([rho])
+    if len(chain) == 1:
+        m = chain[0]
+        small = m @ m.transposed() if len(m.rows) <= len(m.rows[0]) else m.transposed() @ m
+        exponent = min(small.exponent, rho_exponent)
+        rows = [[-shifted(x, small.exponent - exponent) for x in row] for row in small.rows]
+        for i, row in enumerate(rows):
+            row[i] += shifted(rho_integer, rho_exponent - exponent)
+        return Matrix(rows, exponent)
+    ts, t_exponent = dyadics(t)
+    n = len(t)
+    first, last = chain[0], chain[-1]
+    gram, output = first @ first.transposed(), last.transposed() @ last
+    exponents = [rho_exponent + t_exponent, 2 * t_exponent + gram.exponent, rho_exponent + output.exponent]
+    exponents += [rho_exponent + t_exponent + m.exponent for m in chain[1:-1]]
+    exponent = min(exponents)
+    p = [[0] * n for _ in range(n)]
+    for i in range(n):
+        p[i][i] += shifted(2 * rho_integer * ts[i], exponents[0] - exponent)
+    for i, row in enumerate(gram.rows):
+        for j, x in enumerate(row):
+            p[i][j] -= shifted(ts[i] * x * ts[j], exponents[1] - exponent)
+    before = 0
+    for m, e in zip(chain[1:-1], exponents[3:]):
+        begin = before + len(m.rows[0])
+        for i, row in enumerate(m.rows):
+            for j, x in enumerate(row):
+                p[begin + i][before + j] -= shifted(rho_integer * ts[begin + i] * x, e - exponent)
+                p[before + j][begin + i] = p[begin + i][before + j]
+        before = begin
+    for i, row in enumerate(output.rows):
+        for j, x in enumerate(row):
+            p[before + i][before + j] -= shifted(rho_integer * x, exponents[2] - exponent)
+    return Matrix(p, exponent)
+
+
+def shows_positive_semidefinite(p, unit, scale, rows):
+    """E = D P D - R R' is diagonally dominant with a nonnegative diagonal."""
+    n = len(p.rows)
+    if len(scale) != n or len(rows) != n or any(len(row) > i + 1 for i, row in enumerate(rows)):
+        return False
+    exponent = min(p.exponent + 2 * min(scale, default=0), 2 * unit)
+    first = [i + 1 - len(row) for i, row in enumerate(rows)]
+    slack = [0] * n
+    for i in range(n):
+        for j in range(i + 1):
+            start = max(first[i], first[j])
+            gram = sum(map(mul, rows[i][start - first[i]:j + 1 - first[i]], rows[j][start - first[j]:]))
+            e = shifted(p.rows[i][j], p.exponent + scale[i] + scale[j] - exponent) - shifted(gram, 2 * unit - exponent)
+            if i == j:
+                slack[i] += e
+            else:
+                slack[i] -= abs(e)
+                slack[j] -= abs(e)
+    return all(s >= 0 for s in slack)
+
+
+def evaluate(weights, values, exponent):
+    """The network at integers times 2^exponent; exact."""
+    for k, layer in enumerate(weights.layers):
+        w = Matrix.of(layer.weights, layer.inputs)
+        biases, bias_exponent = dyadics(layer.biases)
+        low = min(w.exponent + exponent, bias_exponent)
+        values = [shifted(sum(map(mul, row, values)), w.exponent + exponent - low) + shifted(b, bias_exponent - low)
+                  for row, b in zip(w.rows, biases)]
+        exponent = low
+        if k + 1 < len(weights.layers):
+            values = [max(v, 0) for v in values]
+    return values, exponent
+
+
+def add(a, b):
+    exponent = min(a[1], b[1])
+    return [shifted(x, a[1] - exponent) + shifted(y, b[1] - exponent) for x, y in zip(a[0], b[0])], exponent
+
+
+# --- the checker ---------------------------------------------------------------------------------------------------
+
+class Checker:
+    def __init__(self, certificate, network):
+        self.c, self.network = certificate, network
+        self.norms, self.proved = {}, {}
+
+    def run(self):
+        require_keys(self.c, ["schema", "tool", "statement", "network", "box", "layers", "bounds", "laws",
+                              "content_sha256"], "certificate")
+        require(self.c["schema"] == "swarmcert/certificate/1", "another schema")
+        require(self.c["statement"] == STATEMENT, "another statement")
+        require(self.c["content_sha256"] == content_sha256(self.c), "content_sha256 does not match")
+        self.check_network(self.c["network"])
+        expected = [(name, layer) for name in sorted(self.network.parts) for layer in self.network.parts[name].layers]
+        require(len(self.c["layers"]) == len(expected), "layers does not list every layer")
+        for entry, (name, layer) in zip(self.c["layers"], expected):
+            self.check_layer(entry, name, layer)
+        require(len(listed(self.c["bounds"])) > 0, "bounds is empty")
+        for bound in self.c["bounds"]:
+            self.check_bound(bound)
+        for law in listed(self.c["laws"]):
+            self.check_law(law)
+
+    def check_network(self, named):
+        require_keys(named, ["description_sha256", "as", "weights"], "network")
+        require(named["as"] in (None, "float32"), "network.as is unknown")
+        if named["as"] == "float32":
+            for weights in self.network.parts.values():
+                weights.round_to_float32()
+        require(named["description_sha256"] == self.network.sha256, "another network.toml")
+        require(set(named["weights"]) == set(self.network.parts), "other networks")
+        for name, weights in self.network.parts.items():
+            require(named["weights"][name] == {"sha256": weights.sha256, "precision": weights.precision},
+                    f"network.weights.{name} is of another file")
+
+    def check_layer(self, entry, name, layer):
+        where = f"layer {name} {layer.name}"
+        require_keys(entry, ["network", "name", "spectral_norm", "spectral_norm_hex", "proof"], where)
+        require((entry["network"], entry["name"]) == (name, layer.name), f"{where} is not where it is expected")
+        lower, upper = (number(entry["spectral_norm"][i], entry["spectral_norm_hex"][i], where) for i in (0, 1))
+        require_keys(entry["proof"], ["lower_vector", "upper"], where)
+        vector = hex_floats(entry["proof"]["lower_vector"])
+        require(len(vector) == layer.inputs and any(vector), f"{where}: unusable lower_vector")
+        w, v = Matrix.of(layer.weights, layer.inputs), Matrix.of(vector, 1)
+        square = lambda m: (m.transposed() @ m).fraction(0, 0)
+        require(square(w @ v) >= Fraction(lower) ** 2 * square(v), f"{where}: claims more than |W v| / |v|")
+        self.check_upper([w], entry["proof"]["upper"], upper, where)
+        self.norms[name] = self.norms.get(name, 1) * Fraction(upper)
+
+    def check_upper(self, chain, proof, upper, where):
+        require_keys(proof, ["rho", "t", "factor"], where)
+        rho, t, factor = hex_float(proof["rho"]), hex_floats(proof["t"]), proof["factor"]
+        require(rho > 0 and all(x >= 0 for x in t), f"{where}: rho is not positive, or a t negative")
+        require(len(t) == sum(len(m.rows) for m in chain[:-1]), f"{where}: needs one t per hidden neuron")
+        require(Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
+        require_keys(factor, ["unit_exponent", "scale", "rows"], where)
+        unit, scale = integer(factor["unit_exponent"]), [integer(s) for s in listed(factor["scale"])]
+        require(all(abs(e) <= 8192 for e in [unit] + scale), f"{where}: exponent out of range")
+        rows = []
+        for text in listed(factor["rows"]):
+            require(isinstance(text, str), f"{where}: a row is not text")
+            words = [w for w in re.split("[ \t\n\v\f\r]+", text) if w]
+            require(all(len(w) <= 40 and re.fullmatch("-?[0-9]+", w) for w in words), f"{where}: not an integer")
+            rows.append([int(w) for w in words])
+        require(shows_positive_semidefinite(lmi(chain, rho, t), unit, scale, rows),
+                f"{where}: the factor does not show that the matrix inequality holds")
+
+    def check_bound(self, bound):
+        require_keys(bound, ["function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_hex",
+                             "upper_method", "lower", "lower_hex", "lower_witness", "proof"], "bound")
+        function, block = bound["function"], bound["block"]
+        require(isinstance(function, str) and isinstance(block, str), "bound: a name is not text")
+        where = f"bound {function} {block}"
+        names, scale = networks_of(function), hex_floats(bound["scale"])
+        require(all(s > 0 for s in scale), f"{where}: scale is not positive")
+        boxed = bound["domain"] == "box"
+        require(isinstance(self.c["box"], dict) if boxed else bound["domain"] == "global", f"{where}: unknown domain")
+        require(bound["norm"] == ("weighted_l2" if scale else "l2"), f"{where}: another norm")
+        require(bound["unit"] == unit_of(self.network, function, block), f"{where}: another unit")
+        require(bound["law"] == ("one_neighbour" if len(names) == 2 else "none"), f"{where}: another law")
+        upper = number(bound["upper"], bound["upper_hex"], where)
+        if bound["upper_method"] == "sdp":
+            self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where)
+        else:
+            require(bound["upper_method"] == "product" and bound["proof"] is None, f"{where}: unknown upper_method")
+            require(all(name in self.norms for name in names), f"{where}: no such function")
+            total = Fraction(max(scale)) if scale else Fraction(1)
+            for name in names:
+                total *= self.norms[name]
+            require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
+        if not scale:
+            self.proved[function, block] = Fraction(upper)
+        if bound["lower_witness"] is None:
+            require(bound["lower"] is None and bound["lower_hex"] is None, f"{where}: lower without a witness")
+            return
+        lower = number(bound["lower"], bound["lower_hex"], where)
+        self.check_lower(bound, Fraction(lower), scale, boxed, where)
+
+    def point(self, array, part, boxed, where):
+        values = hex_floats(array)
+        require(part in self.network.parts and len(values) == self.network.parts[part].layers[0].inputs,
+                f"{where}: a point of another size")
+        require(all(abs(x) <= 3.5e38 and f32(x) == x for x in values), f"{where}: a coordinate is not a float32")
+        if boxed:
+            require(part in self.c["box"], f"{where}: no box for {part}")
+            low, high = (hex_floats(self.c["box"][part][side]) for side in ("lower", "upper"))
+            require(len(low) >= len(values) and len(high) >= len(values), f"{where}: the box is too small")
+            require(all(a <= x <= b for a, x, b in zip(low, values, high)), f"{where}: a point is outside of the box")
+        return values
+
+    def term(self, part, values):
+        if self.network.clamp and (part == "network" or (part.startswith("phi:") and part != "phi:ground")):
+            low, high = self.network.clamp
+            values = [float(min(max(x, a), b)) for x, a, b in zip(values, low, high)]
+        return evaluate(self.network.parts[part], *dyadics(values))
+
+    def check_lower(self, bound, lower, scale, boxed, where):
+        witness, function = bound["lower_witness"], bound["function"]
+        names = networks_of(function)
+        require_keys(witness, ["x", "y", "others"], where)
+        x, y = (self.point(witness[key], names[0], boxed, where) for key in "xy")
+        others = []
+        for other in listed(witness["others"]):
+            require_keys(other, ["network", "x"], where)
+            require(len(names) == 2 and str(other["network"]).startswith("phi:"), f"{where}: no neighbour")
+            others.append((other["network"], self.point(other["x"], other["network"], boxed, where)))
+        if len(names) == 2:
+            grounds = [n for n in [names[0]] + [o for o, _ in others] if n == "phi:ground"]
+            require(len(grounds) == ("phi:ground" in self.network.parts), f"{where}: the ground enters exactly once")
+        block = block_coordinates(self.network, function, bound["block"])
+        require(all(a == b for k, (a, b) in enumerate(zip(x, y)) if k not in block), f"{where}: leaves its block")
+        run = sum(((Fraction(a) - Fraction(b)) / (Fraction(s) if scale else 1)) ** 2
+                  for a, b, s in zip(x, y, scale or x))
+        require(run > 0, f"{where}: x == y")
+        require(not scale or len(scale) == len(x), f"{where}: scale has another size")
+        outputs = []
+        for moved in (x, y):
+            value = self.term(names[0], moved)
+            for part, fixed in others:
+                value = add(value, self.term(part, fixed))
+            outputs.append(evaluate(self.network.parts[names[1]], *value) if len(names) == 2 else value)
+        difference, exponent = add(outputs[0], ([-v for v in outputs[1][0]], outputs[1][1]))
+        rise = sum(v * v for v in difference) * power(2 * exponent)
+        require(lower ** 2 * run <= rise, f"{where}: claims more than the slope between x and y")
+
+    def check_law(self, law):
+        require_keys(law, ["rho", "neighbours", "block", "law", "upper", "upper_hex"], "law")
+        where = f"law of {law['rho']} {law['block']}"
+        upper = Fraction(number(law["upper"], law["upper_hex"], where))
+        require(isinstance(law["neighbours"], dict), f"{where}: neighbours is not an object")
+        require("ground" not in law["neighbours"], f"{where}: the ground is no neighbour")
+        terms = dict(law["neighbours"])
+        if "phi:ground" in self.network.parts:
+            terms["ground"] = 1
+        require(law["block"] in ("all", "position", "velocity"), f"{where}: no law for this block")
+        total = squares = Fraction(0)
+        for kind, count in terms.items():
+            require(1 <= integer(count) <= 1000000, f"{where}: impossible number of neighbours")
+            key = (f"set:{kind}:{law['rho']}", law["block"])
+            require(key in self.proved, f"{where}: no bound of {key[0]}")
+            total += integer(count) * self.proved[key]
+            squares += integer(count) * self.proved[key] ** 2
+        require(law["law"] in ("all_stacked", "all_max", "own_state"), f"{where}: unknown law")
+        require(upper ** 2 >= squares if law["law"] == "all_stacked" else upper >= total,
+                f"{where}: claims less than the law gives")
+
+
+def check(certificate, network):
+    """"" if accepted, else why not. A malformed certificate is answered with a reason, not with an exception."""
+    try:
+        Checker(certificate, network).run()
+    except Rejected as reason:
+        return str(reason)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as fault:
+        return f"malformed: {type(fault).__name__} {fault}"
+    return ""
+
+
+def unique(pairs):
+    if len({key for key, _ in pairs}) != len(pairs):
+        raise ValueError("a key appears twice")
+    return dict(pairs)
+
+
+def refuse_constant(text):
+    raise ValueError(f"{text} is not JSON")
+
+
+def parse(text):
+    return json.loads(text, object_pairs_hook=unique, parse_constant=refuse_constant)
+
+
+def main(arguments):
+    options, positional = {}, []
+    while arguments:
+        word = arguments.pop(0)
+        if word in ("--phi", "--rho", "--key") and arguments:
+            options[word[2:]] = arguments.pop(0)
+        else:
+            positional.append(word)
+    if len(positional) != (1 if "phi" in options else 2):
+        print(__doc__.strip(), file=sys.stderr)
+        return 2
+    try:
+        network = Network(*positional[1:], **options)
+        certificate = parse(Path(positional[0]).read_text())
+    except Exception as fault:  # whatever it is: this file cannot be read
+        print(f"cannot be read: {type(fault).__name__} {fault}", file=sys.stderr)
+        return 3
+    reason = check(certificate, network)
+    print(f"rejected: {reason}" if reason else "accepted")
+    return 1 if reason else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,155 @@
+#!/usr/bin/env python3
+"""Runs both checkers over the same certificates: sound ones, and mutations of every part under a forged content hash.
+They must agree on each, and reject each mutation that makes a statement false.
+
+    check_certificate_test.py SWARMCERT SOURCE_DIR [MUTATIONS]
+"""
+import json
+import random
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from struct import pack
+
+import check_certificate as second
+
+SWARMCERT, SOURCE = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
+MUTATIONS = int(sys.argv[3]) if len(sys.argv) > 3 else 250
+
+
+def safetensors(sizes, generator):
+    """A network with random weights in float64, as safetensors."""
+    header, data = {}, b""
+    for k, (inputs, outputs) in enumerate(zip(sizes, sizes[1:])):
+        for part, shape in ("weight", [outputs, inputs]), ("bias", [outputs]):
+            count = outputs * inputs if part == "weight" else outputs
+            numbers = pack(f"<{count}d", *(generator.uniform(-1, 1) for _ in range(count)))
+            header[f"fc{k + 1}.{part}"] = {"dtype": "F64", "shape": shape,
+                                           "data_offsets": [len(data), len(data) + len(numbers)]}
+            data += numbers
+    text = json.dumps(header).encode()
+    return pack("<Q", len(text)) + text + data
+
+
+def heterogeneous(folder, generator):
+    """A network.toml with two kinds, ground, clamp and units."""
+    for name, sizes in (("small", [6, 5, 4]), ("large", [6, 4, 4, 4]), ("ground", [4, 5, 4]), ("rho", [4, 5, 1])):
+        (folder / f"{name}.safetensors").write_bytes(safetensors(sizes, generator))
+    (folder / "box.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1,-1,-1,-2,-2,-2]\nupper = [1,1,1,2,2,2]\n')
+    net = folder / "network.toml"
+    net.write_text("""schema = "swarmcert/network/1"
+output = { quantity = "force_z", unit = "gf" }
+[input]
+order = ["dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"]
+clamp = { lower = [-1,-1,-1,-2,-2,-2], upper = [1,1,1,2,2,2] }
+[phi.small]
+weights = "small.safetensors"
+[phi.large]
+weights = "large.safetensors"
+[phi.ground]
+weights = "ground.safetensors"
+[rho.small]
+weights = "rho.safetensors"
+""")
+    return net
+
+
+def leaves(value, path=()):
+    if isinstance(value, (dict, list)) and value:
+        for key, member in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from leaves(member, path + (key,))
+    else:
+        yield path
+
+
+def mutated(value, generator):
+    """Another value in its place: near it, of the same type, or of another."""
+    if isinstance(value, str) and value.startswith(("0x", "-0x")):
+        number = second.hex_float(value)
+        return generator.choice([(number * (1 - 2 ** -20)).hex(), (-number).hex(), (0.0).hex(), "0x1p5000", "1.5", ""])
+    if isinstance(value, str) and len(value) > 200:  # a row of a factor
+        return generator.choice([value + "7", value + " 1", value[:-2], "x" + value])
+    if isinstance(value, str):
+        return generator.choice([value + "x", value[1:], None, 3, []])
+    if isinstance(value, bool) or value is None:
+        return generator.choice([1, "text", {}, []])
+    if isinstance(value, (int, float)):
+        return generator.choice([value - 1, value + 1, value * (1 - 1e-6), -value - 1, None, "1", 10 ** 9])
+    return generator.choice([None, 1, "text"])
+
+
+def forged(certificate, path, generator):
+    changed = json.loads(json.dumps(certificate))
+    place = changed
+    for key in path[:-1]:
+        place = place[key]
+    how = generator.random()
+    if how < 0.8:
+        place[path[-1]] = mutated(place[path[-1]], generator)
+    elif how < 0.9:
+        del place[path[-1]]
+    elif isinstance(place, dict):
+        place["extra"] = 1
+    else:
+        place.append(place[path[-1]])
+    if path[0] != "content_sha256":
+        changed["content_sha256"] = second.content_sha256(changed)
+    return changed
+
+
+def first_checker(certificate, net, folder, number):
+    path = folder / f"mutation{number}.json"
+    path.write_text(json.dumps(certificate))
+    done = subprocess.run([SWARMCERT, "check", path, *net, "-q"], capture_output=True, text=True)
+    path.unlink()
+    assert done.returncode in (0, 1, 3), f"exit {done.returncode}: {done.stderr}"
+    if done.returncode == 3:
+        assert "schema" in done.stderr, done.stderr  # the file is none of its kind
+    return done.returncode == 0, done.stdout + done.stderr
+
+
+def arguments(net):
+    return dict(zip((a[2:] for a in net[::2]), net[1::2])) if net[0].startswith("--") else {"net": net[0]}
+
+
+def run():
+    generator = random.Random(1)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        demo = SOURCE / "nn/networks/demo"
+        hetero = str(heterogeneous(folder, generator))
+        nets = [([hetero], ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2", "--domain",
+                            str(folder / "box.toml")]),
+                ([hetero], ["--as", "float32", "--neighbours", "2", "--method", "product"]),
+                ([str(demo / "network.toml")], ["--blocks=position"]),
+                (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
+        tried = rejected = 0
+        for index, (net, options) in enumerate(nets):
+            path = folder / f"certificate{index}.json"
+            subprocess.run([SWARMCERT, "certify", *net, *options, "--nodes", "1", "-q", "-o", path],
+                           check=True, capture_output=True)
+            certificate = second.parse(path.read_text())
+            assert first_checker(certificate, net, folder, 0)[0]
+            reason = second.check(certificate, second.Network(**arguments(net)))
+            assert not reason, f"the second checker rejects a sound certificate: {reason}"
+            paths = list(leaves(certificate))
+            chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 0 else MUTATIONS // 5)]
+            changed = [forged(certificate, p, generator) for p in chosen]
+            with ThreadPoolExecutor(2) as pool:
+                first = list(pool.map(lambda i: first_checker(changed[i], net, folder, i), range(len(changed))))
+            for where, mutation, (accepted, said) in zip(chosen, changed, first):
+                other = second.check(mutation, second.Network(**arguments(net)))
+                assert accepted == (not other), f"{where}: first says {said!r}, second says {other!r}"
+                harmless = mutation == certificate or where[0] in ("tool", "box") or "factor" in where or \
+                    where[-1] in ("law", "neighbours")
+                assert harmless or not accepted or "t" in where, f"{where} was changed and both accept"
+                tried += 1
+                rejected += not accepted
+        print(f"{tried} mutated certificates: the checkers agree on each and reject {rejected}")
+        assert rejected > 0.9 * tried
+
+
+if __name__ == "__main__":
+    run()
