@@ -42,15 +42,25 @@ UpperBound bound_of(const Network& network, const LawClaim& law, const std::vect
 
 }  // namespace
 
-Verdict respects_gamma(const GammaStatement& gamma, const Enclosure& norm, std::size_t layers) {
-  const std::size_t exponent = gamma.scope == GammaStatement::Scope::kLayer ? 1 : layers;
+std::vector<Verdict> respects_gamma(const GammaStatement& gamma, const std::vector<Enclosure>& norms) {
   const double slack = gamma.mode == GammaStatement::Mode::kEqual ? kEqualTolerance : 0;
-  const check::Dyadic least = power(norm.lower.value(), exponent);
-  const check::Dyadic most = power(norm.upper.value(), exponent);
   const check::Dyadic ceiling = check::Dyadic(gamma.value) * (1 + slack);
   const check::Dyadic floor = slack > 0 ? check::Dyadic(gamma.value) * (1 - slack) : check::Dyadic();
-  if (ceiling >= most && least >= floor) return Verdict::kProved;
-  return ceiling >= least && most >= floor ? Verdict::kInconclusive : Verdict::kRefuted;
+  const auto verdict = [&](const check::Dyadic& least, const check::Dyadic& most) {
+    if (ceiling >= most && least >= floor) return Verdict::kProved;
+    return ceiling >= least && most >= floor ? Verdict::kInconclusive : Verdict::kRefuted;
+  };
+  const bool whole = gamma.scope == GammaStatement::Scope::kNetwork;
+  std::vector<Verdict> result;
+  check::Dyadic least(1.0), most(1.0);
+  for (const Enclosure& norm : norms) {
+    const std::size_t exponent = whole ? norms.size() : 1;
+    result.push_back(verdict(power(norm.lower.value(), exponent), power(norm.upper.value(), exponent)));
+    least = least * check::Dyadic(norm.lower.value());
+    most = most * check::Dyadic(norm.upper.value());
+  }
+  if (whole && gamma.mode == GammaStatement::Mode::kClip) result.assign(norms.size(), verdict(least, most));
+  return result;
 }
 
 const char* name(UpperMethod method) {
@@ -92,13 +102,21 @@ Certification certify(const Network& network, const CertifyOptions& options) {
 
   files::parallel_for(static_cast<int>(layers.size()), options.jobs, [&](int i) {
     CertifiedLayer& layer = result.layers[static_cast<std::size_t>(i)];
-    const std::size_t depth = parts.at(layer.network)->layers.size();
     std::optional<double> limit;
     if (result.gamma && result.gamma->scope == GammaStatement::Scope::kLayer) limit = result.gamma->value;
     layer.norm = spectral_norm(*layers[static_cast<std::size_t>(i)], limit);
-    if (result.gamma) layer.respects_gamma = respects_gamma(*result.gamma, layer.norm.norm, depth);
     report("spectral norm of " + layer.network + " " + layer.name);
   });
+
+  std::size_t next = 0;
+  for (const auto& [name, weights] : parts) {
+    std::vector<Enclosure> norms;
+    for (std::size_t k = 0; k < weights->layers.size(); ++k)
+      norms.push_back(result.layers[next + k].norm.norm);
+    for (std::size_t k = 0; result.gamma && k < norms.size(); ++k)
+      result.layers[next + k].respects_gamma = respects_gamma(*result.gamma, norms)[k];
+    next += norms.size();
+  }
 
   for (CertifiedBound& bound : result.bounds) {
     std::vector<UpperBound> norms;

@@ -67,11 +67,11 @@ struct Certification {
 /// How far from gamma a norm may lie, relatively, to count as equal to it: what float32 storage costs, and a little.
 inline constexpr double kEqualTolerance = 0x1p-20;
 
-/// Whether a layer's norm satisfies |W|_2 <= gamma (scope layer) or |W|_2^layers <= gamma (scope network: an equal
-/// share), and with mode kEqual also the converse, then both up to kEqualTolerance. Decided in exact arithmetic;
-/// inconclusive where the enclosure straddles the limit.
-/// @param layers of the network that the layer belongs to.
-Verdict respects_gamma(const files::GammaStatement& gamma, const Enclosure& norm, std::size_t layers);
+/// Whether the norms of one network's layers satisfy what was stated of gamma, layer by layer. Scope layer: |W|_2 <=
+/// gamma. Scope network, mode clip: the product of the norms is at most gamma; one verdict for all layers. Scope network,
+/// mode equal: each is the equal share, gamma^(1/layers). Mode equal asks for the converse as well, both up to
+/// kEqualTolerance. Decided in exact arithmetic; inconclusive where an enclosure straddles its limit.
+std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const std::vector<Enclosure>& norms);
 
 /// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases

@@ -223,6 +223,35 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
   return f;
 }
 
+std::vector<mpq_class> value(const files::Network& network, const std::string& function,
+                             const std::vector<std::string>& networks,
+                             const std::vector<std::vector<float>>& points) {
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<std::string> names = files::networks_of(function);
+  if (names.size() == 1 && networks.size() != 1) refuse("a plain network has one point");
+  if (networks.size() != points.size()) refuse("there is not one point per network");
+  DyadicVector sum;
+  sum.integers.resize(static_cast<std::size_t>(parts.at(names[0])->outputs()));
+  for (std::size_t j = 0; j < points.size(); ++j) {
+    const bool clamped = network.clamp && files::is_clamped(networks[j]);
+    const Term term{parts.at(networks[j]), clamped ? &*network.clamp : nullptr};
+    check_point(points[j], term, "point " + std::to_string(j));
+    add(sum, evaluate(term, points[j]));
+  }
+  if (names.size() == 2) sum = evaluate(*parts.at(names[1]), std::move(sum));
+  std::vector<mpq_class> result;
+  for (const mpz_class& integer : sum.integers) {
+    mpq_class exact(integer);
+    if (sum.exponent >= 0) {
+      mpq_mul_2exp(exact.get_mpq_t(), exact.get_mpq_t(), static_cast<mp_bitcnt_t>(sum.exponent));
+    } else {
+      mpq_div_2exp(exact.get_mpq_t(), exact.get_mpq_t(), static_cast<mp_bitcnt_t>(-sum.exponent));
+    }
+    result.push_back(exact);
+  }
+  return result;
+}
+
 mpq_class slope_squared(const SlopeFunction& f, const SlopePoints& points, const std::vector<int>& block,
                         const std::vector<double>& scale) {
   check_function(f);

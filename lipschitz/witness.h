@@ -42,6 +42,13 @@ struct SlopePoints {
 SlopeFunction slope_function(const files::Network& network, const std::string& function,
                              const std::vector<std::string>& others);
 
+/// The value of "network" at one point, or of a set function at the sum of its terms: exact. `networks` names the part
+/// of each point; a set function may have none.
+/// @throws std::invalid_argument or std::out_of_range as slope_function(), or if a point does not fit its network.
+std::vector<mpq_class> value(const files::Network& network, const std::string& function,
+                             const std::vector<std::string>& networks,
+                             const std::vector<std::vector<float>>& points);
+
 /// |f(x) - f(y)|_2^2 / |x - y|_2^2 for the weights as stored, as a rational number: nothing is rounded. By
 /// the definition of a Lipschitz constant its root is a lower bound on that of f over any convex set that
 /// holds x and y, whether or not they lie on kinks. With a `block`, x and y agree outside of it, so that the

@@ -5,17 +5,18 @@
 #include <memory>
 #include <sstream>
 
+#include "analysis/certify_output.h"
 #include "analysis/certify_report.h"
 #include "analysis/commands/command.h"
 #include "analysis/progress.h"
 #include "lipschitz/certify.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
+#include "nn/files/parallel.h"
 
 namespace swarmcert::analysis {
 namespace {
 
-using files::Json;
 using lipschitz::Certification;
 using lipschitz::CertifiedBound;
 using lipschitz::CertifiedLayer;
@@ -28,6 +29,9 @@ struct Options {
   std::string blocks;
   std::string neighbours;
   std::string domain;
+  bool range = false;
+  bool explain = false;
+  double input_step = 0;
   std::string output;
   std::string report;
   double gamma = 0;
@@ -64,133 +68,6 @@ Verdict judge(const Certification& found, double max_lipschitz) {
                                                             : Verdict::kInconclusive);
   }
   return all_of(verdicts);
-}
-
-Json witness_json(const CertifiedBound& bound) {
-  if (!bound.lower.witness) return nullptr;
-  Json others = Json::array();
-  for (std::size_t j = 0; j < bound.lower.witness->others.size(); ++j) {
-    others.push_back({{"network", bound.lower.other_networks[j]}, {"x", bound.lower.witness->others[j]}});
-  }
-  return {{"x", bound.lower.witness->x}, {"y", bound.lower.witness->y}, {"others", std::move(others)}};
-}
-
-Json result_json(const Options& options, const files::Network& network, const Certification& found,
-                 Verdict verdict) {
-  Json layers = Json::array();
-  for (const CertifiedLayer& layer : found.layers) {
-    Json respects;
-    if (layer.respects_gamma == Verdict::kProved) respects = true;
-    if (layer.respects_gamma == Verdict::kRefuted) respects = false;
-    layers.push_back({{"network", layer.network},
-                      {"name", layer.name},
-                      {"spectral_norm", {layer.norm.norm.lower.value(), layer.norm.norm.upper.value()}},
-                      {"respects_gamma", respects}});
-  }
-  Json bounds = Json::array();
-  for (const CertifiedBound& bound : found.bounds) {
-    Json json = summary(network, bound);
-    json["lower_witness"] = witness_json(bound);
-    json["product_upper"] = bound.product.value();
-    json["search_rounds"] = bound.lower.rounds;
-    if (bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) json["sdp_stop"] = name(bound.sdp.stop);
-    bounds.push_back(std::move(json));
-  }
-  for (const lipschitz::CertifiedLaw& law : found.laws) bounds.push_back(summary(network, law));
-  Json result = result_head("certify", input_files(network));
-  result["seed"] = options.certify.lower.seed;
-  result["as"] = found.as_float32 ? Json("float32") : Json();
-  result["gamma"] = found.gamma ? Json(found.gamma->value) : Json();
-  result["max_lipschitz"] = options.max_lipschitz > 0 ? Json(options.max_lipschitz) : Json();
-  result["layers"] = std::move(layers);
-  result["bounds"] = std::move(bounds);
-  result["verdict"] = name(verdict);
-  return result;
-}
-
-std::string sizes(const files::Weights& weights) {
-  std::string text = std::to_string(weights.inputs());
-  for (const files::Layer& layer : weights.layers) text += "-" + std::to_string(layer.outputs);
-  return text;
-}
-
-void print_layers(const files::Network& network, const Certification& found) {
-  fmt::print("Spectral norms, enclosed from both sides in exact arithmetic\n");
-  for (const auto& [name, weights] : files::parts(network)) {
-    fmt::print("  {}  {}  ({}, {})\n", name, weights->path, sizes(*weights), files::name(weights->precision));
-    for (const CertifiedLayer& layer : found.layers) {
-      if (layer.network != name) continue;
-      const double lower = layer.norm.norm.lower.value();
-      const double upper = layer.norm.norm.upper.value();
-      std::string remark;
-      if (layer.respects_gamma) {
-        const double value = found.gamma->value;
-        const bool per_layer = found.gamma->scope == files::GammaStatement::Scope::kLayer;
-        const std::string limit =
-            per_layer ? fmt::format("gamma {}", value) : fmt::format("its share of gamma {}", value);
-        remark = *layer.respects_gamma == Verdict::kProved    ? "  within " + limit
-                 : *layer.respects_gamma == Verdict::kRefuted ? "  VIOLATES " + limit
-                                                              : "  too close to " + limit + " to tell";
-        if (per_layer && *layer.respects_gamma == Verdict::kRefuted)
-          remark += fmt::format(" by {:+.3g}", lower - value);
-      }
-      fmt::print("    {:<8} {:.15g} .. {:.15g}{}\n", layer.name, lower, upper, remark);
-    }
-  }
-}
-
-/// "set:small:large", "set:small:large position", "set:small:large scaled".
-std::string label(const CertifiedBound& bound) {
-  return bound.function + (bound.block == "all" ? "" : " " + bound.block) +
-         (bound.scale.empty() ? "" : " scaled");
-}
-
-void print_bounds(const files::Network& network, const Certification& found) {
-  std::size_t width = 8;
-  for (const CertifiedBound& bound : found.bounds) width = std::max(width, label(bound).size());
-  fmt::print("\nLipschitz constants over {}, Euclidean norms\n",
-             found.domain.empty() ? "all inputs" : "the box");
-  fmt::print("  {:<{}}  {:>14}  {:<7}  {:>12}  {:>14}  {:>6}  {}\n", "function", width, "proved upper",
-             "method", "product", "witnessed", "ratio", "unit");
-  for (const CertifiedBound& bound : found.bounds) {
-    const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
-    fmt::print("  {:<{}}  {:>14.10g}  {:<7}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
-               bound.upper.value(), name(bound.method), bound.product.value(),
-               bound.lower.witness ? fmt::format("{:.8g}", lower) : "-",
-               lower > 0 ? fmt::format("{:.3f}", bound.upper.value() / lower) : "-",
-               files::unit(network, bound.function, bound.block));
-    const bool unproved = !bound.proof && !bound.sdp.proof;
-    if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) {
-      fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
-                 name(bound.sdp.stop));
-    }
-  }
-  if (!network.rho.empty()) {
-    fmt::print("  set: per neighbour that moves, whatever the number and the places of the others\n");
-  }
-  const auto is_block = [](const CertifiedBound& bound) { return bound.block == "position"; };
-  if (std::any_of(found.bounds.begin(), found.bounds.end(), is_block))
-    fmt::print("  blocks add up: |df| <= L_position |dp| + L_velocity |dv|\n");
-}
-
-std::string label(const lipschitz::Neighbours& neighbours) {
-  std::string text;
-  for (const auto& [kind, count] : neighbours)
-    text += fmt::format("{}{} {}", text.empty() ? "" : " + ", count, kind);
-  return text;
-}
-
-void print_laws(const files::Network& network, const Certification& found) {
-  if (found.laws.empty()) return;
-  fmt::print("\nSeveral neighbours at once{}\n",
-             network.phi.count(files::kGroundKind) == 1 ? ", and the ground's input with them" : "");
-  for (const lipschitz::CertifiedLaw& law : found.laws) {
-    const char* meaning = law.law == lipschitz::LawKind::kAllStacked ? "|df| <= L sqrt(sum_j |dx_j|^2)"
-                          : law.law == lipschitz::LawKind::kAllMax   ? "|df| <= L max_j |dx_j|"
-                                                                     : "|df| <= L |d own state|";
-    fmt::print("  {:<24} rho:{:<8} {:<9} {:<11} {:>14.10g}  {}\n", label(law.neighbours), law.rho, law.block,
-               name(law.law), law.upper.value(), meaning);
-  }
 }
 
 /// "3": as many of each kind; "small=1,large=2": that group.
@@ -232,6 +109,43 @@ Certification certify_or_refuse(const files::Network& network, const lipschitz::
   }
 }
 
+void add_comparisons(const files::Network& network, const lipschitz::CertifyOptions& options,
+                     CertifyOutput& output) {
+  const std::vector<CertifiedBound>& bounds = output.found.bounds;
+  output.comparisons.resize(bounds.size());
+  files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
+    const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
+    if (bound.block == "all" && bound.scale.empty())
+      output.comparisons[static_cast<std::size_t>(i)] =
+          compare(network, bound.function, bound.block, bound.scale);
+  });
+}
+
+/// Range and float32 error over the box of --domain, or over what the clamp lets through.
+void add_ranges(const files::Network& network, const Options& options, CertifyOutput& output) {
+  const std::map<std::string, lipschitz::Box> domain =
+      options.domain.empty() ? lipschitz::clamp_domain(network) : options.certify.domain;
+  if (domain.empty()) throw UsageError("--range needs a box: give --domain, or a clamp in network.toml");
+  std::map<std::string, double> bounds, rho_bounds;
+  for (const CertifiedBound& bound : output.found.bounds) {
+    if (bound.block != "all" || !bound.scale.empty()) continue;
+    bounds[bound.function] = bound.upper.value();
+    if (bound.function.rfind("rho:", 0) == 0) rho_bounds[bound.function.substr(4)] = bound.upper.value();
+  }
+  lipschitz::RangeOptions range;
+  range.neighbours = std::max(1, options.certify.neighbours);
+  range.jobs = options.certify.jobs;
+  output.ranges = lipschitz::ranges(network, domain, rho_bounds, range);
+  for (const auto& [name, weights] : files::parts(network))
+    if (weights->precision != files::Precision::kFloat32)
+      return;  // what flies are other weights: --as float32
+  lipschitz::Float32Options float32;
+  float32.neighbours = range.neighbours;
+  float32.input_step = options.input_step;
+  float32.jobs = range.jobs;
+  output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
+}
+
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   refuse_to_replace(common, common.json);
@@ -255,17 +169,21 @@ int run(Options options, const CommonOptions& common) {
   const CancelOnInterrupt interrupt;
   options.certify.cancelled = interrupt.flag();
 
-  Certification found = certify_or_refuse(network, options.certify);
-  found.as_float32 = options.as == "float32";
-  const Verdict verdict = judge(found, options.max_lipschitz);
+  CertifyOutput output;
+  output.found = certify_or_refuse(network, options.certify);
+  output.found.as_float32 = options.as == "float32";
+  output.seed = options.certify.lower.seed;
+  output.max_lipschitz = options.max_lipschitz;
+  const Certification& found = output.found;
+  if (options.explain) add_comparisons(network, options.certify, output);
+  if (!options.domain.empty() || options.range) add_ranges(network, options, output);
+  const Verdict verdict = output.verdict = judge(found, options.max_lipschitz);
   if (!options.output.empty()) {
     files::write_file(options.output, files::to_text(certificate(network, found)), common.force);
   }
-  write_result(common, result_json(options, network, found, verdict));
+  write_result(common, certify_json(network, output));
   if (common.prints_text()) {
-    print_layers(network, found);
-    print_bounds(network, found);
-    print_laws(network, found);
+    print_certification(network, output);
     if (options.max_lipschitz > 0)
       fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
     if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
@@ -313,6 +231,13 @@ Command certify_command() {
             "Laws for several neighbours: a number of each kind, or a group such as small=1,large=2");
         app.add_option("--domain", options->domain,
                        "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
+        app.add_flag("--range", options->range,
+                     "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it");
+        app.add_option("--input-step", options->input_step,
+                       "Inputs are quantised to multiples of this (float32 error)")
+            ->check(CLI::NonNegativeNumber);
+        app.add_flag("--explain", options->explain,
+                     "Other bounds for comparison, and where the bound is lost");
         app.add_option("--gamma", options->gamma, "Limit that every layer's spectral norm must keep")
             ->check(CLI::PositiveNumber);
         app.add_option("--max-lipschitz", options->max_lipschitz,

@@ -6,6 +6,7 @@
 
 #include "nn/files/safetensors.h"
 #include "nn/files/weights.h"
+#include "nn/onnx_writer.h"
 #include "nn/pth_writer.h"
 
 namespace {
@@ -52,6 +53,18 @@ void add_weights(Corpus& corpus, const std::string& data) {
   corpus.add(with_key(0, small_legacy()));
   const swarmcert::files::Weights weights = swarmcert::files::parse_weights(small_zip(), "small");
   corpus.add(with_key(0, swarmcert::files::safetensors_bytes(weights)));
+
+  OnnxModel model;
+  model.nodes = {onnx_node("Gemm", {"x", "w", "b"}, {"h"}, {onnx_integer("transB", 1)}),
+                 onnx_node("Relu", {"h"}, {"r"}), onnx_node("MatMul", {"r", "v"}, {"m"}),
+                 onnx_node("Add", {"c", "m"}, {"y"})};
+  model.tensors = {onnx_raw("w", {2, 2}, {1, 2, 3, 4}), onnx_floats("b", {2}, {1, 2}),
+                   onnx_raw("v", {2, 1}, {1, 2}), onnx_raw("c", {1}, {3})};
+  corpus.add(with_key(0, model.bytes()));
+  corpus.add(
+      with_key(0,
+               "struct A {float fc1_weight[2][1]; float fc1_bias[1];}; static const struct A weights_A = "
+               "{.fc1_weight = {{1},{-2.5e0f}}, .fc1_bias = {.5},};"));
 
   std::vector<TensorSpec> tensors = small_tensors();
   for (TensorSpec& tensor : tensors) tensor.is_parameter = true;

@@ -265,6 +265,35 @@ TEST(Claims, WhatNoFunctionHasIsRefused) {
   EXPECT_THROW(law_claims(network, options), std::invalid_argument);
 }
 
+TEST(Gamma, IsJudgedAsItIsStated) {
+  using files::GammaStatement;
+  const auto norm = [](double lower, double upper) {
+    return Enclosure{LowerBound(lower), UpperBound(upper)};
+  };
+  const auto judged = [&](double value, GammaStatement::Scope scope, GammaStatement::Mode mode,
+                          const std::vector<Enclosure>& norms) {
+    return respects_gamma({value, scope, mode}, norms);
+  };
+  const auto layer = GammaStatement::Scope::kLayer;
+  const auto whole = GammaStatement::Scope::kNetwork;
+  const auto clip = GammaStatement::Mode::kClip;
+  const auto equal = GammaStatement::Mode::kEqual;
+  using Verdicts = std::vector<Verdict>;
+  const Verdict yes = Verdict::kProved;
+  const Verdict no = Verdict::kRefuted;
+  const Verdict unknown = Verdict::kInconclusive;
+  const std::vector<Enclosure> norms = {norm(2, 2), norm(8, 8)};
+  EXPECT_EQ(judged(4, layer, clip, norms), (Verdicts{yes, no}));
+  EXPECT_EQ(judged(16, whole, clip, norms), (Verdicts{yes, yes}));  // 2 * 8, though 8 is above its share of 4
+  EXPECT_EQ(judged(15.999, whole, clip, norms), (Verdicts{no, no}));
+  EXPECT_EQ(judged(16, whole, equal, norms), (Verdicts{no, no}));
+  EXPECT_EQ(judged(16, whole, equal, {norm(4, 4), norm(4 * (1 - 1e-8), 4)}), (Verdicts{yes, yes}));
+  EXPECT_EQ(judged(2, layer, equal, norms), (Verdicts{yes, no}));
+  EXPECT_EQ(judged(3, layer, equal, {norm(2.9, 2.95)}), (Verdicts{no}));
+  EXPECT_EQ(judged(3, layer, clip, {norm(2.9, 3.1)}), (Verdicts{unknown}));
+  EXPECT_EQ(judged(9, whole, clip, {norm(2.9, 3.1), norm(3, 3)}), (Verdicts{unknown, unknown}));
+}
+
 TEST(Domain, IsReadForEveryPartAndRefusedWithLineAndMend) {
   std::mt19937 generator(11);
   const Network network = mixed_network(generator);

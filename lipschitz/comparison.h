@@ -1,0 +1,58 @@
+/// @file Other upper bounds of a chain, the floor below all of them, and where the bound is lost.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lipschitz/bounds.h"
+#include "lipschitz/checker/dyadic.h"
+#include "lipschitz/lmi_proof.h"
+#include "nn/files/network.h"
+
+namespace swarmcert::lipschitz {
+
+/// Combettes and Pesquet 2020: ReLU is the mean of the identity and a reflection, so with M_ij = M_j ... M_{i+1}
+///   L <= 2^{1-K} c_K,  c_0 = 1,  c_j = sum_{i<j} c_i |M_ij|_2.
+/// Every norm is proved in exact arithmetic, the sum rounded up. Nothing where a norm could not be proved.
+std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& stages);
+
+/// ECLipsE-Fast, Xu and Sivaranjani 2024: LipSDP with one multiplier per layer in closed form; X_0 = I,
+///   tau_k = 1 / |M_k X_{k-1}^{-1} M_k'|_2,  X_k = 2 tau_k I - tau_k^2 M_k X_{k-1}^{-1} M_k'.
+/// The multipliers are then proved like those of the semidefinite program. Costs a few factorisations.
+std::optional<UpperProof> eclipse_fast(const std::vector<check::Matrix>& stages);
+
+/// The steepest ReLU pattern that was found, whether or not an input reaches it: |M_K D_{K-1} ... D_1 M_1|_2 with D_k
+/// diagonal of zeros and ones. No bound that ignores which patterns are reachable can lie below the largest such norm;
+/// what is found is a floor for them up to floating point, and no bound itself.
+struct PatternFloor {
+  Estimate slope{0};
+  /// Along the top singular direction of that product: |M_k z| / |z|, and |D_k y| / |y|. Their product is `slope`.
+  std::vector<double> gains;       ///< [K]
+  std::vector<double> relu_gains;  ///< [K - 1]
+};
+
+/// Alternating maximisation over layers from `starts` random patterns, then single flips; deterministic.
+PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts = 24, std::uint64_t seed = 1);
+
+/// What one stage of a function loses: its norm over its gain along the steepest pattern, at least 1.
+struct StageLoss {
+  std::string name;  ///< "fc2", "fc4 of phi with fc1 of rho"
+  double norm = 0;   ///< spectral norm, rounded
+  double gain = 0;
+  double loss() const { return gain > 0 ? norm / gain : 0; }
+};
+
+struct Comparison {
+  std::optional<UpperBound> combettes_pesquet;
+  std::optional<UpperProof> eclipse_fast;
+  PatternFloor floor;
+  std::vector<StageLoss> stages;
+};
+
+/// All of the above for one function and block of NET.
+Comparison compare(const files::Network& network, const std::string& function, const std::string& block,
+                   const std::vector<double>& scale);
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,304 @@
+#include "lipschitz/float32_error.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <queue>
+#include <stdexcept>
+
+#include "lipschitz/range.h"
+#include "lipschitz/reach.h"
+#include "lipschitz/sdp_bound.h"
+#include "lipschitz/stages.h"
+#include "nn/files/functions.h"
+#include "nn/files/parallel.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using files::Network;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnit = 0x1p-24;
+const std::string kGround = std::string("phi:") + files::kGroundKind;
+
+/// All sums here are of numbers that are not negative, with far fewer than 2^20 operations: their rounding in double is
+/// below this relative amount.
+double safely(double x) { return std::isnan(x) ? kInfinity : x * (1 + 0x1p-30) + 1e-300; }
+
+double gamma(Index n) {
+  const double nu = static_cast<double>(n) * kUnit;
+  return safely(nu / (1 - nu));
+}
+
+/// Proved bounds of what follows each layer of a chain: tails[k] for an error in y_k, the last one 1. A chain that is cut
+/// behind k starts with a ReLU, which is no steeper than 1.
+std::vector<double> tails(const std::vector<check::Matrix>& chain) {
+  std::vector<double> result;
+  for (std::size_t k = 1; k < chain.size(); ++k) {
+    const SdpBound bound = sdp_bound({chain.begin() + static_cast<std::ptrdiff_t>(k), chain.end()});
+    result.push_back(bound.proof ? bound.proof->upper.value() : kInfinity);
+  }
+  result.push_back(1);
+  return result;
+}
+
+/// Errors of the layers `begin` .. `end` - 1 of a chain, weighted by what follows them. `before` is the error, entry by
+/// entry, of what layer `begin` takes in; afterwards that of what layer `end` would.
+double weighted_errors(const ReachNetwork& chain, const Reach& reach, std::size_t begin, std::size_t end,
+                       const std::vector<double>& tail, VectorXd& before) {
+  double total = 0;
+  for (std::size_t k = begin; k < end; ++k) {
+    const Eigen::MatrixXd size = chain[k].weights.cwiseAbs();
+    const VectorXd taken = reach.input_magnitude(k) + before;
+    const VectorXd bias = chain[k].bias.cwiseAbs() + chain[k].bias_radius;
+    const VectorXd delta =
+        gamma(chain[k].weights.cols() + 1) * (size * taken + bias) +
+        VectorXd::Constant(bias.size(), 0x1p-149 * static_cast<double>(chain[k].weights.cols()));
+    before = size * before + delta;  // ReLU does not enlarge it
+    total += tail[k - begin] * delta.norm();
+  }
+  return safely(total);
+}
+
+/// The largest value over the box of `cost`, a function of the bounds over a part of it: best first, up to `nodes` parts.
+template <class Cost>
+double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, const Cost& cost) {
+  struct Part {
+    double cost;
+    std::shared_ptr<const Reach> reach;
+    bool operator<(const Part& other) const { return cost < other.cost; }
+  };
+  const auto part_of = [&](const Box& piece, const Reach* around, double at_most) {
+    auto reach = std::make_shared<const Reach>(chain, piece, around);
+    return Part{std::min(at_most, cost(*reach)), std::move(reach)};
+  };
+  std::priority_queue<Part> queue;
+  queue.push(part_of(box, nullptr, kInfinity));
+  for (int done = 1; done + 2 <= nodes; done += 2) {
+    const Part top = queue.top();
+    Index widest = -1;
+    double width = 0;
+    for (std::size_t k = 0; k < box.lower.size(); ++k) {
+      const double whole = box.upper[k] - box.lower[k];
+      const double relative = whole > 0 ? (top.reach->box().upper[k] - top.reach->box().lower[k]) / whole : 0;
+      if (relative > width) width = relative, widest = static_cast<Index>(k);
+    }
+    if (widest < 0) break;
+    queue.pop();
+    const auto [first, second] = halves(top.reach->box(), widest);
+    for (const Box& piece : {first, second}) queue.push(part_of(piece, top.reach.get(), top.cost));
+  }
+  return queue.top().cost;
+}
+
+/// How far an input's conversion may move it, per coordinate.
+std::vector<double> input_errors(const Box& box, double step) {
+  std::vector<double> result;
+  for (std::size_t k = 0; k < box.lower.size(); ++k) {
+    const double largest = std::max(std::abs(box.lower[k]), std::abs(box.upper[k]));
+    result.push_back(safely(step / 2 + kUnit * (largest + step) + 0x1p-149));
+  }
+  return result;
+}
+
+Box inflated(const Box& box, const std::vector<double>& by) {
+  Box result = box;
+  for (std::size_t k = 0; k < by.size(); ++k) {
+    result.lower[k] = std::nextafter(box.lower[k] - by[k], -kInfinity);
+    result.upper[k] = std::nextafter(box.upper[k] + by[k], kInfinity);
+  }
+  return result;
+}
+
+double norm(const std::vector<double>& values) {
+  double squares = 0;
+  for (const double value : values) squares += value * value;
+  return safely(std::sqrt(squares));
+}
+
+/// What a term of the sum contributes: its own error behind everything that follows, the error and size of its output.
+struct TermError {
+  double weighted = 0;
+  VectorXd output;  ///< error, entry by entry
+  Bounds values;    ///< exact output over the box
+};
+
+class SetError {
+ public:
+  SetError(const Network& network, const std::string& function, const std::map<std::string, Box>& domain,
+           int nodes)
+      : names_(files::networks_of(function)), parts_(files::parts(network)), domain_(domain), nodes_(nodes) {
+    has_ground_ = names_.size() == 2 && names_[0] != kGround && parts_.count(kGround) == 1;
+    phi_ = reach_network(*parts_.at(names_[0]));
+    const std::vector<double> whole = tails(check::stages(network, function));
+    phi_tails_ = whole;
+    if (names_.size() == 1) return;
+    rho_ = reach_network(*parts_.at(names_[1]));
+    const std::vector<check::Matrix> rho_stages = check::stages(network, names_[1]);
+    rho_tails_ = tails(rho_stages);
+    const SdpBound rho = sdp_bound(rho_stages);
+    rho_bound_ = rho.proof ? rho.proof->upper.value() : kInfinity;
+    phi_tails_.resize(phi_.size() - 1);
+    phi_tails_.push_back(rho_bound_);  // an error in phi's output goes through rho
+    neighbour_ = term(phi_, names_[0], phi_tails_);
+    if (!has_ground_) return;
+    std::vector<double> ground_tails =
+        tails(check::stages(network, "set:" + kGround.substr(4) + ":" + names_[1].substr(4)));
+    const ReachNetwork ground = reach_network(*parts_.at(kGround));
+    ground_tails.resize(ground.size() - 1);
+    ground_tails.push_back(rho_bound_);
+    ground_ = term(ground, kGround, ground_tails);
+  }
+
+  double plain() const {
+    return largest_over_parts(phi_, domain_.at(names_[0]), nodes_, [&](const Reach& reach) {
+      VectorXd before = VectorXd::Zero(phi_.front().weights.cols());
+      return weighted_errors(phi_, reach, 0, phi_.size(), phi_tails_, before);
+    });
+  }
+
+  /// With exactly `neighbours` neighbours.
+  double set(int neighbours) const {
+    double result = separate(neighbours);
+    if (neighbours == 1 && !has_ground_) result = std::min(result, coupled());
+    return result;
+  }
+
+ private:
+  TermError term(const ReachNetwork& network, const std::string& part,
+                 const std::vector<double>& tail) const {
+    TermError result;
+    const Box& box = domain_.at(part);
+    result.values = hull(network, box, 4 * nodes_).bounds;
+    result.output = VectorXd::Zero(network.back().bias.size());
+    result.weighted = largest_over_parts(network, box, nodes_, [&](const Reach& reach) {
+      VectorXd before = VectorXd::Zero(network.front().weights.cols());
+      return weighted_errors(network, reach, 0, network.size(), tail, before);
+    });
+    VectorXd whole = VectorXd::Zero(network.front().weights.cols());
+    const Reach reach(network, box);
+    weighted_errors(network, reach, 0, network.size(), tail, whole);
+    result.output = whole;
+    return result;
+  }
+
+  /// Adding n + 1 vectors one after the other: each partial sum is rounded; gamma_n of the sum of magnitudes.
+  double sum_error(const VectorXd& magnitudes, int additions) const {
+    return safely(rho_bound_ * gamma(additions) * magnitudes.norm());
+  }
+
+  /// The terms one by one, then rho over the box of their sum.
+  double separate(int neighbours) const {
+    const Index hidden = rho_.front().weights.cols();
+    double total = neighbours * neighbour_.weighted;
+    VectorXd lower = VectorXd::Zero(hidden), upper = lower, magnitude = lower, error = lower;
+    const auto add = [&](const TermError& one, double count) {
+      lower += count * one.values.lower;
+      upper += count * one.values.upper;
+      magnitude += count * (one.values.magnitude() + one.output);
+      error += count * one.output;
+    };
+    add(neighbour_, neighbours);
+    if (has_ground_) {
+      total += ground_.weighted;
+      add(ground_, 1);
+    }
+    total += sum_error(magnitude, neighbours + 1);
+    error += gamma(neighbours + 1) * magnitude;
+    Box box;
+    for (Index i = 0; i < hidden; ++i) {
+      const double slack =
+          1e-9 * (std::abs(lower(i)) + std::abs(upper(i))) + 1e-300;  // far above the rounding here
+      box.lower.push_back(lower(i) - slack);
+      box.upper.push_back(upper(i) + slack);
+    }
+    const Reach reach(rho_, box);
+    total += weighted_errors(rho_, reach, 0, rho_.size(), rho_tails_, error);
+    return safely(total);
+  }
+
+  /// One neighbour: phi and rho over the same part of the box.
+  double coupled() const {
+    ReachNetwork chain = phi_;
+    chain.insert(chain.end(), rho_.begin(), rho_.end());
+    std::vector<double> tail = phi_tails_;
+    tail.insert(tail.end(), rho_tails_.begin(), rho_tails_.end());
+    return largest_over_parts(chain, domain_.at(names_[0]), nodes_, [&](const Reach& reach) {
+      VectorXd error = VectorXd::Zero(chain.front().weights.cols());
+      double total = weighted_errors(chain, reach, 0, phi_.size(), tail, error);
+      const VectorXd magnitude =
+          reach.input_magnitude(phi_.size()) + error;  // adding to zero is exact; to be safe
+      total += sum_error(magnitude, 1);
+      error += gamma(1) * magnitude;
+      return safely(total + weighted_errors(chain, reach, phi_.size(), chain.size(), rho_tails_, error));
+    });
+  }
+
+  std::vector<std::string> names_;
+  std::map<std::string, const files::Weights*> parts_;
+  const std::map<std::string, Box>& domain_;
+  int nodes_;
+  bool has_ground_ = false;
+  ReachNetwork phi_, rho_;
+  std::vector<double> phi_tails_, rho_tails_;
+  double rho_bound_ = 0;
+  TermError neighbour_, ground_;
+};
+
+}  // namespace
+
+std::vector<Float32Error> float32_errors(const Network& network, const std::map<std::string, Box>& domain,
+                                         const std::map<std::string, double>& lipschitz,
+                                         const Float32Options& options) {
+  for (const auto& [name, weights] : files::parts(network)) {
+    if (weights->precision != files::Precision::kFloat32)
+      throw std::invalid_argument("float32_errors: " + name + " is not stored in float32");
+  }
+  const std::map<std::string, Box> inner = clamped(network, domain);
+  std::map<std::string, double> moved;  // |q(x) - x| per part
+  std::map<std::string, Box> inflated_domain;
+  for (const auto& [part, box] : inner) {
+    const std::vector<double> errors = input_errors(box, options.input_step);
+    moved[part] = norm(errors);
+    inflated_domain[part] = inflated(box, errors);
+  }
+  std::vector<std::string> functions;
+  for (const std::string& function : files::functions(network)) {
+    const bool is_set = function.rfind("set:", 0) == 0;
+    if (function == "network" || (is_set && files::networks_of(function)[0] != kGround))
+      functions.push_back(function);
+  }
+  std::vector<std::vector<Float32Error>> found(functions.size());
+  files::parallel_for(static_cast<int>(functions.size()), options.jobs, [&](int index) {
+    const std::string& function = functions[static_cast<std::size_t>(index)];
+    const std::vector<std::string> names = files::networks_of(function);
+    const SetError error(network, function, inflated_domain, options.nodes);
+    double evaluation = 0;
+    for (int n = names.size() == 1 ? 1 : 0; n <= (names.size() == 1 ? 1 : options.neighbours); ++n) {
+      evaluation = std::max(evaluation, names.size() == 1 ? error.plain() : error.set(n));
+      if (n == 0) continue;
+      double inputs = n * lipschitz.at(function) * moved.at(names[0]);
+      if (names.size() == 2 && moved.count(kGround) == 1) {
+        const std::string ground = "set:" + kGround.substr(4) + ":" + names[1].substr(4);
+        inputs += lipschitz.at(ground) * moved.at(kGround);
+      }
+      Float32Error one;
+      one.function = function;
+      one.neighbours_at_most = names.size() == 1 ? 0 : n;
+      one.evaluation = UpperBound(evaluation);
+      one.inputs = UpperBound(safely(inputs));
+      one.total = UpperBound(safely(evaluation + inputs));
+      found[static_cast<std::size_t>(index)].push_back(one);
+    }
+  });
+  std::vector<Float32Error> result;
+  for (auto& group : found) result.insert(result.end(), group.begin(), group.end());
+  return result;
+}
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,50 @@
+/// @file How far the float32 evaluation that flies can be from the exact function.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "lipschitz/bounds.h"
+#include "lipschitz/box.h"
+#include "nn/files/network.h"
+
+namespace swarmcert::lipschitz {
+
+/// |f32(q(x)) - f(x)|_2 over the box, f32 being nn/mlp.h and nn/deep_set.h in float, f the exact function of the weights
+/// as stored, q the conversion of the inputs to what the evaluation gets.
+struct Float32Error {
+  std::string function;        ///< "network" or "set:<phi kind>:<rho kind>"
+  int neighbours_at_most = 0;  ///< of the kind; 0 for a plain network
+  UpperBound evaluation{0};    ///< |f32(x) - f(x)| for float32 inputs x
+  UpperBound inputs{
+      0};  ///< |f(q(x)) - f(x)|: rounding to float32, and half a step where inputs are quantised
+  UpperBound total{0};
+};
+
+struct Float32Options {
+  int neighbours = 1;     ///< up to this many
+  double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
+  int nodes = 200;        ///< parts of the box per function
+  int jobs = 0;
+};
+
+/// Bounds that hold in exact arithmetic for any order of summation and with or without fused multiply-adds.
+///
+/// With u = 2^-24 and m inputs, a computed layer differs from the exact layer at the same computed inputs h by at most
+/// delta = gamma_{m+1} (|W| |h| + |b|) + m 2^-149, entry by entry (Higham 2002, section 3.1; the last term for products
+/// that underflow). Replacing the computed layers by exact ones from the last to the first changes the output by at most
+///   sum_k L_k |delta_k|_2,
+/// where L_k is a proved Lipschitz bound of what follows layer k (LipSDP of the tail, which holds at every point, hence
+/// for any other neighbours). |h| comes from bounds over parts of the box (reach.h), plus what was computed wrong
+/// before. Sums over n neighbours add gamma_n sum_j |phi_j| in front of rho.
+///
+/// @param domain by part, finite.
+/// @param lipschitz proved bounds by function: of "network" or the set functions, the ground's among them.
+/// @throws std::invalid_argument if a network is not stored in float32: its evaluation rounds the weights first.
+std::vector<Float32Error> float32_errors(const files::Network& network,
+                                         const std::map<std::string, Box>& domain,
+                                         const std::map<std::string, double>& lipschitz,
+                                         const Float32Options& options);
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,62 @@
+/// @file Which values NET takes over a box, for up to so many neighbours; and how far it jumps where one comes or goes.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "lipschitz/box.h"
+#include "lipschitz/claims.h"
+#include "lipschitz/reach.h"
+#include "lipschitz/witness.h"
+#include "nn/files/network.h"
+
+namespace swarmcert::lipschitz {
+
+/// A value that the function takes, exactly evaluated at float32 points of the box and rounded inwards.
+struct Attained {
+  double value = 0;
+  std::vector<std::string> networks;       ///< "phi:<kind>" per point, or "network"
+  std::vector<std::vector<float>> points;  ///< empty: no neighbours
+};
+
+/// lower <= f <= upper in exact arithmetic, for the weights as stored, at every point of the box.
+struct CertifiedRange {
+  std::string function;        ///< "network" or "set:<phi kind>:<rho kind>"
+  int output = 0;              ///< index of the output
+  int neighbours_at_most = 0;  ///< of the kind, each anywhere in its box; 0 for a plain network
+  double lower = 0, upper = 0;
+  Attained least, greatest;  ///< lower <= least.value, greatest.value <= upper
+  /// A neighbour that comes or goes while the others stay, anywhere in its box, as at a cut-off of the distance:
+  /// |f(with it) - f(without it)| <= jump, whatever the others do. 0 for a plain network.
+  double jump = 0;
+  double largest() const { return std::max(-lower, upper); }
+};
+
+struct RangeOptions {
+  int neighbours = 1;  ///< up to this many, at least 1
+  int nodes = 300;     ///< boxes per search
+  int jobs = 0;
+};
+
+/// Ranges of the plain network or of every set function, for 1, 2, ... neighbours of one kind; with the ground's term
+/// where there is one. The clamp of NET acts first: with it the range holds for every input, where its interval lies
+/// in the box.
+///
+/// One neighbour: branch and bound over its box, the ground's term as an interval. More: with a linear form a s + c
+/// above rho on the box that the sum s lies in, f <= c + sum_j max a phi(x_j), each maximum by branch and bound.
+/// @param domain by part, finite.
+/// @param rho_bound a proved Lipschitz bound of rho, by its kind; for the jump |f - f'| <= L |phi(x)|.
+std::vector<CertifiedRange> ranges(const files::Network& network, const std::map<std::string, Box>& domain,
+                                   const std::map<std::string, double>& rho_bound,
+                                   const RangeOptions& options);
+
+/// What the network's clamp lets through of a box, per part.
+std::map<std::string, Box> clamped(const files::Network& network, const std::map<std::string, Box>& domain);
+
+/// The box that NET's clamp makes of all inputs, for every part that it clamps; empty if there is no clamp, or a part
+/// without one (the ground).
+std::map<std::string, Box> clamp_domain(const files::Network& network);
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,99 @@
+/// @file What values a ReLU network takes over a box: linear bounds that hold in exact arithmetic.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "lipschitz/box.h"
+#include "nn/files/weights.h"
+
+namespace swarmcert::lipschitz {
+
+/// y = W h + b + e with any e, |e| <= bias_radius; then h = relu(y), or h = y where there is no ReLU.
+struct ReachLayer {
+  Eigen::MatrixXd weights;
+  Eigen::VectorXd bias;
+  Eigen::VectorXd bias_radius;  ///< [outputs], not negative
+  bool has_relu = true;
+};
+using ReachNetwork = std::vector<ReachLayer>;
+
+/// The layers of a stored network, exactly; the last one has no ReLU.
+ReachNetwork reach_network(const files::Weights& weights);
+
+/// lower <= y <= upper, entry by entry.
+struct Bounds {
+  Eigen::VectorXd lower, upper;
+  /// The largest absolute value of each entry.
+  Eigen::VectorXd magnitude() const { return lower.cwiseAbs().cwiseMax(upper.cwiseAbs()); }
+};
+
+/// value <= rows x + constants for each x of the box, entry by entry.
+struct LinearForms {
+  Eigen::MatrixXd rows;
+  Eigen::VectorXd constants;
+};
+
+/// Bounds on every layer over a box by backward substitution of linear relaxations of ReLU (CROWN, Zhang et al. 2018):
+/// on l <= y <= u with l < 0 < u,  alpha y <= relu(y) <= s y + t  with s near u / (u - l), t = max(u - s u, -s l) rounded
+/// up, alpha 0 or 1.
+///
+/// Rounding. A form lambda y_j + c is exact for the lambda that is stored. Multiplying it by W_j in floating point
+/// changes a coefficient by at most gamma_n |lambda| |W_j| in any order of summation, with or without fused products
+/// (Higham 2002, section 3.1), hence the form by gamma_n |lambda| (|W_j| max|h|), which is added to c. Constants are sums
+/// whose rounding is at most N 2^-53 times the sum of their terms' absolute values; twice that is added, which also
+/// covers the rounding of these error terms themselves, and 2^-900 for underflow. Overflow ends as an infinite bound.
+class Reach {
+ public:
+  /// @param box finite, one interval per input.
+  /// @param around bounds of the same network over a larger box, which hold here as well; null: none.
+  Reach(const ReachNetwork& network, const Box& box, const Reach* around = nullptr);
+
+  /// Of y_k, before the ReLU of layer k.
+  const Bounds& before_relu(std::size_t k) const { return bounds_[k]; }
+  /// Largest |h_{k-1}|, what layer k takes in.
+  const Eigen::VectorXd& input_magnitude(std::size_t k) const { return input_magnitude_[k]; }
+  /// Of the network's output.
+  const Bounds& output() const { return bounds_.back(); }
+  const Box& box() const { return box_; }
+
+  /// directions y_K <= rows x + constants over the box.
+  LinearForms upper_forms(const Eigen::MatrixXd& directions) const;
+  /// The largest values of `forms` over the box, rounded up.
+  Eigen::VectorXd largest(const LinearForms& forms) const;
+
+ private:
+  LinearForms substituted(std::size_t top, Eigen::MatrixXd lambda) const;
+
+  const ReachNetwork& network_;
+  Box box_;
+  std::vector<Bounds> bounds_;
+  std::vector<Eigen::VectorXd> input_magnitude_;
+  std::vector<Eigen::VectorXd> term_magnitude_;  ///< |W_k| max|h_{k-1}| + |b_k| + radius
+};
+
+/// f(x) in floating point: an estimate.
+Eigen::VectorXd evaluate_roughly(const ReachNetwork& network, const Eigen::VectorXd& x);
+
+/// What a search for the largest value of direction y_K over a box found.
+struct Maximum {
+  double upper = 0;   ///< at least the true maximum
+  double value = 0;   ///< near direction f(x): an estimate
+  Eigen::VectorXd x;  ///< in the box
+  int nodes = 0;
+};
+
+/// Best-first branch and bound with up to `nodes` boxes; a box is halved where its linear form depends on it most.
+Maximum maximise(const ReachNetwork& network, const Eigen::RowVectorXd& direction, const Box& box, int nodes);
+
+/// All outputs over the box, as the hull over up to `nodes` parts of it; and the largest Euclidean norm of the output.
+struct Hull {
+  Bounds bounds;
+  double norm = 0;  ///< at least |y_K|_2
+};
+Hull hull(const ReachNetwork& network, const Box& box, int nodes);
+
+/// The two halves of `box` across dimension k.
+std::pair<Box, Box> halves(const Box& box, Eigen::Index k);
+
+}  // namespace swarmcert::lipschitz
