@@ -117,7 +117,7 @@ void add_comparisons(const files::Network& network, const lipschitz::CertifyOpti
     const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
     if (bound.block == "all" && bound.scale.empty())
       output.comparisons[static_cast<std::size_t>(i)] =
-          compare(network, bound.function, bound.block, bound.scale);
+          lipschitz::compare(network, bound.function, bound.block, bound.scale);
   });
 }
 

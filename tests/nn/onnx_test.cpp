@@ -197,7 +197,7 @@ TEST(Onnx, DamagedProtobufIsRefusedAtItsOffset) {
   const std::string head = onnx_varint_field(1, 8) + onnx_text(2, "p");
   EXPECT_TRUE(refused(head + "\x3a\xff", {"offset ", "cut off or too long"}));
   EXPECT_TRUE(refused(head + "\x3a\x7f", {"longer than what holds it"}));
-  EXPECT_TRUE(refused(head + std::string("\x03", 1), {"not a protobuf field type"}));
+  EXPECT_TRUE(refused(head + "\x0b", {"not a protobuf field type"}));
   EXPECT_TRUE(refused(head + std::string("\x00\x00", 2), {"not a protobuf field number"}));
   EXPECT_TRUE(refused(head + "\x08" + std::string(10, '\xff') + "\x01", {"cut off or too long"}));
   EXPECT_TRUE(refused(head + "\x0d\x01", {"longer than what holds it"}));

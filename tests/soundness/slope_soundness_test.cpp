@@ -136,13 +136,13 @@ std::vector<Network> networks() {
   return result;
 }
 
-void no_slope_exceeds_its_bound(long pairs, int rounds) {
+void no_slope_exceeds_its_bound(long pairs, int rounds, const std::vector<std::string>& blocks) {
   Tally total;
   std::uint64_t seed = 1;
   std::vector<Network> all = networks();
   lipschitz::CertifyOptions options;
   options.lower.rounds = rounds;
-  options.blocks = {"position", "velocity"};
+  options.blocks = blocks;
   std::vector<lipschitz::Certification> found;
   std::size_t bounds = 0;
   for (const Network& network : all) {
@@ -166,9 +166,9 @@ void no_slope_exceeds_its_bound(long pairs, int rounds) {
   EXPECT_GT(total.closest, 0.9) << "no pair came near its bound: the test does not try hard enough";
 }
 
-TEST(SlopeSoundness, NoSlopeExceedsItsBound) { no_slope_exceeds_its_bound(200'000, 1); }
+TEST(SlopeSoundness, NoSlopeExceedsItsBound) { no_slope_exceeds_its_bound(50'000, 1, {}); }
 TEST(SlopeSoundness, NoneOfTenMillionSlopesExceedsItsBound_slow) {
-  no_slope_exceeds_its_bound(10'000'000, 10);
+  no_slope_exceeds_its_bound(10'000'000, 10, {"position", "velocity"});
 }
 
 /// Several neighbours move at once, and the vehicle itself: against the laws.
