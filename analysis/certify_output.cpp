@@ -136,7 +136,9 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
     bounds.push_back(std::move(json));
   }
   for (const lipschitz::CertifiedLaw& law : found.laws) bounds.push_back(summary(network, law));
-  Json result = result_head("certify", input_files(network));
+  std::vector<std::string> inputs = input_files(network);
+  if (!output.domain_file.empty()) inputs.push_back(output.domain_file);
+  Json result = result_head("certify", inputs);
   result["seed"] = output.seed;
   result["as"] = found.as_float32 ? Json("float32") : Json();
   result["gamma"] = found.gamma ? Json(found.gamma->value) : Json();

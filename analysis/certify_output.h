@@ -24,6 +24,7 @@ struct CertifyOutput {
   lipschitz::Verdict verdict = lipschitz::Verdict::kInconclusive;
   double max_lipschitz = 0;  ///< 0: no limit was given
   std::uint64_t seed = 1;
+  std::string domain_file;  ///< box.toml; empty: none
 };
 
 /// What the numbers mean, in sentences.

@@ -174,6 +174,7 @@ int run(Options options, const CommonOptions& common) {
   output.found.as_float32 = options.as == "float32";
   output.seed = options.certify.lower.seed;
   output.max_lipschitz = options.max_lipschitz;
+  output.domain_file = options.domain;
   const Certification& found = output.found;
   if (options.explain) add_comparisons(network, options.certify, output);
   if (!options.domain.empty() || options.range) add_ranges(network, options, output);

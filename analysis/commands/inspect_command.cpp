@@ -44,6 +44,12 @@ files::Json inspect_certificate(const std::string& path, bool print) {
     if (print) fmt::print("  {}\n", line.dump());
     bounds.push_back(std::move(line));
   }
+  for (const files::Json& law : certificate.value("laws", files::Json::array())) {
+    files::Json line = law;
+    if (line.is_object()) line.erase("upper_hex");
+    if (print) fmt::print("  {}\n", line.dump());
+    bounds.push_back(std::move(line));
+  }
   return {{"file", path}, {"kind", "certificate"}, {"bounds", std::move(bounds)}};
 }
 

@@ -155,6 +155,59 @@ TEST_F(CommandLine, JsonHasTheAgreedFieldsAndTheSameBytesForAnyNumberOfJobs) {
   EXPECT_NEAR(bound["lower"].get<double>(), std::sqrt(10.0), 1e-6);
 }
 
+TEST_F(CommandLine, BlocksScaleBoxRangeAndExplanationOfAPlainNetwork) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1, -1]\nupper = [1, 2]\n");
+  expect("certify " + net + " --blocks --scale 1,2 --domain box.toml --explain -o cert.json --json out.json",
+         0, {"network x0", "network scaled", "wastes most", "Range over the box", "Float32"});
+  expect("check cert.json " + net, 0, {"accepted", "4 upper bounds"});
+  const Json result = Json::parse(read_text(folder_ / "out.json"));
+  ASSERT_EQ(result["bounds"].size(), 4U);
+  EXPECT_EQ(result["bounds"][1]["block"], "x0");
+  EXPECT_EQ(result["bounds"][1]["domain"], "box");
+  EXPECT_NEAR(result["bounds"][2]["upper"].get<double>(), 1,
+              1e-6);  // df/dx1 of relu(3 x0) + relu(-3 x0 + x1)
+  EXPECT_EQ(result["bounds"][3]["norm"], "weighted_l2");
+  EXPECT_EQ(result["inputs"].size(), 2U);
+  ASSERT_EQ(result["range"].size(), 1U);
+  EXPECT_NEAR(result["range"][0]["upper"].get<double>(), 5, 0.01);  // at (-1, 2)
+  EXPECT_EQ(result["range"][0]["upper_witness"]["value"], 5);
+  EXPECT_LE(result["range"][0]["lower"].get<double>(), 0);
+  EXPECT_LT(result["float32_error"][0]["bound"].get<double>(), 1e-5);
+  EXPECT_TRUE(result["bounds"][0]["comparison"].contains("combettes_pesquet_upper"));
+}
+
+TEST_F(CommandLine, OptionsThatAskForWhatTheNetworkHasNotAreUsageErrors) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  expect("certify " + net + " --blocks=position", 2, {"position"});
+  expect("certify " + net + " --scale 1,2,3", 2, {"3 inputs"});
+  expect("certify " + net + " --neighbours many", 2, {"--neighbours many", "small=1"});
+  expect("certify " + net + " --neighbours a=1", 2, {"\"a\""});
+  expect("certify " + net + " --range", 2, {"--domain"});
+  expect("certify " + net + " --method branch", 2, {"branch", "not part of this version"});
+  expect("certify " + net + " --as float16", 2, {"--as"});
+  write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1]\nupper = [1, 2]\n");
+  expect("certify " + net + " --domain box.toml", 3, {"box.toml", "line 2", "2 inputs"});
+}
+
+TEST_F(CommandLine, LawsOfTheShippedNetwork) {
+  const std::string net = tests::source_path("nn/networks/demo/network.toml");
+  ASSERT_EQ(run("certify " + net + " --neighbours small=3 --nodes 0 -o cert.json --json out.json").exit_code,
+            0);
+  const Json result = Json::parse(read_text(folder_ / "out.json"));
+  double one = 0;
+  int laws = 0;
+  for (const Json& bound : result["bounds"]) {
+    if (bound["law"] == "one_neighbour") one = bound["upper"];
+    if (bound["upper_method"] != "law") continue;
+    const double factor = bound["law"] == "all_stacked" ? std::sqrt(3.0) : 3;
+    EXPECT_NEAR(bound["upper"].get<double>(), factor * one, 1e-9 * one) << bound["law"];
+    ++laws;
+  }
+  EXPECT_EQ(laws, 3);
+  expect("check cert.json " + net, 0, {"accepted"});
+}
+
 TEST_F(CommandLine, JsonOnStandardOutputSilencesTheText) {
   const std::string net = saved(small_network(), "net.safetensors");
   const Outcome outcome = run("certify " + net + " --json -");
