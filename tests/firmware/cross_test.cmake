@@ -18,6 +18,7 @@ function(run)
     message(FATAL_ERROR "failed (${result}): ${command}\n${error}${output}")
   endif()
   set(output "${output}" PARENT_SCOPE)
+  set(error "${error}" PARENT_SCOPE)
 endfunction()
 
 function(run_image elf file)
@@ -84,6 +85,28 @@ execute_process(COMMAND ${CMAKE_COMMAND} -E compare_files ${SCRATCH}/host_words.
 if(differ)
   message(FATAL_ERROR "host and Cortex-M4 differ: ${SCRATCH}/host_words.bin, ${SCRATCH}/target_words.bin")
 endif()
+
+# Instructions: exact and the same for every input, so growth above 2 % is a change of the code.
+run(qemu-system-arm -M netduinoplus2 -nographic -icount shift=0 -semihosting-config enable=on,target=native
+    -kernel ${folder}/count.elf)
+set(counts "${output}${error}")
+file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/instructions.txt baseline REGEX "^[^#]")
+foreach(line IN LISTS baseline)
+  string(REGEX MATCH "^([^ ]+) ([0-9]+)$" matched "${line}")
+  set(name ${CMAKE_MATCH_1})
+  set(expected ${CMAKE_MATCH_2})
+  string(REGEX MATCH "${name} ([0-9]+)" matched "${counts}")
+  if(NOT matched)
+    message(FATAL_ERROR "the image counted no ${name}:\n${counts}")
+  endif()
+  set(counted ${CMAKE_MATCH_1})
+  math(EXPR limit "${expected} + ${expected} / 50")
+  if(counted GREATER limit)
+    message(FATAL_ERROR "${name}: ${counted} instructions, 2 % more than ${expected} at most; if that is meant, "
+                        "change instructions.txt")
+  endif()
+  message("${name}: ${counted} instructions (baseline ${expected})")
+endforeach()
 
 # A build that lost both guards against contraction: its detector says so, and its words differ.
 run(${CMAKE_COMMAND} --preset cortex-m4 -S ${SOURCE} -B ${SCRATCH}/contracted

@@ -7,36 +7,12 @@
 #include "controller/flight_controller.h"
 #include "controller/gain_conversion.h"
 #include "controller/neighbours.h"
+#include "networks.h"
 #include "nn/deep_set.h"
 
 namespace swarmcert::tests {
 
 using controller::Vector3;
-
-/// The paper's sizes: phi 6-25-40-40-40, ground 4-25-40-40-40, rho 40-40-40-40-1.
-inline constexpr int kHidden = 40;
-
-/// Weights of one network of four layers.
-template <int inputs, int first, int outputs>
-struct FourLayers {
-  float w1[first * inputs], b1[first], w2[kHidden * first], b2[kHidden], w3[kHidden * kHidden], b3[kHidden],
-      w4[outputs * kHidden], b4[outputs];
-  nn::DenseLayer<float> layers[4];
-
-  template <typename Next>
-  void fill(Next&& next) {
-    const auto all = [&](auto& numbers, int fan_in) {
-      for (float& w : numbers) w = nn::rounded(next() * (2.0f / static_cast<float>(fan_in))) * 1.5f;
-    };
-    all(w1, inputs), all(b1, 8), all(w2, first), all(b2, 8);
-    all(w3, kHidden), all(b3, 8), all(w4, kHidden), all(b4, 8);
-    layers[0] = {w1, b1, first, inputs};
-    layers[1] = {w2, b2, kHidden, first};
-    layers[2] = {w3, b3, kHidden, kHidden};
-    layers[3] = {w4, b4, outputs, kHidden};
-  }
-  nn::Mlp<float> mlp() const { return {layers, 4}; }
-};
 
 /// Random numbers are drawn in statements of their own: in which order a call evaluates its arguments is up to the
 /// compiler, and compilers differ.
