@@ -153,6 +153,32 @@ TEST(RobustLaw, From170DegreesStaysUnderItsStatedDecay) {
   EXPECT_GT(close, 100) << "the stated decay is far above everything that happens";
 }
 
+// Started with the rate that the law wants, only the attitude's own decay is left, and that is nearly attained.
+TEST(RobustLaw, From170DegreesAtTheReferenceRateTheStatedDecayIsNearlyAttained) {
+  std::mt19937 generator(12);
+  const RobustGains<double> gains{{6, 6, 6}, {5e-4, 5e-4, 1e-3}, {}, {}};
+  for (int run = 0; run < 10; ++run) {
+    Simulation sim = from(170.0 / 180.0 * kPi, tests::random_unit_vector(generator), {}, {});
+    const auto rate = [&](const AttitudeState<double>& s, const AttitudeReference<double>& r) {
+      const AttitudeError<double> e = attitude_error(s, r);
+      return reference_rate(gains.Lambda_1_s, modified_rodrigues(e.R_RB), e);
+    };
+    sim.state.omega_B_rad_s = rate(sim.state, sim.reference).omega_r_rad_s;
+    const double sigma_0 = std::tan(sim.angle_rad() / 4);
+    double time = 0.0;
+    for (int i = 0; i < 800; ++i) {
+      sim.step(1e-3, [&](const AttitudeState<double>& s, const AttitudeReference<double>& r) {
+        return robust_torque(gains, kInertia, s.omega_B_rad_s, rate(s, r), {});
+      });
+      time += 1e-3;
+      const double sigma = std::tan(sim.angle_rad() / 4);
+      const double bound = robust_decay(6.0, 5e-4, kInertiaRange, sigma_0, 0.0, time);
+      ASSERT_LE(sigma, bound + 1e-9) << "run " << run << ", t = " << time;
+      ASSERT_GE(sigma, 0.6 * bound) << "run " << run << ", t = " << time;
+    }
+  }
+}
+
 TEST(LeeLaw, From170DegreesStaysUnderItsStatedDecay) {
   std::mt19937 generator(11);
   // Upstream's defaults with equal k_R, as the theorem has it.
