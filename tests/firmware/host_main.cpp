@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   FileSink sink{std::fopen(argv[2], "wb")};
   if (sink.file == nullptr) return 3;
   const auto workload = std::make_unique<swarmcert::tests::Workload<FileSink>>(sink);
-  workload->run(std::atoi(argv[1]));
+  workload->run(static_cast<int>(std::strtol(argv[1], nullptr, 10)));
   if (std::fclose(sink.file) != 0) return 3;
   std::printf("%lu words\n", sink.words);
   return 0;

@@ -9,10 +9,10 @@ namespace swarmcert::tests {
 inline constexpr int kHidden = 40;
 
 /// Weights of one network of four layers.
-template <int inputs, int first, int outputs>
+template <int Inputs, int First, int Outputs>
 struct FourLayers {
-  float w1[first * inputs], b1[first], w2[kHidden * first], b2[kHidden], w3[kHidden * kHidden], b3[kHidden],
-      w4[outputs * kHidden], b4[outputs];
+  float w1[First * Inputs], b1[First], w2[kHidden * First], b2[kHidden], w3[kHidden * kHidden], b3[kHidden],
+      w4[Outputs * kHidden], b4[Outputs];
   nn::DenseLayer<float> layers[4];
 
   template <typename Next>
@@ -20,12 +20,12 @@ struct FourLayers {
     const auto all = [&](auto& numbers, int fan_in) {
       for (float& w : numbers) w = nn::rounded(next() * (2.0f / static_cast<float>(fan_in))) * 1.5f;
     };
-    all(w1, inputs), all(b1, 8), all(w2, first), all(b2, 8);
+    all(w1, Inputs), all(b1, 8), all(w2, First), all(b2, 8);
     all(w3, kHidden), all(b3, 8), all(w4, kHidden), all(b4, 8);
-    layers[0] = {w1, b1, first, inputs};
-    layers[1] = {w2, b2, kHidden, first};
+    layers[0] = {w1, b1, First, Inputs};
+    layers[1] = {w2, b2, kHidden, First};
     layers[2] = {w3, b3, kHidden, kHidden};
-    layers[3] = {w4, b4, outputs, kHidden};
+    layers[3] = {w4, b4, Outputs, kHidden};
   }
   nn::Mlp<float> mlp() const { return {layers, 4}; }
 };
