@@ -25,6 +25,7 @@ const std::vector<Command>& commands() {
       certify_command(),          //
       check_command(),            //
       simulate_command(),         //
+      iss_check_command(),        //
       identify_thrust_command(),  //
       export_command(),           //
       match_command(),            //

@@ -78,6 +78,7 @@ Command demo_command();
 Command export_command();
 Command identify_thrust_command();
 Command inspect_command();
+Command iss_check_command();
 Command match_command();
 Command simulate_command();
 

@@ -1,0 +1,117 @@
+#include "stability/iss_check.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "data.h"
+#include "stability/iss_full_loop.h"
+
+namespace swarmcert::stability {
+namespace {
+
+Model small() { return read_model(tests::source_path("stability/models/crazyflie-small.toml")); }
+
+Gains composite(const std::string& lambda, const std::string& k, const std::string& more = "") {
+  return parse_gains(
+      "schema = \"swarmcert/gains/1\"\n[position]\nLambda = " + lambda + "\nK = " + k + "\n" + more,
+      "gains.toml");
+}
+
+IssOptions with_runs(int runs) {
+  IssOptions options;
+  options.runs = runs;
+  return options;
+}
+
+double worst_of(const IssCheck& check, const std::string& kind) {
+  double worst = 0;
+  for (const IssRun& run : check.runs) {
+    if (run.kind == kind) worst = std::max(worst, run.ratio);
+  }
+  return worst;
+}
+
+TEST(IssCheck, IsotropicGainsReachTheBallByARampAndNothingExceedsIt) {
+  for (const auto& [lambda, k] : {std::pair{"4", "0.136"}, std::pair{"2", "0.2"}, std::pair{"1", "0.5"}}) {
+    const IssCheck check = check_iss(composite(lambda, k), small(), {});
+    EXPECT_TRUE(check.theorem_applies);
+    EXPECT_EQ(check.violations, 0);
+    EXPECT_GT(worst_of(check, "ramp"), 0.999);
+    EXPECT_LE(check.worst_ratio, 1 + 1e-9);
+    EXPECT_LE(check.worst_transient_ratio, 1 + 1e-6);
+    EXPECT_GT(check.worst_transient_ratio, 0.9) << "the starts must come near the transient";
+  }
+}
+
+TEST(IssCheck, HasTheBallOfTheTables) {
+  // Reference 1.2, A1 and A2: unit d_m, 0.45955882352941174 and 1.25 m per N/s.
+  const IssCheck a1 = check_iss(composite("4", "0.136"), small(), with_runs(5));
+  EXPECT_NEAR(a1.ball_m / a1.rate_N_s, 0.45955882352941174, 1e-12);
+  const IssCheck a2 = check_iss(composite("2", "0.2"), small(), with_runs(5));
+  EXPECT_NEAR(a2.ball_m / a2.rate_N_s, 1.25, 1e-12);
+}
+
+TEST(IssCheck, AnisotropicGainsStayInsideWhereTheTheoremIsConservative) {
+  // Reference 1.1, V3: theorem 5.0, exact 2-norm peak gain 1.2503991779, ratio 0.25008.
+  const IssCheck check = check_iss(composite("[2, 2, 4]", "[0.2, 0.2, 0.05]"), small(), {});
+  EXPECT_EQ(check.violations, 0);
+  EXPECT_LE(check.worst_ratio, 0.25008 + 1e-4);
+  EXPECT_GT(check.worst_ratio, 0.95 * 0.25008);
+}
+
+TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
+  const struct {
+    const char* what;
+    Gains gains;
+  } broken[] = {
+      // Reference 2.1: at tau = 0.0625 the command channel's rate norm is 0.4596536, above the ball of 0.4595588.
+      {"motor lag", composite("4", "0.136", "[lag]\nmotor_s = 0.0625\n")},
+      {"clamped integral", composite("4", "0.136", "integrator_limit = 0.01\n")},
+      {"Lambda not symmetric", composite("[[2, 12, 0], [0, 2, 0], [0, 0, 2]]", "0.2")},
+      {"complex poles",
+       parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nKp = 5\nKd = 8\nKi = 25\n", "g.toml")},
+  };
+  for (const auto& [what, gains] : broken) {
+    SCOPED_TRACE(what);
+    const IssCheck check = check_iss(gains, small(), with_runs(45));
+    EXPECT_FALSE(check.theorem_applies);
+    EXPECT_FALSE(check.why_not.empty());
+    EXPECT_GT(check.violations, 0);
+    EXPECT_GT(check.worst_ratio, 1 + 1e-6);
+  }
+}
+
+TEST(IssCheck, DoesNotDependOnJobsOrOnTheRate) {
+  IssOptions options;
+  options.runs = 60;
+  options.jobs = 1;
+  const IssCheck one = check_iss(composite("2", "0.2"), small(), options);
+  options.jobs = 3;
+  const IssCheck three = check_iss(composite("2", "0.2"), small(), options);
+  ASSERT_EQ(one.runs.size(), three.runs.size());
+  for (std::size_t i = 0; i < one.runs.size(); ++i) EXPECT_EQ(one.runs[i].largest_m, three.runs[i].largest_m);
+  options.rate_N_s = one.rate_N_s / 7;
+  const IssCheck slower = check_iss(composite("2", "0.2"), small(), options);
+  EXPECT_NEAR(slower.worst_ratio, one.worst_ratio, 1e-6) << "the unsaturated loop is linear";
+}
+
+TEST(IssCheck, VerticalRampsReachTheBallInTheFullLoopToo) {
+  const Gains gains = composite("4", "0.136", "[attitude]\nlaw = \"lee\"\n");
+  const IssCheck check = check_iss(gains, small(), with_runs(30));
+  const std::vector<FullLoopRun> flown = fly_full_loop(gains, small(), check);
+  ASSERT_EQ(flown.size(), 6u);
+  double vertical = 0, tilt = 0;
+  for (const FullLoopRun& run : flown) {
+    const IssRun& of = check.runs[static_cast<std::size_t>(run.run)];
+    tilt = std::max(tilt, run.largest_tilt_rad);
+    if (of.kind != "ramp" || of.disturbance.rate_W_N_s[0].z() == 0) continue;
+    vertical = run.ratio;
+  }
+  EXPECT_GT(vertical, 0.999);
+  EXPECT_LT(vertical, 1 + 1e-6);
+  EXPECT_GT(tilt, 0.05) << "horizontal disturbances must tilt the vehicle";
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
