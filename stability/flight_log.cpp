@@ -97,7 +97,12 @@ FlightRecorder::FlightRecorder(SampledFlight& loop, std::uint64_t seed) : loop_(
     files::Random random(files::Random(seed + 1000 + static_cast<std::uint64_t>(i)).bits());
     const double start_s = 0.03 * random.uniform();
     const double cutoff_hz = std::min(swarm.model(i).sensor.accelerometer_cutoff_hz, 0.45 * rate_hz);
-    vehicles_.push_back({LowPass(cutoff_hz, rate_hz), random, start_s, {}});
+    const SignalPath& path = swarm.path(i);
+    vehicles_.push_back({DelayedSignal(path.sensor_delay_s, path.sensor_delay_gain, loop.period_s()),
+                         LowPass(cutoff_hz, rate_hz),
+                         random,
+                         start_s,
+                         {}});
     inputs_.push_back(loop.input(i));
   }
 }
@@ -114,7 +119,8 @@ void FlightRecorder::listen() {
     Eigen::Matrix3d R_WB;
     rotation_of(x + kQuaternion, &R_WB);
     const Eigen::Vector3d force_W(dx[kVelocity], dx[kVelocity + 1], dx[kVelocity + 2] + kGravity_m_s2);
-    const Eigen::Vector3d specific_force_B = vehicle.accelerometer.filter(R_WB.transpose() * force_W);
+    const Eigen::Vector3d specific_force_B =
+        vehicle.accelerometer.filter(R_WB.transpose() * vehicle.delay.filter(force_W));
     if (is_due && loop_.time_s() >= vehicle.start_s)
       vehicle.records.push_back(record(i, vehicle, specific_force_B));
   }

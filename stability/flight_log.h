@@ -50,6 +50,7 @@ class FlightRecorder {
 
  private:
   struct Vehicle {
+    DelayedSignal delay;  ///< the model's sensor_delay
     LowPass accelerometer;
     files::Random random;
     double start_s;

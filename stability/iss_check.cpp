@@ -2,150 +2,23 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlopt.hpp>
-#include <optional>
 
 #include "nn/files/parallel.h"
 #include "nn/files/random.h"
-#include "stability/bounds/theorem.h"
-#include "stability/ode_integrator.h"
-#include "stability/position_loop.h"
+#include "stability/iss_judge.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kTolerance = 1e-6;  ///< of a violation; the integrator's is a thousandth of it
-constexpr int kSamples = 250;        ///< per run
-constexpr int kPieces = 80;          ///< of a worst-case input
+constexpr int kPieces = 80;  ///< of a worst-case input
 constexpr double kTwoPi = 6.28318530717958647692;
 
 Eigen::Vector3d random_direction(files::Random& random) {
   const double z = random.symmetric(), angle = kTwoPi * random.uniform(), r = std::sqrt(1 - z * z);
   return {r * std::cos(angle), r * std::sin(angle), z};
 }
-
-/// The transient bound at the sample times, for one unit of each of the numbers that it is linear in.
-class TransientTable {
- public:
-  TransientTable(const Theorem& theorem, double mass_kg, double duration_s) {
-    for (int part = 0; part < kParts; ++part) {
-      Transient unit;
-      unit.l = theorem.min_Lambda;
-      unit.k = theorem.min_K;
-      unit.mass_kg = mass_kg;
-      (part == 0   ? unit.error_m
-       : part == 1 ? unit.speed_m_s
-       : part == 2 ? unit.s_dot_m_s2
-                   : unit.rate_N_s) = 1;
-      for (int k = 0; k <= kSamples; ++k) values_[part].push_back(unit.at(duration_s * k / kSamples));
-    }
-  }
-
-  /// Bound on |p~| at sample k.
-  double at(int k, const std::array<double, 4>& sizes) const {
-    double sum = 0;
-    for (std::size_t part = 0; part < kParts; ++part)
-      sum += sizes[part] * values_[part][static_cast<std::size_t>(k)];
-    return sum;
-  }
-
- private:
-  static constexpr int kParts = 4;
-  std::vector<double> values_[kParts];
-};
-
-/// Integrates one run and judges it against the ball and the transient.
-class Judge {
- public:
-  Judge(const Gains& gains, const Model& model, IssCheck* check, const Theorem& theorem)
-      : loop_(gains, model), check_(*check), theorem_(theorem) {
-    if (check_.has_ball) table_.emplace(theorem, model.mass_kg, check_.duration_s);
-  }
-
-  const PositionLoop& loop() const { return loop_; }
-  double rate_N_s() const { return check_.rate_N_s; }
-  double duration_s() const { return check_.duration_s; }
-
-  void judge(IssRun* run) const {
-    const RateDisturbance& disturbance = run->disturbance;
-    // The learning error within the present piece: eps + (t - from) rate. Runge-Kutta starts anew at every switch at
-    // no cost, which multistep methods do not.
-    Eigen::Vector3d eps = disturbance.bias_W_N, rate = Eigen::Vector3d::Zero();
-    double from_s = 0;
-    OdeIntegrator integrator(
-        OdeMethod::kRungeKutta,
-        [&](double t, const double* x, double* dx) { loop_.derivative(x, eps + (t - from_s) * rate, dx); },
-        1e-9, std::vector<double>(PositionLoop::kSize, 1e-10 * check_.ball_m));
-    PositionLoop::State state = loop_.start(run->position_m, run->velocity_m_s);
-    const bool from_rest =
-        run->position_m.isZero(0) && run->velocity_m_s.isZero(0) && disturbance.bias_W_N.isZero(0);
-    const std::array<double, 4> sizes = start_sizes(*run, state);
-    std::size_t piece = 0;
-    const auto rate_of = [&disturbance](std::size_t i) {
-      return i < disturbance.rate_W_N_s.size() ? disturbance.rate_W_N_s[i]
-                                               : Eigen::Vector3d(Eigen::Vector3d::Zero());
-    };
-    rate = rate_of(0);
-    integrator.start(0, state.data());
-    for (int k = 1; k <= kSamples; ++k) {
-      const double target_s = check_.duration_s * k / kSamples;
-      while (piece < disturbance.until_s.size() && disturbance.until_s[piece] < target_s) {
-        const double until_s = disturbance.until_s[piece];
-        integrator.advance(until_s, until_s);
-        eps += (until_s - from_s) * rate;
-        from_s = until_s;
-        rate = rate_of(++piece);
-        state = Eigen::Map<const PositionLoop::State>(integrator.state());
-        integrator.start(until_s, state.data());
-      }
-      const double limit_s = piece < disturbance.until_s.size() ? disturbance.until_s[piece] : 1e300;
-      integrator.advance(target_s, std::max(limit_s, target_s));
-      const Eigen::Map<const Eigen::Vector3d> error(integrator.state());
-      if (!weigh(error.norm(), k, from_rest, sizes, run)) return;
-    }
-  }
-
- private:
-  /// What the transient bound starts from: |p~|, |p~'|, |s'| at t = 0, and d_m; s'(0) contains the learning error.
-  std::array<double, 4> start_sizes(const IssRun& run, const PositionLoop::State& state) const {
-    if (!check_.has_ball) return {};
-    double derivative[PositionLoop::kSize];
-    loop_.derivative(state.data(), run.disturbance.bias_W_N, derivative);
-    const Eigen::Map<const Eigen::Vector3d> acceleration(derivative + 3);
-    const Eigen::Matrix3d lambda =
-        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(theorem_.composite->Lambda.data());
-    const Eigen::Vector3d s_dot =
-        acceleration + 2 * lambda * run.velocity_m_s + lambda * lambda * run.position_m;
-    return {run.position_m.norm(), run.velocity_m_s.norm(), s_dot.norm(), check_.rate_N_s};
-  }
-
-  /// Takes one sample of |p~| into account; false where the run has left all bounds and need not go on.
-  bool weigh(double error_m, int k, bool from_rest, const std::array<double, 4>& sizes, IssRun* run) const {
-    const double ball_m = check_.ball_m;
-    if (!(error_m <= 1e6 * ball_m)) error_m = 1e6 * ball_m;  // diverged, or not a number
-    if (error_m > run->largest_m) {
-      run->largest_m = error_m;
-      run->at_s = check_.duration_s * k / kSamples;
-    }
-    if (from_rest) {
-      run->ratio = std::max(run->ratio, error_m / ball_m);
-      run->is_violation = run->is_violation || error_m > ball_m * (1 + kTolerance);
-    }
-    if (check_.has_ball) {
-      const double limit_m = table_->at(k, sizes);
-      if (limit_m > 0.01 * ball_m) run->transient_ratio = std::max(run->transient_ratio, error_m / limit_m);
-      run->is_violation = run->is_violation || error_m > limit_m * (1 + kTolerance) + 1e-8 * ball_m;
-    }
-    return error_m < 1e6 * ball_m;
-  }
-
-  PositionLoop loop_;
-  const IssCheck& check_;
-  const Theorem& theorem_;
-  std::optional<TransientTable> table_;
-};
 
 /// Adds a piece to a disturbance.
 void append(RateDisturbance* disturbance, double until_s, const Eigen::Vector3d& rate) {
@@ -161,7 +34,7 @@ Eigen::Vector3d direction(int index, files::Random& random) {
 /// The input that drives the linear loop farthest along `eta` at the end: rate(T - t) = -g(t) / |g(t)| with the kernel
 /// g(t) from rate to eta' p~. By duality z' = A' z, z(0) = eta in p~, and g is the integral of B' z, as the rate is
 /// integrated once before it acts.
-RateDisturbance worst_linear(const Judge& judge, const Eigen::Vector3d& eta) {
+RateDisturbance worst_linear(const IssJudge& judge, const Eigen::Vector3d& eta) {
   const auto a = judge.loop().matrix();
   PositionLoop::State z = PositionLoop::State::Zero();
   z.head<3>() = eta;
@@ -190,7 +63,7 @@ RateDisturbance worst_linear(const Judge& judge, const Eigen::Vector3d& eta) {
 }
 
 /// Switches at random times between +u and -u, or among random vectors of at most d_m.
-RateDisturbance random_pieces(const Judge& judge, bool bang_bang, files::Random& random) {
+RateDisturbance random_pieces(const IssJudge& judge, bool bang_bang, files::Random& random) {
   RateDisturbance disturbance;
   const Eigen::Vector3d axis = random_direction(random);
   const double mean_s = judge.duration_s() / (1 + 10 * random.uniform());
@@ -205,7 +78,7 @@ RateDisturbance random_pieces(const Judge& judge, bool bang_bang, files::Random&
   return disturbance;
 }
 
-IssRun make_run(const Judge& judge, int index, std::uint64_t seed) {
+IssRun make_run(const IssJudge& judge, int index, std::uint64_t seed) {
   files::Random random(files::Random(seed + 0x1000 + static_cast<std::uint64_t>(index)).bits());
   const int turn = index / 5;
   IssRun run;
@@ -240,7 +113,7 @@ IssRun make_run(const Judge& judge, int index, std::uint64_t seed) {
 }
 
 /// NLopt from a start of its own: lengths and directions of a few pieces, to drive |p~| as far as it goes.
-IssRun optimise(const Judge& judge, int evaluations, std::uint64_t seed) {
+IssRun optimise(const IssJudge& judge, int evaluations, std::uint64_t seed) {
   constexpr int kFew = 5;
   files::Random random(seed);
   std::vector<double> x;
@@ -347,7 +220,7 @@ IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& opt
   if (!(check.ball_m > 0 && std::isfinite(check.ball_m)))
     check.ball_m = check.rate_N_s;  // Ki = 0: no ball at all
 
-  const Judge judge(gains, model, &check, theorem);
+  const IssJudge judge(gains, model, check, theorem);
   // A fifth of the runs goes to optimisers, each with so many evaluations.
   constexpr int kEvaluations = 40;
   const int searches = options.runs / (5 * kEvaluations);

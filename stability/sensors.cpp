@@ -35,6 +35,24 @@ Eigen::Vector3d LowPass::filter(const Eigen::Vector3d& input) {
   return output;
 }
 
+DelayedSignal::DelayedSignal(double delay_s, double gain, double period_s) : gain_(gain) {
+  const double periods = delay_s / period_s;
+  share_ = periods - std::floor(periods);
+  past_.resize(static_cast<std::size_t>(std::floor(periods)) + 2);
+}
+
+Eigen::Vector3d DelayedSignal::filter(const Eigen::Vector3d& input) {
+  if (!is_filled_) {
+    std::fill(past_.begin(), past_.end(), input);
+    is_filled_ = true;
+  }
+  past_[next_] = input;
+  next_ = (next_ + 1) % past_.size();  // now the oldest: floor(delay) + 1 periods old
+  const Eigen::Vector3d& older = past_[next_];
+  const Eigen::Vector3d& younger = past_[(next_ + 1) % past_.size()];
+  return input + gain_ * (younger + share_ * (older - younger) - input);
+}
+
 std::uint32_t compress_quaternion(const double* q_wxyz) {
   double q[4];
   for (int i = 0; i < 4; ++i) q[i] = q_wxyz[kPlace[i]];

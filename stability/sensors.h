@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <vector>
 
 namespace swarmcert::stability {
 
@@ -19,6 +20,20 @@ class LowPass {
   double b0_, b1_, b2_, a1_, a2_;
   bool is_filled_ = false;
   Eigen::Vector3d x1_, x2_, y1_, y2_;
+};
+
+/// A signal u sampled at a fixed rate, partly delayed: u + gain (u(t - delay) - u), linear between samples, and before
+/// the first one as that one.
+class DelayedSignal {
+ public:
+  DelayedSignal(double delay_s, double gain, double period_s);
+  Eigen::Vector3d filter(const Eigen::Vector3d& input);
+
+ private:
+  double gain_, share_;  ///< share_: of the older one of the two samples around t - delay
+  std::vector<Eigen::Vector3d> past_;
+  std::size_t next_ = 0;
+  bool is_filled_ = false;
 };
 
 /// A quaternion (w, x, y, z) in 32 bits, as firmware logs it: in the order x, y, z, w, two bits for the index of the

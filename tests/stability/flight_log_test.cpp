@@ -184,6 +184,21 @@ TEST(Sensors, AccelerometerFilterHas3dBAtItsCutoffAndTheStatedDelay) {
   }
 }
 
+TEST(Sensors, DelayedSignalIsLateByTheDelayAndByTheGainsShare) {
+  for (const double delay_s : {0.0, 0.0005, 0.002, 0.0075, 0.03}) {
+    for (const double gain : {0.0, 0.6, 1.0}) {
+      DelayedSignal signal(delay_s, gain, 0.002);
+      for (int k = 0; k < 100; ++k) {
+        const double t = 0.002 * k;
+        const Eigen::Vector3d late = signal.filter({3 * t, 1, -t});
+        if (t < delay_s) continue;
+        ASSERT_NEAR(late.x(), 3 * (t - gain * delay_s), 1e-12) << delay_s << " " << gain;
+        ASSERT_NEAR(late.y(), 1, 1e-15);
+      }
+    }
+  }
+}
+
 TEST(Sensors, MilliTruncatesAndWrapsLikeInt16) {
   EXPECT_EQ(milli(0.0129), 12);
   EXPECT_EQ(milli(-0.0129), -12);
