@@ -1,0 +1,184 @@
+#include "stability/bounds/theorem.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstdio>
+
+#include "controller/gain_conversion.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// How far gains, printed with few digits, may be from a (Lambda, K) form: relative, in Ki.
+constexpr double kFormTolerance = 1e-9;
+constexpr char kAxes[] = "xyz";
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+/// Smallest eigenvalue, where `m` is symmetric; else objects.
+std::optional<double> positive_definite(const Matrix3& m, const char* name,
+                                        std::vector<std::string>& why_not) {
+  const Matrix matrix = Eigen::Map<const Matrix>(m.data());
+  const double asymmetry = (matrix - matrix.transpose()).cwiseAbs().maxCoeff();
+  if (asymmetry > 1e-12 * matrix.cwiseAbs().maxCoeff()) {
+    why_not.push_back(std::string(name) + " is not symmetric: entries differ by " + number(asymmetry) +
+                      ". For such gains the ball can be exceeded");
+    return std::nullopt;
+  }
+  const double least = Eigen::SelfAdjointEigenSolver<Matrix>(matrix, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  if (least > 0) return least;
+  why_not.push_back(std::string(name) + " is not positive definite: its smallest eigenvalue is " +
+                    number(least));
+  return std::nullopt;
+}
+
+/// Diagonal (Lambda, K) of PID gains whose Ki acts as `share` of what is written; else objects.
+std::optional<Composite> composite_of(const PidGains& pid, double share, double mass_kg,
+                                      std::vector<std::string>& why_not) {
+  Composite result{};
+  bool has_form = true;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const controller::AxisPid<double> pid_axis = {pid.Kp[i], pid.Kd[i], pid.Ki[i] * share};
+    const controller::AxisComposite<double> axis =
+        controller::to_composite(pid_axis, mass_kg, kFormTolerance);
+    if (axis.status == controller::ConversionStatus::kOk) {
+      result.Lambda[4 * i] = axis.lambda_1_s;
+      result.K[4 * i] = axis.k_kg_s;
+      continue;
+    }
+    has_form = false;
+    std::string why = std::string("the gains of axis ") + kAxes[i] + " have no (Lambda, K) form: ";
+    if (axis.status == controller::ConversionStatus::kOtherIntegralGain) {
+      why += "Ki = " + number(pid.Ki[i] * share) + ", and Kp, Kd would need " + number(axis.needed_Ki_1_s3);
+    } else {
+      why += controller::to_text(axis.status);
+    }
+    why_not.push_back(why);
+  }
+  if (!has_form) return std::nullopt;
+  return result;
+}
+
+}  // namespace
+
+Theorem check_theorem(const Gains& gains, double mass_kg,
+                      const std::optional<PerAxis>& integrator_needs_m_s) {
+  Theorem theorem;
+  const double share = gains.rate_hz > 0 ? gains.integrator_step_s * gains.rate_hz : 1;
+  const bool acts_as_written = std::abs(share - 1) < 1e-9;
+  if (gains.pid) {
+    theorem.composite = composite_of(*gains.pid, share, mass_kg, theorem.why_not);
+  } else {
+    theorem.composite = Composite{gains.composite->Lambda, gains.composite->K};
+    if (!acts_as_written) {
+      theorem.why_not.push_back("the integrator adds " + number(gains.integrator_step_s) +
+                                " s per cycle of " + number(1 / gains.rate_hz) + " s: Lambda^2 acts " +
+                                number(share) + " times as written, which is no (Lambda, K) form");
+    }
+  }
+  if (theorem.composite) {
+    const auto least_Lambda = positive_definite(theorem.composite->Lambda, "Lambda", theorem.why_not);
+    const auto least_K = positive_definite(theorem.composite->K, "K", theorem.why_not);
+    if (least_Lambda && least_K) {
+      theorem.min_Lambda = *least_Lambda;
+      theorem.min_K = *least_K;
+    } else {
+      theorem.composite.reset();
+    }
+  }
+  if (gains.motor_lag_s > 0) theorem.why_not.push_back("thrust lags by " + number(gains.motor_lag_s) + " s");
+  if (gains.attitude_lag_s > 0) {
+    theorem.why_not.push_back("the thrust's direction lags by " + number(gains.attitude_lag_s) + " s");
+  }
+  if (gains.delay_s > 0) theorem.why_not.push_back("the force is delayed by " + number(gains.delay_s) + " s");
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double limit = gains.integrator_limit_m_s[i];
+    if (std::isinf(limit)) continue;
+    if (integrator_needs_m_s && (*integrator_needs_m_s)[i] <= limit) continue;
+    std::string why =
+        std::string("the integrator of axis ") + kAxes[i] + " is clamped at " + number(limit) + " m s";
+    if (integrator_needs_m_s)
+      why += ", and the disturbance can ask for " + number((*integrator_needs_m_s)[i]);
+    theorem.why_not.push_back(why);
+  }
+  if (gains.network_rate_hz > 0) {
+    theorem.why_not.push_back("the learned force is a staircase of " + number(gains.network_rate_hz) +
+                              " Hz, whose rate is not bounded");
+  }
+  if (gains.network_latency_s > 0) {
+    theorem.why_not.push_back("the learned force is " + number(gains.network_latency_s) +
+                              " s old when applied");
+  }
+  theorem.applies = theorem.why_not.empty() && theorem.composite.has_value();
+  return theorem;
+}
+
+std::optional<AxisGains> axis_gains(const Gains& gains, double mass_kg, int axis) {
+  const auto i = static_cast<std::size_t>(axis);
+  if (gains.pid) return AxisGains{gains.pid->Kp[i], gains.pid->Kd[i], gains.pid->Ki[i]};
+  for (std::size_t j = 0; j < 3; ++j) {
+    if (j == i) continue;
+    for (const Matrix3* m : {&gains.composite->Lambda, &gains.composite->K}) {
+      if ((*m)[3 * i + j] != 0 || (*m)[3 * j + i] != 0) return std::nullopt;
+    }
+  }
+  const auto pid =
+      controller::to_pid<double>(gains.composite->Lambda[4 * i], gains.composite->K[4 * i], mass_kg);
+  return AxisGains{pid.Kp_1_s2, pid.Kd_1_s, pid.Ki_1_s3};
+}
+
+namespace {
+
+/// h(t) m = int_0^t (t - u) e^(-l(t - u)) e^(-au) du
+double kernel(double l, double a, double t) {
+  const double x = (a - l) * t;
+  if (std::abs(x) > 0.5) {
+    const double difference = a - l;
+    return (std::exp(-a * t) - std::exp(-l * t) + difference * t * std::exp(-l * t)) /
+           (difference * difference);
+  }
+  // t^2 e^(-lt) (e^(-x) - 1 + x)/x^2 by its series, which does not cancel.
+  double term = 0.5;
+  double total = term;
+  for (int n = 3; n < 25; ++n) {
+    term *= -x / n;
+    total += term;
+  }
+  return t * t * std::exp(-l * t) * total;
+}
+
+double kernel_integral(double l, double a, double t) {
+  const double difference = a - l;
+  if (std::abs(difference) > 0.02 * l) {
+    const double decayed_l = std::exp(-l * t);
+    return (1 - std::exp(-a * t)) / (a * difference * difference) -
+           (1 - decayed_l) / (l * difference * difference) +
+           (1 - decayed_l * (1 + l * t)) / (l * l * difference);
+  }
+  // Nearly equal rates: the closed form cancels; Simpson's rule on a smooth kernel does not.
+  constexpr int kCells = 6000;
+  const double horizon = std::min(t, 60 / std::min(l, a));
+  const double step = horizon / kCells;
+  double total = kernel(l, a, 0) + kernel(l, a, horizon);
+  for (int i = 1; i < kCells; ++i) total += (i % 2 == 1 ? 4 : 2) * kernel(l, a, i * step);
+  return total * step / 3;
+}
+
+}  // namespace
+
+double Transient::at(double t_s) const {
+  const double a = k / mass_kg;
+  const double decayed = std::exp(-l * t_s);
+  return (1 + l * t_s) * decayed * error_m + t_s * decayed * speed_m_s + kernel(l, a, t_s) * s_dot_m_s2 +
+         rate_N_s / mass_kg * kernel_integral(l, a, t_s);
+}
+
+double Transient::decay_1_s() const { return std::min(k / mass_kg, l); }
+
+}  // namespace swarmcert::stability

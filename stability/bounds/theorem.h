@@ -1,0 +1,62 @@
+/// @file The tracking theorem: when it applies, the ball it gives, and the way there.
+///
+/// With s' = e'' + 2 Lambda e' + Lambda^2 e and force -K s, learning error eps0 + eps(t), |eps'| <= d_m:
+///   limsup |e| <= d_m / (lambda_min(Lambda)^2 lambda_min(K)).
+/// It is a limsup, not a limit. Proof: V = m |s'|^2 / 2 gives |s'(t)| <= e^(-at)|s'(0)| + d_m (1 - e^(-at)) / k with
+/// k = lambda_min(K), a = k/m; two convolutions with exp(-Lambda t), of norm e^(-lt) for symmetric Lambda, give the
+/// rest. Lambda and K need not commute. A non-symmetric Lambda breaks it.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stability/gains.h"
+
+namespace swarmcert::stability {
+
+/// Gains as the theorem wants them.
+struct Composite {
+  Matrix3 Lambda;  ///< 1/s
+  Matrix3 K;       ///< kg/s
+};
+
+struct Theorem {
+  bool applies = false;
+  /// One sentence for each hypothesis that fails: what, by how much.
+  std::vector<std::string> why_not;
+  /// The gains in (Lambda, K) form, where they have one with symmetric positive definite matrices.
+  std::optional<Composite> composite;
+  double min_Lambda = 0;  ///< lambda_min(Lambda), 1/s; where `composite`
+  double min_K = 0;       ///< lambda_min(K), kg/s
+  /// Ball per unit of d_m, m per N/s, from `composite`: true of the loop only where `applies`.
+  double ball_per_rate() const { return 1 / (min_Lambda * min_Lambda * min_K); }
+};
+
+/// Checks every hypothesis on `gains` for a vehicle of `mass_kg`.
+/// @param integrator_needs_m_s largest |int e| that the loop asks of its integrator, per axis, where it is known:
+///   a limit above it does not act and is no objection.
+Theorem check_theorem(const Gains& gains, double mass_kg, const std::optional<PerAxis>& integrator_needs_m_s);
+
+/// PID gains of one axis of `gains`, with the integrator as written; nothing where Lambda or K couples axes.
+struct AxisGains {
+  double Kp, Kd, Ki;
+};
+std::optional<AxisGains> axis_gains(const Gains& gains, double mass_kg, int axis);
+
+/// The closed-form transient, valid for all t >= 0:
+///   |e(t)| <= (1 + lt) e^(-lt) |e(0)| + t e^(-lt) |e'(0)| + m h(t) |s'(0)| + d_m int_0^t h.
+/// s'(0) = e''(0) + 2 Lambda e'(0) + Lambda^2 e(0), and e''(0) contains the initial learning error over the mass.
+struct Transient {
+  double l = 0;  ///< lambda_min(Lambda), 1/s
+  double k = 0;  ///< lambda_min(K), kg/s
+  double mass_kg = 0;
+  double error_m = 0, speed_m_s = 0, s_dot_m_s2 = 0;  ///< norms at t = 0
+  double rate_N_s = 0;                                ///< d_m
+
+  double at(double t_s) const;
+  /// Exponential rate of approach, 1/s: min(k/m, l), up to a polynomial factor.
+  double decay_1_s() const;
+};
+
+}  // namespace swarmcert::stability
