@@ -25,6 +25,11 @@ const std::vector<Command>& commands() {
       certify_command(),          //
       check_command(),            //
       simulate_command(),         //
+      bound_command(),            //
+      spacing_command(),          //
+      sweep_command(),            //
+      merge_command(),            //
+      tune_command(),             //
       iss_check_command(),        //
       identify_thrust_command(),  //
       export_command(),           //

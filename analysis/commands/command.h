@@ -72,6 +72,7 @@ void write_result(const CommonOptions& common, const files::Json& result);
 /// Files that NET was read from.
 std::vector<std::string> input_files(const files::Network& network);
 
+Command bound_command();
 Command certify_command();
 Command check_command();
 Command demo_command();
@@ -80,6 +81,10 @@ Command identify_thrust_command();
 Command inspect_command();
 Command iss_check_command();
 Command match_command();
+Command merge_command();
 Command simulate_command();
+Command spacing_command();
+Command sweep_command();
+Command tune_command();
 
 }  // namespace swarmcert::analysis

@@ -1,0 +1,30 @@
+/// @file What `bound` computes on request: intervals of the vehicle, rigorous enclosures, the tube over time, a swarm.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/tracking_input.h"
+
+namespace swarmcert::analysis {
+
+/// --uncertain: suprema over intervals, per axis and channel.
+/// @param words "mass=0.032:0.037" and the like: mass (kg), thrust (ratio), lag (s), delay (s), battery (V). What is not
+///   named varies by 5 % (mass), 10 % (thrust), 20 % (lag, delay) about the model and the gains.
+/// @throws UsageError for words that are not understood.
+files::Json uncertain_json(const Tracking& input, const std::vector<std::string>& words);
+void print_uncertain(const files::Json& uncertain);
+
+/// --verified: enclosures of the continuous gains, per axis and channel.
+files::Json verified_json(const Tracking& input);
+void print_verified(const files::Json& verified);
+
+/// --tube: bound of |e(t)| from rest, force channel, per axis, at `count` times.
+files::Json tube_json(const Tracking& input, const stability::DisturbanceSource& source, int count);
+
+/// --swarm FILE (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m, speed_m_s,
+/// acceleration_m_s2, cross_rate_N_s; every vehicle has the gains and the model given, its z loop is studied.
+files::Json swarm_json(const Tracking& input, const std::string& path);
+void print_swarm(const files::Json& swarm);
+
+}  // namespace swarmcert::analysis

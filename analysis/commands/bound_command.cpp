@@ -1,0 +1,87 @@
+#include <fmt/core.h>
+
+#include <memory>
+
+#include "analysis/bound_extras.h"
+#include "analysis/bound_report.h"
+#include "analysis/commands/command.h"
+#include "analysis/tracking_input.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+struct Options {
+  TrackingArguments tracking;
+  DisturbanceArguments disturbance;
+  stability::InitialError initial;
+  std::vector<std::string> uncertain;
+  bool is_uncertain = false;
+  bool verified = false;
+  bool tube = false;
+  std::string swarm;
+};
+
+int run(const Options& options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  const Tracking input = load_tracking(options.tracking);
+  std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
+  if (!options.swarm.empty()) inputs.push_back(options.swarm);
+  const stability::DisturbanceSource source = load_disturbance(options.disturbance, inputs);
+  const stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
+
+  files::Json result = result_head("bound", inputs);
+  add_tracking_json(result, input, source, report);
+  if (options.is_uncertain) result["uncertain"] = uncertain_json(input, options.uncertain);
+  if (options.verified) result["verified"] = verified_json(input);
+  if (options.tube) result["tube"] = tube_json(input, source, 101);
+  if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
+  write_result(common, result);
+  if (common.prints_text()) {
+    print_tracking(input, source, report);
+    if (options.is_uncertain) print_uncertain(result["uncertain"]);
+    if (options.verified) print_verified(result["verified"]);
+    if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
+    if (!options.swarm.empty()) print_swarm(result["swarm"]);
+  }
+  if (!options.swarm.empty() && result["swarm"]["verdict"] != "proved") return kInconclusive;
+  return kDone;
+}
+
+}  // namespace
+
+Command bound_command() {
+  return {
+      "bound", "Tracking error that gains and a vehicle give under a bounded force error",
+      "Says whether the tracking theorem applies and why not, its ball, the exact gains of every axis "
+      "for the\n"
+      "continuous and the sampled loop, and, for a declared or measured force error, the smallest of "
+      "five bounds.\n"
+      "A certificate or a network bounds the rate of f_hat only and gives no ball.\n\n"
+      "Example: swarmcert bound --gains controller/gains/crazyflie.toml --model "
+      "stability/models/crazyflie-small.toml \\\n"
+      "           --amplitude 0.097 --impulse 0.0202 --rate 0.75",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<Options>();
+        declare_tracking(app, options->tracking);
+        declare_disturbance(app, options->disturbance);
+        app.add_option("--initial-error", options->initial.position_m, "|e| at t = 0, m, for the transient");
+        app.add_option("--initial-speed", options->initial.velocity_m_s, "|e'| at t = 0, m/s");
+        app.add_option("--initial-learning-error", options->initial.learning_error_N,
+                       "|f_hat - f_a| at t = 0, bias included, N");
+        auto* uncertain = app.add_option("--uncertain", options->uncertain,
+                                         "Worst over intervals: mass=A:B, thrust=A:B, lag=A:B, delay=A:B, "
+                                         "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")
+                              ->expected(0, -1)
+                              ->default_str("default");
+        app.add_flag("--verified", options->verified,
+                     "Rigorous enclosures of the continuous gains (intervals)");
+        app.add_flag("--tube", options->tube, "Bound of |e(t)| over time, from rest (JSON)");
+        app.add_option("--swarm", options->swarm, "swarm.toml: do the vehicles' mutual forces stay bounded?");
+        return [options, uncertain](const CommonOptions& common) {
+          options->is_uncertain = uncertain->count() > 0;
+          return run(*options, common);
+        };
+      }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,237 @@
+#include "analysis/tracking_input.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
+#include "nn/files/functions.h"
+#include "nn/files/input_error.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using files::InputError;
+using files::Json;
+using stability::DisturbanceSource;
+
+/// A number for `axis` in what compare wrote: a number, or an object with axes, with quantiles, or with both.
+double measured_number(const Json& value, const std::string& axis, const std::string& quantile,
+                       const std::string& path, const std::string& field) {
+  if (value.is_number()) return value.get<double>();
+  if (value.is_object()) {
+    if (value.contains(axis)) return measured_number(value[axis], axis, quantile, path, field + "." + axis);
+    if (value.contains(quantile)) {
+      return measured_number(value[quantile], axis, quantile, path, field + "." + quantile);
+    }
+  }
+  throw InputError({path, "", field, value.is_object() ? "an object" : value.dump().substr(0, 40),
+                    "has no number for axis " + axis + " and quantile " + quantile,
+                    "--quantile names one that is there"});
+}
+
+void read_measured(const DisturbanceArguments& arguments, DisturbanceSource& source) {
+  const Json document = files::read_json(arguments.from, "swarmcert/compare/1");
+  if (!document.contains("learning_error") || !document["learning_error"].is_object()) {
+    throw InputError(
+        {arguments.from, "", "learning_error", "", "is missing", "write it with swarmcert compare --json"});
+  }
+  const Json& error = document["learning_error"];
+  double square = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name = stability::axis_name(axis);
+    const auto get = [&](const char* key) {
+      if (!error.contains(key)) return std::numeric_limits<double>::infinity();
+      return std::abs(measured_number(error[key], name, arguments.quantile, arguments.from,
+                                      std::string("learning_error.") + key));
+    };
+    stability::Disturbance& d = source.axis[axis];
+    d.rate_N_s = get("rate");
+    d.amplitude_N = get("amplitude");
+    d.variation_N = get("variation");
+    d.impulse_N_s = get("impulse");
+    source.bias_N[axis] = error.contains("bias") ? get("bias") : 0;
+    square += d.rate_N_s * d.rate_N_s;
+  }
+  source.rate_norm_N_s =
+      std::sqrt(square);  // of quantiles per axis: at least the vector's where they coincide
+  source.kind = "measured";
+}
+
+double newtons(const std::string& unit, double value, const std::string& path) {
+  if (unit.rfind("gf", 0) == 0) return value * stability::kGramForce_N;
+  if (unit.rfind("N", 0) == 0) return value;
+  throw InputError({path, "", "unit", files::in_quotes(unit), "is not a unit of force",
+                    "state output.unit in network.toml"});
+}
+
+/// Largest bound among the set functions (or the plain network) of a list of bounds.
+template <class Bounds, class Function, class Upper, class Unit>
+double largest(const Bounds& bounds, const Function& function, const Upper& upper, const Unit& unit,
+               const std::string& path) {
+  double result = -1;
+  for (const auto& bound : bounds) {
+    const std::string of = function(bound);
+    if (of.rfind("set:", 0) != 0 && of != "network") continue;
+    result = std::max(result, newtons(unit(bound), upper(bound), path));
+  }
+  if (result < 0) throw InputError({path, "", "bounds", "", "has none of a composed function", ""});
+  return result;
+}
+
+void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& source,
+                    std::vector<std::string>& inputs) {
+  if (arguments.speed < 0) {
+    throw UsageError(
+        "a Lipschitz constant gives a rate only with --speed V (and --accel A) of a neighbour "
+        "relative to the vehicle");
+  }
+  const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
+  double lipschitz_N = 0;  // per unit of the network's input
+  if (!arguments.certificate.empty()) {
+    inputs.push_back(arguments.certificate);
+    const Json certificate = files::read_json(arguments.certificate, check::kCertificateSchema);
+    if (!has_network) {
+      throw UsageError(
+          "--certificate C proves nothing without the network that it is about: add --network NET");
+    }
+    const files::Network network = load_net(arguments.network);
+    for (const std::string& path : input_files(network)) inputs.push_back(path);
+    const check::CheckResult verdict = check::check(certificate, network);
+    if (!verdict.accepted) {
+      throw InputError({arguments.certificate, "", "", "", "is rejected by the checker: " + verdict.reason,
+                        "certify the network again"});
+    }
+    lipschitz_N = largest(
+        certificate["bounds"],
+        [](const Json& b) {
+          // Only what bounds one neighbour's whole input, anywhere, in the Euclidean norm; the checker knows the rest.
+          const bool is_plain = b.value("block", "all") == "all" && b.value("domain", "global") == "global" &&
+                                (!b.contains("scale") || b["scale"].empty());
+          return is_plain ? b.value("function", "") : std::string();
+        },
+        [](const Json& b) { return b["upper"].get<double>(); },
+        [&](const Json& b) { return files::unit(network, b["function"].get<std::string>()); },
+        arguments.certificate);
+  } else {
+    const files::Network network = load_net(arguments.network);
+    for (const std::string& path : input_files(network)) inputs.push_back(path);
+    lipschitz::CertifyOptions options;
+    options.method = lipschitz::UpperMethod::kProduct;
+    options.lower.rounds = 0;
+    const lipschitz::Certification found = certify(network, options);
+    lipschitz_N = largest(
+        found.bounds, [](const lipschitz::CertifiedBound& b) { return b.function; },
+        [](const lipschitz::CertifiedBound& b) { return b.upper.value(); },
+        [&](const lipschitz::CertifiedBound& b) { return files::unit(network, b.function); },
+        arguments.network.file);
+  }
+  // The input moves at |(v_rel, a_rel)|, per neighbour; every neighbour adds its own.
+  const double acceleration = std::max(0.0, arguments.acceleration);
+  source.f_hat_rate_N_s = arguments.neighbours * lipschitz_N * std::hypot(arguments.speed, acceleration);
+  source.f_hat_rate_known = true;
+  if (source.kind != "none") return;
+  source.kind = "rate of f_hat";
+  source.axis[2].rate_N_s = source.f_hat_rate_N_s;  // the network's output is the force along z
+}
+
+}  // namespace
+
+void declare_tracking(CLI::App& app, TrackingArguments& arguments) {
+  app.add_option("--gains", arguments.gains, "gains.toml: position gains, loop rate, lags")->required();
+  app.add_option("--model", arguments.model, "model.toml of the vehicle")->required();
+  app.add_option("--battery", arguments.battery_V, "Battery voltage, for the largest thrust (default 4.2)")
+      ->check(CLI::PositiveNumber);
+}
+
+Tracking load_tracking(const TrackingArguments& arguments) {
+  Tracking result;
+  result.gains = stability::load_gains(arguments.gains);
+  result.model = stability::read_model(arguments.model);
+  result.plant.mass_kg = result.model.mass_kg;
+  result.plant.largest_thrust_N = 4 * result.model.thrust.largest_N(arguments.battery_V);
+  for (const stability::EffectSpec& effect : result.model.effects) {
+    if (effect.is_expression()) continue;
+    const auto first = [&](bool shape) {
+      const stability::EffectValues values = effect_values(stability::effect_info(effect.name), effect);
+      return shape ? values.shape.at(0) : values.linear.at(0);
+    };
+    if (effect.name == "motor_lag" && result.gains.motor_lag_s == 0) {
+      result.gains.motor_lag_s = first(true);
+      result.notes.push_back(fmt::format("motor lag {} s of the model", result.gains.motor_lag_s));
+    } else if (effect.name == "delay" && result.gains.delay_s == 0) {
+      result.gains.delay_s = first(true);
+      result.notes.push_back(fmt::format("delay {} s of the model", result.gains.delay_s));
+    } else if (effect.name == "thrust_ratio") {
+      result.plant.thrust_scale = 1 + first(false);
+      result.notes.push_back(fmt::format("thrust scale {} of the model", result.plant.thrust_scale));
+    }
+  }
+  return result;
+}
+
+void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
+  app.add_option("--rate", arguments.rate, "sup |eps'|, N/s: how fast the force error changes")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--amplitude", arguments.amplitude, "sup |eps|, N")->check(CLI::NonNegativeNumber);
+  app.add_option("--edge", arguments.edge, "Total variation of eps, N")->check(CLI::NonNegativeNumber);
+  app.add_option("--impulse", arguments.impulse, "int |eps| dt of one pass, N s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--bias", arguments.bias, "Constant part of the force error, N");
+  app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--pass-length", arguments.pass_s, "How long one pass lasts, s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--from", arguments.from, "Result of compare: measured quantiles of the learning error");
+  app.add_option("--quantile", arguments.quantile, "Which quantile of --from (default p99)");
+  app.add_option("--certificate", arguments.certificate,
+                 "Certificate of --network: bounds the rate of f_hat");
+  app.add_option("--network", arguments.network.file, "network.toml or weight file of f_hat");
+  app.add_option("--phi", arguments.network.phi, "Weight file of phi, with --rho");
+  app.add_option("--rho", arguments.network.rho, "Weight file of rho, with --phi");
+  app.add_option("--speed", arguments.speed, "Largest relative speed of a neighbour, m/s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--accel", arguments.acceleration, "Largest relative acceleration of a neighbour, m/s^2")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--neighbours", arguments.neighbours, "How many neighbours at once (default 1)")
+      ->check(CLI::PositiveNumber);
+}
+
+DisturbanceSource load_disturbance(const DisturbanceArguments& arguments, std::vector<std::string>& inputs) {
+  DisturbanceSource source;
+  const bool is_declared =
+      std::max({arguments.rate, arguments.amplitude, arguments.edge, arguments.impulse}) >= 0;
+  if (is_declared && !arguments.from.empty()) {
+    throw UsageError("--from and --rate, --amplitude, --edge, --impulse both say what the disturbance is");
+  }
+  if (is_declared) {
+    source.kind = "declared";
+    for (stability::Disturbance& d : source.axis) {
+      if (arguments.rate >= 0) d.rate_N_s = arguments.rate;
+      if (arguments.amplitude >= 0) d.amplitude_N = arguments.amplitude;
+      if (arguments.edge >= 0) d.variation_N = arguments.edge;
+      if (arguments.impulse >= 0) d.impulse_N_s = arguments.impulse;
+    }
+    if (arguments.rate >= 0) source.rate_norm_N_s = arguments.rate;
+  } else if (!arguments.from.empty()) {
+    inputs.push_back(arguments.from);
+    read_measured(arguments, source);
+  }
+  if (arguments.passes > 1 && arguments.every_s <= 0) throw UsageError("--passes needs --every S");
+  for (stability::Disturbance& d : source.axis) {
+    d.passes = arguments.passes;
+    d.pass_period_s = arguments.every_s;
+    d.pass_length_s = arguments.pass_s;
+  }
+  if (arguments.bias != 0) std::fill(std::begin(source.bias_N), std::end(source.bias_N), arguments.bias);
+  const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
+  if (!arguments.certificate.empty() || has_network) read_lipschitz(arguments, source, inputs);
+  return source;
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,52 @@
+/// @file Intervals of doubles with outward rounding: every operation encloses the exact result.
+///
+/// Rounding to nearest errs by at most half a unit in the last place, so one step of nextafter outwards encloses. No
+/// switching of rounding modes, which compilers reorder. Not valid under -ffast-math.
+#pragma once
+
+#ifdef __FAST_MATH__
+#error "enclosures need IEEE arithmetic: compile without -ffast-math"
+#endif
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swarmcert::stability {
+
+struct Interval {
+  double lo = 0, hi = 0;
+
+  Interval() = default;
+  Interval(double value) : lo(value), hi(value) {}  // NOLINT: a double is an interval
+  Interval(double low, double high) : lo(low), hi(high) {}
+
+  double mag() const { return std::max(std::abs(lo), std::abs(hi)); }
+  double mig() const { return lo > 0 ? lo : hi < 0 ? -hi : 0; }
+  bool is_positive() const { return lo > 0; }
+  bool is_negative() const { return hi < 0; }
+};
+
+inline double down(double x) { return std::nextafter(x, -std::numeric_limits<double>::infinity()); }
+inline double up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
+
+inline Interval operator-(Interval a) { return {-a.hi, -a.lo}; }
+inline Interval operator+(Interval a, Interval b) { return {down(a.lo + b.lo), up(a.hi + b.hi)}; }
+inline Interval operator-(Interval a, Interval b) { return {down(a.lo - b.hi), up(a.hi - b.lo)}; }
+inline Interval operator*(Interval a, Interval b) {
+  const double p[] = {a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi};
+  return {down(*std::min_element(p, p + 4)), up(*std::max_element(p, p + 4))};
+}
+/// b must not contain zero.
+inline Interval operator/(Interval a, Interval b) {
+  const double q[] = {a.lo / b.lo, a.lo / b.hi, a.hi / b.lo, a.hi / b.hi};
+  return {down(*std::min_element(q, q + 4)), up(*std::max_element(q, q + 4))};
+}
+inline Interval& operator+=(Interval& a, Interval b) { return a = a + b; }
+inline Interval abs(Interval a) { return {a.mig(), a.mag()}; }
+inline Interval sqrt(Interval a) {
+  return {a.lo > 0 ? std::max(0.0, down(std::sqrt(a.lo))) : 0, up(std::sqrt(std::max(a.hi, 0.0)))};
+}
+inline Interval hull(Interval a, Interval b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
+
+}  // namespace swarmcert::stability

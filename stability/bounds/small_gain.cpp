@@ -1,0 +1,108 @@
+#include "stability/bounds/small_gain.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace swarmcert::stability {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd coupling_matrix(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings) {
+  const auto n = static_cast<Index>(loops.size());
+  MatrixXd Gamma = MatrixXd::Zero(n, n);
+  for (const Coupling& c : couplings) {
+    // |v_rel| <= V + g1 (D_on + D_by): both vehicles' own loops turn rates into motion.
+    const auto gain = [&c](const LoopGains& loop) {
+      return c.position_N_m * loop.velocity + c.velocity_N_s_m * loop.acceleration;
+    };
+    Gamma(c.on, c.by) += gain(loops[static_cast<std::size_t>(c.by)]);
+    Gamma(c.on, c.on) += gain(loops[static_cast<std::size_t>(c.on)]);
+  }
+  return Gamma;
+}
+
+/// Collatz and Wielandt: for a nonnegative matrix and any positive x, max_i (Gx)_i/x_i bounds the spectral radius from
+/// above and, min_i, from below.
+void enclose(const MatrixXd& Gamma, double& lower, double& upper) {
+  const Index n = Gamma.rows();
+  // I + G has the same vector and converges where G alone would cycle; a little of everything keeps x positive.
+  VectorXd x = VectorXd::Ones(n);
+  for (int i = 0; i < 2000; ++i) {
+    x = (x + Gamma * x).eval();
+    x /= x.maxCoeff();
+    x = x.cwiseMax(1e-9);
+  }
+  const VectorXd ratio = (Gamma * x).cwiseQuotient(x);
+  upper = ratio.maxCoeff() * (1 + 1e-14 * static_cast<double>(n));
+  lower = std::max(0.0, ratio.minCoeff() * (1 - 1e-14 * static_cast<double>(n)));
+}
+
+bool closes(const MatrixXd& Gamma) {
+  double lower = 0;
+  double upper = 0;
+  enclose(Gamma, lower, upper);
+  return upper < 1;
+}
+
+}  // namespace
+
+SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings) {
+  const auto n = static_cast<Index>(loops.size());
+  for (const Coupling& c : couplings) {
+    if (c.on < 0 || c.by < 0 || c.on >= n || c.by >= n || c.on == c.by) {
+      throw std::invalid_argument("small_gain: coupling of " + std::to_string(c.on) + " by " +
+                                  std::to_string(c.by) + " in a swarm of " + std::to_string(n));
+    }
+    for (const double value :
+         {c.position_N_m, c.velocity_N_s_m, c.speed_m_s, c.acceleration_m_s2, c.cross_rate_N_s}) {
+      if (!(value >= 0)) throw std::invalid_argument("small_gain: negative bound " + std::to_string(value));
+    }
+  }
+  SmallGain result;
+  const MatrixXd Gamma = coupling_matrix(loops, couplings);
+  for (Index i = 0; i < n; ++i) {
+    const VectorXd row = Gamma.row(i);
+    result.Gamma.emplace_back(row.data(), row.data() + n);
+  }
+  enclose(Gamma, result.spectral_radius_lower, result.spectral_radius_upper);
+  result.proved = result.spectral_radius_upper < 1;
+  if (!result.proved) {
+    result.missing_factor = 1 / result.spectral_radius_upper;
+    for (std::size_t k = 0; k < couplings.size(); ++k) {
+      double low = 0;
+      double high = 1;
+      const auto closes_at = [&](double factor) {
+        std::vector<Coupling> weaker = couplings;
+        weaker[k].position_N_m *= factor;
+        weaker[k].velocity_N_s_m *= factor;
+        return closes(coupling_matrix(loops, weaker));
+      };
+      if (closes_at(0)) {
+        for (int i = 0; i < 40; ++i) {
+          const double middle = (low + high) / 2;
+          (closes_at(middle) ? low : high) = middle;
+        }
+      }
+      result.missing_factor_of.push_back(low);
+    }
+    return result;
+  }
+  VectorXd b = VectorXd::Zero(n);
+  for (const Coupling& c : couplings) {
+    b[c.on] += c.position_N_m * c.speed_m_s + c.velocity_N_s_m * c.acceleration_m_s2 + c.cross_rate_N_s;
+  }
+  const VectorXd D = (MatrixXd::Identity(n, n) - Gamma).partialPivLu().solve(b);
+  for (Index i = 0; i < n; ++i) {
+    result.rate_N_s.push_back(D[i]);
+    result.error_m.push_back(loops[static_cast<std::size_t>(i)].position * D[i]);
+  }
+  return result;
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,113 @@
+/// @file Everything that can be said about the tracking error of given gains on a given vehicle.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/disturbance_bounds.h"
+#include "stability/bounds/sampled_loop.h"
+#include "stability/bounds/theorem.h"
+#include "stability/bounds/vector_gain.h"
+#include "stability/gains.h"
+
+namespace swarmcert::stability {
+
+enum class Loop { kContinuous, kSampled };
+
+/// The vehicle as far as bounds need it.
+struct Plant {
+  double mass_kg = 0;
+  double thrust_scale = 1;      ///< force that acts per force commanded
+  double largest_thrust_N = 0;  ///< of all rotors; 0: not known
+};
+
+/// The loop of one axis: lags of thrust, and of its direction for x and y. Nothing where Lambda or K couples axes.
+std::optional<AxisLoop> axis_loop(const Gains& gains, const Plant& plant, int axis);
+
+/// The same as firmware runs it; nothing without rate_hz.
+std::optional<SampledLoop> sampled_axis_loop(const Gains& gains, const Plant& plant, int axis);
+
+/// What is known, and from where; per axis.
+struct DisturbanceSource {
+  Disturbance axis[3];
+  double rate_norm_N_s = std::numeric_limits<double>::infinity();  ///< d_m: sup |eps'| as a vector
+  double bias_N[3] = {0, 0, 0};
+  /// "declared", "measured" or "rate of f_hat": the last bounds the learned force alone, not its error, and so gives
+  /// no ball.
+  std::string kind = "none";
+  double f_hat_rate_N_s = 0;  ///< sup |f_hat'|, for the staircase; where known
+  bool f_hat_rate_known = false;
+};
+
+struct ExactGains {
+  int axis = 0;
+  Channel channel = Channel::kForce;
+  Loop loop = Loop::kContinuous;
+  GainNorms norms;      ///< sampled: at the sampling instants
+  GainNorms all_times;  ///< sampled: also between them
+};
+
+struct AxisBounds {
+  int axis = 0;
+  Channel channel = Channel::kForce;
+  Loop loop = Loop::kContinuous;
+  DisturbanceBounds bounds;  ///< of the linear loop: hold where clamp.never_acts
+  ClampBounds clamp;
+  /// Smallest bound that holds: of `bounds` where the clamp never acts, else of those that hold with it.
+  double least() const {
+    const double clamped = clamp.by_amplitude < clamp.by_impulse ? clamp.by_amplitude : clamp.by_impulse;
+    return clamp.never_acts && bounds.least() < clamped ? bounds.least() : clamped;
+  }
+  double staircase_m = 0;  ///< to be added for a learned force that is a staircase or late
+};
+
+struct AxisFacts {
+  int axis = 0;
+  bool stable = false;
+  LagFloor lag_floor;
+  double effort_gain = 0;
+  double lag_limit_s = 0;
+  double delay_limit_s = 0;
+  double effective_Ki = 0;  ///< sampled loop, else as written
+  double written_Ki = 0;
+  double spectral_radius = 0;    ///< 0: no sampled loop
+  double clamp_authority_N = 0;  ///< constant force that the integrator can cancel; infinite without limit
+  double clamp_residual_m = 0;   ///< of bias_N
+  NoiseDeviation noise;          ///< for 1 mm and 0.05 m/s, sampled loop
+};
+
+struct Assumption {
+  std::string name;
+  std::string status;  ///< "proved", "measured" or "assumed"
+  std::string note;
+};
+
+struct TrackingReport {
+  Theorem theorem;
+  std::optional<double> ball_m;  ///< where the theorem applies and d_m bounds the learning error
+  std::optional<Transient> transient;
+  std::vector<ExactGains> exact;
+  std::vector<AxisBounds> bounds;
+  std::vector<AxisFacts> facts;
+  std::optional<VectorGain> vector;
+  /// No saturation: thrust that is left on the z axis, N; nothing where not known.
+  std::optional<double> thrust_margin_N;
+  std::vector<Assumption> assumptions;
+};
+
+/// @param initial norms of e, e' and e'' at t = 0, for the transient; e'' contains the initial learning error over the
+///   mass, which the caller adds.
+struct InitialError {
+  double position_m = 0, velocity_m_s = 0, learning_error_N = 0;
+};
+
+TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const DisturbanceSource& source,
+                               const InitialError& initial);
+
+/// "x", "y", "z"; "force", "command"; "continuous", "sampled".
+const char* axis_name(int axis);
+const char* name(Channel channel);
+const char* name(Loop loop);
+
+}  // namespace swarmcert::stability

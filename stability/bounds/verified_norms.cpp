@@ -1,0 +1,446 @@
+#include "stability/bounds/verified_norms.h"
+
+#include <Eigen/Dense>
+#include <array>
+#include <vector>
+
+namespace swarmcert::stability {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using IntervalVector = std::vector<Interval>;
+
+class IntervalMatrix {
+ public:
+  explicit IntervalMatrix(std::size_t n) : n_(n), entries_(n * n) {}
+  explicit IntervalMatrix(const MatrixXd& m) : IntervalMatrix(static_cast<std::size_t>(m.rows())) {
+    for (std::size_t i = 0; i < n_; ++i) {
+      for (std::size_t j = 0; j < n_; ++j) (*this)(i, j) = m(static_cast<Index>(i), static_cast<Index>(j));
+    }
+  }
+  std::size_t size() const { return n_; }
+  Interval& operator()(std::size_t i, std::size_t j) { return entries_[i * n_ + j]; }
+  Interval operator()(std::size_t i, std::size_t j) const { return entries_[i * n_ + j]; }
+
+ private:
+  std::size_t n_;
+  std::vector<Interval> entries_;
+};
+
+IntervalMatrix operator*(const IntervalMatrix& a, const IntervalMatrix& b) {
+  IntervalMatrix result(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < a.size(); ++j) {
+      Interval total;
+      for (std::size_t k = 0; k < a.size(); ++k) total += a(i, k) * b(k, j);
+      result(i, j) = total;
+    }
+  }
+  return result;
+}
+
+IntervalVector operator*(const IntervalVector& row, const IntervalMatrix& m) {
+  IntervalVector result(row.size());
+  for (std::size_t j = 0; j < row.size(); ++j) {
+    for (std::size_t k = 0; k < row.size(); ++k) result[j] += row[k] * m(k, j);
+  }
+  return result;
+}
+
+Interval dot(const IntervalVector& a, const std::vector<double>& b) {
+  Interval total;
+  for (std::size_t i = 0; i < a.size(); ++i) total += a[i] * b[i];
+  return total;
+}
+
+/// Upper bound of the Euclidean norm.
+double norm_above(const IntervalVector& v) {
+  Interval total;
+  for (const Interval& x : v) total += Interval(x.mag()) * x.mag();
+  return sqrt(total).hi;
+}
+
+/// Enclosure of the inverse of a matrix: Gauss and Jordan in intervals on (approximate inverse times m), which is
+/// nearly the identity. Nothing where a pivot may vanish.
+std::optional<IntervalMatrix> inverse(const MatrixXd& m) {
+  const MatrixXd approximate = m.inverse();
+  IntervalMatrix left = IntervalMatrix(approximate) * IntervalMatrix(m);
+  IntervalMatrix right(approximate);
+  const std::size_t n = left.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    const Interval pivot = left(k, k);
+    if (!pivot.is_positive()) return std::nullopt;
+    for (std::size_t j = 0; j < n; ++j) {
+      left(k, j) = left(k, j) / pivot;
+      right(k, j) = right(k, j) / pivot;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == k) continue;
+      const Interval factor = left(i, k);
+      for (std::size_t j = 0; j < n; ++j) {
+        left(i, j) = left(i, j) - factor * left(k, j);
+        right(i, j) = right(i, j) - factor * right(k, j);
+      }
+    }
+  }
+  return right;
+}
+
+/// Whether every symmetric matrix in `m` is positive definite: Cholesky with positive pivots.
+bool is_positive_definite(IntervalMatrix m) {
+  const std::size_t n = m.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!m(k, k).is_positive()) return false;
+    for (std::size_t i = k + 1; i < n; ++i) {
+      const Interval factor = m(i, k) / m(k, k);
+      for (std::size_t j = i; j < n; ++j) {
+        m(i, j) = m(i, j) - factor * m(k, j);
+        m(j, i) = m(i, j);
+      }
+    }
+  }
+  return true;
+}
+
+constexpr int kTerms = 18;
+
+/// y(t) = row exp(At) b, with its antiderivative and derivatives, in contracting coordinates.
+struct ContractingSystem {
+  IntervalMatrix A;
+  IntervalVector b;
+  double alpha = 0;
+  /// Rows that give Y (int y, vanishing at infinity), y, y', y''.
+  std::array<IntervalVector, 4> rows;
+};
+
+std::optional<ContractingSystem> contracting(const TransferFunction& h) {
+  const std::size_t n = h.denominator.size() - 1;
+  const auto size = static_cast<Index>(n);
+  double slowest = 1e300;
+  double fastest = 0;
+  for (const std::complex<double>& pole : poles(h.denominator)) {
+    slowest = std::min(slowest, -pole.real());
+    fastest = std::max(fastest, std::abs(pole));
+  }
+  if (!(slowest > 0)) return std::nullopt;
+  // The companion in time units of 1/scale, a power of two so that scaling is exact: x_k = y^(k) / scale^k.
+  const int exponent = static_cast<int>(std::lround(std::log2(fastest)));
+  const double scale = std::ldexp(1.0, exponent);
+  IntervalMatrix companion(n);
+  MatrixXd approximate = MatrixXd::Zero(size, size);
+  std::vector<Interval> a(n + 1);  // monic, scaled
+  for (std::size_t k = 0; k <= n; ++k) {
+    a[k] = Interval(h.denominator[k]) / Interval(h.denominator[n]) /
+           Interval(std::ldexp(1.0, exponent * static_cast<int>(n - k)));
+  }
+  for (std::size_t k = 0; k + 1 < n; ++k) {
+    companion(k, k + 1) = 1;
+    approximate(static_cast<Index>(k), static_cast<Index>(k) + 1) = 1;
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    companion(n - 1, k) = -a[k];
+    approximate(size - 1, static_cast<Index>(k)) = -(a[k].lo + a[k].hi) / 2;
+  }
+  // Lyapunov: (A + alpha)'P + P(A + alpha) = -I/100, P = R'R.
+  const double alpha = 0.8 * slowest / scale;
+  const MatrixXd shifted = approximate + alpha * MatrixXd::Identity(size, size);
+  MatrixXd kronecker = MatrixXd::Zero(size * size, size * size);
+  for (Index i = 0; i < size; ++i) {
+    for (Index j = 0; j < size; ++j) {
+      for (Index k = 0; k < size; ++k) {
+        kronecker(i * size + j, k * size + j) += shifted(k, i);
+        kronecker(i * size + j, i * size + k) += shifted(k, j);
+      }
+    }
+  }
+  VectorXd right = VectorXd::Zero(size * size);
+  for (Index i = 0; i < size; ++i) right[i * size + i] = -1;
+  const VectorXd solution = kronecker.fullPivLu().solve(right);
+  MatrixXd P(size, size);
+  for (Index i = 0; i < size; ++i) {
+    for (Index j = 0; j < size; ++j) P(i, j) = (solution[i * size + j] + solution[j * size + i]) / 2;
+  }
+  const Eigen::LLT<MatrixXd> factor(P);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const MatrixXd R = factor.matrixU();
+  const std::optional<IntervalMatrix> R_inverse = inverse(R);
+  if (!R_inverse) return std::nullopt;
+
+  ContractingSystem system{IntervalMatrix(R) * companion * *R_inverse, {}, 0, {}};
+  for (double share : {0.95, 0.5, 0.1}) {
+    IntervalMatrix test(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < n; ++j) {
+        test(i, j) = -(system.A(i, j) + system.A(j, i)) * Interval(0.5);
+        if (i == j) test(i, j) = test(i, j) - Interval(share * alpha);
+      }
+    }
+    if (is_positive_definite(test)) {
+      system.alpha = share * alpha;
+      break;
+    }
+  }
+  if (system.alpha == 0) return std::nullopt;
+
+  // Initial state: y^(k)(0+)/scale^k from the numerator, as in the exact series division.
+  IntervalVector initial(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t power = n - 1 - k;
+    Interval c = power < h.numerator.size() ? Interval(h.numerator[power]) / Interval(h.denominator[n]) /
+                                                  Interval(std::ldexp(1.0, exponent * static_cast<int>(k)))
+                                            : Interval(0);
+    for (std::size_t j = 0; j < k; ++j) c = c - a[n - k + j] * initial[j];
+    initial[k] = c;
+  }
+  system.b.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = 0; k < n; ++k) {
+      system.b[i] += Interval(R(static_cast<Index>(i), static_cast<Index>(k))) * initial[k];
+    }
+  }
+  IntervalVector antiderivative(n);  // -(a_1 x_0 + ... + a_n x_(n-1))/a_0
+  for (std::size_t k = 0; k < n; ++k) antiderivative[k] = -a[k + 1] / a[0];
+  system.rows[0] = antiderivative * *R_inverse;
+  for (std::size_t d = 0; d < 3; ++d) {
+    IntervalVector unit(n);
+    unit[d] = 1;
+    system.rows[d + 1] = unit * *R_inverse;
+  }
+  // Back to seconds: y^(k) = scale^k x_k, int dt = (1/scale) int; powers of two are exact.
+  const double factors[] = {1 / scale, 1, scale, scale * scale};
+  for (std::size_t r = 0; r < 4; ++r) {
+    for (Interval& x : system.rows[r]) x = x * Interval(factors[r]);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) system.A(i, j) = system.A(i, j) * Interval(scale);
+  }
+  system.alpha *= scale;
+  return system;
+}
+
+/// Taylor coefficients of one output along a trajectory from a point, with a remainder and an error ball.
+struct LocalOutput {
+  std::array<Interval, kTerms> c;
+  double remainder = 0;  ///< times s^kTerms
+  double error = 0;      ///< of the point, seen in this output
+
+  /// What the polynomial may miss anywhere up to `s`.
+  Interval slack(double s) const {
+    const double r = up(up(std::pow(s, kTerms) * (1 + 1e-14)) * remainder);
+    const double total = up(r + error);
+    return {-total, total};
+  }
+  Interval polynomial(double s) const {
+    Interval total;
+    for (int k = kTerms; k-- > 0;) total = total * Interval(s) + c[static_cast<std::size_t>(k)];
+    return total;
+  }
+  Interval at(double s) const { return polynomial(s) + slack(s); }
+
+  /// Range on [a, b]: the value in the middle and the slope over the stretch (mean value form).
+  Interval range(double a, double b) const {
+    const double middle = a + (b - a) / 2;
+    const Interval s(a, b);
+    Interval slope;
+    for (int k = kTerms - 1; k-- > 0;) {
+      slope = slope * s + c[static_cast<std::size_t>(k) + 1] * Interval(static_cast<double>(k + 1));
+    }
+    return polynomial(middle) + slope * (s - Interval(middle)) + slack(b);
+  }
+};
+
+/// int |f| in the order of time. Where f keeps its sign the integral is the difference of an antiderivative F between
+/// the ends of the whole run, so that enclosures of F are paid for once per change of sign and not per stretch.
+class AbsoluteIntegral {
+ public:
+  void add(const LocalOutput& f, const LocalOutput& F, double a, double b, int depth) {
+    const Interval range = f.range(a, b);
+    const int sign = range.lo >= 0 ? 1 : range.hi <= 0 ? -1 : 0;
+    if (sign != 0) {
+      if (sign != sign_) {
+        close();
+        sign_ = sign;
+        start_ = F.at(a);
+      }
+      end_ = F.at(b);
+      return;
+    }
+    const double most = up(up(b - a) * range.mag());
+    // No stretch is short enough to tell the sign of what is smaller than its own error.
+    if (depth == 0 || most < 1e-19 || 8 * f.slack(b).hi > range.mag()) {
+      close();
+      total_ += Interval(0, most);
+      return;
+    }
+    const double middle = a + (b - a) / 2;
+    add(f, F, a, middle, depth - 1);
+    add(f, F, middle, b, depth - 1);
+  }
+
+  Interval finish() {
+    close();
+    return total_;
+  }
+
+ private:
+  void close() {
+    if (sign_ != 0) {
+      const Interval part = sign_ > 0 ? end_ - start_ : start_ - end_;
+      total_ += Interval(std::max(0.0, part.lo), std::max(0.0, part.hi));
+    }
+    sign_ = 0;
+  }
+
+  Interval total_, start_, end_;
+  int sign_ = 0;
+};
+
+class Enclosure {
+ public:
+  explicit Enclosure(const ContractingSystem& system) : system_(system) {
+    const std::size_t n = system.A.size();
+    Interval largest;
+    for (std::size_t i = 0; i < n; ++i) largest += dot_row(i);
+    length_ = 0.25 / sqrt(largest).hi;  // |A| <= its Frobenius norm
+    for (std::size_t r = 0; r < 4; ++r) {
+      taylor_[r][0] = system.rows[r];
+      for (std::size_t k = 1; k <= kTerms; ++k) {
+        taylor_[r][k] = taylor_[r][k - 1] * system.A;
+        for (Interval& x : taylor_[r][k]) x = x / Interval(static_cast<double>(k));
+      }
+      row_norm_[r] = norm_above(taylor_[r][0]);
+      remainder_norm_[r] = norm_above(taylor_[r][kTerms]);
+    }
+    // exp(A length) as intervals, by its Taylor sum; the remainder in norm.
+    IntervalMatrix power(MatrixXd::Identity(static_cast<Index>(n), static_cast<Index>(n)));
+    IntervalMatrix total = power;
+    for (int k = 1; k < kTerms; ++k) {
+      power = power * system.A;
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t j = 0; j < n; ++j) {
+          power(i, j) = power(i, j) * Interval(length_) / Interval(k);
+          total(i, j) += power(i, j);
+        }
+      }
+    }
+    step_ = std::vector<Interval>(n * n);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < n; ++j) step_[i * n + j] = total(i, j);
+    }
+    step_remainder_ = 2 * std::pow(0.2500001, kTerms) / 6.4e15;  // 0.25^18/18! and what follows it
+  }
+
+  /// |row|_1, |row'|_1 as total variation, sup|row|, where `row` is 1 for y and 2 for y'.
+  VerifiedNorms run() {
+    const std::size_t n = system_.A.size();
+    std::vector<double> w(n);
+    double error = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      w[i] = (system_.b[i].lo + system_.b[i].hi) / 2;
+      error = up(error + (system_.b[i].hi - system_.b[i].lo));
+    }
+    const double first = length(w);
+    VerifiedNorms norms;
+    AbsoluteIntegral rate;
+    AbsoluteIntegral amplitude;
+    double best_value = 0;
+    double best_slope = 0;
+    double size = first;
+    for (long step = 0; size > std::max(1e-13 * first, 1e3 * error) && step < 4'000'000; ++step) {
+      std::array<LocalOutput, 4> local;
+      for (std::size_t r = 0; r < 4; ++r) {
+        for (std::size_t k = 0; k < kTerms; ++k) local[r].c[k] = dot(taylor_[r][k], w);
+        local[r].remainder = up(remainder_norm_[r] * size * (1 + 1e-12));
+        local[r].error = up(row_norm_[r] * error);
+      }
+      rate.add(local[1], local[0], 0, length_, kDepth);
+      amplitude.add(local[2], local[1], 0, length_, kDepth);
+      extremum(local[1], local[2], 0, length_, kDepth, best_value, norms.edge);
+      extremum(local[2], local[3], 0, length_, kDepth, best_slope, norms.impulse);
+      advance(w, error);
+      size = length(w) + error;
+    }
+    const double tail = up(size / system_.alpha);
+    norms.rate = rate.finish() + Interval(0, up(row_norm_[1] * tail));
+    norms.amplitude = amplitude.finish() + Interval(0, up(row_norm_[2] * tail));
+    norms.edge = {norms.edge.lo, std::max(norms.edge.hi, up(row_norm_[1] * size))};
+    norms.impulse = {norms.impulse.lo, std::max(norms.impulse.hi, up(row_norm_[2] * size))};
+    return norms;
+  }
+
+ private:
+  static constexpr int kDepth = 30;
+
+  Interval dot_row(std::size_t i) const {
+    Interval total;
+    for (std::size_t j = 0; j < system_.A.size(); ++j)
+      total += Interval(system_.A(i, j).mag()) * system_.A(i, j).mag();
+    return total;
+  }
+  static double length(const std::vector<double>& w) {
+    Interval total;
+    for (const double x : w) total += Interval(x) * x;
+    return sqrt(total).hi;
+  }
+
+  void advance(std::vector<double>& w, double& error) const {
+    const std::size_t n = w.size();
+    std::vector<double> next(n);
+    Interval missed;
+    for (std::size_t i = 0; i < n; ++i) {
+      Interval total;
+      for (std::size_t j = 0; j < n; ++j) total += step_[i * n + j] * w[j];
+      next[i] = total.lo + (total.hi - total.lo) / 2;
+      const double half = up(std::max(total.hi - next[i], next[i] - total.lo));
+      missed += Interval(half) * half;
+    }
+    // The flow contracts, so the old error does not grow.
+    error = up(up(error + sqrt(missed).hi) + step_remainder_ * length(w));
+    w = std::move(next);
+  }
+
+  /// Raises best.lo and best.hi to enclose the supremum of |f| over all stretches seen so far.
+  void extremum(const LocalOutput& f, const LocalOutput& slope, double a, double b, int depth, double& lower,
+                Interval& best) const {
+    lower = std::max({lower, abs(f.at(a)).lo, abs(f.at(b)).lo});
+    best.lo = std::max(best.lo, lower);
+    const Interval turn = slope.range(a, b);
+    double most;
+    if (turn.lo >= 0 || turn.hi <= 0) {
+      most = std::max(f.at(a).mag(), f.at(b).mag());  // monotonic
+    } else {
+      most = f.range(a, b).mag();
+      if (most <= best.hi) return;
+      if (depth > 0 && most > lower * (1 + 1e-15) && 8 * slope.slack(b).hi < turn.mag()) {
+        const double middle = a + (b - a) / 2;
+        extremum(f, slope, a, middle, depth - 1, lower, best);
+        extremum(f, slope, middle, b, depth - 1, lower, best);
+        return;
+      }
+    }
+    best.hi = std::max(best.hi, most);
+  }
+
+  const ContractingSystem& system_;
+  double length_ = 0;
+  std::array<std::array<IntervalVector, kTerms + 1>, 4> taylor_;
+  std::array<double, 4> row_norm_{};
+  std::array<double, 4> remainder_norm_{};
+  std::vector<Interval> step_;
+  double step_remainder_ = 0;
+};
+
+}  // namespace
+
+std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel) {
+  if (loop.delay_s > 0 || !(loop.Ki > 0)) return std::nullopt;
+  const TransferFunction y = step_transfer(loop, channel);
+  const std::optional<ContractingSystem> system =
+      contracting({y.numerator, sum(y.denominator, y.feedback), {}, 0});
+  if (!system) return std::nullopt;
+  return Enclosure(*system).run();
+}
+
+}  // namespace swarmcert::stability

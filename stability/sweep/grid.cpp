@@ -1,0 +1,181 @@
+#include "stability/sweep/grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/suggest.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using files::TomlTable;
+
+constexpr char kSchema[] = "swarmcert/grid/1";
+constexpr double kMostCells = 1e7;
+
+std::vector<std::string> quantity_names() {
+  std::vector<std::string> names;
+  for (const Quantity& quantity : grid_quantities()) names.push_back(quantity.name);
+  return names;
+}
+
+GridAxis read_axis(const TomlTable& axes, const std::string& name) {
+  const TomlTable table = axes.table(name);
+  table.allow_only({"from", "to", "steps", "scale"});
+  const double from = table.number("from");
+  const double to = table.number("to");
+  const double steps = table.number("steps");
+  if (!(steps >= 1) || steps > kMostCells || steps != std::floor(steps)) {
+    table.refuse("steps", std::to_string(steps), "must be a whole number from 1");
+  }
+  const bool is_log = table.has("scale") && table.choice("scale", {"linear", "log"}) == 1;
+  if (is_log && !(from > 0 && to > 0)) table.refuse("from", "", "and to must be positive on a log scale");
+  if (from < 0 || to < 0) table.refuse("from", "", "and to must not be negative");
+  GridAxis axis = {name, {}};
+  for (int i = 0; i < static_cast<int>(steps); ++i) {
+    const double share = steps > 1 ? i / (steps - 1) : 0;
+    axis.values.push_back(is_log ? std::exp(std::log(from) + share * (std::log(to) - std::log(from)))
+                                 : from + share * (to - from));
+  }
+  if (steps > 1) axis.values.back() = to;  // exactly
+  return axis;
+}
+
+std::vector<std::string> read_quantities(const TomlTable& top, const std::string& key) {
+  const std::vector<std::string> known = quantity_names();
+  std::vector<std::string> names = top.texts(key);
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      top.refuse(key, files::in_quotes(name), "is not a quantity", files::did_you_mean(name, known));
+    }
+  }
+  if (names.empty()) top.refuse(key, "", "is empty", "name one of the quantities, e.g. \"amplitude\"");
+  return names;
+}
+
+std::string beside(const std::string& grid, const std::string& file) {
+  return (std::filesystem::path(grid).parent_path() / file).string();
+}
+
+void read_disturbance(const TomlTable& table, Disturbance& disturbance) {
+  table.allow_only({"amplitude_N", "rate_N_s", "variation_N", "impulse_N_s"});
+  const auto read = [&table](const char* key, double& into) {
+    if (!table.has(key)) return;
+    into = table.number(key);
+    if (into < 0) table.refuse(key, std::to_string(into), "must not be negative");
+  };
+  read("amplitude_N", disturbance.amplitude_N);
+  read("rate_N_s", disturbance.rate_N_s);
+  read("variation_N", disturbance.variation_N);
+  read("impulse_N_s", disturbance.impulse_N_s);
+}
+
+}  // namespace
+
+long Grid::cells() const {
+  long total = 1;
+  for (const GridAxis& a : axes) total *= static_cast<long>(a.values.size());
+  return total;
+}
+
+std::vector<double> Grid::at(long cell) const {
+  std::vector<double> result(axes.size());
+  for (std::size_t i = axes.size(); i-- > 0;) {
+    const auto size = static_cast<long>(axes[i].values.size());
+    result[i] = axes[i].values[static_cast<std::size_t>(cell % size)];
+    cell /= size;
+  }
+  return result;
+}
+
+std::vector<std::string> grid_parameters() {
+  return {"Kp",        "Kd",      "Ki",         "Lambda",  "K",       "mass_kg",           "thrust_scale",
+          "battery_V", "motor_s", "attitude_s", "delay_s", "rate_hz", "integrator_step_s", "neighbours",
+          "vehicles"};
+}
+
+const std::vector<Quantity>& grid_quantities() {
+  static const std::vector<Quantity> all = {
+      {"rate", "m per N/s", -1, "worst error per rate of force, |h|_1"},
+      {"amplitude", "m/N", -1, "worst error per amplitude of force, |h'|_1"},
+      {"edge", "m/N", -1, "worst error per variation of force, |h|_oo"},
+      {"impulse", "m per N s", -1, "worst error per impulse, |h'|_oo"},
+      {"error_m", "m", -1, "smallest of the rate, amplitude, edge and impulse bounds for [disturbance]"},
+      {"lag_limit_s", "s", 1, "further first-order lag that the loop bears"},
+      {"delay_limit_s", "s", 1, "delay that the loop bears"},
+      {"lag_floor", "m per N/s", -1, "error that lag leaves with perfect feed-forward"},
+      {"effort", "N/N", -1, "feedback force per amplitude of force"},
+      {"noise_command_m_s2", "m/s^2", -1, "jitter of the command for 1 mm and 0.05 m/s of noise"},
+      {"noise_error_m", "m", -1, "error from the same noise"},
+      {"spectral_radius", "1", -1, "of the sampled loop"},
+      {"integral_authority_N", "N", 1, "constant force that the clamped integrator can cancel"},
+      {"thrust_margin_N", "N", 1, "thrust left about hover for [disturbance]"}};
+  return all;
+}
+
+Grid load_grid(const std::string& path) {
+  const std::string text = files::read_file(path);
+  const toml::table document = files::parse_toml(text, path);
+  const TomlTable top(document, path);
+  if (top.text("schema") != kSchema) {
+    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema),
+               "is this the right file?");
+  }
+  top.allow_only({"schema", "gains", "model", "axis", "axes", "compute", "pareto", "limits", "disturbance"});
+  Grid grid;
+  grid.path = path;
+  grid.sha256 = files::sha256(text);
+  const std::string gains = beside(path, top.text("gains"));
+  const std::string model = beside(path, top.text("model"));
+  grid.gains = load_gains(gains);
+  grid.model = read_model(model);
+  grid.inputs = {path, gains, model};
+  if (top.has("axis")) grid.axis = static_cast<int>(top.choice("axis", {"x", "y", "z"}));
+  const TomlTable axes = top.table("axes");
+  axes.allow_only(grid_parameters());
+  double cells = 1;
+  for (const std::string& name : axes.keys()) {
+    grid.axes.push_back(read_axis(axes, name));
+    cells *= static_cast<double>(grid.axes.back().values.size());
+  }
+  if (grid.axes.empty()) axes.refuse("", "", "has no axis", "e.g. [axes.Kp] from = 5, to = 20, steps = 50");
+  if (cells > kMostCells) axes.refuse("", std::to_string(cells) + " cells", "are more than ten million");
+  const bool pid_axis = axes.has("Kp") || axes.has("Kd") || axes.has("Ki");
+  const bool composite_axis = axes.has("Lambda") || axes.has("K");
+  if (pid_axis && (composite_axis || !grid.gains.pid)) {
+    axes.refuse("", "", "varies Kp, Kd or Ki, and the gains are Lambda, K", "vary Lambda and K");
+  }
+  if (composite_axis && !grid.gains.composite) {
+    axes.refuse("", "", "varies Lambda or K, and the gains are Kp, Kd, Ki", "vary Kp, Kd and Ki");
+  }
+  if (axes.has("integrator_step_s") && grid.gains.rate_hz == 0 && !axes.has("rate_hz")) {
+    axes.refuse("integrator_step_s", "", "needs a sampled loop", "state rate_hz in the gains");
+  }
+  grid.compute = read_quantities(top, "compute");
+  if (top.has("pareto")) {
+    grid.pareto = read_quantities(top, "pareto");
+    for (const std::string& name : grid.pareto) {
+      if (std::find(grid.compute.begin(), grid.compute.end(), name) == grid.compute.end()) {
+        top.refuse("pareto", files::in_quotes(name), "is not computed", "add it to compute");
+      }
+    }
+  }
+  if (top.has("limits")) {
+    const TomlTable limits = top.table("limits");
+    limits.allow_only(quantity_names());
+    for (const std::string& name : limits.keys()) {
+      const TomlTable limit = limits.table(name);
+      limit.allow_only({"least", "most"});
+      grid.limits.push_back({name, limit.has("least") ? limit.number("least") : -INFINITY,
+                             limit.has("most") ? limit.number("most") : INFINITY});
+    }
+  }
+  if (top.has("disturbance")) read_disturbance(top.table("disturbance"), grid.disturbance);
+  return grid;
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,80 @@
+/// @file grid.toml: which gains and vehicles to try, and what to compute for each.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stability/bounds/tracking_bounds.h"
+#include "stability/gains.h"
+#include "stability/model.h"
+
+namespace swarmcert::stability {
+
+/// One axis of the grid: `values` of the parameter `name`.
+struct GridAxis {
+  std::string name;
+  std::vector<double> values;
+};
+
+/// A requirement on a computed quantity; a cell that breaks it is infeasible.
+struct GridLimit {
+  std::string quantity;
+  double least, most;
+};
+
+struct Grid {
+  std::string path, sha256;
+  Gains gains;
+  Model model;
+  int axis = 2;  ///< of the loop under study
+  std::vector<GridAxis> axes;
+  std::vector<std::string> compute;
+  std::vector<GridLimit> limits;
+  std::vector<std::string> pareto;  ///< quantities of the Pareto front
+  Disturbance disturbance;          ///< of one neighbour
+  std::vector<std::string> inputs;  ///< files that were read
+
+  long cells() const;
+  /// Values of the axes at a cell, in the order of `axes`; the last axis moves fastest.
+  std::vector<double> at(long cell) const;
+};
+
+/// Parameters that an axis may have:
+///   Kp Kd Ki (1/s^2, 1/s, 1/s^3), Lambda K (1/s, kg/s), mass_kg, thrust_scale, battery_V, motor_s, attitude_s, delay_s,
+///   rate_hz, integrator_step_s, neighbours (the disturbance times their number), vehicles (neighbours + 1).
+std::vector<std::string> grid_parameters();
+
+/// Quantities that can be computed; `better` is -1 where less is better, +1 where more is.
+struct Quantity {
+  std::string name;
+  std::string unit;
+  int better;
+  std::string meaning;
+};
+const std::vector<Quantity>& grid_quantities();
+
+/// Reads grid.toml (schema swarmcert/grid/1):
+///   gains = "...", model = "...": files relative to the grid's folder; axis = "x" | "y" | "z"
+///   compute = [...]; pareto = [...]
+///   [axes.NAME] from, to, steps, scale = "linear" | "log"
+///   [limits.QUANTITY] least, most
+///   [disturbance] amplitude_N, rate_N_s, variation_N, impulse_N_s
+/// @throws files::InputError with line, key, value and mend; more than ten million cells are refused.
+Grid load_grid(const std::string& path);
+
+/// What one cell gives.
+struct Cell {
+  long index = 0;
+  std::vector<double> values;  ///< of grid.compute, in that order; NaN where there is none
+  std::string infeasible;      ///< why; empty where it is not
+};
+
+/// Depends on nothing but the grid and the index.
+Cell compute_cell(const Grid& grid, long index);
+
+/// Indices, ascending, of the feasible cells that no other feasible cell beats in every quantity of grid.pareto.
+std::vector<long> pareto_front(const Grid& grid, const std::vector<Cell>& cells);
+
+}  // namespace swarmcert::stability

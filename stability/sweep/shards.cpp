@@ -1,0 +1,243 @@
+#include "stability/sweep/shards.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/parallel.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using files::InputError;
+using files::Json;
+namespace fs = std::filesystem;
+
+constexpr char kShardSchema[] = "swarmcert/sweep-shard/1";
+constexpr char kPointsSchema[] = "swarmcert/sweep-points/1";
+constexpr int kBlock = 512;  ///< cells between two looks at the clock and at Ctrl-C
+constexpr double kCheckpoint_s = 5;
+
+/// JSON has no infinity and no NaN; both occur (no bound, no sampled loop) and must survive.
+Json number_json(double value) {
+  if (std::isfinite(value)) return value;
+  return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
+}
+
+double number_of(const Json& json) {
+  if (json.is_number()) return json.get<double>();
+  const std::string text = json.get<std::string>();
+  return text == "nan" ? NAN : text == "inf" ? INFINITY : -INFINITY;
+}
+
+Json shard_head(const Grid& grid, const SweepOptions& options) {
+  Json axes = Json::array();
+  for (const GridAxis& axis : grid.axes) axes.push_back({{"name", axis.name}, {"values", axis.values}});
+  return {{"schema", kShardSchema},
+          {"grid", grid.path},
+          {"grid_sha256", grid.sha256},
+          {"gains_sha256", grid.gains.sha256},
+          {"model_sha256", grid.model.sha256},
+          {"axes", std::move(axes)},
+          {"compute", grid.compute},
+          {"pareto", grid.pareto},
+          {"shard", options.shard % options.count},
+          {"count", options.count},
+          {"total", grid.cells()}};
+}
+
+Json cell_json(const Cell& cell) {
+  Json values = Json::array();
+  for (const double value : cell.values) values.push_back(number_json(value));
+  return {{"index", cell.index}, {"values", std::move(values)}, {"infeasible", cell.infeasible}};
+}
+
+Cell cell_of(const Json& json) {
+  Cell cell;
+  cell.index = json.at("index").get<long>();
+  for (const Json& value : json.at("values")) cell.values.push_back(number_of(value));
+  cell.infeasible = json.at("infeasible").get<std::string>();
+  return cell;
+}
+
+void write_shard(const std::string& file, const Json& head, const std::map<long, Cell>& done) {
+  Json document = head;
+  Json cells = Json::array();
+  for (const auto& [index, cell] : done) cells.push_back(cell_json(cell));
+  document["cells"] = std::move(cells);
+  files::write_file(file, document.dump() + "\n", true);
+}
+
+bool same_grid(const Json& a, const Json& b) {
+  for (const char* key :
+       {"grid_sha256", "gains_sha256", "model_sha256", "axes", "compute", "pareto", "total"}) {
+    if (a.at(key) != b.at(key)) return false;
+  }
+  return true;
+}
+
+/// Members that are missing or of another type end as InputError.
+template <class Read>
+auto reading(const std::string& file, const Read& read) {
+  try {
+    return read();
+  } catch (const Json::exception& error) {
+    throw InputError({file, "", "", "", std::string("is not a shard of a sweep (") + error.what() + ")",
+                      "compute it again with --force"});
+  }
+}
+
+}  // namespace
+
+SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepOptions& options) {
+  const int shard = options.shard % options.count;
+  SweepOutcome outcome;
+  outcome.file = (fs::path(folder) /
+                  ("shard-" + std::to_string(shard) + "-of-" + std::to_string(options.count) + ".json"))
+                     .string();
+  const Json head = shard_head(grid, options);
+  std::map<long, Cell> done;
+  if (fs::exists(outcome.file)) {
+    if (options.resume) {
+      const Json old = files::read_json(outcome.file, kShardSchema);
+      reading(outcome.file, [&] {
+        if (!same_grid(old, head)) {
+          throw InputError({outcome.file, "", "grid_sha256", "", "belongs to another grid, gains or model",
+                            "--force computes it again"});
+        }
+        for (const Json& json : old.at("cells")) {
+          Cell cell = cell_of(json);
+          done.emplace(cell.index, std::move(cell));
+        }
+        return 0;
+      });
+    } else if (!options.overwrite) {
+      throw InputError(
+          {outcome.file, "", "", "", "the file exists", "--resume continues it, --force replaces it"});
+    }
+  }
+  fs::create_directories(folder);
+  std::vector<long> todo;
+  for (long i = shard; i < grid.cells(); i += options.count) {
+    ++outcome.total;
+    if (done.count(i) == 0) todo.push_back(i);
+  }
+  const auto is_cancelled = [&options] { return options.cancelled != nullptr && *options.cancelled; };
+  auto saved = std::chrono::steady_clock::now();
+  for (std::size_t begin = 0; begin < todo.size() && !is_cancelled(); begin += kBlock) {
+    const std::size_t size = std::min<std::size_t>(kBlock, todo.size() - begin);
+    std::vector<Cell> block(size);
+    files::parallel_for(static_cast<int>(size), options.jobs, [&](int i) {
+      block[static_cast<std::size_t>(i)] = compute_cell(grid, todo[begin + static_cast<std::size_t>(i)]);
+    });
+    for (Cell& cell : block) done.emplace(cell.index, std::move(cell));
+    if (options.progress) options.progress(static_cast<long>(done.size()), outcome.total);
+    const auto now = std::chrono::steady_clock::now();
+    if (std::chrono::duration<double>(now - saved).count() > kCheckpoint_s) {
+      write_shard(outcome.file, head, done);
+      saved = now;
+    }
+  }
+  write_shard(outcome.file, head, done);
+  outcome.done = static_cast<long>(done.size());
+  return outcome;
+}
+
+MergedSweep read_shards(const std::string& folder) {
+  std::vector<std::string> paths;
+  if (fs::is_directory(folder)) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+      const std::string name = entry.path().filename().string();
+      if (name.rfind("shard-", 0) == 0 && entry.path().extension() == ".json")
+        paths.push_back(entry.path().string());
+    }
+  }
+  std::sort(paths.begin(), paths.end());
+  if (paths.empty()) {
+    throw InputError(
+        {folder, "", "", "", "has no shard of a sweep", "swarmcert sweep GRID.toml -o " + folder});
+  }
+  Json first;
+  std::map<long, Cell> cells;
+  for (const std::string& path : paths) {
+    const Json shard = files::read_json(path, kShardSchema);
+    reading(path, [&] {
+      if (first.is_null()) first = shard;
+      if (!same_grid(first, shard)) {
+        throw InputError({path, "", "grid_sha256", "", "belongs to another grid than " + paths.front(),
+                          "keep one sweep per folder"});
+      }
+      for (const Json& json : shard.at("cells")) {
+        Cell cell = cell_of(json);
+        const long index = cell.index;
+        if (!cells.emplace(index, std::move(cell)).second) {
+          throw InputError({path, "", "cells", std::to_string(index), "is a cell that another shard has too",
+                            "keep the shards of one cut only"});
+        }
+      }
+      return 0;
+    });
+  }
+  MergedSweep sweep;
+  const long total = reading(paths.front(), [&] {
+    sweep.grid_path = first.at("grid").get<std::string>();
+    sweep.grid_sha256 = first.at("grid_sha256").get<std::string>();
+    for (const Json& axis : first.at("axes")) {
+      sweep.axis_names.push_back(axis.at("name").get<std::string>());
+      sweep.axis_values.push_back(axis.at("values").get<std::vector<double>>());
+    }
+    sweep.compute = first.at("compute").get<std::vector<std::string>>();
+    sweep.pareto = first.at("pareto").get<std::vector<std::string>>();
+    return first.at("total").get<long>();
+  });
+  for (long i = 0; i < total; ++i) {
+    if (cells.count(i) == 1) continue;
+    throw InputError({folder, "", "cells", std::to_string(total - static_cast<long>(cells.size())),
+                      "of " + std::to_string(total) + " are missing, the first is cell " + std::to_string(i),
+                      "run its shard with --resume"});
+  }
+  for (auto& [index, cell] : cells) sweep.cells.push_back(std::move(cell));
+  Grid grid;  // the front needs names only
+  grid.compute = sweep.compute;
+  grid.pareto = sweep.pareto;
+  sweep.front = pareto_front(grid, sweep.cells);
+  return sweep;
+}
+
+Json sweep_json(const MergedSweep& sweep) {
+  Json axes = Json::array();
+  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i) {
+    axes.push_back({{"name", sweep.axis_names[i]}, {"values", sweep.axis_values[i]}});
+  }
+  const std::set<long> front(sweep.front.begin(), sweep.front.end());
+  Json points = Json::array();
+  Grid grid;
+  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i) {
+    grid.axes.push_back({sweep.axis_names[i], sweep.axis_values[i]});
+  }
+  for (const Cell& cell : sweep.cells) {
+    Json at;
+    const std::vector<double> values = grid.at(cell.index);
+    for (std::size_t i = 0; i < values.size(); ++i) at[sweep.axis_names[i]] = values[i];
+    Json computed;
+    for (std::size_t i = 0; i < sweep.compute.size(); ++i) {
+      computed[sweep.compute[i]] = std::isfinite(cell.values[i]) ? Json(cell.values[i]) : Json();
+    }
+    points.push_back({{"index", cell.index},
+                      {"at", std::move(at)},
+                      {"values", std::move(computed)},
+                      {"feasible", cell.infeasible.empty()},
+                      {"reason", cell.infeasible},
+                      {"pareto", front.count(cell.index) == 1}});
+  }
+  return {{"schema", kPointsSchema},    {"grid", sweep.grid_path},  {"grid_sha256", sweep.grid_sha256},
+          {"axes", std::move(axes)},    {"compute", sweep.compute}, {"pareto", sweep.pareto},
+          {"points", std::move(points)}};
+}
+
+}  // namespace swarmcert::stability

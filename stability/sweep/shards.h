@@ -1,0 +1,54 @@
+/// @file A sweep in pieces: each piece writes one file, a merge puts them together and misses nothing.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "nn/files/json.h"
+#include "stability/sweep/grid.h"
+
+namespace swarmcert::stability {
+
+struct SweepOptions {
+  /// Cells with index % count == shard % count: 0/4 .. 3/4 and 1/4 .. 4/4 both cover a grid.
+  int shard = 0, count = 1;
+  bool resume = false;  ///< keep the cells that the shard's file already has
+  bool overwrite = false;
+  int jobs = 0;
+  const std::atomic<bool>* cancelled = nullptr;
+  std::function<void(long done, long total)> progress;
+};
+
+struct SweepOutcome {
+  std::string file;  ///< of the shard
+  long done = 0;     ///< cells in it
+  long total = 0;    ///< cells that belong to it
+  bool complete() const { return done == total; }
+};
+
+/// Computes the cells of one shard and writes FOLDER/shard-I-of-N.json; every few seconds, and when cancelled, what is
+/// done so far (atomically). The file's bytes depend on the grid and the shard only.
+/// @throws files::InputError if the file exists and neither resume nor overwrite is set, or belongs to another grid.
+SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepOptions& options);
+
+/// A whole sweep, read back from its shards.
+struct MergedSweep {
+  std::string grid_path, grid_sha256;
+  std::vector<std::string> axis_names;
+  std::vector<std::vector<double>> axis_values;
+  std::vector<std::string> compute, pareto;
+  std::vector<Cell> cells;  ///< every cell of the grid, by index
+  std::vector<long> front;
+};
+
+/// Reads every shard in `folder`.
+/// @throws files::InputError if shards are missing, incomplete, of different grids, or overlap: the message names them
+///   and the cells that are missing.
+MergedSweep read_shards(const std::string& folder);
+
+/// The sweep as JSON (schema swarmcert/sweep-points/1): the same bytes however the grid was cut.
+files::Json sweep_json(const MergedSweep& sweep);
+
+}  // namespace swarmcert::stability

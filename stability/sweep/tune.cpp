@@ -1,0 +1,176 @@
+#include "stability/sweep/tune.h"
+
+#include <nlopt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kWorst = 1e6;  ///< stands for infinity, which optimisers cannot add up
+
+double objective_of(const GainNorms& norms, TuneObjective objective) {
+  switch (objective) {
+    case TuneObjective::kAmplitude:
+      return norms.amplitude;
+    case TuneObjective::kImpulse:
+      return norms.impulse;
+    case TuneObjective::kEdge:
+      return norms.edge;
+    case TuneObjective::kRate:
+      return norms.rate;
+  }
+  return kWorst;
+}
+
+/// Relative excess over each limit: at most 0 where it holds.
+std::array<double, 4> excesses(const TunedPoint& p, const TuneConstraints& c) {
+  const auto above = [](double value, double most) {
+    if (most <= 0) return -1.0;
+    return std::isfinite(value) ? std::min(value / most - 1, kWorst) : kWorst;
+  };
+  return {above(p.noise_m_s2, c.most_noise_m_s2),
+          c.least_lag_limit_s > 0 ? 1 - p.lag_limit_s / c.least_lag_limit_s : -1.0,
+          above(p.norms.rate, c.most_rate), above(p.effort, c.most_effort)};
+}
+
+constexpr std::array<const char*, 4> kConstraintNames = {"noise", "lag_limit", "rate", "effort"};
+
+class Search {
+ public:
+  Search(const SampledLoop& loop, const TuneOptions& options) : loop_(loop), options_(options) {}
+
+  TunedPoint at(const double* log_gains) const {
+    SampledLoop loop = loop_;
+    loop.plant.Kp = std::exp(log_gains[0]);
+    loop.plant.Kd = std::exp(log_gains[1]);
+    loop.plant.Ki = std::exp(log_gains[2]);
+    TunedPoint point = evaluate_gains(loop, options_.objective);
+    const auto e = excesses(point, options_.constraints);
+    point.feasible =
+        std::isfinite(point.objective) && std::all_of(e.begin(), e.end(), [](double x) { return x <= 0; });
+    return point;
+  }
+
+  /// The point of the last evaluation: objective and constraints ask for the same one in turn.
+  const TunedPoint& cached(const double* x) {
+    if (!std::equal(last_.begin(), last_.end(), x) || !has_last_) {
+      std::copy(x, x + 3, last_.begin());
+      has_last_ = true;
+      point_ = at(x);
+      if (point_.feasible && (!best_.feasible || point_.objective < best_.objective)) {
+        best_ = point_;
+        best_x_ = last_;
+      }
+    }
+    return point_;
+  }
+
+  static double cost(unsigned, const double* x, double*, void* self) {
+    const double value = static_cast<Search*>(self)->cached(x).objective;
+    return std::isfinite(value) ? std::log(value) : std::log(kWorst);
+  }
+  static void constrain(unsigned, double* result, unsigned, const double* x, double*, void* self) {
+    auto* search = static_cast<Search*>(self);
+    const auto e = excesses(search->cached(x), search->options_.constraints);
+    std::copy(e.begin(), e.end(), result);
+  }
+
+  std::string run(nlopt_algorithm algorithm, std::array<double, 3> start, const std::array<double, 3>& low,
+                  const std::array<double, 3>& high, int evaluations) {
+    const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> optimiser(nlopt_create(algorithm, 3),
+                                                                           nlopt_destroy);
+    nlopt_set_min_objective(optimiser.get(), cost, this);
+    nlopt_set_lower_bounds(optimiser.get(), low.data());
+    nlopt_set_upper_bounds(optimiser.get(), high.data());
+    const std::array<double, 4> tolerance = {0, 0, 0, 0};
+    nlopt_add_inequality_mconstraint(optimiser.get(), 4, constrain, this, tolerance.data());
+    nlopt_set_maxeval(optimiser.get(), evaluations);
+    nlopt_set_xtol_rel(optimiser.get(), 1e-7);
+    double value = 0;
+    const nlopt_result result = nlopt_optimize(optimiser.get(), start.data(), &value);
+    return nlopt_result_to_string(result);
+  }
+
+  const TunedPoint& best() const { return best_; }
+  const std::array<double, 3>& best_x() const { return best_x_; }
+
+ private:
+  SampledLoop loop_;
+  TuneOptions options_;
+  std::array<double, 3> last_{};
+  bool has_last_ = false;
+  TunedPoint point_, best_;
+  std::array<double, 3> best_x_{};
+};
+
+}  // namespace
+
+const char* name(TuneObjective objective) {
+  switch (objective) {
+    case TuneObjective::kAmplitude:
+      return "amplitude";
+    case TuneObjective::kImpulse:
+      return "impulse";
+    case TuneObjective::kEdge:
+      return "edge";
+    case TuneObjective::kRate:
+      return "rate";
+  }
+  return "unknown";
+}
+
+TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective) {
+  TunedPoint point;
+  point.Kp = loop.plant.Kp;
+  point.Kd = loop.plant.Kd;
+  point.Ki = loop.plant.Ki;
+  AxisLoop acting = loop.plant;
+  acting.Ki = effective_Ki(loop);
+  point.norms = continuous_norms(acting, Channel::kForce);
+  point.objective = spectral_radius(loop) < 1 ? objective_of(point.norms, objective) : INFINITY;
+  point.noise_m_s2 = noise_deviation(loop, 1e-3, 0.05).command_m_s2;
+  point.lag_limit_s = lag_limit(acting);
+  point.effort = effort_gain(acting);
+  return point;
+}
+
+TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
+  TuneResult result;
+  Search search(loop, options);
+  const std::array<double, 3> given = {std::log(loop.plant.Kp), std::log(loop.plant.Kd),
+                                       std::log(loop.plant.Ki)};
+  std::array<double, 3> low = given;
+  std::array<double, 3> high = given;
+  for (std::size_t i = 0; i < 3; ++i) {
+    low[i] -= std::log(options.range);
+    high[i] += std::log(options.range);
+  }
+  result.shipped = search.cached(given.data());
+  nlopt_srand(static_cast<unsigned long>(options.seed));
+  const std::string global = search.run(NLOPT_GN_ISRES, given, low, high, options.global_evaluations);
+  std::string local = "no feasible point to start from";
+  if (search.best().feasible) {
+    local = search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
+    search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
+  }
+  result.best = search.best();
+  result.stopped = "global " + global + ", local " + local;
+  if (!result.best.feasible) return result;
+  const auto e = excesses(result.best, options.constraints);
+  for (std::size_t i = 0; i < e.size(); ++i) {
+    if (e[i] > -1e-3) result.active_constraints.emplace_back(kConstraintNames[i]);
+  }
+  constexpr std::array<const char*, 3> kGainNames = {"Kp", "Kd", "Ki"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double x = search.best_x()[i];
+    if (x < low[i] + 1e-3) result.active_constraints.push_back(std::string(kGainNames[i]) + " at its least");
+    if (x > high[i] - 1e-3) result.active_constraints.push_back(std::string(kGainNames[i]) + " at its most");
+  }
+  return result;
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,57 @@
+/// @file The best PID gains of one axis under constraints.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/sampled_loop.h"
+
+namespace swarmcert::stability {
+
+struct TuneConstraints {
+  double most_noise_m_s2 = 0;    ///< of the command, for 1 mm and 0.05 m/s of sensor noise
+  double least_lag_limit_s = 0;  ///< further first-order lag that the loop must bear
+  double most_rate = 0;          ///< m per N/s; 0: no such constraint
+  double most_effort = 0;        ///< N/N; 0: no such constraint
+};
+
+enum class TuneObjective { kAmplitude, kImpulse, kEdge, kRate };
+
+struct TuneOptions {
+  TuneObjective objective = TuneObjective::kImpulse;
+  TuneConstraints constraints;
+  double range = 8;  ///< gains between the given ones divided and multiplied by this
+  int global_evaluations = 4000;
+  int local_evaluations = 1500;
+  std::uint64_t seed = 1;
+};
+
+struct TunedPoint {
+  double Kp = 0, Kd = 0, Ki = 0;
+  double objective = 0;
+  GainNorms norms;
+  double noise_m_s2 = 0, lag_limit_s = 0, effort = 0;
+  bool feasible = false;
+};
+
+struct TuneResult {
+  TunedPoint shipped, best;
+  /// Constraints within 0.1 % of their limit at the best gains, and gains at the end of their range.
+  std::vector<std::string> active_constraints;
+  std::string stopped;  ///< why the search ended; it finds good gains, it does not prove them best
+};
+
+/// Everything that constraints and objectives look at, for one set of gains as firmware writes them.
+TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective);
+
+/// Improves Kp, Kd, Ki of `loop`: a global search without derivatives (GN_ISRES, seeded) over the logarithms of the
+/// gains, then COBYLA from its best point and from the given gains. The objective is that of the continuous loop with
+/// the effective Ki, as its kinks (sign changes of the kernel) leave it no derivative.
+/// The result is never worse than the given gains where those are feasible.
+TuneResult tune(const SampledLoop& loop, const TuneOptions& options);
+
+/// "amplitude", "impulse", "edge", "rate".
+const char* name(TuneObjective objective);
+
+}  // namespace swarmcert::stability

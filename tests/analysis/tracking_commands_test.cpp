@@ -1,0 +1,226 @@
+// bound, spacing, sweep, merge and tune as a user runs them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "analysis/run.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::tests {
+namespace {
+
+using files::Json;
+
+const std::string kSource = SWARMCERT_SOURCE_DIR;
+const std::string kModel = " --model " + kSource + "/stability/models/crazyflie-small.toml";
+const std::string kFlown = " --gains " + kSource + "/controller/gains/crazyflie-small.toml" + kModel;
+
+Json json_of(const ScratchFolder& folder, const std::string& command) {
+  const Outcome outcome = run_shell("swarmcert " + command + " --force --json out.json", folder.path());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  return files::parse_json(read_text(folder / "out.json"), "out.json");
+}
+
+std::string gains_file(const ScratchFolder& folder, const std::string& body) {
+  write_text(folder / "gains.toml", "schema = \"swarmcert/gains/1\"\n" + body);
+  return " --gains gains.toml" + kModel;
+}
+
+TEST(BoundCommand, TheTheoremAppliesToIsotropicCompositeGainsWithTheBallOfTheReference) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  const Json result = json_of(folder, "bound" + gains + " --rate 1");
+  EXPECT_EQ(result["schema"], "swarmcert/bound/1");
+  EXPECT_TRUE(result["theorem"]["applies"].get<bool>());
+  EXPECT_NEAR(result["theorem"]["ball"].get<double>(), 0.45955882352941174, 1e-12);
+  EXPECT_TRUE(result["theorem"]["why_not"].empty());
+  EXPECT_LE(result["vector"]["peak_gain"][0].get<double>(), 0.45955882352941174 + 1e-12);
+  EXPECT_GE(result["vector"]["peak_gain"][1].get<double>(), 0.45955882352941174 - 1e-12);
+  EXPECT_EQ(result["exact"].size(), 6u);  // no rate_hz: continuous only
+}
+
+TEST(BoundCommand, FlownGainsAreNotOfTheTheoremsFormAndTheWeakenedIntegratorIsShown) {
+  const ScratchFolder folder;
+  const Json result = json_of(folder, "bound" + kFlown + " --amplitude 0.097 --rate 0.748 --impulse 0.0202");
+  EXPECT_FALSE(result["theorem"]["applies"].get<bool>());
+  EXPECT_TRUE(result["theorem"]["ball"].is_null());
+  EXPECT_GE(result["theorem"]["why_not"].size(), 5u);
+  EXPECT_NEAR(result["axes"][2]["effective_Ki"].get<double>(), 2, 1e-12);
+  EXPECT_EQ(result["axes"][2]["written_Ki"], 10);
+  EXPECT_EQ(result["exact"].size(), 12u);
+  const Outcome text = run_shell("swarmcert bound" + kFlown, folder.path());
+  EXPECT_NE(text.output.find("weakens Ki 5 times"), std::string::npos) << text.output;
+}
+
+TEST(BoundCommand, ANetworkAloneBoundsTheRateOfFHatAndGivesNoBall) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  const std::string network = " --network " + kSource + "/nn/networks/demo/network.toml";
+  const Json result = json_of(folder, "bound" + gains + network + " --speed 1 --accel 2");
+  EXPECT_EQ(result["disturbance"]["source"], "rate of f_hat");
+  EXPECT_GT(result["disturbance"]["f_hat_rate_N_s"].get<double>(), 0);
+  EXPECT_TRUE(result["theorem"]["ball"].is_null());
+  EXPECT_EQ(run_shell("swarmcert bound" + gains + network, folder.path()).exit_code, 2);
+}
+
+TEST(BoundCommand, MeasuredQuantilesAreTaggedMeasured) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  write_text(
+      folder / "compare.json",
+      R"({"schema": "swarmcert/compare/1", "learning_error": {"rate": {"x": {"p99": 0.1}, "y": {"p99": 0.2},
+                "z": {"p99": 0.3}}, "amplitude": {"x": {"p99": 1}, "y": {"p99": 1}, "z": {"p99": 1}}}})");
+  const Json result = json_of(folder, "bound" + gains + " --from compare.json");
+  EXPECT_EQ(result["disturbance"]["source"], "measured");
+  EXPECT_NEAR(result["theorem"]["ball"].get<double>(), std::sqrt(0.14) * 0.45955882352941174, 1e-12);
+  bool tagged = false;
+  for (const Json& a : result["assumptions"]) tagged = tagged || a["status"] == "measured";
+  EXPECT_TRUE(tagged);
+  EXPECT_EQ(
+      run_shell("swarmcert bound" + gains + " --from compare.json --quantile p50", folder.path()).exit_code,
+      3);
+}
+
+TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
+  const ScratchFolder folder;
+  const std::string gains =
+      gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n[lag]\nmotor_s = 0.0575\n");
+  const Json result =
+      json_of(folder, "bound" + gains +
+                          " --verified --uncertain mass=0.033:0.035 thrust=1:1 lag=0.055:0.06 delay=0:0");
+  for (std::size_t i = 0; i < 6; ++i) {
+    const Json& exact = result["exact"][i];
+    const Json& verified = result["verified"][i];
+    ASSERT_EQ(verified["status"], "proved");
+    for (const char* gain : {"rate", "amplitude", "edge", "impulse"}) {
+      EXPECT_LE(verified[gain][0].get<double>(), exact[gain].get<double>()) << gain;
+      EXPECT_GE(verified[gain][1].get<double>(), exact[gain].get<double>()) << gain;
+      EXPECT_LT(verified[gain][1].get<double>() - verified[gain][0].get<double>(), 1e-7) << gain;
+      EXPECT_GE(result["uncertain"]["gains"][i][gain][1].get<double>(), exact[gain].get<double>()) << gain;
+    }
+  }
+  EXPECT_EQ(run_shell("swarmcert bound" + gains + " --uncertain weight=1:2", folder.path()).exit_code, 2);
+}
+
+TEST(BoundCommand, TheShippedSwarmsAreProvedOrInconclusive) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");
+  const std::string swarms = kSource + "/stability/bounds/swarms/";
+  const Json one_way = json_of(folder, "bound" + gains + " --swarm " + swarms + "one-way-pair.toml")["swarm"];
+  EXPECT_EQ(one_way["verdict"], "proved");
+  EXPECT_NEAR(one_way["spectral_radius"][1].get<double>(), 0.145 * 4.996850736188977, 1e-9);
+  const Outcome pair =
+      run_shell("swarmcert bound" + gains + " --swarm " + swarms + "published-pair.toml", folder.path());
+  EXPECT_EQ(pair.exit_code, 4) << pair.output;
+  EXPECT_NE(pair.output.find("would do"), std::string::npos) << pair.output;
+}
+
+TEST(SpacingCommand, FartherNeedsNoMoreSpeedAndAGuardNeedsMore) {
+  const ScratchFolder folder;
+  const Json plain = json_of(folder, "spacing" + kFlown + " --max-error 0.1");
+  const Json guarded = json_of(folder, "spacing" + kFlown + " --max-error 0.1 --guard 1.35");
+  ASSERT_EQ(plain["shape"].size(), guarded["shape"].size());
+  int crossings = 0;
+  for (std::size_t i = 0; i < plain["shape"].size(); ++i) {
+    const Json& a = plain["shape"][i];
+    const Json& b = guarded["shape"][i];
+    EXPECT_LE(a["keep_out_radius_m"].get<double>(), b["keep_out_radius_m"].get<double>());
+    if (!a["may_cross"].get<bool>() || !b["may_cross"].get<bool>()) continue;
+    ++crossings;
+    EXPECT_LE(a["least_speed_m_s"].get<double>(), b["least_speed_m_s"].get<double>());
+  }
+  EXPECT_GT(crossings, 3);
+}
+
+void write_grid(const ScratchFolder& folder) {
+  write_text(folder / "gains.toml",
+             "schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\nrate_hz = 500\n[lag]\n"
+             "motor_s = 0.0575\n");
+  write_text(folder / "grid.toml",
+             "schema = \"swarmcert/grid/1\"\ngains = \"gains.toml\"\nmodel = \"" + kSource +
+                 "/stability/models/crazyflie-small.toml\"\naxis = \"z\"\n"
+                 "compute = [\"amplitude\", \"impulse\", \"noise_command_m_s2\", \"lag_limit_s\"]\n"
+                 "pareto = [\"impulse\", \"noise_command_m_s2\", \"lag_limit_s\"]\n"
+                 "[axes]\nKp = {from = 2, to = 40, steps = 17, scale = \"log\"}\n"
+                 "Kd = {from = 0.5, to = 20, steps = 13, scale = \"log\"}\n"
+                 "mass_kg = {from = 0.03, to = 0.04, steps = 2}\n");
+}
+
+TEST(SweepCommand, ShardsMergeToTheBytesOfAnUndividedRun) {
+  const ScratchFolder folder;
+  write_grid(folder);
+  ASSERT_EQ(run_shell("swarmcert sweep grid.toml -o whole", folder.path()).exit_code, 0);
+  for (int i = 1; i <= 3; ++i) {
+    ASSERT_EQ(run_shell("swarmcert sweep grid.toml -o parts -j 1 --shard " + std::to_string(i) + "/3",
+                        folder.path())
+                  .exit_code,
+              0);
+    if (i < 3) {
+      const Outcome early = run_shell("swarmcert merge parts", folder.path());
+      EXPECT_EQ(early.exit_code, 3);
+      EXPECT_NE(early.output.find("are missing"), std::string::npos) << early.output;
+    }
+  }
+  ASSERT_EQ(run_shell("swarmcert merge parts", folder.path()).exit_code, 0);
+  EXPECT_EQ(read_text(folder / "whole/sweep.json"), read_text(folder / "parts/sweep.json"));
+  EXPECT_EQ(read_text(folder / "whole/report/report.html"), read_text(folder / "parts/report/report.html"));
+  const Json points = files::parse_json(read_text(folder / "whole/sweep.json"), "sweep.json")["points"];
+  ASSERT_EQ(points.size(), 17u * 13 * 2);
+  int infeasible = 0;
+  int on_front = 0;
+  for (const Json& point : points) {
+    if (!point["feasible"].get<bool>()) {
+      ++infeasible;
+      EXPECT_FALSE(point["reason"].get<std::string>().empty());
+    }
+    on_front += point["pareto"].get<bool>();
+  }
+  EXPECT_GT(infeasible, 5);
+  EXPECT_GT(on_front, 5);
+}
+
+TEST(SweepCommand, AnExistingShardIsKeptUnlessToldOtherwise) {
+  const ScratchFolder folder;
+  write_grid(folder);
+  ASSERT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 0/4", folder.path()).exit_code, 0);
+  EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 0/4", folder.path()).exit_code, 3);
+  EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 0/4 --resume", folder.path()).exit_code, 0);
+  EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 5/4", folder.path()).exit_code, 2);
+  // A shard of another cut of the same grid has cells twice.
+  ASSERT_EQ(run_shell("swarmcert sweep grid.toml -o parts --shard 0/2", folder.path()).exit_code, 0);
+  const Outcome twice = run_shell("swarmcert merge parts", folder.path());
+  EXPECT_EQ(twice.exit_code, 3);
+  EXPECT_NE(twice.output.find("another shard has too"), std::string::npos) << twice.output;
+}
+
+/// The variables are those that Slurm sets; the array may start anywhere.
+TEST(SweepCommand, TasksOfAJobArrayMergeToTheWhole) {
+  const ScratchFolder folder;
+  write_grid(folder);
+  for (int task = 7; task <= 9; ++task) {
+    const Outcome outcome = run_shell("SLURM_ARRAY_TASK_ID=" + std::to_string(task) +
+                                          " SLURM_ARRAY_TASK_MIN=7 SLURM_ARRAY_TASK_COUNT=3 sh '" + kSource +
+                                          "/stability/sweep/sweep.sbatch' grid.toml array",
+                                      folder.path());
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  }
+  ASSERT_EQ(run_shell("swarmcert merge array", folder.path()).exit_code, 0);
+  ASSERT_EQ(run_shell("swarmcert sweep grid.toml -o whole", folder.path()).exit_code, 0);
+  EXPECT_EQ(read_text(folder / "whole/sweep.json"), read_text(folder / "array/sweep.json"));
+}
+
+TEST(TuneCommand, FindsGainsThatAreBetterWithinTheConstraints) {
+  const ScratchFolder folder;
+  const Json result = json_of(folder, "tune" + kFlown + " --nodes 400");
+  ASSERT_FALSE(result["gains"].is_null());
+  const Json& tuned = result["tuned"];
+  const Json& shipped = result["shipped"];
+  EXPECT_LE(tuned["impulse"].get<double>(), shipped["impulse"].get<double>());
+  EXPECT_LE(tuned["noise_command_m_s2"].get<double>(),
+            shipped["noise_command_m_s2"].get<double>() * (1 + 1e-12));
+  EXPECT_GE(tuned["lag_limit_s"].get<double>(), result["constraints"]["least_lag_limit_s"].get<double>());
+  EXPECT_FALSE(result["active_constraints"].empty());
+}
+
+}  // namespace
+}  // namespace swarmcert::tests

@@ -1,0 +1,168 @@
+// Reference numbers: reference/stability.md 2.2 and 3.6.
+#include "stability/bounds/disturbance_bounds.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kMass_kg = 0.034;
+constexpr double kLag_s = 1 / 17.4;
+
+AxisLoop pid(double Kp, double Kd, double Ki, double lag_s = 0) { return {kMass_kg, Kp, Kd, Ki, {lag_s}, 0}; }
+
+Disturbance known(double rate, double amplitude, double variation, double impulse) {
+  Disturbance d;
+  d.rate_N_s = rate;
+  d.amplitude_N = amplitude;
+  d.variation_N = variation;
+  d.impulse_N_s = impulse;
+  return d;
+}
+
+TEST(DisturbanceBounds, FlyUnderEventsOfTheReference) {
+  const AxisLoop z2 = pid(10, 5, 2, kLag_s);
+  const GainNorms gains = continuous_norms(z2, Channel::kForce);
+  const double E[] = {.0970, .1635, .2077, .2687}, d[] = {.748, 1.209, 1.421, 1.764};
+  const double J[] = {.0202, .0354, .0485, .0662};
+  const double B1[] = {11.0, 17.8, 20.9, 25.9}, B2[] = {.541, .912, 1.158, 1.499},
+               B3[] = {.270, .456, .579, .749};
+  const double B4[] = {.0949, .1657, .2274, .3105};
+  for (int i = 0; i < 4; ++i) {
+    const DisturbanceBounds b = disturbance_bounds(z2, Channel::kForce, gains, known(d[i], E[i], E[i], J[i]));
+    EXPECT_NEAR(b.by_rate, B1[i], 0.05);
+    EXPECT_NEAR(b.by_amplitude, B2[i], 1e-3);
+    EXPECT_NEAR(b.by_edges, B3[i], 1e-3);
+    EXPECT_NEAR(b.by_impulse, B4[i], 0.012 * B4[i]);  // J is given with three digits, and rises in the source
+    EXPECT_LE(b.by_both, std::min(b.by_rate, b.by_amplitude));
+    EXPECT_EQ(b.which(), "impulse");
+  }
+}
+
+TEST(DisturbanceBounds, EarlierPassesAreStillFelt) {
+  const AxisLoop z2 = pid(10, 5, 2, kLag_s), z10 = pid(10, 5, 10, kLag_s);
+  EXPECT_NEAR(impulse_gain_after(z2, Channel::kForce, 4), .3356, 5e-5);
+  EXPECT_NEAR(impulse_gain_after(z2, Channel::kForce, 8.5), .1225, 5e-5);
+  EXPECT_NEAR(impulse_gain_after(z2, Channel::kForce, 0), 4.686499723003938, 1e-11);
+  EXPECT_NEAR(impulse_gain_after(z10, Channel::kForce, 4), .110, 5e-4);
+  Disturbance passes = known(1, 1, 1, 0.02);
+  passes.passes = 8;
+  passes.pass_period_s = 4.5;
+  passes.pass_length_s = 0.5;
+  const DisturbanceBounds all =
+      disturbance_bounds(z2, Channel::kForce, continuous_norms(z2, Channel::kForce), passes);
+  passes.passes = 1;
+  const DisturbanceBounds one =
+      disturbance_bounds(z2, Channel::kForce, continuous_norms(z2, Channel::kForce), passes);
+  EXPECT_NEAR(all.by_impulse / one.by_impulse, 1.12, 0.01);
+}
+
+/// h >= 0 with one hump: the best split cuts the hump off where it is 2E/d wide (bang-bang with ramps of that length).
+TEST(DisturbanceBounds, AmplitudeAndRateTogetherHaveTheirClosedFormForOneHump) {
+  const double a = 3, m = kMass_kg;
+  const AxisLoop triple = pid(3 * a * a, 3 * a, a * a * a);
+  const double E = 1, d = 4;
+  // h = t^2 e^(-at)/(2m). Level c whose width is 2E/d by bisection.
+  const auto h = [&](double t) { return t * t * std::exp(-a * t) / (2 * m); };
+  const double peak = h(2 / a);
+  double low = 0, high = peak, from = 0, to = 0;
+  for (int i = 0; i < 200; ++i) {
+    const double c = (low + high) / 2;
+    double l = 0, r = 2 / a;
+    for (int k = 0; k < 100; ++k) ((h((l + r) / 2) < c ? l : r) = (l + r) / 2);
+    from = l;
+    l = 2 / a, r = 60;
+    for (int k = 0; k < 100; ++k) ((h((l + r) / 2) > c ? l : r) = (l + r) / 2);
+    to = r;
+    (to - from > 2 * E / d ? low : high) = c;
+  }
+  double above = 0;
+  const int cells = 20000;
+  for (int i = 0; i < cells; ++i)
+    above += (h(from + (i + 0.5) * (to - from) / cells) - low) * (to - from) / cells;
+  const double expected = 2 * E * low + d * above;
+  const double found = amplitude_and_rate_bound(triple, Channel::kForce, E, d);
+  EXPECT_NEAR(found, expected, 2e-4 * expected);
+  EXPECT_GE(found, expected * (1 - 1e-7));
+}
+
+TEST(DisturbanceBounds, AmplitudeAndRateTogetherTendToEachAlone) {
+  const AxisLoop loop = pid(10, 5, 10, kLag_s);
+  const GainNorms gains = continuous_norms(loop, Channel::kForce);
+  EXPECT_NEAR(amplitude_and_rate_bound(loop, Channel::kForce, 1, 1e4), gains.amplitude,
+              1e-2 * gains.amplitude);
+  EXPECT_NEAR(amplitude_and_rate_bound(loop, Channel::kForce, 1e4, 1), gains.rate, 1e-6 * gains.rate);
+  const double both = amplitude_and_rate_bound(loop, Channel::kForce, 1, 2);
+  EXPECT_LT(both, 0.95 * std::min(gains.amplitude, 2 * gains.rate));
+}
+
+/// Ten thousand random forces of each class, each convolved with the kernel: none exceeds the bound of its class, and
+/// the worst input of each class comes near it.
+TEST(DisturbanceBounds, NoneOfTenThousandRandomInputsOfEachClassExceedsItsBound) {
+  const AxisLoop loop = pid(10, 5, 10, kLag_s);
+  const GainNorms gains = continuous_norms(loop, Channel::kForce);
+  constexpr double kStep_s = 0.02;
+  constexpr int kCount = 900;
+  const std::vector<double> kernel =
+      sampled_response(impulse_transfer(loop, Channel::kForce), kStep_s / 2, 2 * kCount);
+  // A force that is constant on each step acts through the kernel's integral over the step (Simpson's rule).
+  std::vector<double> weight(kCount);
+  for (int i = 0; i < kCount; ++i) {
+    const auto at = [&](int k) { return k < 2 * kCount ? kernel[static_cast<std::size_t>(k)] : 0; };
+    weight[static_cast<std::size_t>(i)] = kStep_s / 6 * (at(2 * i) + 4 * at(2 * i + 1) + at(2 * i + 2));
+  }
+  const auto error = [&](const std::vector<double>& force) {
+    double total = 0;
+    for (std::size_t i = 0; i < force.size(); ++i) total += weight[force.size() - 1 - i] * force[i];
+    return std::abs(total);
+  };
+  const double both = amplitude_and_rate_bound(loop, Channel::kForce, 1, 4);
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::vector<double> force(kCount);
+  double nearest = 0;
+  for (int run = 0; run < 10000; ++run) {
+    const auto hold = static_cast<unsigned>(1 + random() % 200);
+    double level = 0, value = 0;
+    double rate = 0, variation = 0, impulse = 0, amplitude = 0, limited = 0, largest_step = 0;
+    std::vector<double> slow(kCount);
+    for (int i = 0; i < kCount; ++i) {
+      if (static_cast<unsigned>(i) % hold == 0)
+        level = run % 3 == 0 ? (unit(random) > 0 ? 1 : -1) : unit(random);
+      const double before = value;
+      value = level;
+      variation += std::abs(value - before);
+      largest_step = std::max(largest_step, std::abs(value - before));
+      impulse += std::abs(value) * kStep_s;
+      amplitude = std::max(amplitude, std::abs(value));
+      force[static_cast<std::size_t>(i)] = value;
+      limited += std::min(std::max(level - limited, -4 * kStep_s), 4 * kStep_s);
+      slow[static_cast<std::size_t>(i)] = limited;
+      rate = 4;
+    }
+    const double reached = error(force);
+    ASSERT_LE(reached, gains.amplitude * amplitude + 1e-9);
+    ASSERT_LE(reached, gains.edge * variation + 1e-9);
+    ASSERT_LE(reached, gains.impulse * impulse + 1e-9);
+    nearest = std::max(nearest, reached / (gains.amplitude * amplitude));
+    // A staircase of slope-limited steps stays within one step of a force of that rate.
+    const double slack = gains.amplitude * rate * kStep_s;
+    ASSERT_LE(error(slow), gains.rate * rate + slack);
+    ASSERT_LE(error(slow), both + slack);
+  }
+  EXPECT_GT(nearest, 0.6);
+  std::vector<double> worst = worst_amplitude_input(loop, Channel::kForce, kStep_s, kCount);
+  EXPECT_GE(error(worst), 0.998 * gains.amplitude);  // of 18 s
+}
+
+TEST(DisturbanceBounds, AStaircaseIsLateByItsPeriodAndItsLatency) {
+  const GainNorms gains = {0, 5, 0, 0};
+  EXPECT_DOUBLE_EQ(staircase_error(gains, 100, 0.004, 0.5), 5 * 0.014 * 0.5);
+  EXPECT_EQ(staircase_error(gains, 0, 0, 0.5), 0);
+}
+
+}  // namespace
+}  // namespace swarmcert::stability

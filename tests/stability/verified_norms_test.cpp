@@ -1,0 +1,77 @@
+#include "stability/bounds/verified_norms.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kMass_kg = 0.034;
+
+testing::AssertionResult encloses(const Interval& interval, double value, double relative_width) {
+  if (!(interval.lo <= value && value <= interval.hi)) {
+    return testing::AssertionFailure()
+           << value << " is not in [" << interval.lo << ", " << interval.hi << "]";
+  }
+  if (!(interval.hi > interval.lo)) return testing::AssertionFailure() << "no width at " << value;
+  const double width = (interval.hi - interval.lo) / value;
+  if (!(width < relative_width)) return testing::AssertionFailure() << "width " << width;
+  return testing::AssertionSuccess();
+}
+
+TEST(VerifiedNorms, EncloseClosedFormsAndAreNarrow) {
+  // Triple pole: |h|_1 = 1/(m a^3), |h|_oo = 2 e^-2/(m a^2), |h'|_1 twice that.
+  const double a = 4;
+  const auto norms = verified_norms({kMass_kg, 3 * a * a, 3 * a, a * a * a, {}, 0}, Channel::kForce);
+  ASSERT_TRUE(norms.has_value());
+  EXPECT_TRUE(encloses(norms->rate, 1 / (kMass_kg * a * a * a), 1e-8));
+  EXPECT_TRUE(encloses(norms->amplitude, 4 * std::exp(-2.0) / (kMass_kg * a * a), 1e-8));
+  EXPECT_TRUE(encloses(norms->edge, 2 * std::exp(-2.0) / (kMass_kg * a * a), 1e-8));
+  EXPECT_TRUE(encloses(norms->impulse,
+                       (2 - std::sqrt(2.0) - std::pow(2 - std::sqrt(2.0), 2) / 2) *
+                           std::exp(std::sqrt(2.0) - 2) / (kMass_kg * a),
+                       1e-8));
+}
+
+TEST(VerifiedNorms, TheEstimateLiesInsideForLoopsOfAnyPolePattern) {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> unit(0, 1);
+  int verified = 0;
+  while (verified < 12) {
+    AxisLoop loop = {
+        kMass_kg, std::exp(3 * unit(random)), std::exp(2.5 * unit(random)), std::exp(3 * unit(random)), {},
+        0};
+    if (verified % 2 == 1) loop.lags_s = {0.02 + 0.1 * unit(random)};
+    if (verified % 4 == 3) loop.lags_s.push_back(0.1 * unit(random));
+    loop.lags_s.push_back(0);
+    if (!is_stable(loop) || lag_limit(loop) < 0.05) continue;
+    const Channel channel = verified % 3 == 0 ? Channel::kCommand : Channel::kForce;
+    const auto norms = verified_norms(loop, channel);
+    ASSERT_TRUE(norms.has_value());
+    const GainNorms estimate = continuous_norms(loop, channel);
+    SCOPED_TRACE(testing::Message() << loop.Kp << " " << loop.Kd << " " << loop.Ki);
+    EXPECT_TRUE(encloses(norms->rate, estimate.rate, 1e-7));
+    EXPECT_TRUE(encloses(norms->amplitude, estimate.amplitude, 1e-7));
+    EXPECT_TRUE(encloses(norms->edge, estimate.edge, 1e-7));
+    EXPECT_TRUE(encloses(norms->impulse, estimate.impulse, 1e-7));
+    ++verified;
+  }
+}
+
+TEST(VerifiedNorms, AnUnstableLoopIsNotVerified) {
+  EXPECT_FALSE(verified_norms({kMass_kg, 1, 0.1, 10, {}, 0}, Channel::kForce).has_value());
+}
+
+TEST(Interval, EveryOperationIsWiderThanRounding) {
+  const Interval third = Interval(1) / Interval(3);
+  EXPECT_LT(third.lo, third.hi);
+  const Interval one = third * Interval(3);
+  EXPECT_LE(one.lo, 1);
+  EXPECT_GE(one.hi, 1);
+  EXPECT_LT((Interval(0.1) + Interval(0.2)).lo, (Interval(0.1) + Interval(0.2)).hi);
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
