@@ -24,6 +24,9 @@ const std::vector<Command>& commands() {
       inspect_command(),          //
       certify_command(),          //
       check_command(),            //
+      compare_command(),          //
+      diagnose_command(),         //
+      add_command(),              //
       simulate_command(),         //
       bound_command(),            //
       spacing_command(),          //

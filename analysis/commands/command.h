@@ -72,10 +72,13 @@ void write_result(const CommonOptions& common, const files::Json& result);
 /// Files that NET was read from.
 std::vector<std::string> input_files(const files::Network& network);
 
+Command add_command();
 Command bound_command();
 Command certify_command();
 Command check_command();
+Command compare_command();
 Command demo_command();
+Command diagnose_command();
 Command export_command();
 Command identify_thrust_command();
 Command inspect_command();

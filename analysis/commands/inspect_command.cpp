@@ -1,8 +1,11 @@
 #include <fmt/core.h>
 
+#include <limits>
 #include <memory>
+#include <sstream>
 
 #include "analysis/commands/command.h"
+#include "analysis/logs/read_log.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
 
@@ -12,6 +15,10 @@ namespace {
 struct Options {
   std::vector<std::string> files;
   std::string key;
+  std::string csv;
+  std::string columns;
+  double t0_s = -std::numeric_limits<double>::infinity();
+  double t1_s = std::numeric_limits<double>::infinity();
 };
 
 files::Json describe(const files::Weights& weights) {
@@ -71,10 +78,63 @@ files::Json inspect_network(const std::string& path, const std::string& key, boo
   return {{"file", path}, {"kind", "network"}, {"networks", std::move(parts)}};
 }
 
+files::Json inspect_log(const std::string& path, const Options& options, const CommonOptions& common) {
+  const logs::Log log = options.columns.empty() ? logs::read_log(path)
+                                                : logs::read_log(path, logs::read_columns(options.columns));
+  const logs::LogHealth& health = log.health;
+  const std::vector<logs::Sample>& samples = log.samples;
+  const double t0_s = samples.empty() ? 0 : samples.front().time_us * 1e-6;
+  const double t1_s = samples.empty() ? 0 : samples.back().time_us * 1e-6;
+  if (!options.csv.empty()) {
+    std::ostringstream text;
+    logs::write_csv(log, options.t0_s, options.t1_s, text);
+    files::write_file(options.csv, text.str(), common.force);
+  }
+  if (common.prints_text()) {
+    fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {} columns\n", path, log.format,
+               health.records, t0_s, t1_s, log.channels.size());
+    for (const std::string& finding : logs::findings(health)) fmt::print("  {}\n", finding);
+    if (!log.signals.force) fmt::print("  no force can be computed: position only\n");
+  }
+  return {{"file", path},
+          {"kind", "log"},
+          {"format", log.format},
+          {"channels", log.channels},
+          {"records", health.records},
+          {"t0_s", t0_s},
+          {"t1_s", t1_s},
+          {"signals",
+           {{"force", log.signals.force},
+            {"rates", log.signals.rates},
+            {"targets", log.signals.targets},
+            {"commands", log.signals.commands}}},
+          {"health",
+           {{"sound", logs::is_sound(health)},
+            {"blocks", health.blocks},
+            {"damaged_blocks", health.damaged_blocks},
+            {"skipped_bytes", health.skipped_bytes},
+            {"damaged_lines", health.damaged_lines},
+            {"not_finite", health.not_finite},
+            {"clock_jumps", health.clock_jumps},
+            {"gaps", health.gaps},
+            {"longest_gap_s", health.longest_gap_s},
+            {"truncated", health.truncated},
+            {"checksum_failed", health.checksum_failed}}}};
+}
+
 int run(const Options& options, const CommonOptions& common) {
+  if (!options.csv.empty()) {
+    if (options.files.size() != 1 || !logs::looks_like_log(options.files[0]))
+      throw UsageError("--csv takes one flight log");
+    refuse_to_replace(common, options.csv);
+  }
   files::Json result = result_head("inspect", options.files);
   result["files"] = files::Json::array();
   for (const std::string& path : options.files) {
+    if (logs::looks_like_log(path)) {
+      result["files"].push_back(inspect_log(path, options, common));
+      continue;
+    }
     result["files"].push_back(is_json(path) ? inspect_certificate(path, common.prints_text())
                                             : inspect_network(path, options.key, common.prints_text()));
   }
@@ -85,17 +145,26 @@ int run(const Options& options, const CommonOptions& common) {
 }  // namespace
 
 Command inspect_command() {
-  return {
-      "inspect", "What is in a weight file, network.toml or certificate, and is it sound",
-      "Exit 0 if every file can be read, else 3 with what is wrong and where.\n\n"
-      "Example: swarmcert inspect nn/networks/demo/network.toml",
-      [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
-        app.add_option("FILE", options->files, "Weight files, network.toml files, certificates")->required();
-        app.add_option("--key", options->key,
-                       "Where the state dict lies inside a nested checkpoint, e.g. model");
-        return [options](const CommonOptions& common) { return run(*options, common); };
-      }};
+  return {"inspect", "What is in a weight file, network.toml, certificate or flight log, and is it sound",
+          "Exit 0 if every file can be read, else 3 with what is wrong and where. Damage inside a flight log "
+          "is skipped,\n"
+          "counted and shown.\n\n"
+          "Example: swarmcert inspect nn/networks/demo/network.toml\n"
+          "         swarmcert inspect cf50_00 --csv cf50_00.csv --t0 2 --t1 12",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<Options>();
+            app.add_option("FILE", options->files,
+                           "Weight files, network.toml files, certificates, flight logs")
+                ->required();
+            app.add_option("--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
+            app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
+            app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
+            app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean")
+                ->check(CLI::ExistingFile);
+            app.add_option("--key", options->key,
+                           "Where the state dict lies inside a nested checkpoint, e.g. model");
+            return [options](const CommonOptions& common) { return run(*options, common); };
+          }};
 }
 
 }  // namespace swarmcert::analysis

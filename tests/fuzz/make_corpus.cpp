@@ -4,6 +4,7 @@
 #include <iostream>
 #include <random>
 
+#include "analysis/log_writer.h"
 #include "nn/files/safetensors.h"
 #include "nn/files/weights.h"
 #include "nn/onnx_writer.h"
@@ -109,6 +110,18 @@ void add_json(Corpus& corpus) {
   corpus.add("-0x0.0000000000001p-1022");
 }
 
+void add_logs(Corpus& corpus, const std::string& data) {
+  corpus.add(small_usd());
+  corpus.add(small_events(1));
+  corpus.add(small_events(2));
+  corpus.add("# time[ms],x[m],y[m],z[m],vx[m/s],vy[m/s],vz[m/s]\n1e4,0,0,1,0,0,0\n2e4,0,0,1,0,0,0\n");
+  const fs::path log = fs::path(data) / "flights/development/21_swap_ss/cf50_00";
+  if (data.empty() || !fs::exists(log)) return;
+  std::string bytes(6000, '\0');
+  std::ifstream(log, std::ios::binary).read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  corpus.add(bytes);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -121,6 +134,8 @@ int main(int argc, char** argv) {
   add_weights(weights, argc > 2 ? argv[2] : "");
   Corpus networks(out / "network");
   add_networks(networks);
+  Corpus logs(out / "log");
+  add_logs(logs, argc > 2 ? argv[2] : "");
   Corpus json(out / "json");
   add_json(json);
   return 0;

@@ -1,0 +1,14 @@
+/// @file The HTML report of a comparison.
+#pragma once
+
+#include <string>
+
+#include "analysis/residuals/comparison.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html with plots; returns its path. @throws as Report::write().
+std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
+                                 const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

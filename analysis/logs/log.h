@@ -1,0 +1,72 @@
+/// @file One vehicle's flight log in SI units, whatever file format it came from.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace swarmcert::logs {
+
+using Vector = std::array<double, 3>;
+
+/// Standard gravity as the authors' code rounds it, m/s^2; also what turns newton into gram-force here.
+inline constexpr double kGravity_m_s2 = 9.81;
+inline constexpr double kNewtonPerGramForce = kGravity_m_s2 / 1000;
+
+/// Two records further apart than this are not neighbours in time: filters restart, nothing is interpolated between.
+inline constexpr double kLongestGap_s = 0.030;
+
+/// One record. Frames: W world, z up; B body, x forward, y left, z up.
+struct Sample {
+  double time_us = 0;     ///< on the vehicle's own clock, which starts with the log; strictly increasing
+  Vector position_m{};    ///< W
+  Vector velocity_m_s{};  ///< W
+  Vector specific_force_m_s2{};                ///< W; what an accelerometer feels: +9.81 in z at rest
+  std::array<double, 4> attitude{0, 0, 0, 1};  ///< unit quaternion x, y, z, w that turns B into W
+  Vector rates_rad_s{};                        ///< B
+  std::array<double, 4> duty{};                ///< PWM/65536 per motor, in [0, 1]
+  double battery_V = 0;
+  Vector target_position_m{}, target_velocity_m_s{};  ///< W; NaN where the log has none
+  std::array<double, 4> motor_force_N{};  ///< what the controller asked of each motor; unsaturated
+  double thrust_command_N = 0;
+  Vector torque_command_Nm{};  ///< B
+  bool restarts = false;       ///< first record, or more than kLongestGap_s after the one before
+};
+
+/// Which optional groups of signals a log has.
+struct Signals {
+  bool force = false;     ///< specific force, attitude, duty and battery: a force residual can be formed
+  bool targets = false;   ///< target position and velocity
+  bool commands = false;  ///< motor forces, thrust and torque commands
+  bool rates = false;
+};
+
+/// What was wrong with a file, and what was done about it: nothing here is silently repaired.
+struct LogHealth {
+  std::size_t blocks = 0;          ///< checksummed blocks that were sound (old binary format only)
+  std::size_t damaged_blocks = 0;  ///< places where a checksum failed or nothing sensible could be read
+  std::size_t skipped_bytes = 0;   ///< at these places, and after the last whole record
+  bool truncated = false;          ///< the file ends inside a block, a record or a line
+  bool checksum_failed = false;    ///< of the whole file (binary versions 1 and 2 only); records are kept
+  std::size_t records = 0;         ///< records kept
+  std::size_t damaged_lines = 0;   ///< CSV lines that are not as many numbers as the header has columns
+  std::size_t not_finite = 0;      ///< records dropped because a needed value is NaN or infinite
+  std::size_t clock_jumps = 0;     ///< records dropped because their time does not follow the one before
+  std::size_t gaps = 0;            ///< pauses over kLongestGap_s
+  double longest_gap_s = 0;
+};
+
+struct Log {
+  std::string path;
+  std::string format;  ///< "usd", "usd version 1", "usd version 2", "csv"
+  Signals signals;
+  LogHealth health;
+  std::vector<std::string> channels;  ///< as the file names them
+  std::vector<Sample> samples;
+};
+
+/// Rotation matrix of `sample`'s attitude, row by row: turns vectors of B into W.
+std::array<Vector, 3> rotation(const Sample& sample);
+
+}  // namespace swarmcert::logs

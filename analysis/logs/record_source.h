@@ -1,0 +1,42 @@
+/// @file Log files as streams of records: numbers under names, in the file's own units.
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "analysis/logs/log.h"
+
+namespace swarmcert::logs {
+
+/// Receives a file's records one by one, so that a reader holds no more than one block of the file.
+class RecordSink {
+ public:
+  virtual ~RecordSink() = default;
+  /// @param names  of the columns, unique. The first is the time.
+  virtual void begin(const std::vector<std::string>& names) = 0;
+  /// @param values one per name; valid during the call only.
+  virtual void record(const std::vector<double>& values) = 0;
+};
+
+/// Old micro-SD format: u8 number of variables, that many "name(type)," tokens, u32 checksum; then blocks of u8 n,
+/// n packed little-endian records, u32 checksum over both. The stored checksum is the bitwise NOT of CRC-32.
+/// A block whose checksum fails is skipped: the reader looks for the next byte at which a sound block with a sensible
+/// time starts.
+/// @throws files::InputError if the header is damaged or names an unknown type, because then no record can be read.
+void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
+
+/// Micro-SD formats with magic 0xBC, versions 1 (times in ms) and 2 (times in us); CRC-32 of all before ends the
+/// file. Every record carries an event; records of the event with the position estimate are passed on, together with
+/// the latest values of the others. Where no known event follows, the reader looks for the next byte from which three
+/// records with increasing times follow each other.
+/// @throws files::InputError as read_usd().
+/// @return the version
+int read_usd_events(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
+
+/// Text: a header line, which may start with "#", and lines of as many numbers.
+/// @throws files::InputError if the header is empty or has a name twice.
+void read_csv(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
+
+}  // namespace swarmcert::logs

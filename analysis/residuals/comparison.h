@@ -1,0 +1,80 @@
+/// @file A model against flights: how large the force residual is, of whom, when and where.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "analysis/residuals/inputs.h"
+#include "analysis/residuals/regions.h"
+#include "analysis/residuals/statistics.h"
+
+namespace swarmcert::residuals {
+
+/// Errors of one group of records.
+struct GroupErrors {
+  ErrorStatistics statistics;
+  std::array<Interval, 4> rmse_interval;  ///< 90 %, of x, y, z, total, from blocks of 2 s
+  Axes nrmse;                             ///< rmse over the vehicles' mean weight
+  Eigen::Vector3d low_band_to_floor = Eigen::Vector3d::Zero();  ///< Spectrum::low_band_to_floor()
+  Eigen::Vector3d noise_floor_N = Eigen::Vector3d::Zero();
+};
+
+struct Moment {
+  std::string flight, vehicle;
+  double time_s = 0;                                     ///< of the log's clock
+  Eigen::Vector3d residual_N = Eigen::Vector3d::Zero();  ///< mean over 0.1 s
+};
+
+/// One vehicle in one flight.
+struct TrackErrors {
+  std::string flight, scenario, vehicle, kind, path;
+  bool position_only = false;
+  std::array<std::size_t, static_cast<std::size_t>(Cut::kCount)> cut{};  ///< records by what became of them
+  double clock_offset_s = 0;
+  int clock_onsets = 0;
+  std::vector<std::string> findings;  ///< what was wrong with the log
+  GroupErrors errors;
+  std::vector<float> time_s, residual_z_N, nominal_z_N;  ///< every tenth used record, for plots
+};
+
+struct RegionErrors {
+  int variable = 0, region = 0;
+  std::string words;  ///< "height below 0.08 m: +3.5 gf"
+  double share = 0;   ///< of all squared residual that this region's bias explains
+  ErrorStatistics statistics;
+};
+
+/// Quantiles over windows of kWindow_s of the residual behind a low-pass of kBandwidth_hz.
+struct LearningError {
+  static constexpr double kWindow_s = 4.5;  ///< one pass of the published swaps
+  static constexpr double kBandwidth_hz = 5;
+  struct Quantiles {
+    Axes p50, p95, p99, max;
+  };
+  std::size_t windows = 0;
+  Quantiles bias_N;       ///< |mean| over a vehicle's flight
+  Quantiles amplitude_N;  ///< largest value
+  Quantiles rate_N_s;     ///< largest rate of change
+  Quantiles variation_N;  ///< total variation
+  Quantiles impulse_N_s;  ///< integral of the absolute value
+};
+
+struct Comparison {
+  GroupErrors overall;
+  std::vector<TrackErrors> tracks;  ///< in order of flights and vehicles
+  std::map<std::string, GroupErrors> scenarios, vehicles, kinds;
+  std::vector<RegionErrors> regions;  ///< worst first
+  std::vector<Moment> moments;        ///< worst first
+  LearningError learning_error;
+  std::vector<std::string> problems;  ///< logs that could not be read
+};
+
+/// Shows progress: flights done of all.
+using Progress = std::function<void(int done, int total)>;
+
+/// Compares. The result does not depend on `jobs`.
+Comparison compare(const Inputs& inputs, int jobs, const Progress& progress);
+
+}  // namespace swarmcert::residuals

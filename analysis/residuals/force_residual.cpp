@@ -1,0 +1,142 @@
+#include "analysis/residuals/force_residual.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stability/effects/registry.h"
+
+namespace swarmcert::residuals {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+/// The authors' lag per record of about 10 ms.
+constexpr double kPublishedLag = 0.16;
+constexpr double kLargestPublishedForce_gf = 50;
+
+stability::EffectContext context_of(const stability::Model& model, const Kinds& kinds) {
+  stability::EffectContext context;
+  context.kind = model.kind;
+  context.kinds = kinds.names;
+  context.path = model.path;
+  return context;
+}
+
+/// Thrust behind a stage of the signal path: u + gain (stage(u) - u).
+void pass_stage(const stability::AppliedEffect& stage, Track& track) {
+  const auto stream = stage.effect().stream(stage.shape().data());
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    stability::Instant& now = track.instants[i];
+    if (track.restarts[i] != 0) stream->restart();
+    stability::Wrench change;
+    stream->advance(now, &change);
+    now.thrust_N += stage.coefficients()[0] * change.force_W_N.dot(now.b3_W());
+  }
+}
+
+bool is_stage(const std::string& effect) { return effect == "delay" || effect == "motor_lag"; }
+
+void pass_published_lag(Track& track) {
+  double lagged_N = 0;
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    stability::Instant& now = track.instants[i];
+    lagged_N = i == 0 ? now.thrust_N : lagged_N + kPublishedLag * (now.thrust_N - lagged_N);
+    now.thrust_N = lagged_N;
+  }
+}
+
+}  // namespace
+
+AccelerometerFilter::AccelerometerFilter(double cutoff_hz, int channels)
+    : rate_1_s_(2 * kPi * cutoff_hz / std::sqrt(2.0)),
+      input_(3, channels),
+      output_(3, channels),
+      slope_(3, channels) {}
+
+// y'' = w^2 (u - y) - sqrt(2) w y' with a = w / sqrt(2). For u = u0 + s t the particular solution is u0 + s t - s / a;
+// the rest decays as e^{-a t} (e0 cos a t + (e0' + a e0) / a sin a t).
+void AccelerometerFilter::advance(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values) {
+  if (!has_past_) {
+    output_ = values;
+    slope_.setZero();
+  } else {
+    const double h = time_s - time_s_;
+    const double a = rate_1_s_;
+    const double decay = std::exp(-a * h), c = decay * std::cos(a * h), s = decay * std::sin(a * h);
+    ramp_ = (values - input_) / h;
+    start_ = output_ - input_ + ramp_ / a;
+    start_slope_ = slope_ - ramp_;
+    output_ = values - ramp_ / a + c * start_ + s * (start_ + start_slope_ / a);
+    slope_ = ramp_ + c * start_slope_ - s * (start_slope_ + 2 * a * start_);
+  }
+  has_past_ = true;
+  time_s_ = time_s;
+  input_ = values;
+  values = output_;
+}
+
+void as_measured(const stability::Instant& now, AccelerometerFilter& filter, Eigen::Matrix3Xd& forces) {
+  forces = (now.R_WB.transpose() * forces).eval();
+  filter.advance(now.time_s, forces);
+  forces = (now.R_WB * forces).eval();
+}
+
+void apply_model(const stability::Model& model, const Kinds& kinds, const CutRules& rules, Track& track) {
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    stability::Instant& now = track.instants[i];
+    now.mass_kg = model.mass_kg;
+    now.thrust_N = 0;
+    for (const double duty : track.duty[i]) now.thrust_N += model.thrust.force_N(duty, now.battery_V);
+  }
+  if (rules.published) {
+    pass_published_lag(track);
+    return;
+  }
+  for (const char* stage : {"delay", "motor_lag"}) {
+    for (const stability::EffectSpec& spec : model.effects) {
+      if (spec.name == stage) pass_stage(stability::AppliedEffect(spec, context_of(model, kinds)), track);
+    }
+  }
+}
+
+std::vector<Eigen::Vector3d> force_residual(const stability::Model& model, const Kinds& kinds,
+                                            const CutRules& rules, const Track& track) {
+  std::vector<std::unique_ptr<stability::AppliedEffect>> effects;
+  std::vector<std::unique_ptr<stability::ColumnStream>> streams;
+  for (const stability::EffectSpec& spec : model.effects) {
+    if (is_stage(spec.name)) continue;
+    effects.push_back(std::make_unique<stability::AppliedEffect>(spec, context_of(model, kinds)));
+    streams.push_back(effects.back()->effect().stream(effects.back()->shape().data()));
+  }
+  AccelerometerFilter filter(model.sensor.accelerometer_cutoff_hz, 1);
+  std::vector<Eigen::Vector3d> residual(track.instants.size());
+  stability::Wrench columns[stability::kMostColumns];
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    const stability::Instant& now = track.instants[i];
+    if (track.restarts[i] != 0) {
+      filter.restart();
+      for (const auto& stream : streams) stream->restart();
+    }
+    Eigen::Matrix3Xd force = now.thrust_N * now.b3_W();
+    for (std::size_t k = 0; k < effects.size(); ++k) {
+      streams[k]->advance(now, columns);
+      for (int c = 0; c < effects[k]->effect().num_columns(); ++c)
+        force.col(0) += effects[k]->coefficients()[static_cast<std::size_t>(c)] * columns[c].force_W_N;
+    }
+    if (!rules.published) as_measured(now, filter, force);
+    residual[i] = model.mass_kg * track.specific_force_m_s2[i] - force.col(0);
+  }
+  return residual;
+}
+
+void cut_large_forces(const stability::Model& model, const CutRules& rules, Track& track) {
+  if (!rules.published) return;
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    const stability::Instant& now = track.instants[i];
+    const double f_az_N = model.mass_kg * track.specific_force_m_s2[i].z() - now.thrust_N * now.b3_W().z();
+    if (track.cut[i] == Cut::kNone && std::abs(f_az_N) >= kLargestPublishedForce_gf * stability::kGramForce_N)
+      track.cut[i] = Cut::kLargeForce;
+  }
+  track.used = static_cast<std::size_t>(std::count(track.cut.begin(), track.cut.end(), Cut::kNone));
+}
+
+}  // namespace swarmcert::residuals

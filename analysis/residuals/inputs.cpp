@@ -1,0 +1,112 @@
+#include "analysis/residuals/inputs.h"
+
+#include <algorithm>
+#include <set>
+
+#include "analysis/residuals/force_residual.h"
+#include "nn/files/input_error.h"
+
+namespace swarmcert::residuals {
+namespace {
+
+void add_kind(Kinds& kinds, const std::string& kind, double mass_kg) {
+  const int index = kinds.index(kind);
+  if (index >= 0) {
+    kinds.masses_kg[static_cast<std::size_t>(index)] = mass_kg;
+    return;
+  }
+  kinds.names.push_back(kind);
+  kinds.masses_kg.push_back(mass_kg);
+}
+
+}  // namespace
+
+Inputs read_inputs(const InputArguments& arguments) {
+  Inputs inputs;
+  inputs.rules = arguments.rules;
+  inputs.map = arguments.columns.empty() ? logs::known_columns() : logs::read_columns(arguments.columns);
+  if (!arguments.columns.empty()) inputs.named_files.push_back(arguments.columns);
+  inputs.found = find_flights(arguments.flights);
+  if (!arguments.fleet.empty()) {
+    inputs.fleet = read_fleet(arguments.fleet);
+    inputs.named_files.push_back(arguments.fleet);
+  }
+  for (const std::string& path : arguments.models) {
+    inputs.models.push_back(stability::read_model(path));
+    inputs.named_files.push_back(path);
+    const std::string& kind = inputs.models.back().kind;
+    for (std::size_t i = 0; i + 1 < inputs.models.size(); ++i) {
+      if (inputs.models[i].kind != kind) continue;
+      throw files::InputError({path, "", "vehicle.kind", kind,
+                               "is the kind of " + inputs.models[i].path + " as well",
+                               "give one model per kind"});
+    }
+  }
+  std::set<std::string> flown, flown_models;
+  for (const FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) {
+      const auto known = inputs.fleet.find(vehicle);
+      if (known == inputs.fleet.end()) continue;
+      flown.insert(known->second.kind);
+      flown_models.insert(known->second.model);
+    }
+  }
+  for (const auto& [vehicle, use] : inputs.fleet) {
+    if (inputs.kinds.index(use.kind) < 0)
+      add_kind(inputs.kinds, use.kind, stability::read_model(use.model).mass_kg);
+  }
+  if (inputs.models.empty()) {
+    std::set<std::string> seen;
+    for (const std::string& path : flown_models) {
+      stability::Model model = stability::read_model(path);
+      if (!seen.insert(model.kind).second) continue;
+      inputs.named_files.push_back(path);
+      inputs.models.push_back(std::move(model));
+    }
+    if (inputs.models.empty()) {
+      throw files::InputError(
+          {arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
+           "no model is named and no vehicle is known",
+           "give a model.toml, or a flights.toml (--flights) that names one per vehicle"});
+    }
+  }
+  for (const stability::Model& model : inputs.models) add_kind(inputs.kinds, model.kind, model.mass_kg);
+  inputs.fallback_kind = inputs.models[0].kind;
+  if (inputs.models.size() == 1 && !flown.empty() && flown.count(inputs.fallback_kind) == 0) {
+    for (auto& [vehicle, use] : inputs.fleet) use.kind = inputs.fallback_kind;
+  }
+  return inputs;
+}
+
+const stability::Model* Inputs::model_of(const std::string& kind) const {
+  for (const stability::Model& model : models) {
+    if (model.kind == kind) return &model;
+  }
+  return nullptr;
+}
+
+std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& problems) const {
+  // A vehicle whose kind has no model is a neighbour and nothing else.
+  Fleet uses = fleet;
+  for (auto& [vehicle, use] : uses) {
+    if (model_of(use.kind) == nullptr) use.position_only = true;
+  }
+  std::vector<Track> tracks =
+      load_flight(found.flights[index], uses, fallback_kind, kinds, map, rules, problems);
+  for (Track& track : tracks) {
+    if (track.position_only) continue;
+    apply_model(*model_of(track.kind), kinds, rules, track);
+    cut_large_forces(*model_of(track.kind), rules, track);
+  }
+  return tracks;
+}
+
+std::vector<std::string> Inputs::files() const {
+  std::vector<std::string> all = named_files;
+  for (const FlightFiles& flight : found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) all.push_back(path);
+  }
+  return all;
+}
+
+}  // namespace swarmcert::residuals

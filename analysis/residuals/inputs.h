@@ -1,0 +1,46 @@
+/// @file What compare, diagnose and add work on: models, flights and who is who.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "analysis/logs/signals.h"
+#include "analysis/residuals/track.h"
+#include "stability/model.h"
+
+namespace swarmcert::residuals {
+
+/// Which files the user named.
+struct InputArguments {
+  std::vector<std::string> models;   ///< model.toml files, at most one per kind; may be empty
+  std::vector<std::string> flights;  ///< files and folders
+  std::string fleet;                 ///< flights.toml
+  std::string columns;               ///< columns.toml; empty: the known columns
+  CutRules rules;
+};
+
+/// Everything but the flights' data. Vehicles fly the given model of their kind; without models, the fleet's; a
+/// vehicle that the fleet does not name, and every vehicle where none has the kind of the only model, that model.
+struct Inputs {
+  std::vector<stability::Model> models;
+  Kinds kinds;
+  Fleet fleet;
+  FoundFlights found;
+  logs::SignalMap map;
+  CutRules rules;
+
+  const stability::Model* model_of(const std::string& kind) const;  ///< nullptr: only a neighbour
+  /// Loads flight `index`; tracks without a model are position only; applies the models.
+  std::vector<Track> load(std::size_t index, std::vector<std::string>& problems) const;
+  /// model.toml, flights.toml and logs, for the list of inputs of a result.
+  std::vector<std::string> files() const;
+
+  std::string fallback_kind;
+  std::vector<std::string> named_files;
+};
+
+/// @throws files::InputError as the readers of these files do, and where two models have one kind.
+Inputs read_inputs(const InputArguments& arguments);
+
+}  // namespace swarmcert::residuals

@@ -1,0 +1,219 @@
+#include "analysis/residuals/track.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "analysis/logs/read_log.h"
+#include "nn/files/input_error.h"
+
+namespace swarmcert::residuals {
+namespace {
+
+constexpr double kCrashTiltCosine = 0.5;  // 60 degrees
+constexpr double kBeforeCrash_s = 0.3;
+constexpr double kLeastDuty = 0.8;
+constexpr double kSettle_s = 0.15;
+
+double contact_height_m(const std::string& kind) { return kind == "large" ? 0.085 : 0.07; }
+
+Eigen::Vector3d vector(const logs::Vector& v) { return {v[0], v[1], v[2]}; }
+
+/// Times at which the target starts to move after standing still, in seconds of the log's clock.
+std::vector<double> onsets_s(const logs::Log& log) {
+  constexpr double kStill_s = 0.3;
+  constexpr double kStill_m_s = 1e-6;
+  std::vector<double> onsets;
+  if (!log.signals.targets) return onsets;
+  double still_since_us = -1;
+  for (const logs::Sample& s : log.samples) {
+    const double speed = vector(s.target_velocity_m_s).norm();
+    if (s.restarts) still_since_us = -1;
+    if (speed <= kStill_m_s) {
+      if (still_since_us < 0) still_since_us = s.time_us;
+      continue;
+    }
+    if (still_since_us >= 0 && s.time_us - still_since_us > 1e6 * kStill_s)
+      onsets.push_back(1e-6 * s.time_us);
+    still_since_us = -1;
+  }
+  return onsets;
+}
+
+/// Median difference of onsets that belong together; 0 with no onsets matched.
+double clock_offset_s(const std::vector<double>& reference, const std::vector<double>& own, int* matched) {
+  constexpr double kLargestOffset_s = 0.1;
+  std::vector<double> differences;
+  for (const double onset : own) {
+    for (const double other : reference) {
+      if (std::abs(onset - other) < kLargestOffset_s) differences.push_back(onset - other);
+    }
+  }
+  *matched = static_cast<int>(differences.size());
+  if (differences.empty()) return 0;
+  std::nth_element(differences.begin(), differences.begin() + differences.size() / 2, differences.end());
+  return differences[differences.size() / 2];
+}
+
+struct State {
+  Eigen::Vector3d p, v;
+};
+
+/// The state of `log` at `time_s` of its clock, between its records; nothing across a gap or outside of the log.
+/// @param from where the search starts; times ascend from call to call.
+std::optional<State> state_at(const logs::Log& log, double time_s, bool everywhere, std::size_t& from) {
+  const std::vector<logs::Sample>& samples = log.samples;
+  if (samples.empty()) return std::nullopt;
+  const double time_us = 1e6 * time_s;
+  while (from + 1 < samples.size() && samples[from + 1].time_us <= time_us) ++from;
+  const logs::Sample& a = samples[from];
+  const bool last = from + 1 == samples.size();
+  if (time_us < a.time_us || last) {
+    const double away_us = std::abs(time_us - a.time_us);
+    if (!everywhere && away_us > 1e6 * logs::kLongestGap_s) return std::nullopt;
+    return State{vector(a.position_m), vector(a.velocity_m_s)};
+  }
+  const logs::Sample& b = samples[from + 1];
+  if (b.restarts && !everywhere && time_us != a.time_us) return std::nullopt;
+  const double share = (time_us - a.time_us) / (b.time_us - a.time_us);
+  return State{vector(a.position_m) + share * (vector(b.position_m) - vector(a.position_m)),
+               vector(a.velocity_m_s) + share * (vector(b.velocity_m_s) - vector(a.velocity_m_s))};
+}
+
+void fill_instants(Track& track, const logs::Log& log) {
+  const std::size_t n = log.samples.size();
+  track.instants.resize(n);
+  track.duty.resize(n);
+  track.specific_force_m_s2.resize(n);
+  track.restarts.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const logs::Sample& s = log.samples[i];
+    stability::Instant& now = track.instants[i];
+    now.time_s = 1e-6 * s.time_us - track.clock_offset_s;
+    now.p_W_m = vector(s.position_m);
+    now.v_W_m_s = vector(s.velocity_m_s);
+    const auto R = logs::rotation(s);
+    for (int row = 0; row < 3; ++row)
+      now.R_WB.row(row) = vector(R[static_cast<std::size_t>(row)]).transpose();
+    if (log.signals.rates) now.omega_B_rad_s = vector(s.rates_rad_s);
+    now.battery_V = log.signals.force ? s.battery_V : stability::kFullBattery_V;
+    track.duty[i] = s.duty;
+    track.specific_force_m_s2[i] = vector(s.specific_force_m_s2);
+    track.restarts[i] = s.restarts ? 1 : 0;
+  }
+}
+
+void cut_phases(Track& track, const CutRules& rules) {
+  const std::size_t n = track.instants.size();
+  track.cut.assign(n, Cut::kNone);
+  double crash_s = INFINITY;
+  for (std::size_t i = 0; i < n && std::isinf(crash_s); ++i) {
+    if (track.instants[i].R_WB(2, 2) < kCrashTiltCosine) crash_s = track.instants[i].time_s - kBeforeCrash_s;
+  }
+  double settled_s = -INFINITY;
+  for (std::size_t i = 0; i < n; ++i) {
+    const stability::Instant& now = track.instants[i];
+    const auto& d = track.duty[i];
+    if (track.restarts[i] != 0) settled_s = now.time_s + kSettle_s;
+    Cut& cut = track.cut[i];
+    if (now.time_s >= crash_s)
+      cut = Cut::kCrash;
+    else if (d[0] + d[1] + d[2] + d[3] < kLeastDuty)
+      cut = Cut::kNotFlying;
+    else if (!rules.published && now.p_W_m.z() <= contact_height_m(track.kind))
+      cut = Cut::kContact;
+    else if (!rules.published && now.time_s < settled_s)
+      cut = Cut::kSettling;
+  }
+}
+
+struct LoadedLog {
+  logs::Log log;
+  std::size_t track;
+};
+
+void add_neighbours(Track& track, std::size_t own, const std::vector<LoadedLog>& all,
+                    const std::vector<Track>& tracks, const Kinds& kinds, const CutRules& rules) {
+  const std::size_t others = all.size() - 1;
+  track.neighbours.resize(track.instants.size() * others);
+  std::vector<std::size_t> from(all.size(), 0);
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    stability::Instant& now = track.instants[i];
+    now.neighbours = track.neighbours.data() + i * others;
+    std::size_t count = 0;
+    for (std::size_t j = 0; j < all.size(); ++j) {
+      if (j == own) continue;
+      const Track& other = tracks[all[j].track];
+      const double time_s = now.time_s + (rules.published ? 0 : other.clock_offset_s);
+      const std::optional<State> state = state_at(all[j].log, time_s, rules.published, from[j]);
+      if (!state) {
+        if (track.cut[i] == Cut::kNone) track.cut[i] = Cut::kNeighbour;
+        continue;
+      }
+      const int kind = kinds.index(other.kind);
+      track.neighbours[i * others + count++] = {state->p - now.p_W_m, state->v - now.v_W_m_s, state->v,
+                                                kinds.masses_kg[static_cast<std::size_t>(kind)], kind};
+    }
+    now.num_neighbours = static_cast<int>(count);
+  }
+}
+
+}  // namespace
+
+const char* name(Cut cut) {
+  static const char* const kNames[] = {"used",     "crash",     "not flying", "ground contact",
+                                       "settling", "neighbour", "large force"};
+  return kNames[static_cast<int>(cut)];
+}
+
+int Kinds::index(const std::string& kind) const {
+  const auto found = std::find(names.begin(), names.end(), kind);
+  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
+}
+
+std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
+                               const std::string& fallback_kind, const Kinds& kinds,
+                               const logs::SignalMap& map, const CutRules& rules,
+                               std::vector<std::string>& problems) {
+  std::vector<Track> tracks;
+  std::vector<LoadedLog> all;
+  std::vector<std::vector<double>> onsets;
+  for (const auto& [vehicle, path] : flight.logs) {
+    logs::Log log;
+    try {
+      log = logs::read_log(path, map);
+    } catch (const files::InputError& error) {
+      problems.emplace_back(error.what());
+      continue;
+    }
+    Track track;
+    track.flight = flight.name;
+    track.scenario = flight.scenario;
+    track.vehicle = vehicle;
+    track.path = path;
+    const auto known = fleet.find(vehicle);
+    track.kind = known == fleet.end() ? fallback_kind : known->second.kind;
+    track.position_only = !log.signals.force || (known != fleet.end() && known->second.position_only);
+    track.health = log.health;
+    onsets.push_back(onsets_s(log));
+    if (!rules.published && !all.empty())
+      track.clock_offset_s = clock_offset_s(onsets[0], onsets.back(), &track.clock_onsets);
+    tracks.push_back(std::move(track));
+    all.push_back({std::move(log), tracks.size() - 1});
+  }
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    Track& track = tracks[k];
+    if (track.position_only) continue;
+    fill_instants(track, all[k].log);
+    cut_phases(track, rules);
+  }
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    Track& track = tracks[k];
+    if (track.position_only) continue;
+    add_neighbours(track, k, all, tracks, kinds, rules);
+    track.used = static_cast<std::size_t>(std::count(track.cut.begin(), track.cut.end(), Cut::kNone));
+  }
+  return tracks;
+}
+
+}  // namespace swarmcert::residuals

@@ -1,0 +1,71 @@
+/// @file One vehicle's part of a flight, on the flight's clock, among its neighbours, cut to where it flew.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "analysis/logs/log.h"
+#include "analysis/logs/signals.h"
+#include "analysis/residuals/flight_set.h"
+#include "stability/effects/effect.h"
+
+namespace swarmcert::residuals {
+
+/// Why a record is not used. The first that applies, in this order.
+enum class Cut : unsigned char {
+  kNone,
+  kCrash,      ///< from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end
+  kNotFlying,  ///< the sum of the four duties is below 0.8: rotors off or idle, outside the thrust calibration
+  kContact,    ///< at or below the height where the vehicle stands (0.07 m; large 0.085 m)
+  kSettling,   ///< within 0.15 s after the start or after a gap in the log: filters have no past
+  kNeighbour,   ///< a neighbour's position is unknown: its log has a gap, has not begun or has ended
+  kLargeForce,  ///< only with CutRules::published
+  kCount
+};
+const char* name(Cut cut);
+
+/// How flights are cut and filtered.
+struct CutRules {
+  /// As the networks' authors did: neighbours interpolated without regard to clocks and gaps, contact and settling
+  /// kept, |f_a,z| >= 50 gf dropped although that looks at the label; thrust lag 0.16 per record, no accelerometer
+  /// filter.
+  bool published = false;
+};
+
+struct Track {
+  std::string flight, scenario, vehicle, kind, path;
+  bool position_only = false;
+  logs::LogHealth health;
+  double clock_offset_s = 0;  ///< of this log's clock against the first vehicle's
+  int clock_onsets = 0;       ///< how many common starts of a trajectory gave it; 0: not estimated
+  std::vector<stability::Instant> instants;  ///< thrust_N and mass_kg are set by apply_model()
+  std::vector<stability::Neighbour> neighbours;
+  std::vector<std::array<double, 4>> duty;
+  std::vector<Eigen::Vector3d> specific_force_m_s2;
+  std::vector<char> restarts;
+  std::vector<Cut> cut;
+  std::size_t used = 0;  ///< records without a cut
+
+  double duration_s() const {
+    return instants.empty() ? 0 : instants.back().time_s - instants.front().time_s;
+  }
+};
+
+/// Kinds and masses of everything that flies, so that neighbours can be named by index.
+struct Kinds {
+  std::vector<std::string> names;
+  std::vector<double> masses_kg;
+  int index(const std::string& kind) const;  ///< -1 if unknown
+};
+
+/// Reads a flight's logs, estimates the offsets of their clocks from the starts of commanded movements, cuts.
+/// A log that cannot be read at all is left out and named in `problems`.
+/// @param fallback_kind of vehicles that `fleet` does not name.
+std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
+                               const std::string& fallback_kind, const Kinds& kinds,
+                               const logs::SignalMap& map, const CutRules& rules,
+                               std::vector<std::string>& problems);
+
+}  // namespace swarmcert::residuals

@@ -1,0 +1,146 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "analysis/log_writer.h"
+#include "analysis/residuals/comparison.h"
+#include "analysis/residuals/force_residual.h"
+#include "analysis/run.h"
+#include "data.h"
+#include "nn/files/input_error.h"
+
+namespace swarmcert::tests {
+namespace {
+
+using residuals::AccelerometerFilter;
+
+double filtered(AccelerometerFilter& filter, double time_s, double value) {
+  Eigen::Matrix3Xd values = Eigen::Matrix3Xd::Constant(3, 1, value);
+  filter.advance(time_s, values);
+  return values(0, 0);
+}
+
+TEST(AccelerometerFilter, DelaysARampByTheTwoPolesAndKeepsItsSlope) {
+  // A Butterworth low-pass of order two delays slow signals by sqrt(2) / (2 pi cutoff).
+  AccelerometerFilter filter(30, 1);
+  const double delay_s = std::sqrt(2.0) / (2 * M_PI * 30);
+  std::mt19937 random(1);
+  double time_s = 0, output = filtered(filter, 0, 0);
+  for (int i = 0; i < 200; ++i) {
+    time_s += 0.008 + 0.004 * static_cast<double>(random()) / 4294967296.0;
+    output = filtered(filter, time_s, 3 * time_s);
+  }
+  EXPECT_NEAR(output, 3 * (time_s - delay_s), 1e-9);
+}
+
+TEST(AccelerometerFilter, StepsOfAnyLengthGiveTheSameResponse) {
+  AccelerometerFilter coarse(30, 1), fine(30, 1);
+  filtered(coarse, 0, 0);
+  filtered(fine, 0, 0);
+  double output = 0;
+  for (int k = 1; k <= 10; ++k) output = filtered(fine, 0.001 * k, 0.1 * k);
+  EXPECT_NEAR(filtered(coarse, 0.01, 1), output, 1e-12);
+}
+
+TEST(FindFlights, GroupsVehiclesByFolderPrefixAndRun) {
+  const ScratchFolder folder;
+  for (const char* name : {"cf1_00", "cf2_00", "cf1_01", "day_cf1_00.csv", "cf1_01.csv", "notes.txt"})
+    write_text(folder / name, "x");
+  const residuals::FoundFlights found = residuals::find_flights({folder.path().string()});
+  ASSERT_EQ(found.flights.size(), 3u);
+  EXPECT_EQ(found.flights[0].logs.size(), 2u);
+  EXPECT_EQ(found.flights[1].logs[0].second, folder / "cf1_01");
+  EXPECT_EQ(found.flights[2].logs[0].first, "cf1");
+  EXPECT_EQ(found.skipped.size(), 2u) << "the text, and the CSV beside a binary log";
+  EXPECT_THROW(residuals::find_flights({folder / "nowhere"}), files::InputError);
+  EXPECT_THROW(residuals::find_flights({folder / "notes.txt"}), files::InputError);
+}
+
+residuals::Inputs visible(const std::string& scenario, bool published) {
+  residuals::InputArguments arguments;
+  arguments.flights = {data_path("flights/" + scenario)};
+  arguments.fleet = source_path("analysis/flights/flights.toml");
+  arguments.rules.published = published;
+  return residuals::read_inputs(arguments);
+}
+
+TEST(Compare, GivesTheSameNumbersForAnyNumberOfJobs) {
+  SWARMCERT_NEEDS_DATA();
+  const residuals::Inputs inputs = visible("visible_test/21_swap_ss", false);
+  const auto quiet = [](int, int) {};
+  const residuals::Comparison one = residuals::compare(inputs, 1, quiet);
+  const residuals::Comparison two = residuals::compare(inputs, 2, quiet);
+  EXPECT_EQ(one.overall.statistics.rmse.total, two.overall.statistics.rmse.total);
+  EXPECT_EQ(one.overall.rmse_interval[3].lower, two.overall.rmse_interval[3].lower);
+  ASSERT_EQ(one.regions.size(), two.regions.size());
+  for (std::size_t i = 0; i < one.regions.size(); ++i) EXPECT_EQ(one.regions[i].words, two.regions[i].words);
+}
+
+TEST(Compare, NamesTheDownwashRegionOfSwapsFirst) {
+  SWARMCERT_NEEDS_DATA();
+  const residuals::Comparison comparison =
+      residuals::compare(visible("visible_test/21_swap_ss", false), 0, [](int, int) {});
+  ASSERT_FALSE(comparison.regions.empty());
+  bool found = false;
+  for (std::size_t i = 0; i < 4; ++i)
+    found = found || comparison.regions[i].words.find("below a vehicle") != std::string::npos;
+  EXPECT_TRUE(found);
+}
+
+TEST(Compare, ReproducesTheErrorsOfThePublishedNetworks_slow) {
+  SWARMCERT_NEEDS_DATA();
+  // Mean squares of f_a,z in gf^2 over the shared flights, with the authors' own filter; kinds of the neighbours,
+  // then of the vehicle; Ge: no neighbour.
+  const std::map<std::string, double> published = {
+      {"Ge2L", 3.12},  {"Ge2S", 0.87},  {"L2L", 8.05},  {"S2S", 1.09},  {"L2S", 1.47},  {"S2L", 4.55},
+      {"SS2L", 11.07}, {"SL2L", 14.68}, {"LL2S", 1.55}, {"SL2S", 2.52}, {"SS2S", 2.11}, {"LL2L", 11.18}};
+  const ScratchFolder folder;
+  std::string network = "schema = \"swarmcert/network/1\"\n";
+  for (const char* part :
+       {"phi.small:phi_S", "phi.large:phi_L", "phi.ground:phi_G", "rho.small:rho_S", "rho.large:rho_L"}) {
+    const std::string text(part);
+    const std::size_t colon = text.find(':');
+    network +=
+        "[" + text.substr(0, colon) + "]\nweights = \"" +
+        std::filesystem::absolute(data_path("weights/zip_f32/" + text.substr(colon + 1) + ".pth")).string() +
+        "\"\n";
+  }
+  write_text(folder / "network.toml", network);
+  residuals::InputArguments arguments;
+  for (const std::string kind : {"small", "large"}) {
+    std::string model = read_text(source_path("stability/models/crazyflie-" + kind + ".toml"));
+    const std::size_t mass = model.find("mass_kg = 0.034");
+    if (mass != std::string::npos) model.replace(mass, 15, "mass_kg = 0.032");
+    write_text(folder / (kind + ".toml"),
+               model + "\n[[effect]]\nname = \"deep_set\"\nnetwork = \"network.toml\"\n");
+    arguments.models.push_back(folder / (kind + ".toml"));
+  }
+  arguments.flights = {data_path("flights")};
+  arguments.fleet = source_path("analysis/flights/flights.toml");
+  arguments.rules.published = true;
+  const residuals::Comparison comparison =
+      residuals::compare(residuals::read_inputs(arguments), 0, [](int, int) {});
+  std::map<std::string, std::pair<double, double>> sums;
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    if (track.position_only) continue;
+    std::string kinds;
+    for (const residuals::TrackErrors& other : comparison.tracks) {
+      if (other.flight == track.flight && other.vehicle != track.vehicle)
+        kinds += other.kind == "large" ? 'L' : 'S';
+    }
+    std::sort(kinds.rbegin(), kinds.rend());
+    auto& [squares, count] = sums[(kinds.empty() ? "Ge" : kinds) + "2" + (track.kind == "large" ? "L" : "S")];
+    const double rms_gf = track.errors.statistics.rmse.z / stability::kGramForce_N;
+    squares += static_cast<double>(track.errors.statistics.samples) * rms_gf * rms_gf;
+    count += static_cast<double>(track.errors.statistics.samples);
+  }
+  for (const auto& [row, mean_square] : published) {
+    ASSERT_EQ(sums.count(row), 1u) << row;
+    EXPECT_NEAR(sums[row].first / sums[row].second, mean_square, 0.05 * mean_square) << row;
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
