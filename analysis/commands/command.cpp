@@ -27,6 +27,7 @@ const std::vector<Command>& commands() {
       compare_command(),          //
       diagnose_command(),         //
       add_command(),              //
+      train_command(),            //
       simulate_command(),         //
       bound_command(),            //
       spacing_command(),          //

@@ -88,6 +88,7 @@ Command merge_command();
 Command simulate_command();
 Command spacing_command();
 Command sweep_command();
+Command train_command();
 Command tune_command();
 
 }  // namespace swarmcert::analysis

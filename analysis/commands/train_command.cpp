@@ -1,0 +1,314 @@
+#include <fmt/core.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include "analysis/commands/flight_options.h"
+#include "analysis/learning/training_run.h"
+#include "analysis/progress.h"
+#include "analysis/train_report.h"
+#include "lipschitz/certify.h"
+#include "nn/files/file_io.h"
+#include "nn/files/functions.h"
+#include "nn/files/input_error.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+namespace fs = std::filesystem;
+using learning::LearningData;
+using learning::Use;
+
+struct Options {
+  FlightOptions flights;
+  std::vector<std::string> test;
+  std::string output, report;
+  learning::NetworkSizes sizes;
+  learning::RunOptions run;
+  std::string gamma_scope = "layer", gamma_mode = "clip";
+  bool no_ground = false;
+};
+
+std::string file_of(const std::string& part) {
+  std::string name = part;
+  name[name.find(':')] = '_';
+  return name + ".safetensors";
+}
+
+std::string network_toml(const LearningData& data, const files::GammaStatement& gamma) {
+  std::string text = fmt::format(
+      "schema = \"swarmcert/network/1\"\noutput = {{ quantity = \"force_z\", unit = \"gf\" }}\n"
+      "gamma = {{ value = {}, scope = \"{}\", mode = \"{}\" }}\n"
+      "[input]\norder = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]\n",
+      gamma.value, gamma.scope == files::GammaStatement::Scope::kLayer ? "layer" : "network",
+      gamma.mode == files::GammaStatement::Mode::kClip ? "clip" : "equal");
+  for (const training::Part& part : data.layout.parts()) {
+    const std::size_t colon = part.name.find(':');
+    text += fmt::format("[{}.{}]\nweights = \"{}\"\n", part.name.substr(0, colon),
+                        part.name.substr(colon + 1), file_of(part.name));
+  }
+  return text;
+}
+
+/// The vehicles' models with the new network as one more effect: what compare and simulate take.
+void write_models(const residuals::Inputs& inputs, const LearningData& data, const fs::path& folder) {
+  for (stability::Model model : inputs.models) {
+    if (data.layout.find("rho:" + model.kind) < 0) continue;
+    stability::EffectSpec effect;
+    effect.name = "deep_set";
+    effect.network = "network.toml";
+    model.effects.push_back(std::move(effect));
+    files::write_file((folder / ("model-" + model.kind + ".toml")).string(),
+                      to_toml(model, {"With the network in this folder."}), true);
+  }
+}
+
+files::Network write_networks(const LearningData& data, const training::Vector& theta,
+                              const files::GammaStatement& gamma, const fs::path& folder) {
+  for (std::size_t p = 0; p < data.layout.parts().size(); ++p) {
+    files::save_safetensors(data.layout.stored(theta, static_cast<int>(p)),
+                            (folder / file_of(data.layout.parts()[p].name)).string(), true);
+  }
+  const std::string path = (folder / "network.toml").string();
+  files::write_file(path, network_toml(data, gamma), true);
+  return files::load_network({path, "", "", ""});
+}
+
+struct Scores {
+  double nothing_gf = 0, network_gf = 0;
+};
+
+std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Vector& theta,
+                                                    int jobs) {
+  std::map<std::string, std::vector<Eigen::Index>> members;
+  for (const learning::TrackSamples& track : data.tracks) {
+    if (track.use != Use::kTest) continue;
+    for (Eigen::Index s = track.begin; s < track.end; ++s) members[track.composition].push_back(s);
+  }
+  std::map<std::string, Scores> result;
+  for (const auto& [composition, samples] : members) {
+    double squares = 0;
+    for (const Eigen::Index s : samples) squares += std::pow(static_cast<double>(data.samples.target[s]), 2);
+    result[composition] = {std::sqrt(squares / static_cast<double>(samples.size())),
+                           std::sqrt(training::mean_loss(data.layout, theta, data.samples, samples, jobs))};
+  }
+  return result;
+}
+
+files::Json number_or_null(double x) { return std::isfinite(x) ? files::Json(x) : files::Json(); }
+
+struct Outcome {
+  learning::Run run;
+  double test_gf = 0, nothing_gf = 0;
+  std::map<std::string, Scores> compositions;
+  std::vector<std::pair<std::string, double>> lipschitz;  ///< per set function, gf per unit of input
+  lipschitz::Verdict gamma = lipschitz::Verdict::kProved;
+};
+
+files::Json result_of(const Options& options, const std::vector<std::string>& inputs,
+                      const LearningData& data, const Outcome& outcome) {
+  files::Json json = result_head("train", inputs);
+  json["seed"] = options.run.trainer.seed;
+  json["gamma"] = options.run.trainer.gamma.value;
+  json["samples"] = {{"fit", data.indices(Use::kFit).size()},
+                     {"select", data.indices(Use::kSelect).size()},
+                     {"test", data.indices(Use::kTest).size()}};
+  json["split"] = data.split_by_time ? "time" : "flights";
+  json["test_rmse"] = number_or_null(outcome.test_gf * stability::kGramForce_N);
+  json["test_rmse_gf"] = number_or_null(outcome.test_gf);
+  json["test_rmse_of_nothing"] = number_or_null(outcome.nothing_gf * stability::kGramForce_N);
+  json["test"] = files::Json::array();
+  for (const auto& [composition, scores] : outcome.compositions) {
+    json["test"].push_back({{"vehicles", composition},
+                            {"rmse", scores.network_gf * stability::kGramForce_N},
+                            {"rmse_of_nothing", scores.nothing_gf * stability::kGramForce_N}});
+  }
+  double largest = 0;
+  json["bounds"] = files::Json::array();
+  for (const auto& [function, upper] : outcome.lipschitz) {
+    largest = std::max(largest, upper);
+    json["bounds"].push_back({{"function", function}, {"upper", upper}, {"unit", "gf per unit of input"}});
+  }
+  json["lipschitz"] = largest;
+  json["gamma_verdict"] = name(outcome.gamma);
+  json["best_epoch"] = outcome.run.best_epoch + 1;
+  json["epochs"] = files::Json::array();
+  for (const learning::Epoch& epoch : outcome.run.epochs)
+    json["epochs"].push_back({{"fit_rmse_gf", epoch.fit_rmse_gf}, {"select_rmse_gf", epoch.select_rmse_gf}});
+  json["problems"] = data.problems;
+  return json;
+}
+
+void print(const Options& options, const LearningData& data, const Outcome& outcome) {
+  std::map<std::string, int> flights[3];
+  for (const learning::TrackSamples& track : data.tracks)
+    ++flights[static_cast<int>(track.use)][track.flight];
+  fmt::print("{} samples: {} to fit ({} flights), {} to select ({}), {} to test ({})\n",
+             data.samples.samples(), data.indices(Use::kFit).size(), flights[0].size(),
+             data.indices(Use::kSelect).size(), flights[1].size(), data.indices(Use::kTest).size(),
+             flights[2].size());
+  if (data.split_by_time)
+    fmt::print("too few flights to split by flight: parts of the same flight test, and look too good\n");
+  fmt::print("best of {} epochs: {}\n\n", outcome.run.epochs.size(), outcome.run.best_epoch + 1);
+  fmt::print("{:<34}{:>16}{:>16}\n", "vertical force on test flights", "no network [gf]", "network [gf]");
+  for (const auto& [composition, scores] : outcome.compositions)
+    fmt::print("{:<34}{:>16.3f}{:>16.3f}\n", composition, scores.nothing_gf, scores.network_gf);
+  fmt::print("{:<34}{:>16.3f}{:>16.3f}\n\n", "all", outcome.nothing_gf, outcome.test_gf);
+  for (const auto& [function, upper] : outcome.lipschitz)
+    fmt::print("Lipschitz constant of {}: at most {:.8g} gf per unit of input, proved\n", function, upper);
+  fmt::print("gamma {} in every {}: {}\n", options.run.trainer.gamma.value, options.gamma_scope,
+             name(outcome.gamma));
+  for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
+  fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
+}
+
+void refuse_to_mix(const Options& options, const CommonOptions& common) {
+  const bool is_used =
+      fs::exists(options.output) && (!fs::is_directory(options.output) || !fs::is_empty(options.output));
+  if (!is_used || common.force || options.run.resumes) return;
+  throw files::InputError({options.output, "", "-o", "", "the folder is not empty",
+                           "--resume goes on with the run in it, --force replaces it"});
+}
+
+int run(Options options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_to_mix(options, common);
+  options.sizes.ground = !options.no_ground;
+  training::TrainerOptions& trainer = options.run.trainer;
+  trainer.gamma.scope = options.gamma_scope == "layer" ? files::GammaStatement::Scope::kLayer
+                                                       : files::GammaStatement::Scope::kNetwork;
+  trainer.gamma.mode =
+      options.gamma_mode == "clip" ? files::GammaStatement::Mode::kClip : files::GammaStatement::Mode::kEqual;
+  trainer.jobs = common.jobs;
+
+  const residuals::Inputs inputs = read_flights(options.flights);
+  residuals::Inputs test;
+  if (!options.test.empty()) {
+    FlightOptions chosen = options.flights;
+    chosen.words = options.test;
+    for (const std::string& word : options.flights.words) {
+      if (fs::path(word).extension() == ".toml") chosen.models.push_back(word);
+    }
+    test = read_flights(chosen);
+  }
+  Progress loading(common.quiet);
+  const LearningData data =
+      learning::load_learning_data(inputs, options.test.empty() ? nullptr : &test, options.sizes, common.jobs,
+                                   [&](int done, int total) { loading.show(done, total, "flights"); });
+  fs::create_directories(options.output);
+  options.run.checkpoint = (fs::path(options.output) / "checkpoint.json").string();
+  Progress training_progress(common.quiet);
+  options.run.progress = [&](int done, int total, double select_gf) {
+    training_progress.show(done, total, fmt::format("epochs, {:.3f} gf", select_gf));
+  };
+  const CancelOnInterrupt interrupt;
+  options.run.cancelled = interrupt.flag();
+  Outcome outcome;
+  outcome.run = learning::run_training(data, options.run);
+  if (outcome.run.was_cancelled) {
+    fmt::print(stderr, "stopped after {} epochs; --resume goes on\n", outcome.run.epochs.size());
+    return kInconclusive;
+  }
+
+  const files::Network network = write_networks(data, outcome.run.theta, trainer.gamma, options.output);
+  write_models(inputs, data, options.output);
+  lipschitz::CertifyOptions certify_options;
+  certify_options.jobs = common.jobs;
+  certify_options.seed = trainer.seed;
+  const lipschitz::Certification found = lipschitz::certify(network, certify_options);
+  files::write_file((fs::path(options.output) / "certificate.json").string(),
+                    files::to_text(lipschitz::certificate(network, found)), true);
+  for (const lipschitz::CertifiedLayer& layer : found.layers) {
+    if (layer.respects_gamma && *layer.respects_gamma != lipschitz::Verdict::kProved)
+      outcome.gamma = *layer.respects_gamma;
+  }
+  for (const lipschitz::CertifiedBound& bound : found.bounds) {
+    if (bound.function.rfind("set:", 0) == 0)
+      outcome.lipschitz.emplace_back(bound.function, bound.upper.value());
+  }
+  outcome.test_gf = learning::rmse_gf(data, outcome.run.theta, Use::kTest, common.jobs);
+  outcome.nothing_gf = learning::rmse_of_nothing_gf(data, Use::kTest);
+  outcome.compositions = scores_by_composition(data, outcome.run.theta, common.jobs);
+
+  std::vector<std::string> files = inputs.files();
+  if (!options.test.empty()) {
+    for (const std::string& file : test.files()) {
+      if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
+    }
+  }
+  write_result(common, result_of(options, files, data, outcome));
+  if (common.prints_text()) print(options, data, outcome);
+  if (!options.report.empty()) {
+    const std::string path = write_train_report(data, outcome.run, options.report, common.force);
+    if (common.prints_text()) fmt::print("report: {}\n", path);
+  }
+  fs::remove(options.run.checkpoint);
+  return kDone;
+}
+
+}  // namespace
+
+Command train_command() {
+  return {
+      "train", "Train spectrally normalised deep sets on flights, with a certificate of the result",
+      "The network learns what the vehicles' models leave of the vertical force. A phi per kind of "
+      "neighbour, a rho "
+      "per kind\nof vehicle, and a phi of the own state for the ground. Flights are split as wholes into "
+      "fit, select "
+      "and test;\nthe epoch with the least error on the selecting flights is kept, and projected so that "
+      "gamma holds "
+      "in exact\narithmetic. An interrupted run goes on with --resume.\n\n"
+      "Example: swarmcert train flights/ --epochs 20 -o trained",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<Options>();
+        training::TrainerOptions& trainer = options->run.trainer;
+        trainer.gamma.value = 3;
+        declare_flights(app, options->flights, true);
+        app.add_option("-o,--output", options->output, "Folder for networks, certificate and models")
+            ->required();
+        app.add_option("--test", options->test, "Flights that only test; without it every fifth flight does");
+        app.add_option("--gamma", trainer.gamma.value, "Limit of the spectral norms")
+            ->check(CLI::PositiveNumber)
+            ->capture_default_str();
+        app.add_option("--gamma-scope", options->gamma_scope,
+                       "Whether gamma limits every layer's norm, or the product over a network's layers")
+            ->check(CLI::IsMember({"layer", "network"}))
+            ->capture_default_str();
+        app.add_option("--gamma-mode", options->gamma_mode,
+                       "clip: at most the limit; equal: always the limit")
+            ->check(CLI::IsMember({"clip", "equal"}))
+            ->capture_default_str();
+        app.add_option("--phi", options->sizes.phi, "Hidden layers of phi")
+            ->delimiter(',')
+            ->capture_default_str();
+        app.add_option("--rho", options->sizes.rho, "Hidden layers of rho")
+            ->delimiter(',')
+            ->capture_default_str();
+        app.add_option("--features", options->sizes.features, "Width between phi and rho")
+            ->check(CLI::Range(1, 4096))
+            ->capture_default_str();
+        app.add_flag("--no-ground", options->no_ground, "Leave out the phi of the own state");
+        app.add_option("--epochs", options->run.epochs, "Passes over the flights")
+            ->check(CLI::Range(1, 100000))
+            ->capture_default_str();
+        app.add_option("--patience", options->run.patience, "Epochs without a better score before it ends")
+            ->check(CLI::Range(1, 100000))
+            ->capture_default_str();
+        app.add_option("--rate", trainer.learning_rate, "Learning rate at the start")
+            ->check(CLI::PositiveNumber)
+            ->capture_default_str();
+        app.add_option("--batch", trainer.batch, "Samples per step")
+            ->check(CLI::Range(1, 1 << 20))
+            ->capture_default_str();
+        app.add_option("--seed", trainer.seed, "Of initial weights and order of samples")
+            ->capture_default_str();
+        app.add_flag("--resume", options->run.resumes, "Go on with an interrupted run in the same folder");
+        app.add_flag("--published-filter", options->flights.published_filter,
+                     "Cut and filter as the networks' authors did, see compare");
+        app.add_option("--report", options->report, "Write an HTML report into this folder");
+        return [options](const CommonOptions& common) { return run(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,224 @@
+#include "analysis/learning/dataset.h"
+
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <set>
+
+#include "analysis/residuals/force_residual.h"
+#include "nn/files/functions.h"
+#include "nn/files/input_error.h"
+#include "nn/files/parallel.h"
+
+namespace swarmcert::learning {
+namespace {
+
+using Eigen::Index;
+using residuals::Track;
+
+constexpr int kNeighbourInputs = 6;
+
+/// Samples of one track before the kinds of all flights are known.
+struct RawTrack {
+  TrackSamples about;
+  std::string kind;
+  std::vector<float> force_gf;
+  std::vector<std::array<float, 4>> own;  ///< -z, -v
+  std::vector<std::size_t> first = {0};
+  std::vector<int> neighbour_kind;  ///< index into Kinds::names
+  std::vector<std::array<float, kNeighbourInputs>> neighbour;
+};
+
+RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs) {
+  RawTrack raw;
+  raw.about = {track.flight, track.scenario, track.vehicle, "", Use::kFit, 0, 0};
+  raw.kind = track.kind;
+  const std::vector<Eigen::Vector3d> residual =
+      residuals::force_residual(*inputs.model_of(track.kind), inputs.kinds, inputs.rules, track);
+  std::multiset<std::string> kinds;
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    if (track.cut[i] != residuals::Cut::kNone) continue;
+    const stability::Instant& now = track.instants[i];
+    raw.force_gf.push_back(static_cast<float>(residual[i].z() / stability::kGramForce_N));
+    const Eigen::Vector3f v = now.v_W_m_s.cast<float>();
+    raw.own.push_back({static_cast<float>(-now.p_W_m.z()), -v.x(), -v.y(), -v.z()});
+    for (int j = 0; j < now.num_neighbours; ++j) {
+      const stability::Neighbour& other = now.neighbours[j];
+      const Eigen::Vector3f dp = other.dp_W_m.cast<float>();
+      const Eigen::Vector3f dv = other.dv_W_m_s.cast<float>();
+      raw.neighbour.push_back({dp.x(), dp.y(), dp.z(), dv.x(), dv.y(), dv.z()});
+      raw.neighbour_kind.push_back(other.kind);
+      if (raw.first.size() == 1) kinds.insert(inputs.kinds.names[other.kind]);
+    }
+    raw.first.push_back(raw.neighbour.size());
+  }
+  for (const std::string& kind : kinds)
+    raw.about.composition += (raw.about.composition.empty() ? "" : "+") + kind;
+  raw.about.composition += ">" + track.kind;
+  return raw;
+}
+
+/// All flights of `inputs`, in their order.
+std::vector<std::vector<RawTrack>> load(const residuals::Inputs& inputs, int jobs,
+                                        const std::function<void()>& flight_done,
+                                        std::vector<std::string>& problems) {
+  const std::size_t count = inputs.found.flights.size();
+  std::vector<std::vector<RawTrack>> flights(count);
+  std::vector<std::vector<std::string>> all_problems(count);
+  files::parallel_for(static_cast<int>(count), jobs, [&](int f) {
+    for (const Track& track : inputs.load(static_cast<std::size_t>(f), all_problems[f])) {
+      if (track.position_only || track.used == 0 || inputs.model_of(track.kind) == nullptr) continue;
+      flights[f].push_back(raw_samples(track, inputs));
+    }
+    flight_done();
+  });
+  for (const std::vector<std::string>& some : all_problems)
+    problems.insert(problems.end(), some.begin(), some.end());
+  return flights;
+}
+
+Use use_of(std::size_t flight, std::size_t flights, bool has_test) {
+  if (has_test)
+    return flight % 5 == 4 || (flights < 5 && flight + 1 == flights && flights > 1) ? Use::kSelect
+                                                                                    : Use::kFit;
+  if (flights < 5)
+    return flight + 1 == flights ? Use::kTest : flight + 2 == flights ? Use::kSelect : Use::kFit;
+  return flight % 5 == 2 ? Use::kSelect : flight % 5 == 4 ? Use::kTest : Use::kFit;
+}
+
+/// Which networks there are: a phi per kind that was ever a neighbour, a rho per kind whose force is known.
+training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vector<std::string>& kinds,
+                           const NetworkSizes& sizes) {
+  std::set<std::string> neighbours, own;
+  for (const RawTrack& track : tracks) {
+    own.insert(track.kind);
+    for (const int kind : track.neighbour_kind) neighbours.insert(kinds[kind]);
+  }
+  std::vector<training::Part> parts;
+  const auto add = [&parts](const std::string& part, int inputs, const std::vector<int>& hidden,
+                            int outputs) {
+    std::vector<int> all = {inputs};
+    all.insert(all.end(), hidden.begin(), hidden.end());
+    all.push_back(outputs);
+    parts.push_back({part, std::move(all), 0});
+  };
+  if (sizes.ground)
+    add(std::string("phi:") + files::kGroundKind, files::kGroundInputs, sizes.phi, sizes.features);
+  for (const std::string& kind : neighbours) add("phi:" + kind, kNeighbourInputs, sizes.phi, sizes.features);
+  for (const std::string& kind : own) add("rho:" + kind, sizes.features, sizes.rho, 1);
+  return training::Layout(std::move(parts));
+}
+
+/// Every composition that is fitted weighs the same in total, and all together as many as there are samples.
+void balance(LearningData& data) {
+  std::map<std::string, double> counts;
+  for (const TrackSamples& track : data.tracks) {
+    if (track.use == Use::kFit) counts[track.composition] += static_cast<double>(track.end - track.begin);
+  }
+  double total = 0;
+  for (const auto& [composition, count] : counts) total += count;
+  for (const TrackSamples& track : data.tracks) {
+    const auto found = counts.find(track.composition);
+    if (track.use != Use::kFit || found == counts.end()) continue;
+    const double weight = total / (static_cast<double>(counts.size()) * found->second);
+    for (Index s = track.begin; s < track.end; ++s) data.samples.weight[s] = static_cast<float>(weight);
+  }
+}
+
+void append(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds, std::size_t from,
+            std::size_t to, Use use) {
+  if (from >= to) return;
+  TrackSamples about = raw.about;
+  about.use = use;
+  about.begin = data.samples.samples();
+  const int ground = data.layout.find(std::string("phi:") + files::kGroundKind);
+  const int rho = data.layout.find("rho:" + raw.kind);
+  std::vector<int> phi;
+  for (const std::string& kind : kinds) phi.push_back(data.layout.find("phi:" + kind));
+  for (std::size_t i = from; i < to; ++i) {
+    if (ground >= 0) data.samples.add_input(ground, {raw.own[i].begin(), raw.own[i].end()});
+    for (std::size_t j = raw.first[i]; j < raw.first[i + 1]; ++j)
+      data.samples.add_input(phi[raw.neighbour_kind[j]], {raw.neighbour[j].begin(), raw.neighbour[j].end()});
+    data.samples.add_sample(rho, {raw.force_gf[i]});
+  }
+  about.end = data.samples.samples();
+  data.tracks.push_back(std::move(about));
+}
+
+}  // namespace
+
+const char* name(Use use) { return use == Use::kFit ? "fit" : use == Use::kSelect ? "select" : "test"; }
+
+std::vector<Index> LearningData::indices(Use use) const {
+  std::vector<Index> result;
+  for (const TrackSamples& track : tracks) {
+    if (track.use != use) continue;
+    for (Index s = track.begin; s < track.end; ++s) result.push_back(s);
+  }
+  return result;
+}
+
+LearningData load_learning_data(const residuals::Inputs& inputs, const residuals::Inputs* test,
+                                const NetworkSizes& sizes, int jobs, const Progress& progress) {
+  LearningData data;
+  std::mutex mutex;
+  int done = 0;
+  const int total =
+      static_cast<int>(inputs.found.flights.size() + (test != nullptr ? test->found.flights.size() : 0));
+  const auto flight_done = [&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    progress(++done, total);
+  };
+  std::vector<std::vector<RawTrack>> flights = load(inputs, jobs, flight_done, data.problems);
+  flights.erase(
+      std::remove_if(flights.begin(), flights.end(), [](const auto& tracks) { return tracks.empty(); }),
+      flights.end());
+  std::vector<std::vector<RawTrack>> test_flights;
+  if (test != nullptr) test_flights = load(*test, jobs, flight_done, data.problems);
+
+  std::vector<RawTrack> fitted;
+  for (const auto& tracks : flights) fitted.insert(fitted.end(), tracks.begin(), tracks.end());
+  const auto refuse = [&](const std::string& what, const std::string& mend) {
+    throw files::InputError(
+        {inputs.found.flights.empty() ? "" : inputs.found.flights.front().logs.front().second, "", "flights",
+         "", what, mend});
+  };
+  if (fitted.empty())
+    refuse("no usable record of a vehicle with a model", "see 'swarmcert compare' for what was cut");
+  if (std::all_of(fitted.begin(), fitted.end(), [](const RawTrack& t) { return t.neighbour.empty(); }))
+    refuse("no vehicle ever has a neighbour", "name flights of two or more vehicles");
+  data.layout = layout_of(fitted, inputs.kinds.names, sizes);
+
+  data.split_by_time = flights.size() + test_flights.size() < 3;
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    for (const RawTrack& track : flights[f]) {
+      const std::size_t count = track.force_gf.size();
+      if (!data.split_by_time) {
+        append(data, track, inputs.kinds.names, 0, count, use_of(f, flights.size(), test != nullptr));
+        continue;
+      }
+      const std::size_t fit = count * 70 / 100, select = count * 85 / 100;
+      append(data, track, inputs.kinds.names, 0, fit, Use::kFit);
+      append(data, track, inputs.kinds.names, fit, select, Use::kSelect);
+      append(data, track, inputs.kinds.names, select, count, Use::kTest);
+    }
+  }
+  for (const auto& tracks : test_flights) {
+    for (const RawTrack& track : tracks) {
+      const bool known = data.layout.find("rho:" + track.kind) >= 0 &&
+                         std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), [&](int kind) {
+                           return data.layout.find("phi:" + test->kinds.names[kind]) >= 0;
+                         });
+      if (known) {
+        append(data, track, test->kinds.names, 0, track.force_gf.size(), Use::kTest);
+      } else {
+        data.problems.push_back(track.about.flight + " " + track.about.vehicle +
+                                ": a kind of vehicle that is not in the flights to learn from");
+      }
+    }
+  }
+  balance(data);
+  return data;
+}
+
+}  // namespace swarmcert::learning

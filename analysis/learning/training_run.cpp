@@ -1,0 +1,145 @@
+#include "analysis/learning/training_run.h"
+
+#include <cmath>
+#include <limits>
+
+#include "analysis/learning/projection.h"
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::learning {
+namespace {
+
+using training::Vector;
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// Everything a run needs to go on.
+struct State {
+  Vector trainer, best;
+  std::vector<Epoch> epochs;
+};
+
+/// Of the data and of every option that the bits depend on: a run may only be taken up by the same one.
+std::string fingerprint(const LearningData& data, const RunOptions& options) {
+  const auto bytes = [](const auto& v) {
+    return std::string(reinterpret_cast<const char*>(v.data()), v.size() * sizeof(v[0]));
+  };
+  std::string text = bytes(data.samples.x) + bytes(data.samples.phi) + bytes(data.samples.first) +
+                     bytes(data.samples.rho) + bytes(data.samples.target) + bytes(data.samples.weight);
+  for (const TrackSamples& track : data.tracks) text += name(track.use) + std::to_string(track.end);
+  for (const training::Part& part : data.layout.parts()) text += part.name + bytes(part.sizes);
+  const training::TrainerOptions& t = options.trainer;
+  for (const double x : {t.gamma.value, t.learning_rate, static_cast<double>(t.gamma.scope),
+                         static_cast<double>(t.gamma.mode), static_cast<double>(t.batch)})
+    text += std::to_string(x) + ",";
+  return files::sha256(text + std::to_string(t.seed) + "," + std::to_string(options.epochs));
+}
+
+constexpr const char* kSchema = "swarmcert/checkpoint/1";
+
+files::Json as_json(const Vector& v) { return std::vector<float>(v.data(), v.data() + v.size()); }
+
+Vector as_vector(const files::Json& json) {
+  const std::vector<float> values = json.get<std::vector<float>>();
+  return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+void write_checkpoint(const State& state, const std::string& key, const std::string& path) {
+  files::Json epochs = files::Json::array();
+  for (const Epoch& epoch : state.epochs) epochs.push_back({epoch.fit_rmse_gf, epoch.select_rmse_gf});
+  const files::Json file = {{"schema", kSchema},
+                            {"run", key},
+                            {"epochs", std::move(epochs)},
+                            {"trainer", as_json(state.trainer)},
+                            {"best", as_json(state.best)}};
+  files::write_file(path, files::to_text(file), true);
+}
+
+State read_checkpoint(const std::string& key, const std::string& path) {
+  const files::Json file = files::read_json(path, kSchema);
+  const auto refuse = [&](const std::string& field, const std::string& what) {
+    throw files::InputError({path, "", field, "", what, "begin anew with --force"});
+  };
+  State state;
+  try {
+    if (file.at("run") != key) refuse("run", "this checkpoint is of other flights, options or seed");
+    state.trainer = as_vector(file.at("trainer"));
+    state.best = as_vector(file.at("best"));
+    for (const files::Json& epoch : file.at("epochs"))
+      state.epochs.push_back({epoch.at(0).get<double>(), epoch.at(1).get<double>()});
+  } catch (const files::Json::exception& error) {
+    refuse("", std::string("not a whole checkpoint: ") + error.what());
+  }
+  return state;
+}
+
+/// The earliest epoch with the least error on the selecting flights.
+int best_of(const std::vector<Epoch>& epochs) {
+  int best = 0;
+  for (std::size_t e = 1; e < epochs.size(); ++e) {
+    if (epochs[e].select_rmse_gf < epochs[best].select_rmse_gf) best = static_cast<int>(e);
+  }
+  return best;
+}
+
+}  // namespace
+
+Run run_training(const LearningData& data, const RunOptions& options) {
+  const std::string key = fingerprint(data, options);
+  const training::TrainerOptions& chosen = options.trainer;
+  training::Trainer trainer(data.layout, data.samples, data.indices(Use::kFit),
+                            training::initial_parameters(data.layout, chosen.seed), chosen);
+  State state;
+  state.best = trainer.theta();
+  if (options.resumes) {
+    state = read_checkpoint(key, options.checkpoint);
+    if (state.best.size() != data.layout.size() || state.epochs.empty())
+      throw files::InputError(
+          {options.checkpoint, "", "best", "", "not a whole checkpoint", "begin anew with --force"});
+    trainer.restore(state.trainer);
+  }
+  Run run;
+  const std::vector<Eigen::Index> select = data.indices(Use::kSelect);
+  for (int epoch = static_cast<int>(state.epochs.size()); epoch < options.epochs; ++epoch) {
+    if (!state.epochs.empty() && epoch - best_of(state.epochs) > options.patience) break;
+    if (options.cancelled != nullptr && *options.cancelled) {
+      run.was_cancelled = true;
+      break;
+    }
+    const double rate = chosen.learning_rate * 0.5 * (1 + std::cos(kPi * epoch / options.epochs));
+    const double fit = trainer.run_epoch(epoch, rate);
+    const double selected =
+        select.empty() ? fit
+                       : training::mean_loss(data.layout, trainer.theta(), data.samples, select, chosen.jobs);
+    state.epochs.push_back({std::sqrt(fit), std::sqrt(selected)});
+    if (best_of(state.epochs) == epoch) state.best = trainer.theta();
+    state.trainer = trainer.state();
+    if (!options.checkpoint.empty()) write_checkpoint(state, key, options.checkpoint);
+    if (options.progress) options.progress(epoch + 1, options.epochs, state.epochs.back().select_rmse_gf);
+  }
+  run.theta = std::move(state.best);
+  run.epochs = std::move(state.epochs);
+  run.best_epoch = run.epochs.empty() ? 0 : best_of(run.epochs);
+  project(data.layout, chosen.gamma, run.theta);
+  return run;
+}
+
+double rmse_gf(const LearningData& data, const Vector& theta, Use use, int jobs) {
+  const std::vector<Eigen::Index> samples = data.indices(use);
+  if (samples.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return std::sqrt(training::mean_loss(data.layout, theta, data.samples, samples, jobs));
+}
+
+double rmse_of_nothing_gf(const LearningData& data, Use use) {
+  double squares = 0;
+  const std::vector<Eigen::Index> samples = data.indices(use);
+  for (const Eigen::Index s : samples) {
+    const double y = static_cast<double>(data.samples.target[s]);
+    squares += y * y;
+  }
+  return std::sqrt(squares / static_cast<double>(samples.size()));
+}
+
+}  // namespace swarmcert::learning

@@ -1,0 +1,48 @@
+/// @file A training run: epochs, early stopping, checkpoints.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/learning/dataset.h"
+#include "nn/training/trainer.h"
+
+namespace swarmcert::learning {
+
+struct RunOptions {
+  training::TrainerOptions trainer;
+  int epochs = 40;
+  int patience = 10;       ///< epochs without a better score on the selecting flights before the run ends
+  std::string checkpoint;  ///< file that is written after every epoch; empty: none
+  bool resumes = false;    ///< begin with what the checkpoint holds
+  const std::atomic<bool>* cancelled = nullptr;  ///< ends the run after the epoch in which it is set
+  std::function<void(int done, int total, double select_rmse_gf)> progress;
+};
+
+/// Root mean square errors in gram-force: of the flights that are fitted, met during the epoch and weighted by
+/// scenario; of those that select.
+struct Epoch {
+  double fit_rmse_gf = 0, select_rmse_gf = 0;
+};
+
+struct Run {
+  training::Vector
+      theta;  ///< of the epoch with the best score on the selecting flights, projected onto gamma
+  int best_epoch = 0;
+  std::vector<Epoch> epochs;
+  bool was_cancelled = false;  ///< the checkpoint holds the rest
+};
+
+/// Trains. The learning rate falls from the stated one to zero along half a cosine over `epochs`. The same data,
+/// options and seed give the same bits, whatever the number of threads and however often the run was taken up again.
+/// @throws files::InputError if the checkpoint cannot be read, or is of other networks, data or options.
+Run run_training(const LearningData& data, const RunOptions& options);
+
+/// RMSE in gram-force of theta on the samples of `use`, of kFit weighted by scenario; NaN where there are none.
+double rmse_gf(const LearningData& data, const training::Vector& theta, Use use, int jobs);
+/// The same of predicting nothing: the root mean square of the targets.
+double rmse_of_nothing_gf(const LearningData& data, Use use);
+
+}  // namespace swarmcert::learning

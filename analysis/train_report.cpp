@@ -1,0 +1,126 @@
+#include "analysis/train_report.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+
+#include "analysis/report.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using Eigen::Index;
+using learning::LearningData;
+using learning::Use;
+
+void add_curve(Report& report, const learning::Run& run) {
+  std::string data;
+  for (std::size_t e = 0; e < run.epochs.size(); ++e)
+    data += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse_gf, run.epochs[e].select_rmse_gf);
+  report.figure(
+      "epochs", data,
+      "set key outside top right\nset grid\nset xlabel 'epoch'\nset ylabel 'RMSE [gf]'\nset yrange [0:*]\n"
+      "plot 'epochs.dat' using 1:2 with lines lw 2 title 'flights to fit', '' using 1:3 with lines lw 2 "
+      "title 'flights to select'\n",
+      fmt::format("Error over epochs. Kept: epoch {}.", run.best_epoch + 1));
+}
+
+/// Share of the test samples per 0.5 gf, before and after.
+void add_histogram(Report& report, const LearningData& data, const learning::Run& run) {
+  const std::vector<Index> samples = data.indices(Use::kTest);
+  if (samples.empty()) return;
+  constexpr int kBins = 81;
+  constexpr double kWidth_gf = 0.5;
+  std::array<std::array<double, kBins>, 2> share{};
+  const auto count = [&](int which, double force_gf) {
+    const double bin = std::round(force_gf / kWidth_gf) + kBins / 2;
+    if (bin >= 0 && bin < kBins)
+      share[which][static_cast<std::size_t>(bin)] += 100.0 / static_cast<double>(samples.size());
+  };
+  const training::Matrix predicted = training::predict(data.layout, run.theta, data.samples, samples.data(),
+                                                       static_cast<Index>(samples.size()));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double target = static_cast<double>(data.samples.target[samples[i]]);
+    count(0, target);
+    count(1, target - static_cast<double>(predicted(0, static_cast<Index>(i))));
+  }
+  std::string text;
+  for (int b = 0; b < kBins; ++b)
+    text += fmt::format("{} {} {}\n", (b - kBins / 2) * kWidth_gf, share[0][b], share[1][b]);
+  report.figure(
+      "residuals", text,
+      "set key outside top right\nset grid\nset xlabel 'vertical force [gf]'\nset ylabel 'samples [%]'\n"
+      "plot 'residuals.dat' using 1:2 with steps lw 2 lc 'gray' title 'without the network', '' using 1:3 "
+      "with "
+      "steps lw 2 title 'left by the network'\n",
+      "Vertical force on the test flights that the model does not explain, per 0.5 gf.");
+}
+
+/// Force on a vehicle at the origin from one neighbour at rest, over the neighbour's place in the plane y = 0.
+void add_map(Report& report, const LearningData& data, const learning::Run& run, int phi, int rho) {
+  training::Dataset grid;
+  constexpr int kSteps = 61;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      const float x = -0.5f + static_cast<float>(i) / (kSteps - 1);
+      const float z = -0.3f + 1.2f * static_cast<float>(j) / (kSteps - 1);
+      const int ground = data.layout.find("phi:ground");
+      if (ground >= 0) grid.add_input(ground, {-0.6f, 0, 0, 0});
+      grid.add_input(phi, {x, 0, z, 0, 0, 0});
+      grid.add_sample(rho, {0.0f});
+    }
+  }
+  std::vector<Index> all(static_cast<std::size_t>(grid.samples()));
+  for (std::size_t s = 0; s < all.size(); ++s) all[s] = static_cast<Index>(s);
+  const training::Matrix force = training::predict(data.layout, run.theta, grid, all.data(), grid.samples());
+  std::string text;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      text += fmt::format("{} {} {}\n", -0.5 + i / (kSteps - 1.0), -0.3 + 1.2 * j / (kSteps - 1.0),
+                          force(0, static_cast<Index>(i) * kSteps + j));
+    }
+    text += "\n";
+  }
+  const std::string name = fmt::format("map_{}_{}", phi, rho);
+  report.figure(
+      name, text,
+      "set view map\nset xlabel 'neighbour to the side [m]'\nset ylabel 'neighbour above [m]'\n"
+      "set cblabel 'vertical force [gf]'\nset palette defined (0 '#2166ac', 0.5 '#f7f7f7', 1 '#b2182b')\n"
+      "stats '" +
+          name +
+          ".dat' using 3 nooutput\nm = (abs(STATS_min) > abs(STATS_max)) ? abs(STATS_min) : "
+          "abs(STATS_max)\nset cbrange [-m:m]\nset size ratio 1.2\nplot '" +
+          name + ".dat' using 1:2:3 with image notitle\n",
+      data.layout.parts()[rho].name + " with one neighbour of " + data.layout.parts()[phi].name +
+          " at rest, 0.6 m above the ground.");
+}
+
+}  // namespace
+
+std::string write_train_report(const LearningData& data, const learning::Run& run, const std::string& folder,
+                               bool overwrite) {
+  Report report("Training of a deep set");
+  report.heading("Learning curve");
+  add_curve(report, run);
+  report.heading("What is left");
+  add_histogram(report, data, run);
+  report.heading("The learned force");
+  const std::vector<training::Part>& parts = data.layout.parts();
+  for (std::size_t phi = 0; phi < parts.size(); ++phi) {
+    if (parts[phi].name.rfind("phi:", 0) != 0 || parts[phi].name == "phi:ground") continue;
+    for (std::size_t rho = 0; rho < parts.size(); ++rho) {
+      if (parts[rho].name.rfind("rho:", 0) == 0)
+        add_map(report, data, run, static_cast<int>(phi), static_cast<int>(rho));
+    }
+  }
+  report.heading("Flights");
+  std::vector<std::vector<std::string>> rows;
+  for (const learning::TrackSamples& track : data.tracks)
+    rows.push_back({track.flight, track.vehicle, track.composition, name(track.use),
+                    std::to_string(track.end - track.begin)});
+  report.table({"flight", "vehicle", "neighbours > vehicle", "use", "samples"}, rows);
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,14 @@
+/// @file Report of a training run: learning curve, residuals before and after, map of the learned force.
+#pragma once
+
+#include <string>
+
+#include "analysis/learning/training_run.h"
+
+namespace swarmcert::analysis {
+
+/// Writes it into `folder`; returns the path of the HTML file.
+std::string write_train_report(const learning::LearningData& data, const learning::Run& run,
+                               const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

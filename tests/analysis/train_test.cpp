@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "analysis/run.h"
+#include "nn/files/json.h"
+
+namespace swarmcert {
+namespace {
+
+using files::Json;
+using tests::Outcome;
+using tests::read_text;
+using tests::write_text;
+
+/// Three simulated swaps of two vehicles with downwash, and a model that knows nothing of it.
+class Train : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string nominal =
+        read_text(std::string(SWARMCERT_SOURCE_DIR) + "/stability/models/crazyflie-small.toml");
+    write_text(folder_ / "nominal.toml", nominal);
+    write_text(folder_ / "truth.toml", nominal + "\n[[effect]]\nname = \"downwash\"\n");
+    for (const std::string run : {"1", "2", "3"}) {
+      const Outcome outcome =
+          execute("swarmcert simulate swap --vehicles 2 --model truth.toml --gains '" +
+                  std::string(SWARMCERT_SOURCE_DIR) +
+                  "/controller/gains/crazyflie-small.toml' --seed " + run + " -o flights/" + run);
+      ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+    }
+  }
+
+  Outcome execute(const std::string& command) { return tests::run_shell(command, folder_.path()); }
+
+  std::string train(const std::string& options) {
+    return "swarmcert train nominal.toml flights --phi 12,12 --rho 12 --features 8 " + options;
+  }
+
+  tests::ScratchFolder folder_;
+};
+
+TEST_F(Train, LearnsTheDownwashOfFlightsThatItDidNotSeeAndCertifiesTheResult) {
+  const Outcome outcome = execute(train("--epochs 25 --batch 256 --rate 5e-3 -o out --json result.json"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const Json result = files::read_json(folder_ / "result.json", "swarmcert/train/1");
+  EXPECT_EQ(result["split"], "flights");
+  EXPECT_LT(result["test_rmse"].get<double>(), 0.6 * result["test_rmse_of_nothing"].get<double>());
+  EXPECT_EQ(result["gamma_verdict"], "proved");
+  EXPECT_GT(result["lipschitz"].get<double>(), 0);
+  EXPECT_EQ(execute("swarmcert check out/certificate.json out/network.toml").exit_code, 0);
+
+  // The model with the network explains the flights better than the one without.
+  const auto rmse = [&](const std::string& model) {
+    const Outcome compared = execute("swarmcert compare " + model + " flights --force --json compared.json");
+    EXPECT_EQ(compared.exit_code, 0) << compared.output;
+    return files::read_json(folder_ / "compared.json", "swarmcert/compare/1")["overall"]["rmse"]["z"]
+        .get<double>();
+  };
+  EXPECT_LT(rmse("out/model-small.toml"), 0.7 * rmse("nominal.toml"));
+}
+
+TEST_F(Train, SameSeedGivesTheSameFilesWhateverTheJobs) {
+  ASSERT_EQ(execute(train("--epochs 3 -o one -j 1")).exit_code, 0);
+  ASSERT_EQ(execute(train("--epochs 3 -o two -j 2")).exit_code, 0);
+  ASSERT_EQ(execute(train("--epochs 3 -o other --seed 2")).exit_code, 0);
+  for (const std::string file :
+       {"phi_small.safetensors", "rho_small.safetensors", "phi_ground.safetensors"}) {
+    EXPECT_EQ(read_text(folder_ / ("one/" + file)), read_text(folder_ / ("two/" + file))) << file;
+    EXPECT_NE(read_text(folder_ / ("one/" + file)), read_text(folder_ / ("other/" + file))) << file;
+  }
+}
+
+TEST_F(Train, RefusesAFolderThatIsNotEmptyAndFlightsWithoutNeighbours) {
+  write_text(folder_ / "kept.txt", "");
+  Outcome outcome = execute(train("--epochs 1 -o ."));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.output.find("--force"), std::string::npos) << outcome.output;
+  ASSERT_EQ(
+      execute("swarmcert simulate hover --vehicles 1 --model truth.toml --gains '" +
+              std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' -o alone")
+          .exit_code,
+      0);
+  outcome = execute("swarmcert train nominal.toml alone --epochs 1 -o out");
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.output.find("neighbour"), std::string::npos) << outcome.output;
+}
+
+}  // namespace
+}  // namespace swarmcert
