@@ -75,7 +75,7 @@ TEST(SampledLoop, TendsToTheContinuousLoop) {
     // Holding a command for a period delays it by half of one: take that much off the delay.
     AxisLoop early = plant;
     early.delay_s -= 0.00025;
-    const GainNorms fast = sampled_norms({early, 0.0005, 0.0005}, channel, Instants::kAll);
+    const GainNorms fast = sampled_norms({early, 0.0005, 0.0005}, channel, Instants::kSampling);
     EXPECT_NEAR(fast.amplitude, exact.amplitude, 1e-3 * exact.amplitude);
     EXPECT_NEAR(fast.rate, exact.rate, 2e-3 * exact.rate);
     EXPECT_NEAR(fast.edge, exact.edge, 1e-3 * exact.edge);

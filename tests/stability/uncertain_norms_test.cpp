@@ -19,7 +19,7 @@ AxisLoop at(double mass, double scale, double lag_s, double delay_s) {
 TEST(UncertainNorms, EncloseEveryLoopOfTheBox) {
   const UncertainPlant box = {{0.032, 0.036}, {0.92, 1.08}, {0.05, 0.065}, {0, 0}};
   for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-    const UncertainNorms norms = uncertain_norms(kLoop, box, channel, 0.05, 400);
+    const UncertainNorms norms = uncertain_norms(kLoop, box, channel, 0.05);
     std::mt19937 random(4);
     std::uniform_real_distribution<double> unit(0, 1);
     const auto in = [&](const Range& r) { return r.from + unit(random) * (r.to - r.from); };
