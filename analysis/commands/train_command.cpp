@@ -215,7 +215,7 @@ int run(Options options, const CommonOptions& common) {
   write_models(inputs, data, options.output);
   lipschitz::CertifyOptions certify_options;
   certify_options.jobs = common.jobs;
-  certify_options.seed = trainer.seed;
+  certify_options.lower.seed = trainer.seed;
   const lipschitz::Certification found = lipschitz::certify(network, certify_options);
   files::write_file((fs::path(options.output) / "certificate.json").string(),
                     files::to_text(lipschitz::certificate(network, found)), true);

@@ -1,6 +1,7 @@
 #include "analysis/learning/projection.h"
 
 #include <stdexcept>
+#include <vector>
 
 #include "lipschitz/certify.h"
 #include "nn/training/spectral_normalization.h"
@@ -12,29 +13,35 @@ namespace {
 constexpr int kMostTries = 40;
 constexpr double kHeadroom = 0x1p-24;
 
-bool is_proved(const files::GammaStatement& gamma, const lipschitz::SpectralNorm& norm, int layers) {
-  return lipschitz::respects_gamma(gamma, norm.norm, static_cast<std::size_t>(layers)) ==
-         lipschitz::Verdict::kProved;
+/// Scales the part's layers that are not proved to keep gamma; true once all are.
+bool improve(const training::Layout& layout, const files::GammaStatement& gamma, int part, int tries,
+             training::Vector& theta) {
+  const int layers = layout.parts()[static_cast<std::size_t>(part)].layers();
+  const double limit = training::layer_limit(gamma, layers);
+  std::vector<lipschitz::Enclosure> norms;
+  for (const files::Layer& layer : layout.stored(theta, part).layers)
+    norms.push_back(lipschitz::spectral_norm(layer, limit).norm);
+  const std::vector<lipschitz::Verdict> verdicts = lipschitz::respects_gamma(gamma, norms);
+  bool all_proved = true;
+  for (int k = 0; k < layers; ++k) {
+    if (verdicts[k] == lipschitz::Verdict::kProved) continue;
+    all_proved = false;
+    const double goal = limit * (1 - kHeadroom * (1 + tries));
+    const double upper = norms[k].upper.value();
+    const bool rescales = gamma.mode == files::GammaStatement::Mode::kEqual ? upper > 0 : upper > goal;
+    if (rescales) layout.weights(theta, part, k) *= static_cast<float>(goal / upper);
+  }
+  return all_proved;
 }
 
 }  // namespace
 
 void project(const training::Layout& layout, const files::GammaStatement& gamma, training::Vector& theta) {
   for (std::size_t p = 0; p < layout.parts().size(); ++p) {
-    const int part = static_cast<int>(p);
-    const int layers = layout.parts()[p].layers();
-    const double limit = training::layer_limit(gamma, layers);
-    for (int k = 0; k < layers; ++k) {
-      bool proved = false;
-      for (int tries = 0; tries < kMostTries && !proved; ++tries) {
-        const files::Layer layer = layout.stored(theta, part).layers[static_cast<std::size_t>(k)];
-        const lipschitz::SpectralNorm norm = lipschitz::spectral_norm(layer, limit);
-        proved = is_proved(gamma, norm, layers);
-        const double upper = norm.norm.upper.value();
-        if (!proved && upper > 0)
-          layout.weights(theta, part, k) *= static_cast<float>(limit / upper * (1 - kHeadroom * (1 + tries)));
-      }
-      if (!proved) throw std::runtime_error(layout.parts()[p].name + ": no proof that a layer keeps gamma");
+    int tries = 0;
+    while (!improve(layout, gamma, static_cast<int>(p), tries, theta)) {
+      if (++tries == kMostTries)
+        throw std::runtime_error(layout.parts()[p].name + ": no proof that it keeps gamma");
     }
   }
 }
