@@ -291,10 +291,10 @@ DeepSetStatus predict_force_z(int own_kind, const float* own, const Neighbour<fl
   float copies[kMostNeighbours * kInputs], sum[kHidden], hidden[kHidden], scratch[kScratch];
   int order[kMostNeighbours];
   const DeepSet<float> set = {{{ground}, phi, kNumKinds, rho[own_kind], {clamp}}};
-  float output = 0.0f;
+  float output[4] = {{}};  // one is used; GCC warns of the evaluator's groups of four where it sees no more
   const DeepSetStatus status =
-      evaluate(set, own, neighbours, num_neighbours, &output, DeepSetWorkspace<float>{{copies, order, kMostNeighbours, sum, hidden, scratch}});
-  if (status == DeepSetStatus::kOk) *force_N = rounded(output * kNewtonPerUnit);
+      evaluate(set, own, neighbours, num_neighbours, output, DeepSetWorkspace<float>{{copies, order, kMostNeighbours, sum, hidden, scratch}});
+  if (status == DeepSetStatus::kOk) *force_N = rounded(output[0] * kNewtonPerUnit);
   return status;
 }}
 
