@@ -167,7 +167,10 @@ int run(const Options& options, const CommonOptions& common) {
     const std::string path = write_compare_report(comparison, inputs, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
-  return kDone;
+  if (comparison.overall.statistics.samples > 0) return kDone;
+  fmt::print(stderr,
+             "no usable record: nothing was compared; 'swarmcert inspect LOG' says what is in a log\n");
+  return kInconclusive;
 }
 
 }  // namespace

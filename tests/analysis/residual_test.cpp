@@ -89,6 +89,18 @@ TEST(Compare, NamesTheDownwashRegionOfSwapsFirst) {
   EXPECT_TRUE(found);
 }
 
+TEST(FlightCommands, GiveNoAnswerWithoutAUsableRecord) {
+  const ScratchFolder folder;
+  write_text(folder / "cf1_00", "");
+  const std::string model = source_path("stability/models/crazyflie-small.toml");
+  for (const std::string& command : {"compare " + model + " .", "diagnose " + model + " .",
+                                     "add auto --model " + model + " . -o new.toml"}) {
+    const Outcome outcome = run_shell("swarmcert " + command, folder.path());
+    EXPECT_EQ(outcome.exit_code, 4) << command << "\n" << outcome.output;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "new.toml"));
+}
+
 TEST(Compare, ReproducesTheErrorsOfThePublishedNetworks_slow) {
   SWARMCERT_NEEDS_DATA();
   // Mean squares of f_a,z in gf^2 over the shared flights, with the authors' own filter; kinds of the neighbours,
