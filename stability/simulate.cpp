@@ -68,7 +68,8 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
       Eigen::Matrix3d R_WB;
       rotation_of(x + kQuaternion, &R_WB);
       SimulatedVehicle& result = simulation.vehicles[i];
-      result.largest_tilt_rad = std::max(result.largest_tilt_rad, std::acos(std::clamp(R_WB(2, 2), -1.0, 1.0)));
+      result.largest_tilt_rad =
+          std::max(result.largest_tilt_rad, std::acos(std::clamp(R_WB(2, 2), -1.0, 1.0)));
       result.smallest_height_m = std::min(result.smallest_height_m, p.z());
       if (options.keep_errors && k % 5 == 0) {
         simulation.errors[i].push_back(
@@ -84,7 +85,8 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
     SimulatedVehicle& result = simulation.vehicles[i];
     result.kind = swarm.model(static_cast<int>(i)).kind;
     result.error = sums[i].result();
-    result.saturated_share = static_cast<double>(saturated[i]) / static_cast<double>(std::max<std::int64_t>(loop.period(), 1));
+    result.saturated_share =
+        static_cast<double>(saturated[i]) / static_cast<double>(std::max<std::int64_t>(loop.period(), 1));
     if (sums[i].count == 0) result.smallest_height_m = options.loop.ground_m;
     if (options.keep_logs) simulation.logs.push_back(recorder.records(static_cast<int>(i)));
   }

@@ -27,8 +27,9 @@ struct SimulatedVehicle {
 
 struct Simulation {
   std::vector<SimulatedVehicle> vehicles;
-  std::vector<std::vector<LogRecord>> logs;      ///< by vehicle; empty unless wanted
-  std::vector<std::vector<std::array<float, 7>>> errors;  ///< by vehicle, every position period: t, p - p_d, p_d
+  std::vector<std::vector<LogRecord>> logs;  ///< by vehicle; empty unless wanted
+  std::vector<std::vector<std::array<float, 7>>>
+      errors;             ///< by vehicle, every position period: t, p - p_d, p_d
   bool diverged = false;  ///< a state became infinite, or farther than 100 m: the flight ends there
   double end_s = 0;
 };

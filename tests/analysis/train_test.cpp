@@ -23,8 +23,8 @@ class Train : public testing::Test {
     for (const std::string run : {"1", "2", "3"}) {
       const Outcome outcome =
           execute("swarmcert simulate swap --vehicles 2 --model truth.toml --gains '" +
-                  std::string(SWARMCERT_SOURCE_DIR) +
-                  "/controller/gains/crazyflie-small.toml' --seed " + run + " -o flights/" + run);
+                  std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' --seed " +
+                  run + " -o flights/" + run);
       ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
     }
   }
@@ -74,11 +74,10 @@ TEST_F(Train, RefusesAFolderThatIsNotEmptyAndFlightsWithoutNeighbours) {
   Outcome outcome = execute(train("--epochs 1 -o ."));
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_NE(outcome.output.find("--force"), std::string::npos) << outcome.output;
-  ASSERT_EQ(
-      execute("swarmcert simulate hover --vehicles 1 --model truth.toml --gains '" +
-              std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' -o alone")
-          .exit_code,
-      0);
+  ASSERT_EQ(execute("swarmcert simulate hover --vehicles 1 --model truth.toml --gains '" +
+                    std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' -o alone")
+                .exit_code,
+            0);
   outcome = execute("swarmcert train nominal.toml alone --epochs 1 -o out");
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_NE(outcome.output.find("neighbour"), std::string::npos) << outcome.output;

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "lipschitz/stages.h"
 #include "lipschitz/sdp_bound.h"
+#include "lipschitz/stages.h"
 #include "nn/files/network.h"
 #include "nn/random_network.h"
 
