@@ -30,11 +30,11 @@ void add_curve(Report& report, const learning::Run& run) {
 void add_histogram(Report& report, const LearningData& data, const learning::Run& run) {
   const std::vector<Index> samples = data.indices(Use::kTest);
   if (samples.empty()) return;
-  constexpr int kBins = 81;
+  constexpr int kBins = 81, kMiddle = kBins / 2;
   constexpr double kWidth_gf = 0.5;
   std::array<std::array<double, kBins>, 2> share{};
   const auto count = [&](int which, double force_gf) {
-    const double bin = std::round(force_gf / kWidth_gf) + kBins / 2;
+    const double bin = std::round(force_gf / kWidth_gf) + kMiddle;
     if (bin >= 0 && bin < kBins)
       share[which][static_cast<std::size_t>(bin)] += 100.0 / static_cast<double>(samples.size());
   };
@@ -47,7 +47,7 @@ void add_histogram(Report& report, const LearningData& data, const learning::Run
   }
   std::string text;
   for (int b = 0; b < kBins; ++b)
-    text += fmt::format("{} {} {}\n", (b - kBins / 2) * kWidth_gf, share[0][b], share[1][b]);
+    text += fmt::format("{} {} {}\n", (b - kMiddle) * kWidth_gf, share[0][b], share[1][b]);
   report.figure(
       "residuals", text,
       "set key outside top right\nset grid\nset xlabel 'vertical force [gf]'\nset ylabel 'samples [%]'\n"

@@ -17,8 +17,8 @@ class PositionLoop {
 
   PositionLoop(const Gains& gains, const Model& model);
 
-  /// d state / dt under the learning error `eps` (f_a_hat - f_a, in newton).
-  void derivative(const double* state, const Eigen::Vector3d& eps_W_N, double* derivative) const;
+  /// dx/dt of the state x under the learning error `eps` (f_a_hat - f_a, in newton).
+  void derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const;
 
   /// At rest with these errors: integral 0, forces those that hold the weight.
   State start(const Eigen::Vector3d& position_m, const Eigen::Vector3d& velocity_m_s) const;
@@ -29,7 +29,7 @@ class PositionLoop {
   double mass_kg() const { return mass_kg_; }
 
  private:
-  Eigen::Vector3d feedback(const double* state) const;
+  Eigen::Vector3d feedback(const double* x) const;
 
   Eigen::Matrix3d position_, velocity_, integral_;  ///< f_d = m g - position_ p~ - velocity_ v - integral_ I
   PerAxis limit_m_s_;

@@ -45,8 +45,8 @@ std::array<double, 4> four(const Values& values, int first) {
   return {values[k], values[k + 1], values[k + 2], values[k + 3]};
 }
 
-template <std::size_t size>
-bool is_finite(const std::array<double, size>& values) {
+template <std::size_t kSize>
+bool is_finite(const std::array<double, kSize>& values) {
   return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
 }
 

@@ -59,7 +59,7 @@ class SampleBuilder : public RecordSink {
 
   /// @throws files::InputError if a signal that every log needs (time, position, velocity) has no column.
   void begin(const std::vector<std::string>& names) override;
-  void record(const std::vector<double>& values) override;
+  void record(const std::vector<double>& raw) override;
   /// Call once after the last record.
   void end();
 
