@@ -172,28 +172,29 @@ double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double am
   return std::min(simple, amplitude_N * variation + rate_N_s * (rest + between + after));
 }
 
-DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const GainNorms& gains,
-                                     const Disturbance& disturbance) {
+DisturbanceBounds disturbance_bounds(const GainNorms& gains, const Disturbance& disturbance) {
   DisturbanceBounds bounds;
   bounds.by_rate = times(gains.rate, disturbance.rate_N_s);
   bounds.by_amplitude = times(gains.amplitude, disturbance.amplitude_N);
   bounds.by_edges = times(gains.edge, disturbance.variation_N);
-  bounds.by_impulse = times(gains.impulse, disturbance.impulse_N_s);
-  const GainNorms continuous = continuous_norms(loop, channel);
+  bounds.by_impulse = times(gains.impulse * disturbance.passes, disturbance.impulse_N_s);
+  bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
+  return bounds;
+}
+
+DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance) {
+  const GainNorms gains = continuous_norms(loop, channel);
+  DisturbanceBounds bounds = disturbance_bounds(gains, disturbance);
   if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1) {
-    double felt = 0;
+    double felt = gains.impulse;
     for (int k = 1; k < disturbance.passes; ++k) {
       const double after_s = std::max(0.0, k * disturbance.pass_period_s - disturbance.pass_length_s);
       felt += impulse_gain_after(loop, channel, after_s);
     }
-    bounds.by_impulse *= 1 + felt / continuous.impulse;
+    bounds.by_impulse = felt * disturbance.impulse_N_s;
   }
   if (std::isfinite(bounds.by_rate) && std::isfinite(bounds.by_amplitude)) {
-    const double excess =
-        std::max({1.0, gains.rate / continuous.rate, gains.amplitude / continuous.amplitude});
-    bounds.by_both = std::min(
-        {bounds.by_rate, bounds.by_amplitude,
-         excess * amplitude_and_rate_bound(loop, channel, disturbance.amplitude_N, disturbance.rate_N_s)});
+    bounds.by_both = amplitude_and_rate_bound(loop, channel, disturbance.amplitude_N, disturbance.rate_N_s);
   }
   return bounds;
 }
@@ -202,6 +203,7 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
                          double integral_share, double limit_m_s) {
   ClampBounds result;
   if (loop.Ki == 0) return result;
+  result.exists = std::isfinite(limit_m_s);
   const GainNorms gains = continuous_norms(loop, channel);
   const double bias_m_s = std::abs(bias_N) / (loop.mass_kg * loop.Ki);
   result.demand_m_s =

@@ -35,13 +35,15 @@ struct DisturbanceBounds {
   std::string which() const;
 };
 
-/// @param gains of the same channel and loop; B5 and the passes use the continuous kernel, scaled by how much the
-///   given gains exceed the continuous ones, so that they cover a sampled loop to first order of its period.
-DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const GainNorms& gains,
-                                     const Disturbance& disturbance);
+/// What the gains alone give, of a continuous or a sampled loop: every pass counts in full, B5 = min(B1, B2).
+DisturbanceBounds disturbance_bounds(const GainNorms& gains, const Disturbance& disturbance);
 
-/// What a clamp |int e| <= limit does to bounds of the linear loop.
+/// The same of a continuous loop with its kernel: B5 is solved, and earlier passes count as far as they can still be felt.
+DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance);
+
+/// What a clamp |int e| <= limit does to bounds of the linear continuous loop. For a sampled loop these are estimates.
 struct ClampBounds {
+  bool exists = false;  ///< whether there is a clamp, and an integrator that it could stop
   /// The integrator of the linear loop stays below this, m s: min(|h|_1 sup|f|, |h|_oo int|f|) plus |bias|/(m Ki).
   double demand_m_s = 0;
   /// Whether the demand is within the limit: then the clamp never acts, and bounds of the linear loop hold.

@@ -47,7 +47,8 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
     add("disturbance class", from, source.kind + " numbers bound the learning error");
   }
   add("mass and thrust scale as in the model", "assumed", "--uncertain encloses intervals");
-  add("no saturation", report.thrust_margin_N && *report.thrust_margin_N >= 0 ? "proved" : "assumed",
+  add("no saturation of the collective thrust",
+      report.thrust_margin_N && *report.thrust_margin_N >= 0 ? "proved" : "assumed",
       report.thrust_margin_N ? "under the disturbance class and for the feedback about hover" : "");
   add("exact position and velocity", "assumed", "sensor noise adds to every bound");
   if (gains.rate_hz > 0) {
@@ -131,9 +132,14 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
       bounds.axis = axis;
       bounds.channel = row.channel;
       bounds.loop = row.loop;
-      bounds.bounds =
-          disturbance_bounds(row.loop == Loop::kSampled ? acting : *loop, row.channel, row.all_times, known);
-      bounds.clamp = clamp_of(row.channel);
+      if (row.loop == Loop::kSampled) {
+        bounds.bounds = disturbance_bounds(row.all_times, known);
+        bounds.clamp = clamp_of(row.channel);
+      } else {
+        bounds.bounds = disturbance_bounds(*loop, row.channel, known);
+        bounds.clamp =
+            clamp_bounds(*loop, row.channel, known, source.bias_N[i], 1, gains.integrator_limit_m_s[i]);
+      }
       if (source.f_hat_rate_known) {
         bounds.staircase_m = staircase_error(row.all_times, gains.network_rate_hz, gains.network_latency_s,
                                              source.f_hat_rate_N_s);

@@ -59,6 +59,8 @@ struct AxisBounds {
     const double clamped = clamp.by_amplitude < clamp.by_impulse ? clamp.by_amplitude : clamp.by_impulse;
     return clamp.never_acts && bounds.least() < clamped ? bounds.least() : clamped;
   }
+  /// Whether least() is an estimate and no bound: what a clamp does to a sampled loop is judged by its continuous one.
+  bool is_estimate() const { return loop == Loop::kSampled && clamp.exists; }
   double staircase_m = 0;  ///< to be added for a learned force that is a staircase or late
 };
 
