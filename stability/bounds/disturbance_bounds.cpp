@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <map>
+#include <complex>
+
+#include "stability/bounds/amplitude_and_rate.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -37,77 +38,39 @@ TransferFunction later(const TransferFunction& y, double after_s) {
   return {result, total, {}, 0};
 }
 
-/// argmin over u of sum_i weight |u_i - h_i| + sum_i |u_(i+1) - u_i|, u = 0 before and after: exact. The derivative of
-/// the optimal cost up to i is a nondecreasing staircase, kept as its jumps; a term of the total variation clips it to
-/// [-1, 1] (Johnson, J. Comput. Graph. Stat. 22, 2013).
-class TotalVariation {
+/// sup |y(t)| over t >= after_s of a stable response.
+class FadingResponse {
  public:
-  TotalVariation(const std::vector<double>& h, double weight) : h_(h), weight_(weight) {}
+  explicit FadingResponse(const TransferFunction& y) : y_(y) {
+    const ResponseNorms norms = response_norms(y);
+    peak_ = norms.max_abs();
+    if (y.delay_s == 0) return;
+    // With a delay: samples, and what can happen between two of them.
+    constexpr int kCount = 200'001;
+    double slowest = kInfinity;
+    for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {
+      slowest = std::min(slowest, std::abs(pole));
+    }
+    step_s_ = std::max(60 / slowest, 400 * y.delay_s) / kCount;
+    between_ = norms.slope_max_abs * step_s_ / 2;
+    later_ = sampled_response(y, step_s_, kCount);
+    for (double& sample : later_) sample = std::abs(sample);
+    for (std::size_t i = later_.size() - 1; i-- > 0;) later_[i] = std::max(later_[i], later_[i + 1]);
+  }
 
-  std::vector<double> solve() {
-    // Cost of the first value: |u - 0|, derivative -1 below 0 and +1 above.
-    steps_ = {{0.0, 2.0}};
-    lowest_ = -1;
-    std::vector<double> low(h_.size());
-    std::vector<double> high(h_.size());
-    for (std::size_t i = 0; i < h_.size(); ++i) {
-      steps_.insert({h_[i], 2 * weight_});
-      lowest_ -= weight_;
-      highest_ += weight_;
-      low[i] = clip_low();
-      high[i] = clip_high();
-    }
-    std::vector<double> u(h_.size());
-    double next = 0;  // after the last
-    for (std::size_t i = h_.size(); i-- > 0;) {
-      next = std::min(std::max(next, low[i]), high[i]);
-      u[i] = next;
-    }
-    return u;
+  double operator()(double after_s) const {
+    if (after_s <= 0) return peak_;
+    if (y_.delay_s == 0) return response_norms(later(y_, after_s)).max_abs();
+    // After the samples' end the response is below what the last of them shows: at least their slack is counted.
+    const auto i = std::min(static_cast<std::size_t>(after_s / step_s_), later_.size() - 1);
+    return std::min(peak_, later_[i] + between_);
   }
 
  private:
-  /// Raises the derivative to at least -1: removes steps from below; the place where it passes -1.
-  double clip_low() {
-    double at = steps_.empty() ? 0 : steps_.begin()->first;
-    while (lowest_ < -1 && !steps_.empty()) {
-      const auto first = steps_.begin();
-      at = first->first;
-      const double jump = first->second;
-      steps_.erase(first);
-      if (lowest_ + jump > -1) {
-        steps_.insert({at, lowest_ + jump + 1});
-        lowest_ = -1;
-        return at;
-      }
-      lowest_ += jump;
-    }
-    lowest_ = std::max(lowest_, -1.0);
-    return at;
-  }
-  double clip_high() {
-    double at = steps_.empty() ? 0 : std::prev(steps_.end())->first;
-    while (highest_ > 1 && !steps_.empty()) {
-      const auto last = std::prev(steps_.end());
-      at = last->first;
-      const double jump = last->second;
-      steps_.erase(last);
-      if (highest_ - jump < 1) {
-        steps_.insert({at, 1 - (highest_ - jump)});
-        highest_ = 1;
-        return at;
-      }
-      highest_ -= jump;
-    }
-    highest_ = std::min(highest_, 1.0);
-    return at;
-  }
-
-  const std::vector<double>& h_;
-  const double weight_;
-  std::multimap<double, double> steps_;  ///< where the derivative jumps, and by how much
-  double lowest_ = -1;
-  double highest_ = 1;
+  TransferFunction y_;
+  double peak_ = 0;
+  double step_s_ = 0, between_ = 0;
+  std::vector<double> later_;  ///< largest of this sample and all later ones
 };
 
 }  // namespace
@@ -128,19 +91,7 @@ std::string DisturbanceBounds::which() const {
 
 double impulse_gain_after(const AxisLoop& loop, Channel channel, double after_s) {
   const TransferFunction y = impulse_transfer(loop, channel);
-  if (!is_stable(y)) return kInfinity;
-  if (after_s <= 0) return response_norms(y).max_abs();
-  if (y.delay_s == 0) return response_norms(later(y, after_s)).max_abs();
-  // With a delay: samples, and what can happen between two of them.
-  const ResponseNorms norms = response_norms(y);
-  constexpr int kCount = 200'001;
-  const double step_s = std::max(4 * after_s, 400 * y.delay_s) / kCount;
-  const std::vector<double> samples = sampled_response(y, step_s, kCount);
-  double result = 0;
-  for (auto i = static_cast<std::size_t>(after_s / step_s); i < samples.size(); ++i) {
-    result = std::max(result, std::abs(samples[i]));
-  }
-  return std::min(norms.max_abs(), result + norms.slope_max_abs * step_s / 2);
+  return is_stable(y) ? FadingResponse(y)(after_s) : kInfinity;
 }
 
 double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double amplitude_N, double rate_N_s,
@@ -156,42 +107,49 @@ double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double am
   }
   const double horizon_s = 25 / slowest;  // e^-25 of the rate bound is left out of the split, and added below
   const double step_s = horizon_s / (nodes - 1);
-  const std::vector<double> samples = sampled_response(h, step_s, nodes);
-  const std::vector<double> u = TotalVariation(samples, rate_N_s * step_s / amplitude_N).solve();
-  double variation = std::abs(u.front()) + std::abs(u.back());
-  double rest = 0;
-  for (std::size_t i = 0; i < u.size(); ++i) {
-    if (i > 0) variation += std::abs(u[i] - u[i - 1]);
-    rest += std::abs(samples[i] - u[i]) * (i == 0 || i + 1 == u.size() ? step_s / 2 : step_s);
-  }
-  // Between nodes u is linear and h bends: |h - u| exceeds the chord by at most step^2/8 sup |h''| there, over all
-  // cells step^2/12 |h''|_1 to leading order, doubled for the variation of h'' inside a cell. After the horizon u = 0.
-  const ResponseNorms norms = response_norms(h);
-  const double between = step_s * step_s / 6 * norms.curvature_integral;
-  const double after = 1e-9 * gains.rate;
-  return std::min(simple, amplitude_N * variation + rate_N_s * (rest + between + after));
+  const auto cells = static_cast<std::size_t>(nodes) - 1;
+  // h bends away from its chord by at most step^2/8 sup |h''|, over all cells step^2/12 |h''|_1 to leading order, doubled
+  // for the variation of h'' inside a cell; shared out evenly, as only the sum counts. After the horizon u = 0.
+  const double between = step_s * step_s / 6 * response_norms(h).curvature_integral;
+  const StepResponse step = {sampled_response(h, step_s, nodes), std::vector<double>(cells, step_s),
+                             std::vector<double>(cells, between / static_cast<double>(cells)),
+                             1e-9 * gains.rate};
+  return std::min(simple, split_bound(step, amplitude_N, rate_N_s));
 }
 
-DisturbanceBounds disturbance_bounds(const GainNorms& gains, const Disturbance& disturbance) {
-  DisturbanceBounds bounds;
-  bounds.by_rate = times(gains.rate, disturbance.rate_N_s);
-  bounds.by_amplitude = times(gains.amplitude, disturbance.amplitude_N);
-  bounds.by_edges = times(gains.edge, disturbance.variation_N);
-  bounds.by_impulse = times(gains.impulse * disturbance.passes, disturbance.impulse_N_s);
-  bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
-  return bounds;
+double felt_passes(const Disturbance& disturbance, const std::function<double(double)>& gain_after) {
+  double total = gain_after(0);
+  for (int k = 1; k < disturbance.passes; ++k) {
+    const double after_s = std::max(0.0, k * disturbance.pass_period_s - disturbance.pass_length_s);
+    const double gain = gain_after(after_s);
+    const int left = disturbance.passes - k;
+    if (gain * left < 1e-9 * total) return total + gain * left;  // gains fall: no later one is larger
+    total += gain;
+  }
+  return total;
 }
 
 DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance) {
   const GainNorms gains = continuous_norms(loop, channel);
-  DisturbanceBounds bounds = disturbance_bounds(gains, disturbance);
+  DisturbanceBounds bounds;
+  bounds.by_rate = times(gains.rate, disturbance.rate_N_s);
+  bounds.by_amplitude = times(gains.amplitude, disturbance.amplitude_N);
+  bounds.by_edges = times(gains.edge, disturbance.variation_N);
+  bounds.by_impulse = times(gains.impulse, disturbance.impulse_N_s);
+  bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
+  if (!is_stable(loop)) return bounds;
   if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1) {
-    double felt = gains.impulse;
-    for (int k = 1; k < disturbance.passes; ++k) {
-      const double after_s = std::max(0.0, k * disturbance.pass_period_s - disturbance.pass_length_s);
-      felt += impulse_gain_after(loop, channel, after_s);
+    bounds.by_impulse =
+        disturbance.impulse_N_s * felt_passes(disturbance, FadingResponse(impulse_transfer(loop, channel)));
+  }
+  if (disturbance.variation_per_pass) {
+    // The force also rises once from zero; without an integrator every edge is felt for ever.
+    bounds.by_edges = kInfinity;
+    if (std::isfinite(disturbance.variation_N) && loop.Ki > 0) {
+      bounds.by_edges =
+          times(gains.edge, disturbance.amplitude_N) +
+          disturbance.variation_N * felt_passes(disturbance, FadingResponse(step_transfer(loop, channel)));
     }
-    bounds.by_impulse = felt * disturbance.impulse_N_s;
   }
   if (std::isfinite(bounds.by_rate) && std::isfinite(bounds.by_amplitude)) {
     bounds.by_both = amplitude_and_rate_bound(loop, channel, disturbance.amplitude_N, disturbance.rate_N_s);
@@ -200,27 +158,33 @@ DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, cons
 }
 
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance, double bias_N,
-                         double integral_share, double limit_m_s) {
+                         double limit_m_s, double integral_share) {
   ClampBounds result;
-  if (loop.Ki == 0) return result;
-  result.exists = std::isfinite(limit_m_s);
+  if (loop.Ki == 0 || std::isinf(limit_m_s)) return result;
+  result.exists = true;
   const GainNorms gains = continuous_norms(loop, channel);
-  const double bias_m_s = std::abs(bias_N) / (loop.mass_kg * loop.Ki);
-  result.demand_m_s =
-      integral_share * (std::min(times(gains.rate, disturbance.amplitude_N),
-                                 times(gains.edge * disturbance.passes, disturbance.impulse_N_s)) +
-                        bias_m_s);
-  result.never_acts = std::isinf(limit_m_s) || result.demand_m_s <= limit_m_s;
-  if (std::isinf(limit_m_s)) return result;
+  double demand_m_s = times(gains.rate, disturbance.amplitude_N);
+  if (std::isfinite(disturbance.impulse_N_s) && is_stable(loop)) {
+    const double felt = disturbance.passes == 1
+                            ? gains.edge
+                            : felt_passes(disturbance, FadingResponse(step_transfer(loop, channel)));
+    demand_m_s = std::min(demand_m_s, disturbance.impulse_N_s * felt);
+  }
+  result.set_demand(integral_share * (demand_m_s + std::abs(bias_N) / (loop.mass_kg * loop.Ki)), limit_m_s);
   AxisLoop without = loop;
   without.Ki = 0;
   const GainNorms pd = continuous_norms(without, channel);
-  // The integrator's force: m Ki_written I, and Ki_written = Ki / share.
   const double integral_N = loop.mass_kg * loop.Ki / integral_share * limit_m_s;
-  result.by_amplitude =
-      times(pd.amplitude, disturbance.amplitude_N) + pd.amplitude * (integral_N + std::abs(bias_N));
-  result.by_impulse = times(pd.impulse * disturbance.passes, disturbance.impulse_N_s) +
-                      pd.amplitude * (integral_N + std::abs(bias_N));
+  const GainNorms pd_command =
+      channel == Channel::kCommand ? pd : continuous_norms(without, Channel::kCommand);
+  const double constant_m = pd_command.amplitude * integral_N + pd.amplitude * std::abs(bias_N);
+  result.by_amplitude = times(pd.amplitude, disturbance.amplitude_N) + constant_m;
+  if (std::isfinite(disturbance.impulse_N_s) && is_stable(without)) {
+    const double felt = disturbance.passes == 1
+                            ? pd.impulse
+                            : felt_passes(disturbance, FadingResponse(impulse_transfer(without, channel)));
+    result.by_impulse = disturbance.impulse_N_s * felt + constant_m;
+  }
   return result;
 }
 

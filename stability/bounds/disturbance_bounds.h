@@ -1,6 +1,7 @@
 /// @file Bounds on the tracking error of one axis from what is known of a force error, and the smallest of them.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -13,11 +14,20 @@ namespace swarmcert::stability {
 struct Disturbance {
   double rate_N_s = std::numeric_limits<double>::infinity();     ///< sup |f'|
   double amplitude_N = std::numeric_limits<double>::infinity();  ///< sup |f|
-  double variation_N = std::numeric_limits<double>::infinity();  ///< total variation of f
+  double variation_N =
+      std::numeric_limits<double>::infinity();  ///< total variation of f, rise from zero included
   double impulse_N_s = std::numeric_limits<double>::infinity();  ///< int |f| dt, of one pass
   int passes = 1;                                                ///< how many such passes
   double pass_period_s = 0;  ///< least time from the start of one pass to the start of the next
   double pass_length_s = 0;  ///< how long one pass lasts
+  /// Whether variation_N, too, is that of one pass, of a force that need not vanish between passes.
+  bool variation_per_pass = false;
+  bool operator==(const Disturbance& o) const {
+    return rate_N_s == o.rate_N_s && amplitude_N == o.amplitude_N && variation_N == o.variation_N &&
+           impulse_N_s == o.impulse_N_s && passes == o.passes && pass_period_s == o.pass_period_s &&
+           pass_length_s == o.pass_length_s && variation_per_pass == o.variation_per_pass;
+  }
+  static constexpr int kManyPasses = 1000;  ///< stands for a flight of any length: older passes are not felt
 };
 
 /// Bounds on sup |e|, m. Infinite where a number is not known.
@@ -35,35 +45,39 @@ struct DisturbanceBounds {
   std::string which() const;
 };
 
-/// What the gains alone give, of a continuous or a sampled loop: every pass counts in full, B5 = min(B1, B2).
-DisturbanceBounds disturbance_bounds(const GainNorms& gains, const Disturbance& disturbance);
-
-/// The same of a continuous loop with its kernel: B5 is solved, and earlier passes count as far as they can still be felt.
+/// Of a continuous loop. Earlier passes count as far as they can still be felt.
 DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance);
 
-/// What a clamp |int e| <= limit does to bounds of the linear continuous loop. For a sampled loop these are estimates.
+/// sum over the passes of gain_after(time since the pass ended): what all of them together can do, per unit of one.
+/// @param gain_after falls.
+double felt_passes(const Disturbance& disturbance, const std::function<double(double)>& gain_after);
+
+/// What a clamp |int e| <= limit does to bounds of the linear loop.
 struct ClampBounds {
   bool exists = false;  ///< whether there is a clamp, and an integrator that it could stop
-  /// The integrator of the linear loop stays below this, m s: min(|h|_1 sup|f|, |h|_oo int|f|) plus |bias|/(m Ki).
+  /// The integrator of the linear loop stays below this, m s: the gain from f to int e, plus |bias|/(m Ki).
   double demand_m_s = 0;
   /// Whether the demand is within the limit: then the clamp never acts, and bounds of the linear loop hold.
   bool never_acts = true;
-  /// Holds whether it acts or not: the integral is a force of at most m Ki limit, which the loop without integral sees
-  /// beside f. |h'_PD|_1 (m Ki limit + sup|f + bias|), or for impulses |h'_PD|_oo int|f| + |h'_PD|_1 (m Ki limit + |bias|).
+  /// Holds whether it acts or not: the integral is a command of at most m Ki limit, which the loop without integral
+  /// sees beside f. |h'_PD|_1 sup|f + bias| + |c'_PD|_1 m Ki limit, c the command channel, or for impulses
+  /// |h'_PD|_oo int|f| + |h'_PD|_1 |bias| + |c'_PD|_1 m Ki limit.
   double by_amplitude = std::numeric_limits<double>::infinity();
   double by_impulse = std::numeric_limits<double>::infinity();
+
+  void set_demand(double value_m_s, double limit_m_s) {
+    demand_m_s = value_m_s;
+    never_acts = value_m_s <= limit_m_s;
+  }
 };
 
-/// @param loop with the integral gain as it acts. @param integral_share what the firmware adds to its integrator per
-///   second of error: 1 unless its step differs from its period. @param limit_m_s on that integrator; infinite: none.
+/// @param loop with the integral gain as it acts. @param bias_N constant part of the force error, which a settled
+///   integrator cancels. @param limit_m_s infinite: none. @param integral_share what the firmware adds to its integrator
+///   per second of error: 1 unless its step differs from its period. For a sampled loop's own clamp see sampled_bounds.h.
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance, double bias_N,
-                         double integral_share, double limit_m_s);
+                         double limit_m_s, double integral_share = 1);
 
-/// sup |e| over all f with |f| <= amplitude and |f'| <= rate, from rest. It is a linear program in f; its dual is
-///   min over u of  amplitude TV(u) + rate |h - u|_1,
-/// a split of the kernel h: part of it sees f through its amplitude, the rest through its rate. Every u proves a bound.
-/// The best u on a grid of `nodes` is found exactly (total-variation denoising by slope trick), its bound evaluated
-/// with the interpolation error of h added.
+/// sup |e| over all f with |f| <= amplitude and |f'| <= rate, from rest: split_bound() of h on a grid of `nodes`.
 double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double amplitude_N, double rate_N_s,
                                 int nodes = 6000);
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 
+#include "stability/bounds/sampled_adjoint.h"
 #include "stability/bounds/sampled_model.h"
 
 namespace swarmcert::stability {
@@ -15,29 +15,10 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
-using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<double GainNorms::*, 4> kAllGains = {&GainNorms::rate, &GainNorms::amplitude,
                                                           &GainNorms::edge, &GainNorms::impulse};
-
-MatrixXd without_row(const MatrixXd& m, Index row) {
-  MatrixXd result(m.rows() - 1, m.cols());
-  result.topRows(row) = m.topRows(row);
-  result.bottomRows(m.rows() - 1 - row) = m.bottomRows(m.rows() - 1 - row);
-  return result;
-}
-
-/// A map of the state without the integral, which nothing reads where Ki is 0; its eigenvalue 1 would mislead.
-MatrixXd without_unread(const MatrixXd& map, const SampledModel& model, double Ki) {
-  if (Ki > 0) return map;
-  const MatrixXd fewer_rows = without_row(map, model.integral_index());
-  return without_row(fewer_rows.transpose(), model.integral_index()).transpose();
-}
-
-double radius(const MatrixXd& map) {
-  return Eigen::EigenSolver<MatrixXd>(map, false).eigenvalues().cwiseAbs().maxCoeff();
-}
 
 /// Adds up |kernel|, |its integral| and their extrema backwards in time from the moment looked at.
 class KernelSum {
@@ -87,65 +68,34 @@ class KernelSum {
 /// Gains to e at one phase of the period; per unit of acceleration.
 class PhaseGains {
  public:
-  PhaseGains(const SampledLoop& loop, Channel channel) : loop_(loop), channel_(channel), model_(loop) {
-    map_ = model_.hold() * model_.control();
-    const double slowest = radius(without_unread(map_, model_, loop.plant.Ki));
-    stable_ = slowest < 1;
-    periods_ = stable_ ? static_cast<long>(std::ceil(42 / -std::log(std::max(slowest, 1e-6)))) + 60 : 0;
-  }
+  PhaseGains(const SampledLoop& loop, Channel channel) : channel_(channel), adjoint_(loop) {}
 
-  bool stable() const { return stable_; }
+  bool stable() const { return adjoint_.is_stable(); }
 
   GainNorms at(double phase_s) const {
-    const RowVectorXd error = model_.error_at(phase_s);
-    RowVectorXd row = error * model_.control();
-    const Index n = row.size();
-    KernelSum force;
+    const double period_s = adjoint_.period_s();
+    if (channel_ == Channel::kForce) {
+      KernelSum force;
+      adjoint_.force_kernel(phase_s, [&](double start, double slope, double length) {
+        force.add_linear(start, slope, length);
+      });
+      return force.norms();
+    }
     GainNorms command;
-    double command_step = 0;
-    const VectorXd from_command = model_.hold().col(model_.command_index());
-    const auto add_command = [&](double kernel) {
-      command_step += kernel;
+    double step = 0;
+    adjoint_.command_kernel(phase_s, [&](double kernel) {
+      step += kernel;
       command.amplitude += std::abs(kernel);
-      command.impulse = std::max(command.impulse, std::abs(kernel) / loop_.period_s);
-      command.edge = std::max(command.edge, std::abs(command_step));
-      command.rate += std::abs(command_step) * loop_.period_s;
-    };
-    const bool is_force = channel_ == Channel::kForce;
-    if (is_force) {
-      force.add_linear(0, 1, phase_s);
-    } else {
-      add_command(error[model_.command_index()]);
-    }
-    // row <- row * map, on plain arrays: this loop runs up to a million times.
-    std::vector<double> now(row.data(), row.data() + n);
-    std::vector<double> next(now.size());
-    for (long j = 0; j < periods_; ++j) {
-      if (is_force) {
-        force.add_linear(now[1], now[0], loop_.period_s);
-      } else {
-        double kernel = 0;
-        for (Index i = 0; i < n; ++i) kernel += now[static_cast<std::size_t>(i)] * from_command[i];
-        add_command(kernel);
-      }
-      for (Index c = 0; c < n; ++c) {
-        double total = 0;
-        const double* column = map_.data() + c * n;
-        for (Index i = 0; i < n; ++i) total += now[static_cast<std::size_t>(i)] * column[i];
-        next[static_cast<std::size_t>(c)] = total;
-      }
-      now.swap(next);
-    }
-    return is_force ? force.norms() : command;
+      command.impulse = std::max(command.impulse, std::abs(kernel) / period_s);
+      command.edge = std::max(command.edge, std::abs(step));
+      command.rate += std::abs(step) * period_s;
+    });
+    return command;
   }
 
  private:
-  SampledLoop loop_;
   Channel channel_;
-  SampledModel model_;
-  MatrixXd map_;
-  bool stable_ = false;
-  long periods_ = 0;
+  SampledAdjoint adjoint_;
 };
 
 /// The largest value of one gain over the phases, from its values on a grid: golden section around the best.
@@ -186,7 +136,7 @@ double effective_Ki(const SampledLoop& loop) {
 
 double spectral_radius(const SampledLoop& loop) {
   const SampledModel model(loop);
-  return radius(without_unread(model.hold() * model.control(), model, loop.plant.Ki));
+  return largest_modulus(without_unread(model.hold() * model.control(), model, loop.plant.Ki));
 }
 
 GainNorms sampled_norms(const SampledLoop& loop, Channel channel, Instants instants) {
@@ -212,7 +162,7 @@ NoiseDeviation noise_deviation(const SampledLoop& loop, double position_m, doubl
   const SampledModel model(loop);
   const double Ki = loop.plant.Ki;
   const MatrixXd map = without_unread(model.hold() * model.control(), model, Ki);
-  if (!(radius(map) < 1)) return {kInfinity, kInfinity};
+  if (!(largest_modulus(map) < 1)) return {kInfinity, kInfinity};
   // Noise enters where the control reads e and e': the columns of control() less what is the state itself.
   MatrixXd read = model.control().leftCols(2);
   read(0, 0) -= 1;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stability/bounds/sampled_bounds.h"
+
 namespace swarmcert::stability {
 namespace {
 
@@ -40,12 +42,17 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
   const auto add = [&report](const std::string& name, const std::string& status, const std::string& note) {
     report.assumptions.push_back({name, status, note});
   };
-  const std::string from = source.kind == "measured" ? "measured" : "assumed";
   if (source.kind == "rate of f_hat") {
     add("rate of f_hat", "proved", "bounds the learned force, not its error: gives no ball");
+  } else if (source.kind == "declared truth") {
+    add("the force is that of the declared truth", "assumed", source.note);
+    add("constants of the declared truth", "proved", "enclosed over the motions stated");
+    if (source.f_hat_rate_known) add("rate of f_hat", "proved", "from the network's Lipschitz constant");
   } else if (source.kind != "none") {
-    add("disturbance class", from, source.kind + " numbers bound the learning error");
+    add("disturbance class", source.kind == "measured" ? "measured" : "assumed",
+        source.kind + " numbers bound the learning error: " + source.note);
   }
+  for (const std::string& assumption : source.further_assumptions) add(assumption, "assumed", "");
   add("mass and thrust scale as in the model", "assumed", "--uncertain encloses intervals");
   add("no saturation of the collective thrust",
       report.thrust_margin_N && *report.thrust_margin_N >= 0 ? "proved" : "assumed",
@@ -104,7 +111,8 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
     if (!loop) continue;
     report.facts.push_back(facts_of(gains, *loop, sampled, axis, source.bias_N[i]));
     std::vector<ExactGains> rows;
-    if (!done.empty() && same(done.back(), *loop)) {
+    const bool repeats_last_axis = !done.empty() && same(done.back(), *loop);
+    if (repeats_last_axis) {
       for (const ExactGains& row : report.exact) {
         if (row.axis == axis - 1) rows.push_back(row);
       }
@@ -119,32 +127,36 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
       }
     }
     done.push_back(*loop);
-    AxisLoop acting = *loop;
-    const double share = sampled ? sampled->integrator_step_s / sampled->period_s : 1;
-    acting.Ki *= share;
-    const auto clamp_of = [&](Channel channel) {
-      return clamp_bounds(acting, channel, known, source.bias_N[i], share, gains.integrator_limit_m_s[i]);
-    };
-    integrator_needs[i] = clamp_of(Channel::kForce).demand_m_s;
-    for (const ExactGains& row : rows) {
+    const double limit_m_s = gains.integrator_limit_m_s[i];
+    const bool is_repeated = repeats_last_axis && axis > 0 && known == source.axis[axis - 1] &&
+                             source.bias_N[i] == source.bias_N[i - 1] &&
+                             limit_m_s == gains.integrator_limit_m_s[i - 1];
+    const std::size_t of_last_axis = report.bounds.size() - std::min(report.bounds.size(), rows.size());
+    integrator_needs[i] =
+        is_repeated ? integrator_needs[i - 1]
+        : sampled   ? clamp_bounds(*sampled, Channel::kForce, known, source.bias_N[i], limit_m_s).demand_m_s
+                    : clamp_bounds(*loop, Channel::kForce, known, source.bias_N[i], limit_m_s).demand_m_s;
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const ExactGains& row = rows[k];
       report.exact.push_back(row);
+      if (source.kind == "none") continue;
       AxisBounds bounds;
+      if (is_repeated) bounds = report.bounds[of_last_axis + k];
       bounds.axis = axis;
       bounds.channel = row.channel;
       bounds.loop = row.loop;
-      if (row.loop == Loop::kSampled) {
-        bounds.bounds = disturbance_bounds(row.all_times, known);
-        bounds.clamp = clamp_of(row.channel);
-      } else {
+      if (!is_repeated && row.loop == Loop::kSampled) {
+        bounds.bounds = disturbance_bounds(*sampled, row.channel, row.all_times, known);
+        bounds.clamp = clamp_bounds(*sampled, row.channel, known, source.bias_N[i], limit_m_s);
+      } else if (!is_repeated) {
         bounds.bounds = disturbance_bounds(*loop, row.channel, known);
-        bounds.clamp =
-            clamp_bounds(*loop, row.channel, known, source.bias_N[i], 1, gains.integrator_limit_m_s[i]);
+        bounds.clamp = clamp_bounds(*loop, row.channel, known, source.bias_N[i], limit_m_s);
       }
       if (source.f_hat_rate_known) {
         bounds.staircase_m = staircase_error(row.all_times, gains.network_rate_hz, gains.network_latency_s,
                                              source.f_hat_rate_N_s);
       }
-      if (source.kind != "none") report.bounds.push_back(bounds);
+      report.bounds.push_back(bounds);
     }
     if (axis == 2 && plant.largest_thrust_N > 0 && std::isfinite(known.amplitude_N)) {
       report.thrust_margin_N =
@@ -159,7 +171,7 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
     report.theorem.why_not.push_back("the force that acts is not the force commanded: thrust scale " +
                                      std::to_string(plant.thrust_scale));
   }
-  const bool bounds_error = source.kind == "declared" || source.kind == "measured";
+  const bool bounds_error = source.bounds_learning_error();
   if (report.theorem.composite) {
     const Composite& composite = *report.theorem.composite;
     report.vector = vector_peak_gain(composite.Lambda, composite.K, plant.mass_kg);

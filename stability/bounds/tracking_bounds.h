@@ -33,9 +33,12 @@ struct DisturbanceSource {
   Disturbance axis[3];
   double rate_norm_N_s = std::numeric_limits<double>::infinity();  ///< d_m: sup |eps'| as a vector
   double bias_N[3] = {0, 0, 0};
-  /// "declared", "measured" or "rate of f_hat": the last bounds the learned force alone, not its error, and so gives
-  /// no ball.
+  /// "declared", "declared truth", "measured" or "rate of f_hat": the last bounds the learned force alone, not its
+  /// error, and so gives no ball.
   std::string kind = "none";
+  std::string note;                              ///< on the numbers, for the list of assumptions
+  std::vector<std::string> further_assumptions;  ///< on which the numbers rest
+  bool bounds_learning_error() const { return kind != "none" && kind != "rate of f_hat"; }
   double f_hat_rate_N_s = 0;  ///< sup |f_hat'|, for the staircase; where known
   bool f_hat_rate_known = false;
 };
@@ -59,8 +62,6 @@ struct AxisBounds {
     const double clamped = clamp.by_amplitude < clamp.by_impulse ? clamp.by_amplitude : clamp.by_impulse;
     return clamp.never_acts && bounds.least() < clamped ? bounds.least() : clamped;
   }
-  /// Whether least() is an estimate and no bound: what a clamp does to a sampled loop is judged by its continuous one.
-  bool is_estimate() const { return loop == Loop::kSampled && clamp.exists; }
   double staircase_m = 0;  ///< to be added for a learned force that is a staircase or late
 };
 

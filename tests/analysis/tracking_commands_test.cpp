@@ -81,6 +81,72 @@ TEST(BoundCommand, MeasuredQuantilesAreTaggedMeasured) {
       3);
 }
 
+/// Flights with an effect that the model lacks; what compare says of them bounds the errors that they had.
+TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
+  const ScratchFolder folder;
+  const std::string truth = kSource + "/stability/models/crazyflie-small-effects.toml";
+  const std::string gains = kSource + "/controller/gains/crazyflie-small.toml";
+  const Json flown =
+      json_of(folder, "simulate swap --vehicles 2 --model " + truth + " --gains " + gains + " -o flights");
+  ASSERT_EQ(run_shell("swarmcert compare " + kSource +
+                          "/stability/models/crazyflie-small.toml flights --json compare.json",
+                      folder.path())
+                .exit_code,
+            0);
+  const Json result = json_of(folder, "bound" + kFlown + " --from compare.json --quantile max");
+  EXPECT_EQ(result["disturbance"]["source"], "measured");
+  double error_z = 0;
+  for (const Json& vehicle : flown["vehicles"])
+    error_z = std::max(error_z, vehicle["max"]["z"].get<double>());
+  int rows = 0;
+  for (const Json& row : result["bounds"]) {
+    if (row["axis"] != "z" || row["loop"] != "sampled" || row["channel"] != "force") continue;
+    ++rows;
+    EXPECT_EQ(row["guarantee"], "bound");
+    EXPECT_GE(row["minimum"].get<double>(), error_z);
+    EXPECT_LT(row["minimum"].get<double>(), 8 * error_z);
+  }
+  EXPECT_EQ(rows, 1);
+  // Every window may bring as much again: more than one impulse, less than many.
+  const double one = result["exact"][9]["between_samples"]["impulse"].get<double>();
+  const Json compare = files::parse_json(read_text(folder / "compare.json"), "compare.json");
+  const double J = compare["learning_error"]["impulse"]["max"]["z"].get<double>();
+  EXPECT_GE(result["bounds"][9]["impulse"].get<double>(), 2 * one * J * (1 - 1e-9));
+}
+
+TEST(BoundCommand, ADeclaredTruthIsEnclosedAndGivesABall) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  const std::string truth = " --truth " + kSource +
+                            "/stability/models/crazyflie-small-effects.toml --speed 1 --own-speed 1 "
+                            "--own-accel 3 --thrust-rate 1 --least-height 0.3 --gap 0.15:0.8";
+  const Json result = json_of(folder, "bound" + gains + truth);
+  EXPECT_EQ(result["disturbance"]["source"], "declared truth");
+  double rate2 = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    double rate = 0;
+    for (const Json& effect : result["truth"]["effects"]) rate += effect["rate_N_s"][axis].get<double>();
+    rate2 += rate * rate;
+  }
+  EXPECT_NEAR(result["theorem"]["ball"].get<double>(), std::sqrt(rate2) * 0.45955882352941174, 1e-9);
+  bool proved = false;
+  for (const Json& a : result["assumptions"]) {
+    proved = proved || (a["name"] == "constants of the declared truth" && a["status"] == "proved");
+  }
+  EXPECT_TRUE(proved);
+  // A network that is to cancel it adds its own rate; without a bound on speed nothing is bounded.
+  const Json with_network = json_of(
+      folder, "bound" + gains + truth + " --accel 2 --network " + kSource + "/nn/networks/demo/network.toml");
+  EXPECT_GT(with_network["theorem"]["ball"].get<double>(), result["theorem"]["ball"].get<double>());
+  const Outcome unknown = run_shell(
+      "swarmcert bound" + gains + " --truth " + kSource + "/stability/models/crazyflie-small-effects.toml",
+      folder.path());
+  EXPECT_EQ(unknown.exit_code, 0);
+  EXPECT_NE(unknown.output.find("needs the relative speed: --speed"), std::string::npos) << unknown.output;
+  EXPECT_EQ(run_shell("swarmcert bound" + gains + truth + " --rate 1", folder.path()).exit_code, 2);
+  EXPECT_EQ(run_shell("swarmcert bound" + gains + truth + " --gap 3:1", folder.path()).exit_code, 2);
+}
+
 TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
   const ScratchFolder folder;
   const std::string gains =

@@ -1,0 +1,153 @@
+#include "stability/bounds/field_slope.h"
+
+#include <cmath>
+#include <queue>
+
+#include "stability/bounds/interval_functions.h"
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kTouching_m = 0.05;
+constexpr double kNearest_m = 0.12;
+constexpr double kFarSpreads = 7;
+constexpr double kGap = 1e-3;
+constexpr int kMostBoxes = 6000;
+
+enum Slope { kTotal, kAcross, kAlong };
+
+/// 1/x of an interval of positive numbers that may be unbounded.
+Interval inverse(Interval x) { return {std::isinf(x.hi) ? 0 : down(1 / x.hi), up(1 / x.lo)}; }
+
+Interval square(Interval x) { return abs(x) * abs(x); }
+
+/// q = r / spread(h), and z, on one side of kNearest_m.
+struct Box {
+  Interval q, z;
+  double bound = 0;
+  bool operator<(const Box& other) const { return bound < other.bound; }
+};
+
+class Slopes {
+ public:
+  Slopes(const WakeField& field, Slope which) : field_(field), which_(which) {
+    at_nearest_ = pow(Interval(0.3) / Interval(kNearest_m), field.decay);
+  }
+
+  Interval operator()(Interval q, Interval z) const {
+    // Beyond kFarSpreads, q^k exp(-q^2/2) with k <= 2 falls, so its values lie between 0 and that at the near end.
+    const bool is_far = std::isinf(q.hi);
+    const Interval nearest(q.lo);
+    const Interval exponent = square(is_far ? nearest : q) / Interval(2);
+    Interval E = exp(-exponent);
+    Interval qE = (is_far ? nearest : q) * E;
+    Interval qqE = square(is_far ? nearest : q) * E;
+    if (is_far) E.lo = qE.lo = qqE.lo = 0;
+    Interval along;
+    Interval across;
+    if (z.hi <= kNearest_m) {
+      const Interval spread =
+          Interval(field_.spread_m) + Interval(field_.spread_slope) * Interval(kNearest_m);
+      const Interval x = (z - Interval(kTouching_m)) / (Interval(kNearest_m) - Interval(kTouching_m));
+      const Interval fade = field_.fades ? smooth_step(x) : Interval(1);
+      const Interval rise =
+          field_.fades ? Interval(6) * x * (Interval(1) - x) / (Interval(kNearest_m) - Interval(kTouching_m))
+                       : Interval(0);
+      along = at_nearest_ * rise * E;
+      across = at_nearest_ * fade * qE / spread;
+    } else {
+      const Interval closeness = inverse(z);
+      const Interval strength = {std::isinf(z.hi) ? (field_.decay > 0 ? 0 : 1) : power(z.hi).lo,
+                                 power(z.lo).hi};
+      const Interval spread = {down(field_.spread_m + down(field_.spread_slope * z.lo)),
+                               std::isinf(z.hi) && field_.spread_slope == 0
+                                   ? up(field_.spread_m)
+                                   : up(field_.spread_m + up(field_.spread_slope * z.hi))};
+      const Interval narrowness = inverse(spread);
+      along = strength *
+              (Interval(field_.spread_slope) * narrowness * qqE - Interval(field_.decay) * closeness * E);
+      across = strength * narrowness * qE;
+    }
+    if (which_ == kAcross) return abs(across);
+    if (which_ == kAlong) return abs(along);
+    return sqrt(square(across) + square(along));
+  }
+
+ private:
+  Interval power(double z) const { return pow(Interval(0.3) / Interval(z), field_.decay); }
+  /// x^2 (3 - 2x), which rises on [0, 1].
+  static Interval smooth_step(Interval x) {
+    const auto at = [](double t) {
+      return Interval(t) * Interval(t) * (Interval(3) - Interval(2) * Interval(t));
+    };
+    return {at(std::max(x.lo, 0.0)).lo, at(std::min(x.hi, 1.0)).hi};
+  }
+
+  const WakeField& field_;
+  Slope which_;
+  Interval at_nearest_;
+};
+
+Interval supremum(const WakeField& field, Slope which, double from_m, double to_m) {
+  const Slopes slope(field, which);
+  std::priority_queue<Box> open;
+  double reached = 0;
+  const auto add = [&](Interval q, Interval z) {
+    open.push({q, z, slope(q, z).hi});
+    const double middle_q = std::isinf(q.hi) ? q.lo : q.lo + (q.hi - q.lo) / 2;
+    const double middle_z = std::isinf(z.hi) ? z.lo : z.lo + (z.hi - z.lo) / 2;
+    for (const double at : {z.lo, middle_z})
+      reached = std::max(reached, slope(Interval(middle_q), Interval(at)).lo);
+  };
+  for (const Interval q : {Interval(0, kFarSpreads), Interval(kFarSpreads, kInfinity)}) {
+    if (from_m < kNearest_m) add(q, {from_m, std::min(to_m, kNearest_m)});
+    if (to_m > kNearest_m) add(q, {std::max(from_m, kNearest_m), to_m});
+  }
+  for (int i = 0; i < kMostBoxes && open.top().bound > reached * (1 + kGap); ++i) {
+    const Box box = open.top();
+    open.pop();
+    const bool halves_z = std::isinf(box.z.hi) || std::isinf(box.q.hi) ||
+                          (box.z.hi - box.z.lo) / box.z.lo > (box.q.hi - box.q.lo);
+    if (halves_z) {
+      const double middle = std::isinf(box.z.hi) ? 2 * box.z.lo : box.z.lo + (box.z.hi - box.z.lo) / 2;
+      if (!(middle > box.z.lo && middle < box.z.hi)) {
+        open.push(box);
+        break;
+      }
+      add(box.q, {box.z.lo, middle});
+      add(box.q, {middle, box.z.hi});
+    } else {
+      const double middle = box.q.lo + (box.q.hi - box.q.lo) / 2;
+      add({box.q.lo, middle}, box.z);
+      add({middle, box.q.hi}, box.z);
+    }
+  }
+  return {reached, open.top().bound};
+}
+
+}  // namespace
+
+FieldSlopes field_slopes(const WakeField& field, double least_gap_m, double largest_gap_m) {
+  FieldSlopes result;
+  if (largest_gap_m <= kTouching_m) return result;
+  const double from_m = std::max(least_gap_m, kTouching_m);
+  // Straight below, the field rises up to kNearest_m and falls beyond.
+  const double strongest_m = std::max(from_m, kNearest_m);
+  result.value = pow(Interval(0.3) / Interval(strongest_m), field.decay);
+  if (largest_gap_m < kNearest_m && field.fades) {
+    const Interval x =
+        (Interval(largest_gap_m) - Interval(kTouching_m)) / (Interval(kNearest_m) - Interval(kTouching_m));
+    result.value = result.value * x * x * (Interval(3) - Interval(2) * x);
+  }
+  if (!field.fades && least_gap_m <= kTouching_m) {
+    result.total = result.across = result.along = {0, kInfinity};
+    return result;
+  }
+  result.total = supremum(field, kTotal, from_m, largest_gap_m);
+  result.across = supremum(field, kAcross, from_m, largest_gap_m);
+  result.along = supremum(field, kAlong, from_m, largest_gap_m);
+  return result;
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,82 @@
+/// @file What a sampled loop's error at one moment owes to every earlier moment: its kernel, period by period, backwards.
+/// Not for users.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "stability/bounds/sampled_model.h"
+
+namespace swarmcert::stability {
+
+/// `map` without the integral, which nothing reads where Ki is 0; its eigenvalue 1 would mislead.
+Eigen::MatrixXd without_unread(const Eigen::MatrixXd& map, const SampledModel& model, double Ki);
+Eigen::MatrixXd without_row(const Eigen::MatrixXd& m, Eigen::Index row);
+/// Largest modulus of an eigenvalue.
+double largest_modulus(const Eigen::MatrixXd& map);
+
+/// Outputs are e at a phase into a period, or I after the control of a period; kernels are per unit of acceleration.
+class SampledAdjoint {
+ public:
+  enum class Output { kError, kIntegral };
+
+  explicit SampledAdjoint(const SampledLoop& loop, Output output = Output::kError);
+
+  bool is_stable() const { return is_stable_; }
+  double period_s() const { return period_s_; }
+  /// After so many periods all kernels have fallen to e^-42 of themselves.
+  long periods() const { return periods_; }
+
+  /// Calls visit(start, slope, length): the kernel from a force to the output is start + slope u, u growing backwards in
+  /// time, on stretches that follow one another; the first is the part of the period before the moment looked at.
+  template <class Visit>
+  void force_kernel(double phase_s, const Visit& visit) const {
+    const Eigen::RowVectorXd after = output_after_control(phase_s);
+    if (output_ == Output::kError) visit(0.0, 1.0, phase_s);
+    walk(after * model_.control(), [&](const std::vector<double>& row) { visit(row[1], row[0], period_s_); });
+  }
+
+  /// Calls visit(kernel): the response to an error of 1 m/s^2 in the command of this period, of the one before, ...
+  template <class Visit>
+  void command_kernel(double phase_s, const Visit& visit) const {
+    const Eigen::RowVectorXd after = output_after_control(phase_s);
+    const Eigen::VectorXd from_command = model_.hold().col(model_.command_index());
+    visit(after[model_.command_index()]);
+    walk(after * model_.control(), [&](const std::vector<double>& row) {
+      double kernel = 0;
+      for (std::size_t i = 0; i < row.size(); ++i)
+        kernel += row[i] * from_command[static_cast<Eigen::Index>(i)];
+      visit(kernel);
+    });
+  }
+
+ private:
+  Eigen::RowVectorXd output_after_control(double phase_s) const;
+
+  /// row <- row * map, on plain arrays: this loop runs up to a million times.
+  template <class Visit>
+  void walk(const Eigen::RowVectorXd& first, const Visit& visit) const {
+    std::vector<double> now(first.data(), first.data() + first.size());
+    std::vector<double> next(now.size());
+    for (long j = 0; j < periods_; ++j) {
+      visit(now);
+      const double* column = map_.data();
+      for (double& to : next) {
+        double total = 0;
+        for (std::size_t i = 0; i < now.size(); ++i) total += now[i] * column[i];
+        to = total;
+        column += now.size();
+      }
+      now.swap(next);
+    }
+  }
+
+  double period_s_;
+  Output output_;
+  SampledModel model_;
+  Eigen::MatrixXd map_;
+  bool is_stable_ = false;
+  long periods_ = 0;
+};
+
+}  // namespace swarmcert::stability

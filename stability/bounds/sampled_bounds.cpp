@@ -1,0 +1,162 @@
+#include "stability/bounds/sampled_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stability/bounds/amplitude_and_rate.h"
+#include "stability/bounds/sampled_adjoint.h"
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kPhases = 5;
+
+double times(double factor, double known) { return std::isinf(known) ? kInfinity : factor * known; }
+
+/// The kernel of one output at one phase, in cells that follow one another backwards in time; per unit of force.
+struct Kernel {
+  std::vector<double> length;
+  std::vector<double> peak;       ///< largest |kernel| on a cell
+  std::vector<double> step;       ///< its integral up to a cell's start, and to the end of the last
+  std::vector<double> step_peak;  ///< largest |integral| on a cell
+  std::vector<double> bend;       ///< of the integral away from its chord, over a cell
+  double area = 0;                ///< int |kernel|
+
+  void add(double start, double slope, double cell) {
+    const double end = start + slope * cell;
+    const double before = step.back();
+    length.push_back(cell);
+    peak.push_back(std::max(std::abs(start), std::abs(end)));
+    step.push_back(before + (start + end) / 2 * cell);
+    double most = std::max(std::abs(before), std::abs(step.back()));
+    if (start * end < 0) {
+      most = std::max(most, std::abs(before - start * start / slope / 2));
+      area += (start * start + end * end) / std::abs(slope) / 2;
+    } else {
+      area += std::abs(step.back() - before);
+    }
+    step_peak.push_back(most);
+    bend.push_back(std::abs(slope) * cell * cell * cell / 12);
+  }
+};
+
+Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s, double mass_kg) {
+  Kernel kernel;
+  kernel.step.push_back(0);
+  if (channel == Channel::kForce) {
+    adjoint.force_kernel(phase_s, [&](double start, double slope, double length) {
+      kernel.add(start / mass_kg, slope / mass_kg, length);
+    });
+  } else {
+    // An error of one period is a force held for the period: int |eps| dt counts it as it counts a force.
+    const double period_s = adjoint.period_s();
+    adjoint.command_kernel(
+        phase_s, [&](double response) { kernel.add(response / (mass_kg * period_s), 0, period_s); });
+  }
+  return kernel;
+}
+
+/// Largest of `values` (one per cell) at `after_s` or earlier in time; falls with after_s.
+class FadingKernel {
+ public:
+  FadingKernel(const Kernel& kernel, std::vector<double> values) : suffix_(std::move(values)) {
+    for (std::size_t i = suffix_.size() - 1; i-- > 0;) suffix_[i] = std::max(suffix_[i], suffix_[i + 1]);
+    double end_s = 0;
+    for (const double length : kernel.length) end_s_.push_back(end_s += length);
+  }
+  double operator()(double after_s) const {
+    const auto cell = std::upper_bound(end_s_.begin(), end_s_.end(), after_s) - end_s_.begin();
+    return suffix_[std::min(static_cast<std::size_t>(cell), suffix_.size() - 1)];
+  }
+
+ private:
+  std::vector<double> suffix_, end_s_;
+};
+
+/// The worst of `bound` over the phases at which the error may be looked at.
+template <class Bound>
+double worst_phase(const SampledLoop& loop, const Bound& bound) {
+  double worst = 0;
+  for (int i = 0; i < kPhases; ++i) worst = std::max(worst, bound(loop.period_s * i / (kPhases - 1)));
+  return worst;
+}
+
+}  // namespace
+
+DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
+                                     const Disturbance& disturbance) {
+  DisturbanceBounds bounds;
+  bounds.by_rate = times(gains.rate, disturbance.rate_N_s);
+  bounds.by_amplitude = times(gains.amplitude, disturbance.amplitude_N);
+  bounds.by_edges = times(gains.edge, disturbance.variation_N);
+  bounds.by_impulse = times(gains.impulse, disturbance.impulse_N_s);
+  bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
+  const SampledAdjoint adjoint(loop);
+  if (!adjoint.is_stable()) return bounds;
+  const double mass_kg = loop.plant.mass_kg;
+  if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1) {
+    bounds.by_impulse = disturbance.impulse_N_s * worst_phase(loop, [&](double phase_s) {
+                          const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
+                          return felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
+                        });
+  }
+  if (disturbance.variation_per_pass) {
+    bounds.by_edges = kInfinity;
+    if (std::isfinite(disturbance.variation_N) && loop.plant.Ki > 0) {
+      bounds.by_edges = times(gains.edge, disturbance.amplitude_N) +
+                        disturbance.variation_N * worst_phase(loop, [&](double phase_s) {
+                          const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
+                          return felt_passes(disturbance, FadingKernel(kernel, kernel.step_peak));
+                        });
+    }
+  }
+  const double E = disturbance.amplitude_N, d = disturbance.rate_N_s;
+  if (std::isfinite(bounds.by_rate) && std::isfinite(bounds.by_amplitude) && E > 0 && d > 0) {
+    const double both = worst_phase(loop, [&](double phase_s) {
+      // In the command, rate acts once per period on the sum up to there; the trapezoids count as much.
+      const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
+      return split_bound({kernel.step, kernel.length, kernel.bend, 1e-12 * gains.rate}, E, d);
+    });
+    bounds.by_both = std::min(bounds.by_both, both);
+  }
+  return bounds;
+}
+
+ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
+                         double bias_N, double limit_m_s) {
+  ClampBounds result;
+  if (loop.plant.Ki == 0 || std::isinf(limit_m_s)) return result;
+  result.exists = true;
+  const double mass_kg = loop.plant.mass_kg;
+  double demand_m_s = kInfinity;
+  const SampledAdjoint integral(loop, SampledAdjoint::Output::kIntegral);
+  if (integral.is_stable()) {
+    const Kernel kernel = kernel_of(integral, channel, 0, mass_kg);
+    demand_m_s = times(kernel.area, disturbance.amplitude_N);
+    if (std::isfinite(disturbance.impulse_N_s)) {
+      demand_m_s = std::min(
+          demand_m_s, disturbance.impulse_N_s * felt_passes(disturbance, FadingKernel(kernel, kernel.peak)));
+    }
+  }
+  result.set_demand(demand_m_s + std::abs(bias_N) / (mass_kg * loop.plant.Ki), limit_m_s);
+  SampledLoop without = loop;
+  without.plant.Ki = 0;
+  const SampledAdjoint pd_adjoint(without);
+  if (!pd_adjoint.is_stable()) return result;
+  const GainNorms pd = sampled_norms(without, channel, Instants::kAll);
+  const GainNorms pd_command =
+      channel == Channel::kCommand ? pd : sampled_norms(without, Channel::kCommand, Instants::kAll);
+  const double constant_m =
+      pd_command.amplitude * mass_kg * loop.plant.Ki * limit_m_s + pd.amplitude * std::abs(bias_N);
+  result.by_amplitude = times(pd.amplitude, disturbance.amplitude_N) + constant_m;
+  if (std::isfinite(disturbance.impulse_N_s)) {
+    result.by_impulse = constant_m + disturbance.impulse_N_s * worst_phase(without, [&](double phase_s) {
+                                       const Kernel kernel = kernel_of(pd_adjoint, channel, phase_s, mass_kg);
+                                       return felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
+                                     });
+  }
+  return result;
+}
+
+}  // namespace swarmcert::stability

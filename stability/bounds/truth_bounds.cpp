@@ -1,0 +1,190 @@
+#include "stability/bounds/truth_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stability/bounds/field_slope.h"
+#include "stability/bounds/interval_functions.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Product of nonnegative numbers, rounded up, in which a factor of 0 wins over one that is not known.
+double times(double a, double b) { return a == 0 || b == 0 ? 0 : up(a * b); }
+double plus(double a, double b) { return up(a + b); }
+
+/// 1/x from above.
+double one_over(double x) { return x > 0 ? up(1 / x) : kInfinity; }
+
+void set_all(double* three, double value) { std::fill(three, three + 3, value); }
+
+/// Values of a spec by name.
+class Values {
+ public:
+  Values(const EffectSpec& spec, const EffectInfo& info) : info_(info), values_(effect_values(info, spec)) {}
+  double operator()(const char* name) const {
+    for (std::size_t i = 0; i < info_.linear.size(); ++i) {
+      if (info_.linear[i].name == name) return values_.linear[i];
+    }
+    for (std::size_t i = 0; i < info_.shape.size(); ++i) {
+      if (info_.shape[i].name == name) return values_.shape[i];
+    }
+    throw std::logic_error(std::string("no parameter ") + name);
+  }
+
+ private:
+  const EffectInfo& info_;
+  EffectValues values_;
+};
+
+/// N^(1/p) from above: how much stronger N equal forces composed with the norm p are than one.
+double composed(int neighbours, double p) {
+  return neighbours <= 1 ? 1 : pow(Interval(neighbours), 1 / p).hi * (1 + 1e-15 * neighbours);
+}
+
+/// A field of position: its amplitude along z, its rate by slope and relative speed.
+void field_bounds(const WakeField& field, double strength_N, double composition, const MotionSet& motion,
+                  EffectBounds& result) {
+  const FieldSlopes slopes = field_slopes(field, motion.least_gap_m, motion.largest_gap_m);
+  const double factor = times(strength_N, composition);
+  result.amplitude_N[2] = times(factor, slopes.value.hi);
+  result.slope_across_N_m = times(strength_N, slopes.across.hi);
+  result.slope_along_N_m = times(strength_N, slopes.along.hi);
+  double rate = times(factor, times(slopes.total.hi, motion.relative_speed_m_s));
+  if (field.convection_s_m > 0) {
+    // The wake's centre moves with the neighbour: r - k dz v_j changes by k |dz'| |v_j| + k dz |v_j'| more.
+    const double drift = plus(times(motion.relative_speed_m_s, motion.speed_m_s),
+                              times(motion.largest_gap_m, motion.acceleration_m_s2));
+    rate = plus(rate, times(times(factor, slopes.across.hi), times(field.convection_s_m, drift)));
+  }
+  result.rate_N_s[2] = rate;
+  if (std::isinf(slopes.total.hi)) {
+    result.unbounded =
+        "the field jumps where vehicles are 0.05 m apart in height: state --gap from above that";
+  } else if (std::isinf(rate)) {
+    result.unbounded = field.convection_s_m > 0
+                           ? "the wake is carried along: needs --speed, --own-speed, --own-accel and --gap"
+                           : "needs the relative speed: --speed";
+  } else {
+    result.reached_rate_N_s = strength_N * slopes.total.lo * motion.relative_speed_m_s;
+  }
+}
+
+void bound_wake(const std::string& name, const Values& value, const MotionSet& motion, EffectBounds& result) {
+  WakeField field;
+  const bool is_downwash = name == "downwash";
+  field.decay = value("decay_exponent");
+  field.spread_m = value("spread_m");
+  field.fades = is_downwash;
+  double composition = motion.neighbours;
+  double strength_N = value("amplitude_N");
+  if (is_downwash) {
+    field.spread_slope = value("spread_slope");
+    field.convection_s_m = value("convection_s_m");
+    composition = composed(motion.neighbours, value("norm_exponent"));
+    const Interval mass = Interval(motion.neighbour_mass_kg) / Interval(0.034);
+    strength_N = times(strength_N, std::max(1.0, pow(mass, value("mass_exponent")).hi));
+    if (motion.neighbour_mass_kg < 0.034)
+      strength_N = times(value("amplitude_N"), pow(mass, value("mass_exponent")).hi);
+  }
+  field_bounds(field, strength_N, composition, motion, result);
+}
+
+void bound_drag(const std::string& name, const Values& value, const Model& model, const MotionSet& m,
+                EffectBounds& result) {
+  double amplitude = 0;
+  double rate = 0;
+  if (name == "drag_linear") {
+    amplitude = times(value("drag_N_s_m"), m.speed_m_s);
+    rate = times(value("drag_N_s_m"), m.acceleration_m_s2);
+  } else if (name == "drag_quadratic") {
+    // |(|v| v)'| <= 2 |v| |v'|
+    amplitude = times(value("drag_N_s2_m2"), times(m.speed_m_s, m.speed_m_s));
+    rate = times(value("drag_N_s2_m2"), times(2 * m.speed_m_s, m.acceleration_m_s2));
+  } else if (name == "drag_rotor") {
+    // (T (I - b b') v)' = T' (I - b b') v - T (b' b + b b')' v + T (I - b b') v', and |T'| + |T b'| <= sqrt(2) |(T b)'|
+    const double k = times(value("drag_N_s_m"), one_over(down(model.mass_kg * kGravity_m_s2)));
+    amplitude = times(k, times(m.largest_thrust_N, m.speed_m_s));
+    rate = times(k, plus(times(1.4142135623730952, times(m.thrust_rate_N_s, m.speed_m_s)),
+                         times(m.largest_thrust_N, m.acceleration_m_s2)));
+  } else {
+    // inflow: (T (b'v) b)', each of b'v, b and T by its own rate
+    const double k = value("loss_s_m");
+    amplitude = times(k, times(m.largest_thrust_N, m.speed_m_s));
+    rate = times(
+        k, plus(times(2 * m.thrust_rate_N_s, m.speed_m_s), times(m.largest_thrust_N, m.acceleration_m_s2)));
+  }
+  set_all(result.amplitude_N, amplitude);
+  set_all(result.rate_N_s, rate);
+  if (std::isinf(amplitude) || std::isinf(rate)) {
+    result.unbounded = name == "drag_rotor" || name == "inflow"
+                           ? "needs --own-speed, --own-accel and --thrust-rate"
+                           : "needs --own-speed and --own-accel";
+  }
+}
+
+void bound_surface(const std::string& name, const Values& value, const MotionSet& m, EffectBounds& result) {
+  // f = a g T b3 with g = exp(-distance/b): |f'| <= a g (|(T b3)'| + T |v_z|/b). The clamps at the surfaces only reduce.
+  const double decay_m = value("decay_m");
+  const double nearest_m = name == "ground"
+                               ? down(std::max(m.least_height_m, 0.0) - value("height_reference_m"))
+                               : std::max(0.0, down(value("height_m") - m.largest_height_m));
+  const double g = exp(-(Interval(nearest_m) / Interval(decay_m))).hi;
+  const double strength = times(value("amplitude"), g);
+  set_all(result.amplitude_N, times(strength, m.largest_thrust_N));
+  set_all(result.rate_N_s,
+          times(strength,
+                plus(m.thrust_rate_N_s, times(m.largest_thrust_N, times(m.speed_m_s, one_over(decay_m))))));
+  if (std::isinf(result.rate_N_s[2])) result.unbounded = "needs --own-speed and --thrust-rate";
+}
+
+}  // namespace
+
+EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const MotionSet& motion) {
+  EffectBounds result;
+  result.effect = effect.name;
+  const auto nothing_known = [&](const char* why) {
+    set_all(result.amplitude_N, kInfinity);
+    set_all(result.rate_N_s, kInfinity);
+    result.unbounded = why;
+  };
+  if (effect.is_expression()) {
+    nothing_known("a formula of the user has no enclosure here");
+    return result;
+  }
+  const std::string& name = effect.name;
+  const EffectInfo& info = effect_info(name);
+  const Values value(effect, info);
+  if (name == "motor_lag" || name == "delay" || name == "thrust_ratio") {
+    result.note = "acts through the loop";
+  } else if (name == "torque_bias") {
+    result.note = "a torque: no force";
+  } else if (name == "sensor_delay") {
+    result.note = "of the accelerometer: no force";
+  } else if (name == "constant_force") {
+    const char* const axes[] = {"force_x_N", "force_y_N", "force_z_N"};
+    for (int i = 0; i < 3; ++i) result.bias_N[i] = std::abs(value(axes[i]));
+  } else if (name == "downwash" || name == "upper_lift") {
+    bound_wake(name, value, motion, result);
+  } else if (name == "drag_linear" || name == "drag_quadratic" || name == "drag_rotor" || name == "inflow") {
+    bound_drag(name, value, model, motion, result);
+  } else if (name == "ground" || name == "ceiling") {
+    bound_surface(name, value, motion, result);
+  } else if (name == "battery") {
+    nothing_known("scales the thrust with the voltage: enclose it with --uncertain battery=A:B");
+  } else {
+    nothing_known("has no enclosure here; a network's rate comes from --network or --certificate");
+  }
+  return result;
+}
+
+std::vector<EffectBounds> truth_bounds(const Model& model, const MotionSet& motion) {
+  std::vector<EffectBounds> result;
+  for (const EffectSpec& effect : model.effects) result.push_back(truth_bounds(effect, model, motion));
+  return result;
+}
+
+}  // namespace swarmcert::stability

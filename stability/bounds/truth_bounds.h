@@ -1,0 +1,57 @@
+/// @file What a declared truth can do to a vehicle: bounds on the force of physical effects over a set of motions.
+///
+/// A network's certificate bounds the rate of f_hat. The learning error f_hat - f_a also needs f_a, which nobody
+/// measures exactly: here it is declared as effects of a model file, and their constants are enclosed.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/interval.h"
+#include "stability/model.h"
+
+namespace swarmcert::stability {
+
+/// Motions over which a truth is bounded. Infinite: nothing is known.
+struct MotionSet {
+  double relative_speed_m_s = std::numeric_limits<double>::infinity();  ///< |v_j - v| of every neighbour
+  double speed_m_s = std::numeric_limits<double>::infinity();           ///< |v| of every vehicle
+  double acceleration_m_s2 = std::numeric_limits<double>::infinity();   ///< |v'| of every vehicle
+  int neighbours = 1;                                                   ///< that act at once
+  double neighbour_mass_kg = 0;                                         ///< of the heaviest
+  /// Height difference of every neighbour, whichever is above; from zero to infinity where nothing is known.
+  double least_gap_m = 0, largest_gap_m = std::numeric_limits<double>::infinity();
+  double least_height_m = 0, largest_height_m = std::numeric_limits<double>::infinity();
+  double largest_thrust_N = 0;
+  double thrust_rate_N_s = std::numeric_limits<double>::infinity();  ///< |(T b3)'|, the thrust as a vector
+};
+
+/// Force of one effect over a motion set. Every number is an upper bound in real arithmetic.
+struct EffectBounds {
+  std::string effect;
+  double bias_N[3] = {0, 0, 0};       ///< constant part
+  double amplitude_N[3] = {0, 0, 0};  ///< of the rest
+  double rate_N_s[3] = {0, 0, 0};
+  /// Fields of position only: slopes of one neighbour's force, horizontally and vertically. What small gain needs.
+  double slope_across_N_m = 0, slope_along_N_m = 0;
+  /// Some motion of the set comes this near to the bounds, by evaluation at a point: how tight they are. 0: not known.
+  double reached_rate_N_s = 0;
+  std::string unbounded;  ///< why amplitude or rate is infinite; empty where both are finite
+  std::string note;
+};
+
+/// Bounds of one effect:
+///   downwash, upper_lift   largest slope of the field by subdivision of the plane of distance and gap, in intervals;
+///                          N neighbours composed with the norm p give at most N^(1/p) times one (Hoelder);
+///   drags, inflow, ground, ceiling   by the product rule, from bounds of speed, acceleration, thrust and its rate;
+///   constant_force         a bias.
+/// Effects that act through the loop (motor_lag, delay, thrust_ratio) and on rotation alone add nothing here. For
+/// others (networks, formulas of the user) the bounds are infinite and `unbounded` says so.
+/// The Gaussian tails that downwash and upper_lift cut off at seven spreads count as if they were not cut.
+EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const MotionSet& motion);
+
+/// One per effect of `model`.
+std::vector<EffectBounds> truth_bounds(const Model& model, const MotionSet& motion);
+
+}  // namespace swarmcert::stability
