@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include "nn/files/input_error.h"
+
 namespace swarmcert::analysis {
 
 std::string bundled_folder(const std::string& name, const std::string& source) {
@@ -34,7 +36,7 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
       ->check(CLI::ExistingFile);
 }
 
-residuals::Inputs read_flights(const FlightOptions& options) {
+residuals::Inputs read_flights(const FlightOptions& options, bool own_models) {
   residuals::InputArguments arguments;
   arguments.models = options.models;
   for (const std::string& word : options.words) {
@@ -46,8 +48,16 @@ residuals::Inputs read_flights(const FlightOptions& options) {
                         ? bundled_folder("analysis/flights", "analysis/flights") + "/flights.toml"
                         : options.fleet;
   arguments.columns = options.columns;
+  arguments.network = options.network;
   arguments.rules.published = options.published_filter;
-  return residuals::read_inputs(arguments);
+  residuals::Inputs inputs = residuals::read_inputs(arguments);
+  if (!own_models && !inputs.vehicle_models.empty()) {
+    throw files::InputError({arguments.fleet, "",
+                             "vehicle." + inputs.vehicle_models.begin()->first + ".model", "",
+                             "is not the model of the other vehicles of its kind",
+                             "this command works on one model per kind: name it on the command line"});
+  }
+  return inputs;
 }
 
 files::Json json_of(const residuals::Axes& axes) {

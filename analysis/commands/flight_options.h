@@ -13,7 +13,7 @@ namespace swarmcert::analysis {
 struct FlightOptions {
   std::vector<std::string> words;   ///< model.toml files, then flights
   std::vector<std::string> models;  ///< --model
-  std::string fleet, columns;
+  std::string fleet, columns, network;
   bool published_filter = false;
 };
 
@@ -21,7 +21,9 @@ struct FlightOptions {
 void declare_flights(CLI::App& app, FlightOptions& options, bool positional_models);
 
 /// Reads models and the list of flights; the bundled flights.toml where --flights is not given.
-residuals::Inputs read_flights(const FlightOptions& options);
+/// @param own_models  vehicles of one kind may have models of their own (flights.toml).
+/// @throws files::InputError as residuals::read_inputs(), and where they have but may not.
+residuals::Inputs read_flights(const FlightOptions& options, bool own_models = false);
 
 /// Folder of files that ship with the tool: `name` beside an installed tool, else `source` in the source tree.
 std::string bundled_folder(const std::string& name, const std::string& source);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cmath>
 
 #include "analysis/logs/read_log.h"
@@ -170,7 +171,15 @@ GroupErrors errors_of(const std::vector<const Part*>& parts) {
   return group;
 }
 
-TrackPart track_part(const Inputs& inputs, Track& track) {
+const stability::Gains* gains_of(const GainsOfKinds& gains, const std::string& kind) {
+  for (const std::string& name : {kind, std::string()}) {
+    const auto found = gains.find(name);
+    if (found != gains.end()) return &found->second;
+  }
+  return nullptr;
+}
+
+TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& track) {
   TrackPart result;
   TrackErrors& errors = result.errors;
   errors.flight = track.flight;
@@ -182,9 +191,12 @@ TrackPart track_part(const Inputs& inputs, Track& track) {
   errors.clock_offset_s = track.clock_offset_s;
   errors.clock_onsets = track.clock_onsets;
   errors.findings = logs::findings(track.health);
-  if (track.position_only) return result;
+  if (track.position_only) {
+    errors.trajectory.refused = "position only";
+    return result;
+  }
 
-  const stability::Model& model = *inputs.model_of(track.kind);
+  const stability::Model& model = inputs.model_for(track);
   stability::Model nominal = model;
   nominal.effects.clear();
   apply_model(nominal, inputs.kinds, inputs.rules, track);
@@ -219,6 +231,15 @@ TrackPart track_part(const Inputs& inputs, Track& track) {
   result.moments = moments_of(track, r);
   sort_and_shorten(result.moments);
   errors.errors = errors_of({&part});
+  const stability::Gains* const own_gains = gains_of(gains, track.kind);
+  if (own_gains == nullptr) {
+    errors.trajectory.refused = "no gains.toml for vehicles of kind " + track.kind;
+  } else {
+    const stability::Model flown = with_lag(model, *own_gains);
+    apply_model(flown, inputs.kinds, inputs.rules, track);
+    const std::vector<Eigen::Vector3d> left = force_residual(flown, inputs.kinds, inputs.rules, track);
+    errors.trajectory = fly_along(flown, *own_gains, inputs.kinds, track, left);
+  }
   return result;
 }
 
@@ -259,6 +280,50 @@ LearningError learning_error(const std::vector<TrackPart>& parts) {
   result.variation_N = quantiles(variation);
   result.impulse_N_s = quantiles(impulse);
   return result;
+}
+
+Eigen::Vector4d array_of(const Axes& a) { return {a.x, a.y, a.z, a.total}; }
+
+Trajectories trajectories(const std::vector<TrackPart>& parts, bool has_gains) {
+  Trajectories all;
+  Eigen::Vector4d squares = Eigen::Vector4d::Zero(), max = squares, measured = squares, simulated = squares;
+  std::vector<Eigen::Vector4d> ratios;
+  std::string refused;
+  for (const TrackPart& part : parts) {
+    const TrajectoryErrors& track = part.errors.trajectory;
+    if (!track.refused.empty()) {
+      if (!part.errors.position_only) refused = track.refused;
+      continue;
+    }
+    ++all.tracks;
+    if (track.diverged) {
+      ++all.diverged;
+      continue;
+    }
+    all.seconds += track.seconds;
+    squares += track.seconds * array_of(track.rmse).cwiseAbs2();
+    measured += track.seconds * array_of(track.measured_rms).cwiseAbs2();
+    simulated += track.seconds * array_of(track.simulated_rms).cwiseAbs2();
+    max = max.cwiseMax(array_of(track.max));
+    ratios.emplace_back(array_of(track.measured_max).cwiseQuotient(array_of(track.replayed_max)));
+  }
+  if (all.tracks == 0)
+    all.refused = !has_gains ? "no gains were given" : refused.empty() ? "no vehicle has a model" : refused;
+  if (all.seconds == 0) return all;
+  const auto root = [&](const Eigen::Vector4d& sum) {
+    const Eigen::Vector4d v = (sum / all.seconds).cwiseSqrt();
+    return Axes{v[0], v[1], v[2], v[3]};
+  };
+  all.rmse_m = root(squares);
+  all.measured_rms_m = root(measured);
+  all.simulated_rms_m = root(simulated);
+  all.max_m = {max[0], max[1], max[2], max[3]};
+  const LearningError::Quantiles q = quantiles(ratios);
+  Eigen::Vector4d covered = Eigen::Vector4d::Zero();
+  for (const Eigen::Vector4d& ratio : ratios) covered += (ratio.array() <= 1).cast<double>().matrix();
+  covered /= static_cast<double>(ratios.size());
+  all.peak_ratio = {q.p50, q.p95, q.max, {covered[0], covered[1], covered[2], covered[3]}, ratios.size()};
+  return all;
 }
 
 std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts) {
@@ -304,16 +369,38 @@ std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts) {
   return regions;
 }
 
+/// Sets the composition of every track of a flight.
+void name_compositions(const Kinds& kinds, std::vector<TrackPart>& tracks) {
+  std::map<char, int> initials;
+  for (const std::string& kind : kinds.names) ++initials[kind.empty() ? '?' : kind[0]];
+  const bool brief =
+      std::all_of(initials.begin(), initials.end(), [](const auto& entry) { return entry.second == 1; });
+  const auto word = [brief](const std::string& kind) {
+    return brief && !kind.empty() ? std::string(1, static_cast<char>(std::toupper(kind[0]))) : kind;
+  };
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    std::vector<std::string> others;
+    for (std::size_t j = 0; j < tracks.size(); ++j) {
+      if (j != i) others.push_back(word(tracks[j].errors.kind));
+    }
+    std::sort(others.rbegin(), others.rend());
+    std::string name;
+    for (const std::string& other : others) name += (brief || name.empty() ? "" : "+") + other;
+    tracks[i].errors.composition = (name.empty() ? "Ge" : name) + "2" + word(tracks[i].errors.kind);
+  }
+}
+
 }  // namespace
 
-Comparison compare(const Inputs& inputs, int jobs, const Progress& progress) {
+Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, const GainsOfKinds& gains) {
   const auto count = inputs.found.flights.size();
   std::vector<std::vector<TrackPart>> by_flight(count);
   std::vector<std::vector<std::string>> problems(count);
   std::atomic<int> done{0};
   files::parallel_for(static_cast<int>(count), jobs, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    for (Track& track : inputs.load(k, problems[k])) by_flight[k].push_back(track_part(inputs, track));
+    for (Track& track : inputs.load(k, problems[k])) by_flight[k].push_back(track_part(inputs, gains, track));
+    name_compositions(inputs.kinds, by_flight[k]);
     progress(++done, static_cast<int>(count));
   });
 
@@ -324,22 +411,25 @@ Comparison compare(const Inputs& inputs, int jobs, const Progress& progress) {
     result.problems.insert(result.problems.end(), problems[k].begin(), problems[k].end());
   }
   std::vector<const Part*> all;
-  std::map<std::string, std::vector<const Part*>> scenarios, vehicles, kinds;
+  std::map<std::string, std::vector<const Part*>> scenarios, vehicles, kinds, compositions;
   for (const TrackPart& part : parts) {
     if (part.part.points.empty()) continue;
     all.push_back(&part.part);
     scenarios[part.errors.scenario].push_back(&part.part);
     vehicles[part.errors.vehicle].push_back(&part.part);
     kinds[part.errors.kind].push_back(&part.part);
+    compositions[part.errors.composition].push_back(&part.part);
     result.moments.insert(result.moments.end(), part.moments.begin(), part.moments.end());
   }
   result.overall = errors_of(all);
   for (const auto& [name, members] : scenarios) result.scenarios[name] = errors_of(members);
   for (const auto& [name, members] : vehicles) result.vehicles[name] = errors_of(members);
   for (const auto& [name, members] : kinds) result.kinds[name] = errors_of(members);
+  for (const auto& [name, members] : compositions) result.compositions[name] = errors_of(members);
   result.regions = regions_of_all(parts);
   sort_and_shorten(result.moments);
   result.learning_error = learning_error(parts);
+  result.trajectories = trajectories(parts, !gains.empty());
   for (TrackPart& part : parts) result.tracks.push_back(std::move(part.errors));
   return result;
 }

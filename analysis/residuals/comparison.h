@@ -9,6 +9,7 @@
 #include "analysis/residuals/inputs.h"
 #include "analysis/residuals/regions.h"
 #include "analysis/residuals/statistics.h"
+#include "analysis/residuals/trajectory.h"
 
 namespace swarmcert::residuals {
 
@@ -30,12 +31,14 @@ struct Moment {
 /// One vehicle in one flight.
 struct TrackErrors {
   std::string flight, scenario, vehicle, kind, path;
+  std::string composition;  ///< see Comparison::compositions
   bool position_only = false;
   std::array<std::size_t, static_cast<std::size_t>(Cut::kCount)> cut{};  ///< records by what became of them
   double clock_offset_s = 0;
   int clock_onsets = 0;
   std::vector<std::string> findings;  ///< what was wrong with the log
   GroupErrors errors;
+  TrajectoryErrors trajectory;
   std::vector<float> time_s, residual_z_N, nominal_z_N;  ///< every tenth used record, for plots
 };
 
@@ -61,20 +64,44 @@ struct LearningError {
   Quantiles impulse_N_s;  ///< integral of the absolute value
 };
 
+/// The second level over all tracks that have it.
+struct Trajectories {
+  std::string refused;  ///< why no track has it; else empty
+  std::size_t tracks = 0, diverged = 0;
+  double seconds = 0;
+  Axes rmse_m, max_m;                    ///< simulated minus measured position, weighted by seconds
+  Axes measured_rms_m, simulated_rms_m;  ///< from the set point
+  /// Largest measured error over the largest replayed one, per track; of tracks that did not diverge.
+  struct PeakRatio {
+    Axes p50, p95, max;
+    Axes coverage;  ///< share of tracks whose replayed peak is at least the measured one
+    std::size_t tracks = 0;
+  } peak_ratio;
+};
+
 struct Comparison {
   GroupErrors overall;
   std::vector<TrackErrors> tracks;  ///< in order of flights and vehicles
   std::map<std::string, GroupErrors> scenarios, vehicles, kinds;
+  /// By kinds of the neighbours, then of the vehicle, as initials: "SL2S"; "Ge2S" flies alone, over the ground. Kinds
+  /// with one initial are written out: "small+slow2small".
+  std::map<std::string, GroupErrors> compositions;
   std::vector<RegionErrors> regions;  ///< worst first
   std::vector<Moment> moments;        ///< worst first
   LearningError learning_error;
+  Trajectories trajectories;
   std::vector<std::string> problems;  ///< logs that could not be read
 };
 
 /// Shows progress: flights done of all.
 using Progress = std::function<void(int done, int total)>;
 
+/// gains.toml by kind of vehicle; "" stands for every kind without its own.
+using GainsOfKinds = std::map<std::string, stability::Gains>;
+
 /// Compares. The result does not depend on `jobs`.
-Comparison compare(const Inputs& inputs, int jobs, const Progress& progress);
+/// @param gains of the second level, for the kinds that have them.
+/// @throws files::InputError if gains cannot be flown at 500 Hz.
+Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, const GainsOfKinds& gains = {});
 
 }  // namespace swarmcert::residuals

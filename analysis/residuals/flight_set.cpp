@@ -60,7 +60,9 @@ FoundFlights find_flights(const std::vector<std::string>& paths) {
         result.skipped.push_back(file);
         continue;
       }
-      const std::string folder = fs::path(file).parent_path().string();
+      fs::path folder_path = fs::path(file).parent_path();
+      if (folder_path.empty()) folder_path = ".";
+      const std::string folder = folder_path.string();
       std::string& chosen = flights[{folder, name.prefix, name.run}][name.vehicle];
       if (chosen == file) continue;
       if (chosen.empty()) {
@@ -76,7 +78,8 @@ FoundFlights find_flights(const std::vector<std::string>& paths) {
   for (const auto& [key, vehicles] : flights) {
     const auto& [folder, prefix, run] = key;
     FlightFiles flight;
-    flight.scenario = fs::path(fs::absolute(folder).lexically_normal()).filename().string();
+    const fs::path place = fs::absolute(folder).lexically_normal();
+    flight.scenario = (place.has_filename() ? place : place.parent_path()).filename().string();
     if (!prefix.empty()) flight.scenario += "/" + prefix;
     flight.run = run;
     flight.name = flight.scenario + "/" + (run < 10 ? "0" : "") + std::to_string(run);

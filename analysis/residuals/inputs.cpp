@@ -1,6 +1,7 @@
 #include "analysis/residuals/inputs.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 
 #include "analysis/residuals/force_residual.h"
@@ -17,6 +18,38 @@ void add_kind(Kinds& kinds, const std::string& kind, double mass_kg) {
   }
   kinds.names.push_back(kind);
   kinds.masses_kg.push_back(mass_kg);
+}
+
+/// What the networks' authors weighed; their labels rest on it.
+void set_published_mass(stability::Model& model) {
+  if (model.kind == "small") model.mass_kg = 0.032;
+  if (model.kind == "large") model.mass_kg = 0.067;
+}
+
+void set_network(stability::Model& model, const std::string& network) {
+  auto& effects = model.effects;
+  effects.erase(std::remove_if(effects.begin(), effects.end(),
+                               [](const stability::EffectSpec& e) { return e.name == "deep_set"; }),
+                effects.end());
+  stability::EffectSpec spec;
+  spec.name = "deep_set";
+  spec.network = std::filesystem::absolute(network).string();
+  effects.push_back(std::move(spec));
+}
+
+/// The fleet's models: the first of each kind, and the vehicles' own where they differ from it.
+void use_fleet_models(Inputs& inputs, const std::map<std::string, std::string>& flown) {
+  std::map<std::string, std::string> of_kind;
+  std::set<std::string> named;
+  for (const auto& [vehicle, path] : flown) {
+    const stability::Model model = stability::read_model(path);
+    const auto [first, is_new] = of_kind.emplace(model.kind, path);
+    if (is_new)
+      inputs.models.push_back(model);
+    else if (first->second != path)
+      inputs.vehicle_models[vehicle] = model;
+    if (named.insert(path).second) inputs.named_files.push_back(path);
+  }
 }
 
 }  // namespace
@@ -42,13 +75,14 @@ Inputs read_inputs(const InputArguments& arguments) {
                                "give one model per kind"});
     }
   }
-  std::set<std::string> flown, flown_models;
+  std::set<std::string> flown;
+  std::map<std::string, std::string> flown_models;  // by vehicle
   for (const FlightFiles& flight : inputs.found.flights) {
     for (const auto& [vehicle, path] : flight.logs) {
       const auto known = inputs.fleet.find(vehicle);
       if (known == inputs.fleet.end()) continue;
       flown.insert(known->second.kind);
-      flown_models.insert(known->second.model);
+      flown_models[vehicle] = known->second.model;
     }
   }
   for (const auto& [vehicle, use] : inputs.fleet) {
@@ -56,13 +90,7 @@ Inputs read_inputs(const InputArguments& arguments) {
       add_kind(inputs.kinds, use.kind, stability::read_model(use.model).mass_kg);
   }
   if (inputs.models.empty()) {
-    std::set<std::string> seen;
-    for (const std::string& path : flown_models) {
-      stability::Model model = stability::read_model(path);
-      if (!seen.insert(model.kind).second) continue;
-      inputs.named_files.push_back(path);
-      inputs.models.push_back(std::move(model));
-    }
+    use_fleet_models(inputs, flown_models);
     if (inputs.models.empty()) {
       throw files::InputError(
           {arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
@@ -70,6 +98,13 @@ Inputs read_inputs(const InputArguments& arguments) {
            "give a model.toml, or a flights.toml (--flights) that names one per vehicle"});
     }
   }
+  const auto complete = [&](stability::Model& model) {
+    if (!arguments.network.empty()) set_network(model, arguments.network);
+    if (arguments.rules.published) set_published_mass(model);
+  };
+  for (stability::Model& model : inputs.models) complete(model);
+  for (auto& [vehicle, model] : inputs.vehicle_models) complete(model);
+  if (!arguments.network.empty()) inputs.named_files.push_back(arguments.network);
   for (const stability::Model& model : inputs.models) add_kind(inputs.kinds, model.kind, model.mass_kg);
   inputs.fallback_kind = inputs.models[0].kind;
   if (inputs.models.size() == 1 && !flown.empty() && flown.count(inputs.fallback_kind) == 0) {
@@ -85,6 +120,11 @@ const stability::Model* Inputs::model_of(const std::string& kind) const {
   return nullptr;
 }
 
+const stability::Model& Inputs::model_for(const Track& track) const {
+  const auto own = vehicle_models.find(track.vehicle);
+  return own == vehicle_models.end() ? *model_of(track.kind) : own->second;
+}
+
 std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& problems) const {
   // A vehicle whose kind has no model is a neighbour and nothing else.
   Fleet uses = fleet;
@@ -95,8 +135,8 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
       load_flight(found.flights[index], uses, fallback_kind, kinds, map, rules, problems);
   for (Track& track : tracks) {
     if (track.position_only) continue;
-    apply_model(*model_of(track.kind), kinds, rules, track);
-    cut_large_forces(*model_of(track.kind), rules, track);
+    apply_model(model_for(track), kinds, rules, track);
+    cut_large_forces(model_for(track), rules, track);
   }
   return tracks;
 }

@@ -17,13 +17,16 @@ struct InputArguments {
   std::vector<std::string> flights;  ///< files and folders
   std::string fleet;                 ///< flights.toml
   std::string columns;               ///< columns.toml; empty: the known columns
+  std::string network;  ///< a learned force that every model gets, in place of its own; empty: none
   CutRules rules;
 };
 
 /// Everything but the flights' data. Vehicles fly the given model of their kind; without models, the fleet's; a
 /// vehicle that the fleet does not name, and every vehicle where none has the kind of the only model, that model.
 struct Inputs {
-  std::vector<stability::Model> models;
+  std::vector<stability::Model> models;  ///< one per kind
+  /// Where the fleet gives vehicles of one kind several models, those that differ from the kind's, by vehicle.
+  std::map<std::string, stability::Model> vehicle_models;
   Kinds kinds;
   Fleet fleet;
   FoundFlights found;
@@ -31,6 +34,8 @@ struct Inputs {
   CutRules rules;
 
   const stability::Model* model_of(const std::string& kind) const;  ///< nullptr: only a neighbour
+  /// The vehicle's own model, else that of its kind. Precondition: the track is not position only.
+  const stability::Model& model_for(const Track& track) const;
   /// Loads flight `index`; tracks without a model are position only; applies the models.
   std::vector<Track> load(std::size_t index, std::vector<std::string>& problems) const;
   /// model.toml, flights.toml and logs, for the list of inputs of a result.

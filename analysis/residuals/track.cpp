@@ -100,6 +100,9 @@ void fill_instants(Track& track, const logs::Log& log) {
     track.duty[i] = s.duty;
     track.specific_force_m_s2[i] = vector(s.specific_force_m_s2);
     track.restarts[i] = s.restarts ? 1 : 0;
+    if (log.signals.targets)
+      track.targets.push_back(
+          {vector(s.target_position_m), vector(s.target_velocity_m_s), Eigen::Vector3d::Zero()});
   }
 }
 

@@ -10,6 +10,7 @@
 #include "analysis/logs/signals.h"
 #include "analysis/residuals/flight_set.h"
 #include "stability/effects/effect.h"
+#include "stability/tasks/task.h"
 
 namespace swarmcert::residuals {
 
@@ -44,6 +45,7 @@ struct Track {
   std::vector<stability::Neighbour> neighbours;
   std::vector<std::array<double, 4>> duty;
   std::vector<Eigen::Vector3d> specific_force_m_s2;
+  std::vector<stability::Setpoint> targets;  ///< empty where the log has no set points; no accelerations
   std::vector<char> restarts;
   std::vector<Cut> cut;
   std::size_t used = 0;  ///< records without a cut
