@@ -82,6 +82,26 @@ files::Json json_of(const residuals::Trajectories::PeakRatio& ratio) {
           {"tracks", ratio.tracks}};
 }
 
+files::Json json_of(const residuals::NeighbourMap& map) {
+  using Map = residuals::NeighbourMap;
+  files::Json cells = files::Json::array();
+  for (int i = 0; i < Map::kHeights; ++i) {
+    for (int j = 0; j < Map::kLateral; ++j) {
+      const Map::Cell& cell = map.cells[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+      if (cell.records == 0) continue;
+      const auto n = static_cast<double>(cell.records);
+      cells.push_back({{"height_m", Map::kLowest_m + (i + 0.5) * Map::kHeightStep_m},
+                       {"lateral_m", (j + 0.5) * Map::kLateralStep_m},
+                       {"records", cell.records},
+                       {"bias_z", cell.sum_N / n},
+                       {"rmse_z", std::sqrt(cell.squares_N2 / n)}});
+    }
+  }
+  return {
+      {"meaning", "neighbour above the vehicle by height_m, laterally away by lateral_m; middles of cells"},
+      {"cells", std::move(cells)}};
+}
+
 files::Json json_of(const residuals::TrackErrors& track) {
   files::Json json = {{"flight", track.flight},
                       {"scenario", track.scenario},
@@ -127,6 +147,7 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
     entry.update(json_of(region.statistics));
     json["regions"].push_back(std::move(entry));
   }
+  json["neighbour_map"] = json_of(comparison.neighbours);
   json["moments"] = files::Json::array();
   for (const residuals::Moment& moment : comparison.moments) {
     json["moments"].push_back({{"flight", moment.flight},
@@ -145,6 +166,10 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
                             {"impulse", json_of(learning.impulse_N_s)},
                             {"peak_ratio", json_of(comparison.trajectories.peak_ratio)}};
   json["trajectory"] = json_of(comparison.trajectories);
+  for (int k = 1; k < static_cast<int>(residuals::Cut::kCount); ++k) {
+    const auto cut = static_cast<residuals::Cut>(k);
+    json["cut_rules"][residuals::name(cut)] = residuals::rule(cut);
+  }
   json["torque"] =
       "refused: logs at 100 Hz of a loop at 500 Hz alias; the inertia they give is wrong by a factor of 28";
   json["problems"] = comparison.problems;

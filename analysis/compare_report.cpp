@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "analysis/report.h"
 
@@ -71,33 +73,134 @@ void add_region_plot(Report& report, const residuals::Comparison& comparison, in
       "Vertical residual over " + label + ".");
 }
 
-/// The flight with the worst moment.
+/// Mean vertical residual by the place of the nearest neighbour.
+void add_neighbour_map(Report& report, const residuals::NeighbourMap& map) {
+  using Map = residuals::NeighbourMap;
+  constexpr std::size_t kFewest = 20;
+  std::string data;
+  bool any = false;
+  for (int i = 0; i < Map::kHeights; ++i) {
+    for (int j = 0; j < Map::kLateral; ++j) {
+      const Map::Cell& cell = map.cells[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+      const bool enough = cell.records >= kFewest;
+      any = any || enough;
+      data += fmt::format("{} {} {}\n", (j + 0.5) * Map::kLateralStep_m,
+                          Map::kLowest_m + (i + 0.5) * Map::kHeightStep_m,
+                          enough ? gf(cell.sum_N / static_cast<double>(cell.records)) : "NaN");
+    }
+    data += "\n";
+  }
+  if (!any) return;
+  report.figure(
+      "neighbours", data,
+      "stats 'neighbours.dat' using 3 nooutput\n"
+      "m = abs(STATS_min) > abs(STATS_max) ? abs(STATS_min) : abs(STATS_max)\n"
+      "set xlabel 'lateral distance [m]'\nset ylabel 'height of the neighbour above the vehicle [m]'\n"
+      "set cblabel 'mean vertical residual [gf]'\nset palette defined (-1 '#2040a0', 0 '#f4f4f4', 1 "
+      "'#b02020')\nset xrange [0:0.6]\nset yrange [-1:1]\n"
+      "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\n"
+      "plot 'neighbours.dat' using 1:2:3 with image pixels notitle\n",
+      "Mean vertical residual over the place of the laterally nearest neighbour; cells of fewer than 20 "
+      "records are empty.");
+}
+
+/// Vehicles with the worst moments first, then the others, as far as a page can hold them.
 void add_time_series(Report& report, const residuals::Comparison& comparison) {
-  if (comparison.moments.empty()) return;
-  const residuals::Moment& worst = comparison.moments[0];
-  for (const residuals::TrackErrors& track : comparison.tracks) {
-    if (track.flight != worst.flight || track.vehicle != worst.vehicle) continue;
-    std::string data;
-    for (std::size_t i = 0; i < track.time_s.size(); ++i) {
-      data += fmt::format("{} {} {}\n", track.time_s[i],
-                          static_cast<double>(track.residual_z_N[i]) / kGramForce_N,
-                          static_cast<double>(track.nominal_z_N[i]) / kGramForce_N);
+  constexpr std::size_t kMost = 12;
+  std::vector<const residuals::TrackErrors*> chosen;
+  const auto choose = [&](const residuals::TrackErrors& track) {
+    if (chosen.size() < kMost && !track.series.empty() &&
+        std::find(chosen.begin(), chosen.end(), &track) == chosen.end())
+      chosen.push_back(&track);
+  };
+  const auto is_of = [](const residuals::Moment& moment, const residuals::TrackErrors& track) {
+    return moment.path == track.path;
+  };
+  for (const residuals::Moment& moment : comparison.moments) {
+    for (const residuals::TrackErrors& track : comparison.tracks) {
+      if (is_of(moment, track)) choose(track);
     }
-    data += "\n\n";
-    for (const residuals::Moment& moment : comparison.moments) {
-      if (moment.flight == worst.flight && moment.vehicle == worst.vehicle)
-        data += fmt::format("{} {}\n", moment.time_s, moment.residual_N.z() / kGramForce_N);
+  }
+  for (const residuals::TrackErrors& track : comparison.tracks) choose(track);
+  std::vector<TimeSeries> all;
+  for (const residuals::TrackErrors* track : chosen) {
+    TimeSeries series;
+    series.name = track->flight + " " + track->vehicle;
+    float last_s = track->series.front()[0];
+    for (std::array<float, 5> row : track->series) {
+      constexpr float kBreak_s = 0.1F;
+      constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+      if (row[0] - last_s > kBreak_s) series.rows.push_back({(row[0] + last_s) / 2, kNaN, kNaN, kNaN, kNaN});
+      last_s = row[0];
+      for (std::size_t k = 1; k < row.size(); ++k) row[k] /= static_cast<float>(kGramForce_N);
+      series.rows.push_back(row);
     }
-    report.figure(
-        "time", data,
-        "set key outside top right\nset grid\nset xlabel 'time on the log [s]'\n"
-        "set ylabel 'vertical residual [gf]'\nplot 'time.dat' index 0 using 1:3 with lines lc 'gray' title "
-        "'without effects', '' index 0 using 1:2 with lines lw 1.5 title 'model', '' index 1 using 1:2 with "
-        "points pt 7 lc 'red' title 'worst'\n",
-        "The vertical residual of " + worst.vehicle + " in " + worst.flight +
-            ", the flight with the worst moment.");
+    for (std::size_t k = 0; k < comparison.moments.size(); ++k) {
+      const residuals::Moment& moment = comparison.moments[k];
+      if (!is_of(moment, *track)) continue;
+      const auto nearest =
+          std::min_element(track->series.begin(), track->series.end(), [&](const auto& a, const auto& b) {
+            return std::abs(static_cast<double>(a[0]) - moment.time_s) <
+                   std::abs(static_cast<double>(b[0]) - moment.time_s);
+          });
+      series.marks.push_back(
+          {(*nearest)[0], static_cast<int>(k) + 1, moment.residual_N.norm() / kGramForce_N});
+    }
+    all.push_back(std::move(series));
+  }
+  if (all.empty()) return;
+  report.heading("Over time");
+  report.time_series(
+      all, fmt::format("Force residual of {} of {} logs, those with the worst moments first; drag to "
+                       "zoom, double click to zoom out. Flags mark the worst moments.",
+                       all.size(), comparison.tracks.size()));
+}
+
+void add_trajectories(Report& report, const residuals::Comparison& comparison) {
+  const residuals::Trajectories& all = comparison.trajectories;
+  report.heading("Closed loop from the logs' set points");
+  if (!all.refused.empty()) {
+    report.paragraph("Not simulated: " + all.refused + " (--gains).");
     return;
   }
+  const auto row = [](const std::string& name, const residuals::Axes& a, double scale) {
+    return std::vector<std::string>{name, fmt::format("{:.2f}", scale * a.x),
+                                    fmt::format("{:.2f}", scale * a.y), fmt::format("{:.2f}", scale * a.z),
+                                    fmt::format("{:.2f}", scale * a.total)};
+  };
+  report.paragraph(fmt::format("{} logs, {:.0f} s, sampled loop; {} diverged and are left out.", all.tracks,
+                               all.seconds, all.diverged));
+  std::vector<std::vector<std::string>> rows = {
+      row("simulated minus measured, RMS [mm]", all.rmse_m, 1000),
+      row("measured minus set point, RMS [mm]", all.measured_rms_m, 1000),
+      row("simulated minus set point, RMS [mm]", all.simulated_rms_m, 1000)};
+  if (all.peak_ratio.tracks > 0) {
+    rows.push_back(row("peaks, measured over replayed: median", all.peak_ratio.p50, 1));
+    rows.push_back(row("95 % of logs below", all.peak_ratio.p95, 1));
+    rows.push_back(row("share of logs that replay covers", all.peak_ratio.coverage, 1));
+  }
+  report.table({"", "x", "y", "z", "vector"}, rows);
+}
+
+void add_learning_error(Report& report, const residuals::LearningError& learning) {
+  report.heading("What bound --from takes from these flights");
+  report.paragraph(fmt::format(
+      "Quantiles over {} windows of {} s of the residual behind a low-pass of {} Hz; bias: "
+      "mean of a flight.",
+      learning.windows, residuals::LearningError::kWindow_s, residuals::LearningError::kBandwidth_hz));
+  std::vector<std::vector<std::string>> rows;
+  const auto add = [&rows](const std::string& name, const residuals::LearningError::Quantiles& q) {
+    const auto cell = [](const residuals::Axes& a) {
+      return fmt::format("{:.4f} {:.4f} {:.4f}", a.x, a.y, a.z);
+    };
+    rows.push_back({name, cell(q.p50), cell(q.p95), cell(q.p99), cell(q.max)});
+  };
+  add("bias [N]", learning.bias_N);
+  add("amplitude [N]", learning.amplitude_N);
+  add("rate [N/s]", learning.rate_N_s);
+  add("variation per pass [N]", learning.variation_N);
+  add("impulse per pass [N s]", learning.impulse_N_s);
+  report.table({"x y z", "median", "95 %", "99 %", "largest"}, rows);
 }
 
 }  // namespace
@@ -122,6 +225,10 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   for (const auto& [name, errors] : comparison.vehicles) rows.push_back(row(name, errors));
   rows.push_back(row("all", comparison.overall));
   report.table(kHeader, rows);
+  report.paragraph("By kinds of the neighbours, then of the vehicle; Ge flies alone:");
+  rows.clear();
+  for (const auto& [name, errors] : comparison.compositions) rows.push_back(row(name, errors));
+  report.table(kHeader, rows);
 
   report.heading("Where the model fails");
   rows.clear();
@@ -134,7 +241,10 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   const char* const kUnits[] = {"[m]", "[m/s]", "", "[V]", "[s]", "[degrees]"};
   for (int variable = 0; variable < 6; ++variable)
     add_region_plot(report, comparison, variable, kUnits[variable]);
+  add_neighbour_map(report, comparison.neighbours);
   add_time_series(report, comparison);
+  add_trajectories(report, comparison);
+  add_learning_error(report, comparison.learning_error);
 
   report.heading("Flights");
   rows.clear();
@@ -142,6 +252,12 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
     if (!track.position_only) rows.push_back(row(track.flight + " " + track.vehicle, track.errors));
   report.table(kHeader, rows);
   report.heading("What was cut, and why");
+  rows.clear();
+  for (int k = 1; k < static_cast<int>(residuals::Cut::kCount); ++k) {
+    const auto cut = static_cast<residuals::Cut>(k);
+    rows.push_back({name(cut), rule(cut)});
+  }
+  report.table({"cut", "rule"}, rows);
   rows.clear();
   for (const residuals::TrackErrors& track : comparison.tracks) {
     std::string cuts, findings;

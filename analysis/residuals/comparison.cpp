@@ -38,7 +38,27 @@ struct TrackPart {
   Part part;
   std::vector<Window> windows;
   std::vector<Moment> moments;
+  NeighbourMap neighbours;
 };
+
+void add_to_map(const stability::Instant& now, double residual_z_N, NeighbourMap& map) {
+  int row = -1, column = NeighbourMap::kLateral;
+  double nearest_m = INFINITY;
+  for (int j = 0; j < now.num_neighbours; ++j) {
+    const Eigen::Vector3d& dp = now.neighbours[j].dp_W_m;
+    const double lateral_m = dp.head<2>().norm();
+    const double height = std::floor((dp.z() - NeighbourMap::kLowest_m) / NeighbourMap::kHeightStep_m);
+    if (!(lateral_m < nearest_m) || !(height >= 0) || height >= NeighbourMap::kHeights) continue;
+    nearest_m = lateral_m;
+    row = static_cast<int>(height);
+    column = static_cast<int>(std::min(lateral_m / NeighbourMap::kLateralStep_m, 1e6));
+  }
+  if (row < 0 || column >= NeighbourMap::kLateral) return;
+  NeighbourMap::Cell& cell = map.cells[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
+  ++cell.records;
+  cell.sum_N += residual_z_N;
+  cell.squares_N2 += residual_z_N * residual_z_N;
+}
 
 Eigen::Vector4d with_norm(const Eigen::Vector3d& v) {
   return {std::abs(v[0]), std::abs(v[1]), std::abs(v[2]), v.norm()};
@@ -108,8 +128,8 @@ std::vector<Moment> moments_of(const Track& track, const std::vector<Eigen::Vect
       run = kMean;
     }
     if (run < kMean) continue;
-    const Moment moment = {track.flight, track.vehicle, track.instants[i].time_s + track.clock_offset_s,
-                           sum / static_cast<double>(kMean)};
+    const Moment moment = {track.flight, track.vehicle, track.path,
+                           track.instants[i].time_s + track.clock_offset_s, sum / static_cast<double>(kMean)};
     if (!found.empty() && moment.time_s - found.back().time_s < 1) {
       if (moment.residual_N.norm() > found.back().residual_N.norm()) found.back() = moment;
     } else {
@@ -220,10 +240,10 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
     }
     part.blocks.back().squares += r[i].cwiseAbs2();
     part.blocks.back().count += 1;
-    if (part.points.size() % 10 == 1) {
-      errors.time_s.push_back(static_cast<float>(now.time_s + track.clock_offset_s));
-      errors.residual_z_N.push_back(point.r.z());
-      errors.nominal_z_N.push_back(point.r0.z());
+    add_to_map(now, r[i].z(), result.neighbours);
+    if (part.points.size() % 2 == 1) {
+      errors.series.push_back({static_cast<float>(now.time_s + track.clock_offset_s), point.r.x(),
+                               point.r.y(), point.r.z(), point.r0.z()});
     }
   }
   add_spectra(track, r, part.spectrum);
@@ -430,6 +450,17 @@ Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, con
   sort_and_shorten(result.moments);
   result.learning_error = learning_error(parts);
   result.trajectories = trajectories(parts, !gains.empty());
+  for (const TrackPart& part : parts) {
+    for (std::size_t i = 0; i < part.neighbours.cells.size(); ++i) {
+      for (std::size_t j = 0; j < part.neighbours.cells[i].size(); ++j) {
+        const NeighbourMap::Cell& cell = part.neighbours.cells[i][j];
+        NeighbourMap::Cell& sum = result.neighbours.cells[i][j];
+        sum.records += cell.records;
+        sum.sum_N += cell.sum_N;
+        sum.squares_N2 += cell.squares_N2;
+      }
+    }
+  }
   for (TrackPart& part : parts) result.tracks.push_back(std::move(part.errors));
   return result;
 }

@@ -1,6 +1,7 @@
 /// @file A model against flights: how large the force residual is, of whom, when and where.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <string>
@@ -23,7 +24,7 @@ struct GroupErrors {
 };
 
 struct Moment {
-  std::string flight, vehicle;
+  std::string flight, vehicle, path;
   double time_s = 0;                                     ///< of the log's clock
   Eigen::Vector3d residual_N = Eigen::Vector3d::Zero();  ///< mean over 0.1 s
 };
@@ -39,7 +40,7 @@ struct TrackErrors {
   std::vector<std::string> findings;  ///< what was wrong with the log
   GroupErrors errors;
   TrajectoryErrors trajectory;
-  std::vector<float> time_s, residual_z_N, nominal_z_N;  ///< every tenth used record, for plots
+  std::vector<std::array<float, 5>> series;  ///< every second used record: time, residual x, y, z, nominal z
 };
 
 struct RegionErrors {
@@ -47,6 +48,18 @@ struct RegionErrors {
   std::string words;  ///< "height below 0.08 m: +3.5 gf"
   double share = 0;   ///< of all squared residual that this region's bias explains
   ErrorStatistics statistics;
+};
+
+/// Vertical residual over the place of the neighbour that is laterally nearest among those within 1 m in height.
+struct NeighbourMap {
+  static constexpr int kLateral = 12, kHeights = 20;
+  static constexpr double kLateralStep_m = 0.05, kHeightStep_m = 0.1, kLowest_m = -1;
+  struct Cell {
+    std::size_t records = 0;
+    double sum_N = 0, squares_N2 = 0;
+  };
+  /// [height of the neighbour above the vehicle, from kLowest_m up][lateral distance, from 0]
+  std::array<std::array<Cell, kLateral>, kHeights> cells{};
 };
 
 /// Quantiles over windows of kWindow_s of the residual behind a low-pass of kBandwidth_hz.
@@ -90,6 +103,7 @@ struct Comparison {
   std::vector<Moment> moments;        ///< worst first
   LearningError learning_error;
   Trajectories trajectories;
+  NeighbourMap neighbours;
   std::vector<std::string> problems;  ///< logs that could not be read
 };
 

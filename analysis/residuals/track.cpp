@@ -169,6 +169,18 @@ const char* name(Cut cut) {
   return kNames[static_cast<int>(cut)];
 }
 
+const char* rule(Cut cut) {
+  static const char* const kRules[] = {
+      "everything else",
+      "from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end of the log",
+      "the four duties add up to less than 0.8: rotors off or idle, outside the thrust calibration",
+      "at or below 0.07 m (large: 0.085 m), where a vehicle stands on the ground",
+      "within 0.15 s after the start and after a gap of more than 30 ms: filters have no past",
+      "the position of a neighbour is unknown: its log has a gap, has not begun or has ended",
+      "published filter only: |f_a,z| of 50 gf or more"};
+  return kRules[static_cast<int>(cut)];
+}
+
 int Kinds::index(const std::string& kind) const {
   const auto found = std::find(names.begin(), names.end(), kind);
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());

@@ -26,6 +26,8 @@ enum class Cut : unsigned char {
   kCount
 };
 const char* name(Cut cut);
+/// The rule in words.
+const char* rule(Cut cut);
 
 /// How flights are cut and filtered.
 struct CutRules {

@@ -185,5 +185,29 @@ TEST(Trajectory, IsRefusedWithTheReasonWhereALogHasNoSetPoints) {
   EXPECT_GT(result["overall"]["samples"].get<int>(), 500);
 }
 
+TEST(CompareReport, IsOneFileInWhichHostileNamesAreTextAndOnlyItsOwnScriptRuns) {
+  const ScratchFolder folder;
+  const std::string gains = source_path("controller/gains/crazyflie-small.toml");
+  const std::string model = source_path("stability/models/crazyflie-small.toml");
+  const std::filesystem::path hostile = folder.path() / "<i onload=x>'\"`touch made`$(touch made)";
+  ASSERT_EQ(
+      run_shell("swarmcert simulate swap --vehicles 2 --model " + model + " --gains " + gains + " -o flight",
+                folder.path())
+          .exit_code,
+      0);
+  std::filesystem::rename(folder.path() / "flight", hostile);
+  const Outcome outcome =
+      run_shell("swarmcert compare . " + model + " --report \"out'\\`touch made\\`\"", folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "made"));
+  const std::string html = read_text((folder.path() / "out'`touch made`" / "report.html").string());
+  EXPECT_EQ(html.find("<i onload"), std::string::npos);
+  EXPECT_NE(html.find("&lt;i onload"), std::string::npos);
+  EXPECT_EQ(html.find("Not drawn"), std::string::npos);
+  EXPECT_EQ(html.find("'unsafe-eval'"), std::string::npos);
+  const bool has_script = html.find("script-src 'sha256-") != std::string::npos;
+  EXPECT_NE(has_script, html.find("built without dygraphs") != std::string::npos);
+}
+
 }  // namespace
 }  // namespace swarmcert::tests

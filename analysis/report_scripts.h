@@ -1,0 +1,12 @@
+/// @file What a report's time series need, embedded at build time.
+#pragma once
+
+#include <string_view>
+
+namespace swarmcert::analysis {
+
+/// dygraphs and this project's script behind it; empty where the build found no dygraphs (package libjs-dygraphs).
+extern const std::string_view kTimeSeriesScript;
+extern const std::string_view kTimeSeriesStyle;
+
+}  // namespace swarmcert::analysis
