@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "controller/attitude_law.h"
 #include "controller/battery.h"
@@ -100,7 +101,7 @@ struct FlightCommand {
   AttitudeCase attitude_case = AttitudeCase::kRegular;
   Wrench<Scalar> wanted;
   Mixed<Scalar> mixed;
-  std::uint16_t pwm[kMostRotors] = {};
+  decltype(pwm_register(std::declval<Scalar>())) pwm[kMostRotors] = {};
 };
 
 namespace detail {

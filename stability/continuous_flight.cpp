@@ -11,7 +11,7 @@
 namespace swarmcert::stability {
 namespace {
 
-// The solver's vector: the plant of all vehicles, then for each vehicle three integrals of position and three of rate.
+// The vector of numbers: the plant of all vehicles, then for each vehicle three integrals of position and three of rate.
 constexpr int kControllerSize = 6;
 constexpr int kEventsPerVehicle = 5;  ///< thrust, three integrals, ground
 constexpr double kPull_1_s = 2;       ///< keeps | |q|^2 - 1 | below 3e-8 at a tolerance of 1e-6
@@ -47,6 +47,7 @@ ContinuousFlight::ContinuousFlight(Swarm& swarm, const Gains& gains, const Task&
   }
   const int n = swarm.size();
   std::vector<double> start(static_cast<std::size_t>(n * (kVehicleStateSize + kControllerSize)));
+  y_ = dy_ = start;
   std::vector<double> absolute(start.size(), 1e-10);
   inputs_.resize(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) {
@@ -68,25 +69,53 @@ ContinuousFlight::ContinuousFlight(Swarm& swarm, const Gains& gains, const Task&
     std::fill(tolerance + kRotors, tolerance + kVehicleStateSize, 1e-9);
     inputs_[static_cast<std::size_t>(i)].battery_V = options.battery_V;
   }
-  for (double& tolerance : absolute) tolerance *= options.absolute_scale;
-  std::sort(knots_s_.begin(), knots_s_.end());
+  const bool rates_are_integrated = gains.attitude_law == AttitudeLaw::kRobust;
+  std::vector<double> tolerances;
+  for (std::size_t k = 0; k < start.size(); ++k) {
+    const bool is_plant = k < static_cast<std::size_t>(swarm.state_size());
+    const int within =
+        static_cast<int>(is_plant ? k % kVehicleStateSize
+                                  : (k - static_cast<std::size_t>(swarm.state_size())) % kControllerSize);
+    const int vehicle = static_cast<int>(k / kVehicleStateSize);
+    const bool moves = is_plant ? within < kRotors || swarm.path(vehicle).motor_lag_s > 0
+                                : within < 3 || rates_are_integrated;
+    if (!moves) continue;
+    moving_.push_back(k);
+    tolerances.push_back(absolute[k] * options.absolute_scale);
+  }
   swarm.forget_neighbours();
   integrator_ = std::make_unique<OdeIntegrator>(
-      options.method, [this](double t, const double* y, double* dy) { derivative(t, y, dy); },
-      options.relative, absolute);
+      options.method,
+      [this](double t, const double* y, double* dy) {
+        derivative(t, expand(y), dy_.data());
+        for (std::size_t k = 0; k < moving_.size(); ++k) dy[k] = dy_[moving_[k]];
+      },
+      options.relative, tolerances);
   if (options.events) {
     integrator_->watch(n * kEventsPerVehicle,
-                       [this](double t, const double* y, double* g) { watch(t, y, g); });
+                       [this](double t, const double* y, double* g) { watch(t, expand(y), g); });
   }
-  integrator_->start(0, start.data());
+  y_ = start;  // what never moves stays
+  this->start(0, start.data());
+  at_ = start;
 }
 
 ContinuousFlight::~ContinuousFlight() = default;
 
 double ContinuousFlight::time_s() const { return integrator_->time(); }
 
-const double* ContinuousFlight::state(int vehicle) const {
-  return integrator_->state() + vehicle * kVehicleStateSize;
+const double* ContinuousFlight::state(int vehicle) const { return at_.data() + vehicle * kVehicleStateSize; }
+
+/// All numbers, of those that the solver has.
+const double* ContinuousFlight::expand(const double* solved) {
+  for (std::size_t k = 0; k < moving_.size(); ++k) y_[moving_[k]] = solved[k];
+  return y_.data();
+}
+
+void ContinuousFlight::start(double t, const double* y) {
+  std::vector<double> solved(moving_.size());
+  for (std::size_t k = 0; k < moving_.size(); ++k) solved[k] = y[moving_[k]];
+  integrator_->start(t, solved.data());
 }
 
 long ContinuousFlight::evaluations() const { return integrator_->evaluations(); }
@@ -214,10 +243,10 @@ void ContinuousFlight::fly_to(double end_s, double limit_s) {
     if (met.empty()) return;
     if (++count > kMostEvents) throw IntegrationError("more than 1000 events between two stops");
     const double t = integrator_->time();
-    std::vector<double> y(integrator_->state(),
-                          integrator_->state() + swarm_.size() * (kVehicleStateSize + kControllerSize));
+    expand(integrator_->state());
+    std::vector<double> y = y_;
     for (const int event : met) meet(event, t, y.data());
-    integrator_->start(t, y.data());
+    start(t, y.data());
   }
 }
 
@@ -228,13 +257,15 @@ void ContinuousFlight::advance(double time_s) {
     const double limit_s = knot == knots_s_.end() ? kEver_s : *knot;
     if (limit_s > time_s) {
       fly_to(time_s, limit_s);
-      return;
+      break;
     }
     fly_to(limit_s, limit_s);
-    const std::vector<double> y(integrator_->state(),
-                                integrator_->state() + swarm_.size() * (kVehicleStateSize + kControllerSize));
-    integrator_->start(limit_s, y.data());
+    expand(integrator_->state());
+    const std::vector<double> y = y_;
+    start(limit_s, y.data());
   }
+  expand(integrator_->state());
+  at_ = y_;
 }
 
 }  // namespace swarmcert::stability

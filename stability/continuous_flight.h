@@ -66,6 +66,8 @@ class ContinuousFlight {
   void watch(double t, const double* y, double* g);
   void meet(int event, double t, double* y);
   void fly_to(double end_s, double limit_s);
+  const double* expand(const double* solved);
+  void start(double t, const double* y);
 
   Swarm& swarm_;
   const Task& task_;
@@ -76,6 +78,10 @@ class ContinuousFlight {
   std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
   std::vector<VehicleInput> inputs_;
   std::vector<FlightEvent> events_;
+  std::vector<std::size_t>
+      moving_;                  ///< numbers of the state that change: without motor lag the rotors' do not
+  std::vector<double> y_, dy_;  ///< all numbers: the vehicles' states, then their controllers'
+  std::vector<double> at_;      ///< the state that state() shows
   std::unique_ptr<OdeIntegrator> integrator_;
 };
 

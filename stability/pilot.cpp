@@ -98,5 +98,6 @@ controller::Vector3<Scalar> Pilot<Scalar>::rate_error(const controller::FlightMe
 
 template class Pilot<float>;
 template class Pilot<double>;
+template class Pilot<Lanes>;
 
 }  // namespace swarmcert::stability

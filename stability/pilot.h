@@ -5,11 +5,12 @@
 
 #include "controller/flight_controller.h"
 #include "stability/gains.h"
+#include "stability/lanes.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
 
-/// Scalar is float, as it flies, or double, for integrators.
+/// Scalar is float, as it flies, Lanes, for eight such vehicles at once, or double, for integrators.
 template <typename Scalar>
 class Pilot {
  public:
@@ -31,6 +32,12 @@ class Pilot {
   controller::Vector3<Scalar> rate_error(const controller::FlightMemory<Scalar>& memory,
                                          const controller::Measured<Scalar>& measured) const;
 
+  /// f(settings), with those of controller::flight_step().
+  template <typename F>
+  auto with_settings(F&& f) const {
+    return std::visit(std::forward<F>(f), settings_);
+  }
+
  private:
   template <typename Position>
   using Settings = controller::FlightSettings<Scalar, Position>;
@@ -40,5 +47,6 @@ class Pilot {
 
 extern template class Pilot<float>;
 extern template class Pilot<double>;
+extern template class Pilot<Lanes>;
 
 }  // namespace swarmcert::stability

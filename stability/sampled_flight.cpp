@@ -4,8 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "stability/pilot.h"
-
 namespace swarmcert::stability {
 namespace {
 
@@ -21,39 +19,7 @@ int periods(double control_hz, double slow_hz, const char* what) {
   return static_cast<int>(whole);
 }
 
-template <typename Scalar>
-controller::Vector3<Scalar> narrow(const Eigen::Vector3d& v) {
-  return {static_cast<Scalar>(v.x()), static_cast<Scalar>(v.y()), static_cast<Scalar>(v.z())};
-}
-
-template <typename Scalar>
-Eigen::Vector3d wide(const controller::Vector3<Scalar>& v) {
-  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
-}
-
-template <typename Scalar>
-controller::Matrix3<Scalar> narrow_matrix(const Eigen::Matrix3d& m) {
-  return {narrow<Scalar>(Eigen::Vector3d(m.row(0))), narrow<Scalar>(Eigen::Vector3d(m.row(1))),
-          narrow<Scalar>(Eigen::Vector3d(m.row(2)))};
-}
-
 }  // namespace
-
-/// The controllers of all vehicles, with what they remember.
-template <typename Scalar>
-struct SampledFlight::Controllers {
-  std::vector<Pilot<Scalar>> pilots;  ///< by kind
-  std::vector<controller::FlightMemory<Scalar>> memories;
-  std::vector<controller::Measured<Scalar>> measured;
-  std::vector<controller::FlightReference<Scalar>> references;
-
-  Controllers(const Swarm& swarm, const Gains& gains, double period_s) {
-    for (const Model& model : swarm.models()) pilots.emplace_back(gains, model, period_s);
-    memories.resize(static_cast<std::size_t>(swarm.size()));
-    measured.resize(memories.size());
-    references.resize(memories.size());
-  }
-};
 
 SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
                              const SampledFlightOptions& options, const files::Network* network)
@@ -68,7 +34,7 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
   network_late_ = static_cast<int>(std::ceil(gains.network_latency_s * control_hz - 1e-9));
 
   const auto size = static_cast<std::size_t>(swarm.state_size());
-  for (std::vector<double>* vector : {&state_, &k1_, &k2_, &k3_, &k4_, &stage_}) vector->resize(size);
+  state_.resize(size);
   inputs_.resize(static_cast<std::size_t>(swarm.size()));
   records_.resize(inputs_.size());
   for (int i = 0; i < swarm.size(); ++i) {
@@ -81,11 +47,8 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
     std::copy(rotors, rotors + kNumRotors, input(i).rotor_command_N);
     std::copy(rotors, rotors + kNumRotors, records_[static_cast<std::size_t>(i)].rotor_N.begin());
   }
-  if (options.flies_float) {
-    float_ = std::make_unique<Controllers<float>>(swarm, gains, period_s_);
-  } else {
-    double_ = std::make_unique<Controllers<double>>(swarm, gains, period_s_);
-  }
+  controllers_ = options.flies_float ? make_float_bank(swarm, gains, period_s_)
+                                     : make_double_bank(swarm, gains, period_s_);
   if (network != nullptr) {
     std::vector<std::string> kinds;
     for (const Model& model : swarm.models()) kinds.push_back(model.kind);
@@ -136,91 +99,50 @@ void SampledFlight::predict() {
   }
 }
 
-template <typename Scalar>
-void SampledFlight::control(Controllers<Scalar>& controllers) {
-  const double battery = battery_V();
+/// New positions and set points for the position loop.
+void SampledFlight::measure() {
   const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
   for (int i = 0; i < swarm_.size(); ++i) {
-    const auto index = static_cast<std::size_t>(i);
-    const double* const x = &state_[index * kVehicleStateSize];
-    VehicleInput& input = inputs_[index];
-    ControlRecord& record = records_[index];
-    controller::Measured<Scalar>& measured = controllers.measured[index];
-    controller::FlightReference<Scalar>& reference = controllers.references[index];
-    input.battery_V = battery;
-    if (ran_position_) {
-      record.setpoint = task_.at(i, time_s());
-      Eigen::Vector3d p(x[0], x[1], x[2]), v(x[3], x[4], x[5]);
-      if (options_.noise) {
-        const SensorModel& sensor = swarm_.model(i).sensor;
-        for (int axis = 0; axis < 3; ++axis) {
-          p[axis] += sensor.position_noise_m * random_.bell();
-          v[axis] += sensor.velocity_noise_m_s * random_.bell();
-        }
+    const double* const x = &state_[static_cast<std::size_t>(i) * kVehicleStateSize];
+    Setpoint& setpoint = records_[static_cast<std::size_t>(i)].setpoint;
+    setpoint = task_.at(i, time_s());
+    Eigen::Vector3d p(x[0], x[1], x[2]), v(x[3], x[4], x[5]);
+    if (options_.noise) {
+      const SensorModel& sensor = swarm_.model(i).sensor;
+      for (int axis = 0; axis < 3; ++axis) {
+        p[axis] += sensor.position_noise_m * random_.bell();
+        v[axis] += sensor.velocity_noise_m_s * random_.bell();
       }
-      measured.position_W_m = narrow<Scalar>(p);
-      measured.velocity_W_m_s = narrow<Scalar>(v);
-      measured.position_stamp_ms = now_ms;
-      reference = {narrow<Scalar>(record.setpoint.p_W_m),
-                   narrow<Scalar>(record.setpoint.v_W_m_s),
-                   narrow<Scalar>(record.setpoint.a_W_m_s2),
-                   {},
-                   {},
-                   {}};
     }
-    Eigen::Matrix3d R_WB;
-    rotation_of(x + kQuaternion, &R_WB);
-    measured.attitude = {narrow_matrix<Scalar>(R_WB),
-                         {static_cast<Scalar>(x[kOmega]), static_cast<Scalar>(x[kOmega + 1]),
-                          static_cast<Scalar>(x[kOmega + 2])}};
-    measured.attitude_stamp_ms = now_ms;
-    measured.battery_V = static_cast<Scalar>(battery);
-    controller::FlightMemory<Scalar>& memory = controllers.memories[index];
-    const controller::FlightCommand<Scalar> command =
-        controllers.pilots[static_cast<std::size_t>(swarm_.kind_of(i))].step(
-            memory, measured, reference, static_cast<Scalar>(record.prediction_N), now_ms, ran_position_);
+    controllers_->see(i, p, v, now_ms);
+    controllers_->follow(i, setpoint);
+  }
+}
+
+void SampledFlight::control() {
+  const double battery = battery_V();
+  const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
+  if (ran_position_) measure();
+  controllers_->step(state_.data(), battery, now_ms, ran_position_, records_);
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    VehicleInput& input = inputs_[i];
+    ControlRecord& record = records_[i];
+    input.battery_V = battery;
     // On the ground the motors are off until the task leaves it, and no integral grows.
-    const bool off =
-        command.motors_off || (input.resting && record.setpoint.p_W_m.z() <= options_.ground_m + 1e-3);
     if (input.resting) {
-      memory.integral_m_s = {};
-      memory.rate_integral_rad = {};
+      controllers_->reset_integrals(static_cast<int>(i));
+      record.integral_m_s.setZero();
     }
-    record.force_W_N = wide(command.force_W_N);
-    record.integral_m_s = wide(memory.integral_m_s);
-    record.thrust_N = off ? 0 : static_cast<double>(command.wanted.thrust_N);
-    record.torque_B_Nm = wide(command.wanted.torque_N_m);
-    record.saturated = memory.thrust_saturated;
-    record.faults = command.faults;
-    for (std::size_t r = 0; r < kNumRotors; ++r) {
-      record.rotor_N[r] = off ? 0 : static_cast<double>(command.mixed.forces.at_N[r]);
-      record.pwm[r] = off ? std::uint16_t{0} : command.pwm[r];
+    if (record.motors_off || (input.resting && record.setpoint.p_W_m.z() <= options_.ground_m + 1e-3)) {
+      record.thrust_N = 0;
+      record.rotor_N = {};
+      record.pwm = {};
     }
   }
 }
 
-void SampledFlight::advance(double h_s) {
-  const std::size_t size = state_.size();
-  const double start_s = time_s();
-  const double h = h_s / options_.substeps;
-  double* const x = state_.data();
-  double* const stage = stage_.data();
-  const VehicleInput* const inputs = inputs_.data();
-  double *const k1 = k1_.data(), *const k2 = k2_.data(), *const k3 = k3_.data(), *const k4 = k4_.data();
-  const auto to_stage = [&](double step_s, const double* k) {
-    for (std::size_t i = 0; i < size; ++i) stage[i] = x[i] + step_s * k[i];
-  };
-  for (int step = 0; step < options_.substeps; ++step) {
-    const double t = start_s + step * h;
-    swarm_.derivative(t, x, inputs, k1);
-    to_stage(0.5 * h, k1);
-    swarm_.derivative(t + 0.5 * h, stage, inputs, k2);
-    to_stage(0.5 * h, k2);
-    swarm_.derivative(t + 0.5 * h, stage, inputs, k3);
-    to_stage(h, k3);
-    swarm_.derivative(t + h, stage, inputs, k4);
-    for (std::size_t i = 0; i < size; ++i) x[i] += h / 6 * (k1[i] + 2 * (k2[i] + k3[i]) + k4[i]);
-  }
+void SampledFlight::advance(double from_s, double h_s) {
+  swarm_.runge_kutta(from_s, h_s / options_.substeps, options_.substeps, inputs_.data(), state_.data());
 }
 
 /// Puts the commands that delays let through into the inputs: those of `late` part of the period, or of the early one.
@@ -248,7 +170,7 @@ void SampledFlight::move() {
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       std::copy(records_[i].rotor_N.begin(), records_[i].rotor_N.end(), inputs_[i].rotor_command_N);
     }
-    advance(period_s_);
+    advance(time_s(), period_s_);
     return;
   }
   const auto slots = static_cast<std::int64_t>(delayed_.front().size() / kNumRotors);
@@ -258,10 +180,10 @@ void SampledFlight::move() {
   }
   if (switch_s_ > 0) {
     apply_delayed(false);
-    advance(switch_s_);
+    advance(time_s(), switch_s_);
   }
   apply_delayed(true);
-  advance(period_s_ - switch_s_);
+  advance(time_s() + switch_s_, period_s_ - switch_s_);
 }
 
 /// Inelastic ground: a vehicle that sinks to it stands level until thrust lifts it.
@@ -290,11 +212,7 @@ void SampledFlight::step() {
   if (period_ % kListEvery == 0) swarm_.find_neighbours(state_.data(), kListEvery * period_s_);
   ran_position_ = period_ % position_every_ == 0;
   if (!networks_.empty()) predict();
-  if (float_) {
-    control(*float_);
-  } else {
-    control(*double_);
-  }
+  control();
   move();
   ++period_;
   for (int i = 0; i < swarm_.size(); ++i) {

@@ -1,5 +1,7 @@
 /// @file The sampled closed loop: controllers at their own rates, forces held between, the plant by Runge-Kutta.
 ///
+/// Vehicles are computed together where registers are wide enough; each flies the same bits as alone.
+///
 /// Every control period (the attitude loop's, 2 ms): the position loop where it is due, the network's prediction where
 /// it is due (a staircase, applied late by its latency), the attitude law and mixing; then the plant moves by classical
 /// Runge-Kutta under held commands, which change inside a period only where a command delay says so. Quaternions are
@@ -13,6 +15,7 @@
 
 #include "nn/files/network.h"
 #include "nn/files/random.h"
+#include "stability/controller_bank.h"
 #include "stability/deep_set_force.h"
 #include "stability/gains.h"
 #include "stability/swarm.h"
@@ -29,20 +32,6 @@ struct SampledFlightOptions {
   double battery_start_V = 4.1;
   double battery_drop_V_s = 1.5e-3;  ///< a Crazyflie's cell lasts about five minutes
   double ground_m = 0.05;            ///< vehicles cannot be lower
-};
-
-/// What one vehicle's controller did last.
-struct ControlRecord {
-  Setpoint setpoint;
-  Eigen::Vector3d force_W_N = Eigen::Vector3d::Zero();  ///< f_d
-  double thrust_N = 0;
-  Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
-  std::array<double, kNumRotors> rotor_N = {};  ///< commands before the delay
-  std::array<std::uint16_t, kNumRotors> pwm = {};
-  double prediction_N = 0;  ///< f_a_hat along z, as applied
-  Eigen::Vector3d integral_m_s = Eigen::Vector3d::Zero();
-  bool saturated = false;   ///< thrust was held at its upper limit
-  std::uint8_t faults = 0;  ///< sum of controller::Fault
 };
 
 class SampledFlight {
@@ -68,20 +57,18 @@ class SampledFlight {
   double* state() { return state_.data(); }
   const VehicleInput& input(int vehicle) const { return inputs_[static_cast<std::size_t>(vehicle)]; }
   VehicleInput& input(int vehicle) { return inputs_[static_cast<std::size_t>(vehicle)]; }
+  /// What a vehicle's controller did last.
   const ControlRecord& record(int vehicle) const { return records_[static_cast<std::size_t>(vehicle)]; }
   Swarm& swarm() { return swarm_; }
   double battery_V() const;
 
  private:
-  template <typename Scalar>
-  struct Controllers;
-
-  template <typename Scalar>
-  void control(Controllers<Scalar>& controllers);
+  void measure();
+  void control();
   void predict();
   void move();
   void apply_delayed(bool late);
-  void advance(double h_s);
+  void advance(double from_s, double h_s);
   void touch_ground();
 
   Swarm& swarm_;
@@ -91,11 +78,10 @@ class SampledFlight {
   int position_every_, network_every_, network_late_;
   std::int64_t period_ = 0;
   bool ran_position_ = false;
-  std::vector<double> state_, k1_, k2_, k3_, k4_, stage_;
+  std::vector<double> state_;
   std::vector<VehicleInput> inputs_;
   std::vector<ControlRecord> records_;
-  std::unique_ptr<Controllers<float>> float_;
-  std::unique_ptr<Controllers<double>> double_;
+  std::unique_ptr<ControllerBank> controllers_;
   std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
   std::vector<std::vector<double>> predictions_;         ///< ring by age in network_every_ periods
   std::vector<std::vector<double>> delayed_;             ///< ring of rotor commands, by age in periods

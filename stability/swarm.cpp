@@ -1,6 +1,5 @@
 #include "stability/swarm.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -8,13 +7,17 @@
 namespace swarmcert::stability {
 
 struct Swarm::Kind {
-  double mass_kg = 0, inverse_mass_1_kg = 0, offset_m = 0, yaw_m = 0;
+  double mass_kg = 0, offset_m = 0, yaw_m = 0;
   double lag_rate_1_s = 0, lag_share = 0;  ///< 1 / tau and gain of the motor lag, 0 without
-  Eigen::Vector3d inertia = Eigen::Vector3d::Zero(), inverse_inertia = Eigen::Vector3d::Zero();
+  Eigen::Vector3d inertia = Eigen::Vector3d::Zero();
   SignalPath path;
   std::vector<AppliedEffect> effects;      ///< without those that live in `path`
   std::vector<const AppliedEffect*> wide;  ///< that look at neighbours
 };
+
+inline const Swarm::Kind& Swarm::kind(int vehicle) const {
+  return kinds_[static_cast<std::size_t>(kind_of(vehicle))];
+}
 
 void Swarm::set_lag(Kind* kind) {
   kind->lag_rate_1_s = kind->path.motor_lag_s > 0 ? 1 / kind->path.motor_lag_s : 0;
@@ -37,7 +40,7 @@ double reach_m(const std::vector<const AppliedEffect*>& effects, double dz_m) {
 }  // namespace
 
 Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
-    : models_(std::move(models)), kind_of_(std::move(kind_of)) {
+    : models_(std::move(models)), kind_of_(std::move(kind_of)), bodies_(size()) {
   std::vector<std::string> names;
   for (const Model& model : models_) names.push_back(model.kind);
   for (const int kind : kind_of_) {
@@ -50,11 +53,9 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
     const Model& model = models_[i];
     Kind& kind = kinds_[i];
     kind.mass_kg = model.mass_kg;
-    kind.inverse_mass_1_kg = 1 / model.mass_kg;
     kind.offset_m = model.arm_m * std::sqrt(0.5);
     kind.yaw_m = model.torque_per_thrust_m;
     kind.inertia = Vector3Map(model.inertia_kg_m2.data());
-    kind.inverse_inertia = kind.inertia.cwiseInverse();
     for (const EffectSpec& spec : model.effects) {
       AppliedEffect applied(spec, {model.kind, names, model.path});
       if (applied.effect().info().remembers) {
@@ -71,6 +72,10 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
   }
   near_.resize(kind_of_.size());
   neighbours_.resize(kind_of_.size());
+  for (std::vector<double>* rows : {&rows_, &start_, &sum_}) {
+    rows->resize(static_cast<std::size_t>(bodies_.stride()) * kVehicleStateSize);
+  }
+  set_bodies();
 }
 
 Swarm::Swarm(Model model, int vehicles)
@@ -78,8 +83,21 @@ Swarm::Swarm(Model model, int vehicles)
 
 Swarm::~Swarm() = default;
 
-const SignalPath& Swarm::path(int vehicle) const {
-  return kinds_[static_cast<std::size_t>(kind_of(vehicle))].path;
+const SignalPath& Swarm::path(int vehicle) const { return kind(vehicle).path; }
+
+void Swarm::set_bodies() {
+  for (int i = 0; i < size(); ++i) {
+    const Kind& own = kind(i);
+    bodies_.at(RigidBodies::kInverseMass, i) = 1 / own.mass_kg;
+    bodies_.at(RigidBodies::kOffset, i) = own.offset_m;
+    bodies_.at(RigidBodies::kYaw, i) = own.yaw_m;
+    bodies_.at(RigidBodies::kLagRate, i) = own.lag_rate_1_s;
+    bodies_.at(RigidBodies::kLagShare, i) = own.lag_share;
+    for (int axis = 0; axis < 3; ++axis) {
+      bodies_.at(RigidBodies::kInertia + axis, i) = own.inertia[axis];
+      bodies_.at(RigidBodies::kInverseInertia + axis, i) = 1 / own.inertia[axis];
+    }
+  }
 }
 
 void Swarm::assume_lag(double motor_lag_s, double delay_s) {
@@ -94,75 +112,70 @@ void Swarm::assume_lag(double motor_lag_s, double delay_s) {
     }
     set_lag(&kind);
   }
+  set_bodies();
 }
 
-inline void Swarm::rotor_wrench(const Kind& kind, const double* x, const VehicleInput& input,
-                                double* thrust_N, Eigen::Vector3d* torque_B_Nm) const {
+void Swarm::fill(int vehicle, const States& states, const VehicleInput& input) {
+  const Kind& own = kind(vehicle);
+  instant_.p_W_m = states.three(vehicle, kPosition);
+  instant_.v_W_m_s = states.three(vehicle, kVelocity);
+  const double q[4] = {states(vehicle, kQuaternion), states(vehicle, kQuaternion + 1),
+                       states(vehicle, kQuaternion + 2), states(vehicle, kQuaternion + 3)};
+  rotation_of(q, &instant_.R_WB);
+  instant_.omega_B_rad_s = states.three(vehicle, kOmega);
   double f[kNumRotors];
   for (int r = 0; r < kNumRotors; ++r) {
-    f[r] = input.rotor_command_N[r] + kind.lag_share * (x[kRotors + r] - input.rotor_command_N[r]);
+    const double command = input.rotor_command_N[r];
+    f[r] = command + own.lag_share * (states(vehicle, kRotors + r) - command);
   }
-  // Rotors: front right, back right, back left, front left; the first turns the body clockwise seen from above.
-  *thrust_N = f[0] + f[1] + f[2] + f[3];
-  *torque_B_Nm = {kind.offset_m * (f[2] + f[3] - f[0] - f[1]), kind.offset_m * (f[1] + f[2] - f[0] - f[3]),
-                  kind.yaw_m * (f[1] + f[3] - f[0] - f[2])};
-}
-
-void Swarm::fill(int vehicle, const double* state, const VehicleInput& input, double thrust_N,
-                 const Eigen::Vector3d& torque_B_Nm, const Eigen::Matrix3d& R_WB) {
-  const double* const x = state + vehicle * kVehicleStateSize;
-  instant_.p_W_m = Vector3Map(x + kPosition);
-  instant_.v_W_m_s = Vector3Map(x + kVelocity);
-  instant_.R_WB = R_WB;
-  instant_.omega_B_rad_s = Vector3Map(x + kOmega);
-  instant_.thrust_N = thrust_N;
-  instant_.torque_B_Nm = torque_B_Nm;
+  // As in RigidBodies.
+  instant_.thrust_N = f[0] + f[1] + f[2] + f[3];
+  instant_.torque_B_Nm = {own.offset_m * (f[2] + f[3] - f[0] - f[1]),
+                          own.offset_m * (f[1] + f[2] - f[0] - f[3]),
+                          own.yaw_m * (f[1] + f[3] - f[0] - f[2])};
   instant_.battery_V = input.battery_V;
-  instant_.mass_kg = kinds_[static_cast<std::size_t>(kind_of(vehicle))].mass_kg;
+  instant_.mass_kg = own.mass_kg;
   instant_.neighbours = neighbours_.data();
 }
 
-void Swarm::add_neighbour(int vehicle, int other, const double* state) {
-  const double* const x = state + vehicle * kVehicleStateSize;
-  const double* const y = state + other * kVehicleStateSize;
+void Swarm::add_neighbour(int vehicle, int other, const States& states) {
   Neighbour& neighbour = neighbours_[static_cast<std::size_t>(instant_.num_neighbours++)];
-  neighbour.dp_W_m = Vector3Map(y + kPosition) - Vector3Map(x + kPosition);
-  neighbour.v_W_m_s = Vector3Map(y + kVelocity);
-  neighbour.dv_W_m_s = neighbour.v_W_m_s - Vector3Map(x + kVelocity);
+  neighbour.dp_W_m = states.three(other, kPosition) - states.three(vehicle, kPosition);
+  neighbour.v_W_m_s = states.three(other, kVelocity);
+  neighbour.dv_W_m_s = neighbour.v_W_m_s - states.three(vehicle, kVelocity);
   neighbour.kind = kind_of(other);
-  neighbour.mass_kg = kinds_[static_cast<std::size_t>(neighbour.kind)].mass_kg;
+  neighbour.mass_kg = kind(other).mass_kg;
 }
 
-void Swarm::gather(int vehicle, const double* state, bool all) {
+void Swarm::gather(int vehicle, const States& states, bool all) {
   instant_.num_neighbours = 0;
   if (!all && listed_) {
-    for (const int other : near_[static_cast<std::size_t>(vehicle)]) add_neighbour(vehicle, other, state);
+    for (const int other : near_[static_cast<std::size_t>(vehicle)]) add_neighbour(vehicle, other, states);
     return;
   }
   for (int other = 0; other < size(); ++other) {
-    if (other != vehicle) add_neighbour(vehicle, other, state);
+    if (other != vehicle) add_neighbour(vehicle, other, states);
   }
 }
 
 const Instant& Swarm::instant(int vehicle, double time_s, const double* state, const VehicleInput& input) {
-  const double* const x = state + vehicle * kVehicleStateSize;
-  const Kind& kind = kinds_[static_cast<std::size_t>(kind_of(vehicle))];
-  double thrust_N;
-  Eigen::Vector3d torque_B_Nm;
-  Eigen::Matrix3d R_WB;
-  rotor_wrench(kind, x, input, &thrust_N, &torque_B_Nm);
-  rotation_of(x + kQuaternion, &R_WB);
+  const States states = by_vehicle(state);
   instant_.time_s = time_s;
-  fill(vehicle, state, input, thrust_N, torque_B_Nm, R_WB);
-  gather(vehicle, state, true);
+  fill(vehicle, states, input);
+  gather(vehicle, states, true);
   return instant_;
 }
 
 Wrench Swarm::effects_on(int vehicle, double time_s, const double* state, const VehicleInput& input) {
   instant(vehicle, time_s, state, input);
+  return sum_of_effects(vehicle, input);
+}
+
+/// At instant_.
+Wrench Swarm::sum_of_effects(int vehicle, const VehicleInput& input) const {
   Wrench sum;
   sum.force_W_N = input.disturbance_W_N;
-  for (const AppliedEffect& applied : kinds_[static_cast<std::size_t>(kind_of(vehicle))].effects) {
+  for (const AppliedEffect& applied : kind(vehicle).effects) {
     const Wrench wrench = applied.wrench(instant_);
     sum.force_W_N += wrench.force_W_N;
     sum.torque_B_Nm += wrench.torque_B_Nm;
@@ -170,65 +183,77 @@ Wrench Swarm::effects_on(int vehicle, double time_s, const double* state, const 
   return sum;
 }
 
+void Swarm::to_rows(const double* state, double* rows) const {
+  const int stride = bodies_.stride();
+  for (int i = 0; i < size(); ++i) {
+    for (int c = 0; c < kVehicleStateSize; ++c) rows[c * stride + i] = state[i * kVehicleStateSize + c];
+  }
+}
+
+void Swarm::from_rows(const double* rows, double* state) const {
+  const int stride = bodies_.stride();
+  for (int i = 0; i < size(); ++i) {
+    for (int c = 0; c < kVehicleStateSize; ++c) state[i * kVehicleStateSize + c] = rows[c * stride + i];
+  }
+}
+
+void Swarm::hold(const VehicleInput* inputs) {
+  for (int i = 0; i < size(); ++i) {
+    const VehicleInput& input = inputs[i];
+    bodies_.at(RigidBodies::kMoving, i) = input.resting ? 0 : 1;
+    for (int r = 0; r < kNumRotors; ++r) bodies_.at(RigidBodies::kCommand + r, i) = input.rotor_command_N[r];
+    for (int axis = 0; axis < 3; ++axis) {
+      bodies_.at(RigidBodies::kForce + axis, i) = input.disturbance_W_N[axis];
+      bodies_.at(RigidBodies::kTorque + axis, i) = 0;
+    }
+  }
+  acted_on_.clear();
+  for (int i = 0; i < size(); ++i) {
+    const Kind& own = kind(i);
+    // Where only neighbours matter and none is near, there is nothing to add.
+    const bool alone = listed_ && near_[static_cast<std::size_t>(i)].empty();
+    const bool nothing = own.effects.empty() || (alone && own.wide.size() == own.effects.size());
+    if (!inputs[i].resting && !nothing) acted_on_.push_back(i);
+  }
+}
+
+/// Disturbances and effects, as outer forces of the bodies.
+void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
+  const States states = {rows, bodies_.stride(), 1};
+  instant_.time_s = time_s;
+  for (const int i : acted_on_) {
+    fill(i, states, inputs[i]);
+    instant_.num_neighbours = 0;
+    if (!kind(i).wide.empty()) gather(i, states, false);
+    const Wrench sum = sum_of_effects(i, inputs[i]);
+    for (int axis = 0; axis < 3; ++axis) {
+      bodies_.at(RigidBodies::kForce + axis, i) = sum.force_W_N[axis];
+      bodies_.at(RigidBodies::kTorque + axis, i) = sum.torque_B_Nm[axis];
+    }
+  }
+}
+
 void Swarm::derivative(double time_s, const double* state, const VehicleInput* inputs, double* derivative,
                        double stabilise) {
-  instant_.time_s = time_s;
-  for (int vehicle = 0; vehicle < size(); ++vehicle) {
-    const double* const x = state + vehicle * kVehicleStateSize;
-    double* const dx = derivative + vehicle * kVehicleStateSize;
-    const VehicleInput& input = inputs[vehicle];
-    const Kind& kind = kinds_[static_cast<std::size_t>(kind_of(vehicle))];
+  to_rows(state, rows_.data());
+  hold(inputs);
+  act(time_s, rows_.data(), inputs);
+  bodies_.derivative(rows_.data(), stabilise, sum_.data());
+  from_rows(sum_.data(), derivative);
+}
 
-    for (int r = 0; r < kNumRotors; ++r) {
-      dx[kRotors + r] = kind.lag_rate_1_s * (input.rotor_command_N[r] - x[kRotors + r]);
+void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* state) {
+  to_rows(state, start_.data());
+  hold(inputs);
+  for (int step = 0; step < steps; ++step) {
+    const double t = time_s + step * step_s;
+    const double at_s[] = {t, t + step_s / 2, t + step_s / 2, t + step_s};
+    for (int stage = 0; stage < 4; ++stage) {
+      act(at_s[stage], (stage == 0 ? start_ : rows_).data(), inputs);
+      bodies_.stage(stage, step_s, start_.data(), rows_.data(), sum_.data());
     }
-    if (input.resting) {
-      std::fill(dx, dx + kRotors, 0.0);
-      continue;
-    }
-    double thrust_N;
-    Eigen::Vector3d torque_B_Nm;
-    rotor_wrench(kind, x, input, &thrust_N, &torque_B_Nm);
-    const double* const q = x + kQuaternion;
-    const double length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    const double s = 2 / length2;
-    Eigen::Vector3d force_W_N(s * (q[1] * q[3] + q[0] * q[2]), s * (q[2] * q[3] - q[0] * q[1]),
-                              1 - s * (q[1] * q[1] + q[2] * q[2]));  // b3
-    force_W_N = thrust_N * force_W_N + input.disturbance_W_N;
-    const Vector3Map omega(x + kOmega);
-    Eigen::Vector3d moment_B_Nm = torque_B_Nm;
-
-    // Where only neighbours matter and none is near, there is nothing to add.
-    const bool alone = listed_ && near_[static_cast<std::size_t>(vehicle)].empty();
-    if (!(kind.effects.empty() || (alone && kind.wide.size() == kind.effects.size()))) {
-      Eigen::Matrix3d R_WB;
-      rotation_of(q, &R_WB);
-      fill(vehicle, state, input, thrust_N, torque_B_Nm, R_WB);
-      instant_.num_neighbours = 0;
-      if (!kind.wide.empty()) gather(vehicle, state, false);
-      for (const AppliedEffect& applied : kind.effects) {
-        const Wrench wrench = applied.wrench(instant_);
-        force_W_N += wrench.force_W_N;
-        moment_B_Nm += wrench.torque_B_Nm;
-      }
-    }
-
-    for (int i = 0; i < 3; ++i) {
-      dx[kPosition + i] = x[kVelocity + i];
-      dx[kVelocity + i] = force_W_N[i] * kind.inverse_mass_1_kg;
-    }
-    dx[kVelocity + 2] -= kGravity_m_s2;
-    // q' = q (0, omega) / 2, plus a pull to |q| = 1.
-    const double pull = stabilise * (1 - length2);
-    const double wx = omega[0], wy = omega[1], wz = omega[2];
-    dx[kQuaternion] = 0.5 * (-q[1] * wx - q[2] * wy - q[3] * wz) + pull * q[0];
-    dx[kQuaternion + 1] = 0.5 * (q[0] * wx + q[2] * wz - q[3] * wy) + pull * q[1];
-    dx[kQuaternion + 2] = 0.5 * (q[0] * wy - q[1] * wz + q[3] * wx) + pull * q[2];
-    dx[kQuaternion + 3] = 0.5 * (q[0] * wz + q[1] * wy - q[2] * wx) + pull * q[3];
-    const Eigen::Vector3d momentum = kind.inertia.cwiseProduct(omega);
-    const Eigen::Vector3d omega_dot = kind.inverse_inertia.cwiseProduct(momentum.cross(omega) + moment_B_Nm);
-    for (int i = 0; i < 3; ++i) dx[kOmega + i] = omega_dot[i];
   }
+  from_rows(start_.data(), state);
 }
 
 void Swarm::find_neighbours(const double* state, double horizon_s) {
@@ -249,9 +274,12 @@ void Swarm::find_neighbours(const double* state, double horizon_s) {
       if (j == i) continue;
       const double* const y = state + j * kVehicleStateSize;
       const double dx = y[0] - x[0], dy = y[1] - x[1], dz = y[2] - x[2];
-      const double reach =
-          std::max(reach_m(kind.wide, dz - margin_m), reach_m(kind.wide, dz + margin_m)) + margin_m;
-      if (reach > margin_m && dx * dx + dy * dy < reach * reach) near.push_back(j);
+      const double distance2 = dx * dx + dy * dy;
+      const auto reaches = [&](double height_m) {
+        const double reach = reach_m(kind.wide, height_m);
+        return reach > 0 && distance2 < (reach + margin_m) * (reach + margin_m);
+      };
+      if (reaches(dz + margin_m) || reaches(dz - margin_m)) near.push_back(j);
     }
   }
 }

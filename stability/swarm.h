@@ -2,15 +2,16 @@
 ///
 ///   p' = v,  m v' = m g + R f_u + f_a,  R' = R S(omega),  J omega' = J omega x omega + tau_u + tau_a
 /// (paper, equations (1) to (3)); f_u and tau_u come from four rotors behind the motor lag, f_a and tau_a from the
-/// models' effects. Nothing is saturated here, and no time passes: integrators call derivative().
+/// models' effects. Nothing is saturated here.
 #pragma once
 
-#include <memory>
+#include <cstddef>
 #include <vector>
 
 #include "stability/effects/effect.h"
 #include "stability/effects/signal_path.h"
 #include "stability/model.h"
+#include "stability/rigid_bodies.h"
 #include "stability/vehicle_state.h"
 
 namespace swarmcert::stability {
@@ -52,6 +53,10 @@ class Swarm {
   void derivative(double time_s, const double* state, const VehicleInput* inputs, double* derivative,
                   double stabilise = 0);
 
+  /// Classical Runge-Kutta steps of `step_s` each, under inputs that are held.
+  /// @param state [state_size()], from `time_s` on; overwritten. Quaternions are not normalised.
+  void runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* state);
+
   /// f_a and tau_a of one vehicle at `state`.
   Wrench effects_on(int vehicle, double time_s, const double* state, const VehicleInput& input);
 
@@ -65,13 +70,29 @@ class Swarm {
 
  private:
   struct Kind;
+  /// States of all vehicles: component c of vehicle i at x[c * component + i * vehicle].
+  struct States {
+    const double* x;
+    std::ptrdiff_t component, vehicle;
+
+    double operator()(int i, int c) const { return x[c * component + i * vehicle]; }
+    Eigen::Vector3d three(int i, int c) const {
+      return {(*this)(i, c), (*this)(i, c + 1), (*this)(i, c + 2)};
+    }
+  };
+
   static void set_lag(Kind* kind);
-  void fill(int vehicle, const double* state, const VehicleInput& input, double thrust_N,
-            const Eigen::Vector3d& torque_B_Nm, const Eigen::Matrix3d& R_WB);
-  void add_neighbour(int vehicle, int other, const double* state);
-  void gather(int vehicle, const double* state, bool all);
-  void rotor_wrench(const Kind& kind, const double* x, const VehicleInput& input, double* thrust_N,
-                    Eigen::Vector3d* torque_B_Nm) const;
+  const Kind& kind(int vehicle) const;
+  States by_vehicle(const double* state) const { return {state, 1, kVehicleStateSize}; }
+  void fill(int vehicle, const States& states, const VehicleInput& input);
+  void add_neighbour(int vehicle, int other, const States& states);
+  void gather(int vehicle, const States& states, bool all);
+  Wrench sum_of_effects(int vehicle, const VehicleInput& input) const;
+  void to_rows(const double* state, double* rows) const;
+  void from_rows(const double* rows, double* state) const;
+  void hold(const VehicleInput* inputs);
+  void act(double time_s, const double* rows, const VehicleInput* inputs);
+  void set_bodies();
 
   std::vector<Model> models_;
   std::vector<int> kind_of_;
@@ -79,8 +100,11 @@ class Swarm {
   bool interacts_ = false;  ///< some effect looks at neighbours
   bool listed_ = false;
   std::vector<std::vector<int>> near_;  ///< by vehicle, if listed_
+  std::vector<int> acted_on_;           ///< vehicles on which effects act, since hold()
   Instant instant_;
   std::vector<Neighbour> neighbours_;
+  RigidBodies bodies_;
+  std::vector<double> rows_, start_, sum_;
 };
 
 /// Initial state: at `p_W_m`, with velocity `v_W_m_s`, level, heading +x, rotors at hover force.

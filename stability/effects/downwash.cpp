@@ -61,21 +61,28 @@ EffectInfo Downwash::describe() {
 
 void Downwash::columns(const Instant& now, const double* shape, Wrench* columns) const {
   columns[0] = {};
-  double sum = 0;
-  double single = 0;
+  const double norm = shape[kNorm];
+  double sum = 0;  // of g^p
+  double single = 0, single_fade = 0;
   int count = 0;
+  const auto to_the_norm = [norm](double log_strength, double faded) {
+    const double power = std::exp(norm * log_strength);
+    return faded == 1 ? power : power * std::pow(faded, norm);
+  };
   for (int j = 0; j < now.num_neighbours; ++j) {
     double strength;
     if (!log_strength(now.neighbours[j], shape, &strength)) continue;
     const double faded = fade(now.neighbours[j].dp_W_m.z());
     if (++count == 1) {  // the common case needs no power: (g^p)^(1/p) = g
-      single = faded * std::exp(strength);
+      single = strength;
+      single_fade = faded;
       continue;
     }
-    if (count == 2) sum = std::pow(single, shape[kNorm]);
-    sum += std::pow(faded * std::exp(strength), shape[kNorm]);
+    if (count == 2) sum = to_the_norm(single, single_fade);
+    sum += to_the_norm(strength, faded);
   }
-  if (count > 0) columns[0].force_W_N.z() = count == 1 ? -single : -std::pow(sum, 1 / shape[kNorm]);
+  if (count == 1) columns[0].force_W_N.z() = -single_fade * std::exp(single);
+  if (count > 1) columns[0].force_W_N.z() = sum > 0 ? -std::exp(std::log(sum) / norm) : 0;
 }
 
 bool Downwash::in_support(const Instant& now, const double* shape) const {

@@ -31,11 +31,15 @@ double speed(double simulated_s, const std::function<void()>& work) {
   return simulated_s / best;
 }
 
-Model vehicle() {
-  Model model = read_model(swarmcert::tests::source_path("stability/models/crazyflie-small.toml"));
-  EffectSpec downwash;
-  downwash.name = "downwash";
-  model.effects.push_back(downwash);
+/// Read once: what is timed is flying.
+const Model& vehicle() {
+  static const Model model = [] {
+    Model model = read_model(swarmcert::tests::source_path("stability/models/crazyflie-small.toml"));
+    EffectSpec downwash;
+    downwash.name = "downwash";
+    model.effects.push_back(downwash);
+    return model;
+  }();
   return model;
 }
 

@@ -85,6 +85,67 @@ TEST(SampledFlight, OneAndFourSubstepsAgree) {
       << "the two must differ for the test to say something";
 }
 
+/// One vehicle of a task, flown as the only one.
+class OneOf : public Task {
+ public:
+  OneOf(const Task& task, int vehicle) : task_(task), vehicle_(vehicle) {}
+  Setpoint at(int, double time_s) const override { return task_.at(vehicle_, time_s); }
+  double duration_s() const override { return task_.duration_s(); }
+
+ private:
+  const Task& task_;
+  const int vehicle_;
+};
+
+TEST(SampledFlight, AVehicleFliesTheSameBitsAloneAndAmongOthers) {
+  // Several vehicles share wide registers, in the controllers (Lanes) and in the plant (RigidBodies); each kind of
+  // batch must give the bits of a single one. Gains this high drive the thrust of some vehicles to its limit.
+  for (const int vehicles : {2, 3, 5, 8, 11}) {
+    for (const char* const law : {"lee", "robust"}) {
+      Model weak = with_effects({{"drag_linear", {{"drag_N_s_m", 0.013}}}, {"motor_lag", {}}});
+      weak.mass_kg *= 2.4;
+      Model strong = with_effects({{"motor_lag", {}}});
+      const Gains given = parse_gains(
+          "schema = \"swarmcert/gains/1\"\n[position]\nKp = [20, 20, 40]\nKd = [10, 10, 9]\nKi = [3, 3, "
+          "10]\nrate_hz = 100\n[attitude]\nlaw = \"" +
+              std::string(law) + "\"\n",
+          "gains.toml");
+      std::vector<int> kind_of;
+      for (int i = 0; i < vehicles; ++i) kind_of.push_back(i % 4 == 3 ? 1 : 0);
+      const auto task = make_task("random-walk", {vehicles, 6, 3});
+      Swarm swarm({weak, strong}, kind_of);
+      SampledFlight together(swarm, given, *task, {});
+      int mixed = 0;
+      std::vector<std::vector<double>> states;
+      while (together.time_s() < 6) {
+        together.step();
+        int saturated = 0;
+        for (int i = 0; i < vehicles; ++i) saturated += together.record(i).saturated ? 1 : 0;
+        mixed += saturated > 0 && saturated < vehicles ? 1 : 0;
+        if (together.period() % 100 == 0) {
+          states.emplace_back(together.state(), together.state() + swarm.state_size());
+        }
+      }
+      if (vehicles > 3) {
+        EXPECT_GT(mixed, 0) << "some must reach the limit while others do not";
+      }
+      for (int i = 0; i < vehicles; ++i) {
+        Swarm single({weak, strong}, {kind_of[static_cast<std::size_t>(i)]});
+        const OneOf own(*task, i);
+        SampledFlight alone(single, given, own, {});
+        for (const std::vector<double>& state : states) {
+          for (int k = 0; k < 100; ++k) alone.step();
+          for (int c = 0; c < kVehicleStateSize; ++c) {
+            ASSERT_EQ(alone.state()[c], state[static_cast<std::size_t>(i * kVehicleStateSize + c)])
+                << vehicles << " vehicles, " << law << ", vehicle " << i << ", component " << c << ", "
+                << alone.time_s() << " s";
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(SampledFlight, HoversWhereItShouldAndFloatFliesLikeDouble) {
   for (const bool flies_float : {true, false}) {
     Swarm swarm(small(), 2);

@@ -1,0 +1,73 @@
+#include "stability/rigid_bodies.h"
+
+#include "stability/model.h"
+
+namespace swarmcert::stability {
+namespace {
+
+#define KERNEL narrow
+#define KERNEL_BLOCK 2
+#include "stability/rigid_bodies_kernel.inc"
+#undef KERNEL
+#undef KERNEL_BLOCK
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define SWARMCERT_WIDE_KERNELS
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#define KERNEL avx2
+#define KERNEL_BLOCK 4
+#include "stability/rigid_bodies_kernel.inc"
+#undef KERNEL
+#undef KERNEL_BLOCK
+#pragma GCC pop_options
+
+#pragma GCC push_options
+#pragma GCC target("avx512f")
+#define KERNEL avx512
+#define KERNEL_BLOCK 8
+#include "stability/rigid_bodies_kernel.inc"
+#undef KERNEL
+#undef KERNEL_BLOCK
+#pragma GCC pop_options
+#endif
+
+struct Kernel {
+  decltype(&narrow::derivatives) derivatives;
+  decltype(&narrow::stage) stage;
+};
+
+/// The widest that this processor has and `size` vehicles fill.
+Kernel choose([[maybe_unused]] int size) {
+#if defined(SWARMCERT_WIDE_KERNELS)
+  if (size > 4 && __builtin_cpu_supports("avx512f") != 0) return {avx512::derivatives, avx512::stage};
+  if (size > 2 && __builtin_cpu_supports("avx2") != 0) return {avx2::derivatives, avx2::stage};
+#endif
+  return {narrow::derivatives, narrow::stage};
+}
+
+constexpr int kWidest = 8;
+
+}  // namespace
+
+struct RigidBodies::Choice {
+  Kernel kernel;
+};
+
+RigidBodies::RigidBodies(int size)
+    : size_(size),
+      stride_((size + kWidest - 1) / kWidest * kWidest),
+      rows_(static_cast<std::size_t>(stride_) * kNumRows, 0.0),
+      choice_(std::make_unique<Choice>(Choice{choose(size)})) {}
+
+RigidBodies::~RigidBodies() = default;
+
+void RigidBodies::derivative(const double* state, double stabilise, double* derivative) const {
+  choice_->kernel.derivatives(rows_.data(), state, size_, stride_, stabilise, derivative);
+}
+
+void RigidBodies::stage(int which, double step_s, double* start, double* state, double* sum) const {
+  choice_->kernel.stage(which, rows_.data(), size_, stride_, step_s, start, state, sum);
+}
+
+}  // namespace swarmcert::stability
