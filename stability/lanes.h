@@ -49,11 +49,21 @@ class Lanes {
   SWARMCERT_LANE friend Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(Raw{a.v_ / b.v_}); }
   SWARMCERT_LANE friend Lanes product(const Lanes& a, const Lanes& b) { return Lanes(Raw{a.v_ * b.v_}); }
 
-  SWARMCERT_LANE friend bool operator<(const Lanes& a, const Lanes& b) { return together(Choice{a.v_ < b.v_}); }
-  SWARMCERT_LANE friend bool operator>(const Lanes& a, const Lanes& b) { return together(Choice{a.v_ > b.v_}); }
-  SWARMCERT_LANE friend bool operator<=(const Lanes& a, const Lanes& b) { return together(Choice{a.v_ <= b.v_}); }
-  SWARMCERT_LANE friend bool operator>=(const Lanes& a, const Lanes& b) { return together(Choice{a.v_ >= b.v_}); }
-  SWARMCERT_LANE friend bool operator==(const Lanes& a, const Lanes& b) { return together(Choice{a.v_ == b.v_}); }
+  SWARMCERT_LANE friend bool operator<(const Lanes& a, const Lanes& b) {
+    return together(Choice{a.v_ < b.v_});
+  }
+  SWARMCERT_LANE friend bool operator>(const Lanes& a, const Lanes& b) {
+    return together(Choice{a.v_ > b.v_});
+  }
+  SWARMCERT_LANE friend bool operator<=(const Lanes& a, const Lanes& b) {
+    return together(Choice{a.v_ <= b.v_});
+  }
+  SWARMCERT_LANE friend bool operator>=(const Lanes& a, const Lanes& b) {
+    return together(Choice{a.v_ >= b.v_});
+  }
+  SWARMCERT_LANE friend bool operator==(const Lanes& a, const Lanes& b) {
+    return together(Choice{a.v_ == b.v_});
+  }
 
   // As in controller/scalar.h and battery.h, lane by lane.
   SWARMCERT_LANE friend Lanes square_root(const Lanes& x) {
@@ -67,7 +77,9 @@ class Lanes {
 #endif
   }
   SWARMCERT_LANE friend Lanes absolute(const Lanes& x) { return Lanes(Raw{x.v_ < Vector{} ? -x.v_ : x.v_}); }
-  SWARMCERT_LANE friend Lanes positive_part(const Lanes& x) { return Lanes(Raw{x.v_ < Vector{} ? Vector{} : x.v_}); }
+  SWARMCERT_LANE friend Lanes positive_part(const Lanes& x) {
+    return Lanes(Raw{x.v_ < Vector{} ? Vector{} : x.v_});
+  }
   SWARMCERT_LANE friend Lanes clamp(const Lanes& x, const Lanes& lower, const Lanes& upper) {
     const Raw from_below{x.v_ > upper.v_ ? upper.v_ : x.v_};
     return Lanes(Raw{x.v_ < lower.v_ ? lower.v_ : from_below.v});
