@@ -5,6 +5,7 @@
 
 #include "analysis/bound_report.h"
 #include "analysis/commands/command.h"
+#include "analysis/progress.h"
 #include "analysis/tracking_input.h"
 #include "stability/sweep/tune.h"
 
@@ -19,53 +20,103 @@ struct Options {
   stability::TuneOptions tune;
   std::string objective = "impulse";
   std::string axis = "z";
-  double noise_factor = 1, lag_factor = 0.5;
 };
 
-files::Json point_json(const TunedPoint& p) {
-  return {{"Kp", p.Kp},
-          {"Kd", p.Kd},
-          {"Ki", p.Ki},
-          {"objective", finite(p.objective)},
-          {"rate", finite(p.norms.rate)},
-          {"amplitude", finite(p.norms.amplitude)},
-          {"edge", finite(p.norms.edge)},
-          {"impulse", finite(p.norms.impulse)},
-          {"noise_command_m_s2", finite(p.noise_m_s2)},
-          {"lag_limit_s", finite(p.lag_limit_s)},
-          {"effort", finite(p.effort)},
-          {"feasible", p.feasible}};
+/// Part of the further lag that the shipped gains bear and that tuned ones must still bear, where nothing else is said.
+constexpr double kKeptLag = 0.5;
+
+files::Json norms_json(const stability::GainNorms& norms) {
+  return {{"rate", finite(norms.rate)},
+          {"amplitude", finite(norms.amplitude)},
+          {"edge", finite(norms.edge)},
+          {"impulse", finite(norms.impulse)}};
 }
 
-void print_row(const char* what, double before, double after, const char* unit) {
+files::Json point_json(const TunedPoint& p, const stability::GainNorms& sampled) {
+  files::Json json = {{"Kp", p.Kp},
+                      {"Kd", p.Kd},
+                      {"Ki", p.Ki},
+                      {"objective", finite(p.objective)},
+                      {"sampled", norms_json(sampled)},
+                      {"noise_command_m_s2", finite(p.noise_m_s2)},
+                      {"lag_limit_s", finite(p.lag_limit_s)},
+                      {"effort", finite(p.effort)},
+                      {"feasible", p.feasible}};
+  json.update(norms_json(p.norms));
+  return json;
+}
+
+/// The gains as the published firmware calls them.
+struct FirmwareGain {
+  const char* name;
+  double TunedPoint::*value;
+  const char* unit;
+};
+constexpr FirmwareGain kFirmwareGains[] = {{"Kpos_P", &TunedPoint::Kp, "1/s^2"},
+                                           {"Kpos_D", &TunedPoint::Kd, "1/s"},
+                                           {"Kpos_I", &TunedPoint::Ki, "1/s^3"}};
+
+files::Json firmware_json(const std::string& axis, const TuneResult& found) {
+  files::Json rows = files::Json::array();
+  for (const FirmwareGain& gain : kFirmwareGains) {
+    const double before = found.shipped.*gain.value;
+    const double after = found.best.*gain.value;
+    rows.push_back({{"name", gain.name},
+                    {"axis", axis},
+                    {"shipped", before},
+                    {"tuned", after},
+                    {"relative_change", after / before - 1},
+                    {"unit", gain.unit}});
+  }
+  return rows;
+}
+
+void print_row(const std::string& what, double before, double after, const char* unit) {
   fmt::print("  {:<22} {:>12.6g} {:>12.6g} {:>+9.1f} %  {}\n", what, before, after,
              100 * (after / before - 1), unit);
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
 }
 
 void print_result(const Options& options, const TuneResult& found, const stability::TuneConstraints& limits) {
   const TunedPoint& a = found.shipped;
   const TunedPoint& b = found.best;
-  fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, further lag of {:.6g} s borne\n\n",
+  fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, further lag of {:.6g} s borne",
              options.axis, options.objective, limits.most_noise_m_s2, limits.least_lag_limit_s);
+  if (limits.most_rate > 0) fmt::print(", rate gain at most {:.6g}", limits.most_rate);
+  if (limits.most_effort > 0) fmt::print(", effort at most {:.6g}", limits.most_effort);
+  fmt::print("\n\n");
   if (!b.feasible) {
-    fmt::print("no gains within a factor {} satisfy the constraints ({})\n", options.tune.range,
-               found.stopped);
+    if (found.infeasible.empty()) {
+      fmt::print(
+          "NONE FOUND: no gains within a factor {} of the given ones were found that satisfy all "
+          "constraints\n",
+          options.tune.range);
+    } else {
+      fmt::print("INFEASIBLE: {}\n", found.infeasible);
+    }
+    fmt::print("nearest: Kp {:.6g}, Kd {:.6g}, Ki {:.6g}; violates {} by {:.3g} %\nsearch: {}\n", b.Kp, b.Kd,
+               b.Ki, listed(found.violated), 100 * b.excess, found.stopped);
     return;
   }
   fmt::print("  {:<22} {:>12} {:>12}\n", "", "shipped", "tuned");
-  print_row(("Kp[" + options.axis + "]").c_str(), a.Kp, b.Kp, "1/s^2");
-  print_row(("Kd[" + options.axis + "]").c_str(), a.Kd, b.Kd, "1/s");
-  print_row(("Ki[" + options.axis + "]").c_str(), a.Ki, b.Ki, "1/s^3");
+  for (const FirmwareGain& gain : kFirmwareGains) {
+    print_row(fmt::format("{} {}", gain.name, options.axis), a.*gain.value, b.*gain.value, gain.unit);
+  }
   print_row("rate", a.norms.rate, b.norms.rate, "m per N/s");
   print_row("amplitude", a.norms.amplitude, b.norms.amplitude, "m/N");
   print_row("edge", a.norms.edge, b.norms.edge, "m/N");
   print_row("impulse", a.norms.impulse, b.norms.impulse, "m per N s");
+  print_row("impulse, sampled", found.shipped_sampled.impulse, found.best_sampled.impulse, "m per N s");
   print_row("noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2");
   print_row("further lag borne", a.lag_limit_s, b.lag_limit_s, "s");
   print_row("effort", a.effort, b.effort, "N/N");
-  std::string active;
-  for (const std::string& name : found.active_constraints) active += (active.empty() ? "" : ", ") + name;
-  fmt::print("\nactive constraints: {}\n", active.empty() ? "none" : active);
+  fmt::print("\nactive constraints: {}\n", listed(found.active_constraints));
+  if (!a.feasible) fmt::print("the shipped gains violate a constraint\n");
   fmt::print("search: {}; good gains, not proved to be the best\n", found.stopped);
 }
 
@@ -86,8 +137,13 @@ int run(Options options, const CommonOptions& common) {
                                                             : stability::TuneObjective::kImpulse;
   const TunedPoint shipped = evaluate_gains(*loop, options.tune.objective);
   stability::TuneConstraints& limits = options.tune.constraints;
-  if (limits.most_noise_m_s2 == 0) limits.most_noise_m_s2 = options.noise_factor * shipped.noise_m_s2;
-  if (limits.least_lag_limit_s == 0) limits.least_lag_limit_s = options.lag_factor * shipped.lag_limit_s;
+  // By default nothing may get worse than it is, except the lag that is borne; the slack is for rounding.
+  constexpr double kSlack = 1e-9;
+  if (limits.most_noise_m_s2 == 0) limits.most_noise_m_s2 = shipped.noise_m_s2 * (1 + kSlack);
+  if (limits.least_lag_limit_s == 0) limits.least_lag_limit_s = kKeptLag * shipped.lag_limit_s;
+  if (limits.most_rate == 0) limits.most_rate = shipped.norms.rate * (1 + kSlack);
+  Progress progress(common.quiet);
+  options.tune.progress = [&progress](int done, int total) { progress.show(done, total, "evaluations"); };
   const TuneResult found = stability::tune(*loop, options.tune);
 
   files::Json result = result_head("tune", {options.tracking.gains, options.tracking.model});
@@ -97,18 +153,27 @@ int run(Options options, const CommonOptions& common) {
   result["constraints"] = {
       {"most_noise_m_s2", limits.most_noise_m_s2},
       {"least_lag_limit_s", limits.least_lag_limit_s},
-      {"most_rate", limits.most_rate > 0 ? files::Json(limits.most_rate) : files::Json()},
+      {"most_rate", finite(limits.most_rate)},
       {"most_effort", limits.most_effort > 0 ? files::Json(limits.most_effort) : files::Json()}};
-  result["gains"] = found.best.feasible
-                        ? files::Json{{"Kp", found.best.Kp}, {"Kd", found.best.Kd}, {"Ki", found.best.Ki}}
-                        : files::Json();
-  result["shipped"] = point_json(found.shipped);
-  result["tuned"] = found.best.feasible ? point_json(found.best) : files::Json();
+  const TunedPoint& best = found.best;
+  result["verdict"] = !best.feasible ? (found.infeasible.empty() ? "none found" : "infeasible")
+                      : found.shipped.feasible && best.objective > found.shipped.objective * (1 - 1e-6)
+                          ? "no better gains found"
+                          : "found";
+  result["gains"] =
+      best.feasible ? files::Json{{"Kp", best.Kp}, {"Kd", best.Kd}, {"Ki", best.Ki}} : files::Json();
+  result["firmware_parameters"] = best.feasible ? firmware_json(options.axis, found) : files::Json();
+  result["shipped"] = point_json(found.shipped, found.shipped_sampled);
+  result["tuned"] = best.feasible ? point_json(best, found.best_sampled) : files::Json();
+  result["nearest"] = best.feasible ? files::Json() : point_json(best, found.best_sampled);
+  result["violated_constraints"] = found.violated;
+  result["why_infeasible"] = found.infeasible;
   result["active_constraints"] = found.active_constraints;
   result["stopped"] = found.stopped;
   write_result(common, result);
   if (common.prints_text()) print_result(options, found, limits);
-  return found.best.feasible ? kDone : kInconclusive;
+  if (!best.feasible) return found.infeasible.empty() ? kInconclusive : kViolated;
+  return kDone;
 }
 
 }  // namespace
@@ -118,9 +183,11 @@ Command tune_command() {
       "tune", "Better gains for one axis under constraints",
       "Searches Kp, Kd, Ki of one axis, globally and then locally (NLopt), for the least worst-case error "
       "under\n"
-      "limits on the command's noise, the lag that must be borne, and others. Says which limits hold it back "
-      "and\n"
-      "what changes against the gains given.\n\n"
+      "limits on the command's noise, the lag that must be borne, the rate gain, and the effort. Says which "
+      "limits "
+      "hold\n"
+      "it back and what changes against the gains given. Exit code 4: no gains found; 1: proved that there "
+      "are none.\n\n"
       "Example: swarmcert tune --gains controller/gains/crazyflie-small.toml --model "
       "stability/models/crazyflie-small.toml",
       [](CLI::App& app) {
@@ -138,7 +205,8 @@ Command tune_command() {
         app.add_option("--min-lag", limits.least_lag_limit_s,
                        "Further lag that the loop must bear, s (default: half of what it bears now)")
             ->check(CLI::PositiveNumber);
-        app.add_option("--max-rate", limits.most_rate, "Largest rate gain, m per N/s")
+        app.add_option("--max-rate", limits.most_rate,
+                       "Largest rate gain, m per N/s (default: as now; keeps Ki up)")
             ->check(CLI::PositiveNumber);
         app.add_option("--max-effort", limits.most_effort, "Largest effort gain, N/N")
             ->check(CLI::PositiveNumber);

@@ -109,8 +109,8 @@ double split_bound(const StepResponse& h, double amplitude, double rate) {
   }
   const std::vector<double> u = TotalVariation(values, weights).solve();
 
-  double variation = std::abs(u.front()) + std::abs(u.back());
-  double rest = h.after;
+  double variation = std::abs(u.front());
+  double rest = 0;
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
     variation += std::abs(u[k + 1] - u[k]);
     const double span = time[nodes[k + 1]] - time[nodes[k]];
@@ -123,7 +123,12 @@ double split_bound(const StepResponse& h, double amplitude, double rate) {
       before = here;
     }
   }
-  return amplitude * variation + rate * rest;
+  // After the last node u is zero, or it is h, which then only falls.
+  double end = amplitude * std::abs(u.back()) + rate * h.after;
+  if (h.falls_after) {
+    end = std::min(end, amplitude * (std::abs(u.back() - h.value.back()) + std::abs(h.value.back())));
+  }
+  return amplitude * variation + rate * rest + end;
 }
 
 }  // namespace swarmcert::stability

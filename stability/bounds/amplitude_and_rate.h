@@ -12,6 +12,7 @@ struct StepResponse {
   std::vector<double> length;
   std::vector<double> bend;
   double after = 0;
+  bool falls_after = false;  ///< whether |h| falls to zero there without changing its sign
 };
 
 /// sup |y| over all f with |f| <= amplitude, |f'| <= rate, from rest. It is a linear program in f; its dual is

@@ -137,7 +137,7 @@ class Scan {
     VectorXd x = chain_.initial();
     double t = 0;
     long events_before_alone = -1;
-    while (slowest * t < kGone) {
+    while (slowest * t < kGone && !is_lone_decay(t)) {
       if (const double ratio = lone_oscillation(t); ratio > 0) {
         if (events_before_alone < 0) events_before_alone = zeros_.least_events();
         if (zeros_.least_events() > events_before_alone + 3) return zeros_.finish_oscillation(0, ratio);
@@ -157,6 +157,16 @@ class Scan {
     double four[4];
     chain_.first_four(x, four);
     return four[1];
+  }
+
+  /// Whether one real pole is all that is left: the response and its derivatives have no zeros any more, and sampling
+  /// on would only find those of rounding.
+  bool is_lone_decay(double t) const {
+    int left = 0;
+    for (const std::complex<double>& pole : chain_.sorted_poles()) {
+      if (-pole.real() / chain_.rate() * t < kGone) left += pole.imag() == 0 ? 1 : 2;
+    }
+    return left == 1;
   }
 
   /// Where one pair of complex poles is all that is left: what it keeps over half a cycle; else 0.

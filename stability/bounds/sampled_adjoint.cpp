@@ -28,9 +28,28 @@ double largest_modulus(const MatrixXd& map) {
 
 SampledAdjoint::SampledAdjoint(const SampledLoop& loop, Output output)
     : period_s_(loop.period_s), output_(output), model_(loop), map_(model_.hold() * model_.control()) {
-  const double slowest = largest_modulus(without_unread(map_, model_, loop.plant.Ki));
-  is_stable_ = slowest < 1;
-  periods_ = is_stable_ ? static_cast<long>(std::ceil(42 / -std::log(std::max(slowest, 1e-6)))) + 60 : 0;
+  const Eigen::VectorXcd modes =
+      Eigen::EigenSolver<MatrixXd>(without_unread(map_, model_, loop.plant.Ki), false).eigenvalues();
+  Index slowest = 0;
+  for (Index i = 0; i < modes.size(); ++i) {
+    if (std::abs(modes[i]) > std::abs(modes[slowest])) slowest = i;
+  }
+  const double modulus = std::abs(modes[slowest]);
+  if (!(modulus < 1)) return;
+  double next = 1e-6;
+  for (Index i = 0; i < modes.size(); ++i) {
+    if (i != slowest) next = std::max(next, std::abs(modes[i]));
+  }
+  // Repeated modes, as those of a delay, take some periods more to fade.
+  constexpr double kMore = 60;
+  const double until_gone = 42 / -std::log(std::max(modulus, 1e-6)) + kMore;
+  const double until_alone = next < modulus ? 42 / std::log(modulus / next) + kMore : 1e300;
+  const bool ends_alone = modes[slowest].imag() == 0 && modes[slowest].real() > 0 && until_alone < until_gone;
+  const double periods = ends_alone ? until_alone : until_gone;
+  if (periods > kMostPeriods) return;
+  is_stable_ = true;
+  periods_ = static_cast<long>(std::ceil(periods));
+  if (ends_alone) ratio_ = modulus;
 }
 
 RowVectorXd SampledAdjoint::output_after_control(double phase_s) const {

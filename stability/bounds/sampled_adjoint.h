@@ -22,40 +22,49 @@ class SampledAdjoint {
 
   explicit SampledAdjoint(const SampledLoop& loop, Output output = Output::kError);
 
+  /// Whether the loop is stable and an oscillation that is left fades within kMostPeriods. Where not, there are no
+  /// kernels, and gains count as infinite.
   bool is_stable() const { return is_stable_; }
   double period_s() const { return period_s_; }
-  /// After so many periods all kernels have fallen to e^-42 of themselves.
-  long periods() const { return periods_; }
+  static constexpr double kMostPeriods = 3e6;
 
   /// Calls visit(start, slope, length): the kernel from a force to the output is start + slope u, u growing backwards in
-  /// time, on stretches that follow one another; the first is the part of the period before the moment looked at.
-  template <class Visit>
-  void force_kernel(double phase_s, const Visit& visit) const {
+  /// time, on stretches that follow one another; the first is the part of the period before the moment looked at. Ends
+  /// where the kernel has fallen to e^-42, or where one real mode is all that is left: then every further period has
+  /// `ratio` times the kernel of the one before, and finish(start, slope, length, ratio) is called with the next one.
+  template <class Visit, class Finish>
+  void force_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
     const Eigen::RowVectorXd after = output_after_control(phase_s);
     if (output_ == Output::kError) visit(0.0, 1.0, phase_s);
-    walk(after * model_.control(), [&](const std::vector<double>& row) { visit(row[1], row[0], period_s_); });
+    const std::vector<double> rest = walk(
+        after * model_.control(), [&](const std::vector<double>& row) { visit(row[1], row[0], period_s_); });
+    if (ratio_ > 0) finish(rest[1], rest[0], period_s_, ratio_);
   }
 
   /// Calls visit(kernel): the response to an error of 1 m/s^2 in the command of this period, of the one before, ...
-  template <class Visit>
-  void command_kernel(double phase_s, const Visit& visit) const {
+  /// and finish(kernel, ratio) as above.
+  template <class Visit, class Finish>
+  void command_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
     const Eigen::RowVectorXd after = output_after_control(phase_s);
     const Eigen::VectorXd from_command = model_.hold().col(model_.command_index());
-    visit(after[model_.command_index()]);
-    walk(after * model_.control(), [&](const std::vector<double>& row) {
+    const auto kernel_of = [&](const std::vector<double>& row) {
       double kernel = 0;
       for (std::size_t i = 0; i < row.size(); ++i)
         kernel += row[i] * from_command[static_cast<Eigen::Index>(i)];
-      visit(kernel);
-    });
+      return kernel;
+    };
+    visit(after[model_.command_index()]);
+    const std::vector<double> rest =
+        walk(after * model_.control(), [&](const std::vector<double>& row) { visit(kernel_of(row)); });
+    if (ratio_ > 0) finish(kernel_of(rest), ratio_);
   }
 
  private:
   Eigen::RowVectorXd output_after_control(double phase_s) const;
 
-  /// row <- row * map, on plain arrays: this loop runs up to a million times.
+  /// row <- row * map, on plain arrays: this loop runs up to a million times. Returns the row after the last visited.
   template <class Visit>
-  void walk(const Eigen::RowVectorXd& first, const Visit& visit) const {
+  std::vector<double> walk(const Eigen::RowVectorXd& first, const Visit& visit) const {
     std::vector<double> now(first.data(), first.data() + first.size());
     std::vector<double> next(now.size());
     for (long j = 0; j < periods_; ++j) {
@@ -69,6 +78,7 @@ class SampledAdjoint {
       }
       now.swap(next);
     }
+    return now;
   }
 
   double period_s_;
@@ -77,6 +87,7 @@ class SampledAdjoint {
   Eigen::MatrixXd map_;
   bool is_stable_ = false;
   long periods_ = 0;
+  double ratio_ = 0;  ///< of the lone real mode after periods_; 0: nothing is left then
 };
 
 }  // namespace swarmcert::stability

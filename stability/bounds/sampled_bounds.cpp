@@ -22,6 +22,7 @@ struct Kernel {
   std::vector<double> step_peak;  ///< largest |integral| on a cell
   std::vector<double> bend;       ///< of the integral away from its chord, over a cell
   double area = 0;                ///< int |kernel|
+  double step_area_after = 0;     ///< int |integral| after the last cell
 
   void add(double start, double slope, double cell) {
     const double end = start + slope * cell;
@@ -39,20 +40,36 @@ struct Kernel {
     step_peak.push_back(most);
     bend.push_back(std::abs(slope) * cell * cell * cell / 12);
   }
+
+  /// A last cell, of which every later one is `ratio` times the one before; the integral falls in proportion.
+  void add_series(double start, double slope, double cell, double ratio) {
+    const double before = area;
+    add(start, slope, cell);
+    area = before + (area - before) / (1 - ratio);
+    const double on_cell = (std::abs(step[step.size() - 2]) + std::abs(step.back())) / 2 * cell + bend.back();
+    step_area_after = on_cell * ratio / (1 - ratio);
+  }
 };
 
 Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s, double mass_kg) {
   Kernel kernel;
   kernel.step.push_back(0);
   if (channel == Channel::kForce) {
-    adjoint.force_kernel(phase_s, [&](double start, double slope, double length) {
-      kernel.add(start / mass_kg, slope / mass_kg, length);
-    });
+    adjoint.force_kernel(
+        phase_s,
+        [&](double start, double slope, double length) {
+          kernel.add(start / mass_kg, slope / mass_kg, length);
+        },
+        [&](double start, double slope, double length, double ratio) {
+          kernel.add_series(start / mass_kg, slope / mass_kg, length, ratio);
+        });
   } else {
     // An error of one period is a force held for the period: int |eps| dt counts it as it counts a force.
     const double period_s = adjoint.period_s();
+    const double scale = 1 / (mass_kg * period_s);
     adjoint.command_kernel(
-        phase_s, [&](double response) { kernel.add(response / (mass_kg * period_s), 0, period_s); });
+        phase_s, [&](double response) { kernel.add(response * scale, 0, period_s); },
+        [&](double response, double ratio) { kernel.add_series(response * scale, 0, period_s, ratio); });
   }
   return kernel;
 }
@@ -116,7 +133,9 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
     const double both = worst_phase(loop, [&](double phase_s) {
       // In the command, rate acts once per period on the sum up to there; the trapezoids count as much.
       const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
-      return split_bound({kernel.step, kernel.length, kernel.bend, 1e-12 * gains.rate}, E, d);
+      return split_bound({kernel.step, kernel.length, kernel.bend,
+                          kernel.step_area_after + 1e-12 * gains.rate, kernel.step_area_after > 0},
+                         E, d);
     });
     bounds.by_both = std::min(bounds.by_both, both);
   }

@@ -35,6 +35,14 @@ class KernelSum {
     }
   }
 
+  /// That stretch, then again and again `ratio` times smaller; the integral, too, falls in proportion.
+  void add_series(double start, double slope, double length, double ratio) {
+    const GainNorms before = norms_;
+    add_linear(start, slope, length);
+    norms_.rate = before.rate + (norms_.rate - before.rate) / (1 - ratio);
+    norms_.amplitude = before.amplitude + (norms_.amplitude - before.amplitude) / (1 - ratio);
+  }
+
   const GainNorms& norms() const { return norms_; }
 
  private:
@@ -76,19 +84,29 @@ class PhaseGains {
     const double period_s = adjoint_.period_s();
     if (channel_ == Channel::kForce) {
       KernelSum force;
-      adjoint_.force_kernel(phase_s, [&](double start, double slope, double length) {
-        force.add_linear(start, slope, length);
-      });
+      adjoint_.force_kernel(
+          phase_s, [&](double start, double slope, double length) { force.add_linear(start, slope, length); },
+          [&](double start, double slope, double length, double ratio) {
+            force.add_series(start, slope, length, ratio);
+          });
       return force.norms();
     }
     GainNorms command;
     double step = 0;
-    adjoint_.command_kernel(phase_s, [&](double kernel) {
+    const auto add = [&](double kernel) {
       step += kernel;
       command.amplitude += std::abs(kernel);
       command.impulse = std::max(command.impulse, std::abs(kernel) / period_s);
       command.edge = std::max(command.edge, std::abs(step));
       command.rate += std::abs(step) * period_s;
+    };
+    adjoint_.command_kernel(phase_s, add, [&](double kernel, double ratio) {
+      // The step returns to zero in proportion to the kernel.
+      const double rate = command.rate;
+      const double amplitude = command.amplitude;
+      add(kernel);
+      command.rate = rate + (command.rate - rate) / (1 - ratio);
+      command.amplitude = amplitude + (command.amplitude - amplitude) / (1 - ratio);
     });
     return command;
   }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
+#include <limits>
 #include <memory>
 
 namespace swarmcert::stability {
@@ -48,10 +50,13 @@ class Search {
     loop.plant.Kp = std::exp(log_gains[0]);
     loop.plant.Kd = std::exp(log_gains[1]);
     loop.plant.Ki = std::exp(log_gains[2]);
-    TunedPoint point = evaluate_gains(loop, options_.objective);
+    return judged(evaluate_gains(loop, options_.objective));
+  }
+
+  TunedPoint judged(TunedPoint point) const {
     const auto e = excesses(point, options_.constraints);
-    point.feasible =
-        std::isfinite(point.objective) && std::all_of(e.begin(), e.end(), [](double x) { return x <= 0; });
+    point.excess = std::isfinite(point.objective) ? *std::max_element(e.begin(), e.end()) : kWorst;
+    point.feasible = point.excess <= 0;
     return point;
   }
 
@@ -61,9 +66,14 @@ class Search {
       std::copy(x, x + 3, last_.begin());
       has_last_ = true;
       point_ = at(x);
-      if (point_.feasible && (!best_.feasible || point_.objective < best_.objective)) {
+      const int total = options_.global_evaluations + 3 * options_.local_evaluations;
+      if (options_.progress) options_.progress(std::min(++evaluations_, total), total);
+      const bool is_better = point_.feasible ? !best_.feasible || point_.objective < best_.objective
+                                             : !best_.feasible && point_.excess < best_.excess;
+      if (!has_best_ || is_better) {
         best_ = point_;
         best_x_ = last_;
+        has_best_ = true;
       }
     }
     return point_;
@@ -102,7 +112,9 @@ class Search {
   SampledLoop loop_;
   TuneOptions options_;
   std::array<double, 3> last_{};
+  int evaluations_ = 0;
   bool has_last_ = false;
+  bool has_best_ = false;
   TunedPoint point_, best_;
   std::array<double, 3> best_x_{};
 };
@@ -123,6 +135,19 @@ const char* name(TuneObjective objective) {
   return "unknown";
 }
 
+namespace {
+
+/// Whether some oscillation keeps more than half of itself for 10 cycles: no candidate, and its norms are many terms.
+bool rings(const AxisLoop& loop) {
+  const TransferFunction y = impulse_transfer(loop, Channel::kForce);
+  for (const std::complex<double>& pole : poles(sum(y.denominator, y.feedback))) {
+    if (std::abs(pole.imag()) > 90 * -pole.real()) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective) {
   TunedPoint point;
   point.Kp = loop.plant.Kp;
@@ -130,11 +155,14 @@ TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective) {
   point.Ki = loop.plant.Ki;
   AxisLoop acting = loop.plant;
   acting.Ki = effective_Ki(loop);
-  point.norms = continuous_norms(acting, Channel::kForce);
-  point.objective = spectral_radius(loop) < 1 ? objective_of(point.norms, objective) : INFINITY;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const bool is_candidate = spectral_radius(loop) < 1 && !rings(acting);
+  point.norms = is_candidate ? continuous_norms(acting, Channel::kForce)
+                             : GainNorms{kInfinity, kInfinity, kInfinity, kInfinity};
+  point.objective = objective_of(point.norms, objective);
   point.noise_m_s2 = noise_deviation(loop, 1e-3, 0.05).command_m_s2;
   point.lag_limit_s = lag_limit(acting);
-  point.effort = effort_gain(acting);
+  point.effort = is_candidate ? effort_gain(acting) : kInfinity;
   return point;
 }
 
@@ -149,18 +177,33 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
     low[i] -= std::log(options.range);
     high[i] += std::log(options.range);
   }
-  result.shipped = search.cached(given.data());
+  search.cached(given.data());
+  result.shipped = search.judged(evaluate_gains(loop, options.objective));
+  const double largest_Ki = effective_Ki(loop) * options.range;
+  if (options.constraints.most_rate > 0 &&
+      1 / (loop.plant.mass_kg * largest_Ki) > options.constraints.most_rate) {
+    result.infeasible = "the rate gain is at least 1/(m Ki), above the limit even at the largest Ki";
+  }
   nlopt_srand(static_cast<unsigned long>(options.seed));
   const std::string global = search.run(NLOPT_GN_ISRES, given, low, high, options.global_evaluations);
-  std::string local = "no feasible point to start from";
-  if (search.best().feasible) {
-    local = search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
-    search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
-  }
+  // COBYLA walks into the constraints by itself: from the best point, or from the one that violates least.
+  const std::string local =
+      search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
+  search.run(NLOPT_LN_COBYLA, search.best_x(), low, high, options.local_evaluations);
+  search.run(NLOPT_LN_COBYLA, given, low, high, options.local_evaluations);
   result.best = search.best();
   result.stopped = "global " + global + ", local " + local;
-  if (!result.best.feasible) return result;
+  result.shipped_sampled = sampled_norms(loop, Channel::kForce, Instants::kSampling);
+  SampledLoop tuned = loop;
+  tuned.plant.Kp = result.best.Kp;
+  tuned.plant.Kd = result.best.Kd;
+  tuned.plant.Ki = result.best.Ki;
+  result.best_sampled = sampled_norms(tuned, Channel::kForce, Instants::kSampling);
   const auto e = excesses(result.best, options.constraints);
+  for (std::size_t i = 0; i < e.size(); ++i) {
+    if (e[i] > 0) result.violated.emplace_back(kConstraintNames[i]);
+  }
+  if (!result.best.feasible) return result;
   for (std::size_t i = 0; i < e.size(); ++i) {
     if (e[i] > -1e-3) result.active_constraints.emplace_back(kConstraintNames[i]);
   }

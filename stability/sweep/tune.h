@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@ namespace swarmcert::stability {
 struct TuneConstraints {
   double most_noise_m_s2 = 0;    ///< of the command, for 1 mm and 0.05 m/s of sensor noise
   double least_lag_limit_s = 0;  ///< further first-order lag that the loop must bear
-  double most_rate = 0;          ///< m per N/s; 0: no such constraint
-  double most_effort = 0;        ///< N/N; 0: no such constraint
+  double most_rate =
+      0;  ///< m per N/s; 0: no such constraint. As the rate gain is at least 1/(m Ki), it keeps Ki up
+  double most_effort = 0;  ///< N/N; 0: no such constraint
 };
 
 enum class TuneObjective { kAmplitude, kImpulse, kEdge, kRate };
@@ -23,8 +25,9 @@ struct TuneOptions {
   TuneConstraints constraints;
   double range = 8;  ///< gains between the given ones divided and multiplied by this
   int global_evaluations = 4000;
-  int local_evaluations = 1500;
+  int local_evaluations = 600;
   std::uint64_t seed = 1;
+  std::function<void(int done, int total)> progress = {};  ///< called after every evaluation
 };
 
 struct TunedPoint {
@@ -33,10 +36,16 @@ struct TunedPoint {
   GainNorms norms;
   double noise_m_s2 = 0, lag_limit_s = 0, effort = 0;
   bool feasible = false;
+  double excess = 0;  ///< of the constraint that is violated most, relative; at most 0 where feasible
 };
 
 struct TuneResult {
-  TunedPoint shipped, best;
+  TunedPoint shipped;
+  TunedPoint best;                          ///< where none is feasible: the one that violates least
+  GainNorms shipped_sampled, best_sampled;  ///< force channel of the sampled loop, at its samples
+  std::vector<std::string> violated;        ///< by `best`, where it is not feasible
+  /// Why no gains of the range satisfy the constraints, where that is proved; else empty.
+  std::string infeasible;
   /// Constraints within 0.1 % of their limit at the best gains, and gains at the end of their range.
   std::vector<std::string> active_constraints;
   std::string stopped;  ///< why the search ended; it finds good gains, it does not prove them best

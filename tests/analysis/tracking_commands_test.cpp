@@ -283,9 +283,44 @@ TEST(TuneCommand, FindsGainsThatAreBetterWithinTheConstraints) {
   const Json& shipped = result["shipped"];
   EXPECT_LE(tuned["impulse"].get<double>(), shipped["impulse"].get<double>());
   EXPECT_LE(tuned["noise_command_m_s2"].get<double>(),
-            shipped["noise_command_m_s2"].get<double>() * (1 + 1e-12));
+            shipped["noise_command_m_s2"].get<double>() * (1 + 1e-8));
   EXPECT_GE(tuned["lag_limit_s"].get<double>(), result["constraints"]["least_lag_limit_s"].get<double>());
   EXPECT_FALSE(result["active_constraints"].empty());
+  EXPECT_EQ(result["verdict"], "found");
+  // The rate gain may not get worse, which keeps the integrator: it is at least 1/(m Ki).
+  EXPECT_LE(tuned["rate"].get<double>(), shipped["rate"].get<double>() * (1 + 1e-8));
+  EXPECT_GE(result["gains"]["Ki"].get<double>(), 9.999);
+  EXPECT_EQ(result["firmware_parameters"][0]["name"], "Kpos_P");
+  EXPECT_EQ(result["firmware_parameters"][0]["shipped"], 10);
+  EXPECT_EQ(result["firmware_parameters"][0]["tuned"], result["gains"]["Kp"]);
+}
+
+TEST(TuneCommand, SameSeedSameBytes) {
+  const ScratchFolder folder;
+  for (const char* out : {"a.json", "b.json"}) {
+    ASSERT_EQ(
+        run_shell("swarmcert tune" + kFlown + " --nodes 150 --seed 4 --json " + out, folder.path()).exit_code,
+        0);
+  }
+  EXPECT_EQ(read_text(folder / "a.json"), read_text(folder / "b.json"));
+}
+
+TEST(TuneCommand, ConstraintsThatCannotBeMetAreRefutedOrNotFoundWithTheNearestGains) {
+  const ScratchFolder folder;
+  // The rate gain is at least 1/(0.034 kg 8 2 1/s^3) = 1.84 m per N/s within a factor of 8.
+  const Outcome refuted =
+      run_shell("swarmcert tune" + kFlown + " --nodes 150 --max-rate 1.8 --json a.json", folder.path());
+  EXPECT_EQ(refuted.exit_code, 1) << refuted.output;
+  const Json a = files::parse_json(read_text(folder / "a.json"), "a.json");
+  EXPECT_EQ(a["verdict"], "infeasible");
+  EXPECT_TRUE(a["gains"].is_null());
+  const Outcome none =
+      run_shell("swarmcert tune" + kFlown + " --nodes 150 --max-noise 0.01 --json b.json", folder.path());
+  EXPECT_EQ(none.exit_code, 4) << none.output;
+  const Json b = files::parse_json(read_text(folder / "b.json"), "b.json");
+  EXPECT_EQ(b["verdict"], "none found");
+  EXPECT_FALSE(b["violated_constraints"].empty());
+  EXPECT_GT(b["nearest"]["noise_command_m_s2"].get<double>(), 0.01);
 }
 
 }  // namespace

@@ -165,6 +165,42 @@ TEST(SampledLoop, WithoutIntegralTheRestIsFiniteAndNearTheContinuousLoop) {
   EXPECT_TRUE(std::isfinite(noise_deviation(sampled(10, 5, 0, 500), 1e-3, 0.05).command_m_s2));
 }
 
+/// One slow mode remains for hours: its geometric series is summed. The rate gain is at least the constant one, 1/(m Ki),
+/// and equal to it for a response of one sign.
+TEST(SampledLoop, AVerySlowIntegratorCostsNoTimeAndHasItsClosedForm) {
+  for (const double Ki : {1e-3, 1e-6}) {
+    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+      const GainNorms norms = sampled_norms(sampled(12, 8, Ki, 500), channel, Instants::kSampling);
+      const GainNorms exact = continuous_norms({kMass_kg, 12, 8, Ki, {}, 0}, channel);
+      EXPECT_NEAR(norms.rate * kMass_kg * Ki, 1, 1e-6);
+      EXPECT_NEAR(norms.amplitude, exact.amplitude, 5e-3 * exact.amplitude);
+      EXPECT_NEAR(norms.edge, exact.edge, 5e-3 * exact.edge);
+    }
+  }
+}
+
+/// The same numbers with and without the shortcut: a plain sum over a million periods.
+TEST(SampledLoop, TheSeriesOfTheLastModeEqualsThePlainSum) {
+  const SampledLoop loop = sampled(9, 4, 0.3, 200, 0.002);
+  const GainNorms norms = sampled_norms(loop, Channel::kCommand, Instants::kSampling);
+  double p = 0, v = 0, integral = 0, late = 1 / kMass_kg, step = 0, rate = 0, amplitude = 0, edge = 0;
+  const double T = loop.period_s;
+  for (int k = 0; k < 1'000'000; ++k) {  // an error of the command of 1 N in the first period
+    integral += loop.integrator_step_s * p;
+    const double u = -(9 * p + 4 * v + 0.3 * integral) + late;
+    late = 0;
+    p += v * T + u * T * T / 2;
+    v += u * T;
+    step += p;
+    amplitude += std::abs(p);
+    rate += std::abs(step) * T;
+    edge = std::max(edge, std::abs(step));
+  }
+  EXPECT_NEAR(norms.amplitude, amplitude, 1e-9 * amplitude);
+  EXPECT_NEAR(norms.rate, rate, 1e-7 * rate);
+  EXPECT_NEAR(norms.edge, edge, 1e-9 * edge);
+}
+
 TEST(SampledLoop, AnUnstableLoopHasNoFiniteGain) {
   EXPECT_TRUE(std::isinf(sampled_norms(sampled(10, 5, 10, 2), Channel::kForce, Instants::kAll).amplitude));
   EXPECT_TRUE(std::isinf(noise_deviation(sampled(10, 5, 10, 2), 1, 1).error_m));
