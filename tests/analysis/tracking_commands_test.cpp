@@ -314,8 +314,8 @@ TEST(TuneCommand, ConstraintsThatCannotBeMetAreRefutedOrNotFoundWithTheNearestGa
   const Json a = files::parse_json(read_text(folder / "a.json"), "a.json");
   EXPECT_EQ(a["verdict"], "infeasible");
   EXPECT_TRUE(a["gains"].is_null());
-  const Outcome none =
-      run_shell("swarmcert tune" + kFlown + " --nodes 150 --max-noise 0.01 --json b.json", folder.path());
+  const Outcome none = run_shell(
+      "swarmcert tune" + kFlown + " --nodes 150 --range 2 --max-noise 0.01 --json b.json", folder.path());
   EXPECT_EQ(none.exit_code, 4) << none.output;
   const Json b = files::parse_json(read_text(folder / "b.json"), "b.json");
   EXPECT_EQ(b["verdict"], "none found");
