@@ -7,7 +7,8 @@
 /// replays. So the sum has one order, a function of the set alone: first the ground, then the kinds by index, and
 /// within a kind by the clamped inputs, compared number by number as unsigned bit patterns. Any total order would do;
 /// this one needs no case for zeros of either sign. Neighbours that compare equal have equal inputs and are
-/// interchangeable.
+/// interchangeable. Neighbours that follow one another in this order and are of one kind go through phi together, a few
+/// at a time; what is added when does not change.
 #pragma once
 
 #include <cstdint>
@@ -56,18 +57,22 @@ struct DeepSetWorkspace {
   int* order;          ///< [capacity]
   int capacity;        ///< most neighbours
   Scalar* hidden_sum;  ///< [DeepSet::hidden()]
-  Scalar* hidden;      ///< [DeepSet::hidden()]
   Scalar* scratch;     ///< [scratch_size(set)]
 };
+
+/// Neighbours that go through phi at once, at most.
+inline constexpr int kMostTogether = 3;
 
 /// Elements that evaluate() needs in DeepSetWorkspace::scratch.
 template <typename Scalar>
 constexpr int scratch_size(const DeepSet<Scalar>& set) {
   int largest = scratch_size(set.rho);
-  for (int kind = 0; kind < set.num_kinds; ++kind) {
-    if (scratch_size(set.phi[kind]) > largest) largest = scratch_size(set.phi[kind]);
-  }
   if (set.ground != nullptr && scratch_size(*set.ground) > largest) largest = scratch_size(*set.ground);
+  for (int kind = 0; kind < set.num_kinds; ++kind) {
+    const int size =
+        scratch_size(set.phi[kind], kMostTogether) + kMostTogether * (set.inputs() + set.hidden());
+    if (size > largest) largest = size;
+  }
   return largest;
 }
 
@@ -120,6 +125,27 @@ inline void sort_canonically(const DeepSet<Scalar>& set, const Neighbour<Scalar>
   }
 }
 
+/// Adds phi of `Together` neighbours to the sum, in their order.
+/// @param order [Together], of neighbours of one kind.
+template <int Together, typename Scalar>
+inline void add_phi(const DeepSet<Scalar>& set, int kind, const int* order,
+                    const DeepSetWorkspace<Scalar>& workspace) {
+  const int inputs = set.inputs();
+  Scalar* const x = workspace.scratch;
+  Scalar* const hidden = x + static_cast<long>(Together) * inputs;
+  Scalar* const scratch = hidden + static_cast<long>(Together) * set.hidden();
+  for (int c = 0; c < Together; ++c) {
+    const Scalar* const own = workspace.inputs + static_cast<long>(order[c]) * inputs;
+    for (int j = 0; j < inputs; ++j) x[j * Together + c] = own[j];
+  }
+  evaluate_together<Together>(set.phi[kind], x, hidden, scratch);
+  for (int i = 0; i < set.hidden(); ++i) {
+    Scalar sum = workspace.hidden_sum[i];
+    for (int c = 0; c < Together; ++c) sum += hidden[i * Together + c];
+    workspace.hidden_sum[i] = sum;
+  }
+}
+
 template <typename Scalar>
 inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* own,
                                       const Neighbour<Scalar>* neighbours, int num_neighbours, Scalar* output,
@@ -136,11 +162,18 @@ inline DeepSetStatus evaluate_checked(const DeepSet<Scalar>& set, const Scalar* 
     }
     evaluate(*set.ground, own, workspace.hidden_sum, workspace.scratch);
   }
-  for (int position = 0; position < num_neighbours; ++position) {
-    const int j = workspace.order[position];
-    const Scalar* const x = workspace.inputs + static_cast<long>(j) * set.inputs();
-    evaluate(set.phi[neighbours[j].kind], x, workspace.hidden, workspace.scratch);
-    for (int i = 0; i < set.hidden(); ++i) workspace.hidden_sum[i] += workspace.hidden[i];
+  for (int begin = 0; begin < num_neighbours;) {
+    const int* const order = workspace.order + begin;
+    const int kind = neighbours[order[0]].kind;
+    int left = 1;
+    while (begin + left < num_neighbours && neighbours[order[left]].kind == kind) ++left;
+    if (left == 3 || left > 4) {
+      add_phi<3>(set, kind, order, workspace), begin += 3;
+    } else if (left > 1) {  // four are two pairs: cheaper than three and one
+      add_phi<2>(set, kind, order, workspace), begin += 2;
+    } else {
+      add_phi<1>(set, kind, order, workspace), begin += 1;
+    }
   }
   evaluate(set.rho, workspace.hidden_sum, output, workspace.scratch);
   for (int i = 0; i < set.outputs(); ++i) {

@@ -89,7 +89,6 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
   newton_per_unit_ = network_.output_unit == "N" ? 1 : kGramForce_N;
   own_.resize(files::kGroundInputs);
   hidden_sum_.resize(static_cast<std::size_t>(set_.hidden()));
-  hidden_.resize(static_cast<std::size_t>(set_.hidden()));
   scratch_.resize(static_cast<std::size_t>(nn::scratch_size(set_)));
   reserve(16);
 }
@@ -116,7 +115,7 @@ double DeepSetForce::force_z_N(const Instant& now) {
   double force = 0;
   nn::evaluate(set_, own_.data(), neighbours_.data(), now.num_neighbours, &force,
                {clamped_.data(), order_.data(), static_cast<int>(order_.size()), hidden_sum_.data(),
-                hidden_.data(), scratch_.data()});
+                scratch_.data()});
   return newton_per_unit_ * force;
 }
 

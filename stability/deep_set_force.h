@@ -35,7 +35,7 @@ class DeepSetForce {
   std::vector<int> input_;  ///< 0..2: component of dp, 3..5: of dv
   double newton_per_unit_ = 0;
 
-  std::vector<double> own_, inputs_, hidden_sum_, hidden_, scratch_, clamped_;
+  std::vector<double> own_, inputs_, hidden_sum_, scratch_, clamped_;
   std::vector<int> order_;
   std::vector<nn::Neighbour<double>> neighbours_;
 };

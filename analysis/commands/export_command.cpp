@@ -4,7 +4,9 @@
 #include <memory>
 
 #include "analysis/commands/command.h"
+#include "analysis/commands/flown_network.h"
 #include "analysis/firmware/export_source.h"
+#include "nn/files/content_hash.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
 #include "nn/files/input_error.h"
@@ -16,28 +18,45 @@ namespace fs = std::filesystem;
 
 struct Options {
   files::NetworkArguments network;
-  std::string output, certificate;
+  std::string output, certificate, as;
   firmware::ExportOptions source;
 };
 
+/// The content hash of the certificate in `path`, after a look whether it speaks of these weights as they are exported.
+std::string certificate_of(const files::Network& network, const std::string& path, bool as_float32) {
+  const auto refuse = [&](const std::string& field, const std::string& value, const std::string& what) {
+    throw files::InputError({path, "", field, value, what, "certify the network that you export"});
+  };
+  const files::Json certificate = files::parse_json(files::read_file(path), path);
+  if (!certificate.is_object() || !certificate.contains("content_sha256") ||
+      !certificate["content_sha256"].is_string() || !certificate.contains("network") ||
+      !certificate["network"].contains("weights"))
+    refuse("content_sha256", "", "no certificate: certify -o writes one");
+  std::string hash = certificate["content_sha256"].get<std::string>();
+  if (hash != files::content_sha256(certificate))
+    refuse("content_sha256", hash, "is not this document's: it was changed");
+  const files::Json& weights = certificate["network"]["weights"];
+  for (const auto& [part, one] : files::parts(network)) {
+    if (!weights.contains(part)) refuse("network.weights", part, "is not in the certificate");
+    if (weights[part].value("sha256", "") != one->sha256)
+      refuse("network.weights." + part + ".sha256", weights[part].value("sha256", ""),
+             "is not the hash of " + one->path);
+  }
+  const bool certified_as_float32 = certificate["network"].value("as", files::Json()) == "float32";
+  if (as_float32 && !certified_as_float32)
+    refuse("network.as", "null",
+           "is about float64 weights, and float32 ones are exported: certify with --as float32");
+  return hash;
+}
+
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
-  files::Network network = load_net(options.network);
-  for (const auto& [part, weights] : files::parts(network)) {
-    if (weights->precision == files::Precision::kFloat32) continue;
-    throw files::InputError({weights->path, "", part, "float64",
-                             "flight code is float32: rounding would change the function",
-                             "certify with --as float32 and store that network"});
-  }
+  bool is_rounded = false;
+  const files::Network network = load_flown_net(options.network, options.as, is_rounded);
   std::vector<std::string> inputs = input_files(network);
   if (!options.certificate.empty()) {
     inputs.push_back(options.certificate);
-    const files::Json certificate =
-        files::parse_json(files::read_file(options.certificate), options.certificate);
-    if (!certificate.contains("content_sha256") || !certificate["content_sha256"].is_string())
-      throw files::InputError(
-          {options.certificate, "", "content_sha256", "", "no certificate", "name what certify -o wrote"});
-    options.source.certificate_sha256 = certificate["content_sha256"].get<std::string>();
+    options.source.certificate_sha256 = certificate_of(network, options.certificate, is_rounded);
   }
   const std::vector<firmware::SourceFile> sources = firmware::export_source(network, options.source);
   for (const firmware::SourceFile& source : sources) {
@@ -52,6 +71,7 @@ int run(Options options, const CommonOptions& common) {
     list.push_back({{"name", source.name}, {"sha256", files::sha256(source.contents)}});
   }
   files::Json result = result_head("export", inputs);
+  result["as"] = is_rounded ? files::Json("float32") : files::Json();
   result["seed"] = options.source.seed;
   result["files"] = std::move(list);
   result["golden_vectors"] = options.source.golden_vectors * static_cast<int>(network.rho.size());
@@ -78,6 +98,7 @@ Command export_command() {
         const auto options = std::make_shared<Options>();
         declare_network(app, options->network);
         app.add_option("-o,--output", options->output, "Folder for the source")->required();
+        declare_as(app, options->as);
         app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source")
             ->check(CLI::ExistingFile);
         app.add_option("--most-neighbours", options->source.most_neighbours, "Neighbours of one evaluation")

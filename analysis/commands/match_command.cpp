@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "analysis/commands/command.h"
+#include "analysis/commands/flown_network.h"
 #include "analysis/firmware/match.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
@@ -15,7 +16,7 @@ namespace {
 struct Options {
   files::NetworkArguments network;
   std::vector<std::string> words;  ///< NET FILE, or FILE with --phi and --rho
-  std::string file;
+  std::string file, as;
 };
 
 files::Json json_of(const firmware::Difference& difference) {
@@ -58,12 +59,8 @@ int run(Options options, const CommonOptions& common) {
     throw UsageError("match takes NET FILE, or --phi F --rho F FILE");
   options.file = options.words.back();
   if (options.words.size() == 2) options.network.file = options.words.front();
-  const files::Network network = load_net(options.network);
-  for (const auto& [part, weights] : files::parts(network)) {
-    if (weights->precision == files::Precision::kFloat32) continue;
-    throw files::InputError({weights->path, "", part, "float64", "flight code holds float32",
-                             "certify with --as float32 and store that network"});
-  }
+  bool is_rounded = false;
+  const files::Network network = load_flown_net(options.network, options.as, is_rounded);
   const std::string bytes = files::read_file(options.file);
   const firmware::MatchResult result =
       match(network, firmware::is_elf(bytes) ? firmware::blocks_in_elf(bytes, options.file)
@@ -71,6 +68,7 @@ int run(Options options, const CommonOptions& common) {
   std::vector<std::string> inputs = input_files(network);
   inputs.push_back(options.file);
   files::Json json = result_head("match", inputs);
+  json["as"] = is_rounded ? files::Json("float32") : files::Json();
   json["equal"] = result.equal;
   json["arrays"] = result.arrays;
   json["numbers"] = result.numbers;
@@ -84,7 +82,8 @@ int run(Options options, const CommonOptions& common) {
 
 Command match_command() {
   return {"match", "Whether a source file or an ELF holds exactly these weights",
-          "Every weight matrix, row by row or transposed, and every bias must stand in FILE bit for bit: C "
+          "Every weight matrix, in the layout of an export, row by row or transposed, and every bias must "
+          "stand in FILE bit for bit: C "
           "or C++ source "
           "of\nours or of the networks' authors, or a little-endian ELF with or without symbols. Exit code 1 "
           "and the first\n"
@@ -101,6 +100,7 @@ Command match_command() {
             rho->needs(phi);
             app.add_option("--key", options->network.key,
                            "Where the state dict lies inside a nested checkpoint");
+            declare_as(app, options->as);
             return [options](const CommonOptions& common) { return run(*options, common); };
           }};
 }

@@ -21,10 +21,10 @@ struct SourceFile {
 };
 
 /// Files of the export:
-///   swarmcert_network.h    what the firmware includes: evaluate(), self_test(), hashes
-///   swarmcert_network.cpp  weights as hexadecimal floats in arrays swarmcert_<part>_<k>_weight and _bias, row by row;
-///                          clamp, scale to newton; golden vectors, computed here by the evaluator that flies
-///   nn/{arithmetic,mlp,deep_set}.h  that evaluator, so that the folder builds alone
+///   swarmcert_network.h    what the firmware includes: deep_set(), predict_force_z(), self_test(), hashes
+///   swarmcert_network.cpp  weights as hexadecimal floats in arrays swarmcert_<part>_<k>_weight, in nn::Layout::kBlocks,
+///                          and _bias; clamp, scale to newton; golden vectors
+///   nn/*.h                 the evaluator, so that the folder builds alone
 /// Needs C++17 and nothing else: no heap, no exceptions, no libm.
 /// Precondition: every weight is a float32 (files::as_float32()).
 /// @throws files::InputError if the network states a unit or quantity that is not a vertical force.

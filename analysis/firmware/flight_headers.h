@@ -9,6 +9,6 @@ struct FlightHeader {
 };
 
 /// Made at build time from nn/: the same bytes.
-extern const FlightHeader kFlightHeaders[3];
+extern const FlightHeader kFlightHeaders[4];
 
 }  // namespace swarmcert::firmware

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "nn/dense_layer.h"
 #include "nn/files/functions.h"
 
 namespace swarmcert::firmware {
@@ -28,12 +29,26 @@ float float_of(std::uint32_t bits) {
   return value;
 }
 
-Bits transposed(const Bits& matrix, int rows, int cols) {
-  Bits result(matrix.size());
-  for (int i = 0; i < rows; ++i) {
-    for (int j = 0; j < cols; ++j)
-      result[static_cast<std::size_t>(j) * rows + i] = matrix[static_cast<std::size_t>(i) * cols + j];
+/// Which entry of a matrix, counted row by row, stands at each place of an array.
+using Order = std::vector<std::size_t>;
+
+/// The layouts in which weights are stored: row by row, column by column, nn::Layout::kBlocks.
+std::vector<Order> orders(const files::Layer& layer) {
+  const auto rows = static_cast<std::size_t>(layer.outputs), columns = static_cast<std::size_t>(layer.inputs);
+  std::vector<Order> result(3);
+  for (std::size_t i = 0; i < rows * columns; ++i) result[0].push_back(i);
+  for (std::size_t j = 0; j < columns; ++j) {
+    for (std::size_t i = 0; i < rows; ++i) result[1].push_back(i * columns + j);
   }
+  result[2].resize(rows * columns);
+  nn::to_blocks(result[0].data(), layer.outputs, layer.inputs, result[2].data());
+  return result;
+}
+
+Bits reordered(const Bits& matrix, const Order& order) {
+  Bits result;
+  result.reserve(matrix.size());
+  for (const std::size_t i : order) result.push_back(matrix[i]);
   return result;
 }
 
@@ -44,17 +59,19 @@ struct Place {
 };
 
 /// The place in `block` where most numbers agree with `expected`. Only places are tried where one of a few numbers
-/// spread over the array agrees and is not zero.
+/// spread over the array agrees and is not zero, unless all of these are.
 Place best_place(const Bits& expected, const FloatBlock& block) {
   Place best;
   const std::size_t size = expected.size();
   if (block.bits.size() < size) return best;
   constexpr std::size_t kProbes = 16;
+  bool has_telling_probe = false;
+  for (std::size_t p = 0; p < kProbes; ++p) has_telling_probe |= expected[p * size / kProbes] != 0;
   for (std::size_t begin = 0; begin + size <= block.bits.size(); ++begin) {
     bool is_candidate = false;
     for (std::size_t p = 0; p < kProbes && !is_candidate; ++p) {
       const std::size_t i = p * size / kProbes;
-      is_candidate = expected[i] == block.bits[begin + i] && expected[i] != 0;
+      is_candidate = expected[i] == block.bits[begin + i] && (expected[i] != 0 || !has_telling_probe);
     }
     if (!is_candidate && block.bits.size() != size) continue;
     std::size_t equal = 0;
@@ -104,7 +121,7 @@ Place bias_place(const Bits& expected, const Place& matrix, std::size_t matrix_s
     if (best.block == nullptr || place.equal > best.equal) best = place;
   }
   if (best.equal == expected.size() || expected.size() < kTelling) return best;
-  const Place elsewhere = best_place(expected, *matrix.block);
+  const Place elsewhere = best_place(expected, blocks);
   return elsewhere.block != nullptr && elsewhere.equal > best.equal ? elsewhere : best;
 }
 
@@ -140,15 +157,14 @@ MatchResult match(const files::Network& network, const std::vector<FloatBlock>& 
       result.arrays += 2;
       result.numbers += layer.weights.size() + layer.biases.size();
       const Bits rows = bits_of(layer.weights);
-      const Bits columns = transposed(rows, layer.outputs, layer.inputs);
-      Place matrix = best_place(rows, blocks);
-      bool is_transposed = false;
-      if (matrix.equal < rows.size()) {
-        const Place other = best_place(columns, blocks);
-        is_transposed = other.equal > matrix.equal;
-        if (is_transposed) matrix = other;
+      Place matrix;
+      Order order;
+      for (const Order& candidate : orders(layer)) {
+        const Place place = best_place(reordered(rows, candidate), blocks);
+        if (order.empty() || place.equal > matrix.equal) matrix = place, order = candidate;
+        if (matrix.equal == rows.size()) break;
       }
-      const Bits& expected = is_transposed ? columns : rows;
+      const Bits expected = reordered(rows, order);
       if (!resembles(matrix, expected)) {
         Difference difference;
         difference.entry = "weight";
@@ -158,10 +174,9 @@ MatchResult match(const files::Network& network, const std::vector<FloatBlock>& 
       }
       if (matrix.equal < expected.size()) {
         Difference difference = first_difference(expected, matrix);
-        const std::size_t i = std::stoul(difference.entry);
-        const std::size_t width = static_cast<std::size_t>(is_transposed ? layer.outputs : layer.inputs);
-        difference.entry = is_transposed ? fmt::format("weight[{}][{}]", i % width, i / width)
-                                         : fmt::format("weight[{}][{}]", i / width, i % width);
+        const std::size_t i = order[std::stoul(difference.entry)];
+        const auto columns = static_cast<std::size_t>(layer.inputs);
+        difference.entry = fmt::format("weight[{}][{}]", i / columns, i % columns);
         note(part, layer.name, difference);
         continue;
       }

@@ -26,9 +26,10 @@ struct MatchResult {
   std::optional<Difference> first_difference;
 };
 
-/// Looks for every weight matrix, row by row or transposed, and every bias vector, as uninterrupted runs of the same
-/// bits. A bias must be the variable that goes by its matrix's name with "bias" for "weight"; where nothing has such
-/// a name, follow its matrix or, from four numbers on, lie in the same section: single numbers are found anywhere.
+/// Looks for every weight matrix, row by row, transposed or in nn::Layout::kBlocks, and every bias vector, as
+/// uninterrupted runs of the same bits. A bias must be the variable that goes by its matrix's name with "bias" for
+/// "weight"; where nothing has such a name, follow its matrix or, from four numbers on, lie anywhere: fewer numbers are
+/// found everywhere.
 /// Guarantee: `equal` means that all of them stand in the file bit for bit. Which code reads them is not looked at.
 /// Precondition: every weight is a float32 (files::as_float32()).
 MatchResult match(const files::Network& network, const std::vector<FloatBlock>& blocks);

@@ -27,7 +27,7 @@ class Networks {
 
   nn::DeepSet<float> set() const { return {&ground_mlp_, phi_.data(), 2, rho_mlp_, nullptr, nullptr}; }
   nn::DeepSetWorkspace<float> workspace() {
-    return {inputs_.data(), order_.data(), kMostNeighbours, sum_.data(), hidden_.data(), scratch_.data()};
+    return {inputs_.data(), order_.data(), kMostNeighbours, sum_.data(), scratch_.data()};
   }
 
  private:
@@ -51,8 +51,8 @@ class Networks {
   std::array<nn::Mlp<float>, 2> phi_{nn::Mlp<float>{small_layers_.data(), 2}, {large_layers_.data(), 2}};
   std::array<float, std::size_t{kMostNeighbours} * kNeighbourInputs> inputs_{};
   std::array<int, kMostNeighbours> order_{};
-  std::array<float, kHidden> sum_{}, hidden_{};
-  std::array<float, 2 * kWide> scratch_{};
+  std::array<float, kHidden> sum_{};
+  std::vector<float> scratch_ = std::vector<float>(static_cast<std::size_t>(scratch_size(set())));
 };
 
 class NeighboursTest : public testing::Test {

@@ -1,47 +1,26 @@
-// Prints how many instructions one evaluation takes, as lines "NAME COUNT". Needs QEMU's -icount shift=0: then one
-// instruction is one nanosecond, and SysTick, at 168 MHz, counts them in steps of 5.952.
-#include <cstdint>
-
-#include "networks.h"
-#include "semihosting.h"
-
-namespace semihosting = swarmcert::tests::semihosting;
-namespace nn = swarmcert::nn;
-using swarmcert::tests::FourLayers;
-using swarmcert::tests::kHidden;
+// What one evaluation costs on the microcontroller: lines "NAME INSTRUCTIONS CYCLES TAKEN_BRANCHES", some names several
+// times, for other inputs. Run under QEMU with the plugin of cycle_model/.
+#include "flash_networks.h"
+#include "flight_case.h"
+#include "measure.h"
+#include "published_style.h"
 
 namespace {
 
-volatile std::uint32_t& control = *reinterpret_cast<volatile std::uint32_t*>(0xE000E010);
-volatile std::uint32_t& reload = *reinterpret_cast<volatile std::uint32_t*>(0xE000E014);
-volatile std::uint32_t& current = *reinterpret_cast<volatile std::uint32_t*>(0xE000E018);
+namespace nn = swarmcert::nn;
+namespace controller = swarmcert::controller;
+using swarmcert::tests::FlashNetwork;
+using swarmcert::tests::measure;
 
-/// Instructions of `work`, the mean of a hundred runs.
-template <typename Work>
-std::uint32_t count(const Work& work) {
-  constexpr std::uint32_t kRuns = 100;
-  const std::uint32_t before = current;
-  for (std::uint32_t i = 0; i < kRuns; ++i) work();
-  const std::uint32_t ticks = (before - current) & 0xFFFFFFu;  // counts down
-  return (ticks * 125u + 21u * kRuns / 2u) / (21u * kRuns);    // 125 / 21 = 1000 / 168
-}
+constexpr int kHidden = 40, kMost = controller::kMostNeighbours;
+constexpr auto phi_values = FlashNetwork<6, 25, 40, 40, 40>::random(1);
+constexpr auto rho_values = FlashNetwork<40, 40, 40, 40, 1>::random(2);
+nn::DenseLayer<float> phi_layers[4], rho_layers[4];
+const nn::Mlp<float> phi{phi_layers, 4}, rho{rho_layers, 4};
 
-void print(const char* name, std::uint32_t value) {
-  char text[64];
-  int at = 0;
-  for (; name[at] != '\0'; ++at) text[at] = name[at];
-  text[at++] = ' ';
-  char digits[10];
-  int n = 0;
-  do {
-    digits[n++] = static_cast<char>('0' + value % 10);
-    value /= 10;
-  } while (value != 0);
-  while (n > 0) text[at++] = digits[--n];
-  text[at++] = '\n';
-  text[at] = '\0';
-  semihosting::print(text);
-}
+float inputs[kMost][6], hidden[kHidden], output[kHidden];
+float copies[6 * kMost], sum[kHidden], scratch[1024];
+int order[kMost];
 
 std::uint32_t state = 1;
 float next() {
@@ -49,31 +28,47 @@ float next() {
   return static_cast<float>(static_cast<std::int32_t>(state >> 8) - (1 << 23)) * 0x1p-23f;
 }
 
-FourLayers<6, 25, kHidden> phi;
-FourLayers<kHidden, kHidden, 1> rho;
-float inputs[10][6], output[kHidden], scratch[2 * kHidden], copies[60], sum[kHidden], hidden[kHidden];
-int order[10];
+/// One network and sets of them.
+void networks() {
+  measure("phi_6_25_40_40_40", [] { nn::evaluate(phi, inputs[0], output, scratch); });
+  measure("rho_40_40_40_40_1", [] { nn::evaluate(rho, hidden, output, scratch); });
+  const nn::DeepSet<float> set{nullptr, &phi, 1, rho, nullptr, nullptr};
+  const nn::DeepSetWorkspace<float> workspace{copies, order, kMost, sum, scratch};
+  nn::Neighbour<float> neighbours[kMost];
+  for (int j = 0; j < kMost; ++j) neighbours[j] = {inputs[j], 0};
+  const char* const names[] = {"set_of_1", "set_of_2", "set_of_3", "set_of_4", "set_of_5",
+                               "set_of_6", "set_of_7", "set_of_8", "set_of_9", "set_of_10"};
+  for (int count = 1; count <= kMost; ++count) {
+    measure(names[count - 1], [&] {
+      nn::evaluate(set, static_cast<const float*>(nullptr), neighbours, count, output, workspace);
+    });
+  }
+}
+
+void flight() {
+  swarmcert::tests::FlightCase flight;
+  for (int i = 0; i < 100; ++i) {
+    flight.next();
+    measure(flight.is_lee() ? "position_attitude_lee_mixing" : "position_attitude_mixing",
+            [&] { flight.step(true); });
+    measure("attitude_mixing", [&] { flight.step(false); });
+  }
+}
 
 }  // namespace
 
 extern "C" int program() {
-  phi.fill(next);
-  rho.fill(next);
-  for (auto& input : inputs) {
-    for (float& x : input) x = next();
+  phi_values.layers(phi_layers);
+  rho_values.layers(rho_layers);
+  for (const float scale : {1.0f, -100.0f, 0.0f}) {
+    for (auto& input : inputs) {
+      for (float& x : input) x = scale * next();
+    }
+    for (float& x : hidden) x = scale * next();
+    networks();
   }
-  reload = 0xFFFFFF;
-  current = 0;
-  control = 5;
-  const nn::Mlp<float> phi_mlp = phi.mlp(), rho_mlp = rho.mlp();
-  print("phi_6_25_40_40_40", count([&] { nn::evaluate(phi_mlp, inputs[0], output, scratch); }));
-  print("rho_40_40_40_40_1", count([&] { nn::evaluate(rho_mlp, hidden, output, scratch); }));
-  nn::Neighbour<float> neighbours[6];
-  for (int j = 0; j < 6; ++j) neighbours[j] = {inputs[j], 0};
-  const nn::DeepSet<float> set{nullptr, &phi_mlp, 1, rho_mlp, nullptr, nullptr};
-  const nn::DeepSetWorkspace<float> workspace{copies, order, 10, sum, hidden, scratch};
-  print("set_of_6", count([&] {
-          nn::evaluate(set, static_cast<const float*>(nullptr), neighbours, 6, output, workspace);
-        }));
+  measure("published_phi", [] { swarmcert::tests::published_phi(phi_values.values, inputs[0], scratch); });
+  measure("published_rho", [] { swarmcert::tests::published_rho(rho_values.values, hidden, scratch); });
+  flight();
   return 0;
 }

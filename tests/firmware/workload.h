@@ -7,6 +7,7 @@
 #include "controller/flight_controller.h"
 #include "controller/gain_conversion.h"
 #include "controller/neighbours.h"
+#include "flight_case.h"
 #include "networks.h"
 #include "nn/deep_set.h"
 
@@ -24,22 +25,10 @@ class Workload {
  public:
   explicit Workload(Sink& sink) : sink_(sink) {
     const auto next = [this] { return unit(); };
-    phi_[0].fill(next);
-    phi_[1].fill(next);
+    phi_small_.fill(next);
+    phi_large_.fill(next);
     ground_.fill(next);
     rho_.fill(next);
-    settings_.mass_kg = 0.034f;
-    settings_.inertia_kg_m2 =
-        controller::diagonal(Vector3<float>{16.57171e-6f, 16.655602e-6f, 29.261652e-6f});
-    settings_.position = {{20, 20, 10}, {10, 10, 5}, {3, 3, 10}};
-    settings_.integrator = {{0.1f, 0.1f, 0.1f}, 0.002f};
-    settings_.lee = {{7e-3f, 7e-3f, 8e-3f}, {1.15e-3f, 1.15e-3f, 2e-3f}};
-    settings_.robust = {{10, 10, 4}, {5e-4f, 5e-4f, 1e-3f}, {2.5e-4f, 2.5e-4f, 5e-4f}, {2, 2, 2}};
-    settings_.attitude_step_s = 0.002f;
-    settings_.thrust_map = {11.0933585f, -39.0810417f, -9.5256471f, 20.5733023f, 38.4288507f};
-    settings_.largest_force = {-9.8557744f, 3.0164757f, 26.7163688f, 8.0f, 25.0f};
-    settings_.idle_force_N = 0.005f;
-    settings_.allocation = controller::allocation(controller::crazyflie_rotors(0.046f, 0.006f));
   }
 
   void run(int vectors) {
@@ -117,15 +106,14 @@ class Workload {
     }
     float x[6];
     for (float& entry : x) entry = number(1);
-    nn::evaluate(phi_[0].mlp(), x, output, scratch_);
+    nn::evaluate(phi_small_.mlp(), x, output, scratch_);
     for (const float y : output) put(y);
     nn::evaluate(rho_.mlp(), output, output, scratch_ + 2 * kHidden);
     put(output[0]);
 
-    const nn::Mlp<float> phi[2] = {phi_[0].mlp(), phi_[1].mlp()}, ground = ground_.mlp();
+    const nn::Mlp<float> phi[2] = {phi_small_.mlp(), phi_large_.mlp()}, ground = ground_.mlp();
     const nn::DeepSet<float> set{&ground, phi, 2, rho_.mlp(), nullptr, nullptr};
-    const nn::DeepSetWorkspace<float> workspace{inputs_, order_,  controller::kMostNeighbours,
-                                                sum_,    hidden_, scratch_};
+    const nn::DeepSetWorkspace<float> workspace{inputs_, order_, controller::kMostNeighbours, sum_, scratch_};
     for (int shuffle = 0; shuffle < 2; ++shuffle) {
       float y = 0;
       sink_(static_cast<std::uint32_t>(nn::evaluate(set, own, neighbours, count, &y, workspace)));
@@ -243,13 +231,14 @@ class Workload {
   Sink& sink_;
   std::uint32_t state_ = 2463534242u;
   bool boundary_ = false;
-  FourLayers<6, 25, kHidden> phi_[2];
-  FourLayers<4, 25, kHidden> ground_;
+  FourLayers<6, 25, kHidden> phi_small_;
+  FourLayers<6, 15, kHidden> phi_large_;  // blocks of 8, 4, 2 and 1
+  FourLayers<4, 25, kHidden, nn::Layout::kRows> ground_;
   FourLayers<kHidden, kHidden, 1> rho_;
-  controller::FlightSettings<float, controller::PidGains<float>> settings_{};
+  Settings settings_ = crazyflie_settings();
   controller::FlightMemory<float> memory_;
   controller::NeighbourTrack<float> tracks_[controller::kMostNeighbours];
-  float inputs_[controller::kMostNeighbours * 6], sum_[kHidden], hidden_[kHidden], scratch_[4 * kHidden];
+  float inputs_[controller::kMostNeighbours * 6], sum_[kHidden], scratch_[12 * kHidden];
   int order_[controller::kMostNeighbours];
 };
 

@@ -30,7 +30,7 @@ class Fixture {
 
   DeepSetWorkspace<Scalar> workspace(const DeepSet<Scalar>& set) {
     scratch_.assign(static_cast<std::size_t>(scratch_size(set)), std::numeric_limits<Scalar>::quiet_NaN());
-    return {inputs_.data(), order_.data(), kCapacity, sum_.data(), hidden_.data(), scratch_.data()};
+    return {inputs_.data(), order_.data(), kCapacity, sum_.data(), scratch_.data()};
   }
 
   /// The result, where the evaluation must succeed.
@@ -55,7 +55,7 @@ class Fixture {
   std::array<Mlp<Scalar>, 2> phi_ = {small_.mlp(), large_.mlp()};
   std::array<Scalar, std::size_t{kCapacity} * kInputs> inputs_{};
   std::array<int, kCapacity> order_{};
-  std::array<Scalar, kHidden> sum_{}, hidden_{};
+  std::array<Scalar, kHidden> sum_{};
   std::vector<Scalar> scratch_;
 };
 

@@ -37,7 +37,6 @@ TEST(Mlp, OneLayerIsAffineAndNeedsNoScratch) {
 }
 
 TEST(Mlp, NotANumberReachesTheOutput) {
-  EXPECT_TRUE(std::isnan(nn::relu(kNaN)));
   EXPECT_TRUE(std::isnan(files::Evaluator<float>(example())({kNaN, 0})[0]));
 }
 

@@ -1,0 +1,2 @@
+// What 'swarmcert export NET -o network' wrote.
+#include "swarmcert_network.cpp"

@@ -1,0 +1,18 @@
+# A build that lost both guards against contraction: its detector says so, and its words differ.
+cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
+set(contracted ${SCRATCH}/contracted)
+run(${CMAKE_COMMAND} --preset cortex-m4 -S ${SOURCE} -B ${contracted}
+    "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DSWARMCERT_VECTORS=500 '-D__builtin_assoc_barrier(x)=(x)'")
+file(READ ${contracted}/build.ninja rules)
+string(REPLACE "-ffp-contract=off" "-ffp-contract=fast" rules "${rules}")
+file(WRITE ${contracted}/build.ninja "${rules}")
+run(${CMAKE_COMMAND} --build ${contracted} --target workload)
+run_image(${contracted}/tests/firmware/workload.elf ${SCRATCH}/contracted_words.bin)
+run(${HOST_WORKLOAD} 500 ${SCRATCH}/few_host_words.bin)
+file(READ ${SCRATCH}/contracted_words.bin first LIMIT 4 HEX)
+compare(${SCRATCH}/few_host_words.bin ${SCRATCH}/contracted_words.bin)
+if(NOT first STREQUAL "01000000" OR NOT differ)
+  message(FATAL_ERROR "a contracted build went unnoticed (detector ${first}, files differ: ${differ})")
+endif()
+file(REMOVE_RECURSE ${contracted})

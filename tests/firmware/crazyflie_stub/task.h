@@ -1,0 +1,7 @@
+/* Stub: see FreeRTOS.h. */
+#pragma once
+
+#include "FreeRTOS.h"
+
+TickType_t xTaskGetTickCount(void);
+void vTaskDelayUntil(TickType_t* previous, TickType_t increment);

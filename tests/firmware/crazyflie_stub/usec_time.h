@@ -1,0 +1,6 @@
+/* Stub: see FreeRTOS.h. */
+#pragma once
+
+#include <stdint.h>
+
+uint64_t usecTimestamp(void);

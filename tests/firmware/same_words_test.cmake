@@ -1,0 +1,10 @@
+# Host and microcontroller give the same words.
+cmake_minimum_required(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/common.cmake)
+run_image(${images}/workload.elf ${SCRATCH}/target_words.bin)
+run(${HOST_WORKLOAD} 10000 ${SCRATCH}/host_words.bin)
+message("10000 vectors, ${output}")
+compare(${SCRATCH}/host_words.bin ${SCRATCH}/target_words.bin)
+if(differ)
+  message(FATAL_ERROR "host and Cortex-M4 differ: ${SCRATCH}/host_words.bin, ${SCRATCH}/target_words.bin")
+endif()
