@@ -46,11 +46,16 @@ std::map<std::string, std::string> identifiers(const files::Network& network) {
   return result;
 }
 
-std::string array(const std::string& declaration, const std::vector<float>& values) {
-  std::string text = fmt::format("{}[{}] = {{", declaration, values.size());
+/// "{", the numbers in lines of six, "}".
+std::string braces(const std::vector<float>& values) {
+  std::string text = "{";
   for (std::size_t i = 0; i < values.size(); ++i)
     text += (i % 6 == 0 ? "\n    " : " ") + literal(values[i]) + ",";
-  return text + "\n};\n";
+  return text + "\n}";
+}
+
+std::string array(const std::string& declaration, const std::vector<float>& values) {
+  return fmt::format("{}[{}] = {};\n", declaration, values.size(), braces(values));
 }
 
 std::vector<float> narrow(const std::vector<double>& values) { return {values.begin(), values.end()}; }
@@ -69,9 +74,12 @@ std::string weights_source(const files::Weights& weights, const std::string& id)
   for (std::size_t k = 0; k < weights.layers.size(); ++k) {
     const files::Layer& layer = weights.layers[k];
     const std::string name = fmt::format("swarmcert_{}_{}", id, k + 1);
-    text += array(fmt::format("extern \"C\" alignas(16) const float {}_weight", name), in_blocks(layer));
-    text += array(fmt::format("extern \"C\" alignas(16) const float {}_bias", name), narrow(layer.biases));
-    layers += fmt::format("    {{{0}_weight, {0}_bias, {1}, {2}, Layout::kBlocks}},\n", name, layer.outputs,
+    text += fmt::format(
+        "struct {0}_layer {{ float weight[{1}]; float bias[{2}]; }};\n"
+        "extern \"C\" alignas(16) const {0}_layer {0} = {{{3}, {4}}};\n",
+        name, layer.weights.size(), layer.biases.size(), braces(in_blocks(layer)),
+        braces(narrow(layer.biases)));
+    layers += fmt::format("    {{{0}.weight, {0}.bias, {1}, {2}, Layout::kBlocks}},\n", name, layer.outputs,
                           layer.inputs);
   }
   return text + fmt::format("static const DenseLayer<float> {}_layers[] = {{\n{}}};\n\n", id, layers);

@@ -22,8 +22,8 @@ struct SourceFile {
 
 /// Files of the export:
 ///   swarmcert_network.h    what the firmware includes: deep_set(), predict_force_z(), self_test(), hashes
-///   swarmcert_network.cpp  weights as hexadecimal floats in arrays swarmcert_<part>_<k>_weight, in nn::Layout::kBlocks,
-///                          and _bias; clamp, scale to newton; golden vectors
+///   swarmcert_network.cpp  weights as hexadecimal floats, of layer k in the object swarmcert_<part>_<k>: `weight` in
+///                          nn::Layout::kBlocks, then `bias`; clamp, scale to newton; golden vectors
 ///   nn/*.h                 the evaluator, so that the folder builds alone
 /// Needs C++17 and nothing else: no heap, no exceptions, no libm.
 /// Precondition: every weight is a float32 (files::as_float32()).

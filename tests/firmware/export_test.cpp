@@ -91,7 +91,7 @@ TEST_F(Firmware, ExportPassesItsOwnSelfTestWhateverTheCompilerMayContract) {
 
 TEST_F(Firmware, SelfTestFailsForAChangedWeight) {
   std::string source = read_text(folder_ / "out/swarmcert_network.cpp");
-  const std::size_t array = source.find("swarmcert_rho_small_2_weight[12]");
+  const std::size_t array = source.find("swarmcert_rho_small_2 = {");
   const std::size_t digit = source.find("p-", array) - 1;
   source[digit] = source[digit] == '2' ? '4' : '2';
   write_text(folder_ / "out/swarmcert_network.cpp", source);
@@ -109,15 +109,24 @@ TEST_F(Firmware, MatchFindsEveryWeightInSourceObjectAndStrippedProgram) {
   for (const std::string file : {"object.o", "flown", "stripped"}) expect_match(file, 0, {"equal"});
 }
 
-TEST_F(Firmware, MatchFindsOneFlippedBitOfAnyMatrixInAnElf) {
-  ASSERT_EQ(run("g++ -std=c++17 -Iout -c out/swarmcert_network.cpp -o object.o").exit_code, 0);
+TEST_F(Firmware, MatchAndSelfTestFindOneFlippedBitOfAnyArrayInAnElf) {
+  ASSERT_EQ(run("g++ -std=c++17 -Iout -c out/swarmcert_network.cpp -o object.o && "
+                "g++ -std=c++17 -Iout -c main.cpp -o main.o && g++ object.o main.o -o flown && ./flown")
+                .exit_code,
+            0);
+  const auto expect_self_test_to_fail = [&] {
+    const int verdict = run("g++ changed.o main.o -o flown && ./flown").exit_code;
+    EXPECT_TRUE(verdict == 2 || verdict == 3) << verdict;  // a golden vector, or the hash of the weights
+  };
   int tried = 0;
   for (const std::string part : {"phi.ground", "phi.small", "phi.large", "rho.small", "rho.large"}) {
     for (const files::Layer& layer : weights(part).layers) {
       ASSERT_TRUE(flip_last_bit("object.o", "changed.o", layer.weights.back()));
-      expect_match("changed.o", 1, {"different", layer.name, "_weight", "address"});
+      expect_match("changed.o", 1, {"different", layer.name + " weight[", "swarmcert_", "address"});
+      expect_self_test_to_fail();
       ASSERT_TRUE(flip_last_bit("object.o", "changed.o", layer.biases.back()));
-      expect_match("changed.o", 1, {"different", layer.name, "_bias", "address"});
+      expect_match("changed.o", 1, {"different", layer.name + " bias[", "swarmcert_", "address"});
+      expect_self_test_to_fail();
       tried += 2;
     }
   }
@@ -156,6 +165,91 @@ TEST_F(Firmware, MatchReadsTransposedMatricesInMembersOfAnObject) {
   const Outcome changed = run("swarmcert match rho.small.safetensors changed.c");
   EXPECT_EQ(changed.exit_code, 1);
   EXPECT_NE(changed.output.find("fc2 bias[0]"), std::string::npos) << changed.output;
+}
+
+TEST_F(Firmware, MatchReadsAnElfOfTheAuthorsLayoutAndNamesTheSymbol) {
+  std::string text =
+      "struct rho { float w1[5][12]; float b1[12]; float w2[12][1]; float b2[1]; };\n"
+      "const struct rho weights_rho = {\n";
+  for (const files::Layer& layer : weights("rho.small").layers) {
+    text += "{";
+    for (int j = 0; j < layer.inputs; ++j) {
+      text += "{";
+      for (int i = 0; i < layer.outputs; ++i) text += decimal(layer.weights[i * layer.inputs + j]);
+      text += "},";
+    }
+    text += "}, {";
+    for (const double bias : layer.biases) text += decimal(bias);
+    text += "},\n";
+  }
+  write_text(folder_ / "flown.c", text + "};\n");
+  ASSERT_EQ(run("gcc -c flown.c -o flown.o && strip -g flown.o").exit_code, 0);
+  EXPECT_EQ(run("swarmcert match rho.small.safetensors flown.o").exit_code, 0);
+  ASSERT_TRUE(flip_last_bit("flown.o", "changed.o", weights("rho.small").layers[0].weights[3]));
+  const Outcome changed = run("swarmcert match rho.small.safetensors changed.o");
+  EXPECT_EQ(changed.exit_code, 1);
+  EXPECT_NE(changed.output.find("fc1 weight[0][3]"), std::string::npos) << changed.output;
+  EXPECT_NE(changed.output.find("weights_rho, address 0x"), std::string::npos) << changed.output;
+}
+
+TEST_F(Firmware, Float64NetworksAreExportedAsFloat32WhereAskedAndNeverSilently) {
+  for (const std::string part : {"phi.ground", "phi.small", "phi.large", "rho.small", "rho.large"}) {
+    files::Weights wide = weights(part);
+    wide.precision = files::Precision::kFloat64;
+    wide.layers[0].weights[1] = 0.1;  // no float
+    files::save_safetensors(wide, folder_ / (part + ".safetensors"), true);
+  }
+  for (const std::string command :
+       {"export network.toml -o wide", "match network.toml out/swarmcert_network.cpp"}) {
+    const Outcome refused = run("swarmcert " + command);
+    EXPECT_EQ(refused.exit_code, 3);
+    EXPECT_NE(refused.output.find("--as float32"), std::string::npos) << refused.output;
+  }
+  const Outcome exported = run("swarmcert export network.toml --as float32 -o wide --json wide.json");
+  ASSERT_EQ(exported.exit_code, 0) << exported.output;
+  EXPECT_EQ(files::parse_json(read_text(folder_ / "wide.json"), "")["as"], "float32");
+  ASSERT_EQ(run("g++ -std=c++17 -Iwide wide/swarmcert_network.cpp main.cpp -o flown").exit_code, 0);
+  EXPECT_EQ(run("./flown").exit_code, 0);
+  for (const std::string file : {"wide/swarmcert_network.cpp", "flown"})
+    EXPECT_EQ(run("swarmcert match network.toml --as float32 " + file).exit_code, 0) << file;
+  EXPECT_EQ(run("swarmcert match network.toml --as float32 out/swarmcert_network.cpp").exit_code, 1);
+
+  // A certificate must be about the rounded weights.
+  ASSERT_EQ(run("swarmcert certify network.toml --method product -o wide.cert.json").exit_code, 0);
+  EXPECT_EQ(run("swarmcert export network.toml --as float32 --certificate wide.cert.json -o other").exit_code,
+            3);
+  ASSERT_EQ(run("swarmcert certify network.toml --method product --as float32 -o narrow.cert.json").exit_code,
+            0);
+  EXPECT_EQ(
+      run("swarmcert export network.toml --as float32 --certificate narrow.cert.json -o other").exit_code, 0);
+}
+
+TEST_F(Firmware, AChangedWeightFileFailsTheCheckerAndExportWithItsCertificate) {
+  ASSERT_EQ(run("swarmcert certify network.toml --method product -o cert.json").exit_code, 0);
+  EXPECT_EQ(run("swarmcert check cert.json network.toml").exit_code, 0);
+  EXPECT_EQ(run("swarmcert export network.toml --certificate cert.json -o certified").exit_code, 0);
+  ASSERT_TRUE(flip_last_bit("phi.small.safetensors", "phi.small.safetensors",
+                            weights("phi.small").layers[1].weights[2]));
+  EXPECT_EQ(run("swarmcert check cert.json network.toml").exit_code, 1);
+  const Outcome refused = run("swarmcert export network.toml --certificate cert.json -o changed");
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.output.find("phi:small"), std::string::npos) << refused.output;
+  expect_match("out/swarmcert_network.cpp", 1, {"phi:small", "fc2 weight[0][2]"});
+}
+
+TEST_F(Firmware, FilesThatAreNoElfOfAMicrocontrollerOrAHostAreBadInput) {
+  ASSERT_EQ(run("g++ -std=c++17 -Iout -c out/swarmcert_network.cpp -o object.o").exit_code, 0);
+  std::string big_endian = read_text(folder_ / "object.o");
+  big_endian[5] = 2;
+  write_text(folder_ / "big_endian.o", big_endian);
+  expect_match("big_endian.o", 3, {"big_endian.o", "little-endian"});
+  std::string of_no_class = read_text(folder_ / "object.o");
+  of_no_class[4] = 7;
+  write_text(folder_ / "class.o", of_no_class);
+  expect_match("class.o", 3, {"neither 32 nor 64 bit"});
+  write_text(folder_ / "firmware.bin", std::string(4096, '\x7f'));
+  expect_match("firmware.bin", 3, {"firmware.bin", "ELF"});
+  expect_match("missing.elf", 3, {"missing.elf"});
 }
 
 TEST_F(Firmware, DamagedElfsAreBadInputAndNeverACrash) {
