@@ -43,7 +43,7 @@ Variant variant_of(const Grid& grid, const std::vector<double>& values) {
     if (name == "vehicles") v.neighbours = std::max(0.0, value - 1);
   }
   if (v.gains.rate_hz > 0 && !own_step) v.gains.integrator_step_s = 1 / v.gains.rate_hz;
-  v.plant.largest_thrust_N = 4 * grid.model.thrust.largest_N(battery_V);
+  v.plant.largest_thrust_N = v.plant.thrust_scale * 4 * grid.model.thrust.largest_N(battery_V);
   // Firmware commands forces with the mass it was told: another mass scales what its gains do.
   v.plant.thrust_scale *= grid.model.mass_kg / v.plant.mass_kg;
   return v;
@@ -54,7 +54,9 @@ class Quantities {
  public:
   Quantities(const Grid& grid, const Variant& variant, const AxisLoop& loop,
              const std::optional<SampledLoop>& sampled)
-      : grid_(grid), variant_(variant), loop_(loop), sampled_(sampled) {}
+      : grid_(grid), variant_(variant), loop_(loop), acting_(loop), sampled_(sampled) {
+    if (sampled_) acting_.Ki = effective_Ki(*sampled_);
+  }
 
   double operator()(const std::string& name) {
     if (name == "rate") return norms().rate;
@@ -62,9 +64,9 @@ class Quantities {
     if (name == "edge") return norms().edge;
     if (name == "impulse") return norms().impulse;
     if (name == "error_m") return error();
-    if (name == "lag_limit_s") return lag_limit(loop_);
-    if (name == "delay_limit_s") return delay_limit(loop_);
-    if (name == "lag_floor") return lag_floor(loop_).rate;
+    if (name == "lag_limit_s") return lag_limit(acting_);
+    if (name == "delay_limit_s") return delay_limit(acting_);
+    if (name == "lag_floor") return lag_floor(acting_).rate;
     if (name == "effort") return effort();
     if (name == "noise_command_m_s2") return sampled_ ? noise().command_m_s2 : NAN;
     if (name == "noise_error_m") return sampled_ ? noise().error_m : NAN;
@@ -83,22 +85,29 @@ class Quantities {
 
   /// Of the loop that flies: its integrator acts with the effective gain.
   const GainNorms& norms() {
-    if (!norms_) {
-      AxisLoop acting = loop_;
-      if (sampled_) acting.Ki = effective_Ki(*sampled_);
-      norms_ = continuous_norms(acting, Channel::kForce);
-    }
+    if (!norms_) norms_ = continuous_norms(acting_, Channel::kForce);
     return *norms_;
   }
   double error() {
     const Disturbance& d = grid_.disturbance;
+    Disturbance all = d;
+    all.amplitude_N = scaled(d.amplitude_N);
+    all.impulse_N_s = scaled(d.impulse_N_s);
+    all.rate_N_s = scaled(d.rate_N_s);
+    all.variation_N = scaled(d.variation_N);
+    const double share = sampled_ ? sampled_->integrator_step_s / sampled_->period_s : 1;
+    const ClampBounds clamp =
+        clamp_bounds(acting_, Channel::kForce, all, 0,
+                     variant_.gains.integrator_limit_m_s[static_cast<std::size_t>(grid_.axis)], share);
+    // Where the integrator may reach its clamp the loop is not linear.
+    if (clamp.exists && !clamp.never_acts) return std::min(clamp.by_amplitude, clamp.by_impulse);
     const auto bound = [](double gain, double known) { return std::isinf(known) ? kInfinity : gain * known; };
     return std::min({bound(norms().rate, scaled(d.rate_N_s)), bound(norms().amplitude, scaled(d.amplitude_N)),
                      bound(norms().edge, scaled(d.variation_N)),
                      bound(norms().impulse, scaled(d.impulse_N_s))});
   }
   double effort() {
-    if (!effort_) effort_ = effort_gain(loop_);
+    if (!effort_) effort_ = effort_gain(acting_);
     return *effort_;
   }
   const NoiseDeviation& noise() {
@@ -109,6 +118,7 @@ class Quantities {
   const Grid& grid_;
   const Variant& variant_;
   const AxisLoop& loop_;
+  AxisLoop acting_;  ///< with the integral gain that the sampled loop has in effect
   const std::optional<SampledLoop>& sampled_;
   std::optional<GainNorms> norms_;
   std::optional<double> effort_;
@@ -122,6 +132,23 @@ std::string limit_text(const GridLimit& limit, double value) {
   } else {
     std::snprintf(text, sizeof text, "%s %.4g is above %.4g", limit.quantity.c_str(), value, limit.most);
   }
+  return text;
+}
+
+/// Empty where the rotors can lift the vehicle.
+std::string lift_text(const Variant& variant) {
+  const double weight_N = variant.plant.mass_kg * kGravity_m_s2;
+  if (variant.plant.largest_thrust_N > weight_N) return "";
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the rotors cannot lift the vehicle: %.4g N of thrust for %.4g N of weight",
+                variant.plant.largest_thrust_N, weight_N);
+  return text;
+}
+
+std::string thrust_text(double margin_N) {
+  char text[160];
+  std::snprintf(text, sizeof text, "the thrust is %.4g N short under the disturbance", -margin_N);
   return text;
 }
 
@@ -146,9 +173,16 @@ Cell compute_cell(const Grid& grid, long index) {
     cell.infeasible = "the sampled loop is unstable";
     return cell;
   }
+  cell.infeasible = lift_text(variant);
   Quantities quantities(grid, variant, *loop, sampled);
   for (std::size_t i = 0; i < grid.compute.size(); ++i) cell.values[i] = quantities(grid.compute[i]);
+  // Every bound is of a loop whose thrust is never at its limit.
+  if (cell.infeasible.empty() && std::isfinite(grid.disturbance.amplitude_N)) {
+    const double margin_N = quantities("thrust_margin_N");
+    if (margin_N < 0) cell.infeasible = thrust_text(margin_N);
+  }
   for (const GridLimit& limit : grid.limits) {
+    if (!cell.infeasible.empty()) break;
     const double value = quantities(limit.quantity);
     if (!(value >= limit.least && value <= limit.most)) {
       cell.infeasible = limit_text(limit, value);
