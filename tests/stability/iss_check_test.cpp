@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 
 #include "data.h"
 #include "stability/iss_full_loop.h"
@@ -58,6 +59,17 @@ TEST(IssCheck, AnisotropicGainsStayInsideWhereTheTheoremIsConservative) {
   EXPECT_EQ(check.violations, 0);
   EXPECT_LE(check.worst_ratio, 0.25008 + 1e-4);
   EXPECT_GT(check.worst_ratio, 0.95 * 0.25008);
+}
+
+TEST(IssCheck, NoneOfTenThousandOfEachKindLeavesBallOrTransient_slow) {
+  const IssCheck check = check_iss(composite("4", "0.136"), small(), with_runs(63000));
+  std::map<std::string, int> count;
+  for (const IssRun& run : check.runs) ++count[run.kind];
+  for (const char* const kind : {"ramp", "worst_linear", "bang_bang", "random", "initial_state"}) {
+    EXPECT_GE(count[kind], 10000) << kind;  // a fifth of the runs are evaluations of the optimisers
+  }
+  EXPECT_EQ(check.violations, 0);
+  EXPECT_GT(check.worst_ratio, 0.999);
 }
 
 TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
