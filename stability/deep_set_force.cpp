@@ -113,10 +113,31 @@ double DeepSetForce::force_z_N(const Instant& now) {
     neighbours_[static_cast<std::size_t>(j)] = {x, phi_of_kind_[static_cast<std::size_t>(neighbour.kind)]};
   }
   double force = 0;
-  nn::evaluate(set_, own_.data(), neighbours_.data(), now.num_neighbours, &force,
-               {clamped_.data(), order_.data(), static_cast<int>(order_.size()), hidden_sum_.data(),
-                scratch_.data()});
+  nn::evaluate(
+      set_, own_.data(), neighbours_.data(), now.num_neighbours, &force,
+      {clamped_.data(), order_.data(), static_cast<int>(order_.size()), hidden_sum_.data(), scratch_.data()});
   return newton_per_unit_ * force;
+}
+
+double DeepSetForce::force_z_N(const Instant& now, const double* weights) {
+  double sum = 0, level = 1;
+  Instant some = now;
+  for (;;) {
+    present_.clear();
+    double next = 0;
+    for (int j = 0; j < now.num_neighbours; ++j) {
+      if (weights[j] >= level) {
+        present_.push_back(now.neighbours[j]);
+      } else {
+        next = std::max(next, weights[j]);
+      }
+    }
+    some.neighbours = present_.data();
+    some.num_neighbours = static_cast<int>(present_.size());
+    sum += (level - next) * force_z_N(some);
+    if (!(next > 0)) return sum;
+    level = next;
+  }
 }
 
 }  // namespace swarmcert::stability

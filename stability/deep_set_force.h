@@ -23,6 +23,11 @@ class DeepSetForce {
   /// 0 where the evaluation has no finite result.
   double force_z_N(const Instant& now);
 
+  /// The same among neighbours that fade, as flight code composes it (controller::predict()): the mean of the deep set
+  /// over all thresholds in [0, 1], of the neighbours whose weight is at least the threshold.
+  /// @param weights [now.num_neighbours], in [0, 1].
+  double force_z_N(const Instant& now, const double* weights);
+
  private:
   void reserve(int neighbours);
 
@@ -37,6 +42,7 @@ class DeepSetForce {
 
   std::vector<double> own_, inputs_, hidden_sum_, scratch_, clamped_;
   std::vector<int> order_;
+  std::vector<Neighbour> present_;  ///< with at least some weight
   std::vector<nn::Neighbour<double>> neighbours_;
 };
 

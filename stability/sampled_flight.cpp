@@ -55,6 +55,7 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
     for (const Model& model : swarm.models()) {
       networks_.push_back(std::make_unique<DeepSetForce>(*network, model.kind, kinds));
     }
+    radio_ = std::make_unique<Radio>(swarm.size(), network_every_ * period_s_, options.radio);
     predictions_.assign(inputs_.size(), std::vector<double>(static_cast<std::size_t>(network_late_ + 1)));
   }
   int longest = 0;
@@ -81,15 +82,31 @@ double SampledFlight::battery_V() const {
   return std::max(options_.battery_start_V - options_.battery_drop_V_s * time_s(), 3.2);
 }
 
-/// The staircase: predictions are made from the states now, and applied network_late_ periods later.
+Eigen::Vector3d SampledFlight::measured_position(int vehicle) {
+  const double* const x = &state_[static_cast<std::size_t>(vehicle) * kVehicleStateSize];
+  Eigen::Vector3d p(x[0], x[1], x[2]);
+  for (int axis = 0; options_.noise && axis < 3; ++axis) {
+    p[axis] += swarm_.model(vehicle).sensor.position_noise_m * random_.bell();
+  }
+  return p;
+}
+
+/// The staircase: predictions are made from what is known now, and applied network_late_ periods later.
 void SampledFlight::predict() {
   const auto slots = static_cast<std::int64_t>(network_late_) + 1;
+  const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
+  if (period_ % network_every_ == 0) {
+    sent_W_m_.clear();
+    for (int i = 0; i < swarm_.size(); ++i) sent_W_m_.push_back(measured_position(i));
+    radio_->broadcast(sent_W_m_, now_ms, random_);
+  }
   for (int i = 0; i < swarm_.size(); ++i) {
     std::vector<double>& ring = predictions_[static_cast<std::size_t>(i)];
     double& now = ring[static_cast<std::size_t>(period_ % slots)];
     if (period_ % network_every_ == 0) {
-      now = networks_[static_cast<std::size_t>(swarm_.kind_of(i))]->force_z_N(
-          swarm_.instant(i, time_s(), state_.data(), input(i)));
+      Instant known = swarm_.instant(i, time_s(), state_.data(), input(i));
+      radio_->look(i, now_ms, &known, known_, weights_);
+      now = networks_[static_cast<std::size_t>(swarm_.kind_of(i))]->force_z_N(known, weights_.data());
     } else {
       now = ring[static_cast<std::size_t>((period_ + slots - 1) % slots)];
     }

@@ -3,7 +3,7 @@
 /// Vehicles are computed together where registers are wide enough; each flies the same bits as alone.
 ///
 /// Every control period (the attitude loop's, 2 ms): the position loop where it is due, the network's prediction where
-/// it is due (a staircase, applied late by its latency), the attitude law and mixing; then the plant moves by classical
+/// it is due (a staircase, applied late by its latency, from neighbours' positions that came by radio), the attitude law and mixing; then the plant moves by classical
 /// Runge-Kutta under held commands, which change inside a period only where a command delay says so. Quaternions are
 /// normalised between periods, never inside one.
 #pragma once
@@ -18,6 +18,7 @@
 #include "stability/controller_bank.h"
 #include "stability/deep_set_force.h"
 #include "stability/gains.h"
+#include "stability/radio.h"
 #include "stability/swarm.h"
 #include "stability/tasks/task.h"
 
@@ -32,6 +33,7 @@ struct SampledFlightOptions {
   double battery_start_V = 4.1;
   double battery_drop_V_s = 1.5e-3;  ///< a Crazyflie's cell lasts about five minutes
   double ground_m = 0.05;            ///< vehicles cannot be lower
+  RadioOptions radio;                ///< by which the network's inputs come, at the network's rate
 };
 
 class SampledFlight {
@@ -65,6 +67,7 @@ class SampledFlight {
  private:
   void measure();
   void control();
+  Eigen::Vector3d measured_position(int vehicle);
   void predict();
   void move();
   void apply_delayed(bool late);
@@ -83,9 +86,13 @@ class SampledFlight {
   std::vector<ControlRecord> records_;
   std::unique_ptr<ControllerBank> controllers_;
   std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
-  std::vector<std::vector<double>> predictions_;         ///< ring by age in network_every_ periods
-  std::vector<std::vector<double>> delayed_;             ///< ring of rotor commands, by age in periods
-  double switch_s_ = 0;                                  ///< when, inside a period, delayed commands change
+  std::unique_ptr<Radio> radio_;
+  std::vector<Eigen::Vector3d> sent_W_m_;
+  std::vector<Neighbour> known_;
+  std::vector<double> weights_;
+  std::vector<std::vector<double>> predictions_;  ///< ring by age in network_every_ periods
+  std::vector<std::vector<double>> delayed_;      ///< ring of rotor commands, by age in periods
+  double switch_s_ = 0;                           ///< when, inside a period, delayed commands change
   bool has_delay_ = false;
   files::Random random_;
 };

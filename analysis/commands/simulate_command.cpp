@@ -27,6 +27,7 @@ struct Options {
   double duration_s = 0;
   std::uint64_t seed = 0;
   bool no_noise = false;
+  stability::RadioOptions radio;
 };
 
 Json axes(const std::array<double, 4>& values) {
@@ -52,6 +53,9 @@ Json result_json(const Options& options, const std::vector<std::string>& inputs,
   result["loop"] = "sampled";
   result["duration_s"] = task.duration_s();
   result["noise"] = !options.no_noise;
+  if (!options.network.file.empty() || !options.network.phi.empty()) {
+    result["radio"] = {{"latency_s", options.radio.latency_s}, {"loss", options.radio.loss}};
+  }
   result["diverged"] = flown.diverged;
   result["unit"] = "m";
   Json vehicles = Json::array();
@@ -163,6 +167,7 @@ int run(Options options, const CommonOptions& common) {
   stability::SimulationOptions how;
   how.loop.noise = !options.no_noise;
   how.loop.seed = options.seed;
+  how.loop.radio = options.radio;
   how.progress = [&progress](double time_s, double duration_s) {
     progress.show(static_cast<int>(time_s), std::max(static_cast<int>(duration_s), 1), "seconds flown");
   };
@@ -224,6 +229,13 @@ Command simulate_command() {
             app.add_option("--seed", options->seed, "Of noise, clocks and random goals (default 0)");
             app.add_option("--run", options->run, "Number of the run in the logs' names (default 0)")
                 ->check(CLI::NonNegativeNumber);
+            app.add_option("--radio-latency", options->radio.latency_s,
+                           "Seconds until neighbours' positions arrive at the network (default 0)")
+                ->check(CLI::Range(0.0, 10.0));
+            app.add_option("--radio-loss", options->radio.loss,
+                           "Share of neighbours' positions that are lost (default 0); after 500 ms without "
+                           "one, a neighbour no longer counts")
+                ->check(CLI::Range(0.0, 1.0));
             app.add_flag("--no-noise", options->no_noise, "The controller sees the true state");
             return [options](const CommonOptions& common) { return run(*options, common); };
           }};

@@ -285,6 +285,50 @@ TEST(SampledFlight, PredictedForceIsAStaircaseThatComesLate) {
   EXPECT_GT(changes, 200);
 }
 
+TEST(SampledFlight, ANeighbourThatFallsSilentFadesOutWithin500ms) {
+  // A network whose answer depends on its neighbours only: with all positions lost the prediction is that of an
+  // empty set, with none lost it is another; lost from the start or late ones never give a third.
+  const auto network = files::load_network({tests::source_path("nn/networks/demo/network.toml"), "", "", ""});
+  const auto predictions = [&](const RadioOptions& radio, std::uint64_t seed) {
+    Swarm swarm(with_effects({{"downwash", {}}}), 2);
+    const auto task = make_task("swap", {2, 9, 0});
+    SampledFlightOptions options = exact();
+    options.radio = radio;
+    options.seed = seed;
+    SampledFlight loop(swarm, gains(), *task, options, &network);
+    std::vector<double> result;
+    while (loop.time_s() < 6) {
+      loop.step();
+      result.push_back(loop.record(0).prediction_N);
+    }
+    return result;
+  };
+  const auto distance = [](const std::vector<double>& a, const std::vector<double>& b) {
+    double largest = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) largest = std::max(largest, std::abs(a[k] - b[k]));
+    return largest;
+  };
+  const auto largest = [](const std::vector<double>& a) {
+    double result = 0;
+    for (const double x : a) result = std::max(result, std::abs(x));
+    return result;
+  };
+  const std::vector<double> all = predictions({0, 0}, 0), half = predictions({0, 0.5}, 0);
+  EXPECT_GT(largest(all), 0.02);
+  EXPECT_LT(distance(all, half), 0.5 * largest(all)) << "half of the positions are enough";
+  EXPECT_GT(distance(all, half), 0);
+  EXPECT_LT(largest(predictions({0, 1}, 0)), 0.1 * largest(all)) << "a vehicle that knows of nobody";
+  // 0.45 s old positions still count, with the weight that is left; 0.5 s old ones do not.
+  EXPECT_GT(distance(predictions({0.45, 0}, 0), predictions({0, 1}, 0)), 1e-3);
+  EXPECT_LT(distance(predictions({0.5, 0}, 0), predictions({0, 1}, 0)), 1e-3);
+  // No jump: between two of the network's periods (10 ms) a fade of 100 ms lets through a tenth and some motion.
+  const std::vector<double> rare = predictions({0, 0.97}, 5);
+  double jump = 0;
+  for (std::size_t k = 1; k < rare.size(); ++k) jump = std::max(jump, std::abs(rare[k] - rare[k - 1]));
+  EXPECT_GT(largest(rare), 0.01);
+  EXPECT_LT(jump, 0.35 * largest(all));
+}
+
 TEST(Simulation, TakesOffFromTheGroundAndLands) {
   Swarm swarm(with_effects({{"ground", {{"amplitude", 0.164}}}}), 1);
   const auto task = make_task("takeoff", {1, 0, 0});
