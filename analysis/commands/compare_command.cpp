@@ -1,8 +1,10 @@
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 
+#include "analysis/budget_output.h"
 #include "analysis/commands/flight_options.h"
 #include "analysis/compare_output.h"
 #include "analysis/compare_report.h"
@@ -16,6 +18,8 @@ struct Options {
   FlightOptions flights;
   std::string report;
   std::vector<std::string> gains;
+  std::vector<std::string> budget;
+  std::string fitted;
 };
 
 /// "FILE" for every kind, "KIND=FILE" for one.
@@ -31,8 +35,35 @@ residuals::GainsOfKinds read_gains(const std::vector<std::string>& words) {
   return gains;
 }
 
+/// The fit sees the models and rules of the comparison, and other flights.
+identification::Budget budget_of(const Options& options, const residuals::Inputs& inputs,
+                                 const CommonOptions& common) {
+  FlightOptions words = options.flights;
+  words.words.clear();
+  words.network.clear();
+  for (const std::string& word : options.flights.words) {
+    if (std::filesystem::path(word).extension() == ".toml") words.words.push_back(word);
+  }
+  words.words.insert(words.words.end(), options.budget.begin(), options.budget.end());
+  residuals::Inputs fit = read_flights(words, true);
+  for (const residuals::FlightFiles& flight : fit.found.flights) {
+    for (const residuals::FlightFiles& judged : inputs.found.flights) {
+      if (flight.logs == judged.logs) {
+        throw UsageError("--budget names a flight that is judged as well: " + flight.logs[0].second);
+      }
+    }
+  }
+  Progress progress(common.quiet);
+  return identification::error_budget(fit, inputs, options.flights.network, common.jobs,
+                                      [&](int done, int total) { progress.show(done, total, "passes"); });
+}
+
 int run(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  if (!options.fitted.empty()) {
+    if (options.budget.empty()) throw UsageError("--fitted writes what --budget fits: name its flights");
+    refuse_to_replace(common, (std::filesystem::path(options.fitted) / "flights.toml").string());
+  }
   const residuals::GainsOfKinds gains = read_gains(options.gains);
   const residuals::Inputs inputs = read_flights(options.flights, true);
   Progress progress(common.quiet);
@@ -49,8 +80,15 @@ int run(const Options& options, const CommonOptions& common) {
     own = residuals::compare(read_flights(without, true), common.jobs, show);
     result["mean_square_z_gf2_own_filter"] = mean_squares_gf2(*own);
   }
+  std::optional<identification::Budget> budget;
+  if (!options.budget.empty()) {
+    budget = budget_of(options, inputs, common);
+    result["budget"] = json_of(*budget);
+    if (!options.fitted.empty()) write_fitted(*budget, options.fitted, common.force);
+  }
   write_result(common, result);
   if (common.prints_text()) print_comparison(comparison, inputs, own ? &*own : nullptr);
+  if (common.prints_text() && budget) print(*budget);
   if (!options.report.empty()) {
     const std::string path = write_compare_report(comparison, inputs, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
@@ -71,6 +109,7 @@ Command compare_command() {
       "the result counts them. Forces are in newton in the JSON, in gram-force on the terminal.\n\n"
       "Example: swarmcert compare stability/models/crazyflie-small.toml flights/ --report out\n"
       "         swarmcert compare flights/ --network network.toml --published-filter\n"
+      "         swarmcert compare test/ --budget development/ --network network.toml\n"
       "         swarmcert compare flights/ --gains small=small.toml --gains large=large.toml",
       [](CLI::App& app) {
         const auto options = std::make_shared<Options>();
@@ -84,6 +123,13 @@ Command compare_command() {
         app.add_option("--network", options->flights.network,
                        "network.toml: a learned force that every model gets, in place of its own")
             ->check(CLI::ExistingFile);
+        app.add_option(
+               "--budget", options->budget,
+               "Flights to fit: how the error of FLIGHTS falls from the nominal model by motor lag, offset "
+               "per vehicle, ground, downwash and the rest; --network adds a row")
+            ->allow_extra_args(false);
+        app.add_option("--fitted", options->fitted,
+                       "Folder for what --budget fitted: a model per vehicle and their flights.toml");
         app.add_flag(
             "--published-filter", options->flights.published_filter,
             "Cut and filter as the networks' authors did: 32 g (small) and 67 g (large), thrust lag 0.16 "

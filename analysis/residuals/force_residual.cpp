@@ -87,7 +87,7 @@ void apply_model(const stability::Model& model, const Kinds& kinds, const CutRul
     now.thrust_N = 0;
     for (const double duty : track.duty[i]) now.thrust_N += model.thrust.force_N(duty, now.battery_V);
   }
-  if (rules.published) {
+  if (rules.has_published_signals()) {
     pass_published_lag(track);
     return;
   }
@@ -122,7 +122,7 @@ std::vector<Eigen::Vector3d> force_residual(const stability::Model& model, const
       for (int c = 0; c < effects[k]->effect().num_columns(); ++c)
         force.col(0) += effects[k]->coefficients()[static_cast<std::size_t>(c)] * columns[c].force_W_N;
     }
-    if (!rules.published) as_measured(now, filter, force);
+    if (!rules.has_published_signals()) as_measured(now, filter, force);
     residual[i] = model.mass_kg * track.specific_force_m_s2[i] - force.col(0);
   }
   return residual;

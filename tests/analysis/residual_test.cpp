@@ -102,14 +102,8 @@ TEST(FlightCommands, GiveNoAnswerWithoutAUsableRecord) {
   EXPECT_FALSE(std::filesystem::exists(folder / "new.toml"));
 }
 
-TEST(Compare, ReproducesTheErrorsOfThePublishedNetworks_slow) {
-  SWARMCERT_NEEDS_DATA();
-  // Mean squares of f_a,z in gf^2 over the shared flights, with the authors' own filter; kinds of the neighbours,
-  // then of the vehicle; Ge: no neighbour.
-  const std::map<std::string, double> published = {
-      {"Ge2L", 3.12},  {"Ge2S", 0.87},  {"L2L", 8.05},  {"S2S", 1.09},  {"L2S", 1.47},  {"S2L", 4.55},
-      {"SS2L", 11.07}, {"SL2L", 14.68}, {"LL2S", 1.55}, {"SL2S", 2.52}, {"SS2S", 2.11}, {"LL2L", 11.18}};
-  const ScratchFolder folder;
+/// network.toml of the networks that were published with the flights.
+std::string published_network() {
   std::string network = "schema = \"swarmcert/network/1\"\n";
   for (const char* part :
        {"phi.small:phi_S", "phi.large:phi_L", "phi.ground:phi_G", "rho.small:rho_S", "rho.large:rho_L"}) {
@@ -120,7 +114,18 @@ TEST(Compare, ReproducesTheErrorsOfThePublishedNetworks_slow) {
         std::filesystem::absolute(data_path("weights/zip_f32/" + text.substr(colon + 1) + ".pth")).string() +
         "\"\n";
   }
-  write_text(folder / "network.toml", network);
+  return network;
+}
+
+TEST(Compare, ReproducesTheErrorsOfThePublishedNetworks_slow) {
+  SWARMCERT_NEEDS_DATA();
+  // Mean squares of f_a,z in gf^2 over the shared flights, with the authors' own filter; kinds of the neighbours,
+  // then of the vehicle; Ge: no neighbour.
+  const std::map<std::string, double> published = {
+      {"Ge2L", 3.12},  {"Ge2S", 0.87},  {"L2L", 8.05},  {"S2S", 1.09},  {"L2S", 1.47},  {"S2L", 4.55},
+      {"SS2L", 11.07}, {"SL2L", 14.68}, {"LL2S", 1.55}, {"SL2S", 2.52}, {"SS2S", 2.11}, {"LL2L", 11.18}};
+  const ScratchFolder folder;
+  write_text(folder / "network.toml", published_network());
   const Outcome outcome =
       run_shell("swarmcert compare " + std::filesystem::absolute(data_path("flights")).string() +
                     " --network network.toml --published-filter --json result.json",
@@ -207,6 +212,63 @@ TEST(CompareReport, IsOneFileInWhichHostileNamesAreTextAndOnlyItsOwnScriptRuns) 
   EXPECT_EQ(html.find("'unsafe-eval'"), std::string::npos);
   const bool has_script = html.find("script-src 'sha256-") != std::string::npos;
   EXPECT_NE(has_script, html.find("built without dygraphs") != std::string::npos);
+}
+
+/// RMS of the vertical residual in a row of a budget, N.
+double rmse_z_N(const files::Json& budget, const std::string& row, const std::string& group) {
+  for (const files::Json& entry : budget["rows"]) {
+    if (entry["name"] == row) return entry["rmse_z"][group].get<double>();
+  }
+  ADD_FAILURE() << "no row " << row;
+  return 0;
+}
+
+TEST(Budget, FallsToTheNoiseOnFlightsWhoseEffectsItKnowsAndItsModelsReproduceTheLastRow) {
+  const ScratchFolder folder;
+  const std::string gains = source_path("controller/gains/crazyflie-small.toml");
+  const std::string truth = source_path("stability/models/crazyflie-small-effects.toml");
+  const std::string nominal = source_path("stability/models/crazyflie-small.toml");
+  for (const std::string seed : {"1", "2", "3"}) {
+    ASSERT_EQ(
+        run_shell("swarmcert simulate random-walk --vehicles 2 --duration 20 --seed " + seed + " --model " +
+                      truth + " --gains " + gains + " -o " + (seed == "3" ? "test/" : "fit/") + seed,
+                  folder.path())
+            .exit_code,
+        0);
+  }
+  const Outcome outcome =
+      run_shell("swarmcert compare " + nominal + " test --budget fit --fitted fitted --json budget.json",
+                folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json budget = files::read_json(folder / "budget.json", "swarmcert/compare/1")["budget"];
+  EXPECT_LT(rmse_z_N(budget, "rest", "all"), 0.35 * rmse_z_N(budget, "nominal", "all"));
+  EXPECT_EQ(budget["nominal_mass_kg"]["small"], 0.034) << "what flew";
+  ASSERT_EQ(run_shell("swarmcert compare test --flights fitted/flights.toml --json again.json", folder.path())
+                .exit_code,
+            0);
+  const files::Json again = files::read_json(folder / "again.json", "swarmcert/compare/1");
+  EXPECT_NEAR(again["overall"]["rmse"]["z"].get<double>(), rmse_z_N(budget, "rest", "all"), 1e-9);
+  EXPECT_EQ(run_shell("swarmcert compare " + nominal + " test --budget test", folder.path()).exit_code, 2)
+      << "fitted and judged on the same flights";
+}
+
+TEST(Budget, OfThePublishedFlightsFallsByHalfAndReachesTheNetworks_slow) {
+  SWARMCERT_NEEDS_DATA();
+  const ScratchFolder folder;
+  write_text(folder / "network.toml", published_network());
+  const std::string flights = std::filesystem::absolute(data_path("flights")).string();
+  const Outcome outcome = run_shell("swarmcert compare " + flights + "/visible_test --budget " + flights +
+                                        "/development --network network.toml --json budget.json",
+                                    folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json budget = files::read_json(folder / "budget.json", "swarmcert/compare/1")["budget"];
+  const std::map<std::string, double> least_drop = {
+      {"S2S", 0.5}, {"Ge2S", 0.5}, {"L2L", 0.5}, {"Ge2L", 0.45}};
+  for (const auto& [group, drop] : least_drop) {
+    EXPECT_GE(budget["drop"][group].get<double>(), drop) << group;
+    EXPECT_LE(budget["rest_over_network"][group].get<double>(), 1.05) << group;
+  }
+  EXPECT_LE(budget["rest_over_network"]["all"].get<double>(), 1.05);
 }
 
 }  // namespace
