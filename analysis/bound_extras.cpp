@@ -10,6 +10,7 @@
 #include "nn/files/toml.h"
 #include "stability/bounds/small_gain.h"
 #include "stability/bounds/uncertain_norms.h"
+#include "stability/bounds/unstable_swarm.h"
 #include "stability/bounds/verified_norms.h"
 
 namespace swarmcert::analysis {
@@ -263,7 +264,20 @@ Json swarm_json(const Tracking& input, const std::string& path) {
                        {"by", couplings[i].by},
                        {"missing_factor", found.proved ? Json() : Json(found.missing_factor_of[i])}});
   }
-  return {{"verdict", found.proved ? "proved" : "inconclusive"},
+  // Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
+  std::optional<UnstableSwarm> unstable;
+  if (!found.proved) unstable = find_unstable_swarm(acting, static_cast<int>(vehicles), couplings);
+  Json witness;
+  if (unstable) {
+    witness = {{"signs", unstable->sign},
+               {"growth_1_s", unstable->growth_1_s},
+               {"simulated_s", unstable->seconds},
+               {"error_over_initial", unstable->largest_error}};
+  }
+  return {{"verdict", found.proved ? "proved"
+                      : unstable   ? "refuted"
+                                   : "inconclusive"},
+          {"witness", std::move(witness)},
           {"loop", "continuous"},
           {"axis", "z"},
           {"Gamma", found.Gamma},
@@ -283,6 +297,12 @@ void print_swarm(const Json& swarm) {
                  swarm["rate_N_s"][i].get<double>(), swarm["error_m"][i].get<double>());
     }
     return;
+  }
+  if (swarm["verdict"] == "refuted") {
+    fmt::print(
+        "  forces of this class make the errors grow by {:.4g} 1/s: simulated, {:.4g} times the initial "
+        "error\n",
+        swarm["witness"]["growth_1_s"].get<double>(), swarm["witness"]["error_over_initial"].get<double>());
   }
   fmt::print("  all couplings times {:.4g} would do\n", swarm["missing_factor"].get<double>());
   for (const Json& c : swarm["couplings"]) {

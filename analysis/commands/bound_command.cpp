@@ -47,8 +47,8 @@ int run(const Options& options, const CommonOptions& common) {
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
     if (!options.swarm.empty()) print_swarm(result["swarm"]);
   }
-  if (!options.swarm.empty() && result["swarm"]["verdict"] != "proved") return kInconclusive;
-  return kDone;
+  if (options.swarm.empty() || result["swarm"]["verdict"] == "proved") return kDone;
+  return result["swarm"]["verdict"] == "refuted" ? kViolated : kInconclusive;
 }
 
 }  // namespace

@@ -52,18 +52,22 @@ bool closes(const MatrixXd& Gamma) {
 
 }  // namespace
 
-SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings) {
-  const auto n = static_cast<Index>(loops.size());
+void check_couplings(const std::vector<Coupling>& couplings, int vehicles) {
   for (const Coupling& c : couplings) {
-    if (c.on < 0 || c.by < 0 || c.on >= n || c.by >= n || c.on == c.by) {
+    if (c.on < 0 || c.by < 0 || c.on >= vehicles || c.by >= vehicles || c.on == c.by) {
       throw std::invalid_argument("small_gain: coupling of " + std::to_string(c.on) + " by " +
-                                  std::to_string(c.by) + " in a swarm of " + std::to_string(n));
+                                  std::to_string(c.by) + " in a swarm of " + std::to_string(vehicles));
     }
     for (const double value :
          {c.position_N_m, c.velocity_N_s_m, c.speed_m_s, c.acceleration_m_s2, c.cross_rate_N_s}) {
       if (!(value >= 0)) throw std::invalid_argument("small_gain: negative bound " + std::to_string(value));
     }
   }
+}
+
+SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings) {
+  const auto n = static_cast<Index>(loops.size());
+  check_couplings(couplings, static_cast<int>(n));
   SmallGain result;
   const MatrixXd Gamma = coupling_matrix(loops, couplings);
   for (Index i = 0; i < n; ++i) {

@@ -46,4 +46,7 @@ struct SmallGain {
 /// @throws std::invalid_argument if a coupling names a vehicle that is not there, or a negative number.
 SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings);
 
+/// @throws std::invalid_argument if a coupling names a vehicle that is not there, or a negative number.
+void check_couplings(const std::vector<Coupling>& couplings, int vehicles);
+
 }  // namespace swarmcert::stability

@@ -168,7 +168,7 @@ TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
   EXPECT_EQ(run_shell("swarmcert bound" + gains + " --uncertain weight=1:2", folder.path()).exit_code, 2);
 }
 
-TEST(BoundCommand, TheShippedSwarmsAreProvedOrInconclusive) {
+TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");
   const std::string swarms = kSource + "/stability/bounds/swarms/";
@@ -179,6 +179,13 @@ TEST(BoundCommand, TheShippedSwarmsAreProvedOrInconclusive) {
       run_shell("swarmcert bound" + gains + " --swarm " + swarms + "published-pair.toml", folder.path());
   EXPECT_EQ(pair.exit_code, 4) << pair.output;
   EXPECT_NE(pair.output.find("would do"), std::string::npos) << pair.output;
+  // With the integrator that flew (10 written, 2 acting), the third swarm is unstable, and a simulation shows it.
+  const Outcome unstable = run_shell(
+      "swarmcert bound" + kFlown + " --swarm " + swarms + "unstable-pair.toml --json u.json", folder.path());
+  EXPECT_EQ(unstable.exit_code, 1) << unstable.output;
+  const Json refuted = files::parse_json(read_text(folder / "u.json"), "u.json")["swarm"];
+  EXPECT_EQ(refuted["verdict"], "refuted");
+  EXPECT_GE(refuted["witness"]["error_over_initial"].get<double>(), 1000);
 }
 
 TEST(SpacingCommand, FartherNeedsNoMoreSpeedAndAGuardNeedsMore) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "stability/bounds/small_gain.h"
+#include "stability/bounds/unstable_swarm.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -173,6 +174,27 @@ double pair_error(double Lp, double Kp, double Kd, double Ki, double seconds) {
 TEST(SmallGain, WhatItDoesNotProveCanBeRefutedBySimulation) {
   EXPECT_GT(pair_error(0.25, 10, 5, 2, 60), 0.01);   // from a micrometre
   EXPECT_LT(pair_error(0.145, 10, 5, 2, 60), 1e-5);  // inconclusive, and yet stable
+}
+
+/// Reference 2.6: the relative mode of two vehicles is unstable above m (Kp - Ki/Kd)/2 = 0.136 N/m, or m (Kd - Ki/Kp)/2 =
+/// 0.068 N s/m.
+TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveTheLimitsOfTheReference) {
+  const AxisLoop z = {0.034, 10, 5, 10, {}, 0};
+  const auto pair = [](double Lp, double Lv) {
+    return std::vector<Coupling>{{0, 1, Lp, Lv, 0.1, 0, 0}, {1, 0, Lp, Lv, 0.1, 0, 0}};
+  };
+  EXPECT_FALSE(find_unstable_swarm(z, 2, pair(0.136 * 0.999, 0)));
+  EXPECT_FALSE(find_unstable_swarm(z, 2, pair(0, 0.068 * 0.999)));
+  for (const auto& couplings : {pair(0.136 * 1.02, 0), pair(0, 0.068 * 1.02)}) {
+    const auto found = find_unstable_swarm(z, 2, couplings);
+    ASSERT_TRUE(found.has_value());
+    EXPECT_EQ(found->sign, (std::vector<int>{1, 1}));
+    EXPECT_GE(found->largest_error, 1000);
+  }
+  // One-way forces close no loop through the other vehicle, but change the vehicle's own: Kp - Lp/m or Kp + Lp/m.
+  EXPECT_FALSE(find_unstable_swarm(z, 2, {{0, 1, 0.145, 0, 0.1, 0, 0}}));
+  EXPECT_TRUE(find_unstable_swarm(z, 2, {{0, 1, 0.034 * 8 * 1.05, 0, 0.1, 0, 0}}));
+  EXPECT_TRUE(find_unstable_swarm({0.034, 10, 5, 10, {1 / 17.4}, 0}, 2, pair(0.14, 0)));
 }
 
 TEST(SmallGain, RefusesVehiclesThatAreNotThere) {
