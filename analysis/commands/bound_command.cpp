@@ -6,6 +6,7 @@
 #include "analysis/bound_report.h"
 #include "analysis/commands/command.h"
 #include "analysis/disturbance_input.h"
+#include "analysis/float_errors.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -33,6 +34,17 @@ int run(const Options& options, const CommonOptions& common) {
 
   files::Json result = result_head("bound", inputs);
   add_tracking_json(result, input, source, report);
+  const FloatErrors float32 = float_errors(input, report);
+  result["float32"] = float_errors_json(float32);
+  // The error budget of every row: its bound, what the staircase adds, what float32 adds.
+  for (files::Json& row : result["bounds"]) {
+    const std::string& axis = row["axis"].get_ref<const std::string&>();
+    const double of_float = float32.tracking_error_m[axis == "x" ? 0 : axis == "y" ? 1 : 2];
+    row["float32"] = finite(of_float);
+    row["total"] = row["minimum"].is_number()
+                       ? finite(row["minimum"].get<double>() + row["staircase"].get<double>() + of_float)
+                       : files::Json();
+  }
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
   if (options.is_uncertain) result["uncertain"] = uncertain_json(input, options.uncertain);
   if (options.verified) result["verified"] = verified_json(input);
@@ -41,6 +53,7 @@ int run(const Options& options, const CommonOptions& common) {
   write_result(common, result);
   if (common.prints_text()) {
     print_tracking(input, source, report);
+    print_float_errors(float32);
     if (disturbance.truth) print_truth(*disturbance.truth);
     if (options.is_uncertain) print_uncertain(result["uncertain"]);
     if (options.verified) print_verified(result["verified"]);

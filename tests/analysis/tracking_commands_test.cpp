@@ -52,6 +52,19 @@ TEST(BoundCommand, FlownGainsAreNotOfTheTheoremsFormAndTheWeakenedIntegratorIsSh
   EXPECT_NE(text.output.find("weakens Ki 5 times"), std::string::npos) << text.output;
 }
 
+TEST(BoundCommand, WhatFloat32CostsIsPartOfTheErrorBudget) {
+  const ScratchFolder folder;
+  const Json result = json_of(folder, "bound" + kFlown + " --amplitude 0.1");
+  EXPECT_TRUE(result["float32"]["applies"].get<bool>());
+  for (const Json& row : result["bounds"]) {
+    const double of_float = row["float32"].get<double>();
+    EXPECT_GT(of_float, 1e-7);
+    EXPECT_LT(of_float, 1e-4);
+    EXPECT_NEAR(row["total"].get<double>(),
+                row["minimum"].get<double>() + row["staircase"].get<double>() + of_float, 1e-15);
+  }
+}
+
 TEST(BoundCommand, ANetworkAloneBoundsTheRateOfFHatAndGivesNoBall) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");

@@ -1,0 +1,85 @@
+#include "analysis/float_errors.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <limits>
+
+#include "controller/rounding/rounding_bounds.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using namespace stability;  // NOLINT: every name below is of that library
+
+controller::Vector3<double> vector(const PerAxis& v) { return {v[0], v[1], v[2]}; }
+controller::Matrix3<double> matrix(const Matrix3& m) {
+  return {{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}};
+}
+
+/// Cycle of a loop whose rate is not given: that of the fastest position loop of the published firmware.
+constexpr double kUnstatedPeriod_s = 0.002;
+
+}  // namespace
+
+FloatErrors float_errors(const Tracking& input, const TrackingReport& report) {
+  const Gains& gains = input.gains;
+  const double period_s = gains.rate_hz > 0 ? 1 / gains.rate_hz : kUnstatedPeriod_s;
+  controller::RoundedLaw law;
+  law.mass_kg = input.plant.mass_kg;
+  law.is_composite = gains.composite.has_value();
+  if (law.is_composite) {
+    law.composite = {matrix(gains.composite->Lambda), matrix(gains.composite->K)};
+  } else {
+    law.pid = {vector(gains.pid->Kp), vector(gains.pid->Kd), vector(gains.pid->Ki)};
+  }
+  law.integrator = {vector(gains.integrator_limit_m_s),
+                    gains.rate_hz > 0 ? gains.integrator_step_s : kUnstatedPeriod_s};
+  law.is_robust = false;  // forces do not depend on the attitude law
+  const controller::RoundingBounds bounds = rounding_bounds(law, {});
+  FloatErrors errors;
+  errors.applies = bounds.applies;
+  errors.why_not = bounds.why_not;
+  const double force[] = {bounds.force_N.x, bounds.force_N.y, bounds.force_N.z};
+  const double integral[] = {bounds.integral_m_s.x, bounds.integral_m_s.y, bounds.integral_m_s.z};
+  const Loop flown = gains.rate_hz > 0 ? Loop::kSampled : Loop::kContinuous;
+  for (std::size_t i = 0; i < 3; ++i) {
+    errors.force_N[i] = force[i];
+    errors.integral_m_s[i] = integral[i];
+    errors.tracking_error_m[i] = std::numeric_limits<double>::infinity();
+    const std::optional<AxisGains> pid = axis_gains(gains, input.plant.mass_kg, static_cast<int>(i));
+    for (const ExactGains& row : report.exact) {
+      if (!pid || row.axis != static_cast<int>(i) || row.channel != Channel::kCommand || row.loop != flown)
+        continue;
+      const double rate_N_s = input.plant.mass_kg * pid->Ki * integral[i] / period_s;
+      errors.tracking_error_m[i] =
+          row.all_times.amplitude * force[i] + (rate_N_s > 0 ? row.all_times.rate * rate_N_s : 0);
+    }
+  }
+  return errors;
+}
+
+files::Json float_errors_json(const FloatErrors& errors) {
+  files::Json json = {{"applies", errors.applies}, {"why_not", errors.why_not}};
+  for (int i = 0; i < 3; ++i) {
+    json["force_N"].push_back(errors.force_N[i]);
+    json["integral_m_s"].push_back(errors.integral_m_s[i]);
+    const double e = errors.tracking_error_m[i];
+    json["tracking_error_m"].push_back(std::isfinite(e) ? files::Json(e) : files::Json());
+  }
+  return json;
+}
+
+void print_float_errors(const FloatErrors& errors) {
+  if (!errors.applies) {
+    fmt::print("\nfloat32 against double: not bounded: {}\n", errors.why_not);
+    return;
+  }
+  fmt::print(
+      "\nfloat32 against double: f_d within {:.3g}, {:.3g}, {:.3g} N; adds at most {:.3g}, {:.3g}, {:.3g} "
+      "m\n",
+      errors.force_N[0], errors.force_N[1], errors.force_N[2], errors.tracking_error_m[0],
+      errors.tracking_error_m[1], errors.tracking_error_m[2]);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,25 @@
+/// @file What float32 on the vehicle costs against the double that is analysed, as a tracking error.
+#pragma once
+
+#include "analysis/tracking_input.h"
+
+namespace swarmcert::analysis {
+
+/// Bounds over controller::FlightEnvelope (10 m, 5 m/s, errors up to 1 m and 3 m/s), per axis.
+struct FloatErrors {
+  bool applies = false;
+  std::string why_not;
+  double force_N[3] = {0, 0, 0};           ///< of the commanded force, each cycle
+  double integral_m_s[3] = {0, 0, 0};      ///< of the integrator, each cycle
+  double tracking_error_m[3] = {0, 0, 0};  ///< of both, at all times; infinite where nothing bounds it
+};
+
+/// The command errs by force_N, an amplitude; what the integrator loses acts on the command through m Ki and grows by as
+/// much in each cycle, a rate. Both enter the command channel: of the sampled loop where there is a rate, else of the
+/// continuous one with a cycle of 2 ms.
+FloatErrors float_errors(const Tracking& input, const stability::TrackingReport& report);
+
+files::Json float_errors_json(const FloatErrors& errors);
+void print_float_errors(const FloatErrors& errors);
+
+}  // namespace swarmcert::analysis

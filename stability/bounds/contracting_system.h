@@ -1,0 +1,26 @@
+/// @file A linear system in coordinates in which it verifiably contracts. Not for users.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "stability/bounds/impulse_response.h"
+#include "stability/bounds/interval_matrix.h"
+
+namespace swarmcert::stability {
+
+/// y(t) = row exp(At) b, with its antiderivative and derivatives, in contracting coordinates.
+struct ContractingSystem {
+  IntervalMatrix A;
+  IntervalVector b;
+  double alpha = 0;
+  /// Rows that give Y (int y, vanishing at infinity), y, y', y''.
+  std::array<IntervalVector, 4> rows;
+};
+
+/// Coordinates R x of the companion form, R'R the solution of a Lyapunov equation; the symmetric part of the system's
+/// matrix there is verified to lie below -alpha I (interval Cholesky), so |exp(A t)|_2 <= e^(-alpha t).
+/// Nothing where stability could not be verified. @param h without a delay.
+std::optional<ContractingSystem> contracting(const TransferFunction& h);
+
+}  // namespace swarmcert::stability

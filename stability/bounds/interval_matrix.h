@@ -1,0 +1,46 @@
+/// @file Small matrices of intervals. Not for users.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "stability/bounds/interval.h"
+
+namespace swarmcert::stability {
+
+using IntervalVector = std::vector<Interval>;
+
+class IntervalMatrix {
+ public:
+  explicit IntervalMatrix(std::size_t n) : n_(n), entries_(n * n) {}
+  explicit IntervalMatrix(const Eigen::MatrixXd& m) : IntervalMatrix(static_cast<std::size_t>(m.rows())) {
+    for (std::size_t i = 0; i < n_; ++i) {
+      for (std::size_t j = 0; j < n_; ++j)
+        (*this)(i, j) = m(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  std::size_t size() const { return n_; }
+  Interval& operator()(std::size_t i, std::size_t j) { return entries_[i * n_ + j]; }
+  Interval operator()(std::size_t i, std::size_t j) const { return entries_[i * n_ + j]; }
+
+ private:
+  std::size_t n_;
+  std::vector<Interval> entries_;
+};
+
+IntervalMatrix operator*(const IntervalMatrix& a, const IntervalMatrix& b);
+IntervalVector operator*(const IntervalVector& row, const IntervalMatrix& m);
+Interval dot(const IntervalVector& a, const std::vector<double>& b);
+
+/// Upper bound of the Euclidean norm.
+double norm_above(const IntervalVector& v);
+
+/// Enclosure of the inverse of a matrix: Gauss and Jordan in intervals on (approximate inverse times m), which is
+/// nearly the identity. Nothing where a pivot may vanish.
+std::optional<IntervalMatrix> inverse(const Eigen::MatrixXd& m);
+
+/// Whether every symmetric matrix in `m` is positive definite: Cholesky with positive pivots.
+bool is_positive_definite(IntervalMatrix m);
+
+}  // namespace swarmcert::stability
