@@ -228,8 +228,8 @@ Json swarm_json(const Tracking& input, const std::string& path) {
   }
   std::vector<Coupling> couplings;
   for (const files::TomlTable& table : top.tables("coupling")) {
-    table.allow_only(
-        {"on", "by", "position_N_m", "velocity_N_s_m", "speed_m_s", "acceleration_m_s2", "cross_rate_N_s"});
+    table.allow_only({"on", "by", "position_N_m", "velocity_N_s_m", "speed_m_s", "acceleration_m_s2",
+                      "cross_rate_N_s", "direction"});
     const auto vehicle = [&](const char* key) {
       const double value = table.number(key);
       if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
@@ -247,6 +247,7 @@ Json swarm_json(const Tracking& input, const std::string& path) {
                number("position_N_m"),  number("velocity_N_s_m"),
                number("speed_m_s"),     number("acceleration_m_s2"),
                number("cross_rate_N_s")};
+    if (table.has("direction")) c.direction = table.choice("direction", {"apart", "together"}) == 0 ? 1 : -1;
     if (c.on == c.by) table.refuse("by", std::to_string(c.by), "is the vehicle itself");
     couplings.push_back(c);
   }
@@ -269,13 +270,15 @@ Json swarm_json(const Tracking& input, const std::string& path) {
   if (!found.proved) unstable = find_unstable_swarm(acting, static_cast<int>(vehicles), couplings);
   Json witness;
   if (unstable) {
-    witness = {{"signs", unstable->sign},
+    witness = {{"of", unstable->is_declared ? "the swarm as declared" : "one swarm of the class"},
+               {"signs", unstable->sign},
                {"growth_1_s", unstable->growth_1_s},
                {"simulated_s", unstable->seconds},
                {"error_over_initial", unstable->largest_error}};
   }
+  const bool is_refuted = unstable && unstable->is_declared;
   return {{"verdict", found.proved ? "proved"
-                      : unstable   ? "refuted"
+                      : is_refuted ? "refuted"
                                    : "inconclusive"},
           {"witness", std::move(witness)},
           {"loop", "continuous"},
@@ -298,11 +301,12 @@ void print_swarm(const Json& swarm) {
     }
     return;
   }
-  if (swarm["verdict"] == "refuted") {
-    fmt::print(
-        "  forces of this class make the errors grow by {:.4g} 1/s: simulated, {:.4g} times the initial "
-        "error\n",
-        swarm["witness"]["growth_1_s"].get<double>(), swarm["witness"]["error_over_initial"].get<double>());
+  if (!swarm["witness"].is_null()) {
+    fmt::print("  {}: errors grow by {:.4g} 1/s; simulated, {:.4g} times the initial error\n",
+               swarm["verdict"] == "refuted" ? "with the directions stated"
+                                             : "if all forces of the class are allowed",
+               swarm["witness"]["growth_1_s"].get<double>(),
+               swarm["witness"]["error_over_initial"].get<double>());
   }
   fmt::print("  all couplings times {:.4g} would do\n", swarm["missing_factor"].get<double>());
   for (const Json& c : swarm["couplings"]) {

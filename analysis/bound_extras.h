@@ -23,7 +23,8 @@ void print_verified(const files::Json& verified);
 files::Json tube_json(const Tracking& input, const stability::DisturbanceSource& source, int count);
 
 /// --swarm FILE (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m, speed_m_s,
-/// acceleration_m_s2, cross_rate_N_s; every vehicle has the gains and the model given, its z loop is studied.
+/// acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" where the force's sign is known; every vehicle has the gains and the model given, its z loop is studied.
+/// Refuted: the forces as stated, with their directions, make errors grow in a simulation.
 files::Json swarm_json(const Tracking& input, const std::string& path);
 void print_swarm(const files::Json& swarm);
 

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "analysis/bound_extras.h"
+#include "analysis/bound_plots.h"
 #include "analysis/bound_report.h"
 #include "analysis/commands/command.h"
 #include "analysis/disturbance_input.h"
@@ -20,6 +21,7 @@ struct Options {
   bool verified = false;
   bool tube = false;
   std::string swarm;
+  std::string report;
 };
 
 int run(const Options& options, const CommonOptions& common) {
@@ -50,6 +52,10 @@ int run(const Options& options, const CommonOptions& common) {
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
   if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
+  std::string report_path;
+  if (!options.report.empty()) {
+    report_path = write_bound_report(input, disturbance, report, options.report, common.force);
+  }
   write_result(common, result);
   if (common.prints_text()) {
     print_tracking(input, source, report);
@@ -59,6 +65,7 @@ int run(const Options& options, const CommonOptions& common) {
     if (options.verified) print_verified(result["verified"]);
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
     if (!options.swarm.empty()) print_swarm(result["swarm"]);
+    if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
   if (options.swarm.empty() || result["swarm"]["verdict"] == "proved") return kDone;
   return result["swarm"]["verdict"] == "refuted" ? kViolated : kInconclusive;
@@ -94,6 +101,7 @@ Command bound_command() {
                      "Rigorous enclosures of the continuous gains (intervals)");
         app.add_flag("--tube", options->tube, "Bound of |e(t)| over time, from rest (JSON)");
         app.add_option("--swarm", options->swarm, "swarm.toml: do the vehicles' mutual forces stay bounded?");
+        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
         return [options, uncertain](const CommonOptions& common) {
           options->is_uncertain = uncertain->count() > 0;
           return run(*options, common);

@@ -16,6 +16,8 @@ struct Coupling {
   double acceleration_m_s2 = 0;
   /// Part of the rate that comes from other axes, which this loop does not feed: added to b.
   double cross_rate_N_s = 0;
+  /// +1: the force is known to push the vehicles apart, with the slopes above; -1: together; 0: only bounds are known.
+  int direction = 0;
 };
 
 /// What one vehicle's loop makes of a learning error of rate 1 N/s (command channel).

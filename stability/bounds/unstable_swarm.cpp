@@ -83,13 +83,22 @@ std::optional<UnstableSwarm> find_unstable_swarm(const AxisLoop& loop, int vehic
   const bool combines = count <= kMostCombined;
   for (std::size_t code = 0; code < (combines ? std::size_t{1} << count : 2); ++code) {
     std::vector<int> sign(count);
-    for (std::size_t c = 0; c < count; ++c) sign[c] = (combines ? code >> c : code) % 2 == 0 ? 1 : -1;
+    bool is_new = true;
+    for (std::size_t c = 0; c < count; ++c) {
+      sign[c] = (combines ? code >> c : code) % 2 == 0 ? 1 : -1;
+      const int stated = couplings[c].direction;
+      if (stated != 0 && stated != sign[c] && combines) is_new = false;
+      if (stated != 0) sign[c] = stated;
+    }
+    if (!is_new) continue;
     const MatrixXd A = swarm_matrix(loop, vehicles, couplings, sign);
     const double growth = Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues().real().maxCoeff();
     if (growth > worst.growth_1_s) worst.growth_1_s = growth, worst.sign = sign;
   }
   // Slower growth is not told from rounding, nor worth the name.
   if (!(worst.growth_1_s > 1e-3)) return std::nullopt;
+  worst.is_declared =
+      std::all_of(couplings.begin(), couplings.end(), [](const Coupling& c) { return c.direction != 0; });
   worst.seconds = 5 * std::log(kGrown) / worst.growth_1_s;
   worst.largest_error =
       replayed_growth(swarm_matrix(loop, vehicles, couplings, worst.sign), vehicles, worst.seconds);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "analysis/run.h"
 #include "nn/files/json.h"
@@ -63,6 +64,36 @@ TEST(BoundCommand, WhatFloat32CostsIsPartOfTheErrorBudget) {
     EXPECT_NEAR(row["total"].get<double>(),
                 row["minimum"].get<double>() + row["staircase"].get<double>() + of_float, 1e-15);
   }
+}
+
+TEST(BoundCommand, TheReportPlotsTheErrorInsideTheBallAndTheTube) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  const std::string command =
+      "swarmcert bound" + gains + " --rate 0.5 --amplitude 0.1 --initial-error 0.1 --report r";
+  ASSERT_EQ(run_shell(command, folder.path()).exit_code, 0);
+  EXPECT_EQ(run_shell(command, folder.path()).exit_code, 3);  // nothing is overwritten
+  EXPECT_NE(read_text(folder / "r/report.html").find("Rests on"), std::string::npos);
+  std::istringstream data(read_text(folder / "r/theorem.dat"));
+  std::string line;
+  std::getline(data, line);
+  double t = 0, transient = 0, ball = 0, ramp = 0, last = 0;
+  int rows = 0;
+  while (data >> t >> transient >> ball >> ramp) {
+    ++rows;
+    EXPECT_LE(ramp, ball * (1 + 1e-4));  // a sum over 4000 samples
+    last = ramp;
+  }
+  EXPECT_GT(rows, 300);
+  EXPECT_GT(last, 0.99 * ball);  // the worst of its class reaches the ball
+  std::istringstream tube(read_text(folder / "r/tube_z.dat"));
+  std::getline(tube, line);
+  double bound = 0, width = 0, error = 0, force = 0;
+  while (tube >> t >> width >> bound >> error >> force) {
+    EXPECT_LE(std::abs(error), width * (1 + 1e-3) + 1e-6);
+    EXPECT_LE(width, bound * (1 + 1e-4));
+  }
+  EXPECT_GT(error, 0.98 * bound);
 }
 
 TEST(BoundCommand, ANetworkAloneBoundsTheRateOfFHatAndGivesNoBall) {

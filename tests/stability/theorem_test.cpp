@@ -189,12 +189,19 @@ TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveTheLimitsOfTheReference) {
     const auto found = find_unstable_swarm(z, 2, couplings);
     ASSERT_TRUE(found.has_value());
     EXPECT_EQ(found->sign, (std::vector<int>{1, 1}));
+    EXPECT_FALSE(found->is_declared);
     EXPECT_GE(found->largest_error, 1000);
   }
   // One-way forces close no loop through the other vehicle, but change the vehicle's own: Kp - Lp/m or Kp + Lp/m.
   EXPECT_FALSE(find_unstable_swarm(z, 2, {{0, 1, 0.145, 0, 0.1, 0, 0}}));
   EXPECT_TRUE(find_unstable_swarm(z, 2, {{0, 1, 0.034 * 8 * 1.05, 0, 0.1, 0, 0}}));
   EXPECT_TRUE(find_unstable_swarm({0.034, 10, 5, 10, {1 / 17.4}, 0}, 2, pair(0.14, 0)));
+  // Forces that are known to pull together are stiffness.
+  std::vector<Coupling> together = pair(0.25, 0);
+  for (Coupling& c : together) c.direction = -1;
+  EXPECT_FALSE(find_unstable_swarm(z, 2, together));
+  for (Coupling& c : together) c.direction = 1;
+  EXPECT_TRUE(find_unstable_swarm(z, 2, together)->is_declared);
 }
 
 TEST(SmallGain, RefusesVehiclesThatAreNotThere) {

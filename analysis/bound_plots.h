@@ -1,0 +1,17 @@
+/// @file The report of `bound`: tables, and plots of the error inside its bounds over time.
+#pragma once
+
+#include <string>
+
+#include "analysis/disturbance_input.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html; returns its path. Plots: the theorem's transient with the response to a ramp inside the
+/// ball, and per axis the response to the worst force of the amplitude class inside its tube.
+/// @throws files::InputError as Report::write().
+std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
+                               const stability::TrackingReport& report, const std::string& folder,
+                               bool overwrite);
+
+}  // namespace swarmcert::analysis
