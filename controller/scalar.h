@@ -1,6 +1,6 @@
 /// @file What the control laws ask of a number type, so that one text serves flight, integration and error analysis.
 ///
-/// float flies; double serves the integrator; a third type (controller/rounding_error.h, host only) carries bounds on
+/// float flies; double serves the integrator; a third type (controller/rounding/bounded.h, host only) carries bounds on
 /// their difference through the same operations. The laws use +, -, /, comparisons, and the functions below; a type
 /// of its own overloads them in its namespace. Every product is rounded before it enters a sum (nn/arithmetic.h), and
 /// each formula is evaluated in the order in which it is written: the same bits on every machine.

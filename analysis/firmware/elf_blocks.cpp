@@ -93,6 +93,11 @@ class ElfReader {
       refuse(name, "lies outside its section");
     const std::uint64_t offset = section.sh_offset + (address - section.sh_addr);
     need(offset, size, name);
+    // Each byte once in a section and once in a symbol; symbols that claim the same bytes again and again are no
+    // compiler's.
+    taken_ += size;
+    if (taken_ > 8 * bytes_.size())
+      refuse(name, "the symbols overlap: together they are larger than the file");
     FloatBlock block;
     block.name = name;
     block.address = address;
@@ -105,6 +110,7 @@ class ElfReader {
   const std::string& path_;
   std::vector<typename Elf::Section> sections_;
   std::vector<FloatBlock> blocks_;
+  std::uint64_t taken_ = 0;  ///< bytes copied into blocks
 };
 
 }  // namespace

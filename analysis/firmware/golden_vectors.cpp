@@ -1,5 +1,7 @@
 #include "analysis/firmware/golden_vectors.h"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "nn/files/functions.h"
@@ -98,7 +100,10 @@ std::vector<GoldenVector> golden_vectors(const files::Network& network, int coun
       vector.inputs.resize(static_cast<std::size_t>(g % (most_neighbours + 1)));
       for (std::vector<float>& input : vector.inputs) {
         for (int i = 0; i < inputs; ++i) {
-          const float range = network.clamp ? 1.5f * static_cast<float>(network.clamp->upper[i])
+          const double side =
+              !network.clamp ? 0
+                             : std::max(std::abs(network.clamp->lower[i]), std::abs(network.clamp->upper[i]));
+          const float range = network.clamp ? static_cast<float>(1.5 * std::min(side, 1e3))
                                             : (i < 3 ? kMostPosition_m : kMostVelocity_m_s);
           input.push_back(within(range));
         }

@@ -31,6 +31,13 @@ if(output MATCHES "vfn?m[as]\\.f32" OR NOT output MATCHES "vmul\\.f32")
   message(FATAL_ERROR "the app's products are fused, or there are none")
 endif()
 
+foreach(object flight network network_task)
+  run(arm-none-eabi-nm -u ${folder}/app/${object}.o)
+  if(output MATCHES "malloc|_Zn|_Zd|__aeabi_d|__aeabi_f2d|__cxa|sqrtf|sinf|cosf")
+    message(FATAL_ERROR "${object}.o needs what does not fly:\n${output}")
+  endif()
+endforeach()
+
 build_app(${folder}/lost ${folder}/network ${main} NO_KBUILD_FLAGS)
 expect_exit_code(0 "without the flags of src/Kbuild: the guard in the code holds alone"
                  ${qemu} -kernel ${folder}/lost/app.elf)

@@ -1,3 +1,4 @@
+#include <elf.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -250,6 +251,39 @@ TEST_F(Firmware, FilesThatAreNoElfOfAMicrocontrollerOrAHostAreBadInput) {
   write_text(folder_ / "firmware.bin", std::string(4096, '\x7f'));
   expect_match("firmware.bin", 3, {"firmware.bin", "ELF"});
   expect_match("missing.elf", 3, {"missing.elf"});
+}
+
+TEST_F(Firmware, AnElfWhoseSymbolsClaimMoreThanItHoldsIsRefusedBeforeItsCopiesFillTheMemory) {
+  constexpr std::uint32_t kData = 1 << 16, kSymbols = 2000;
+  Elf32_Ehdr header{};
+  std::memcpy(header.e_ident, ELFMAG, SELFMAG);
+  header.e_ident[EI_CLASS] = ELFCLASS32;
+  header.e_ident[EI_DATA] = ELFDATA2LSB;
+  header.e_shentsize = sizeof(Elf32_Shdr);
+  header.e_shnum = 3;
+  Elf32_Shdr sections[3] = {};
+  sections[0].sh_type = SHT_PROGBITS;
+  sections[0].sh_flags = SHF_ALLOC;
+  sections[0].sh_offset = sizeof header;
+  sections[0].sh_size = kData;
+  sections[1].sh_type = SHT_SYMTAB;
+  sections[1].sh_offset = sizeof header + kData;
+  sections[1].sh_size = kSymbols * sizeof(Elf32_Sym);
+  sections[1].sh_link = 2;
+  sections[2].sh_type = SHT_STRTAB;
+  sections[2].sh_offset = sizeof header;
+  sections[2].sh_size = 8;
+  header.e_shoff = sections[1].sh_offset + sections[1].sh_size;
+  Elf32_Sym symbol{};
+  symbol.st_info = STT_OBJECT;
+  symbol.st_size = kData;
+  const auto bytes_of = [](const auto& object) {
+    return std::string(reinterpret_cast<const char*>(&object), sizeof object);
+  };
+  std::string elf = bytes_of(header) + std::string(kData, 'x');
+  for (std::uint32_t i = 0; i < kSymbols; ++i) elf += bytes_of(symbol);
+  write_text(folder_ / "overlapping.elf", elf + bytes_of(sections));
+  expect_match("overlapping.elf", 3, {"symbols overlap"});
 }
 
 TEST_F(Firmware, DamagedElfsAreBadInputAndNeverACrash) {

@@ -20,7 +20,9 @@ foreach(name g++ clang++)
     message("NOTICE: no ${name}, left out")
     continue()
   endif()
-  foreach(flags IN ITEMS "-O0" "-O1;-march=native" "-O2;-march=native" "-O3;-march=native;-ffp-contract=fast")
+  foreach(flags IN ITEMS
+          -O0 -O1 -O2 -O3 "-O0;-march=native" "-O1;-march=native" "-O2;-march=native" "-O3;-march=native"
+          "-O3;-march=native;-ffp-contract=fast")
     run(${compiler_${name}} -std=c++17 ${flags} -I${SOURCE} ${CMAKE_CURRENT_LIST_DIR}/host_main.cpp
         -o ${SCRATCH}/workload)
     run(${SCRATCH}/workload 2000 ${SCRATCH}/words.bin)
