@@ -96,6 +96,7 @@ int run(char** arguments, int count) {
   for (const auto& [part, one] : swarmcert::files::parts(network)) weights[part] = {{"sha256", one->sha256}};
   Json facts = {
       {"schema", "swarmcert/firmware-facts/1"},
+      {"tool", "swarmcert " SWARMCERT_VERSION},
       {"network", {{"sha256", network.sha256}, {"weights", std::move(weights)}}},
       {"target", "STM32F405 (Cortex-M4F) at 168 MHz, flash with 5 wait states"},
       {"compiler", arguments[4]},
