@@ -2,15 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "analysis/bound_report.h"
-#include "nn/files/file_io.h"
 #include "nn/files/input_error.h"
-#include "nn/files/toml.h"
-#include "stability/bounds/small_gain.h"
 #include "stability/bounds/uncertain_norms.h"
-#include "stability/bounds/unstable_swarm.h"
 #include "stability/bounds/verified_norms.h"
 
 namespace swarmcert::analysis {
@@ -88,18 +85,51 @@ AxisLoop fixed_part(const Tracking& input, int axis) {
   return loop;
 }
 
-std::string pair_text(const Json& pair) {
-  const auto text = [](const Json& x) {
-    return x.is_null() ? std::string("unbounded") : fmt::format("{:.8g}", x.get<double>());
-  };
-  return text(pair[0]) + " .. " + text(pair[1]);
+std::string number_text(const Json& x) {
+  return x.is_null() ? std::string("unbounded") : fmt::format("{:.8g}", x.get<double>());
+}
+
+std::string pair_text(const Json& pair) { return number_text(pair[0]) + " .. " + number_text(pair[1]); }
+
+}  // namespace
+
+namespace {
+
+/// What the sampled loop reaches at the corners and the middle of the box: no supremum, which has no enclosure here.
+Json sampled_reached_json(const Tracking& input, const UncertainPlant& plant, int axis, Channel channel) {
+  GainNorms most;
+  for (int corner = 0; corner <= 16; ++corner) {
+    const auto at = [&](const Range& range, int bit) {
+      return corner == 16 ? (range.from + range.to) / 2 : (corner >> bit) % 2 == 0 ? range.from : range.to;
+    };
+    AxisLoop loop = fixed_part(input, axis);
+    const double mass_kg = at(plant.mass_kg, 0);
+    const double scale = at(plant.thrust_scale, 1) * loop.mass_kg / mass_kg;
+    loop.mass_kg = mass_kg;
+    loop.Kp *= scale;
+    loop.Kd *= scale;
+    loop.Ki *= scale;
+    loop.lags_s.insert(loop.lags_s.begin(), at(plant.lag_s, 2));
+    loop.delay_s = at(plant.delay_s, 3);
+    const GainNorms norms = sampled_norms({loop, 1 / input.gains.rate_hz, input.gains.integrator_step_s},
+                                          channel, Instants::kSampling);
+    most = {std::max(most.rate, norms.rate), std::max(most.amplitude, norms.amplitude),
+            std::max(most.edge, norms.edge), std::max(most.impulse, norms.impulse)};
+  }
+  const auto reached = [](double value) { return Json{finite(value), nullptr}; };
+  return {{"axis", axis_name(axis)},    {"channel", name(channel)},
+          {"loop", "sampled"},          {"status", "reached at corners, not enclosed"},
+          {"rate", reached(most.rate)}, {"amplitude", reached(most.amplitude)},
+          {"edge", reached(most.edge)}, {"impulse", reached(most.impulse)}};
 }
 
 }  // namespace
 
-Json uncertain_json(const Tracking& input, const std::vector<std::string>& words) {
+Json uncertain_json(const Tracking& input, const std::vector<std::string>& words,
+                    const std::function<void(int done, int total)>& progress) {
   const UncertainPlant plant = intervals_of(input, words);
   Json gains = Json::array();
+  int done = 0;
   for (int axis = 0; axis < 3; ++axis) {
     if (!axis_loop(input.gains, input.plant, axis)) continue;
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
@@ -107,12 +137,17 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
       gains.push_back({{"axis", axis_name(axis)},
                        {"channel", name(channel)},
                        {"loop", "continuous"},
+                       {"status", "enclosed"},
                        {"rate", gain_json(norms.rate)},
                        {"amplitude", gain_json(norms.amplitude)},
                        {"edge", gain_json(norms.edge)},
                        {"impulse", gain_json(norms.impulse)},
+                       {"worst_rate", worst_json(norms.rate)},
                        {"worst_amplitude", worst_json(norms.amplitude)},
+                       {"worst_edge", worst_json(norms.edge)},
                        {"worst_impulse", worst_json(norms.impulse)}});
+      if (input.gains.rate_hz > 0) gains.push_back(sampled_reached_json(input, plant, axis, channel));
+      progress(++done, 6);
     }
   }
   const auto range = [](const Range& r) { return Json{r.from, r.to}; };
@@ -131,7 +166,14 @@ void print_uncertain(const Json& uncertain) {
       "\nWorst over mass {} kg, thrust scale {}, motor lag {} s, delay {} s: reached .. never exceeded\n",
       text("mass_kg"), text("thrust_scale"), text("lag_s"), text("delay_s"));
   for (const Json& g : uncertain["gains"]) {
-    fmt::print("  {} {:<8} amplitude {}  impulse {}  rate {}\n", g["axis"].get<std::string>(),
+    if (g["loop"] == "sampled") {
+      fmt::print(
+          "  {} {:<8} sampled    reached at corners, not enclosed: amplitude {}  impulse {}  rate {}\n",
+          g["axis"].get<std::string>(), g["channel"].get<std::string>(), number_text(g["amplitude"][0]),
+          number_text(g["impulse"][0]), number_text(g["rate"][0]));
+      continue;
+    }
+    fmt::print("  {} {:<8} continuous amplitude {}  impulse {}  rate {}\n", g["axis"].get<std::string>(),
                g["channel"].get<std::string>(), pair_text(g["amplitude"]), pair_text(g["impulse"]),
                pair_text(g["rate"]));
   }
@@ -157,15 +199,23 @@ Json verified_json(const Tracking& input) {
                                        : "stability could not be verified in intervals";
       }
       rows.push_back(std::move(row));
+      if (input.gains.rate_hz > 0) {
+        rows.push_back({{"axis", axis_name(axis)},
+                        {"channel", name(channel)},
+                        {"loop", "sampled"},
+                        {"status", "inconclusive"},
+                        {"why", "no interval method: its gains are sums computed to about 1e-10"}});
+      }
     }
   }
   return rows;
 }
 
 void print_verified(const Json& verified) {
-  fmt::print("\nVerified enclosures of the continuous gains\n");
+  fmt::print("\nVerified enclosures of the gains\n");
   for (const Json& row : verified) {
-    fmt::print("  {} {:<8} ", row["axis"].get<std::string>(), row["channel"].get<std::string>());
+    fmt::print("  {} {:<8} {:<10} ", row["axis"].get<std::string>(), row["channel"].get<std::string>(),
+               row["loop"].get<std::string>());
     if (row["status"] != "proved") {
       fmt::print("inconclusive: {}\n", row["why"].get<std::string>());
       continue;
@@ -173,7 +223,7 @@ void print_verified(const Json& verified) {
     const auto text = [&row](const char* key) {
       return fmt::format("{} [{:.13g}, {:.13g}]", key, row[key][0].get<double>(), row[key][1].get<double>());
     };
-    fmt::print("{}  {}\n             {}  {}\n", text("rate"), text("amplitude"), text("edge"),
+    fmt::print("{}  {}\n                        {}  {}\n", text("rate"), text("amplitude"), text("edge"),
                text("impulse"));
   }
 }
@@ -211,110 +261,6 @@ Json tube_json(const Tracking& input, const DisturbanceSource& source, int count
                     {"at", std::move(at)}});
   }
   return rows;
-}
-
-Json swarm_json(const Tracking& input, const std::string& path) {
-  const std::string text = files::read_file(path);
-  const auto document = files::parse_toml(text, path);
-  const files::TomlTable top(document, path);
-  constexpr char kSchema[] = "swarmcert/swarm/1";
-  if (top.text("schema") != kSchema) {
-    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema));
-  }
-  top.allow_only({"schema", "vehicles", "coupling"});
-  const double vehicles = top.number("vehicles");
-  if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {
-    top.refuse("vehicles", fmt::format("{}", vehicles), "must be a whole number from 1 to 200");
-  }
-  std::vector<Coupling> couplings;
-  for (const files::TomlTable& table : top.tables("coupling")) {
-    table.allow_only({"on", "by", "position_N_m", "velocity_N_s_m", "speed_m_s", "acceleration_m_s2",
-                      "cross_rate_N_s", "direction"});
-    const auto vehicle = [&](const char* key) {
-      const double value = table.number(key);
-      if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
-        table.refuse(key, fmt::format("{}", value),
-                     fmt::format("must be a vehicle from 0 to {}", vehicles - 1));
-      }
-      return static_cast<int>(value);
-    };
-    const auto number = [&](const char* key) {
-      const double value = table.has(key) ? table.number(key) : 0;
-      if (value < 0) table.refuse(key, fmt::format("{}", value), "must not be negative");
-      return value;
-    };
-    Coupling c{vehicle("on"),           vehicle("by"),
-               number("position_N_m"),  number("velocity_N_s_m"),
-               number("speed_m_s"),     number("acceleration_m_s2"),
-               number("cross_rate_N_s")};
-    if (table.has("direction")) c.direction = table.choice("direction", {"apart", "together"}) == 0 ? 1 : -1;
-    if (c.on == c.by) table.refuse("by", std::to_string(c.by), "is the vehicle itself");
-    couplings.push_back(c);
-  }
-  const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, 2);
-  if (!loop) throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
-  AxisLoop acting = *loop;
-  if (const auto sampled = sampled_axis_loop(input.gains, input.plant, 2)) acting.Ki = effective_Ki(*sampled);
-  const RateGains gains = rate_gains(acting);
-  const std::vector<LoopGains> loops(static_cast<std::size_t>(vehicles),
-                                     {gains.position, gains.velocity, gains.acceleration});
-  const SmallGain found = small_gain(loops, couplings);
-  Json entries = Json::array();
-  for (std::size_t i = 0; i < couplings.size(); ++i) {
-    entries.push_back({{"on", couplings[i].on},
-                       {"by", couplings[i].by},
-                       {"missing_factor", found.proved ? Json() : Json(found.missing_factor_of[i])}});
-  }
-  // Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
-  std::optional<UnstableSwarm> unstable;
-  if (!found.proved) unstable = find_unstable_swarm(acting, static_cast<int>(vehicles), couplings);
-  Json witness;
-  if (unstable) {
-    witness = {{"of", unstable->is_declared ? "the swarm as declared" : "one swarm of the class"},
-               {"signs", unstable->sign},
-               {"growth_1_s", unstable->growth_1_s},
-               {"simulated_s", unstable->seconds},
-               {"error_over_initial", unstable->largest_error}};
-  }
-  const bool is_refuted = unstable && unstable->is_declared;
-  return {{"verdict", found.proved ? "proved"
-                      : is_refuted ? "refuted"
-                                   : "inconclusive"},
-          {"witness", std::move(witness)},
-          {"loop", "continuous"},
-          {"axis", "z"},
-          {"Gamma", found.Gamma},
-          {"spectral_radius", {found.spectral_radius_lower, found.spectral_radius_upper}},
-          {"rate_N_s", found.rate_N_s},
-          {"error_m", found.error_m},
-          {"missing_factor", found.missing_factor},
-          {"couplings", std::move(entries)}};
-}
-
-void print_swarm(const Json& swarm) {
-  fmt::print("\nSwarm small gain (z, continuous): rho(Gamma) <= {:.6g}: {}\n",
-             swarm["spectral_radius"][1].get<double>(), swarm["verdict"].get<std::string>());
-  if (swarm["verdict"] == "proved") {
-    for (std::size_t i = 0; i < swarm["rate_N_s"].size(); ++i) {
-      fmt::print("  vehicle {}: |eps'| at most {:.6g} N/s, |e| at most {:.6g} m in the long run\n", i,
-                 swarm["rate_N_s"][i].get<double>(), swarm["error_m"][i].get<double>());
-    }
-    return;
-  }
-  if (!swarm["witness"].is_null()) {
-    fmt::print("  {}: errors grow by {:.4g} 1/s; simulated, {:.4g} times the initial error\n",
-               swarm["verdict"] == "refuted" ? "with the directions stated"
-                                             : "if all forces of the class are allowed",
-               swarm["witness"]["growth_1_s"].get<double>(),
-               swarm["witness"]["error_over_initial"].get<double>());
-  }
-  fmt::print("  all couplings times {:.4g} would do\n", swarm["missing_factor"].get<double>());
-  for (const Json& c : swarm["couplings"]) {
-    const double factor = c["missing_factor"].get<double>();
-    fmt::print("  force on {} by {}: {}\n", c["on"].get<int>(), c["by"].get<int>(),
-               factor > 0 ? fmt::format("alone times {:.4g} would do", factor)
-                          : std::string("alone does not suffice"));
-  }
 }
 
 }  // namespace swarmcert::analysis

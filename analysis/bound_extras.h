@@ -1,6 +1,7 @@
 /// @file What `bound` computes on request: intervals of the vehicle, rigorous enclosures, the tube over time, a swarm.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -8,14 +9,16 @@
 
 namespace swarmcert::analysis {
 
-/// --uncertain: suprema over intervals, per axis and channel.
+/// --uncertain: suprema of the continuous gains over intervals, enclosed, per axis and channel; of the sampled gains what
+/// the corners reach, which proves nothing about the rest.
 /// @param words "mass=0.032:0.037" and the like: mass (kg), thrust (ratio), lag (s), delay (s), battery (V). What is not
 ///   named varies by 5 % (mass), 10 % (thrust), 20 % (lag, delay) about the model and the gains.
 /// @throws UsageError for words that are not understood.
-files::Json uncertain_json(const Tracking& input, const std::vector<std::string>& words);
+files::Json uncertain_json(const Tracking& input, const std::vector<std::string>& words,
+                           const std::function<void(int done, int total)>& progress);
 void print_uncertain(const files::Json& uncertain);
 
-/// --verified: enclosures of the continuous gains, per axis and channel.
+/// --verified: enclosures of the continuous gains, per axis and channel; sampled rows say that they have none.
 files::Json verified_json(const Tracking& input);
 void print_verified(const files::Json& verified);
 

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/tracking_input.h"
-#include "stability/bounds/truth_bounds.h"
+#include "analysis/truth_input.h"
 
 namespace swarmcert::analysis {
 
@@ -31,13 +30,6 @@ struct DisturbanceArguments {
 
 void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments);
 
-/// A declared truth, enclosed.
-struct Truth {
-  std::string path;
-  stability::MotionSet motion;
-  std::vector<stability::EffectBounds> effects;
-};
-
 struct LoadedDisturbance {
   stability::DisturbanceSource source;
   std::optional<Truth> truth;
@@ -48,8 +40,5 @@ struct LoadedDisturbance {
 /// a certificate or a network with --speed (rate of f_hat, which is no learning error).
 /// @throws UsageError for combinations that mean nothing; files::InputError for bad files.
 LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const Tracking& tracking);
-
-files::Json truth_json(const Truth& truth);
-void print_truth(const Truth& truth);
 
 }  // namespace swarmcert::analysis

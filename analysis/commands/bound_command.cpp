@@ -8,6 +8,7 @@
 #include "analysis/commands/command.h"
 #include "analysis/disturbance_input.h"
 #include "analysis/float_errors.h"
+#include "analysis/progress.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -48,7 +49,12 @@ int run(const Options& options, const CommonOptions& common) {
                        : files::Json();
   }
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
-  if (options.is_uncertain) result["uncertain"] = uncertain_json(input, options.uncertain);
+  if (options.is_uncertain) {
+    Progress progress(common.quiet);
+    result["uncertain"] = uncertain_json(input, options.uncertain, [&progress](int done, int total) {
+      progress.show(done, total, "loops over the intervals");
+    });
+  }
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
   if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
@@ -80,8 +86,10 @@ Command bound_command() {
       "for the\n"
       "continuous and the sampled loop, and, for a declared or measured force error, the smallest of "
       "five bounds.\n"
-      "A certificate or a network bounds the rate of f_hat only and gives no ball.\n\n"
-      "Example: swarmcert bound --gains controller/gains/crazyflie.toml --model "
+      "A certificate or a network bounds the rate of f_hat only and gives no ball; --truth declares what the "
+      "force\n"
+      "really is, and encloses its constants; --from takes measured quantiles.\n\n"
+      "Example: swarmcert bound --gains controller/gains/crazyflie-small.toml --model "
       "stability/models/crazyflie-small.toml \\\n"
       "           --amplitude 0.097 --impulse 0.0202 --rate 0.75",
       [](CLI::App& app) {

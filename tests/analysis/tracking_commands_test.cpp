@@ -209,6 +209,20 @@ TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
       EXPECT_GE(result["uncertain"]["gains"][i][gain][1].get<double>(), exact[gain].get<double>()) << gain;
     }
   }
+  // A sampled loop has neither enclosure, and says so.
+  const Json sampled = json_of(folder, "bound" + kFlown +
+                                           " --verified --uncertain mass=0.034:0.0341 thrust=1:1 "
+                                           "lag=0.0575:0.0575 delay=0:0");
+  int rows = 0;
+  for (const Json& row : sampled["verified"]) {
+    rows += row["loop"] == "sampled";
+    EXPECT_EQ(row["status"], row["loop"] == "sampled" ? "inconclusive" : "proved");
+  }
+  for (const Json& row : sampled["uncertain"]["gains"]) {
+    rows += row["loop"] == "sampled";
+    EXPECT_EQ(row["amplitude"][1].is_null(), row["loop"] == "sampled");
+  }
+  EXPECT_EQ(rows, 12);
   EXPECT_EQ(run_shell("swarmcert bound" + gains + " --uncertain weight=1:2", folder.path()).exit_code, 2);
 }
 
