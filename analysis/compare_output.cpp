@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "analysis/commands/flight_options.h"
@@ -102,6 +104,65 @@ files::Json json_of(const residuals::NeighbourMap& map) {
       {"cells", std::move(cells)}};
 }
 
+files::Json json_of(const residuals::TorqueErrors& torque) {
+  if (!torque.refused.empty()) return {{"refused", torque.refused}};
+  return {{"unit", "N m"},
+          {"records", torque.records},
+          {"rate_hz", torque.rate_hz},
+          {"rmse", json_of(torque.rmse_Nm)},
+          {"bias", json_of(torque.bias_Nm)},
+          {"max", json_of(torque.max_Nm)}};
+}
+
+/// How many logs have a torque residual; where none has, why.
+files::Json torque_json(const Comparison& comparison) {
+  std::size_t tracks = 0;
+  std::string refused = "no vehicle has a model";
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    if (track.torque.refused.empty()) ++tracks;
+    if (!track.torque.refused.empty() && !track.position_only) refused = track.torque.refused;
+  }
+  if (tracks == 0) return {{"refused", refused}};
+  return {{"tracks", tracks}, {"where", "flights[].torque"}};
+}
+
+void print_torque(const Comparison& comparison) {
+  const files::Json summary = torque_json(comparison);
+  if (summary.contains("refused")) {
+    fmt::print("Torque residual refused: {}.\n", summary["refused"].get<std::string>());
+    return;
+  }
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    const residuals::TorqueErrors& t = track.torque;
+    if (!t.refused.empty()) continue;
+    fmt::print("Torque residual of {} {}, RMS x y z [uN m]: {:.1f} {:.1f} {:.1f}\n", track.flight,
+               track.vehicle, 1e6 * t.rmse_Nm.x, 1e6 * t.rmse_Nm.y, 1e6 * t.rmse_Nm.z);
+  }
+}
+
+void print_cuts(const Comparison& comparison) {
+  std::array<std::size_t, static_cast<std::size_t>(residuals::Cut::kCount)> sums{};
+  double largest_s = 0;
+  std::size_t estimated = 0, tracks = 0;
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += track.cut[k];
+    ++tracks;
+    if (track.clock_onsets > 0) ++estimated;
+    largest_s = std::max(largest_s, std::abs(track.clock_offset_s));
+  }
+  fmt::print("Records cut:");
+  bool any = false;
+  for (std::size_t k = 1; k < sums.size(); ++k) {
+    if (sums[k] == 0) continue;
+    fmt::print("{} {} {}", any ? "," : "", sums[k], residuals::name(static_cast<residuals::Cut>(k)));
+    any = true;
+  }
+  fmt::print(
+      "{}. Clocks: {} of {} logs have an offset estimated against the first of their flight, up to {:.1f} "
+      "ms.\n",
+      any ? "" : " none", estimated, tracks, 1000 * largest_s);
+}
+
 files::Json json_of(const residuals::TrackErrors& track) {
   files::Json json = {{"flight", track.flight},
                       {"scenario", track.scenario},
@@ -118,6 +179,7 @@ files::Json json_of(const residuals::TrackErrors& track) {
     records[residuals::name(static_cast<residuals::Cut>(k))] = track.cut[k];
   json.update(json_of(track.errors));
   json["trajectory"] = json_of(track.trajectory);
+  json["torque"] = json_of(track.torque);
   return json;
 }
 
@@ -170,8 +232,7 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
     const auto cut = static_cast<residuals::Cut>(k);
     json["cut_rules"][residuals::name(cut)] = residuals::rule(cut);
   }
-  json["torque"] =
-      "refused: logs at 100 Hz of a loop at 500 Hz alias; the inertia they give is wrong by a factor of 28";
+  json["torque"] = torque_json(comparison);
   json["problems"] = comparison.problems;
   json["skipped_files"] = inputs.found.skipped;
 }
@@ -230,11 +291,10 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
     fmt::print("Model {}: {}, {:.1f} g, {} effects\n", model.path, model.kind, 1000 * model.mass_kg,
                model.effects.size());
   }
-  fmt::print(
-      "{} flights; force residual f_a = m a - model, in the world. The torque is not compared: logs at 100 "
-      "Hz\n"
-      "of a loop at 500 Hz alias.\n\n",
-      inputs.found.flights.size());
+  fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
+  print_cuts(comparison);
+  print_torque(comparison);
+  fmt::print("\n");
   fmt::print("{:<28}{:>9}{:>22}{:>22}{:>10}{:>9}\n", "", "records", "RMSE x y z [gf]", "bias x y z [gf]",
              "p99.9 z", "max z");
   const auto line = [&](const std::string& name, const residuals::GroupErrors& group) {

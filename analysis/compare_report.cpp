@@ -218,7 +218,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   report.paragraph(
       "Force residual: mass times measured specific force minus thrust and effects, in the world frame, in "
       "gram-force. "
-      "Torque is not compared: logs at 100 Hz of a loop at 500 Hz alias.");
+      "A torque residual needs logs of at least 400 Hz: slower ones alias what the attitude loop does.");
   report.heading("Scenarios and vehicles");
   std::vector<std::vector<std::string>> rows;
   for (const auto& [name, errors] : comparison.scenarios) rows.push_back(row(name, errors));

@@ -212,7 +212,7 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   errors.clock_onsets = track.clock_onsets;
   errors.findings = logs::findings(track.health);
   if (track.position_only) {
-    errors.trajectory.refused = "position only";
+    errors.trajectory.refused = errors.torque.refused = "position only";
     return result;
   }
 
@@ -251,6 +251,7 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   result.moments = moments_of(track, r);
   sort_and_shorten(result.moments);
   errors.errors = errors_of({&part});
+  errors.torque = torque_errors(model, track);
   const stability::Gains* const own_gains = gains_of(gains, track.kind);
   if (own_gains == nullptr) {
     errors.trajectory.refused = "no gains.toml for vehicles of kind " + track.kind;

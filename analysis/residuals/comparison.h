@@ -10,6 +10,7 @@
 #include "analysis/residuals/inputs.h"
 #include "analysis/residuals/regions.h"
 #include "analysis/residuals/statistics.h"
+#include "analysis/residuals/torque_residual.h"
 #include "analysis/residuals/trajectory.h"
 
 namespace swarmcert::residuals {
@@ -40,6 +41,7 @@ struct TrackErrors {
   std::vector<std::string> findings;  ///< what was wrong with the log
   GroupErrors errors;
   TrajectoryErrors trajectory;
+  TorqueErrors torque;
   std::vector<std::array<float, 5>> series;  ///< every second used record: time, residual x, y, z, nominal z
 };
 

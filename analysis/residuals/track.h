@@ -44,6 +44,7 @@ struct CutRules {
 struct Track {
   std::string flight, scenario, vehicle, kind, path;
   bool position_only = false;
+  bool has_rates = false;
   logs::LogHealth health;
   double clock_offset_s = 0;  ///< of this log's clock against the first vehicle's
   int clock_onsets = 0;       ///< how many common starts of a trajectory gave it; 0: not estimated

@@ -214,6 +214,40 @@ TEST(CompareReport, IsOneFileInWhichHostileNamesAreTextAndOnlyItsOwnScriptRuns) 
   EXPECT_NE(has_script, html.find("built without dygraphs") != std::string::npos);
 }
 
+TEST(TorqueResidual, IsGivenWhereTheLogIsAsFastAsTheLoopAndRefusedWhereItAliases) {
+  const ScratchFolder folder;
+  const std::string gains = source_path("controller/gains/crazyflie-small-nominal.toml");
+  std::string model = read_text(source_path("stability/models/crazyflie-small.toml"));
+  write_text(folder / "slow.toml", model);
+  const std::string rate = "log_rate_hz = 100.0";
+  ASSERT_NE(model.find(rate), std::string::npos);
+  model.replace(model.find(rate), rate.size(), "log_rate_hz = 500.0");
+  const std::string lag = "\n[[effect]]\nname = \"motor_lag\"\n";
+  write_text(folder / "fast.toml", model + lag);
+  // What acted, 1.5e-4 N m about y, is missing in fast.toml.
+  write_text(folder / "truth.toml",
+             model + lag + "\n[[effect]]\nname = \"torque_bias\"\nparameters = { torque_y_Nm = 1.5e-4 }\n");
+  const auto compare = [&](const std::string& truth, const std::string& name) {
+    EXPECT_EQ(run_shell("swarmcert simulate circle --duration 6 --model " + truth + " --gains " + gains +
+                            " -o " + name,
+                        folder.path())
+                  .exit_code,
+              0);
+    const std::string judged = truth == "truth.toml" ? "fast.toml" : truth;
+    const Outcome outcome =
+        run_shell("swarmcert compare " + judged + " " + name + " --json " + name + ".json", folder.path());
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return files::read_json(folder / (name + ".json"), "swarmcert/compare/1");
+  };
+  const files::Json fast = compare("truth.toml", "fast");
+  ASSERT_EQ(fast["torque"]["tracks"], 1) << fast["torque"];
+  const files::Json& torque = fast["flights"][0]["torque"];
+  EXPECT_NEAR(torque["bias"]["y"].get<double>(), 1.5e-4, 0.2e-4);
+  EXPECT_NEAR(torque["bias"]["x"].get<double>(), 0, 0.2e-4);
+  const files::Json slow = compare("slow.toml", "slow");
+  EXPECT_EQ(slow["torque"]["refused"], "logs at 100 Hz of a loop at 500 Hz alias");
+}
+
 /// RMS of the vertical residual in a row of a budget, N.
 double rmse_z_N(const files::Json& budget, const std::string& row, const std::string& group) {
   for (const files::Json& entry : budget["rows"]) {
