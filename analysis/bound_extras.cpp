@@ -85,6 +85,10 @@ AxisLoop fixed_part(const Tracking& input, int axis) {
   return loop;
 }
 
+bool is_same(const AxisLoop& a, const AxisLoop& b) {
+  return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
+}
+
 std::string number_text(const Json& x) {
   return x.is_null() ? std::string("unbounded") : fmt::format("{:.8g}", x.get<double>());
 }
@@ -132,8 +136,22 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
   int done = 0;
   for (int axis = 0; axis < 3; ++axis) {
     if (!axis_loop(input.gains, input.plant, axis)) continue;
+    if (axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
+        is_same(fixed_part(input, axis), fixed_part(input, axis - 1))) {
+      const std::size_t count = input.gains.rate_hz > 0 ? 4 : 2;
+      for (std::size_t i = 0; i < count; ++i) {
+        Json row = gains[gains.size() - count];
+        row["axis"] = axis_name(axis);
+        gains.push_back(std::move(row));
+      }
+      progress(done += 2, 6);
+      continue;
+    }
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-      const UncertainNorms norms = uncertain_norms(fixed_part(input, axis), plant, channel);
+      // With a delay an evaluation takes ten times as long: fewer parts, wider enclosures.
+      const int evaluations = plant.delay_s.to > 0 ? 100 : 1500;
+      const UncertainNorms norms =
+          uncertain_norms(fixed_part(input, axis), plant, channel, 0.01, evaluations);
       gains.push_back({{"axis", axis_name(axis)},
                        {"channel", name(channel)},
                        {"loop", "continuous"},

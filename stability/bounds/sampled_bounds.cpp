@@ -22,7 +22,8 @@ struct Kernel {
   std::vector<double> step_peak;  ///< largest |integral| on a cell
   std::vector<double> bend;       ///< of the integral away from its chord, over a cell
   double area = 0;                ///< int |kernel|
-  double step_area_after = 0;     ///< int |integral| after the last cell
+  double ratio = 0;            ///< of every cell after the last to the one before; 0: nothing is left there
+  double step_area_after = 0;  ///< int |integral| after the last cell
 
   void add(double start, double slope, double cell) {
     const double end = start + slope * cell;
@@ -42,7 +43,8 @@ struct Kernel {
   }
 
   /// A last cell, of which every later one is `ratio` times the one before; the integral falls in proportion.
-  void add_series(double start, double slope, double cell, double ratio) {
+  void add_series(double start, double slope, double cell, double shrinks) {
+    ratio = shrinks;
     const double before = area;
     add(start, slope, cell);
     area = before + (area - before) / (1 - ratio);
@@ -77,18 +79,22 @@ Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s,
 /// Largest of `values` (one per cell) at `after_s` or earlier in time; falls with after_s.
 class FadingKernel {
  public:
-  FadingKernel(const Kernel& kernel, std::vector<double> values) : suffix_(std::move(values)) {
+  FadingKernel(const Kernel& kernel, std::vector<double> values)
+      : suffix_(std::move(values)), ratio_(kernel.ratio), period_s_(kernel.length.back()) {
     for (std::size_t i = suffix_.size() - 1; i-- > 0;) suffix_[i] = std::max(suffix_[i], suffix_[i + 1]);
     double end_s = 0;
     for (const double length : kernel.length) end_s_.push_back(end_s += length);
   }
   double operator()(double after_s) const {
     const auto cell = std::upper_bound(end_s_.begin(), end_s_.end(), after_s) - end_s_.begin();
-    return suffix_[std::min(static_cast<std::size_t>(cell), suffix_.size() - 1)];
+    if (static_cast<std::size_t>(cell) < suffix_.size()) return suffix_[static_cast<std::size_t>(cell)];
+    const double further = std::floor((after_s - end_s_.back()) / period_s_);
+    return ratio_ > 0 ? suffix_.back() * std::pow(ratio_, further) : suffix_.back();
   }
 
  private:
   std::vector<double> suffix_, end_s_;
+  double ratio_, period_s_;
 };
 
 /// The worst of `bound` over the phases at which the error may be looked at.

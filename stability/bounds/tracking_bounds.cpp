@@ -54,9 +54,14 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
   }
   for (const std::string& assumption : source.further_assumptions) add(assumption, "assumed", "");
   add("mass and thrust scale as in the model", "assumed", "--uncertain encloses intervals");
+  const bool has_thrust = report.thrust_margin_N && *report.thrust_margin_N >= 0;
   add("no saturation of the collective thrust",
-      report.thrust_margin_N && *report.thrust_margin_N >= 0 ? "proved" : "assumed",
-      report.thrust_margin_N ? "under the disturbance class and for the feedback about hover" : "");
+      !has_thrust                 ? "assumed"
+      : source.kind == "measured" ? "measured"
+                                  : "proved",
+      report.thrust_margin_N
+          ? "under the disturbance class, about hover, by the effort gain of the continuous loop"
+          : "");
   add("exact position and velocity", "assumed", "sensor noise adds to every bound");
   if (gains.rate_hz > 0) {
     add("continuous position loop", "assumed", "rows named 'sampled' do not need it");
@@ -159,8 +164,10 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
       report.bounds.push_back(bounds);
     }
     if (axis == 2 && plant.largest_thrust_N > 0 && std::isfinite(known.amplitude_N)) {
+      // Neither more than the rotors give nor less than nothing.
+      const double weight_N = plant.mass_kg * kGravity_m_s2;
       report.thrust_margin_N =
-          plant.thrust_scale * plant.largest_thrust_N - plant.mass_kg * kGravity_m_s2 -
+          std::min(plant.thrust_scale * plant.largest_thrust_N - weight_N, weight_N) -
           report.facts.back().effort_gain * (known.amplitude_N + std::abs(source.bias_N[2]));
     }
   }

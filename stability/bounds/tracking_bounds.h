@@ -94,7 +94,7 @@ struct TrackingReport {
   std::vector<AxisBounds> bounds;
   std::vector<AxisFacts> facts;
   std::optional<VectorGain> vector;
-  /// No saturation: thrust that is left on the z axis, N; nothing where not known.
+  /// No saturation: thrust that is left on the z axis, up to the largest or down to none, N; nothing where not known.
   std::optional<double> thrust_margin_N;
   std::vector<Assumption> assumptions;
 };

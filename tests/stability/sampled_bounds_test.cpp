@@ -163,6 +163,20 @@ TEST(SampledBounds, PassesAreFeltAsOftenAsTheyComeAndNoTrainOfThemExceedsTheBoun
   EXPECT_GT(most, 0.6 * bound);
 }
 
+/// Many passes of a loop with a slow mode, long after all others are gone: near those of the continuous loop.
+TEST(SampledBounds, PassesFadeWithTheSlowestMode) {
+  const SampledLoop loop = loop_of(20, 10, 3, 1000);
+  Disturbance train = of(INFINITY, 0.1, 0.02);
+  train.variation_N = 0.2;
+  train.variation_per_pass = true;
+  train.passes = Disturbance::kManyPasses;
+  train.pass_period_s = train.pass_length_s = 4.5;
+  const DisturbanceBounds sampled = bounds_of(loop, train);
+  const DisturbanceBounds continuous = disturbance_bounds(loop.plant, Channel::kForce, train);
+  EXPECT_NEAR(sampled.by_impulse, continuous.by_impulse, 0.02 * continuous.by_impulse);
+  EXPECT_NEAR(sampled.by_edges, continuous.by_edges, 0.02 * continuous.by_edges);
+}
+
 /// The clamp that firmware has: both bounds that hold with it, its demand, and whether it acts.
 TEST(SampledBounds, NoForceDrivesAClampedLoopBeyondItsBounds) {
   const double E = 0.1;
