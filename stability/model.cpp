@@ -136,9 +136,10 @@ void check_parameters(const TomlTable& effect, const EffectSpec& spec, const Eff
 }
 
 EffectSpec read_effect(const TomlTable& effect, const std::string& path) {
-  effect.allow_only({"name", "parameters", "network", "expression", "fit"});
+  effect.allow_only({"name", "vehicle", "parameters", "network", "expression", "fit"});
   EffectSpec spec;
   spec.name = effect.text("name");
+  if (effect.has("vehicle")) spec.vehicle = effect.text("vehicle");
   if (effect.has("parameters")) {
     const TomlTable parameters = effect.table("parameters");
     for (const std::string& key : parameters.keys()) spec.parameters[key] = parameters.number(key);
@@ -163,8 +164,32 @@ EffectSpec read_effect(const TomlTable& effect, const std::string& path) {
   if (!spec.network.empty() && spec.name != "deep_set") {
     effect.refuse("network", files::in_quotes(spec.network), "belongs to the effect deep_set only");
   }
-  check_parameters(effect, spec, effect_info(spec.name));
+  const EffectInfo& info = effect_info(spec.name);
+  if (info.remembers && !spec.vehicle.empty()) {
+    effect.refuse("vehicle", files::in_quotes(spec.vehicle), "cannot have a lag or delay of its own",
+                  "give it a model of its own in flights.toml");
+  }
+  check_parameters(effect, spec, info);
   return spec;
+}
+
+LadderRow read_row(const TomlTable& table) {
+  table.allow_only({"effect", "accepted", "fit_rmse_N", "select_rmse_N", "test_rmse_N", "noise_floor_N",
+                    "test_looks", "note", "values"});
+  LadderRow row;
+  row.effect = table.text("effect");
+  if (table.has("accepted")) row.accepted = table.flag("accepted");
+  row.fit_rmse_N = not_negative(table, "fit_rmse_N", 0);
+  row.select_rmse_N = not_negative(table, "select_rmse_N", 0);
+  row.test_rmse_N = not_negative(table, "test_rmse_N", 0);
+  row.noise_floor_N = not_negative(table, "noise_floor_N", 0);
+  row.test_looks = static_cast<int>(std::min(not_negative(table, "test_looks", 0), 1e6));
+  if (table.has("note")) row.note = table.text("note");
+  if (table.has("values")) {
+    const TomlTable values = table.table("values");
+    for (const std::string& key : values.keys()) row.values[key] = values.number(key);
+  }
+  return row;
 }
 
 }  // namespace
@@ -187,17 +212,20 @@ Model parse_model(const std::string& text, const std::string& path) {
     top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema),
                "is this the right file?");
   }
-  top.allow_only({"schema", "vehicle", "sensor", "effect"});
+  top.allow_only({"schema", "vehicle", "sensor", "effect", "ladder"});
   Model model;
   model.path = path;
   model.sha256 = files::sha256(text);
   read_vehicle(top.table("vehicle"), &model);
   if (top.has("sensor")) read_sensor(top.table("sensor"), &model.sensor);
+  if (top.has("ladder")) {
+    for (const TomlTable& row : top.tables("ladder")) model.ladder.push_back(read_row(row));
+  }
   if (!top.has("effect")) return model;
   for (const TomlTable& effect : top.tables("effect")) {
     EffectSpec spec = read_effect(effect, path);
     for (const EffectSpec& other : model.effects) {
-      if (other.name == spec.name) {
+      if (other.name == spec.name && other.vehicle == spec.vehicle) {
         effect.refuse("name", files::in_quotes(spec.name), "appears twice", "keep one of the two");
       }
     }

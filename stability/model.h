@@ -68,12 +68,27 @@ struct FitProvenance {
 /// One [[effect]] of a model file. Parameters that are not named have the effect's defaults.
 struct EffectSpec {
   std::string name;
+  std::string vehicle;  ///< "cf50": acts on this one only; empty: on every vehicle of the kind
   std::map<std::string, double> parameters;
   std::string network;          ///< of `deep_set`: path as stated, relative to the model's folder
   EffectExpression expression;  ///< of user-defined effects
   FitProvenance fit;
 
   bool is_expression() const { return !expression.formulas.empty(); }
+  bool acts_on(const std::string& name_of_vehicle) const {
+    return vehicle.empty() || vehicle == name_of_vehicle;
+  }
+};
+
+/// One row of the ladder of errors that led to a model: what was tried on top of the rows before it.
+struct LadderRow {
+  std::string effect;  ///< "nominal" for the first
+  bool accepted = true;
+  double fit_rmse_N = 0, select_rmse_N = 0, test_rmse_N = 0, noise_floor_N = 0;
+  int test_looks = 0;  ///< how often test flights had been scored when this was written
+  std::string note;    ///< why it was refused, or kept all the same
+  /// Of every effect after this row, so that it can be gone back to: "motor_lag.tau_s", "constant_force@cf50.force_x_N".
+  std::map<std::string, double> values;
 };
 
 /// One kind of vehicle. Invariant after read_model(): all numbers finite, mass, inertia and arm positive, every
@@ -89,6 +104,7 @@ struct Model {
   ThrustMap thrust;
   SensorModel sensor;
   std::vector<EffectSpec> effects;
+  std::vector<LadderRow> ladder;  ///< empty where effects were not fitted step by step
 
   double weight_N() const { return mass_kg * kGravity_m_s2; }
 };

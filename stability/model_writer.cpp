@@ -85,6 +85,7 @@ std::string fit_text(const FitProvenance& fit) {
 
 std::string effect_text(const EffectSpec& effect) {
   std::string text = "\n[[effect]]\nname = " + quoted(effect.name) + "\n";
+  if (!effect.vehicle.empty()) text += "vehicle = " + quoted(effect.vehicle) + "\n";
   if (!effect.parameters.empty()) {
     text += "parameters = { " +
             joined(effect.parameters,
@@ -94,6 +95,19 @@ std::string effect_text(const EffectSpec& effect) {
   if (!effect.network.empty()) text += "network = " + quoted(effect.network) + "\n";
   if (effect.is_expression()) text += expression_text(effect.expression);
   if (!effect.fit.is_empty()) text += fit_text(effect.fit);
+  return text;
+}
+
+std::string row_text(const LadderRow& row) {
+  std::string text = "\n[[ladder]]\neffect = " + quoted(row.effect) + "\n";
+  if (!row.accepted) text += "accepted = false\n";
+  text += "fit_rmse_N = " + number(row.fit_rmse_N) + "\nselect_rmse_N = " + number(row.select_rmse_N) +
+          "\ntest_rmse_N = " + number(row.test_rmse_N) + "\nnoise_floor_N = " + number(row.noise_floor_N) +
+          fmt::format("\ntest_looks = {}\n", row.test_looks);
+  if (!row.note.empty()) text += "note = " + quoted(row.note) + "\n";
+  text += "values = { " +
+          joined(row.values, [](const auto& item) { return key(item.first) + " = " + number(item.second); }) +
+          " }\n";
   return text;
 }
 
@@ -121,6 +135,7 @@ std::string to_toml(const Model& model, const std::vector<std::string>& comments
   text += "attitude_noise_rad = " + number(sensor.attitude_noise_rad) + "\n";
   text += "log_rate_hz = " + number(sensor.log_rate_hz) + "\n";
   for (const EffectSpec& effect : model.effects) text += effect_text(effect);
+  for (const LadderRow& row : model.ladder) text += row_text(row);
   return text;
 }
 

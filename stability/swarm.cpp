@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
+#include <string>
 
 namespace swarmcert::stability {
 
@@ -12,6 +14,7 @@ struct Swarm::Kind {
   Eigen::Vector3d inertia = Eigen::Vector3d::Zero();
   SignalPath path;
   std::vector<AppliedEffect> effects;      ///< without those that live in `path`
+  std::vector<int> only;                   ///< by effect: the one vehicle that it acts on; kEvery: all
   std::vector<const AppliedEffect*> wide;  ///< that look at neighbours
 };
 
@@ -27,6 +30,17 @@ void Swarm::set_lag(Kind* kind) {
 namespace {
 
 using Vector3Map = Eigen::Map<const Eigen::Vector3d>;
+
+constexpr int kEvery = -1;
+
+/// Simulated vehicles are named as their logs: the first is cf1. A vehicle that does not fly is none of them.
+int only_vehicle(const EffectSpec& spec) {
+  if (spec.vehicle.empty()) return kEvery;
+  const bool is_number = spec.vehicle.size() > 2 && spec.vehicle.size() < 9 &&
+                         spec.vehicle.compare(0, 2, "cf") == 0 &&
+                         spec.vehicle.find_first_not_of("0123456789", 2) == std::string::npos;
+  return is_number ? std::stoi(spec.vehicle.substr(2)) - 1 : std::numeric_limits<int>::max();
+}
 
 /// Largest horizontal distance at which a neighbour that is `dz_m` higher does something.
 double reach_m(const std::vector<const AppliedEffect*>& effects, double dz_m) {
@@ -62,6 +76,7 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
         applied.effect().add_to(kind.path, applied.coefficients().data(), applied.shape().data());
       } else {
         kind.effects.push_back(std::move(applied));
+        kind.only.push_back(only_vehicle(spec));
       }
     }
     for (const AppliedEffect& applied : kind.effects) {
@@ -175,8 +190,10 @@ Wrench Swarm::effects_on(int vehicle, double time_s, const double* state, const 
 Wrench Swarm::sum_of_effects(int vehicle, const VehicleInput& input) const {
   Wrench sum;
   sum.force_W_N = input.disturbance_W_N;
-  for (const AppliedEffect& applied : kind(vehicle).effects) {
-    const Wrench wrench = applied.wrench(instant_);
+  const Kind& own = kind(vehicle);
+  for (std::size_t e = 0; e < own.effects.size(); ++e) {
+    if (own.only[e] != kEvery && own.only[e] != vehicle) continue;
+    const Wrench wrench = own.effects[e].wrench(instant_);
     sum.force_W_N += wrench.force_W_N;
     sum.torque_B_Nm += wrench.torque_B_Nm;
   }

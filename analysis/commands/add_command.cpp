@@ -3,17 +3,18 @@
 #include <memory>
 #include <sstream>
 
+#include "analysis/commands/effect_output.h"
 #include "analysis/commands/flight_options.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/progress.h"
 #include "nn/files/file_io.h"
 #include "nn/files/suggest.h"
-#include "stability/effects/registry.h"
 
 namespace swarmcert::analysis {
 namespace {
 
 using identification::Ladder;
+using stability::LadderRow;
 
 struct Options {
   FlightOptions flights;
@@ -31,13 +32,14 @@ std::vector<std::string> split_names(const std::string& text) {
 }
 
 void check(const std::vector<std::string>& names, const stability::Model& model) {
-  const std::vector<std::string> known = stability::effect_names();
+  if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
+  const std::vector<std::string> known = identification::candidate_names(model);
   for (const std::string& name : names) {
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      throw UsageError("unknown effect " + name + ": " + files::did_you_mean(name, known));
     if (name == "deep_set" || name == "torque_bias")
       throw UsageError("the effect " + name +
                        " cannot be fitted to the force of a flight; write it into the model file");
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw UsageError("unknown effect " + name + ": " + files::did_you_mean(name, known));
     if (identification::is_taken(name, model))
       throw UsageError("the model has the effect " + name +
                        " already; remove it from the file to fit it anew");
@@ -50,107 +52,176 @@ files::Json names_of(const residuals::Inputs& inputs, const std::vector<int>& wh
   return names;
 }
 
-files::Json result_of(const Ladder& ladder, const residuals::Inputs& inputs) {
-  files::Json json = result_head("add", inputs.files());
-  json["ladder"] = files::Json::array();
-  for (const identification::Step& step : ladder.steps) {
-    json["ladder"].push_back({{"effect", step.effect},
-                              {"fit_rmse", step.fit_rmse_N},
-                              {"select_rmse", step.select_rmse_N},
-                              {"test_rmse", step.test_rmse_N},
-                              {"accepted", step.accepted},
-                              {"reason", step.reason}});
-  }
-  json["split"] = {{"by_flight", ladder.split.by_flight},
-                   {"fit", names_of(inputs, ladder.split.fit)},
-                   {"select", names_of(inputs, ladder.split.select)},
-                   {"test", names_of(inputs, ladder.split.test)}};
-  json["effects"] = files::Json::array();
-  for (const stability::EffectSpec& effect : ladder.model.effects) {
-    files::Json entry = {{"effect", effect.name}, {"parameters", effect.parameters}};
-    for (const auto& [name, interval] : effect.fit.interval)
-      entry["interval_90"][name] = {interval.first, interval.second};
-    json["effects"].push_back(std::move(entry));
+files::Json json_of(const LadderRow& row) {
+  return {{"effect", row.effect},
+          {"fit_rmse", row.fit_rmse_N},
+          {"select_rmse", row.select_rmse_N},
+          {"test_rmse", row.test_rmse_N},
+          {"over_noise_floor",
+           row.noise_floor_N > 0 ? files::Json(row.test_rmse_N / row.noise_floor_N) : nullptr},
+          {"test_looks", row.test_looks},
+          {"accepted", row.accepted},
+          {"reason", row.note}};
+}
+
+files::Json json_of(const std::vector<LadderRow>& rows) {
+  files::Json json = files::Json::array();
+  for (const LadderRow& row : rows) json.push_back(json_of(row));
+  return json;
+}
+
+files::Json json_of(const std::vector<stability::EffectSpec>& effects) {
+  files::Json json = files::Json::array();
+  for (const stability::EffectSpec& effect : effects) {
+    files::Json entry = {{"effect", effect.name},
+                         {"parameters", values_json(effect.parameters, effect.fit.interval)}};
+    if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
+    json.push_back(std::move(entry));
   }
   return json;
 }
 
-void print(const Ladder& ladder) {
-  fmt::print("RMSE of the force residual, in newton; flights for fit / select / test: {} / {} / {}{}\n",
-             ladder.split.fit.size(), ladder.split.select.size(), ladder.split.test.size(),
-             ladder.split.by_flight ? "" : " (too few to split: all for everything)");
-  fmt::print("  {:<18}{:>10}{:>10}{:>10}\n", "", "fit", "select", "test");
-  for (const identification::Step& step : ladder.steps) {
-    fmt::print("  {:<18}{:>10.5f}{:>10.5f}{:>10.5f}{}\n",
-               (step.effect == "nominal" ? "" : "+ ") + step.effect, step.fit_rmse_N, step.select_rmse_N,
-               step.test_rmse_N,
-               step.reason.empty() ? "" : (step.accepted ? "  kept although " : "  refused: ") + step.reason);
-  }
-  for (const stability::EffectSpec& effect : ladder.model.effects) {
-    for (const auto& [name, value] : effect.parameters) {
-      const auto interval = effect.fit.interval.find(name);
-      fmt::print("{} {} = {:.4g}", effect.name, name, value);
-      if (interval != effect.fit.interval.end())
-        fmt::print(", 90 % {:.4g} .. {:.4g}", interval->second.first, interval->second.second);
-      fmt::print("\n");
-    }
+void print(const std::vector<LadderRow>& rows) {
+  fmt::print("  {:<18}{:>10}{:>10}{:>10}{:>14}\n", "", "fit", "select", "test", "test / floor");
+  for (const LadderRow& row : rows) {
+    fmt::print("  {:<18}{:>10.5f}{:>10.5f}{:>10.5f}{:>14}{}\n",
+               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N, row.select_rmse_N,
+               row.test_rmse_N,
+               row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
+               row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
   }
 }
 
-int run(const Options& options, const CommonOptions& common) {
-  refuse_to_replace(common, common.json);
+void print(const Ladder& ladder) {
+  if (!ladder.earlier.empty()) {
+    fmt::print("The model's ladder so far, on the flights of then:\n");
+    print(ladder.earlier);
+  }
+  fmt::print("RMSE of the force residual, in newton; flights for fit / select / test: {} / {} / {}{}\n",
+             ladder.split.fit.size(), ladder.split.select.size(), ladder.split.test.size(),
+             ladder.split.by_flight ? "" : " (too few to split: all for everything)");
+  print(ladder.rows);
+  fmt::print("Test flights looked at: {} time{}\n", ladder.test_looks, ladder.test_looks == 1 ? "" : "s");
+  for (const stability::EffectSpec& effect : ladder.model.effects) {
+    print_values(effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle) + " ",
+                 effect.parameters, effect.fit.interval);
+  }
+}
+
+/// `add undo`: back to the model before the last accepted effect.
+int undo(const Options& options, const CommonOptions& common) {
+  if (options.flights.models.size() != 1) throw UsageError("add undo takes one --model");
+  if (options.output.empty()) throw UsageError("add undo writes a new model: name it with -o");
+  const std::string& path = options.flights.models[0];
+  const stability::Model model = identification::undone(stability::read_model(path));
+  files::write_file(options.output,
+                    stability::to_toml(model, {"Effects fitted to flights by swarmcert add."}), common.force);
+  files::Json result = result_head("add", {path});
+  result["ladder"] = json_of(model.ladder);
+  result["effects"] = json_of(model.effects);
+  write_result(common, result);
+  if (common.prints_text()) {
+    print(model.ladder);
+    fmt::print("Written: {}\n", options.output);
+  }
+  return kDone;
+}
+
+/// `add show`: the ladders that model files keep, one below the other.
+int show(const Options& options, const CommonOptions& common) {
+  files::Json result = result_head("add", options.flights.models);
+  result["ladders"] = files::Json::array();
+  for (const std::string& path : options.flights.models) {
+    const stability::Model model = stability::read_model(path);
+    result["ladders"].push_back(
+        {{"model", path}, {"ladder", json_of(model.ladder)}, {"effects", json_of(model.effects)}});
+    if (!common.prints_text()) continue;
+    fmt::print("{}{}\n", path, model.ladder.empty() ? ": no ladder" : "");
+    if (!model.ladder.empty()) print(model.ladder);
+  }
+  write_result(common, result);
+  return kDone;
+}
+
+int climb(const Options& options, const CommonOptions& common) {
+  if (options.output.empty()) throw UsageError("add writes a new model: name it with -o");
+  if (options.flights.words.empty()) throw UsageError("add needs flights: name logs or folders of them");
   refuse_to_replace(common, options.output);
   if (options.flights.models.size() != 1) throw UsageError("add takes one --model");
   const residuals::Inputs inputs = read_flights(options.flights);
   identification::LadderOptions what;
   what.automatic = options.effects == "auto";
-  if (!what.automatic) what.effects = split_names(options.effects);
+  if (!what.automatic) {
+    what.effects = split_names(options.effects);
+    check(what.effects, inputs.models[0]);
+  }
   what.keep_anyway = options.keep_anyway;
-  check(what.effects, inputs.models[0]);
   Progress progress(common.quiet);
   const Ladder ladder = identification::climb(
       inputs, what, common.jobs, [&](int done, int total) { progress.show(done, total, "flights"); });
-  const bool any = std::any_of(ladder.steps.begin() + 1, ladder.steps.end(),
-                               [](const identification::Step& step) { return step.accepted; });
-  if (any) {
+  // Measured residuals are never exactly zero: there was none.
+  if (ladder.rows.front().fit_rmse_N <= 0) {
+    fmt::print(stderr, "no usable record: nothing was fitted; 'swarmcert compare' says what was cut\n");
+    return kInconclusive;
+  }
+  if (ladder.any_accepted) {
     files::write_file(options.output,
                       stability::to_toml(ladder.model, {"Effects fitted to flights by swarmcert add."}),
                       common.force);
   }
-  write_result(common, result_of(ladder, inputs));
+  files::Json result = result_head("add", inputs.files());
+  result["ladder"] = json_of(ladder.rows);
+  result["earlier"] = json_of(ladder.earlier);
+  result["test_looks"] = ladder.test_looks;
+  result["split"] = {{"by_flight", ladder.split.by_flight},
+                     {"fit", names_of(inputs, ladder.split.fit)},
+                     {"select", names_of(inputs, ladder.split.select)},
+                     {"test", names_of(inputs, ladder.split.test)}};
+  result["effects"] = json_of(ladder.model.effects);
+  result["written"] = ladder.any_accepted;
+  write_result(common, result);
   if (common.prints_text()) {
     print(ladder);
-    if (any)
+    if (ladder.any_accepted)
       fmt::print("Written: {}\n", options.output);
     else
       fmt::print("Nothing helped: {} is not written. --keep-anyway writes it all the same.\n",
                  options.output);
   }
-  // Measured residuals are never exactly zero: there was none.
-  const bool has_records = ladder.steps.front().fit_rmse_N > 0;
-  if (!has_records)
-    fmt::print(stderr, "no usable record: nothing was fitted; 'swarmcert compare' says what was cut\n");
-  return has_records ? kDone : kInconclusive;
+  return kDone;
+}
+
+int run(const Options& options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  if (options.effects == "undo") return undo(options, common);
+  if (options.effects == "show") return show(options, common);
+  return climb(options, common);
 }
 
 }  // namespace
 
 Command add_command() {
-  return {"add", "Fit effects to flights and add them to a model, with the errors before and after",
-          "EFFECT is one name, several with commas, or auto: what diagnose finds on the flights of the fit. "
-          "An effect\n"
-          "is accepted if the error of flights that the fit has not seen falls; the test flights are only "
-          "shown.\n\n"
-          "Example: swarmcert add auto --model stability/models/crazyflie-small.toml flights/ -o fitted.toml",
-          [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
-            app.add_option("EFFECT", options->effects, "Names of effects with commas between, or auto")
-                ->required();
-            declare_flights(app, options->flights, false);
-            app.add_option("-o,--output", options->output, "The new model.toml")->required();
-            app.add_flag("--keep-anyway", options->keep_anyway, "Add also what does not help");
-            return [options](const CommonOptions& common) { return run(*options, common); };
-          }};
+  return {
+      "add", "Fit effects to flights and add them to a model, with the errors before and after",
+      "EFFECT is one name, several with commas, or auto: what diagnose finds on the flights of the fit. "
+      "An effect\n"
+      "is accepted if the error of flights that the fit has not seen falls; the test flights are only "
+      "shown.\n"
+      "vehicle_offset is a constant force of each vehicle. undo goes back by one accepted effect; show "
+      "prints "
+      "the\n"
+      "ladders of all --model files.\n\n"
+      "Examples: swarmcert add auto --model stability/models/crazyflie-small.toml flights/ -o fitted.toml\n"
+      "          swarmcert add undo --model fitted.toml -o before.toml",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<Options>();
+        app.add_option("EFFECT", options->effects, "Names of effects with commas between, auto, undo or show")
+            ->required();
+        declare_flights(app, options->flights, false);
+        app.add_option("-o,--output", options->output, "The new model.toml");
+        app.add_flag("--keep-anyway", options->keep_anyway, "Add also what does not help");
+        return [options](const CommonOptions& common) { return run(*options, common); };
+      }};
 }
 
 }  // namespace swarmcert::analysis

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "analysis/commands/effect_output.h"
 #include "analysis/commands/flight_options.h"
 #include "analysis/identification/diagnose.h"
 #include "analysis/progress.h"
@@ -18,36 +19,73 @@ struct Options {
 };
 
 constexpr const char* kDetectableMeaning =
-    "the smallest size that these flights would have shown with 90 % probability, computed from the blocks' "
-    "scatter; "
+    "the smallest size that these flights show in 90 % of injections (open loop: column times size is added "
+    "to the "
+    "residual of resampled blocks; the flight does not react); null: not at any size within the physical "
+    "bounds; "
     "nothing_missing means none above these sizes";
+
+files::Json json_of(const identification::InstrumentedValue& value) {
+  return {{"least_squares", value.least_squares},
+          {"instrument", value.instrument},
+          {"interval_90", {value.interval.first, value.interval.second}},
+          {"difference_z", value.difference_z},
+          {"verdict", !value.is_strong()    ? "too_weak"
+                      : value.contradicts() ? "contradicts"
+                                            : "agrees"}};
+}
 
 files::Json json_of(const Missing& missing) {
   const identification::Finding& finding = missing.finding;
-  files::Json parameters = files::Json::object();
-  for (const auto& [name, value] : missing.spec.parameters) {
-    files::Json& entry = parameters[name] = {{"value", value}};
-    const auto interval = missing.spec.fit.interval.find(name);
-    if (interval != missing.spec.fit.interval.end())
-      entry["interval_90"] = {interval->second.first, interval->second.second};
+  files::Json model_form = files::Json::object(), instrument = files::Json::object();
+  for (std::size_t c = 0; c < missing.coefficients.size(); ++c) {
+    if (c < finding.model_form.size())
+      model_form[missing.coefficients[c]] = {finding.model_form[c].first, finding.model_form[c].second};
+    if (c < missing.instrument.size()) instrument[missing.coefficients[c]] = json_of(missing.instrument[c]);
   }
-  files::Json model_form = files::Json::array();
-  for (const auto& [lower, upper] : finding.model_form) model_form.push_back({lower, upper});
+  files::Json rivals = files::Json::array();
+  for (const identification::Rival& rival : finding.rivals)
+    rivals.push_back({{"effect", rival.effect}, {"fly", rival.excitation}});
   return {{"effect", missing.effect},
           {"kind", missing.kind},
           {"rmse_before", finding.rmse_before_N},
           {"rmse_after", finding.rmse_after_N},
           {"drop", 1 - finding.rmse_after_N / finding.rmse_before_N},
           {"drop_ci", {finding.drop_interval.first, finding.drop_interval.second}},
-          {"parameters", std::move(parameters)},
+          {"parameters", values_json(missing.parameters, missing.intervals)},
+          {"per_vehicle", !missing.specs.empty() && !missing.specs[0].vehicle.empty()},
           {"model_form", std::move(model_form)},
+          {"instrument", std::move(instrument)},
           {"class", missing.equivalence_class},
-          {"confounded_with", finding.confounded_with},
+          {"confounded_with", finding.confounded_with()},
+          {"rivals", std::move(rivals)},
           {"separated_by", missing.excitation},
           {"paired_z", finding.paired_z},
           {"wald_z", finding.wald_z},
           {"records_in_support", finding.support.records},
-          {"blocks_in_support", finding.support.blocks}};
+          {"blocks_in_support", finding.support.blocks},
+          {"flights_in_support", finding.support.flights}};
+}
+
+void print(const Missing& missing, int flights) {
+  const identification::Finding& finding = missing.finding;
+  fmt::print("  {:<15} RMSE {:.5f} -> {:.5f} N ({:.1f} %, 90 %: {:.1f} .. {:.1f})\n", missing.effect,
+             finding.rmse_before_N, finding.rmse_after_N,
+             100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.first,
+             100 * finding.drop_interval.second);
+  print_values("    ", missing.parameters, missing.intervals);
+  for (std::size_t c = 0; c < missing.instrument.size(); ++c) {
+    const identification::InstrumentedValue& value = missing.instrument[c];
+    if (!value.is_strong()) continue;
+    fmt::print("    by instrument (set points) {} = {:.4g}, 90 % {:.4g} .. {:.4g}\n", missing.coefficients[c],
+               value.instrument, value.interval.first, value.interval.second);
+  }
+  if (flights > 1 && finding.support.flights == 1) fmt::print("    seen in 1 flight of {}\n", flights);
+  if (missing.equivalence_class != missing.effect)
+    fmt::print("    flights cannot tell apart: {}\n", missing.equivalence_class);
+  for (const identification::Rival& rival : finding.rivals)
+    fmt::print("    these flights cannot tell it from {}; what would: {}; {}\n", rival.effect,
+               missing.excitation, rival.excitation);
 }
 
 void print(const Diagnosis& diagnosis) {
@@ -58,37 +96,57 @@ void print(const Diagnosis& diagnosis) {
     return;
   }
   if (diagnosis.ranking.empty()) fmt::print("  No effect of the library is missing above the sizes below.\n");
-  for (const Missing& missing : diagnosis.ranking) {
-    const identification::Finding& finding = missing.finding;
-    fmt::print("  {:<15} RMSE {:.5f} -> {:.5f} N ({:.1f} %, 90 %: {:.1f} .. {:.1f})\n", missing.effect,
-               finding.rmse_before_N, finding.rmse_after_N,
-               100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.first,
-               100 * finding.drop_interval.second);
-    for (const auto& [name, value] : missing.spec.parameters) {
-      const auto interval = missing.spec.fit.interval.find(name);
-      if (interval == missing.spec.fit.interval.end())
-        fmt::print("    {} = {:.4g}\n", name, value);
-      else
-        fmt::print("    {} = {:.4g}, 90 % {:.4g} .. {:.4g}\n", name, value, interval->second.first,
-                   interval->second.second);
-    }
-    if (missing.equivalence_class != missing.effect)
-      fmt::print("    flights cannot tell apart: {}\n", missing.equivalence_class);
-    for (const std::string& rival : finding.confounded_with)
-      fmt::print("    these flights cannot tell it from {}; what would: {}\n", rival, missing.excitation);
+  for (const Missing& missing : diagnosis.ranking) print(missing, diagnosis.flights);
+  for (const std::string& effect : diagnosis.contradicted) {
+    fmt::print(
+        "  Not counted: {} fits, but not along the set points: the controller's answer to something else\n",
+        effect);
+  }
+  if (diagnosis.thrust_scale.is_known) {
+    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
+    fmt::print("  Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f})\n",
+               1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.first,
+               1 + scale.interval.second);
   }
   const identification::Remainder& rest = diagnosis.remainder;
   fmt::print("  Left: {:.5f} N; low frequencies {:.1f} times the noise floor{}", diagnosis.rmse_after_N,
              rest.ratio, rest.flag ? ": not everything is explained" : "");
   for (std::size_t i = 0; i < rest.depends_on.size(); ++i)
     fmt::print("{}{}", i == 0 ? ", depends on " : ", ", rest.depends_on[i]);
-  fmt::print("\n  Would have been seen in 9 of 10 cases, if at least as large as:\n");
+  fmt::print("\n  Shown in 9 of 10 injections (open loop), if at least as large as:\n");
   for (const identification::Detectable& entry : diagnosis.detectable) {
     if (std::isfinite(entry.size))
       fmt::print("    {} {} = {:.3g}\n", entry.effect, entry.parameter, entry.size);
     else
       fmt::print("    {} {}: not at any size; fly {}\n", entry.effect, entry.parameter, entry.excitation);
   }
+}
+
+files::Json json_of(const Diagnosis& diagnosis) {
+  files::Json kind = {{"kind", diagnosis.kind},
+                      {"records", diagnosis.records},
+                      {"blocks", diagnosis.blocks},
+                      {"flights", diagnosis.flights},
+                      {"rmse_before", diagnosis.rmse_before_N},
+                      {"rmse_after", diagnosis.rmse_after_N},
+                      {"closed_loop_artefacts", diagnosis.contradicted}};
+  if (diagnosis.thrust_scale.is_known) {
+    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
+    kind["thrust_scale"] = {{"least_squares", 1 + scale.least_squares},
+                            {"instrument", 1 + scale.instrument},
+                            {"interval_90", {1 + scale.interval.first, 1 + scale.interval.second}},
+                            {"difference_z", scale.difference_z}};
+  }
+  return kind;
+}
+
+files::Json json_of(const identification::Detectable& entry, const std::string& kind) {
+  return {{"effect", entry.effect},
+          {"kind", kind},
+          {"parameter", entry.parameter},
+          {"size", std::isfinite(entry.size) ? files::Json(entry.size) : files::Json(nullptr)},
+          {"shape", entry.shape},
+          {"excitation", entry.excitation}};
 }
 
 int run(const Options& options, const CommonOptions& common) {
@@ -107,23 +165,13 @@ int run(const Options& options, const CommonOptions& common) {
     if (common.prints_text()) print(diagnosis);
     inconclusive = inconclusive && diagnosis.inconclusive;
     for (const Missing& missing : diagnosis.ranking) ranking.push_back(json_of(missing));
-    for (const identification::Detectable& entry : diagnosis.detectable) {
-      detectable.push_back(
-          {{"effect", entry.effect},
-           {"kind", diagnosis.kind},
-           {"parameter", entry.parameter},
-           {"size", std::isfinite(entry.size) ? files::Json(entry.size) : files::Json(nullptr)},
-           {"excitation", entry.excitation}});
-    }
+    for (const identification::Detectable& entry : diagnosis.detectable)
+      detectable.push_back(json_of(entry, diagnosis.kind));
     const identification::Remainder& rest = diagnosis.remainder;
     flag = flag || rest.flag;
     ratio = std::max(ratio, rest.ratio);
     for (const std::string& variable : rest.depends_on) depends_on.push_back(variable);
-    kinds.push_back({{"kind", diagnosis.kind},
-                     {"records", diagnosis.records},
-                     {"blocks", diagnosis.blocks},
-                     {"rmse_before", diagnosis.rmse_before_N},
-                     {"rmse_after", diagnosis.rmse_after_N}});
+    kinds.push_back(json_of(diagnosis));
   }
   result["verdict"] = inconclusive ? "inconclusive" : ranking.empty() ? "nothing_missing" : "missing_effect";
   result["ranking"] = std::move(ranking);
@@ -140,8 +188,10 @@ int run(const Options& options, const CommonOptions& common) {
 Command diagnose_command() {
   return {"diagnose", "Which physical effect is missing in a model, judged by flights",
           "Every known effect is a candidate; one counts as found if it lowers the cross-validated error by "
-          "2 % and\n"
-          "stands out from the scatter between blocks of 2 s. What remains is tested separately.\n\n"
+          "2 %,\n"
+          "stands out from the scatter between blocks of 2 s, and set points do not contradict it. What "
+          "remains is "
+          "tested separately.\n\n"
           "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/",
           [](CLI::App& app) {
             const auto options = std::make_shared<Options>();

@@ -23,7 +23,7 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
            "or folders of them")
         ->required();
   } else {
-    app.add_option("FLIGHTS", options.words, "Flight logs or folders of them")->required();
+    app.add_option("FLIGHTS", options.words, "Flight logs or folders of them");
     app.add_option("--model", options.models, "model.toml")
         ->required()
         ->allow_extra_args(false)

@@ -1,12 +1,14 @@
-/// @file Which effect is missing: selection, refinement of thetas, and what is left.
+/// @file Which effect is missing: selection, refinement of thetas, the check against closed-loop bias, what is left.
 #pragma once
 
-#include <optional>
+#include <map>
 #include <string>
 #include <vector>
 
-#include "analysis/identification/selection.h"
-#include "analysis/residuals/comparison.h"
+#include "analysis/identification/findings.h"
+#include "analysis/identification/injection.h"
+#include "analysis/identification/instrument.h"
+#include "analysis/identification/remainder.h"
 
 namespace swarmcert::identification {
 
@@ -14,38 +16,49 @@ namespace swarmcert::identification {
 struct Missing {
   std::string effect, equivalence_class, kind, excitation;
   Finding finding;
-  stability::EffectSpec spec;  ///< with values and 90 % intervals
-  int flights = 0;             ///< in which it was in support
+  std::map<std::string, double> parameters;
+  std::map<std::string, Interval> intervals;  ///< 90 %, statistical
+  std::vector<std::string> coefficients;      ///< names, in the order of finding.model_form and `instrument`
+  std::vector<InstrumentedValue> instrument;  ///< of each coefficient; empty where there is no check
+  std::vector<stability::EffectSpec> specs;   ///< for the model file
 };
 
-/// What no effect of the library explains.
-struct Remainder {
-  bool flag = false;
-  double ratio = 0;  ///< largest over the axes of Spectrum::low_band_to_floor(); 0 where there is no spectrum
-  std::vector<std::string> depends_on;  ///< variables over which its mean varies most
+/// 1 + ratio, with a constant force beside it, by least squares and by instrument: the controller's answer to
+/// disturbances biases the first.
+struct ThrustScale {
+  bool is_known = false;
+  InstrumentedValue value;
 };
 
 struct Diagnosis {
   std::string kind;
   bool inconclusive = false;  ///< fewer than ten blocks of 2 s: no answer
   std::vector<Missing> ranking;
+  std::vector<std::string> contradicted;  ///< selected, but only as the controller's answer to something else
   std::vector<Detectable> detectable;
   Remainder remainder;
+  ThrustScale thrust_scale;
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated
   std::size_t records = 0, blocks = 0;
+  int flights = 0;
 };
 
 /// Diagnoses the model of one kind of vehicle on the flights `which`.
 Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
                    int jobs, const residuals::Progress& progress);
 
+/// As diagnose(), the ranking only.
+std::vector<Missing> missing_effects(const residuals::Inputs& inputs, const std::string& kind,
+                                     const std::vector<int>& which, int jobs,
+                                     const residuals::Progress& progress);
+
 /// `names` fitted jointly on the flights `which`, in this order, with refined thetas; no test of acceptance.
 std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::string& kind,
                                  const std::vector<std::string>& names, const std::vector<int>& which,
                                  int jobs, const residuals::Progress& progress);
 
-/// `model` with `specs`; an effect that the model has already is increased instead.
-stability::Model with_effects(const stability::Model& model, const std::vector<stability::EffectSpec>& specs);
+/// The numbers of `missing` for with_effects().
+std::vector<stability::EffectSpec> specs_of(const std::vector<Missing>& missing);
 
 /// All flights.
 std::vector<int> every_flight(const residuals::Inputs& inputs);

@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
+#include "nn/files/input_error.h"
 #include "nn/files/parallel.h"
 
 namespace swarmcert::identification {
 namespace {
+
+using stability::LadderRow;
 
 constexpr double kLeastFall = 0.005;
 
@@ -39,17 +43,41 @@ double rmse(residuals::Inputs inputs, const stability::Model& model, const std::
   return count > 0 ? std::sqrt(sum / count) : 0;
 }
 
+/// What no model can remove from the flights `which`: the white part of the spectrum.
+double noise_floor_N(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
+                     int jobs) {
+  inputs.models = {model};
+  std::vector<residuals::FlightFiles> flights;
+  for (const int i : which) flights.push_back(inputs.found.flights[static_cast<std::size_t>(i)]);
+  inputs.found.flights = std::move(flights);
+  const double floor_N = residuals::compare(inputs, jobs, [](int, int) {}).overall.noise_floor_N.norm();
+  return std::isfinite(floor_N) ? floor_N : 0;
+}
+
 int looks_so_far(const stability::Model& model) {
   int looks = 0;
   for (const stability::EffectSpec& effect : model.effects) looks = std::max(looks, effect.fit.test_looks);
+  for (const LadderRow& row : model.ladder) looks = std::max(looks, row.test_looks);
   return looks;
 }
 
-std::vector<stability::EffectSpec> specs_of(const std::vector<Missing>& fitted) {
-  std::vector<stability::EffectSpec> specs;
-  for (const Missing& missing : fitted) specs.push_back(missing.spec);
-  return specs;
+std::string prefix_of(const stability::EffectSpec& spec) {
+  return spec.name + (spec.vehicle.empty() ? "" : "@" + spec.vehicle) + ".";
 }
+
+std::map<std::string, double> values_of(const stability::Model& model) {
+  std::map<std::string, double> values;
+  for (const stability::EffectSpec& spec : model.effects) {
+    for (const auto& [name, value] : spec.parameters) values[prefix_of(spec) + name] = value;
+  }
+  return values;
+}
+
+/// One candidate on top of the model of the last accepted row.
+struct Trial {
+  LadderRow row;
+  stability::Model model;
+};
 
 }  // namespace
 
@@ -76,57 +104,104 @@ Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int 
   ladder.split = split_flights(inputs);
   const stability::Model& nominal = inputs.models[0];
   const std::string& kind = nominal.kind;
+  ladder.earlier = nominal.ladder;
+  ladder.test_looks = looks_so_far(nominal) + 1;
   std::vector<std::string> wanted = options.effects;
   if (options.automatic) {
-    for (const Missing& missing : diagnose(inputs, kind, ladder.split.fit, jobs, progress).ranking)
-      wanted.push_back(missing.effect);
+    for (const Missing& missing : missing_effects(inputs, kind, ladder.split.fit, jobs, progress)) {
+      const bool each = !missing.specs.empty() && !missing.specs[0].vehicle.empty();
+      wanted.push_back(each ? kVehicleOffset : missing.effect);
+    }
   }
-  const auto step = [&](const std::string& name, const stability::Model& model) {
-    return Step{name,
-                rmse(inputs, model, ladder.split.fit, jobs),
-                rmse(inputs, model, ladder.split.select, jobs),
-                rmse(inputs, model, ladder.split.test, jobs),
-                true,
-                ""};
+  const auto trial = [&](const std::string& effect, stability::Model model) {
+    Trial next{{}, std::move(model)};
+    next.row.effect = effect;
+    next.row.fit_rmse_N = rmse(inputs, next.model, ladder.split.fit, jobs);
+    next.row.select_rmse_N = rmse(inputs, next.model, ladder.split.select, jobs);
+    next.row.values = values_of(next.model);
+    return next;
   };
-  ladder.model = nominal;
-  ladder.steps.push_back(step("nominal", nominal));
-  const int looks = looks_so_far(nominal) + 1;
+  std::vector<Trial> trials = {trial("nominal", nominal)};
+  std::size_t best = 0;  // the last accepted trial
   std::vector<std::string> accepted;
   for (const std::string& name : wanted) {
-    const Step& before =
-        *std::find_if(ladder.steps.rbegin(), ladder.steps.rend(), [](const Step& s) { return s.accepted; });
-    const double before_select_N = before.select_rmse_N;
     std::vector<std::string> names = accepted;
     names.push_back(name);
     std::vector<Missing> fitted = fit_effects(inputs, kind, names, ladder.split.fit, jobs, progress);
-    for (Missing& missing : fitted) {
-      missing.spec.fit.test_looks = looks;
-      if (!ladder.split.by_flight)
-        missing.spec.fit.note = "fewer than three flights: selected and tested on the fit's";
-    }
-    stability::Model model = with_effects(nominal, specs_of(fitted));
-    Step next = step(name, model);
-    const bool helps = next.select_rmse_N <= (1 - kLeastFall) * before_select_N;
-    if (!helps) {
-      next.reason = fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N",
-                                before_select_N, next.select_rmse_N);
-    }
-    next.accepted = helps || options.keep_anyway;
-    if (next.accepted) {
-      for (stability::EffectSpec& effect : model.effects) {
-        if (effect.name != name) continue;
-        effect.fit.select_rmse_before_N = before_select_N;
-        effect.fit.select_rmse_after_N = next.select_rmse_N;
-        if (!helps) effect.fit.note = "kept although " + next.reason;
+    Trial next = trial(name, with_effects(nominal, specs_of(fitted)));
+    const double before_N = trials[best].row.select_rmse_N, after_N = next.row.select_rmse_N;
+    const bool helps = after_N <= (1 - kLeastFall) * before_N;
+    if (!helps)
+      next.row.note =
+          fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N", before_N, after_N);
+    next.row.accepted = helps || options.keep_anyway;
+    if (next.row.accepted) {
+      for (const stability::EffectSpec& fresh : fitted.back().specs) {
+        for (stability::EffectSpec& effect : next.model.effects) {
+          if (effect.name != fresh.name || effect.vehicle != fresh.vehicle) continue;
+          effect.fit.select_rmse_before_N = before_N;
+          effect.fit.select_rmse_after_N = after_N;
+          if (!helps) effect.fit.note = "kept although " + next.row.note;
+        }
       }
       accepted.push_back(name);
-      ladder.model = std::move(model);
       ladder.fitted = std::move(fitted);
+      best = trials.size();
+    } else {
+      next.row.values = trials[best].row.values;
     }
-    ladder.steps.push_back(next);
+    trials.push_back(std::move(next));
   }
+  ladder.any_accepted = best > 0;
+  ladder.model = trials[best].model;
+  for (stability::EffectSpec& effect : ladder.model.effects) {
+    if (effect.fit.is_empty()) continue;
+    effect.fit.test_looks = ladder.test_looks;
+    if (!ladder.split.by_flight && effect.fit.note.empty())
+      effect.fit.note = "fewer than three flights: selected and tested on the fit's";
+  }
+  const double floor_N = noise_floor_N(inputs, ladder.model, ladder.split.test, jobs);
+  for (Trial& t : trials) {
+    t.row.test_rmse_N = rmse(inputs, t.model, ladder.split.test, jobs);
+    t.row.noise_floor_N = floor_N;
+    t.row.test_looks = ladder.test_looks;
+    ladder.rows.push_back(std::move(t.row));
+  }
+  ladder.model.ladder = ladder.earlier;
+  ladder.model.ladder.insert(ladder.model.ladder.end(), ladder.rows.begin(), ladder.rows.end());
   return ladder;
+}
+
+stability::Model undone(const stability::Model& model) {
+  const std::vector<LadderRow>& rows = model.ladder;
+  std::size_t last = rows.size();
+  while (last > 0 && (!rows[last - 1].accepted || rows[last - 1].effect == "nominal")) --last;
+  if (last == 0) {
+    throw files::InputError({model.path, "", "ladder", "", "has no effect that 'add' accepted",
+                             "only models that 'swarmcert add' wrote can be gone back from"});
+  }
+  --last;  // the row to undo; one before it is accepted, because a ladder starts with the nominal model
+  std::size_t to = last;
+  while (to > 0 && !rows[to - 1].accepted) --to;
+  if (to == 0) {
+    throw files::InputError({model.path, "", "ladder", "", "does not start with the nominal model", ""});
+  }
+  stability::Model result = model;
+  const std::map<std::string, double>& values = rows[to - 1].values;
+  result.effects.clear();
+  for (stability::EffectSpec spec : model.effects) {
+    bool present = spec.parameters.empty();
+    for (auto& [name, value] : spec.parameters) {
+      const auto before = values.find(prefix_of(spec) + name);
+      if (before == values.end()) continue;
+      present = true;
+      if (value != before->second) spec.fit.interval.clear();  // those of another fit
+      value = before->second;
+    }
+    if (present) result.effects.push_back(std::move(spec));
+  }
+  result.ladder.erase(result.ladder.begin() + static_cast<std::ptrdiff_t>(last), result.ladder.end());
+  return result;
 }
 
 }  // namespace swarmcert::identification

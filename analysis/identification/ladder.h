@@ -18,19 +18,14 @@ struct Split {
 /// or four flights the last is for the test and the one before to select.
 Split split_flights(const residuals::Inputs& inputs);
 
-struct Step {
-  std::string effect;                                         ///< "nominal" for the first
-  double fit_rmse_N = 0, select_rmse_N = 0, test_rmse_N = 0;  ///< of the vector residual
-  bool accepted = true;
-  std::string reason;  ///< why it was refused
-};
-
 struct Ladder {
   Split split;
-  std::vector<Step> steps;
-  stability::Model model;       ///< with what was accepted, or with everything where `keep` asked for it
-  std::vector<Missing> fitted;  ///< what was fitted, accepted or not
-  double noise_floor_N = 0;     ///< of the test flights: what no model can remove
+  std::vector<stability::LadderRow> earlier;  ///< of the model that was given
+  std::vector<stability::LadderRow> rows;     ///< "nominal": the model that was given; then what was tried
+  stability::Model model;                     ///< with what was accepted, and with all rows
+  std::vector<Missing> fitted;                ///< what was fitted and accepted, as of the last row
+  bool any_accepted = false;
+  int test_looks = 0;  ///< including this ladder
 };
 
 struct LadderOptions {
@@ -40,8 +35,13 @@ struct LadderOptions {
 };
 
 /// Fits and accepts effects for inputs' only model: an effect is accepted if the RMSE of the select flights falls by
-/// at least half a percent. Coefficients of all effects that were accepted so far are fitted anew with each step.
+/// at least half a percent. Coefficients of all effects that were accepted so far are fitted anew with each step. The
+/// test flights are scored once, after the last step: their errors decide nothing.
 Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress);
+
+/// `model` one accepted row back: the effect of that row is gone, the others have the values they had before it.
+/// @throws files::InputError if the model has no row to go back to.
+stability::Model undone(const stability::Model& model);
 
 }  // namespace swarmcert::identification

@@ -4,78 +4,47 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 
-#include "analysis/residuals/statistics.h"
+#include "analysis/identification/box_least_squares.h"
 
 namespace swarmcert::identification {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// argmin y - 2 c'b + c'Gc within lower <= c <= upper. Active set: violated bounds are fixed, and released where the
-/// gradient points inside.
-Eigen::VectorXd box_least_squares(const Eigen::MatrixXd& gram, const Eigen::VectorXd& b,
-                                  const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
-  const auto n = static_cast<int>(b.size());
-  std::vector<int> state(static_cast<std::size_t>(n), 0);  // -1, 0, 1: at lower bound, free, at upper bound
+/// Whole flights are left out where there are this many.
+constexpr std::size_t kFewestFlights = 5;
+
+Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns) {
+  Eigen::VectorXd part(static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t i = 0; i < columns.size(); ++i) part[static_cast<Eigen::Index>(i)] = all[columns[i]];
+  return part;
+}
+
+Eigen::MatrixXd sub_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns) {
+  const auto n = static_cast<int>(columns.size());
+  Eigen::MatrixXd g(n, n);
   for (int i = 0; i < n; ++i) {
-    if (lower[i] == upper[i]) state[static_cast<std::size_t>(i)] = -1;
+    for (int j = 0; j <= i; ++j) {
+      g(i, j) = g(j, i) =
+          packed[Grams::packed(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)])];
+    }
   }
-  Eigen::VectorXd c = Eigen::VectorXd::Zero(n);
-  for (int pass = 0; pass < 6 * n + 6; ++pass) {
-    std::vector<int> free;
-    for (int i = 0; i < n; ++i) {
-      const int s = state[static_cast<std::size_t>(i)];
-      if (s == 0)
-        free.push_back(i);
-      else
-        c[i] = s < 0 ? lower[i] : upper[i];
-    }
-    const auto m = static_cast<int>(free.size());
-    Eigen::MatrixXd g(m, m);
-    Eigen::VectorXd rhs(m);
-    for (int i = 0; i < m; ++i) {
-      const int fi = free[static_cast<std::size_t>(i)];
-      rhs[i] = b[fi];
-      for (int k = 0; k < n; ++k) {
-        if (state[static_cast<std::size_t>(k)] != 0) rhs[i] -= gram(fi, k) * c[k];
-      }
-      for (int j = 0; j < m; ++j) g(i, j) = gram(fi, free[static_cast<std::size_t>(j)]);
-      g(i, i) += 1e-10 * gram(fi, fi) + 1e-18;
-    }
-    if (m > 0) {
-      const Eigen::VectorXd solution = g.ldlt().solve(rhs);
-      for (int i = 0; i < m; ++i) c[free[static_cast<std::size_t>(i)]] = solution[i];
-    }
-    int worst = -1;
-    double most = 0;
-    for (const int i : free) {
-      const double scale = std::sqrt(std::max(gram(i, i), 0.0));
-      const double beyond = scale * std::max(lower[i] - c[i], c[i] - upper[i]);
-      if (beyond > most) {
-        most = beyond;
-        worst = i;
-      }
-    }
-    if (worst >= 0) {
-      state[static_cast<std::size_t>(worst)] = c[worst] < lower[worst] ? -1 : 1;
-      continue;
-    }
-    const Eigen::VectorXd gradient = b - gram * c;
-    most = 1e-9 * std::abs(b.cwiseAbs().maxCoeff());
-    for (int i = 0; i < n; ++i) {
-      const int s = lower[i] == upper[i] ? 0 : state[static_cast<std::size_t>(i)];
-      const double inside = s < 0 ? gradient[i] : s > 0 ? -gradient[i] : 0;
-      if (inside > most) {
-        most = inside;
-        worst = i;
-      }
-    }
-    if (worst < 0) break;
-    state[static_cast<std::size_t>(worst)] = 0;
-  }
-  return c.cwiseMax(lower).cwiseMin(upper);
+  return g;
+}
+
+}  // namespace
+
+Members without(Members members, std::size_t index) {
+  members.erase(members.begin() + static_cast<std::ptrdiff_t>(index));
+  return members;
+}
+
+Members with(Members members, const Member& added) {
+  members.push_back(added);
+  return members;
 }
 
 double paired_z(const std::vector<double>& before, const std::vector<double>& after) {
@@ -90,101 +59,119 @@ double paired_z(const std::vector<double>& before, const std::vector<double>& af
   return variance > 0 ? sum / n / std::sqrt(variance / n) : 0;
 }
 
-double sum_of(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return sum;
-}
-
-std::pair<double, double> drop_interval(const std::vector<double>& before, const std::vector<double>& after) {
-  std::mt19937_64 generator(1);
-  std::vector<double> drops;
-  for (int i = 0; i < 200; ++i) {
-    double a = 0, b = 0;
-    for (std::size_t k = 0; k < before.size(); ++k) {
-      const std::size_t j = generator() % before.size();
-      b += before[j];
-      a += after[j];
-    }
-    drops.push_back(1 - std::sqrt(std::max(a, 0.0) / b));
+Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int>& free,
+                         const Eigen::VectorXd& c, const Eigen::VectorXd& ridge) {
+  const auto n = static_cast<Eigen::Index>(free.size());
+  std::vector<int> all;
+  for (int i = 0; i < c.size(); ++i) all.push_back(i);
+  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n), bread = meat;
+  Eigen::VectorXd last = Eigen::VectorXd::Zero(n);
+  for (const Block& block : blocks) {
+    const Eigen::MatrixXd gram = sub_gram(block.gram, all);
+    const Eigen::VectorXd score = part_of(block.b - gram * c, free);
+    meat += score * score.transpose();
+    if (block.follows) meat += 0.5 * (score * last.transpose() + last * score.transpose());
+    last = score;
+    bread += sub_gram(block.gram, free);
   }
-  return {residuals::quantile(drops, 0.05), residuals::quantile(drops, 0.95)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    bread(i, i) += 1e-10 * bread(i, i) + 1e-18;
+    if (ridge.size() > 0) bread(i, i) += ridge[free[static_cast<std::size_t>(i)]];
+  }
+  const Eigen::MatrixXd inverse = bread.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const auto count = static_cast<double>(blocks.size());
+  const Eigen::MatrixXd inner =
+      inverse * meat * inverse * (count / std::max(1.0, count - static_cast<double>(n)));
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(c.size(), c.size());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j)
+      covariance(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]) = inner(i, j);
+  }
+  return covariance;
 }
-
-std::vector<Member> without(std::vector<Member> members, std::size_t index) {
-  members.erase(members.begin() + static_cast<std::ptrdiff_t>(index));
-  return members;
-}
-
-std::vector<Member> with(std::vector<Member> members, const Member& added) {
-  members.push_back(added);
-  return members;
-}
-
-}  // namespace
 
 Selection::Selection(const Grams& grams, Thresholds thresholds) : grams_(grams), thresholds_(thresholds) {
-  const Eigen::Index packed = Eigen::Index(grams.columns) * (grams.columns + 1) / 2;
-  const auto clear = [&](Sum& sum) {
-    sum.gram.setZero(packed);
-    sum.b.setZero(grams.columns);
-  };
-  clear(total_);
-  for (Sum& sum : folds_) clear(sum);
   // Random folds, equally many blocks in each.
   std::mt19937_64 generator(1);
-  for (std::size_t i = 0; i < grams.blocks.size(); ++i) fold_.push_back(static_cast<int>(i % kFolds));
-  for (std::size_t i = fold_.size(); i > 1; --i) std::swap(fold_[i - 1], fold_[generator() % i]);
-  for (std::size_t i = 0; i < grams.blocks.size(); ++i) {
-    const Block& block = grams.blocks[i];
-    for (Sum* sum : {&total_, &folds_[static_cast<std::size_t>(fold_[i])]}) {
-      sum->gram += block.gram;
-      sum->b += block.b;
-      sum->y += block.y;
-      sum->records += block.records;
+  std::vector<int>& fold = random_.of_block;
+  for (std::size_t i = 0; i < grams.blocks.size(); ++i) fold.push_back(static_cast<int>(i % kFolds));
+  for (std::size_t i = fold.size(); i > 1; --i) std::swap(fold[i - 1], fold[generator() % i]);
+  divide(random_);
+  std::map<int, int> fold_of_flight;
+  for (const Block& block : grams.blocks)
+    fold_of_flight.emplace(block.flight, static_cast<int>(fold_of_flight.size()) % kFolds);
+  has_flights_ = fold_of_flight.size() >= kFewestFlights;
+  if (has_flights_) {
+    for (const Block& block : grams.blocks) by_flight_.of_block.push_back(fold_of_flight[block.flight]);
+    divide(by_flight_);
+  }
+  const Eigen::Index packed = Eigen::Index(grams.columns) * (grams.columns + 1) / 2;
+  total_.gram.setZero(packed);
+  total_.b.setZero(grams.columns);
+  for (const Sum& sum : random_.inside) {
+    total_.gram += sum.gram;
+    total_.b += sum.b;
+    total_.y += sum.y;
+    total_.records += sum.records;
+  }
+}
+
+void Selection::divide(Folds& folds) const {
+  const Eigen::Index packed = Eigen::Index(grams_.columns) * (grams_.columns + 1) / 2;
+  for (Sum& sum : folds.inside) {
+    sum.gram.setZero(packed);
+    sum.b.setZero(grams_.columns);
+  }
+  for (std::size_t i = 0; i < grams_.blocks.size(); ++i) {
+    const Block& block = grams_.blocks[i];
+    Sum& sum = folds.inside[static_cast<std::size_t>(folds.of_block[i])];
+    sum.gram += block.gram;
+    sum.b += block.b;
+    sum.y += block.y;
+    sum.records += block.records;
+  }
+  for (std::size_t f = 0; f < kFolds; ++f) {
+    Sum& rest = folds.outside[f];
+    rest.gram.setZero(packed);
+    rest.b.setZero(grams_.columns);
+    for (std::size_t other = 0; other < kFolds; ++other) {
+      if (other == f) continue;
+      rest.gram += folds.inside[other].gram;
+      rest.b += folds.inside[other].b;
     }
   }
 }
 
-std::vector<int> Selection::columns(const std::vector<Member>& members) const {
+/// Whole flights, unless an effect was active in one flight only: left out, it could not be learned.
+const Selection::Folds& Selection::folds_for(const Members& members) const {
+  const bool by_flight = has_flights_ && std::all_of(members.begin(), members.end(), [&](const Member& m) {
+                           return support(m).flights >= 2 && candidate(m).vehicles.empty();
+                         });
+  return by_flight ? by_flight_ : random_;
+}
+
+std::vector<int> Selection::columns(const Members& members) const {
   std::vector<int> all;
   for (const Member& m : members) {
-    const auto k = static_cast<std::size_t>(m.candidate);
-    const int first = grams_.first_column[k][static_cast<std::size_t>(m.theta)];
-    for (std::size_t c = 0; c < grams_.candidates[k].info.linear.size(); ++c)
-      all.push_back(first + static_cast<int>(c));
+    const int first =
+        grams_.first_column[static_cast<std::size_t>(m.candidate)][static_cast<std::size_t>(m.theta)];
+    for (int c = 0; c < candidate(m).columns(); ++c) all.push_back(first + c);
   }
   return all;
 }
 
-Eigen::MatrixXd Selection::sub_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns) const {
-  const auto n = static_cast<int>(columns.size());
-  Eigen::MatrixXd g(n, n);
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j)
-      g(i, j) =
-          packed[Grams::packed(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)])];
-  }
-  return g;
+bool Selection::is_present(const Members& members, int which) const {
+  const std::string& name = grams_.candidates[static_cast<std::size_t>(which)].name;
+  return std::any_of(members.begin(), members.end(),
+                     [&](const Member& m) { return candidate(m).name == name; });
 }
 
-namespace {
-
-Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns) {
-  Eigen::VectorXd part(static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t i = 0; i < columns.size(); ++i) part[static_cast<Eigen::Index>(i)] = all[columns[i]];
-  return part;
-}
-
-}  // namespace
-
-Eigen::VectorXd Selection::solve(const Sum& sum, const std::vector<Member>& members) const {
+Eigen::VectorXd Selection::solve(const Sum& sum, const Members& members) const {
   const std::vector<int> all = columns(members);
   Eigen::VectorXd lower(static_cast<Eigen::Index>(all.size())), upper = lower;
   Eigen::Index i = 0;
   for (const Member& m : members) {
-    for (const stability::Parameter& p :
-         grams_.candidates[static_cast<std::size_t>(m.candidate)].info.linear) {
+    for (const stability::Parameter& p : candidate(m).info.linear) {
       lower[i] = p.lower;
       upper[i++] = p.upper;
     }
@@ -192,42 +179,42 @@ Eigen::VectorXd Selection::solve(const Sum& sum, const std::vector<Member>& memb
   return box_least_squares(sub_gram(sum.gram, all), part_of(sum.b, all), lower, upper);
 }
 
-std::array<Eigen::VectorXd, Selection::kFolds> Selection::fold_fits(
-    const std::vector<Member>& members) const {
-  std::array<Eigen::VectorXd, kFolds> fits;
-  const std::vector<int> all = columns(members);
-  if (all.empty()) return fits;
-  for (std::size_t f = 0; f < kFolds; ++f) {
-    Sum rest;
-    rest.gram = total_.gram - folds_[f].gram;
-    rest.b = total_.b - folds_[f].b;
-    fits[f] = solve(rest, members);
-  }
+std::vector<Eigen::VectorXd> Selection::fold_coefficients(const Members& members) const {
+  std::vector<Eigen::VectorXd> fits;
+  for (const Sum& rest : folds_for(members).outside) fits.push_back(solve(rest, members));
   return fits;
 }
 
-double Selection::mean_square(const std::vector<Member>& members) const {
-  const auto fits = fold_fits(members);
+double Selection::mean_square(const Members& members) const {
+  return mean_square(members, folds_for(members));
+}
+
+double Selection::mean_square(const Members& members, const Folds& folds) const {
   const std::vector<int> all = columns(members);
   double error = 0;
   for (std::size_t f = 0; f < kFolds; ++f) {
-    error += folds_[f].y;
+    error += folds.inside[f].y;
     if (all.empty()) continue;
-    error +=
-        fits[f].dot(sub_gram(folds_[f].gram, all) * fits[f]) - 2 * fits[f].dot(part_of(folds_[f].b, all));
+    const Eigen::VectorXd c = solve(folds.outside[f], members);
+    error += c.dot(sub_gram(folds.inside[f].gram, all) * c) - 2 * c.dot(part_of(folds.inside[f].b, all));
   }
   return total_.records > 0 ? error / total_.records : kInfinity;
 }
 
-std::vector<double> Selection::block_errors(const std::vector<Member>& members) const {
-  const auto fits = fold_fits(members);
+std::vector<double> Selection::block_errors(const Members& members) const {
+  return block_errors(members, folds_for(members));
+}
+
+std::vector<double> Selection::block_errors(const Members& members, const Folds& folds) const {
   const std::vector<int> all = columns(members);
+  std::array<Eigen::VectorXd, kFolds> fits;
+  for (std::size_t f = 0; f < kFolds && !all.empty(); ++f) fits[f] = solve(folds.outside[f], members);
   std::vector<double> errors;
   for (std::size_t i = 0; i < grams_.blocks.size(); ++i) {
     const Block& block = grams_.blocks[i];
     double error = block.y;
     if (!all.empty()) {
-      const Eigen::VectorXd& c = fits[static_cast<std::size_t>(fold_[i])];
+      const Eigen::VectorXd& c = fits[static_cast<std::size_t>(folds.of_block[i])];
       error += c.dot(sub_gram(block.gram, all) * c) - 2 * c.dot(part_of(block.b, all));
     }
     errors.push_back(std::max(error, 0.0));
@@ -235,29 +222,30 @@ std::vector<double> Selection::block_errors(const std::vector<Member>& members) 
   return errors;
 }
 
-Fit Selection::fit(const std::vector<Member>& members) const {
+Fit Selection::fit(const Members& members) const {
   Fit result;
   result.coefficients = solve(total_, members);
   const std::vector<int> all = columns(members);
-  const auto n = static_cast<Eigen::Index>(all.size());
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
+  std::vector<Block> blocks;
+  std::vector<int> free;
   for (const Block& block : grams_.blocks) {
-    const Eigen::VectorXd score = part_of(block.b, all) - sub_gram(block.gram, all) * result.coefficients;
-    meat += score * score.transpose();
+    Block small;
+    small.follows = block.follows;
+    small.b = part_of(block.b, all);
+    const Eigen::MatrixXd gram = sub_gram(block.gram, all);
+    small.gram.resize(gram.rows() * (gram.rows() + 1) / 2);
+    for (int j = 0; j < gram.rows(); ++j)
+      small.gram.segment(Eigen::Index(j) * (j + 1) / 2, j + 1) = gram.col(j).head(j + 1);
+    blocks.push_back(std::move(small));
   }
-  Eigen::MatrixXd gram = sub_gram(total_.gram, all);
-  for (Eigen::Index i = 0; i < n; ++i) gram(i, i) += 1e-10 * gram(i, i) + 1e-18;
-  const Eigen::MatrixXd inverse = gram.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  const auto blocks = static_cast<double>(grams_.blocks.size());
-  result.covariance = inverse * meat * inverse * (blocks / std::max(1.0, blocks - static_cast<double>(n)));
+  for (int i = 0; i < static_cast<int>(all.size()); ++i) free.push_back(i);
+  result.covariance = sandwich(blocks, free, result.coefficients);
   return result;
 }
 
-/// Of the last member, on the scale of one coefficient: comparable whatever its number of columns.
-double Selection::wald(const std::vector<Member>& members) const {
+double Selection::wald(const Members& members) const {
   const Fit f = fit(members);
-  const auto p = static_cast<Eigen::Index>(
-      grams_.candidates[static_cast<std::size_t>(members.back().candidate)].info.linear.size());
+  const Eigen::Index p = candidate(members.back()).columns();
   const Eigen::VectorXd c = f.coefficients.tail(p);
   Eigen::MatrixXd v = f.covariance.bottomRightCorner(p, p);
   for (Eigen::Index i = 0; i < p; ++i) v(i, i) += 1e-12 * v(i, i) + 1e-30;
@@ -265,12 +253,12 @@ double Selection::wald(const std::vector<Member>& members) const {
   return std::sqrt(std::max(0.0, statistic - 3 * static_cast<double>(p - 1)));
 }
 
-Member Selection::best_theta(const std::vector<Member>& members, int candidate) const {
-  Member best{candidate, 0};
+Member Selection::best_theta(const Members& members, int which) const {
+  Member best{which, 0};
   double least = kInfinity;
-  const auto& thetas = grams_.candidates[static_cast<std::size_t>(candidate)].thetas;
-  for (std::size_t t = 0; t < thetas.size(); ++t) {
-    const Member member{candidate, static_cast<int>(t)};
+  const auto thetas = static_cast<int>(grams_.candidates[static_cast<std::size_t>(which)].thetas.size());
+  for (int t = 0; t < thetas; ++t) {
+    const Member member{which, t};
     const double square = mean_square(with(members, member));
     if (square < least) {
       least = square;
@@ -280,49 +268,55 @@ Member Selection::best_theta(const std::vector<Member>& members, int candidate) 
   return best;
 }
 
-bool Selection::is_acceptable(const std::vector<Member>& before, const Member& added, double before_square,
-                              double after_square) const {
+bool Selection::is_acceptable(const Members& before, const Member& added) const {
+  const Members after = with(before, added);
+  const Folds& folds = folds_for(after);
+  return is_acceptable(before, added, mean_square(before, folds), mean_square(after, folds), folds);
+}
+
+bool Selection::is_acceptable(const Members& before, const Member& added, double before_square,
+                              double after_square, const Folds& folds) const {
   if (!(after_square <= (1 - thresholds_.gain) * before_square)) return false;
-  const auto k = static_cast<std::size_t>(added.candidate);
-  const Support& support = grams_.support[k][static_cast<std::size_t>(added.theta)];
-  if (support.records < thresholds_.support_records || support.blocks < thresholds_.support_blocks)
-    return false;
-  const std::vector<Member> after = with(before, added);
-  if (grams_.candidates[k].info.remembers) {
+  const Support& where = support(added);
+  if (where.records < thresholds_.support_records || where.blocks < thresholds_.support_blocks) return false;
+  const Members after = with(before, added);
+  if (candidate(added).info.remembers) {
     const Eigen::VectorXd c = solve(total_, after);
-    if (std::abs(c[c.size() - 1] - 1) > thresholds_.memory_tolerance) return false;
+    if (std::abs(c[c.size() - 1] - 1) > 0.999 * kMemoryTolerance) return false;  // held by its bounds
   }
-  const double z = paired_z(block_errors(before), block_errors(after));
+  const double z = paired_z(block_errors(before, folds), block_errors(after, folds));
   return z >= thresholds_.paired_z || (z >= thresholds_.least_paired_z && wald(after) >= thresholds_.wald_z);
 }
 
-bool Selection::add_one(std::vector<Member>& members) const {
-  const double before = mean_square(members);
+bool Selection::add_one(Members& members) const {
   struct Choice {
     Member member;
-    double square;
-    std::size_t parameters;
+    const Folds* folds;
+    double before, after;
+    int parameters;
+    double share() const { return after / before; }
   };
   std::vector<Choice> choices;
   for (int k = 0; k < static_cast<int>(grams_.candidates.size()); ++k) {
-    const bool present =
-        std::any_of(members.begin(), members.end(), [k](const Member& m) { return m.candidate == k; });
-    if (present) continue;
+    if (is_present(members, k)) continue;
     const Member member = best_theta(members, k);
-    choices.push_back({member, mean_square(with(members, member)),
-                       grams_.candidates[static_cast<std::size_t>(k)].info.linear.size()});
+    const Members after = with(members, member);
+    const Folds& folds = folds_for(after);
+    choices.push_back({member, &folds, mean_square(members, folds), mean_square(after, folds),
+                       candidate(member).columns()});
   }
   std::stable_sort(choices.begin(), choices.end(),
-                   [](const Choice& a, const Choice& b) { return a.square < b.square; });
+                   [](const Choice& a, const Choice& b) { return a.share() < b.share(); });
+  const auto accepts = [&](const Choice& c) {
+    return is_acceptable(members, c.member, c.before, c.after, *c.folds);
+  };
   for (std::size_t i = 0; i < choices.size(); ++i) {
-    if (!is_acceptable(members, choices[i].member, before, choices[i].square)) continue;
+    if (!accepts(choices[i])) continue;
     // Of what does equally well, the effect with the fewest numbers.
     const Choice* best = &choices[i];
     for (std::size_t j = i + 1; j < choices.size(); ++j) {
-      if (choices[j].square - choices[i].square > thresholds_.swap_gain * before) break;
-      if (choices[j].parameters < best->parameters &&
-          is_acceptable(members, choices[j].member, before, choices[j].square))
-        best = &choices[j];
+      if (choices[j].share() - choices[i].share() > thresholds_.swap_gain) break;
+      if (choices[j].parameters < best->parameters && accepts(choices[j])) best = &choices[j];
     }
     members.push_back(best->member);
     return true;
@@ -330,21 +324,19 @@ bool Selection::add_one(std::vector<Member>& members) const {
   return false;
 }
 
-bool Selection::swap_one(std::vector<Member>& members) const {
-  const double now = mean_square(members);
+bool Selection::swap_one(Members& members) const {
   for (std::size_t i = 0; i < members.size(); ++i) {
-    const std::vector<Member> rest = without(members, i);
-    const double rest_square = mean_square(rest);
+    const Members rest = without(members, i);
     for (int k = 0; k < static_cast<int>(grams_.candidates.size()); ++k) {
-      const bool present =
-          std::any_of(rest.begin(), rest.end(), [k](const Member& m) { return m.candidate == k; });
-      if (present) continue;
+      if (is_present(rest, k)) continue;
       const Member member = best_theta(rest, k);
       if (member == members[i]) continue;
-      const double square = mean_square(with(rest, member));
+      const Members instead = with(rest, member);
+      const Folds& folds = folds_for(with(instead, members[i]));
+      const double now = mean_square(members, folds), then = mean_square(instead, folds);
       const bool retunes = k == members[i].candidate;
-      if (square < (retunes ? 1 - 1e-6 : 1 - thresholds_.swap_gain) * now &&
-          is_acceptable(rest, member, rest_square, square)) {
+      if (then < (retunes ? 1 - 1e-6 : 1 - thresholds_.swap_gain) * now &&
+          is_acceptable(rest, member, mean_square(rest, folds), then, folds)) {
         members[i] = member;
         return true;
       }
@@ -353,12 +345,13 @@ bool Selection::swap_one(std::vector<Member>& members) const {
   return false;
 }
 
-bool Selection::remove_one(std::vector<Member>& members) const {
-  const double now = mean_square(members);
+bool Selection::remove_one(Members& members) const {
+  const Folds& folds = folds_for(members);
+  const double now = mean_square(members, folds);
   std::size_t least = members.size();
   double least_square = kInfinity;
   for (std::size_t i = 0; i < members.size(); ++i) {
-    const double square = mean_square(without(members, i));
+    const double square = mean_square(without(members, i), folds);
     if (square < least_square) {
       least_square = square;
       least = i;
@@ -370,146 +363,45 @@ bool Selection::remove_one(std::vector<Member>& members) const {
   return true;
 }
 
-std::vector<Member> Selection::select() const {
-  std::vector<Member> members;
+void Selection::prune(Members& members) const {
+  while (remove_one(members)) {
+  }
+}
+
+Members Selection::select() const {
+  Members members;
   if (!is_sound()) return members;
   constexpr std::size_t kMostEffects = 10;
   for (int round = 0; round < 20 && members.size() < kMostEffects; ++round) {
     if (!add_one(members)) break;
     for (int i = 0; i < 20 && swap_one(members); ++i) {
     }
-    while (remove_one(members)) {
-    }
+    prune(members);
   }
-  // In the order in which they lower the error most.
-  std::vector<Member> ordered;
-  while (!members.empty()) {
-    std::size_t best = 0;
-    double least = kInfinity;
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      const double square = mean_square(with(ordered, members[i]));
-      if (square < least) {
-        least = square;
-        best = i;
-      }
-    }
-    ordered.push_back(members[best]);
-    members = without(members, best);
-  }
-  return ordered;
+  return ordered(members);
 }
 
-std::vector<Finding> Selection::findings(const std::vector<Member>& members) const {
-  constexpr double kQuantile90 = 1.6449;  // two-sided 90 % of the normal distribution
-  std::vector<Finding> result;
-  if (members.empty()) return result;
-  const Fit full = fit(members);
-  const double full_square = mean_square(members);
-  const std::vector<double> full_errors = block_errors(members);
-  Eigen::Index at = 0;
-  std::vector<Member> prefix;
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    Finding finding;
-    finding.member = members[i];
-    const auto k = static_cast<std::size_t>(members[i].candidate);
-    finding.support = grams_.support[k][static_cast<std::size_t>(members[i].theta)];
-    const std::vector<double> before = block_errors(prefix);
-    prefix.push_back(members[i]);
-    const std::vector<double> after = block_errors(prefix);
-    finding.rmse_before_N = std::sqrt(sum_of(before) / total_.records);
-    finding.rmse_after_N = std::sqrt(sum_of(after) / total_.records);
-    finding.drop_interval = drop_interval(before, after);
-    const std::vector<Member> rest = without(members, i);
-    const double rest_square = mean_square(rest);
-    finding.paired_z = paired_z(block_errors(rest), full_errors);
-    finding.wald_z = wald(with(rest, members[i]));
-    const std::size_t p = grams_.candidates[k].info.linear.size();
-    for (std::size_t c = 0; c < p; ++c, ++at) {
-      const double value = full.coefficients[at];
-      const double half = kQuantile90 * std::sqrt(std::max(0.0, full.covariance(at, at)));
-      finding.coefficients.push_back(value);
-      finding.intervals.emplace_back(value - half, value + half);
-      finding.model_form.emplace_back(value, value);
-    }
-    for (int q = 0; q < static_cast<int>(grams_.candidates.size()); ++q) {
-      const bool present =
-          std::any_of(members.begin(), members.end(), [q](const Member& m) { return m.candidate == q; });
-      if (present) continue;
-      const Member rival = best_theta(rest, q);
-      const std::vector<Member> instead = with(rest, rival);
-      const bool explains = rest_square - mean_square(instead) > 0.5 * (rest_square - full_square);
-      if (explains && paired_z(block_errors(instead), full_errors) < 2)
-        finding.confounded_with.push_back(grams_.candidates[static_cast<std::size_t>(q)].name);
-      const Fit beside = fit(with(with(rest, rival), members[i]));
-      for (std::size_t c = 0; c < p; ++c) {
-        const double value =
-            beside.coefficients[beside.coefficients.size() - static_cast<Eigen::Index>(p - c)];
-        finding.model_form[c].first = std::min(finding.model_form[c].first, value);
-        finding.model_form[c].second = std::max(finding.model_form[c].second, value);
-      }
-    }
-    result.push_back(std::move(finding));
-  }
-  return result;
-}
-
-std::vector<Detectable> Selection::detectable(const std::vector<Member>& members) const {
-  constexpr double kPower90 = 1.2816;  // 90 % of the normal distribution
-  const std::vector<int> selected = columns(members);
-  const double square_sum = mean_square(members) * total_.records;
-  const Fit base = members.empty() ? Fit{} : fit(members);
-  const Eigen::MatrixXd gram = sub_gram(total_.gram, selected);
-  std::vector<Detectable> result;
-  for (std::size_t k = 0; k < grams_.candidates.size(); ++k) {
-    const stability::EffectInfo& info = grams_.candidates[k].info;
-    const bool present = std::any_of(members.begin(), members.end(),
-                                     [k](const Member& m) { return m.candidate == static_cast<int>(k); });
-    if (present) continue;
-    const std::size_t thetas = grams_.candidates[k].thetas.size();
-    for (std::size_t c = 0; c < info.linear.size(); ++c) {
-      Detectable entry{info.name, info.linear[c].name, kInfinity, info.excitation};
-      for (std::size_t t = 0; t < thetas; ++t) {
-        const Support& support = grams_.support[k][t];
-        if (support.records < thresholds_.support_records || support.blocks < thresholds_.support_blocks)
-          continue;
-        const int column = grams_.first_column[k][t] + static_cast<int>(c);
-        // What of the column the selected effects do not already explain.
-        Eigen::VectorXd projection(static_cast<Eigen::Index>(selected.size()));
-        Eigen::VectorXd cross = projection;
-        for (std::size_t i = 0; i < selected.size(); ++i)
-          cross[static_cast<Eigen::Index>(i)] = total_.gram[Grams::packed(selected[i], column)];
-        const double own = total_.gram[Grams::packed(column, column)];
-        if (!selected.empty()) projection = gram.ldlt().solve(cross);
-        const double energy = own - (selected.empty() ? 0 : cross.dot(projection));
-        if (!(energy > 1e-9 * own)) continue;
-        double meat = 0;
-        for (const Block& block : grams_.blocks) {
-          double score = block.b[column];
-          if (!selected.empty()) {
-            Eigen::VectorXd mixed(cross.size());
-            for (std::size_t i = 0; i < selected.size(); ++i)
-              mixed[static_cast<Eigen::Index>(i)] = block.gram[Grams::packed(selected[i], column)];
-            const Eigen::MatrixXd block_gram = sub_gram(block.gram, selected);
-            score -= mixed.dot(base.coefficients);
-            score -= projection.dot(part_of(block.b, selected) - block_gram * base.coefficients);
-          }
-          meat += score * score;
-        }
-        const double deviation = std::sqrt(meat) / energy;
-        const double by_gain = std::sqrt(thresholds_.gain / (1 - thresholds_.gain) * square_sum / energy);
-        const double size =
-            std::max(by_gain + kPower90 * deviation, (thresholds_.wald_z + kPower90) * deviation);
-        if (info.remembers) {
-          // Gain 1 or nothing: the size is the shortest time that shows.
-          if (size <= 1 - thresholds_.memory_tolerance / 2) {
-            entry.parameter = info.shape[0].name;
-            entry.size = std::min(entry.size, grams_.candidates[k].thetas[t][0]);
-          }
-        } else if (size <= std::max(std::abs(info.linear[c].lower), std::abs(info.linear[c].upper))) {
-          entry.size = std::min(entry.size, size);
+Members Selection::ordered(Members members) const {
+  // A shape without a memory: ground, jets, ...
+  const auto is_local = [&](const Member& m) {
+    return !candidate(m).info.shape.empty() && !candidate(m).info.remembers;
+  };
+  Members result;
+  for (const bool local : {true, false}) {
+    while (
+        std::any_of(members.begin(), members.end(), [&](const Member& m) { return is_local(m) == local; })) {
+      std::size_t best = 0;
+      double least = kInfinity;
+      for (std::size_t i = 0; i < members.size(); ++i) {
+        if (is_local(members[i]) != local) continue;
+        const double square = mean_square(with(result, members[i]));
+        if (square < least) {
+          least = square;
+          best = i;
         }
       }
-      result.push_back(std::move(entry));
+      result.push_back(members[best]);
+      members = without(members, best);
     }
   }
   return result;

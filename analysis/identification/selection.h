@@ -2,9 +2,6 @@
 #pragma once
 
 #include <array>
-#include <map>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "analysis/identification/block_grams.h"
@@ -18,8 +15,7 @@ struct Thresholds {
   double wald_z = 3.5;  ///< cluster-robust, together with
   double least_paired_z = 1;
   double swap_gain = 0.003;
-  double removal_share = 0.7;     ///< of `gain`: an effect that loses less than this is removed
-  double memory_tolerance = 0.3;  ///< lags and delays have gain 1; a fit further away is something else
+  double removal_share = 0.7;  ///< of `gain`: an effect that loses less than this is removed
   std::size_t support_records = 100, support_blocks = 5;
 };
 
@@ -28,49 +24,67 @@ struct Member {
   int candidate = 0, theta = 0;
   bool operator==(const Member& other) const { return candidate == other.candidate && theta == other.theta; }
 };
+using Members = std::vector<Member>;
+
+/// `members` without the one at `index`; with `added` at the end.
+Members without(Members members, std::size_t index);
+Members with(Members members, const Member& added);
 
 /// A fit on all blocks.
 struct Fit {
   Eigen::VectorXd coefficients;
-  Eigen::MatrixXd covariance;  ///< sandwich, clustered by block
+  Eigen::MatrixXd covariance;  ///< see sandwich()
 };
 
-/// Everything known of a selected effect.
-struct Finding {
-  Member member;
-  double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated, of the vector
-  std::pair<double, double> drop_interval;  ///< 90 % of the relative fall of the RMSE, by resampling blocks
-  double paired_z = 0, wald_z = 0;
-  Support support;
-  std::vector<double> coefficients;
-  std::vector<std::pair<double, double>> intervals;  ///< 90 %, statistical, one per coefficient
-  std::vector<std::string> confounded_with;          ///< candidates that these data cannot tell from it
-  std::vector<std::pair<double, double>>
-      model_form;  ///< spread of each coefficient over the fits with a rival added
-};
+/// Covariance of least-squares coefficients `c` of the columns `free`, robust to correlation within blocks and between
+/// neighbouring ones (Bartlett weight 1/2, Newey and West 1987). Rows and columns of the others are zero.
+/// @param ridge added to the diagonal of G, [columns] or empty.
+Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int>& free,
+                         const Eigen::VectorXd& c, const Eigen::VectorXd& ridge = {});
 
-/// The smallest effect that these data would have shown in 90 % of cases.
-struct Detectable {
-  std::string effect, parameter;
-  double size = 0;         ///< infinite where no size within the physical bounds would be seen
-  std::string excitation;  ///< what to fly to see smaller ones
-};
+/// Mean difference of two lists of errors over its standard error.
+double paired_z(const std::vector<double>& before, const std::vector<double>& after);
 
 class Selection {
  public:
   /// @param grams must outlive this.
-  Selection(const Grams& grams, Thresholds thresholds = {});
+  explicit Selection(const Grams& grams, Thresholds thresholds = {});
 
-  /// Forward, swap and backward passes; the effects in the order in which they lower the error most.
-  std::vector<Member> select() const;
+  /// Forward, swap and backward passes; the effects ordered().
+  Members select() const;
+  /// One step forward from `members`. Returns false where nothing is left to add.
+  bool add_one(Members& members) const;
+  /// Drops effects that have become needless.
+  void prune(Members& members) const;
+  /// First the effects that act in some places only, then those that act everywhere, which a wrong calibration looks
+  /// like; of each, in the order in which they lower the error most.
+  Members ordered(Members members) const;
   /// Cross-validated mean square of the vector residual, N^2. Infinite if it cannot be fitted.
-  double mean_square(const std::vector<Member>& members) const;
+  double mean_square(const Members& members) const;
   /// The theta of `candidate` that suits best beside `members`.
-  Member best_theta(const std::vector<Member>& members, int candidate) const;
-  Fit fit(const std::vector<Member>& members) const;
-  std::vector<Finding> findings(const std::vector<Member>& members) const;
-  std::vector<Detectable> detectable(const std::vector<Member>& members) const;
+  Member best_theta(const Members& members, int candidate) const;
+  Fit fit(const Members& members) const;
+  /// Cross-validated squared error of each block, N^2.
+  std::vector<double> block_errors(const Members& members) const;
+  /// Cluster-robust, of the last member, on the scale of one coefficient: comparable whatever its number of columns.
+  double wald(const Members& members) const;
+  /// True where the data show that `added` belongs to `before`.
+  bool is_acceptable(const Members& before, const Member& added) const;
+  /// Enough blocks for an answer.
   bool is_sound() const { return grams_.blocks.size() >= 10; }
+  /// Coefficients of the fits without one fold each.
+  std::vector<Eigen::VectorXd> fold_coefficients(const Members& members) const;
+
+  const Grams& grams() const { return grams_; }
+  const Candidate& candidate(const Member& member) const {
+    return grams_.candidates[static_cast<std::size_t>(member.candidate)];
+  }
+  const Support& support(const Member& member) const {
+    return grams_.support[static_cast<std::size_t>(member.candidate)][static_cast<std::size_t>(member.theta)];
+  }
+  /// True if an effect of the candidate's name is among `members`.
+  bool is_present(const Members& members, int candidate) const;
+  double records() const { return total_.records; }
 
  private:
   static constexpr int kFolds = 5;
@@ -79,22 +93,26 @@ class Selection {
     double y = 0;
     double records = 0;
   };
-  std::vector<int> columns(const std::vector<Member>& members) const;
-  Eigen::MatrixXd sub_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns) const;
-  Eigen::VectorXd solve(const Sum& sum, const std::vector<Member>& members) const;
-  std::array<Eigen::VectorXd, kFolds> fold_fits(const std::vector<Member>& members) const;
-  std::vector<double> block_errors(const std::vector<Member>& members) const;
-  double wald(const std::vector<Member>& members) const;
-  bool is_acceptable(const std::vector<Member>& before, const Member& added, double before_square,
-                     double after_square) const;
-  bool add_one(std::vector<Member>& members) const;
-  bool swap_one(std::vector<Member>& members) const;
-  bool remove_one(std::vector<Member>& members) const;
+  /// A way to divide the blocks: at random, or by whole flights.
+  struct Folds {
+    std::vector<int> of_block;
+    std::array<Sum, kFolds> inside, outside;
+  };
+  void divide(Folds& folds) const;
+  const Folds& folds_for(const Members& members) const;
+  double mean_square(const Members& members, const Folds& folds) const;
+  std::vector<double> block_errors(const Members& members, const Folds& folds) const;
+  std::vector<int> columns(const Members& members) const;
+  Eigen::VectorXd solve(const Sum& sum, const Members& members) const;
+  bool is_acceptable(const Members& before, const Member& added, double before_square, double after_square,
+                     const Folds& folds) const;
+  bool swap_one(Members& members) const;
+  bool remove_one(Members& members) const;
 
   const Grams& grams_;
   const Thresholds thresholds_;
-  std::vector<int> fold_;  ///< by block
-  std::array<Sum, kFolds> folds_;
+  Folds random_, by_flight_;
+  bool has_flights_ = false;
   Sum total_;
 };
 

@@ -103,7 +103,7 @@ std::vector<Eigen::Vector3d> force_residual(const stability::Model& model, const
   std::vector<std::unique_ptr<stability::AppliedEffect>> effects;
   std::vector<std::unique_ptr<stability::ColumnStream>> streams;
   for (const stability::EffectSpec& spec : model.effects) {
-    if (is_stage(spec.name)) continue;
+    if (is_stage(spec.name) || !spec.acts_on(track.vehicle)) continue;
     effects.push_back(std::make_unique<stability::AppliedEffect>(spec, context_of(model, kinds)));
     streams.push_back(effects.back()->effect().stream(effects.back()->shape().data()));
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace swarmcert::stability {
 namespace {
@@ -23,8 +24,10 @@ bool log_strength(const Neighbour& neighbour, const double* shape, double* resul
   const double height_m = std::max(dz, kNearest_m);
   const double spread_m = shape[Downwash::kSpread0] + shape[Downwash::kSpreadSlope] * height_m;
   const double in_spreads2 = (rx * rx + ry * ry) / (spread_m * spread_m);
-  if (in_spreads2 > kReachInSpreads * kReachInSpreads) return false;
-  *result = shape[Downwash::kDecay] * std::log(kReference_m / height_m) - 0.5 * in_spreads2;
+  const double tail = shape[Downwash::kTail];
+  if (tail == 0 && in_spreads2 > kReachInSpreads * kReachInSpreads) return false;
+  *result = shape[Downwash::kDecay] * std::log(kReference_m / height_m) -
+            (tail == 0 ? 0.5 * in_spreads2 : std::log1p(0.5 * tail * in_spreads2) / tail);
   if (neighbour.mass_kg != kReferenceMass_kg) {
     *result += shape[Downwash::kMassExponent] * std::log(neighbour.mass_kg / kReferenceMass_kg);
   }
@@ -42,19 +45,20 @@ double fade(double dz) {
 
 EffectInfo Downwash::describe() {
   return {"downwash",
-          "f_z = -A (sum_j g_j^p)^(1/p), g_j = (m_j / 0.034)^e (0.3 / dz)^n exp(-|r - k dz v_j|^2 / (2 (s0 + "
-          "s1 dz)^2))",
+          "f_z = -A (sum_j g_j^p)^(1/p), g_j = (m_j / 0.034)^e (0.3 / dz)^n (1 + q x)^(-1/q), "
+          "x = |r - k dz v_j|^2 / (2 (s0 + s1 dz)^2); exp(-x) for q = 0",
           "least squares on 103 230 samples of two published Crazyflies; composition from flights of three",
           "downwash",
           "pass and stay below another vehicle, 0.2 .. 0.6 m, and fly alone in the same flights",
           {{"amplitude_N", "force 0.3 m straight below a vehicle of 0.034 kg", 10.03299049 * kGramForce_N, 0,
             0.6}},
-          {{"decay_exponent", "n", 0.44084819, 0, 4},
-           {"spread_m", "s0", 0.0259477, 0.005, 0.3},
-           {"spread_slope", "s1", 0.08181592, 0, 1},
-           {"norm_exponent", "p: 1 adds forces, 2 adds momentum flux", 1.3, 1, 10},
-           {"convection_s_m", "k: 1 / speed of the wake", 0, 0, 1},
-           {"mass_exponent", "e: 0.5 is momentum theory at equal rotor area", 0.5, 0, 2}},
+          {{"decay_exponent", "n", 0.44084819, 0, 4, {0.44084819, 1}},
+           {"spread_m", "s0", 0.0259477, 0.005, 0.3, {0.0259477, 0.06}},
+           {"spread_slope", "s1", 0.08181592, 0, 1, {0.028, 0.08181592}},
+           {"norm_exponent", "p: 1 adds forces, 2 adds momentum flux", 1.3, 1, 10, {1.3, 1.85}},
+           {"convection_s_m", "k: 1 / speed of the wake", 0, 0, 1, {0, 0.15}},
+           {"mass_exponent", "e: 0.5 is momentum theory at equal rotor area", 0.5, 0, 2},
+           {"tail", "q: 0 is a Gaussian profile, 1 a Lorentzian one", 0, 0, 1, {0, 1}}},
           false,
           true};
 }
@@ -95,16 +99,16 @@ bool Downwash::in_support(const Instant& now, const double* shape) const {
 }
 
 std::vector<std::vector<double>> Downwash::grid(const FlightRange&) const {
-  // Spreads that go together, from narrow and opening to wide and parallel; the product of six grids would be
-  // thousands of columns.
+  // Spreads that go together, from narrow and opening to wide and parallel; the product of all grids would be
+  // thousands of columns. What is left out here is for refinement to find.
   const double spreads[][2] = {
       {0.0259477, 0.08181592}, {0.035, 0.1}, {0.04, 0.055}, {0.052, 0.028}, {0.06, 0.06}};
   std::vector<std::vector<double>> thetas;
   for (const auto& spread : spreads) {
-    for (const double norm : {1.3, 1.85}) {
-      for (const double convection_s_m : {0.0, 0.15}) {
-        thetas.push_back({info().shape[kDecay].value, spread[0], spread[1], norm, convection_s_m,
-                          info().shape[kMassExponent].value});
+    for (const double convection_s_m : {0.0, 0.15}) {
+      for (const double tail : {0.0, 1.0}) {
+        thetas.push_back({info().shape[kDecay].value, spread[0], spread[1], info().shape[kNorm].value,
+                          convection_s_m, info().shape[kMassExponent].value, tail});
       }
     }
   }
@@ -113,6 +117,7 @@ std::vector<std::vector<double>> Downwash::grid(const FlightRange&) const {
 
 double Downwash::reach_m(double dz_m, const double* shape) const {
   if (dz_m <= kTouching_m) return 0;
+  if (shape[kTail] > 0) return std::numeric_limits<double>::infinity();
   // The wake lags by k dz |v|; 20 m/s is faster than anything this project flies.
   const double lag_m = shape[kConvection] * dz_m * 20;
   return kReachInSpreads * (shape[kSpread0] + shape[kSpreadSlope] * std::max(dz_m, kNearest_m)) + lag_m;

@@ -1,7 +1,8 @@
 /// @file Downwash of the vehicles above, composed by a p-norm.
 ///
 /// One neighbour j, higher by dz_j, of mass m_j, gives per newton of amplitude
-///   g_j = (m_j / 0.034 kg)^e (0.3 / dz)^n exp(-|r_j|^2 / (2 s^2)) u(dz),   s = s0 + s1 dz,
+///   g_j = (m_j / 0.034 kg)^e (0.3 / dz)^n (1 + q x)^(-1/q) u(dz),   x = |r_j|^2 / (2 s^2),   s = s0 + s1 dz,
+/// exp(-x) for q = 0, a Gaussian profile; q = 1 is Lorentzian, with the far tail of a turbulent jet;
 /// with r_j the horizontal distance of its wake: the wake of a moving vehicle lags behind it by k dz v_j. Below
 /// 0.12 m dz counts as 0.12 m, and u fades the force out from there to 0.05 m, where vehicles touch. Together:
 ///   f_z = -A (sum_j g_j^p)^(1/p).
@@ -16,7 +17,7 @@ namespace swarmcert::stability {
 class Downwash : public Effect {
  public:
   /// Places in theta.
-  enum Shape { kDecay, kSpread0, kSpreadSlope, kNorm, kConvection, kMassExponent };
+  enum Shape { kDecay, kSpread0, kSpreadSlope, kNorm, kConvection, kMassExponent, kTail };
 
   Downwash() : Effect(describe()) {}
   static EffectInfo describe();

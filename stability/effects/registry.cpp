@@ -1,5 +1,7 @@
 #include "stability/effects/registry.h"
 
+#include <algorithm>
+#include <deque>
 #include <functional>
 #include <stdexcept>
 
@@ -26,7 +28,7 @@ namespace {
 
 struct Entry {
   EffectInfo info;
-  std::function<std::unique_ptr<Effect>(const EffectSpec&, const EffectContext&)> make;
+  EffectMaker make;
 };
 
 template <typename T>
@@ -41,8 +43,9 @@ Entry entry() {
 }
 
 /// A new effect is one line here.
-const std::vector<Entry>& entries() {
-  static const std::vector<Entry> all = {
+std::deque<Entry>& entries() {
+  static std::deque<Entry> all = {
+      // a deque keeps references when users add theirs
       entry<MotorLag>(),  entry<Delay>(),         entry<SensorDelay>(),   entry<ThrustRatio>(),
       entry<Battery>(),   entry<DragLinear>(),    entry<DragQuadratic>(), entry<DragRotor>(),
       entry<Inflow>(),    entry<Ground>(),        entry<Ceiling>(),       entry<Downwash>(),
@@ -64,6 +67,17 @@ std::vector<std::string> effect_names() {
   std::vector<std::string> names;
   for (const Entry& entry : entries()) names.push_back(entry.info.name);
   return names;
+}
+
+void register_effect(EffectInfo info, EffectMaker make) {
+  const std::vector<std::string> names = effect_names();
+  if (info.name.empty() || std::find(names.begin(), names.end(), info.name) != names.end())
+    throw std::invalid_argument("register_effect: the name '" + info.name + "' is empty or taken");
+  if (info.linear.empty() || info.linear.size() > kMostColumns || info.shape.size() > kMostShape)
+    throw std::invalid_argument("register_effect: " + info.name +
+                                " must have 1 to 8 coefficients and at most 8 shape parameters");
+  if (info.equivalence_class.empty()) info.equivalence_class = info.name;
+  entries().push_back({std::move(info), std::move(make)});
 }
 
 const EffectInfo& effect_info(const std::string& name) { return find(name).info; }

@@ -1,6 +1,7 @@
 /// @file Every effect by name.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,7 +13,15 @@ namespace swarmcert::stability {
 /// Names of the effects that this library knows, in the order of the documentation.
 std::vector<std::string> effect_names();
 
-/// What is known of a built-in effect.
+/// Makes an effect for one vehicle's model.
+using EffectMaker = std::function<std::unique_ptr<Effect>(const EffectSpec&, const EffectContext&)>;
+
+/// Adds an effect of your own: model files may name it, the simulator flies it, and identification tries it as it
+/// tries the others. Call it before models are read, from one thread.
+/// @throws std::invalid_argument if the name is empty or taken, or if it has no coefficient or too many.
+void register_effect(EffectInfo info, EffectMaker make);
+
+/// What is known of an effect of the registry.
 /// @throws std::invalid_argument if there is none of that name.
 const EffectInfo& effect_info(const std::string& name);
 

@@ -31,7 +31,7 @@ EffectInfo SensorDelay::describe() {
           "sensor_delay",
           "tilt of more than 5 degrees at more than 1 Hz: a motor lag does not delay the thrust axis",
           {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
-          {{"delay_s", "d", 0.0075, 0, 0.5, {0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.04}}},
+          {{"delay_s", "d", 0.0075, 0, 0.5, {0.01, 0.015, 0.02, 0.03, 0.04}}},
           true};
 }
 

@@ -13,6 +13,8 @@ namespace {
 constexpr double kStep_s = 0.01;
 constexpr double kLowest_m = 0.3;  ///< of the box; it is 0.6 m high
 constexpr double kHeight_m = 0.6;
+/// The box of one vehicle alone, as in the published flights of single vehicles: low, where the ground is felt.
+constexpr double kLowestAlone_m = 0.08, kHeightAlone_m = 0.3;
 constexpr double kPull_1_s2 = 8, kDamping_1_s = 4;
 constexpr double kSafe_m = 0.45;     ///< vehicles nearer than this repel each other
 constexpr double kRepulsion = 0.25;  ///< m^3/s^2
@@ -27,9 +29,9 @@ struct Walker {
   double next_goal_s = 0;
 };
 
-Eigen::Vector3d random_place(files::Random& random, double side_m) {
+Eigen::Vector3d random_place(files::Random& random, double side_m, double lowest_m, double height_m) {
   const double x_m = side_m / 2 * random.symmetric(), y_m = side_m / 2 * random.symmetric();
-  return {x_m, y_m, kLowest_m + kHeight_m * random.uniform()};
+  return {x_m, y_m, lowest_m + height_m * random.uniform()};
 }
 
 /// Repulsion of a vehicle at `p` from one at `q`.
@@ -46,6 +48,8 @@ Eigen::Vector3d repulsion(const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
 RandomWalk::RandomWalk(const TaskOptions& options)
     : duration_s_(options.duration_s > 0 ? options.duration_s : 60) {
   const double side_m = options.vehicles <= 2 ? 0.2 : 0.3;
+  const bool alone = options.vehicles == 1;
+  const double lowest_m = alone ? kLowestAlone_m : kLowest_m, height_m = alone ? kHeightAlone_m : kHeight_m;
   std::vector<files::Random> random;
   std::vector<Walker> walkers;
   for (int i = 0; i < options.vehicles; ++i) {
@@ -53,8 +57,8 @@ RandomWalk::RandomWalk(const TaskOptions& options)
     // They start apart, stacked over the box.
     const double share = (i + 0.5) / options.vehicles;
     Walker walker;
-    walker.p = random_place(random.back(), side_m);
-    walker.p.z() = kLowest_m + kHeight_m * share;
+    walker.p = random_place(random.back(), side_m, lowest_m, height_m);
+    walker.p.z() = lowest_m + height_m * share;
     walker.v = Eigen::Vector3d::Zero();
     walker.goal = walker.p;
     walkers.push_back(walker);
@@ -67,7 +71,7 @@ RandomWalk::RandomWalk(const TaskOptions& options)
     for (std::size_t i = 0; i < walkers.size(); ++i) {
       Walker& walker = walkers[i];
       if (time_s >= walker.next_goal_s) {
-        walker.goal = random_place(random[i], side_m);
+        walker.goal = random_place(random[i], side_m, lowest_m, height_m);
         walker.next_goal_s = time_s + std::max((walker.goal - walker.p).norm() / 0.3, 2.0) / 2;
       }
       Eigen::Vector3d a = kPull_1_s2 * (walker.goal - walker.p) - kDamping_1_s * walker.v;

@@ -240,5 +240,32 @@ TEST(ExpressionEffect, SumsOverNeighbours) {
   EXPECT_NEAR(effect.wrench(state.now).force_W_N.z(), expected, 1e-15);
 }
 
+class SidewaysPull : public Effect {
+ public:
+  SidewaysPull() : Effect(describe()) {}
+  static EffectInfo describe() {
+    return {"sideways_pull", "f_x = a T", "a test", "", "thrust changes", {{"pull", "", 0, -1, 1}}, {}};
+  }
+  void columns(const Instant& now, const double*, Wrench* columns) const override {
+    columns[0] = {{now.thrust_N, 0, 0}, {0, 0, 0}};
+  }
+};
+
+// Last: the registry keeps it.
+TEST(RegisteredEffect, IsNamedInModelFilesAndTakesPartLikeTheOthers) {
+  const EffectMaker make = [](const EffectSpec&, const EffectContext&) {
+    return std::make_unique<SidewaysPull>();
+  };
+  register_effect(SidewaysPull::describe(), make);
+  EXPECT_THROW(register_effect(SidewaysPull::describe(), make), std::invalid_argument);
+  EXPECT_EQ(effect_names().back(), "sideways_pull");
+  EXPECT_EQ(effect_info("sideways_pull").equivalence_class, "sideways_pull");
+  EffectSpec spec = spec_of("sideways_pull");
+  spec.parameters["pull"] = 0.1;
+  Instant now;
+  now.thrust_N = 0.3;
+  EXPECT_NEAR(AppliedEffect(spec, kContext).wrench(now).force_W_N.x(), 0.03, 1e-15);
+}
+
 }  // namespace
 }  // namespace swarmcert::stability

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "stability/tasks/task.h"
@@ -60,6 +61,21 @@ TEST(Tasks, RandomWalkStaysInItsLimitsAndPassesBelow) {
     }
     EXPECT_GT(stacked, 200) << "at least 2 s of downwash";
     EXPECT_GT(nearest, 0.08);
+  }
+}
+
+TEST(Tasks, ALoneRandomWalkGoesToWhereTheGroundIsFelt) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const auto task = make_task("random-walk", {1, 120, seed});
+    double lowest_m = 1;
+    int low = 0;
+    for (double t = 0; t < 120; t += 0.01) {
+      const double z_m = task->at(0, t).p_W_m.z();
+      lowest_m = std::min(lowest_m, z_m);
+      if (z_m < 0.15) ++low;
+    }
+    EXPECT_GT(lowest_m, 0.06) << "above the floor";
+    EXPECT_GT(low, 200) << "at least 2 s";
   }
 }
 

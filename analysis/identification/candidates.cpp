@@ -1,0 +1,228 @@
+#include "analysis/identification/candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "nn/files/parallel.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using stability::EffectInfo;
+using stability::EffectSpec;
+
+const EffectSpec* find(const stability::Model& model, const std::string& name,
+                       const std::string& vehicle = "") {
+  for (const EffectSpec& spec : model.effects) {
+    if (spec.name == name && spec.vehicle == vehicle) return &spec;
+  }
+  return nullptr;
+}
+
+EffectInfo info_of(const EffectSpec& spec, const std::string& path) {
+  if (!spec.is_expression()) return stability::effect_info(spec.name);
+  return stability::make_effect(spec, {"", {}, path})->info();
+}
+
+/// The candidate is what changes: bounds of the change, and the shape that the model has.
+void make_change(Candidate& candidate, const EffectSpec& present) {
+  const stability::EffectValues values = stability::effect_values(candidate.info, present);
+  candidate.thetas = {values.shape};
+  for (std::size_t c = 0; c < values.linear.size(); ++c) {
+    candidate.info.linear[c].lower -= values.linear[c];
+    candidate.info.linear[c].upper -= values.linear[c];
+  }
+  for (std::size_t i = 0; i < values.shape.size(); ++i) {
+    candidate.info.shape[i].lower = candidate.info.shape[i].upper = values.shape[i];
+    candidate.info.shape[i].grid.clear();
+  }
+}
+
+Candidate vehicle_offset(const stability::Model& model, const Coverage& coverage) {
+  Candidate result;
+  result.name = result.spec.name = "constant_force";
+  result.info = stability::effect_info("constant_force");
+  result.thetas = {{}};
+  result.vehicles = coverage.vehicles;
+  std::vector<stability::Parameter> all;
+  for (const std::string& vehicle : coverage.vehicles) {
+    const EffectSpec* present = find(model, "constant_force", vehicle);
+    for (stability::Parameter parameter : result.info.linear) {
+      const double value = present == nullptr || present->parameters.count(parameter.name) == 0
+                               ? 0
+                               : present->parameters.at(parameter.name);
+      parameter.lower -= value;
+      parameter.upper -= value;
+      parameter.name = vehicle + "." + parameter.name;
+      all.push_back(parameter);
+    }
+  }
+  result.info.linear = all;
+  return result;
+}
+
+}  // namespace
+
+Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
+                  int jobs) {
+  using residuals::Track;
+  struct Part {
+    Coverage covered;
+    double squares = 0;
+    std::set<std::string> vehicles;
+  };
+  std::vector<Part> parts(which.size());
+  files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
+    Part& part = parts[static_cast<std::size_t>(i)];
+    part.covered.range = {INFINITY, -INFINITY};
+    std::vector<std::string> problems;
+    for (const Track& track :
+         inputs.load(static_cast<std::size_t>(which[static_cast<std::size_t>(i)]), problems)) {
+      if (track.position_only || track.kind != kind) continue;
+      for (std::size_t s = 0; s < track.instants.size(); ++s) {
+        if (track.cut[s] != residuals::Cut::kNone) continue;
+        const stability::Instant& now = track.instants[s];
+        stability::FlightRange& range = part.covered.range;
+        range.z_min_m = std::min(range.z_min_m, now.p_W_m.z());
+        range.z_max_m = std::max(range.z_max_m, now.p_W_m.z());
+        part.covered.most_neighbours = std::max(part.covered.most_neighbours, now.num_neighbours);
+        part.squares += now.v_W_m_s.squaredNorm();
+        part.vehicles.insert(track.vehicle);
+        ++part.covered.records;
+      }
+    }
+  });
+  Coverage all;
+  all.range = {INFINITY, -INFINITY};
+  double squares = 0;
+  std::set<std::string> vehicles;
+  for (const Part& part : parts) {
+    all.range.z_min_m = std::min(all.range.z_min_m, part.covered.range.z_min_m);
+    all.range.z_max_m = std::max(all.range.z_max_m, part.covered.range.z_max_m);
+    all.most_neighbours = std::max(all.most_neighbours, part.covered.most_neighbours);
+    all.records += part.covered.records;
+    squares += part.squares;
+    vehicles.insert(part.vehicles.begin(), part.vehicles.end());
+  }
+  all.vehicles.assign(vehicles.begin(), vehicles.end());
+  all.speed_rms_m_s = all.records > 0 ? std::sqrt(squares / static_cast<double>(all.records)) : 0;
+  return all;
+}
+
+bool is_taken(const std::string& name, const stability::Model& model) {
+  const EffectSpec* present = find(model, name);
+  return present != nullptr && info_of(*present, model.path).remembers;
+}
+
+Candidate candidate(const std::string& name, const stability::Model& model, const Coverage& coverage) {
+  if (name == kVehicleOffset) return vehicle_offset(model, coverage);
+  Candidate result;
+  result.name = name;
+  const EffectSpec* present = find(model, name);
+  if (present != nullptr && present->is_expression()) {
+    result.spec = *present;
+  } else {
+    result.spec.name = name;
+  }
+  result.info = info_of(result.spec, model.path);
+  result.thetas = stability::make_effect(result.spec, {"", {}, model.path})->grid(coverage.range);
+  if (result.info.remembers) {
+    // A lag or delay has gain 1. Some freedom lets a coarse grid of times find it.
+    result.info.linear[0].lower = 1 - kMemoryTolerance;
+    result.info.linear[0].upper = 1 + kMemoryTolerance;
+  }
+  if (present == nullptr) return result;
+  const stability::EffectValues values = stability::effect_values(result.info, *present);
+  const bool is_switched_off =
+      present->is_expression() &&
+      std::all_of(values.linear.begin(), values.linear.end(), [](double value) { return value == 0; });
+  if (!is_switched_off) make_change(result, *present);
+  return result;
+}
+
+std::vector<std::string> candidate_names(const stability::Model& model) {
+  std::vector<std::string> names;
+  for (const std::string& name : stability::effect_names()) {
+    if (name != "deep_set" && name != "torque_bias") names.push_back(name);
+  }
+  for (const EffectSpec& spec : model.effects) {
+    if (spec.is_expression()) names.push_back(spec.name);
+  }
+  names.emplace_back(kVehicleOffset);
+  return names;
+}
+
+std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage) {
+  std::vector<Candidate> all;
+  for (const std::string& name : candidate_names(model)) {
+    if (name == kVehicleOffset && coverage.vehicles.size() < 2) continue;
+    if (is_taken(name, model)) continue;
+    Candidate next = candidate(name, model, coverage);
+    if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
+    all.push_back(std::move(next));
+  }
+  return all;
+}
+
+std::vector<EffectSpec> specs_of(const Candidate& candidate, const std::vector<double>& coefficients,
+                                 const std::vector<double>& theta,
+                                 const std::vector<std::pair<double, double>>& linear_intervals,
+                                 const std::vector<std::pair<double, double>>& shape_intervals) {
+  const std::vector<std::string> vehicles =
+      candidate.vehicles.empty() ? std::vector<std::string>{""} : candidate.vehicles;
+  const std::size_t each = coefficients.size() / vehicles.size();
+  std::vector<EffectSpec> specs;
+  for (std::size_t v = 0; v < vehicles.size(); ++v) {
+    EffectSpec spec = candidate.spec;
+    spec.vehicle = vehicles[v];
+    for (std::size_t c = 0; c < each; ++c) {
+      std::string name = candidate.info.linear[v * each + c].name;
+      if (!vehicles[v].empty()) name = name.substr(vehicles[v].size() + 1);
+      spec.parameters[name] = coefficients[v * each + c];
+      spec.fit.interval[name] = linear_intervals[v * each + c];
+    }
+    for (std::size_t i = 0; i < theta.size(); ++i) {
+      const std::string& name = candidate.info.shape[i].name;
+      spec.parameters[name] = theta[i];
+      if (shape_intervals[i].first < shape_intervals[i].second) spec.fit.interval[name] = shape_intervals[i];
+    }
+    specs.push_back(std::move(spec));
+  }
+  return specs;
+}
+
+stability::Model with_effects(const stability::Model& model, const std::vector<EffectSpec>& specs) {
+  stability::Model result = model;
+  for (const EffectSpec& spec : specs) {
+    const auto known = std::find_if(result.effects.begin(), result.effects.end(), [&](const EffectSpec& e) {
+      return e.name == spec.name && e.vehicle == spec.vehicle;
+    });
+    if (known == result.effects.end()) {
+      result.effects.push_back(spec);
+      continue;
+    }
+    // candidate() kept the shape, or the coefficients were zero: c1 X + c2 X = (c1 + c2) X; the intervals are those of
+    // the addition.
+    const EffectInfo info = info_of(*known, model.path);
+    const stability::EffectValues values = stability::effect_values(info, *known);
+    for (std::size_t c = 0; c < info.linear.size(); ++c) {
+      const std::string& name = info.linear[c].name;
+      known->parameters[name] = values.linear[c] + spec.parameters.at(name);
+      const auto& [lower, upper] = spec.fit.interval.at(name);
+      known->fit.interval[name] = {values.linear[c] + lower, values.linear[c] + upper};
+    }
+    for (const stability::Parameter& p : info.shape) {
+      known->parameters[p.name] = spec.parameters.at(p.name);
+      const auto interval = spec.fit.interval.find(p.name);
+      if (interval != spec.fit.interval.end()) known->fit.interval[p.name] = interval->second;
+    }
+    known->fit.flights = spec.fit.flights;
+    known->fit.note = spec.fit.note;
+  }
+  return result;
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,70 @@
+/// @file Which effects may be missing, with the thetas to try.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/residuals/inputs.h"
+#include "stability/effects/effect.h"
+
+namespace swarmcert::identification {
+
+/// An effect that may be missing, with the thetas to try.
+struct Candidate {
+  std::string name;
+  stability::EffectSpec spec;  ///< as the model file would name it, without values
+  stability::EffectInfo info;  ///< coefficients per vehicle where `vehicles` names some: "cf50.force_x_N"
+  std::vector<std::vector<double>> thetas;
+  std::vector<std::string> vehicles = {};  ///< each has coefficients of its own; empty: all have the same
+
+  int columns() const { return static_cast<int>(info.linear.size()); }
+};
+
+/// What the flights of one kind of vehicle cover.
+struct Coverage {
+  stability::FlightRange range;
+  int most_neighbours = 0;
+  double speed_rms_m_s = 0;
+  std::size_t records = 0;
+  std::vector<std::string> vehicles;  ///< of the kind that flew, without those used for their position only
+};
+
+/// Coverage of the flights `which` (indices into inputs.found.flights) by vehicles of `kind`.
+Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
+                  int jobs);
+
+/// Every effect of the registry that a force can reveal, with its grid fitted to the coverage, and those that the
+/// model file defines by formulas. Effects of neighbours are left out where nobody has one, lags and delays where
+/// `model` has them; deep sets always, because a network must be named. Where several vehicles flew, also a constant
+/// force of each.
+std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage);
+
+/// One candidate by name. Of an effect that `model` has already, the candidate is a change of its coefficients; of a
+/// formula whose coefficients are all zero in `model`, the formula with all its thetas.
+/// @param name "constant_force" or another, "vehicle_offset" for a constant force of each vehicle.
+/// @throws std::invalid_argument if there is none.
+Candidate candidate(const std::string& name, const stability::Model& model, const Coverage& coverage);
+
+/// Names that candidate() knows for `model`.
+std::vector<std::string> candidate_names(const stability::Model& model);
+
+/// True for lags and delays that `model` has: a second one cannot be written as a change of the first.
+bool is_taken(const std::string& name, const stability::Model& model);
+
+/// A lag or delay whose gain would be further from 1 than this is something else.
+inline constexpr double kMemoryTolerance = 0.3;
+
+/// The name under which candidate() gives each vehicle a constant force of its own.
+inline constexpr char kVehicleOffset[] = "vehicle_offset";
+
+/// `spec` of `candidate` with these numbers; several where each vehicle has its own.
+std::vector<stability::EffectSpec> specs_of(const Candidate& candidate,
+                                            const std::vector<double>& coefficients,
+                                            const std::vector<double>& theta,
+                                            const std::vector<std::pair<double, double>>& linear_intervals,
+                                            const std::vector<std::pair<double, double>>& shape_intervals);
+
+/// `model` with `specs`; an effect that the model has already is increased instead.
+stability::Model with_effects(const stability::Model& model, const std::vector<stability::EffectSpec>& specs);
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,37 @@
+/// @file What is known of each selected effect, and which others could stand in its place.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/identification/selection.h"
+
+namespace swarmcert::identification {
+
+using Interval = std::pair<double, double>;
+
+/// A candidate that these data cannot tell from a selected effect.
+struct Rival {
+  std::string effect;
+  std::string excitation;  ///< what would show it
+};
+
+/// Everything known of a selected effect.
+struct Finding {
+  Member member;
+  double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated, of the vector
+  Interval drop_interval;  ///< 90 % of the relative fall of the RMSE, by resampling blocks
+  double paired_z = 0, wald_z = 0;
+  Support support;
+  std::vector<Rival> rivals;
+  std::vector<Interval>
+      model_form;  ///< of each coefficient: spread over fits without a fold, and with a rival added
+
+  std::vector<std::string> confounded_with() const;
+};
+
+/// @param members in the order of their ranking.
+std::vector<Finding> findings(const Selection& selection, const Members& members);
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,32 @@
+/// @file Is an effect real, or does the controller make it up? A check against closed-loop bias.
+///
+/// Thrust answers disturbances, so that least squares mistakes the answer for a cause. Set points do not answer: the
+/// columns along the set points, as if vehicles followed them exactly, are instruments Z. With as many instruments as
+/// columns, c = (Z'X)^-1 Z'r. Source: the instrumental-variable estimator; its comparison with least squares is
+/// Hausman's test 1978, here with influences summed by block.
+#pragma once
+
+#include <vector>
+
+#include "analysis/identification/refinement.h"
+
+namespace swarmcert::identification {
+
+/// One coefficient by both estimators.
+struct InstrumentedValue {
+  double least_squares = 0, instrument = 0;
+  Interval interval;        ///< 90 %, of `instrument`
+  double difference_z = 0;  ///< their difference over its standard error
+
+  /// The instrument can tell the coefficient from none at all.
+  bool is_strong() const;
+  /// ... and says that most of it is not there.
+  bool contradicts() const;
+};
+
+/// Both estimates of all coefficients of `effects` together, without bounds, effect by effect. Empty where a log has
+/// no set points, or nothing moves.
+std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
+                                                       const std::vector<Candidate>& effects);
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,260 @@
+#include "analysis/identification/refinement.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+
+#include "analysis/identification/box_least_squares.h"
+
+namespace swarmcert::identification {
+namespace {
+
+constexpr std::size_t kManyRecords = 400'000;
+constexpr double kDifference = 0.05;  ///< of a shape's scale, for derivatives
+constexpr double kLargestStep = 0.5;  ///< of a shape's scale
+constexpr double kSettled = 0.01;
+
+/// One number that varies: a coefficient, or a shape of a member.
+struct Unknown {
+  std::size_t member;
+  bool is_shape;
+  std::size_t index;
+  double scale;  ///< of shapes
+};
+
+/// The members at one point of their shapes, with the columns of coefficients and of derivatives.
+struct Point {
+  std::vector<std::vector<double>> thetas;  ///< by member
+  std::vector<Block> blocks;                ///< over the unknowns
+  Eigen::MatrixXd gram;
+  Eigen::VectorXd b, coefficients;  ///< coefficients: of the fit with these thetas; 0 for shapes
+  double error = 0;                 ///< of that fit
+  double equations = 0;
+};
+
+double scale_of(const stability::Parameter& parameter, double value) {
+  double typical = std::abs(value);
+  if (!parameter.grid.empty()) typical = std::max(typical, 0.5 * std::abs(parameter.grid.back()));
+  return typical;
+}
+
+class Refinement {
+ public:
+  Refinement(const Passes& passes, const Grams& grams, const Members& members) : passes_(passes) {
+    for (const Member& m : members) {
+      candidates_.push_back(grams.candidates[static_cast<std::size_t>(m.candidate)]);
+      Candidate& candidate = candidates_.back();
+      const std::vector<std::vector<double>> tried = candidate.thetas;
+      const std::vector<double> theta = tried[static_cast<std::size_t>(m.theta)];
+      const std::size_t index = candidates_.size() - 1;
+      // A lag is a lag: once found, its gain is 1 and its time takes what the free gain had taken.
+      if (candidate.info.remembers) candidate.info.linear[0].lower = candidate.info.linear[0].upper = 1;
+      for (std::size_t c = 0; c < candidate.info.linear.size(); ++c)
+        unknowns_.push_back({index, false, c, 0});
+      for (std::size_t i = 0; i < theta.size(); ++i) {
+        const stability::Parameter& parameter = candidate.info.shape[i];
+        const bool varies = !parameter.grid.empty() ||
+                            std::any_of(tried.begin(), tried.end(), [&](const std::vector<double>& other) {
+                              return other[i] != theta[i];
+                            });
+        const double scale = scale_of(parameter, theta[i]);
+        if (varies && scale > 0 && parameter.lower < parameter.upper)
+          unknowns_.push_back({index, true, i, scale});
+      }
+      start_.push_back(theta);
+    }
+  }
+
+  std::vector<Refined> run() {
+    Point best = evaluate(start_);
+    const bool moves =
+        std::any_of(unknowns_.begin(), unknowns_.end(), [](const Unknown& u) { return u.is_shape; });
+    const int steps = !moves ? 0 : passes_.records > kManyRecords ? 1 : 7;
+    double radius = kLargestStep;
+    for (int i = 0; i < steps; ++i) {
+      double length = 0;
+      const std::vector<std::vector<double>> next = step(best, radius, &length);
+      if (length < kSettled) break;
+      Point point = evaluate(next);
+      if (point.error < best.error)
+        best = std::move(point);
+      else
+        radius *= 0.3;
+    }
+    return result(best);
+  }
+
+ private:
+  double& shape(std::vector<std::vector<double>>& thetas, const Unknown& u) const {
+    return thetas[u.member][u.index];
+  }
+  const stability::Parameter& parameter(const Unknown& u) const {
+    const stability::EffectInfo& info = candidates_[u.member].info;
+    return u.is_shape ? info.shape[u.index] : info.linear[u.index];
+  }
+
+  /// One pass over the flights.
+  Point evaluate(const std::vector<std::vector<double>>& thetas) const {
+    struct Difference {
+      double lower, upper;
+    };
+    std::vector<Candidate> around = candidates_;
+    std::vector<Difference> differences(unknowns_.size(), {0, 0});
+    for (std::size_t m = 0; m < around.size(); ++m) around[m].thetas = {thetas[m]};
+    for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+      const Unknown& u = unknowns_[k];
+      if (!u.is_shape) continue;
+      const double at = thetas[u.member][u.index], h = kDifference * u.scale;
+      differences[k] = {std::max(at - h, parameter(u).lower), std::min(at + h, parameter(u).upper)};
+      for (const double value : {differences[k].lower, differences[k].upper}) {
+        around[u.member].thetas.push_back(thetas[u.member]);
+        around[u.member].thetas.back()[u.index] = value;
+      }
+    }
+    const Grams full =
+        block_grams(passes_.inputs, passes_.kind, around, passes_.flights, passes_.jobs, passes_.progress);
+    Members members;
+    for (int m = 0; m < static_cast<int>(around.size()); ++m) members.push_back({m, 0});
+    Point point;
+    point.thetas = thetas;
+    const Eigen::VectorXd c = Selection(full).fit(members).coefficients;
+    // Column of unknown k = sum over the columns of `full`.
+    Eigen::MatrixXd mix = Eigen::MatrixXd::Zero(full.columns, static_cast<Eigen::Index>(unknowns_.size()));
+    point.coefficients = Eigen::VectorXd::Zero(mix.cols());
+    std::vector<std::size_t> next_theta(around.size(), 1);
+    std::vector<Eigen::Index> first_coefficient(around.size(), 0);
+    for (std::size_t m = 1; m < around.size(); ++m)
+      first_coefficient[m] = first_coefficient[m - 1] + around[m - 1].columns();
+    for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+      const Unknown& u = unknowns_[k];
+      const auto column = static_cast<Eigen::Index>(k);
+      const Eigen::Index first = first_coefficient[u.member];
+      const std::vector<int>& columns = full.first_column[u.member];
+      if (!u.is_shape) {
+        point.coefficients[column] = c[first + static_cast<Eigen::Index>(u.index)];
+        mix(columns[0] + static_cast<int>(u.index), column) = 1;
+        continue;
+      }
+      const std::size_t lower = next_theta[u.member]++, upper = next_theta[u.member]++;
+      const double width = differences[k].upper - differences[k].lower;
+      for (int i = 0; i < around[u.member].columns(); ++i) {
+        mix(columns[upper] + i, column) = c[first + i] / width;
+        mix(columns[lower] + i, column) = -c[first + i] / width;
+      }
+    }
+    const Eigen::Index n = mix.cols();
+    point.gram = Eigen::MatrixXd::Zero(n, n);
+    point.b = Eigen::VectorXd::Zero(n);
+    double y = 0;
+    for (const Block& block : full.blocks) {
+      Eigen::MatrixXd dense(full.columns, full.columns);
+      for (int j = 0; j < full.columns; ++j) {
+        for (int i = 0; i <= j; ++i) dense(i, j) = dense(j, i) = block.gram[Grams::packed(i, j)];
+      }
+      const Eigen::MatrixXd gram = mix.transpose() * dense * mix;
+      Block small;
+      small.gram.resize(n * (n + 1) / 2);
+      for (Eigen::Index j = 0; j < n; ++j)
+        small.gram.segment(j * (j + 1) / 2, j + 1) = gram.col(j).head(j + 1);
+      small.b = mix.transpose() * block.b;
+      small.follows = block.follows;
+      point.gram += gram;
+      point.b += small.b;
+      y += block.y;
+      point.equations += 3.0 * block.records;
+      point.blocks.push_back(std::move(small));
+    }
+    point.error =
+        y - 2 * point.coefficients.dot(point.b) + point.coefficients.dot(point.gram * point.coefficients);
+    return point;
+  }
+
+  /// One over the variance of the pull of each shape towards where it is, in units of the noise.
+  Eigen::VectorXd ridge(const Point& point) const {
+    Eigen::VectorXd pull = Eigen::VectorXd::Zero(point.b.size());
+    const double variance = point.error / std::max(point.equations, 1.0);
+    for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+      const double scale = unknowns_[k].scale;
+      if (unknowns_[k].is_shape) pull[static_cast<Eigen::Index>(k)] = variance / (scale * scale);
+    }
+    return pull;
+  }
+
+  std::vector<std::vector<double>> step(const Point& from, double radius, double* length) const {
+    Eigen::VectorXd lower(from.b.size()), upper = lower;
+    for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+      const Unknown& u = unknowns_[k];
+      const auto i = static_cast<Eigen::Index>(k);
+      lower[i] = parameter(u).lower;
+      upper[i] = parameter(u).upper;
+      if (!u.is_shape) continue;
+      const double at = from.thetas[u.member][u.index];
+      lower[i] = std::max(lower[i] - at, -radius * u.scale);
+      upper[i] = std::min(upper[i] - at, radius * u.scale);
+    }
+    Eigen::MatrixXd gram = from.gram;
+    gram.diagonal() += ridge(from);
+    const Eigen::VectorXd change = box_least_squares(gram, from.b, lower, upper);
+    std::vector<std::vector<double>> thetas = from.thetas;
+    *length = 0;
+    for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+      const Unknown& u = unknowns_[k];
+      if (!u.is_shape) continue;
+      const double moved = change[static_cast<Eigen::Index>(k)];
+      shape(thetas, u) = std::clamp(shape(thetas, u) + moved, parameter(u).lower, parameter(u).upper);
+      *length = std::max(*length, std::abs(moved) / u.scale);
+    }
+    return thetas;
+  }
+
+  std::vector<Refined> result(const Point& best) const {
+    std::vector<int> free;
+    for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+      const Unknown& u = unknowns_[k];
+      const auto i = static_cast<Eigen::Index>(k);
+      const double value = u.is_shape ? best.thetas[u.member][u.index] : best.coefficients[i];
+      const bool held = parameter(u).lower == parameter(u).upper;
+      const bool at_end = u.is_shape && (value <= parameter(u).lower || value >= parameter(u).upper);
+      if (!held && !at_end && best.gram(i, i) > 0) free.push_back(static_cast<int>(k));
+    }
+    const Eigen::MatrixXd covariance = sandwich(best.blocks, free, best.coefficients, ridge(best));
+    const double freedom = static_cast<double>(best.blocks.size()) - static_cast<double>(free.size());
+    const double quantile = boost::math::quantile(boost::math::students_t(std::max(freedom, 1.0)), 0.95);
+    std::vector<Refined> refined;
+    for (std::size_t m = 0; m < candidates_.size(); ++m) {
+      refined.push_back({candidates_[m], {}, best.thetas[m], {}, {}});
+      refined.back().candidate.thetas = {best.thetas[m]};
+      for (const double value : best.thetas[m]) refined.back().shape_intervals.emplace_back(value, value);
+    }
+    for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+      const Unknown& u = unknowns_[k];
+      const auto i = static_cast<Eigen::Index>(k);
+      Refined& to = refined[u.member];
+      const double half = quantile * std::sqrt(std::max(0.0, covariance(i, i)));
+      const double value = u.is_shape ? to.theta[u.index] : best.coefficients[i];
+      const Interval interval = {std::max(value - half, parameter(u).lower),
+                                 std::min(value + half, parameter(u).upper)};
+      if (u.is_shape) {
+        to.shape_intervals[u.index] = interval;
+      } else {
+        to.coefficients.push_back(value);
+        to.linear_intervals.push_back(interval);
+      }
+    }
+    return refined;
+  }
+
+  const Passes& passes_;
+  std::vector<Candidate> candidates_;
+  std::vector<Unknown> unknowns_;  ///< of each member first the coefficients, then the shapes
+  std::vector<std::vector<double>> start_;
+};
+
+}  // namespace
+
+std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members) {
+  if (members.empty()) return {};
+  return Refinement(passes, grams, members).run();
+}
+
+}  // namespace swarmcert::identification

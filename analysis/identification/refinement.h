@@ -1,0 +1,33 @@
+/// @file Thetas off the grid, with intervals for them: Gauss-Newton steps on coefficients and shapes together.
+#pragma once
+
+#include <vector>
+
+#include "analysis/identification/findings.h"
+
+namespace swarmcert::identification {
+
+/// A selected effect with the numbers that fit best.
+struct Refined {
+  Candidate candidate;  ///< its only theta is the best one
+  std::vector<double> coefficients, theta;
+  /// 90 %, from the sandwich of coefficients and free shapes together; equal ends where a number was held.
+  std::vector<Interval> linear_intervals, shape_intervals;
+};
+
+/// What a pass over the flights needs to know.
+struct Passes {
+  const residuals::Inputs& inputs;
+  std::string kind;
+  std::vector<int> flights;  ///< indices into inputs.found.flights
+  std::size_t records = 0;
+  int jobs = 0;
+  residuals::Progress progress;
+};
+
+/// Refines `members` of `grams` jointly. Derivatives with respect to shapes are differences of columns; steps are
+/// bounded, and a weak pull towards the start keeps shapes in place about which the flights say nothing. Flights of
+/// more than 400 000 records get one step.
+std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members);
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,45 @@
+#include "analysis/identification/remainder.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "analysis/residuals/comparison.h"
+
+namespace swarmcert::identification {
+namespace {
+
+constexpr double kFlagRatio = 3;
+constexpr double kLeastShare =
+    0.02;  ///< of the squared residual that the means over a variable's regions explain
+
+}  // namespace
+
+Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {
+  residuals::Inputs inputs = passes.inputs;
+  inputs.models = {with_effects(*inputs.model_of(passes.kind), specs)};
+  for (auto& [vehicle, model] : inputs.vehicle_models) model = with_effects(model, specs);
+  std::vector<residuals::FlightFiles> flights;
+  for (const int i : passes.flights) flights.push_back(inputs.found.flights[static_cast<std::size_t>(i)]);
+  inputs.found.flights = flights;
+  const residuals::Comparison left = residuals::compare(inputs, passes.jobs, [](int, int) {});
+  Remainder result;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double ratio = left.overall.low_band_to_floor[axis];
+    if (std::isfinite(ratio)) result.ratio = std::max(result.ratio, ratio);
+  }
+  result.flag = result.ratio > kFlagRatio;
+  if (!result.flag) return result;
+  std::array<double, residuals::kNumVariables> shares{};
+  for (const residuals::RegionErrors& region : left.regions)
+    shares[static_cast<std::size_t>(region.variable)] += region.share;
+  for (int rank = 0; rank < residuals::kNumVariables; ++rank) {
+    const auto largest = std::max_element(shares.begin(), shares.end());
+    if (*largest < kLeastShare) break;
+    result.depends_on.emplace_back(residuals::variable_name(static_cast<int>(largest - shares.begin())));
+    *largest = 0;
+  }
+  return result;
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "analysis/identification/box_least_squares.h"
+#include "analysis/identification/injection.h"
+#include "analysis/identification/selection.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::identification {
+namespace {
+
+TEST(BoxLeastSquares, MeetsTheConditionsOfAnOptimumWithinBounds) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> bell;
+  int at_bounds = 0, free = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const int n = 1 + trial % 6;
+    Eigen::MatrixXd x(20, n);
+    Eigen::VectorXd r(20), lower(n), upper(n);
+    for (int i = 0; i < 20; ++i) {
+      for (int j = 0; j < n; ++j) x(i, j) = bell(random);
+      r[i] = bell(random);
+    }
+    for (int j = 0; j < n; ++j) {
+      lower[j] = -0.2 * std::abs(bell(random));
+      upper[j] = 0.2 * std::abs(bell(random));
+    }
+    const Eigen::MatrixXd gram = x.transpose() * x;
+    const Eigen::VectorXd b = x.transpose() * r;
+    const Eigen::VectorXd c = box_least_squares(gram, b, lower, upper);
+    const Eigen::VectorXd downhill = b - gram * c;
+    for (int j = 0; j < n; ++j) {
+      ASSERT_GE(c[j], lower[j]);
+      ASSERT_LE(c[j], upper[j]);
+      const double tolerance = 1e-6 * (1 + b.norm());
+      if (c[j] == lower[j]) {
+        EXPECT_LE(downhill[j], tolerance);
+        ++at_bounds;
+      } else if (c[j] == upper[j]) {
+        EXPECT_GE(downhill[j], -tolerance);
+        ++at_bounds;
+      } else {
+        EXPECT_NEAR(downhill[j], 0, tolerance);
+        ++free;
+      }
+    }
+  }
+  EXPECT_GT(at_bounds, 50);
+  EXPECT_GT(free, 50);
+}
+
+/// Forty blocks of white noise; the one candidate's column is as random as the residual.
+struct WhiteNoise {
+  static constexpr int kBlocks = 40, kRows = 600;
+  std::vector<Eigen::VectorXd> column, residual;
+  Candidate candidate;
+
+  WhiteNoise() {
+    std::mt19937_64 random(2);
+    std::normal_distribution<double> bell;
+    for (int k = 0; k < kBlocks; ++k) {
+      column.emplace_back(kRows);
+      residual.emplace_back(kRows);
+      for (int i = 0; i < kRows; ++i) {
+        column.back()[i] = bell(random);
+        residual.back()[i] = 0.01 * bell(random);
+      }
+    }
+    candidate.name = candidate.spec.name = "drag_linear";
+    candidate.info = stability::effect_info("drag_linear");
+    candidate.thetas = {{}};
+  }
+  /// With `size` times the column in the residual.
+  Grams grams(double size) const {
+    Grams result;
+    result.candidates = {candidate};
+    result.first_column = {{0}};
+    result.support = {{{10'000, 40, 1}}};
+    result.columns = 1;
+    for (std::size_t k = 0; k < column.size(); ++k) {
+      const Eigen::VectorXd r = residual[k] + size * column[k];
+      Block block;
+      block.gram = Eigen::VectorXd::Constant(1, column[k].squaredNorm());
+      block.b = Eigen::VectorXd::Constant(1, column[k].dot(r));
+      block.y = r.squaredNorm();
+      block.records = kRows / 3;
+      result.blocks.push_back(block);
+    }
+    return result;
+  }
+};
+
+TEST(Detectable, SizesAreWhereInjectionsBeginToShow) {
+  const WhiteNoise noise;
+  const Grams grams = noise.grams(0);
+  const std::vector<Detectable> sizes = detectable(grams, {});
+  ASSERT_EQ(sizes.size(), 1u);
+  // The gain of 2 % needs size^2 / (size^2 + 0.01^2) = 0.02: 0.00143.
+  EXPECT_NEAR(sizes[0].size, 0.00143, 0.0003);
+  for (const double factor : {0.7, 1.3}) {
+    const Grams injected = noise.grams(factor * sizes[0].size);
+    EXPECT_EQ(Selection(injected).is_acceptable({}, {0, 0}), factor > 1) << factor;
+  }
+}
+
+TEST(Sandwich, IsTheVarianceOfWhiteNoiseAndGrowsWhereBlocksAreAlike) {
+  const WhiteNoise noise;
+  const Grams grams = noise.grams(0);
+  double energy = 0, product = 0;
+  for (const Block& block : grams.blocks) {
+    energy += block.gram[0];
+    product += block.b[0];
+  }
+  const Eigen::VectorXd c = Eigen::VectorXd::Constant(1, product / energy);
+  const double white = 0.01 * 0.01 / energy;
+  EXPECT_NEAR(sandwich(grams.blocks, {0}, c)(0, 0), white, 0.5 * white);  // 40 blocks: 22 % standard error
+  // Each block twice: the same news counted twice, where the second follows the first.
+  std::vector<Block> twice;
+  for (const Block& block : grams.blocks) {
+    twice.push_back(block);
+    twice.push_back(block);
+    twice.back().follows = true;
+  }
+  EXPECT_GT(sandwich(twice, {0}, c)(0, 0), 0.7 * sandwich(grams.blocks, {0}, c)(0, 0));
+  for (Block& block : twice) block.follows = false;
+  EXPECT_LT(sandwich(twice, {0}, c)(0, 0), 0.6 * sandwich(grams.blocks, {0}, c)(0, 0));
+}
+
+}  // namespace
+}  // namespace swarmcert::identification

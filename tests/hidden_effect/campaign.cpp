@@ -1,0 +1,321 @@
+#include "hidden_effect/campaign.h"
+
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <boost/math/distributions/beta.hpp>
+#include <cmath>
+#include <filesystem>
+
+#include "analysis/run.h"
+#include "data.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::tests {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kLag_s = 0.06;
+
+/// Sanchez-Cuevas, Heredia and Ollero 2017: four rotors near the ground, R = 23.5 mm, arms of 46 mm.
+Vector3d multirotor_ground(const Moment& now, double radius_m) {
+  const double R = radius_m, d = 2 * 0.0325, b = 0.092, kBody = 2;
+  const double z = std::max(now.p_m.z() - 0.02, 0.03);
+  const auto power = [](double x) { return x * std::sqrt(x); };
+  const double loss = (R / (4 * z)) * (R / (4 * z)) + R * R * z / power(d * d + 4 * z * z) +
+                      R * R / 2 * z / power(2 * d * d + 4 * z * z) +
+                      2 * R * R * z * kBody / power(b * b + 4 * z * z);
+  return now.thrust_N * (1 / (1 - loss) - 1) * now.b3;
+}
+
+/// Gain at the floor and a dip above it, as published flights show.
+Vector3d ground_with_dip(const Moment& now) {
+  const double h = now.p_m.z() - 0.06;
+  const double bump = (now.p_m.z() - 0.19) / 0.04;
+  return now.thrust_N * (0.2 * std::exp(-h / 0.04) - 0.01 * std::exp(-bump * bump / 2)) * now.b3;
+}
+
+/// Each of the upper vehicle's rotors blows by itself.
+Vector3d jet_per_rotor(const Moment& now) {
+  double sum_N = 0;
+  for (const Moment::Other& other : now.others) {
+    const double dz = other.dp_m.z();
+    if (dz < 0.05) continue;
+    const double spread_m = 0.03 + 0.07 * dz;
+    for (const double x : {-0.0325, 0.0325}) {
+      for (const double y : {-0.0325, 0.0325}) {
+        const double r2 = std::pow(other.dp_m.x() + x, 2) + std::pow(other.dp_m.y() + y, 2);
+        sum_N += 0.033 * std::min((dz - 0.05) / 0.07, 1.0) * std::exp(-r2 / (2 * spread_m * spread_m));
+      }
+    }
+  }
+  return {0, 0, -sum_N};
+}
+
+Vector3d jet_lorentzian(const Moment& now) {
+  double sum_N = 0;
+  for (const Moment::Other& other : now.others) {
+    const double dz = other.dp_m.z();
+    if (dz < 0.05) continue;
+    sum_N +=
+        0.09 * std::min((dz - 0.05) / 0.07, 1.0) / (1 + other.dp_m.head<2>().squaredNorm() / (0.08 * 0.08));
+  }
+  return {0, 0, -sum_N};
+}
+
+/// The library's form with its default spreads: f_z = -A (0.3 / dz)^0.44 exp(-r^2 / (2 (s0 + s1 dz)^2)).
+Vector3d jet_gaussian(const Moment& now, double amplitude_N) {
+  double sum_N = 0;
+  for (const Moment::Other& other : now.others) {
+    const double dz = other.dp_m.z();
+    if (dz <= 0.05) continue;
+    const double height_m = std::max(dz, 0.12);
+    const double spread_m = 0.026 + 0.082 * height_m;
+    const double x = std::min((dz - 0.05) / 0.07, 1.0);
+    sum_N += amplitude_N * x * x * (3 - 2 * x) * std::pow(0.3 / height_m, 0.44) *
+             std::exp(-other.dp_m.head<2>().squaredNorm() / (2 * spread_m * spread_m));
+  }
+  return {0, 0, -sum_N};
+}
+
+/// Wide rotors under a ceiling at 1.25 m: 1 / (1 - a (R / gap)^2), Sanchez-Cuevas's measured form. Steeper ones pull
+/// the vehicle up faster than its controller lets go.
+Vector3d rational_ceiling(const Moment& now) {
+  const double gap_m = std::max(1.25 - now.p_m.z(), 0.2);
+  return now.thrust_N * (1 / (1 - 0.8 * std::pow(0.1 / gap_m, 2)) - 1) * now.b3;
+}
+
+Hidden force(const std::string& name, std::function<Vector3d(const Moment&)> f,
+             std::set<std::string> answers) {
+  Hidden hidden;
+  hidden.name = name;
+  hidden.truth.force_N = std::move(f);
+  hidden.answers = std::move(answers);
+  return hidden;
+}
+
+Hidden valued(Hidden hidden, const std::string& parameter, double value, double tolerance = 0.1) {
+  hidden.parameter = parameter;
+  hidden.value = value;
+  hidden.tolerance = tolerance;
+  return hidden;
+}
+
+Hidden signals(const std::string& name, const std::function<void(Truth&)>& change,
+               std::set<std::string> answers) {
+  Hidden hidden;
+  hidden.name = name;
+  change(hidden.truth);
+  hidden.answers = std::move(answers);
+  return hidden;
+}
+
+/// Both truths at once.
+Truth together(const Truth& a, const Truth& b) {
+  Truth both = a;
+  both.mass_factor *= b.mass_factor;
+  both.thrust_factor *= b.thrust_factor;
+  both.battery_1_V += b.battery_1_V;
+  both.motor_lag_s = std::max(a.motor_lag_s, b.motor_lag_s);
+  both.motor_lag2_s = std::max(a.motor_lag2_s, b.motor_lag2_s);
+  both.command_delay_s += b.command_delay_s;
+  both.sensor_delay_s += b.sensor_delay_s;
+  both.imu_bias_m_s2 += b.imu_bias_m_s2;
+  both.gust_N = std::hypot(a.gust_N, b.gust_N);
+  if (a.force_N && b.force_N)
+    both.force_N = [f = a.force_N, g = b.force_N](const Moment& now) { return Vector3d(f(now) + g(now)); };
+  else if (b.force_N)
+    both.force_N = b.force_N;
+  return both;
+}
+
+}  // namespace
+
+std::vector<Hidden> single_effects() {
+  const std::set<std::string> constant = {"constant_force"};
+  std::vector<Hidden> all = {
+      // What is too heavy by a twentieth seems to have a twentieth less thrust.
+      valued(signals("mass", [](Truth& t) { t.mass_factor = 1.05; }, {"thrust_ratio"}), "ratio",
+             1 / 1.05 - 1),
+      valued(signals("thrust", [](Truth& t) { t.thrust_factor = 1.08; }, {"thrust_ratio"}), "ratio", 0.08),
+      valued(signals("battery", [](Truth& t) { t.battery_1_V = 0.25; }, {"battery"}), "sensitivity_1_V",
+             0.25),
+      valued(signals("motor lag", [](Truth& t) { t.motor_lag_s = kLag_s; }, {"motor_lag"}), "tau_s", kLag_s),
+      signals("motor of second order",
+              [](Truth& t) {
+                t.motor_lag_s = 0.045;
+                t.motor_lag2_s = 0.02;
+              },
+              {"motor_lag"}),
+      valued(signals("command delay", [](Truth& t) { t.command_delay_s = 0.03; }, {"delay"}), "delay_s",
+             0.03),
+      valued(signals("sensor delay", [](Truth& t) { t.sensor_delay_s = 0.03; }, {"sensor_delay"}), "delay_s",
+             0.03),
+      valued(force("linear drag", [](const Moment& now) { return Vector3d(-0.02 * now.v_m_s); },
+                   {"drag_linear"}),
+             "drag_N_s_m", 0.02),
+      valued(force("quadratic drag",
+                   [](const Moment& now) { return Vector3d(-0.03 * now.v_m_s.norm() * now.v_m_s); },
+                   {"drag_quadratic"}),
+             "drag_N_s2_m2", 0.03),
+      valued(force("rotor drag",
+                   [](const Moment& now) {
+                     const Vector3d in_plane = now.v_m_s - now.b3 * now.b3.dot(now.v_m_s);
+                     return Vector3d(-0.02 * now.thrust_N / (0.034 * 9.81) * in_plane);
+                   },
+                   {"drag_rotor"}),
+             "drag_N_s_m", 0.02),
+      valued(force("inflow",
+                   [](const Moment& now) {
+                     return Vector3d(-0.06 * now.thrust_N * now.b3.dot(now.v_m_s) * now.b3);
+                   },
+                   {"inflow"}),
+             "loss_s_m", 0.06),
+      force("multirotor ground", [](const Moment& now) { return multirotor_ground(now, 0.0235); },
+            {"ground"}),
+      force("ground with a dip", ground_with_dip, {"ground"}),
+      force("rational ceiling", rational_ceiling, {"ceiling"}),
+      force("jet of each rotor", jet_per_rotor, {"downwash"}),
+      force("Lorentzian jet", jet_lorentzian, {"downwash"}),
+      valued(force("Gaussian jet", [](const Moment& now) { return jet_gaussian(now, 0.09); }, {"downwash"}),
+             "amplitude_N", 0.09, 0.15),
+      valued(force(
+                 "wind", [](const Moment&) { return Vector3d(0.02, 0.01, 0); }, constant),
+             "force_x_N", 0.02),
+      signals(
+          "IMU bias",
+          [](Truth& t) {
+            t.imu_bias_m_s2 = {0.2, 0, 0};
+          },
+          constant),
+      force(
+          "tilted thrust axis", [](const Moment& now) { return Vector3d(now.thrust_N * 0.019 * now.b1); },
+          constant),
+  };
+  for (Hidden& hidden : all) {
+    if (hidden.name.find("jet") != std::string::npos) hidden.vehicles = 2;
+  }
+  return all;
+}
+
+std::vector<Hidden> foreign_forces() {
+  Hidden gust = signals("gust", [](Truth& t) { t.gust_N = 0.02; }, {});
+  Hidden strong = signals("strong gust", [](Truth& t) { t.gust_N = 0.04; }, {});
+  strong.truth.gust_time_s = 1;
+  Hidden waves = force("waves in space",
+                       [](const Moment& now) {
+                         return Vector3d(0, 0, 0.04 * std::sin(9 * now.p_m.x()) * std::cos(7 * now.p_m.y()));
+                       },
+                       {});
+  Hidden spring =
+      force("a spring to one place",
+            [](const Moment& now) {
+              const Vector3d away = now.p_m - Vector3d(0.3, 0, 0.5);
+              return Vector3d(-0.06 * away.norm() * std::sin(6 * away.norm()) * away.normalized());
+            },
+            {});
+  std::vector<Hidden> all = {gust, strong, waves, spring};
+  for (Hidden& hidden : all) hidden.is_foreign = true;
+  return all;
+}
+
+std::vector<std::vector<Hidden>> pairs() {
+  const std::vector<Hidden> all = single_effects();
+  const auto named = [&](const std::string& name) {
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Hidden& h) { return h.name == name; });
+    if (found == all.end()) throw std::logic_error("no effect " + name);
+    return *found;
+  };
+  std::vector<std::vector<Hidden>> result;
+  const std::pair<const char*, const char*> wanted[] = {{"mass", "linear drag"},
+                                                        {"motor lag", "ground with a dip"},
+                                                        {"battery", "rotor drag"},
+                                                        {"Gaussian jet", "motor lag"},
+                                                        {"Lorentzian jet", "mass"},
+                                                        {"wind", "linear drag"},
+                                                        {"multirotor ground", "thrust"},
+                                                        {"quadratic drag", "motor lag"},
+                                                        {"ground with a dip", "jet of each rotor"},
+                                                        {"IMU bias", "mass"},
+                                                        {"command delay", "linear drag"},
+                                                        {"inflow", "wind"}};
+  for (const auto& [a, b] : wanted) result.push_back({named(a), named(b)});
+  return result;
+}
+
+Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s, std::uint64_t seed,
+           const std::string& folder, bool knows_lag) {
+  Answer answer;
+  Truth truth;
+  int vehicles = 1;
+  for (const Hidden& h : hidden) {
+    answer.label += (answer.label.empty() ? "" : " + ") + h.name;
+    truth = together(truth, h.truth);
+    vehicles = std::max(vehicles, h.vehicles);
+  }
+  std::string model = read_text(source_path("stability/models/crazyflie-small.toml"));
+  if (knows_lag && truth.motor_lag_s == 0) {
+    truth.motor_lag_s = kLag_s;
+    model += fmt::format("\n[[effect]]\nname = \"motor_lag\"\nparameters = {{ tau_s = {} }}\n", kLag_s);
+  }
+  const std::string flights = folder + "/flights";
+  std::filesystem::remove_all(flights);
+  write_text(folder + "/model.toml", model);
+  fly(truth, {program, vehicles, duration_s, seed}, flights);
+  const Outcome outcome =
+      run_shell("swarmcert diagnose model.toml flights -q --force --json result.json", folder);
+  EXPECT_EQ(outcome.exit_code, 0) << answer.label << ": " << outcome.output;
+  if (outcome.exit_code != 0) return answer;
+  const files::Json result = files::read_json(folder + "/result.json", "swarmcert/diagnose/1");
+  std::set<std::string> allowed;
+  std::size_t found = 0;
+  for (const files::Json& entry : result["ranking"]) answer.named.push_back(entry["effect"]);
+  const auto is_named = [&](const std::string& name) {
+    return std::find(answer.named.begin(), answer.named.end(), name) != answer.named.end();
+  };
+  for (const Hidden& h : hidden) {
+    allowed.insert(h.answers.begin(), h.answers.end());
+    allowed.insert(h.allowed.begin(), h.allowed.end());
+    found += h.answers.empty() || std::any_of(h.answers.begin(), h.answers.end(), is_named) ? 1 : 0;
+    if (!answer.named.empty() && h.answers.count(answer.named[0]) == 1) answer.first_right = true;
+  }
+  answer.all_found = found == hidden.size();
+  answer.claims_falsely = std::any_of(answer.named.begin(), answer.named.end(),
+                                      [&](const std::string& n) { return allowed.count(n) == 0; });
+  answer.exact = answer.all_found && !answer.claims_falsely;
+  answer.flagged = result["unexplained"]["flag"];
+  answer.ratio = result["unexplained"]["ratio"];
+  if (hidden.size() == 1 && !hidden[0].parameter.empty() && answer.first_right) {
+    const files::Json& fitted = result["ranking"][0]["parameters"][hidden[0].parameter];
+    answer.has_value = true;
+    answer.value_error = fitted["value"].get<double>() / hidden[0].value - 1;
+    answer.value_right = std::abs(answer.value_error) <= hidden[0].tolerance;
+    if (fitted.contains("interval_90")) {
+      answer.covered = fitted["interval_90"][0].get<double>() <= hidden[0].value &&
+                       hidden[0].value <= fitted["interval_90"][1].get<double>();
+    }
+  }
+  return answer;
+}
+
+std::pair<double, double> clopper_pearson(int hits, int runs) {
+  const double tail = 0.05;
+  const double lower =
+      hits == 0 ? 0 : boost::math::quantile(boost::math::beta_distribution<>(hits, runs - hits + 1), tail);
+  const double upper =
+      hits == runs ? 1
+                   : boost::math::quantile(boost::math::beta_distribution<>(hits + 1, runs - hits), 1 - tail);
+  return {lower, upper};
+}
+
+std::string share(int hits, int runs) {
+  const auto [lower, upper] = clopper_pearson(hits, runs);
+  return fmt::format("{} of {} ({:.3f}, 90 %: {:.3f} .. {:.3f})", hits, runs,
+                     runs > 0 ? double(hits) / runs : 0, lower, upper);
+}
+
+}  // namespace swarmcert::tests
