@@ -6,6 +6,7 @@
 #include "analysis/bound_report.h"
 #include "analysis/commands/command.h"
 #include "analysis/tracking_input.h"
+#include "nn/files/input_error.h"
 #include "stability/bounds/spacing.h"
 #include "stability/effects/registry.h"
 
@@ -39,6 +40,10 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
     }
     throw std::logic_error(std::string("downwash has no parameter ") + name);
   };
+  if (shape("tail") != 0) {
+    throw files::InputError({model.path, "", "downwash, tail", std::to_string(shape("tail")),
+                             "spacing knows the Gaussian profile only", "fit the effect with tail = 0"});
+  }
   DownwashField field;
   field.amplitude_N =
       std::abs(values.linear.at(0)) * std::pow(neighbour_mass_kg / 0.034, shape("mass_exponent"));

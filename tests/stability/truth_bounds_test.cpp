@@ -190,9 +190,9 @@ TEST(TruthBounds, WhatIsNotEnclosedIsInfiniteAndSaysWhy) {
       "[\"a\"]\n[[effect]]\nname = \"battery\"\n[[effect]]\nname = \"motor_lag\"\n[[effect]]\nname = "
       "\"constant_force\"\nparameters = { force_x_N = -0.02 }\n[[effect]]\nname = "
       "\"drag_linear\"\nparameters = { "
-      "drag_N_s_m = 0.01 }\n");
+      "drag_N_s_m = 0.01 }\n[[effect]]\nname = \"downwash\"\nparameters = { tail = 0.5 }\n");
   const auto bounds = truth_bounds(model, MotionSet());
-  for (const std::size_t i : {0u, 1u, 4u}) {
+  for (const std::size_t i : {0u, 1u, 4u, 5u}) {
     EXPECT_TRUE(std::isinf(bounds.at(i).rate_N_s[2])) << bounds[i].effect;
     EXPECT_FALSE(bounds[i].unbounded.empty());
   }
