@@ -2,10 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "controller/rounding/rounding_bounds.h"
+#include "stability/pilot.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -35,25 +37,36 @@ FloatErrors float_errors(const Tracking& input, const TrackingReport& report) {
   }
   law.integrator = {vector(gains.integrator_limit_m_s),
                     gains.rate_hz > 0 ? gains.integrator_step_s : kUnstatedPeriod_s};
-  law.is_robust = false;  // forces do not depend on the attitude law
+  constexpr double kAttitudePeriod_s = 0.002;
+  Pilot<double>(gains, input.model, kAttitudePeriod_s).with_settings([&law](const auto& settings) {
+    law.thrust_rule = settings.thrust_rule;
+    law.is_robust = settings.attitude_law == controller::AttitudeLaw::kRobust;
+    law.lee = settings.lee;
+    law.robust = settings.robust;
+    law.attitude_step_s = settings.attitude_step_s;
+    law.inertia_kg_m2 = settings.inertia_kg_m2;
+  });
   const controller::RoundingBounds bounds = rounding_bounds(law, {});
   FloatErrors errors;
   errors.applies = bounds.applies;
   errors.why_not = bounds.why_not;
   const double force[] = {bounds.force_N.x, bounds.force_N.y, bounds.force_N.z};
+  const double torque[] = {bounds.torque_N_m.x, bounds.torque_N_m.y, bounds.torque_N_m.z};
+  errors.thrust_N = bounds.thrust_N;
   const double integral[] = {bounds.integral_m_s.x, bounds.integral_m_s.y, bounds.integral_m_s.z};
   const Loop flown = gains.rate_hz > 0 ? Loop::kSampled : Loop::kContinuous;
   for (std::size_t i = 0; i < 3; ++i) {
     errors.force_N[i] = force[i];
     errors.integral_m_s[i] = integral[i];
+    errors.torque_N_m[i] = torque[i];
     errors.tracking_error_m[i] = std::numeric_limits<double>::infinity();
     const std::optional<AxisGains> pid = axis_gains(gains, input.plant.mass_kg, static_cast<int>(i));
     for (const ExactGains& row : report.exact) {
       if (!pid || row.axis != static_cast<int>(i) || row.channel != Channel::kCommand || row.loop != flown)
         continue;
       const double rate_N_s = input.plant.mass_kg * pid->Ki * integral[i] / period_s;
-      errors.tracking_error_m[i] =
-          row.all_times.amplitude * force[i] + (rate_N_s > 0 ? row.all_times.rate * rate_N_s : 0);
+      errors.tracking_error_m[i] = row.all_times.amplitude * std::max(force[i], bounds.thrust_N) +
+                                   (rate_N_s > 0 ? row.all_times.rate * rate_N_s : 0);
     }
   }
   return errors;
@@ -61,8 +74,10 @@ FloatErrors float_errors(const Tracking& input, const TrackingReport& report) {
 
 files::Json float_errors_json(const FloatErrors& errors) {
   files::Json json = {{"applies", errors.applies}, {"why_not", errors.why_not}};
+  json["thrust_N"] = errors.thrust_N;
   for (int i = 0; i < 3; ++i) {
     json["force_N"].push_back(errors.force_N[i]);
+    json["torque_N_m"].push_back(errors.torque_N_m[i]);
     json["integral_m_s"].push_back(errors.integral_m_s[i]);
     const double e = errors.tracking_error_m[i];
     json["tracking_error_m"].push_back(std::isfinite(e) ? files::Json(e) : files::Json());
@@ -76,10 +91,12 @@ void print_float_errors(const FloatErrors& errors) {
     return;
   }
   fmt::print(
-      "\nfloat32 against double: f_d within {:.3g}, {:.3g}, {:.3g} N; adds at most {:.3g}, {:.3g}, {:.3g} "
-      "m\n",
-      errors.force_N[0], errors.force_N[1], errors.force_N[2], errors.tracking_error_m[0],
-      errors.tracking_error_m[1], errors.tracking_error_m[2]);
+      "\nfloat32 against double: f_d within {:.3g}, {:.3g}, {:.3g} N, thrust {:.3g} N, torque {:.3g}, "
+      "{:.3g}, "
+      "{:.3g} N m; adds at most {:.3g}, {:.3g}, {:.3g} m\n",
+      errors.force_N[0], errors.force_N[1], errors.force_N[2], errors.thrust_N, errors.torque_N_m[0],
+      errors.torque_N_m[1], errors.torque_N_m[2], errors.tracking_error_m[0], errors.tracking_error_m[1],
+      errors.tracking_error_m[2]);
 }
 
 }  // namespace swarmcert::analysis

@@ -208,6 +208,7 @@ IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& opt
   const Theorem theorem = check_theorem(gains, model.mass_kg, std::nullopt);
   check.theorem_applies = theorem.applies;
   check.why_not = theorem.why_not;
+  check.delay_left_out_s = gains.delay_s;
   check.has_ball = theorem.composite.has_value();
   const PositionLoop loop(gains, model);
   const double decay_1_s = slowest_decay(loop);

@@ -60,7 +60,9 @@ struct IssCheck {
   std::vector<IssRun> runs;
   int violations = 0;
   double worst_ratio = 0, worst_transient_ratio = 0;
-  int worst = -1;         ///< index of the run with the worst ratio
+  int worst = -1;  ///< index of the run with the worst ratio
+  /// Of gains.toml: a differential equation without memory has none, so the runs say nothing about it.
+  double delay_left_out_s = 0;
   bool unstable = false;  ///< the linear loop has no decaying response at all
   bool cancelled = false;
 };

@@ -81,6 +81,7 @@ Json result_json(const Options& options, const IssCheck& check,
   Json result = result_head("iss-check", {options.gains, options.model});
   result["seed"] = options.check.seed;
   result["loop"] = "continuous position loop with the declared lags, clamps and thrust limit";
+  result["delay_left_out_s"] = check.delay_left_out_s;
   result["theorem"] = {{"applies", check.theorem_applies}, {"why_not", check.why_not}};
   result["rate_N_s"] = check.rate_N_s;
   result["ball_m"] = check.ball_m;
@@ -136,6 +137,11 @@ void print(const Options& options, const IssCheck& check, const std::vector<stab
       "Integrated with SUNDIALS (Dormand-Prince 5(4), 1e-9), {:.3g} s each; ratios are |error| over the "
       "ball, from rest\n",
       check.duration_s);
+  if (check.delay_left_out_s > 0) {
+    fmt::print(
+        "Not integrated: the delay of {} s. A loop with it may violate more; simulate and bound have it\n",
+        check.delay_left_out_s);
+  }
   fmt::print("  {:<14} {:>6} {:>11} {:>12} {:>16}\n", "disturbance", "runs", "violations", "worst ratio",
              "over transient");
   for (const auto& [name, kind] : by_kind(check)) {

@@ -22,8 +22,7 @@ double ramp_integral(double x) {
 
 }  // namespace
 
-Circle::Circle(const TaskOptions& options)
-    : vehicles_(options.vehicles), duration_s_(options.duration_s > 0 ? options.duration_s : 20) {}
+Circle::Circle(const TaskOptions& options) : TimedTask(options, 20) {}
 
 Setpoint Circle::at(int vehicle, double time_s) const {
   const double full_rad_s = kTwoPi / kTurn_s;

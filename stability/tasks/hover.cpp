@@ -2,7 +2,7 @@
 
 namespace swarmcert::stability {
 
-Hover::Hover(const TaskOptions& options) : duration_s_(options.duration_s > 0 ? options.duration_s : 10) {}
+Hover::Hover(const TaskOptions& options) : TimedTask(options, 10) {}
 
 Setpoint Hover::at(int vehicle, double) const {
   Setpoint setpoint;

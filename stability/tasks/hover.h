@@ -5,16 +5,12 @@
 
 namespace swarmcert::stability {
 
-class Hover : public Task {
+class Hover : public TimedTask {
  public:
   static constexpr char kName[] = "hover";
   static constexpr char kSummary[] = "stay in place, 0.5 m apart";
   explicit Hover(const TaskOptions& options);
   Setpoint at(int vehicle, double time_s) const override;
-  double duration_s() const override { return duration_s_; }
-
- private:
-  double duration_s_;
 };
 
 }  // namespace swarmcert::stability

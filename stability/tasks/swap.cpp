@@ -26,8 +26,7 @@ Geometry geometry(int vehicles) {
 
 }  // namespace
 
-Swap::Swap(const TaskOptions& options)
-    : vehicles_(options.vehicles), duration_s_(options.duration_s > 0 ? options.duration_s : 6 * kPeriod_s) {}
+Swap::Swap(const TaskOptions& options) : TimedTask(options, 6 * kPeriod_s) {}
 
 Setpoint Swap::at(int vehicle, double time_s) const {
   const Geometry place = geometry(vehicles_);

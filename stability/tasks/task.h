@@ -34,6 +34,19 @@ struct TaskOptions {
   std::uint64_t seed = 0;
 };
 
+/// A task that lasts as long as it was asked to.
+class TimedTask : public Task {
+ public:
+  /// @param own_s where nothing was asked for.
+  TimedTask(const TaskOptions& options, double own_s)
+      : vehicles_(options.vehicles), duration_s_(options.duration_s > 0 ? options.duration_s : own_s) {}
+  double duration_s() const override { return duration_s_; }
+
+ protected:
+  int vehicles_;
+  double duration_s_;
+};
+
 /// Names of the tasks, in the order of the documentation.
 std::vector<std::string> task_names();
 

@@ -115,10 +115,10 @@ double odeint_sampled(int vehicles, double end_s) {
   });
 }
 
-double sampled(int vehicles, double end_s) {
+double sampled(const char* name, int vehicles, double end_s) {
   return speed(end_s, [=] {
     Swarm swarm(vehicle(), vehicles);
-    const auto task = make_task("circle", {vehicles, end_s, 0});
+    const auto task = make_task(name, {vehicles, end_s, 0});
     SampledFlight flight(swarm, gains(), *task, {});
     while (flight.time_s() < end_s) flight.step();
   });
@@ -141,12 +141,14 @@ double continuous(int vehicles, double end_s, OdeMethod method, long* evaluation
 }  // namespace
 
 int main() {
-  fmt::print("Simulated seconds per second, one core, best of three; task: circle, downwash between all\n");
+  fmt::print("Simulated seconds per second, one core, best of three; downwash between all\n");
   fmt::print("{:<34} {:>10} {:>10} {:>10}\n", "", "1", "5", "16");
-  fmt::print("{:<34} {:>10.0f} {:>10.0f} {:>10.0f}\n", "sampled, 500 Hz, RK4", sampled(1, 40), sampled(5, 40),
-             sampled(16, 20));
-  fmt::print("{:<34} {:>10.0f} {:>10.0f} {:>10.0f}\n", "the same by a plain odeint loop",
-             odeint_sampled(1, 40), odeint_sampled(5, 40), odeint_sampled(16, 20));
+  for (const char* const task : {"circle", "swap"}) {
+    fmt::print("{:<34} {:>10.0f} {:>10.0f} {:>10.0f}\n", fmt::format("sampled, 500 Hz, RK4, {}", task),
+               sampled(task, 1, 40), sampled(task, 5, 40), sampled(task, 16, 20));
+  }
+  fmt::print("{:<34} {:>10.0f} {:>10.0f} {:>10.0f}\n", "circle by a plain odeint loop", odeint_sampled(1, 40),
+             odeint_sampled(5, 40), odeint_sampled(16, 20));
   const std::pair<const char*, OdeMethod> methods[] = {
       {"continuous, CVODE BDF 1e-6", OdeMethod::kBdf},
       {"continuous, CVODE Adams 1e-6", OdeMethod::kAdams},
