@@ -150,6 +150,26 @@ TEST(PthRefusal, ThingsThatAreNotStateDicts) {
       refused(program("}" + text_op("epoch") + "K\2s"), {"\"epoch\" = an integer", "is not a tensor"}));
 }
 
+TEST(PthRefusal, NamesWhatStandsInTheTensorsPlace) {
+  const std::vector<std::pair<std::string, std::string>> ops_and_names = {
+      {"N", "None"},
+      {"\x88", "a truth value"},
+      {integer_op(7), "an integer"},
+      {"G" + std::string(8, '\0'), "a number"},
+      {text_op("x"), "text"},
+      {")", "a tuple"},
+      {"]", "a list"},
+      {global_op("torch._utils", "_rebuild_tensor_v2"), "a function"},
+      {"r" + little_endian(7, 4) + "j" + little_endian(7, 4),
+       "text"},  // the name itself, remembered and recalled
+      {global_op("torch", "FloatStorage"), "a storage type"},
+      {storage_op(small_tensors()[0], false), "a storage"}};
+  for (const auto& [op, what] : ops_and_names) {
+    EXPECT_TRUE(
+        refused(program("}" + text_op("epoch") + op + "s"), {"\"epoch\" = " + what, "is not a tensor"}));
+  }
+}
+
 TEST(PthRefusal, ViewsThatLeaveTheirStorage) {
   const auto with = [](std::int64_t offset, const std::vector<std::int64_t>& strides) {
     std::vector<TensorSpec> tensors = small_tensors();
