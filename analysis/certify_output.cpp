@@ -130,6 +130,11 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
     json["lower_witness"] = witness_json(bound);
     json["product_upper"] = bound.product.value();
     json["search_rounds"] = bound.lower.rounds;
+    if (bound.nodes > 0) {
+      json["nodes"] = bound.nodes;
+      const bool has_lower = bound.lower.witness && bound.lower.witness->slope.value() > 0;
+      json["gap"] = has_lower ? Json(bound.upper.value() / bound.lower.witness->slope.value() - 1) : Json();
+    }
     if (bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) json["sdp_stop"] = name(bound.sdp.stop);
     if (i < output.comparisons.size() && output.comparisons[i])
       json["comparison"] = comparison_json(bound, *output.comparisons[i]);
@@ -216,7 +221,7 @@ void print_bounds(const files::Network& network, const Certification& found) {
                bound.lower.witness ? fmt::format("{:.8g}", lower) : "-",
                lower > 0 ? fmt::format("{:.3f}", bound.upper.value() / lower) : "-",
                files::unit(network, bound.function, bound.block));
-    const bool unproved = !bound.proof && !bound.sdp.proof;
+    const bool unproved = !bound.proof && !bound.sdp.proof && !bound.local;
     if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) {
       fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
                  name(bound.sdp.stop));

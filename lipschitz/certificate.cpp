@@ -15,6 +15,13 @@ Json hex_floats(const std::vector<double>& values) {
   return array;
 }
 
+/// One text: a tree has more numbers than a document should have nodes.
+std::string joined(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : " ") + hex_float(value);
+  return text;
+}
+
 Json hex_floats(const std::vector<float>& values) {
   return hex_floats(std::vector<double>(values.begin(), values.end()));
 }
@@ -31,6 +38,28 @@ Json factor_json(const check::Factor& factor) {
 
 Json upper_json(const UpperProof& proof) {
   return {{"rho", hex_float(proof.rho)}, {"t", hex_floats(proof.t)}, {"factor", factor_json(proof.factor)}};
+}
+
+Json local_json(const LocalProof& proof) {
+  Json form;
+  if (proof.form) {
+    const Eigen::MatrixXd& q = proof.form->q;
+    Json rows = Json::array();
+    for (Eigen::Index i = 0; i < q.rows(); ++i) {
+      std::vector<double> row;
+      for (Eigen::Index j = 0; j <= i; ++j) row.push_back(q(i, j));
+      rows.push_back(joined(row));
+    }
+    form = {{"q", std::move(rows)},
+            {"t", hex_floats(proof.form->t)},
+            {"factor", factor_json(proof.form->factor)}};
+  }
+  Json multipliers = Json::array();
+  for (const std::vector<double>& t : proof.tree.multipliers) multipliers.push_back(joined(t));
+  return {{"rho", hex_float(proof.rho)},
+          {"form", std::move(form)},
+          {"tree", proof.tree.tree},
+          {"multipliers", std::move(multipliers)}};
 }
 
 Json layer_json(const CertifiedLayer& layer) {
@@ -53,6 +82,7 @@ Json bound_json(const files::Network& network, const CertifiedBound& bound) {
                {"lower_witness", nullptr},
                {"proof", nullptr}});
   if (bound.proof) json["proof"] = upper_json(*bound.proof);
+  if (bound.local) json["proof"] = local_json(*bound.local);
   if (!bound.lower.witness) return json;
   const SlopeWitness& witness = *bound.lower.witness;
   Json others = Json::array();
@@ -65,9 +95,13 @@ Json bound_json(const files::Network& network, const CertifiedBound& bound) {
 }
 
 Json law_json(const CertifiedLaw& law) {
-  return {
-      {"rho", law.rho},       {"neighbours", law.neighbours}, {"block", law.block},
-      {"law", name(law.law)}, {"upper", law.upper.value()},   {"upper_hex", hex_float(law.upper.value())}};
+  return {{"rho", law.rho},
+          {"neighbours", law.neighbours},
+          {"domain", law.domain},
+          {"block", law.block},
+          {"law", name(law.law)},
+          {"upper", law.upper.value()},
+          {"upper_hex", hex_float(law.upper.value())}};
 }
 
 }  // namespace
@@ -91,7 +125,7 @@ Json summary(const files::Network& network, const CertifiedLaw& law) {
   const std::string kind = law.neighbours.begin()->first;
   const std::string shown = law.neighbours.size() == 1 ? kind : "mixed";
   return {{"function", "set:" + shown + ":" + law.rho},
-          {"domain", "global"},
+          {"domain", law.domain},
           {"block", law.block},
           {"law", name(law.law)},
           {"neighbours", law.neighbours},

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "lipschitz/range.h"
 #include "lipschitz/stages.h"
 #include "nn/files/functions.h"
 #include "nn/files/parallel.h"
@@ -40,6 +41,31 @@ UpperBound bound_of(const Network& network, const LawClaim& law, const std::vect
   return law_bound(law.law, terms);
 }
 
+/// Replaces the bound for all inputs by a smaller one for the box, where there is one.
+void branch_further(const Network& network, const std::map<std::string, Box>& domain,
+                    const CertifyOptions& options, CertifiedBound& bound) {
+  BranchOptions branch = options.branch;
+  branch.known = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
+  branch.cancelled = options.cancelled;
+  if (options.progress) {
+    branch.progress = [&options, &bound, &branch](int nodes, double upper) {
+      options.progress(nodes, branch.nodes,
+                       bound.function + " " + bound.block + " at most " + std::to_string(upper));
+    };
+  }
+  const UpperProof* const global = bound.proof       ? &*bound.proof
+                                   : bound.sdp.proof ? &*bound.sdp.proof
+                                                     : nullptr;
+  LocalBound local = local_bound(network, bound, domain.at(files::networks_of(bound.function).front()),
+                                 global != nullptr ? global->t : std::vector<double>(), branch);
+  bound.nodes = local.nodes;
+  if (!local.proof || !(local.upper.value() < bound.upper.value())) return;
+  bound.upper = local.upper;
+  bound.method = UpperMethod::kBranch;
+  bound.local = std::move(local.proof);
+  bound.proof.reset();
+}
+
 }  // namespace
 
 std::vector<Verdict> respects_gamma(const GammaStatement& gamma, const std::vector<Enclosure>& norms) {
@@ -64,7 +90,17 @@ std::vector<Verdict> respects_gamma(const GammaStatement& gamma, const std::vect
 }
 
 const char* name(UpperMethod method) {
-  return method == UpperMethod::kAuto ? "auto" : method == UpperMethod::kProduct ? "product" : "sdp";
+  switch (method) {
+    case UpperMethod::kAuto:
+      return "auto";
+    case UpperMethod::kProduct:
+      return "product";
+    case UpperMethod::kSdp:
+      return "sdp";
+    case UpperMethod::kBranch:
+      break;
+  }
+  return "branch";
 }
 
 Certification certify(const Network& network, const CertifyOptions& options) {
@@ -73,6 +109,8 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   if (result.gamma && !(result.gamma->value > 0)) {
     throw std::invalid_argument("certify: gamma must be positive");
   }
+  if (options.method == UpperMethod::kBranch && options.domain.empty())
+    throw std::invalid_argument("branch and bound needs a box: give --domain");
   const std::map<std::string, const Weights*> parts = files::parts(network);
   std::vector<const files::Layer*> layers;
   for (const auto& [name, weights] : parts) {
@@ -154,7 +192,19 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     }
   });
 
-  for (CertifiedLaw& law : result.laws) law.upper = bound_of(network, law, result.bounds);
+  if (options.method == UpperMethod::kBranch) {
+    const std::map<std::string, Box> domain = clamped(network, options.domain);
+    files::parallel_for(count, options.jobs, [&](int i) {
+      CertifiedBound& bound = result.bounds[static_cast<std::size_t>(i)];
+      if (bound.domain == "box") branch_further(network, domain, options, bound);
+    });
+  }
+
+  for (CertifiedLaw& law : result.laws) {
+    law.upper = bound_of(network, law, result.bounds);
+    for (const CertifiedBound& bound : result.bounds)
+      if (bound.method == UpperMethod::kBranch) law.domain = "box";
+  }
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "lipschitz/bounds.h"
+#include "lipschitz/branch/local_bound.h"
 #include "lipschitz/claims.h"
 #include "lipschitz/lower_bound.h"
 #include "lipschitz/sdp_bound.h"
@@ -23,11 +24,13 @@ enum class UpperMethod {
   kAuto,     ///< the smaller of both
   kProduct,  ///< product of the layers' spectral norms
   kSdp,      ///< LipSDP-Neuron
+  kBranch,   ///< branch and bound on the claim's box; kAuto for claims about all inputs
 };
 
 struct CertifyOptions : ClaimOptions {
   UpperMethod method = UpperMethod::kAuto;
   std::optional<files::GammaStatement> gamma;    ///< overrides what network.toml states
+  BranchOptions branch;                          ///< per claim; `known` and `cancelled` are taken from here
   LowerBoundOptions lower;                       ///< its `cancelled` is taken from here below
   int jobs = 0;                                  ///< threads; 0: all. Results do not depend on it.
   const std::atomic<bool>* cancelled = nullptr;  ///< upper bounds found so far are kept
@@ -46,12 +49,15 @@ struct CertifiedBound : Claim {
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
   std::optional<UpperProof> proof;  ///< where method is kSdp
+  std::optional<LocalProof> local;  ///< where method is kBranch
+  int nodes = 0;                    ///< boxes that branch and bound looked at
   UpperBound product{0};            ///< product of spectral norms, for comparison
   SdpBound sdp;                     ///< how the semidefinite program went; its proof is moved to `proof`
   FoundSlope lower;                 ///< proves the lower bound
 };
 
 struct CertifiedLaw : LawClaim {
+  std::string domain = "global";  ///< "box" where a bound that it rests on holds there only
   UpperBound upper{0};
 };
 
@@ -75,8 +81,8 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 
 /// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
-/// a distance, leaves the upper bounds valid.
-/// @throws std::invalid_argument if gamma is not positive, or as claims() and law_claims().
+/// a distance, leaves the upper bounds valid. Branch and bound runs on what the clamp lets through of the box.
+/// @throws std::invalid_argument if gamma is not positive, if kBranch has no domain, or as claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 
 /// What the law gives from verified bounds of its terms, rounded up.
@@ -90,7 +96,7 @@ files::Json summary(const files::Network& network, const CertifiedLaw& law);
 /// The certificate of what was found: everything that check::check() needs besides the weights.
 files::Json certificate(const files::Network& network, const Certification& certification);
 
-/// "auto", "product", "sdp".
+/// "auto", "product", "sdp", "branch".
 const char* name(UpperMethod method);
 
 }  // namespace swarmcert::lipschitz

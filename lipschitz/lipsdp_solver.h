@@ -6,12 +6,16 @@
 #include <vector>
 
 #include "lipschitz/bounds.h"
+#include "lipschitz/interior_point.h"
 
 namespace swarmcert::lipschitz {
 
 /// A ReLU chain f = M_K relu(... relu(M_1 x + b_1) ...) + b_K without its biases, which no global bound can use.
 /// M_k is [n_k x n_{k-1}].
 using ReluChain = std::vector<Eigen::MatrixXd>;
+
+/// e_1 .. e_K such that the chain M_k 2^-e_k has (rho, t) of order one; see scale() for how.
+std::vector<int> balancing_exponents(const ReluChain& chain);
 
 /// A feasible point of the semidefinite program, up to rounding: S(rho, t) > 0 held in floating point.
 struct LipSdpPoint {
@@ -25,12 +29,6 @@ struct LipSdpOptions {
   int max_iterations = 80;
   const std::atomic<bool>* cancelled = nullptr;
 };
-
-/// Why solve_lipsdp() stopped. Every stop leaves usable points; only kGapReached says they are near the optimum.
-enum class LipSdpStop { kNothingRun, kGapReached, kIterationLimit, kNumericalLimit, kCancelled };
-
-/// "gap reached", ...
-const char* name(LipSdpStop stop);
 
 struct LipSdpResult {
   LipSdpStop stop = LipSdpStop::kNothingRun;
@@ -47,11 +45,8 @@ struct LipSdpResult {
 /// in the variables (x, z_1, ..., z_{K-1}); e_i selects neuron i and a_i = (its row of M_k in the columns of
 /// z_{k-1}) - e_i. sqrt(rho) bounds the Lipschitz constant of the chain.
 ///
-/// HKM direction with Mehrotra's predictor and corrector (Helmberg et al. 1996; Kojima et al. 1997; Monteiro 1997).
-/// Each constraint matrix has rank two, so the Schur complement costs a few products of n x n matrices instead of
-/// one per pair of constraints. S is recomputed from (rho, t) in each iteration: every iterate is feasible.
-/// Chains are scaled by powers of two per layer first, and wide inputs (n_0 > n_1) reduced to n_1 by a QR
-/// factorisation of M_1'.
+/// Solved by minimise() of interior_point.h. Chains are scaled by powers of two per layer first, and wide inputs
+/// (n_0 > n_1) reduced to n_1 by a QR factorisation of M_1'.
 ///
 /// @param chain at least two matrices (one hidden layer), finite entries, matching sizes.
 /// @returns points in the chain's own scale. Floating point estimates without a guarantee: verify them.

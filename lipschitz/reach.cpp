@@ -44,7 +44,7 @@ ReachNetwork reach_network(const files::Weights& weights) {
   return network;
 }
 
-Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around)
+Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, std::vector<MatrixXd>* slopes)
     : network_(network), box_(box) {
   VectorXd magnitude = largest_input(box);
   for (std::size_t k = 0; k < network.size(); ++k) {
@@ -53,17 +53,28 @@ Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around)
     input_magnitude_.push_back(magnitude);
     term_magnitude_.emplace_back(layer.weights.cwiseAbs() * magnitude + layer.bias.cwiseAbs() +
                                  layer.bias_radius);
-    MatrixXd both(2 * rows, rows);
-    both << MatrixXd::Identity(rows, rows), -MatrixXd::Identity(rows, rows);
-    const VectorXd ends = largest(substituted(k, std::move(both)));
-    Bounds bounds{-ends.tail(rows), ends.head(rows)};
-    for (Index i = 0; i < rows; ++i) {
-      if (around != nullptr) {
-        bounds.lower(i) = std::max(bounds.lower(i), around->bounds_[k].lower(i));
-        bounds.upper(i) = std::min(bounds.upper(i), around->bounds_[k].upper(i));
-      }
-      if (std::isnan(bounds.lower(i)) || std::isnan(bounds.upper(i)))
-        bounds.lower(i) = -kInfinity, bounds.upper(i) = kInfinity;
+    // The larger box's bounds hold here; they do for neurons that it decides, whose exact range no relaxation needs.
+    Bounds bounds = around != nullptr
+                        ? around->bounds_[k]
+                        : Bounds{VectorXd::Constant(rows, -kInfinity), VectorXd::Constant(rows, kInfinity)};
+    std::vector<Index> open;
+    for (Index i = 0; i < rows; ++i)
+      if (!layer.has_relu || (bounds.lower(i) < 0 && bounds.upper(i) > 0)) open.push_back(i);
+    const auto count = static_cast<Index>(open.size());
+    MatrixXd both = MatrixXd::Zero(2 * count, rows);
+    for (Index i = 0; i < count; ++i)
+      both(i, open[static_cast<std::size_t>(i)]) = 1, both(count + i, open[static_cast<std::size_t>(i)]) = -1;
+    const LinearForms forms = substituted(k, std::move(both));
+    const VectorXd ends = largest(forms);
+    if (slopes != nullptr) slopes->push_back(MatrixXd::Zero(rows, network.front().weights.cols()));
+    for (Index i = 0; i < count; ++i) {
+      double& lower = bounds.lower(open[static_cast<std::size_t>(i)]);
+      double& upper = bounds.upper(open[static_cast<std::size_t>(i)]);
+      if (-ends(count + i) > lower) lower = -ends(count + i);  // false for NaN
+      if (ends(i) < upper) upper = ends(i);
+      if (slopes != nullptr)
+        slopes->back().row(open[static_cast<std::size_t>(i)]) =
+            0.5 * (forms.rows.row(i).cwiseAbs() + forms.rows.row(count + i).cwiseAbs());
     }
     magnitude = layer.has_relu ? VectorXd(bounds.upper.cwiseMax(0.0)) : bounds.magnitude();
     bounds_.push_back(std::move(bounds));

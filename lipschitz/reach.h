@@ -46,8 +46,12 @@ struct LinearForms {
 class Reach {
  public:
   /// @param box finite, one interval per input.
-  /// @param around bounds of the same network over a larger box, which hold here as well; null: none.
-  Reach(const ReachNetwork& network, const Box& box, const Reach* around = nullptr);
+  /// @param around bounds of the same network over a larger box, which hold here as well; null: none. Neurons that it
+  ///   decides keep its bounds.
+  /// @param slopes if not null, one matrix per layer: |slope| of the forms that bound each neuron, [outputs x inputs],
+  ///   the mean of the upper and the lower one; zero for neurons that `around` decides.
+  Reach(const ReachNetwork& network, const Box& box, const Reach* around = nullptr,
+        std::vector<Eigen::MatrixXd>* slopes = nullptr);
 
   /// Of y_k, before the ReLU of layer k.
   const Bounds& before_relu(std::size_t k) const { return bounds_[k]; }

@@ -36,4 +36,25 @@ std::vector<Matrix> stages(const files::Network& network, const std::string& fun
   return chain;
 }
 
+LocalFunction local_function(const files::Network& network, const std::string& part, const std::string& block,
+                             const std::vector<double>& scale, const Matrix& q) {
+  const std::vector<files::Layer>& layers = files::parts(network).at(part)->layers;
+  const files::Layer& last = layers.back();
+  if (layers.size() < 2) throw std::invalid_argument(part + " has no hidden layer");
+  if (q.rows != 0 && q.rows != last.outputs)
+    throw std::invalid_argument("the form is not of the outputs of " + part);
+  LocalFunction f;
+  for (std::size_t k = 0; k + 1 < layers.size(); ++k)
+    f.hidden.push_back({layers[k].outputs, layers[k].inputs, layers[k].weights, layers[k].biases});
+  const Matrix w(last.outputs, last.inputs, last.weights);
+  Matrix transposed(last.inputs, last.outputs);
+  for (int i = 0; i < last.outputs; ++i)
+    for (int j = 0; j < last.inputs; ++j) transposed(j, i) = w(i, j);
+  f.gram = product(transposed, q.rows == 0 ? w : product(q, w));
+  f.coordinates = files::block_coordinates(network, part, block);
+  for (const int k : f.coordinates)
+    f.weight.push_back(scale.empty() ? 1.0 : scale.at(static_cast<std::size_t>(k)));
+  return f;
+}
+
 }  // namespace swarmcert::check

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lipschitz/checker/dyadic.h"
+#include "lipschitz/checker/tree_proof.h"
 #include "nn/files/network.h"
 
 namespace swarmcert::check {
@@ -16,5 +17,11 @@ namespace swarmcert::check {
 ///   number per input.
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});
+
+/// "network" or "phi:<kind>" in front of |.|^2, or of the form Q, exactly, as a proof on a box sees it.
+/// @param q [outputs x outputs]; no rows: the identity.
+/// @throws as stages(), and std::invalid_argument if the network has no hidden layer or Q another size.
+LocalFunction local_function(const files::Network& network, const std::string& part, const std::string& block,
+                             const std::vector<double>& scale, const Matrix& q);
 
 }  // namespace swarmcert::check

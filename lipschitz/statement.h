@@ -13,7 +13,8 @@ inline constexpr const char* kStatement =
     "So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
     "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x "
     "to y, whatever the number and the places of the others. Laws hold for the neighbours listed and "
-    "the ground's input where there is one: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, "
+    "the ground's input where there is one, in the box where their domain is box: all_stacked, |df| <= upper "
+    "sqrt(sum |dx_j|^2); all_max, "
     "|df| <= upper max |dx_j|; own_state, |df| <= upper |dx| where the vehicle's own state moves by dx.";
 
 }  // namespace swarmcert::check

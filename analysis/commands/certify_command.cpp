@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 #include <memory>
 #include <sstream>
 
@@ -34,6 +35,8 @@ struct Options {
   double input_step = 0;
   std::string output;
   std::string report;
+  std::optional<int> nodes;
+  double seconds = 0;
   double gamma = 0;
   double max_lipschitz = 0;
   lipschitz::CertifyOptions certify;
@@ -149,19 +152,26 @@ void add_ranges(const files::Network& network, const Options& options, CertifyOu
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   refuse_to_replace(common, common.json);
-  if (options.method == "branch")
-    throw UsageError(
-        "--method branch is not part of this version: product and sdp bound every input, and so every box");
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
   parse_blocks(options.blocks, options.certify);
   files::Network network = load_net(options.network);
   if (options.as == "float32") network = files::as_float32(std::move(network));
   if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
   if (options.gamma != 0) options.certify.gamma = files::GammaStatement{options.gamma};
-  options.certify.method = options.method == "sdp"       ? lipschitz::UpperMethod::kSdp
+  options.certify.method = options.method == "branch"    ? lipschitz::UpperMethod::kBranch
+                           : options.method == "sdp"     ? lipschitz::UpperMethod::kSdp
                            : options.method == "product" ? lipschitz::UpperMethod::kProduct
                                                          : lipschitz::UpperMethod::kAuto;
   options.certify.jobs = common.jobs;
+  if (options.method == "branch") {
+    if (options.nodes == 0) throw UsageError("--nodes 0: branch and bound looks at one box at least");
+    if (options.nodes) options.certify.branch.nodes = *options.nodes;
+    if (!options.nodes && options.seconds > 0) options.certify.branch.nodes = std::numeric_limits<int>::max();
+    options.certify.branch.seconds = options.seconds;
+  } else {
+    options.certify.lower.rounds = options.nodes;
+    options.certify.lower.seconds = options.seconds;
+  }
   Progress progress(common.quiet);
   options.certify.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
@@ -213,9 +223,10 @@ Command certify_command() {
       [](CLI::App& app) {
         const auto options = std::make_shared<Options>();
         declare_network(app, options->network);
-        app.add_option(
-               "--method", options->method,
-               "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), or auto, the smaller one")
+        app.add_option("--method", options->method,
+                       "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), auto, the smaller one, "
+                       "or branch: branch "
+                       "and bound over the box of --domain, for bounds that hold there only")
             ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
             ->capture_default_str();
         app.add_option("--as", options->as,
@@ -245,12 +256,14 @@ Command certify_command() {
                        "Limit on the Lipschitz constant of the network, or of every set function")
             ->check(CLI::PositiveNumber);
         app.add_option(
-               "--nodes", options->certify.lower.rounds,
+               "--nodes", options->nodes,
                "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
-               "networks)")
+               "networks). With --method branch: boxes to look at, per bound (default: 20000)")
             ->check(CLI::NonNegativeNumber);
-        app.add_option("--time", options->certify.lower.seconds,
-                       "End the search for a lower bound after the round in which this many seconds pass")
+        app.add_option(
+               "--time", options->seconds,
+               "End the search for a lower bound after the round in which this many seconds pass; with "
+               "--method branch: the search for an upper bound, per bound")
             ->check(CLI::PositiveNumber);
         app.add_option("--seed", options->certify.lower.seed, "Of the search for lower bounds")
             ->capture_default_str();

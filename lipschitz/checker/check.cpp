@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
 #include "lipschitz/checker/lipschitz_lmi.h"
+#include "lipschitz/checker/tree_proof.h"
 #include "lipschitz/stages.h"
 #include "lipschitz/witness.h"
 #include "nn/files/content_hash.h"
@@ -28,6 +30,14 @@ double number(const Json& decimal, const Json& hex, const std::string& where) {
   require(decimal.is_number() && decimal.get<double>() == value && value >= 0,
           where + ": negative, or decimal and hex notation differ");
   return value;
+}
+
+/// Finite hex floats in one text, separated by single spaces.
+std::vector<double> hex_floats_in(const Json& json) {
+  std::vector<double> values;
+  std::istringstream text(json.get<std::string>());
+  for (std::string word; text >> word;) values.push_back(files::parse_hex_float(word));
+  return values;
 }
 
 Dyadic squared_norm(const Matrix& m) {
@@ -96,8 +106,12 @@ class Checker {
     require(certificate_["laws"].is_array(), "laws is not an array");
     for (const Json& bound : certificate_["bounds"]) check_bound(bound);
     for (const Json& law : certificate_["laws"]) check_law(law);
-    return {true, "every statement verified in exact arithmetic", spectral_norms_, upper_bounds_,
-            lower_bounds_};
+    return {true,
+            "every statement verified in exact arithmetic",
+            spectral_norms_,
+            upper_bounds_,
+            lower_bounds_,
+            on_a_box_};
   }
 
  private:
@@ -156,6 +170,8 @@ class Checker {
     const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
     if (bound["upper_method"] == "sdp") {
       check_upper(stages(network_, function, block, scale), bound["proof"], upper, where);
+    } else if (bound["upper_method"] == "branch") {
+      check_local(bound, upper, scale, where);
     } else {
       require(bound["upper_method"] == "product" && bound["proof"].is_null(),
               where + ": unknown upper_method");
@@ -163,7 +179,10 @@ class Checker {
       for (const std::string& name : names) total = total * norms_.at(name);
       require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
     }
-    if (scale.empty()) proved_[function + " " + block] = upper;
+    if (scale.empty()) {
+      proved_[function + " " + block] = upper;
+      if (bound["upper_method"] == "branch") local_.insert(function + " " + block);
+    }
     ++upper_bounds_;
     if (bound["lower_witness"].is_null())
       return require(bound["lower"].is_null() && bound["lower_hex"].is_null(),
@@ -171,6 +190,66 @@ class Checker {
     const double lower = number(bound["lower"], bound["lower_hex"], where + " lower");
     check_lower(bound, lower, scale, where + ": lower_witness");
     ++lower_bounds_;
+  }
+
+  /// sqrt(rho) <= `upper` bounds the slope on the box, or on what the input clamp makes of it; of a set function through
+  /// a quadratic form of rho.
+  void check_local(const Json& bound, double upper, const std::vector<double>& scale,
+                   const std::string& where) {
+    const Json& proof = bound["proof"];
+    require(bound["domain"] == "box", where + ": a bound by parts of a box without a box");
+    require_keys(proof, {"rho", "form", "tree", "multipliers"}, where + ".proof");
+    const std::vector<std::string> names = files::networks_of(bound["function"].get<std::string>());
+    require(names.front().rfind("rho:", 0) != 0, where + ": rho has no box");
+    require(proof["form"].is_null() == (names.size() == 1),
+            where + ": a form for set functions, and only for those");
+    Matrix q(0, 0);
+    if (names.size() == 2) q = checked_form(proof["form"], names.back(), where + ".form");
+    const double rho = files::parse_hex_float(proof["rho"].get<std::string>());
+    require(rho > 0 && Dyadic(upper) * upper >= Dyadic(rho), where + ": claims less than sqrt(rho)");
+
+    const std::string& moved = names.front();
+    std::vector<double> lower_end = files::parse_hex_floats(certificate_["box"].at(moved).at("lower"));
+    std::vector<double> upper_end = files::parse_hex_floats(certificate_["box"].at(moved).at("upper"));
+    const auto inputs = static_cast<std::size_t>(parts_.at(moved)->inputs());
+    require(lower_end.size() == inputs && upper_end.size() == inputs, where + ": the box has another size");
+    for (std::size_t k = 0; k < inputs; ++k) {
+      if (network_.clamp && files::is_clamped(moved)) {  // never increases a distance
+        lower_end[k] = std::clamp(lower_end[k], network_.clamp->lower[k], network_.clamp->upper[k]);
+        upper_end[k] = std::clamp(upper_end[k], network_.clamp->lower[k], network_.clamp->upper[k]);
+      }
+      require(lower_end[k] <= upper_end[k], where + ": the box is empty");
+    }
+    TreeProof tree{proof["tree"].get<std::string>(), {}};
+    for (const Json& words : proof["multipliers"]) tree.multipliers.push_back(hex_floats_in(words));
+    const TreeVerdict verdict =
+        check_tree(local_function(network_, moved, bound["block"].get<std::string>(), scale, q), lower_end,
+                   upper_end, rho, tree);
+    require(verdict.holds, where + ": " + verdict.reason);
+    ++on_a_box_;
+  }
+
+  /// Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w), its lower triangle given row by row.
+  Matrix checked_form(const Json& form, const std::string& rho, const std::string& where) const {
+    require_keys(form, {"q", "t", "factor"}, where);
+    const std::vector<Matrix> chain = stages(network_, rho);
+    const int size = chain.front().cols;
+    require(form["q"].is_array() && form["q"].size() == static_cast<std::size_t>(size),
+            where + ": q has another size");
+    Matrix q(size, size);
+    for (int i = 0; i < size; ++i) {
+      const std::vector<double> row = hex_floats_in(form["q"][static_cast<std::size_t>(i)]);
+      require(row.size() == static_cast<std::size_t>(i) + 1, where + ": q is not a lower triangle");
+      for (int j = 0; j <= i; ++j) q(i, j) = q(j, i) = row[static_cast<std::size_t>(j)];
+    }
+    const std::vector<double> t = files::parse_hex_floats(form["t"]);
+    require(
+        t.size() == hidden_neurons(chain) && std::all_of(t.begin(), t.end(), [](double x) { return x >= 0; }),
+        where + ": needs one nonnegative t per hidden neuron");
+    require(shows_positive_semidefinite(quadratic_lmi(chain, q, {t.begin(), t.end()}),
+                                        parse_factor(form["factor"], where + ".factor")),
+            where + ": the factor does not show that the matrix inequality holds");
+    return q;
   }
 
   /// |f(x) - f(y)| >= lower |x - y|. In a set function one neighbour moves from x to y, the others stay.
@@ -214,18 +293,21 @@ class Checker {
   /// Several terms of the sum move: by the triangle inequality one after the other, each by its one_neighbour bound.
   /// Not by single coordinates: those of the ground are others than those of a neighbour.
   void check_law(const Json& law) {
-    require_keys(law, {"rho", "neighbours", "block", "law", "upper", "upper_hex"}, "law");
+    require_keys(law, {"rho", "neighbours", "domain", "block", "law", "upper", "upper_hex"}, "law");
     const std::string rho = law["rho"].get<std::string>(), block = law["block"].get<std::string>();
     const std::string where = "law of " + rho + " " + block;
     const double upper = number(law["upper"], law["upper_hex"], where + " upper");
     std::map<std::string, long> terms = law["neighbours"].get<std::map<std::string, long>>();
     require(terms.count(files::kGroundKind) == 0, where + ": the ground is no neighbour");
     if (parts_.count(std::string("phi:") + files::kGroundKind) == 1) terms[files::kGroundKind] = 1;
+    require(law["domain"] == "box" || law["domain"] == "global", where + ": unknown domain");
     Dyadic sum, sum_of_squares;
     for (const auto& [kind, count] : terms) {
       require(1 <= count && count <= 1000000, where + ": impossible number of neighbours");
       const Dyadic n = static_cast<double>(count);
       const Dyadic& k = proved_.at("set:" + kind + ":" + rho + " " + block);
+      require(law["domain"] == "box" || local_.count("set:" + kind + ":" + rho + " " + block) == 0,
+              where + ": rests on a bound that holds on a box only");
       sum += n * k;
       sum_of_squares += n * k * k;
     }
@@ -243,7 +325,8 @@ class Checker {
   std::map<std::string, const Weights*> parts_;
   std::map<std::string, Dyadic> norms_;   ///< product of the verified norms, by network
   std::map<std::string, Dyadic> proved_;  ///< verified upper bounds, by "<function> <block>"
-  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0;
+  std::set<std::string> local_;           ///< those of them that hold on the box only
+  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_a_box_ = 0;
 };
 
 }  // namespace
@@ -252,7 +335,7 @@ CheckResult check(const Json& certificate, const files::Network& network) {
   try {
     return Checker(certificate, network).run();
   } catch (const std::exception& fault) {
-    return {false, fault.what(), 0, 0, 0};
+    return {false, fault.what(), 0, 0, 0, 0};
   }
 }
 

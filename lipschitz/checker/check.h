@@ -1,7 +1,8 @@
 /// @file The independent checker: does this certificate prove its statements for these weights?
 ///
-/// It trusts no optimiser and never rounds. What it relies on: the readers of weight files, SHA-256, GMP's integers,
-/// the two short files beside this one and, for lower bounds, the exact slope of lipschitz/witness.h.
+/// It trusts no optimiser. What it relies on: the readers of weight files, SHA-256, GMP's integers, the short files
+/// beside this one and, for lower bounds, the exact slope of lipschitz/witness.h. It never rounds, but for proofs on a
+/// box (tree_proof.h): those have thousands of parts and are verified in double, with every rounding accounted for.
 #pragma once
 
 #include <string>
@@ -18,11 +19,12 @@ struct CheckResult {
   int spectral_norms = 0;
   int upper_bounds = 0;
   int lower_bounds = 0;
+  int on_a_box = 0;  ///< of the upper bounds, those proved part by part
 };
 
 /// Verifies every statement of `certificate` against the weights of `network`: content hash; no unknown field; the
 /// named weights; each spectral norm from both sides; each upper bound by its linear matrix inequality
-/// (lipschitz_lmi.h), as product of norms, or by a law from bounds verified before; each lower bound by the exact
+/// (lipschitz_lmi.h), part by part on a box (tree_proof.h), as product of norms, or by a law from bounds verified before; each lower bound by the exact
 /// slope between its two witness points. A malformed certificate is answered with a reason, not with an exception.
 CheckResult check(const files::Json& certificate, const files::Network& network);
 

@@ -69,6 +69,33 @@ Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const
   return p;
 }
 
+Matrix quadratic_lmi(const std::vector<Matrix>& stages, const Matrix& q, const std::vector<Dyadic>& t) {
+  const int inputs = q.rows;
+  Matrix p(inputs + static_cast<int>(t.size()), inputs + static_cast<int>(t.size()));
+  for (int i = 0; i < inputs; ++i) {
+    for (int j = 0; j < inputs; ++j) p(i, j) = q(i, j);
+  }
+  int before = 0, begin = inputs;
+  for (std::size_t k = 0; k + 1 < stages.size(); ++k) {
+    const Matrix& m = stages[k];
+    for (int i = 0; i < m.rows; ++i) {
+      const Dyadic& multiplier = t[begin - inputs + i];
+      p(begin + i, begin + i) = Dyadic(2.0) * multiplier;
+      for (int j = 0; j < m.cols; ++j) {
+        p(begin + i, before + j) = -(multiplier * m(i, j));
+        p(before + j, begin + i) = p(begin + i, before + j);
+      }
+    }
+    before = begin;
+    begin += m.rows;
+  }
+  const Matrix last_gram = product(transposed(stages.back()), stages.back());
+  for (int i = 0; i < last_gram.rows; ++i) {
+    for (int j = 0; j < last_gram.cols; ++j) p(before + i, before + j) += -last_gram(i, j);
+  }
+  return p;
+}
+
 bool shows_positive_semidefinite(const Matrix& p, const Factor& factor) {
   const auto size = static_cast<std::size_t>(p.rows);
   if (factor.rows.size() != size || factor.scale.size() != size) return false;

@@ -38,6 +38,12 @@ std::size_t hidden_neurons(const std::vector<Matrix>& stages);
 /// @param t      one nonnegative multiplier per hidden neuron, first layer first.
 Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const std::vector<Dyadic>& t);
 
+/// The symmetric matrix whose positive semidefiniteness proves |g(v) - g(w)|^2 <= (v - w)' Q (v - w) for the same kind
+/// of chain g: the form above with Q in place of rho I, over (dv, dz_1, ..., dz_{K-1}), nothing minimised out. Blocks:
+///   (0, 0) Q,  (k, k) 2 T_k,  (k, k - 1) - T_k M_k,  and - M_K' M_K in the last one.
+/// @param q symmetric, as many rows as M_1 has columns.
+Matrix quadratic_lmi(const std::vector<Matrix>& stages, const Matrix& q, const std::vector<Dyadic>& t);
+
 /// True only if P is positive semidefinite, shown by E = D P D - R R' being diagonally dominant with a nonnegative
 /// diagonal: then E >= 0 (Gershgorin), D P D = R R' + E >= 0, and P >= 0 since D is invertible. False means that
 /// this factor does not show it, or has another shape than P; not that P is indefinite.

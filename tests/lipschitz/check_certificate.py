@@ -32,7 +32,7 @@ STATEMENT = (
     "and y in the box. So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
     "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x to y, whatever the "
     "number and the places of the others. Laws hold for the neighbours listed and the ground's input where there is "
-    "one: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, |df| <= upper max |dx_j|; own_state, |df| <= upper "
+    "one, in the box where their domain is box: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, |df| <= upper max |dx_j|; own_state, |df| <= upper "
     "|dx| where the vehicle's own state moves by dx.")
 
 
@@ -548,6 +548,42 @@ def lmi(chain, rho, t):
     return Matrix(p, exponent)
 
 
+def parse_factor(factor, where):
+    require_keys(factor, ["unit_exponent", "scale", "rows"], where)
+    unit, scale = integer(factor["unit_exponent"]), [integer(s) for s in listed(factor["scale"])]
+    require(all(abs(e) <= 8192 for e in [unit] + scale), f"{where}: exponent out of range")
+    rows = []
+    for text in listed(factor["rows"]):
+        require(isinstance(text, str), f"{where}: a row is not text")
+        words = [w for w in re.split("[ \t\n\v\f\r]+", text) if w]
+        require(all(len(w) <= 40 and re.fullmatch("-?[0-9]+", w) for w in words), f"{where}: not an integer")
+        rows.append([int(w) for w in words])
+    return unit, scale, rows
+
+
+def quadratic_lmi(chain, q, t):
+    """The matrix over (dv, dz) whose positive semidefiniteness gives |drho|^2 <= dv' Q dv."""
+    size, fraction = len(q.rows), [[q.fraction(i, j) for j in range(len(q.rows))] for i in range(len(q.rows))]
+    n = size + len(t)
+    p = [[Fraction(0)] * n for _ in range(n)]
+    for i in range(size):
+        p[i][:size] = fraction[i]
+    before, begin = 0, size
+    for m in chain[:-1]:
+        for i, row in enumerate(m.rows):
+            multiplier = Fraction(t[begin - size + i])
+            p[begin + i][begin + i] = 2 * multiplier
+            for j in range(len(row)):
+                p[begin + i][before + j] = p[before + j][begin + i] = -multiplier * m.fraction(i, j)
+        before, begin = begin, begin + len(m.rows)
+    gram = chain[-1].transposed() @ chain[-1]
+    for i in range(len(gram.rows)):
+        for j in range(len(gram.rows)):
+            p[before + i][before + j] -= gram.fraction(i, j)
+    exponent = -max(x.denominator.bit_length() - 1 for row in p for x in row)  # all denominators are powers of two
+    return Matrix([[(x * power(-exponent)).numerator for x in row] for row in p], exponent)
+
+
 def shows_positive_semidefinite(p, unit, scale, rows):
     """E = D P D - R R' is diagonally dominant with a nonnegative diagonal."""
     n = len(p.rows)
@@ -567,6 +603,114 @@ def shows_positive_semidefinite(p, unit, scale, rows):
                 slack[i] -= abs(e)
                 slack[j] -= abs(e)
     return all(s >= 0 for s in slack)
+
+
+def rounded_up(x):
+    """The next multiple of 2^-80: keeps fractions short."""
+    return Fraction(-((-x.numerator << 80) // x.denominator), 1 << 80)
+
+
+def neuron_bounds(layers, low, high, around):
+    """Bounds on every neuron over a box by linear relaxation of ReLU, layer by layer; those that `around` decides keep
+    its bounds. Exact but for bounds and slopes, which are rounded so that they still hold."""
+    bounds = []
+    for k, (weights, biases) in enumerate(layers):
+        bounds.append([])
+        for i in range(len(biases)):
+            lower, upper = around[k][i] if around else (None, None)
+            if lower is not None and (lower >= 0 or upper <= 0):
+                bounds[k].append((lower, upper))
+                continue
+            ends = []
+            for sign in 1, -1:
+                form, constant = [sign * w for w in weights[i]], sign * biases[i]
+                for j in range(k - 1, -1, -1):
+                    for c, (l, u) in enumerate(bounds[j]):
+                        if l >= 0 or form[c] == 0:
+                            continue
+                        if u <= 0 or (form[c] < 0 and u <= -l):
+                            form[c] = Fraction(0)
+                        elif form[c] > 0:
+                            slope = min(Fraction(1), rounded_up(u / (u - l)))
+                            constant += form[c] * max(u - slope * u, -slope * l)
+                            form[c] *= slope
+                    constant += sum(map(mul, form, layers[j][1]))
+                    form = [sum(c * row[x] for c, row in zip(form, layers[j][0]) if c)
+                            for x in range(len(layers[j][0][0]))]
+                ends.append(rounded_up(constant + sum(c * (h if c > 0 else l) for c, l, h in zip(form, low, high))))
+            l, u = -ends[1], ends[0]
+            bounds[k].append((l, u) if lower is None else (max(l, lower), min(u, upper)))
+    return bounds
+
+
+def is_positive_semidefinite(s):
+    """L D L' in fractions."""
+    n = len(s)
+    for j in range(n):
+        pivot = s[j][j]
+        if pivot < 0 or (pivot == 0 and any(s[i][j] != 0 for i in range(j + 1, n))):
+            return False
+        for i in range(j + 1, n):
+            if pivot == 0 or s[i][j] == 0:
+                continue
+            factor = s[i][j] / pivot
+            for k in range(j + 1, i + 1):
+                s[i][k] -= factor * s[k][j]
+    return True
+
+
+def part_holds(layers, gram, moving, weight, bounds, rho, t):
+    """S = rho I - F' G F - sum_i t_i (a_i e_i' + e_i a_i') over the moving inputs and the undecided neurons."""
+    n = len(moving) + sum(l < 0 < u for layer in bounds for l, u in layer)
+    s = [[Fraction(0)] * n for _ in range(n)]
+    for i in range(len(moving)):
+        s[i][i] = Fraction(rho)
+    z = [[weight[j] if j < len(moving) and moving[j] == i else Fraction(0) for j in range(n)]
+         for i in range(len(layers[0][0][0]))]
+    variable, neuron = len(moving), 0
+    for (weights, _), layer in zip(layers, bounds):
+        y = [[sum(w * row[j] for w, row in zip(weights_of_one, z)) for j in range(n)] for weights_of_one in weights]
+        for i, (l, u) in enumerate(layer):
+            if l < 0 < u:
+                for j in range(n):
+                    s[variable][j] -= t[neuron] * y[i][j]
+                    s[j][variable] -= t[neuron] * y[i][j]
+                s[variable][variable] += 2 * t[neuron]
+                y[i] = [Fraction(int(j == variable)) for j in range(n)]
+                variable += 1
+            elif l < 0:
+                y[i] = [Fraction(0)] * n
+            neuron += 1
+        z = y
+    h = [[sum(g * row[j] for g, row in zip(gram_row, z)) for j in range(n)] for gram_row in gram]
+    for i in range(n):
+        for j in range(n):
+            s[i][j] -= sum(f[i] * x[j] for f, x in zip(z, h))
+    return is_positive_semidefinite(s)
+
+
+def tree_fails(layers, gram, moving, weight, low, high, rho, text, multipliers):
+    """"" if every part of the box is proved, else why not."""
+    open_parts = [(low, high, neuron_bounds(layers, low, high, None))]
+    for word in text.split(" ") if text else []:
+        if not re.fullmatch("[st][0-9]{1,15}", word) or not open_parts:
+            return f"{word!r} is no split and no leaf, or one too many"
+        low, high, bounds = open_parts.pop()
+        index = int(word[1:])
+        if word[0] == "t":
+            if index >= len(multipliers) or not part_holds(layers, gram, moving, weight, bounds, rho, multipliers[index]):
+                return f"{word} does not prove its part"
+            continue
+        if index >= len(low) or len(open_parts) > 2000:
+            return f"{word}: no such coordinate, or too deep"
+        middle = Fraction(float(low[index]) + (float(high[index]) - float(low[index])) / 2)
+        if not low[index] <= middle <= high[index]:
+            return f"{word}: the side cannot be halved"
+        for is_upper in True, False:
+            l, h = list(low), list(high)
+            (l if is_upper else h)[index] = middle
+            open_parts.append((l, h, neuron_bounds(layers, l, h, bounds)))
+    return "the tree ends early" if open_parts else ""
 
 
 def evaluate(weights, values, exponent):
@@ -593,7 +737,7 @@ def add(a, b):
 class Checker:
     def __init__(self, certificate, network):
         self.c, self.network = certificate, network
-        self.norms, self.proved = {}, {}
+        self.norms, self.proved, self.local = {}, {}, set()
 
     def run(self):
         require_keys(self.c, ["schema", "tool", "statement", "network", "box", "layers", "bounds", "laws",
@@ -644,15 +788,7 @@ class Checker:
         require(rho > 0 and all(x >= 0 for x in t), f"{where}: rho is not positive, or a t negative")
         require(len(t) == sum(len(m.rows) for m in chain[:-1]), f"{where}: needs one t per hidden neuron")
         require(Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
-        require_keys(factor, ["unit_exponent", "scale", "rows"], where)
-        unit, scale = integer(factor["unit_exponent"]), [integer(s) for s in listed(factor["scale"])]
-        require(all(abs(e) <= 8192 for e in [unit] + scale), f"{where}: exponent out of range")
-        rows = []
-        for text in listed(factor["rows"]):
-            require(isinstance(text, str), f"{where}: a row is not text")
-            words = [w for w in re.split("[ \t\n\v\f\r]+", text) if w]
-            require(all(len(w) <= 40 and re.fullmatch("-?[0-9]+", w) for w in words), f"{where}: not an integer")
-            rows.append([int(w) for w in words])
+        unit, scale, rows = parse_factor(factor, where)
         require(shows_positive_semidefinite(lmi(chain, rho, t), unit, scale, rows),
                 f"{where}: the factor does not show that the matrix inequality holds")
 
@@ -672,6 +808,8 @@ class Checker:
         upper = number(bound["upper"], bound["upper_hex"], where)
         if bound["upper_method"] == "sdp":
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where)
+        elif bound["upper_method"] == "branch":
+            self.check_local(bound, upper, scale, where)
         else:
             require(bound["upper_method"] == "product" and bound["proof"] is None, f"{where}: unknown upper_method")
             require(all(name in self.norms for name in names), f"{where}: no such function")
@@ -681,11 +819,67 @@ class Checker:
             require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
         if not scale:
             self.proved[function, block] = Fraction(upper)
+            if bound["upper_method"] == "branch":
+                self.local.add((function, block))
         if bound["lower_witness"] is None:
             require(bound["lower"] is None and bound["lower_hex"] is None, f"{where}: lower without a witness")
             return
         lower = number(bound["lower"], bound["lower_hex"], where)
         self.check_lower(bound, Fraction(lower), scale, boxed, where)
+
+    def check_local(self, bound, upper, scale, where):
+        proof = bound["proof"]
+        require(bound["domain"] == "box", f"{where}: a bound by parts of a box without a box")
+        require_keys(proof, ["rho", "form", "tree", "multipliers"], where)
+        names = networks_of(bound["function"])
+        require(all(name in self.network.parts for name in names), f"{where}: no such function")
+        require(not names[0].startswith("rho:"), f"{where}: rho has no box")
+        layers = self.network.parts[names[0]].layers
+        require(len(layers) > 1, f"{where}: no hidden layer")
+        require((proof["form"] is None) == (len(names) == 1), f"{where}: a form for set functions only")
+        last = Matrix.of(layers[-1].weights, layers[-1].inputs)
+        gram = last.transposed() @ last
+        if len(names) == 2:
+            gram = last.transposed() @ self.checked_form(proof["form"], names[1], where) @ last
+        gram = [[gram.fraction(i, j) for j in range(len(gram.rows))] for i in range(len(gram.rows))]
+        rho = hex_float(proof["rho"])
+        require(rho > 0 and Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
+
+        moving = block_coordinates(self.network, names[0], bound["block"])
+        require(not scale or len(scale) == layers[0].inputs, f"{where}: scale has another size")
+        weight = [Fraction(scale[k]) if scale else Fraction(1) for k in moving]
+        require(names[0] in self.c["box"], f"{where}: no box for {names[0]}")
+        low, high = (hex_floats(self.c["box"][names[0]][side]) for side in ("lower", "upper"))
+        require(len(low) == len(high) == layers[0].inputs, f"{where}: the box has another size")
+        if self.network.clamp and names[0] != "phi:ground":
+            clamp = list(zip(*self.network.clamp))
+            low, high = ([min(max(x, a), b) for x, (a, b) in zip(side, clamp)] for side in (low, high))
+        require(all(a <= b for a, b in zip(low, high)), f"{where}: the box is empty")
+        hidden = [([[Fraction(w) for w in layer.weights[i * layer.inputs:(i + 1) * layer.inputs]]
+                    for i in range(layer.outputs)], [Fraction(b) for b in layer.biases]) for layer in layers[:-1]]
+        multipliers = []
+        for text in listed(proof["multipliers"]):
+            multipliers.append([Fraction(x) for x in hex_floats([w for w in re.split("[ \t\n\v\f\r]+", text) if w])])
+        require(all(len(t) == sum(len(b) for _, b in hidden) and min(t) >= 0 for t in multipliers),
+                f"{where}: multipliers are not one nonnegative number per hidden neuron")
+        require(isinstance(proof["tree"], str), f"{where}: the tree is not text")
+        reason = tree_fails(hidden, gram, moving, weight, [Fraction(x) for x in low], [Fraction(x) for x in high], rho,
+                            proof["tree"], multipliers)
+        require(not reason, f"{where}: {reason}")
+
+    def checked_form(self, form, name, where):
+        """Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w)."""
+        require_keys(form, ["q", "t", "factor"], where)
+        chain = stages(self.network, name, "all", [])
+        size, t = len(chain[0].rows[0]), hex_floats(form["t"])
+        triangle = [hex_floats([w for w in re.split("[ \t\n\v\f\r]+", row) if w]) for row in listed(form["q"])]
+        require([len(row) for row in triangle] == list(range(1, size + 1)), f"{where}: q is not a lower triangle")
+        require(len(t) == sum(len(m.rows) for m in chain[:-1]) and all(x >= 0 for x in t), f"{where}: unusable t")
+        q = Matrix.of([triangle[max(i, j)][min(i, j)] for i in range(size) for j in range(size)], size)
+        unit, scale, rows = parse_factor(form["factor"], where)
+        require(shows_positive_semidefinite(quadratic_lmi(chain, q, t), unit, scale, rows),
+                f"{where}: the factor does not show that the matrix inequality holds")
+        return q
 
     def point(self, array, part, boxed, where):
         values = hex_floats(array)
@@ -735,7 +929,7 @@ class Checker:
         require(lower ** 2 * run <= rise, f"{where}: claims more than the slope between x and y")
 
     def check_law(self, law):
-        require_keys(law, ["rho", "neighbours", "block", "law", "upper", "upper_hex"], "law")
+        require_keys(law, ["rho", "neighbours", "domain", "block", "law", "upper", "upper_hex"], "law")
         where = f"law of {law['rho']} {law['block']}"
         upper = Fraction(number(law["upper"], law["upper_hex"], where))
         require(isinstance(law["neighbours"], dict), f"{where}: neighbours is not an object")
@@ -744,11 +938,13 @@ class Checker:
         if "phi:ground" in self.network.parts:
             terms["ground"] = 1
         require(law["block"] in ("all", "position", "velocity"), f"{where}: no law for this block")
+        require(law["domain"] in ("box", "global"), f"{where}: unknown domain")
         total = squares = Fraction(0)
         for kind, count in terms.items():
             require(1 <= integer(count) <= 1000000, f"{where}: impossible number of neighbours")
             key = (f"set:{kind}:{law['rho']}", law["block"])
             require(key in self.proved, f"{where}: no bound of {key[0]}")
+            require(law["domain"] == "box" or key not in self.local, f"{where}: rests on a bound for a box only")
             total += integer(count) * self.proved[key]
             squares += integer(count) * self.proved[key] ** 2
         require(law["law"] in ("all_stacked", "all_max", "own_state"), f"{where}: unknown law")

@@ -38,6 +38,8 @@ def heterogeneous(folder, generator):
     for name, sizes in (("small", [6, 5, 4]), ("large", [6, 4, 4, 4]), ("ground", [4, 5, 4]), ("rho", [4, 5, 1])):
         (folder / f"{name}.safetensors").write_bytes(safetensors(sizes, generator))
     (folder / "box.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1,-1,-1,-2,-2,-2]\nupper = [1,1,1,2,2,2]\n')
+    (folder / "part.toml").write_text(
+        'schema = "swarmcert/box/1"\nlower = [0,-0.3,-0.2,0,0.1,0]\nupper = [0.4,0.1,0.3,3,0.5,0.6]\n')
     net = folder / "network.toml"
     net.write_text("""schema = "swarmcert/network/1"
 output = { quantity = "force_z", unit = "gf" }
@@ -69,6 +71,14 @@ def mutated(value, generator):
     if isinstance(value, str) and value.startswith(("0x", "-0x")):
         number = second.hex_float(value)
         return generator.choice([(number * (1 - 2 ** -20)).hex(), (-number).hex(), (0.0).hex(), "0x1p5000", "1.5", ""])
+    if isinstance(value, str) and value[:2] in ("s0", "s1", "s2", "s3", "s4", "s5"):  # a tree
+        return generator.choice([value + " t0", value[:-3], value.replace("s", "t"), value.replace("t", "s"), "s9 t0 t0",
+                                 " ".join(value.split()[1:]), ""])
+    if isinstance(value, str) and " 0x" in value:  # multipliers, or a row of a form
+        words = value.split()
+        at = generator.randrange(len(words))
+        words[at] = generator.choice([(second.hex_float(words[at]) * generator.choice([0.5, 1.001])).hex(), "-0x1p0", "x"])
+        return " ".join(words)
     if isinstance(value, str) and len(value) > 200:  # a row of a factor
         return generator.choice([value + "7", value + " 1", value[:-2], "x" + value])
     if isinstance(value, str):
@@ -125,13 +135,15 @@ def run():
         hetero = str(heterogeneous(folder, generator))
         nets = [([hetero], ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2", "--domain",
                             str(folder / "box.toml")]),
+                ([hetero], ["--neighbours", "2", "--domain", str(folder / "part.toml"), "--method", "branch"]),
                 ([hetero], ["--as", "float32", "--neighbours", "2", "--method", "product"]),
                 ([str(demo / "network.toml")], ["--blocks=position"]),
                 (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
         tried = rejected = 0
         for index, (net, options) in enumerate(nets):
             path = folder / f"certificate{index}.json"
-            subprocess.run([SWARMCERT, "certify", *net, *options, "--nodes", "1", "-q", "-o", path],
+            subprocess.run([SWARMCERT, "certify", *net, *options, "--nodes", "30" if "branch" in options else "1", "-q",
+                            "-o", path],
                            check=True, capture_output=True)
             certificate = second.parse(path.read_text())
             assert first_checker(certificate, net, folder, 0)[0]
@@ -148,7 +160,7 @@ def run():
                 # Where the slack of a proof allows it, another factor or multiplier proves the same; a law that holds
                 # for two neighbours holds for one.
                 harmless = mutation == certificate or is_longer or where[0] in ("tool", "box") or \
-                    any(key in where for key in ("factor", "t", "law", "neighbours"))
+                    any(key in where for key in ("factor", "t", "q", "multipliers", "tree", "law", "neighbours"))
                 assert harmless or not accepted, f"{where} was changed and both accept"
                 tried += 1
                 rejected += not accepted

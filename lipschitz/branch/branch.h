@@ -1,0 +1,47 @@
+/// @file Branch and bound for the Lipschitz constant on a box: halve the box where that decides neurons.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <vector>
+
+#include "lipschitz/branch/local_chain.h"
+
+namespace swarmcert::lipschitz {
+
+/// A bisection of the box with a proof per part, in preorder: a split is followed by its lower, then its upper half.
+struct BranchTree {
+  static constexpr int kLeaf = -1;
+  struct Node {
+    int split = kLeaf;    ///< coordinate that is halved, or kLeaf
+    int multipliers = 0;  ///< of a leaf: index into `multipliers`
+  };
+  std::vector<Node> nodes;
+  std::vector<std::vector<double>> multipliers;  ///< one per hidden neuron of the network, in its own units
+  double rho = 0;                                ///< claimed bound on the squared Lipschitz constant
+};
+
+struct BranchOptions {
+  int nodes = 20000;        ///< boxes to look at
+  double seconds = 0;       ///< wall clock; the search stops at the next node; 0: no limit
+  double known = 0;         ///< a Lipschitz constant that is attained: no need to go below
+  double tolerance = 1e-3;  ///< stop when the bound is within this of `known`, relatively
+  const std::atomic<bool>* cancelled = nullptr;
+  /// After every so many nodes: boxes looked at, bound so far.
+  std::function<void(int nodes, double bound)> progress;
+};
+
+struct BranchResult {
+  BranchTree tree;
+  int nodes = 0;     ///< boxes looked at
+  int programs = 0;  ///< semidefinite programs solved
+  double bound = 0;  ///< sqrt(tree.rho): an estimate until the tree is checked
+};
+
+/// Best-first search. Each box bounds its neurons by linear relaxation (Reach), takes out those that it decides, and
+/// inherits the multipliers of an ancestor; the box that dominates gets multipliers of its own once enough of its
+/// neurons are decided, and is halved otherwise. The result depends on the options only, not on the machine's load
+/// (seconds unset). It can be used whenever the search stops.
+BranchResult branch(const LocalChain& chain, const Box& box, const BranchOptions& options);
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,39 @@
+/// @file A Lipschitz bound that holds on a box only, proved part by part.
+#pragma once
+
+#include <optional>
+
+#include "lipschitz/bounds.h"
+#include "lipschitz/branch/branch.h"
+#include "lipschitz/branch/rho_form.h"
+#include "lipschitz/checker/tree_proof.h"
+#include "lipschitz/claims.h"
+#include "nn/files/network.h"
+
+namespace swarmcert::lipschitz {
+
+/// What shows |f(x) - f(y)| <= sqrt(rho) |x - y| on the box.
+struct LocalProof {
+  double rho = 0;
+  std::optional<RhoForm> form;  ///< of a set function
+  check::TreeProof tree;
+};
+
+struct LocalBound {
+  std::optional<LocalProof> proof;  ///< nothing where the checker did not accept what the search found
+  UpperBound upper{0};              ///< sqrt(rho), rounded up
+  int nodes = 0;                    ///< boxes looked at
+  int programs = 0;                 ///< semidefinite programs solved
+  long leaves = 0;
+};
+
+/// Bound of `claim` for inputs in `box`, both ends of the slope: of a plain network or of phi; of a set function with one
+/// neighbour moving in the box, whatever the number and the places of the others, through a RhoForm.
+///
+/// Branch and bound proposes, check::check_tree() verifies: what is returned has been accepted.
+/// @param joint_t multipliers of the claim's global bound (UpperProof::t); for a set function.
+/// @returns no proof for functions without hidden layers, and for rho alone.
+LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,
+                       const std::vector<double>& joint_t, const BranchOptions& options);
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,37 @@
+/// @file The function of a local bound, in the form that all nodes of its search share.
+#pragma once
+
+#include <vector>
+
+#include "lipschitz/box.h"
+#include "lipschitz/reach.h"
+
+namespace swarmcert::lipschitz {
+
+/// f = g(h_K-1), with the hidden layers h_k = relu(W_k h_k-1 + b_k) and |g(z) - g(z')|^2 <= (z - z')' G (z - z') for
+/// all z, z'. Of a plain network G = W_K' W_K; for phi in front of rho it carries a bound on rho (RhoBound).
+///
+/// Everything is scaled by powers of two per layer, which ReLU lets through, so that (rho, t) are of order one:
+/// h_k here is 2^-scale[k] times the network's.
+struct LocalChain {
+  ReachNetwork hidden;         ///< W_1 .. W_K-1 with ReLU, at least one
+  Eigen::MatrixXd gram;        ///< G, rounded to nearest: a search proposes, the checker verifies
+  std::vector<int> block;      ///< coordinates of x that move; the box bounds all
+  std::vector<double> weight;  ///< per moving coordinate: |dx|^2 = sum (dx_k / weight_k)^2
+  std::vector<int>
+      exponents;  ///< per hidden layer: e_1 + ... + e_k of the scaling; the output's is `output_exponent`
+  int output_exponent = 0;
+
+  Eigen::Index inputs() const { return hidden.front().weights.cols(); }
+  Eigen::Index neurons() const;
+  /// rho of the network for rho here, and the other way round for multipliers of layer k.
+  double unscaled_rho(double rho) const;
+  double unscaled_multiplier(double t, std::size_t layer) const;
+};
+
+/// @param layers the network's layers in double, the last one without ReLU, at least two.
+/// @param form   the Gram matrix of what follows the last layer, [outputs x outputs]; empty: the identity.
+LocalChain local_chain(const ReachNetwork& layers, const Eigen::MatrixXd& form, const std::vector<int>& block,
+                       const std::vector<double>& weight);
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,43 @@
+/// @file LipSDP-Neuron on a box: the neurons that the box decides are no variables any more.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "lipschitz/branch/local_chain.h"
+#include "lipschitz/interior_point.h"
+
+namespace swarmcert::lipschitz {
+
+/// What a box leaves of a neuron's slope.
+enum class NeuronState : char { kOff, kOn, kUndecided };
+
+/// S(rho, t) over the moving inputs and the undecided neurons. A neuron that is off has dz = 0, one that is on dz = dy:
+/// both are substituted, so that S is dense but small. Positive semidefinite, it proves |df|^2 <= rho |dx|^2 for all
+/// pairs of points of the box, since the segment between them stays inside.
+class NodeInequality final : public RankTwoInequality {
+ public:
+  NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states);
+
+  Eigen::Index size() const override { return a_.rows(); }
+  Eigen::Index inputs() const override { return inputs_; }
+  Eigen::MatrixXd linear(const Eigen::VectorXd& y) const override;
+  Eigen::MatrixXd slack(const Eigen::VectorXd& y) const override;
+  Eigen::MatrixXd times_a(const Eigen::MatrixXd& x) const override;
+  Eigen::MatrixXd a_transposed_times(const Eigen::MatrixXd& x) const override;
+  Eigen::MatrixXd times_patterned(const Eigen::MatrixXd& x, const Eigen::MatrixXd& d) const override;
+
+  /// Indices of the undecided neurons among all, ascending: t has one entry for each.
+  const std::vector<Eigen::Index>& undecided() const { return undecided_; }
+
+  /// The least rho with S(rho, t) >= 0, up to rounding; infinity if there is none.
+  double least_rho(const Eigen::VectorXd& t) const;
+
+ private:
+  Eigen::Index inputs_;
+  std::vector<Eigen::Index> undecided_;
+  Eigen::MatrixXd a_;          ///< [size x neurons] columns a_i
+  Eigen::MatrixXd last_gram_;  ///< of df in the variables
+};
+
+}  // namespace swarmcert::lipschitz

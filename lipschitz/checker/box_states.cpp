@@ -1,0 +1,127 @@
+#include "lipschitz/checker/box_states.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swarmcert::check {
+namespace {
+
+using Row = std::vector<double>;
+
+constexpr double kUnit = 0x1p-53;
+constexpr double kTiny = 0x1p-900;  ///< covers what underflow may cost in sums of at most 10^6 terms
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double next_up(double x) { return std::nextafter(x, kInfinity); }
+double next_down(double x) { return std::nextafter(x, -kInfinity); }
+
+/// An upper bound on one neuron's (signed) value, as a linear form in some layer's y or in x.
+struct Form {
+  Row coefficients;
+  double constant = 0, absolute = 0;  ///< sum of the constants' terms, and of their absolute values
+  double error = 0;                   ///< what rounding the coefficients may have cost
+  long terms = 0;                     ///< of `constant`
+};
+
+/// Substitutes y = W h + b: the form becomes one in h.
+void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
+  Row next(static_cast<std::size_t>(layer.inputs), 0.0);
+  double error = 0;
+  for (int i = 0; i < layer.outputs; ++i) {
+    const double c = form.coefficients[static_cast<std::size_t>(i)];
+    if (c == 0) continue;
+    const double* const row = &layer.weights[static_cast<std::size_t>(i) * layer.inputs];
+    for (int j = 0; j < layer.inputs; ++j) next[static_cast<std::size_t>(j)] += c * row[j];
+    const double bias = c * layer.biases[static_cast<std::size_t>(i)];
+    form.constant += bias;
+    form.absolute += std::abs(bias);
+    error += std::abs(c) * term[static_cast<std::size_t>(i)];
+    ++form.terms;
+  }
+  form.error += 1.01 * (layer.outputs + 2) * kUnit * error;
+  form.coefficients = std::move(next);
+}
+
+/// Substitutes h = relu(y), l <= y <= u.
+void through_relu(Form& form, const Row& lower, const Row& upper) {
+  for (std::size_t i = 0; i < form.coefficients.size(); ++i) {
+    double& c = form.coefficients[i];
+    const double l = lower[i], u = upper[i];
+    if (c == 0 || l >= 0) continue;
+    if (u <= 0) {
+      c = 0;
+    } else if (c < 0) {
+      if (!(u > -l)) c = 0;
+    } else {
+      const double slope = std::min(1.0, u / (u - l));
+      const double offset = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
+      form.constant += c * offset;
+      form.absolute += c * offset;
+      ++form.terms;
+      c *= slope;
+      form.error += 4 * kUnit * c * std::max(u, -l);
+    }
+  }
+}
+
+/// The form's largest value over the box, rounded up.
+double largest(const Form& form, const Row& lower, const Row& upper) {
+  double value = form.constant, absolute = form.absolute;
+  for (std::size_t j = 0; j < form.coefficients.size(); ++j) {
+    const double c = form.coefficients[j];
+    value += c * (c > 0 ? upper[j] : lower[j]);
+    absolute += std::abs(c) * std::max(std::abs(lower[j]), std::abs(upper[j]));
+  }
+  const double terms =
+      static_cast<double>(form.terms) + 2.0 * static_cast<double>(form.coefficients.size()) + 16;
+  const double result = next_up(value + (2 * terms * kUnit * absolute + 1.01 * form.error + kTiny));
+  return std::isnan(result) ? kInfinity : result;
+}
+
+}  // namespace
+
+NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lower, const Row& upper,
+                           const NeuronBounds* around) {
+  NeuronBounds bounds;
+  std::vector<Row> term;
+  Row magnitude;  // of the layer's input
+  for (std::size_t j = 0; j < lower.size(); ++j)
+    magnitude.push_back(std::max(std::abs(lower[j]), std::abs(upper[j])));
+  for (std::size_t k = 0; k < layers.size(); ++k) {
+    const HiddenLayer& layer = layers[k];
+    const auto rows = static_cast<std::size_t>(layer.outputs);
+    term.emplace_back(rows);
+    for (std::size_t i = 0; i < rows; ++i) {
+      double sum = std::abs(layer.biases[i]);
+      for (std::size_t j = 0; j < magnitude.size(); ++j)
+        sum += std::abs(layer.weights[i * magnitude.size() + j]) * magnitude[j];
+      term.back()[i] = (1 + 2 * kUnit * static_cast<double>(magnitude.size() + 4)) * sum + kTiny;
+    }
+    bounds.lower.push_back(around != nullptr ? around->lower[k] : Row(rows, -kInfinity));
+    bounds.upper.push_back(around != nullptr ? around->upper[k] : Row(rows, kInfinity));
+    magnitude.assign(rows, 0);
+    for (std::size_t i = 0; i < rows; ++i) {
+      double& l = bounds.lower[k][i];
+      double& u = bounds.upper[k][i];
+      if (l < 0 && u > 0) {
+        for (const double sign : {1.0, -1.0}) {
+          Form form;
+          form.coefficients.assign(rows, 0.0);
+          form.coefficients[i] = sign;
+          for (std::size_t j = k + 1; j-- > 0;) {
+            through_layer(form, layers[j], term[j]);
+            if (j > 0) through_relu(form, bounds.lower[j - 1], bounds.upper[j - 1]);
+          }
+          const double end = largest(form, lower, upper);
+          if (sign > 0) u = std::min(u, end);
+          if (sign < 0) l = std::max(l, -end);
+        }
+      }
+      magnitude[i] = std::max(0.0, u);
+    }
+  }
+  return bounds;
+}
+
+}  // namespace swarmcert::check

@@ -1,0 +1,249 @@
+#include "lipschitz/interior_point.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lipschitz/dense_kernels.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Step lengths come from Lanczos, which can miss the least eigenvalue: shorten until Cholesky agrees.
+constexpr double kBacktrack = 0.8;
+/// Relative accuracy of that eigenvalue: for the centring parameter, which is a heuristic, and for the step.
+constexpr double kRough = 0.1, kFine = 0.02;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Largest alpha <= 1 with X + alpha D >= 0 kept at a distance, from the least eigenvalue of L^-1 D L^-T by Lanczos
+/// with full reorthogonalisation, stopped at a relative accuracy. `factor` is L with X = L L'.
+double step_length(const MatrixXd& factor, const MatrixXd& direction, double fraction, double accuracy) {
+  const Index n = direction.rows();
+  const int steps = static_cast<int>(std::min<Index>(n, 30));
+  MatrixXd basis(n, steps + 1);
+  VectorXd alpha(steps), beta(steps);
+  basis.col(0) = VectorXd::LinSpaced(n, 1.0, 1.7).normalized();
+  double least = 0;
+  for (int k = 0; k < steps; ++k) {
+    VectorXd w = congruence_times(factor, direction, basis.col(k));
+    alpha(k) = basis.col(k).dot(w);
+    w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
+    w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
+    beta(k) = w.norm();
+    const bool last = k + 1 == steps || beta(k) < 1e-12;
+    if (last || k % 5 == 4) {
+      Eigen::SelfAdjointEigenSolver<MatrixXd> eigen;
+      eigen.computeFromTridiagonal(alpha.head(k + 1), beta.head(k), Eigen::ComputeEigenvectors);
+      const double residual = std::abs(beta(k) * eigen.eigenvectors()(k, 0));
+      least = eigen.eigenvalues()(0) - residual;
+      if (last || residual < accuracy * std::abs(eigen.eigenvalues()(0))) break;
+    }
+    basis.col(k + 1) = w / beta(k);
+  }
+  return least < 0 ? std::min(1.0, -fraction / least) : 1.0;
+}
+
+/// Tries `step`, then shorter ones, until `factor_at(step)` succeeds; empty if none does.
+template <class FactorAt>
+MatrixXd backtrack(double step, const FactorAt& factor_at) {
+  MatrixXd factor;
+  for (int tries = 0; tries < 10 && factor.size() == 0; ++tries) {
+    factor = factor_at(step);
+    step *= kBacktrack;
+  }
+  return factor;
+}
+
+/// (<A_j, X>)_j for symmetric X, given X A.
+VectorXd functionals(const RankTwoInequality& it, const MatrixXd& x, const MatrixXd& x_a) {
+  VectorXd v(1 + it.neurons());
+  v(0) = x.diagonal().head(it.inputs()).sum();
+  v.tail(it.neurons()) = -2.0 * x_a.bottomRows(it.neurons()).diagonal();
+  return v;
+}
+
+void symmetrise(MatrixXd& x) { x = 0.5 * (x + MatrixXd(x.transpose())); }
+
+/// M_ij = <A_i, Z A_j Y>, from rank-two constraints.
+MatrixXd schur_complement(const RankTwoInequality& it, const MatrixXd& z, const MatrixXd& z_a,
+                          const MatrixXd& y, const MatrixXd& y_a) {
+  const Index n0 = it.inputs();
+  const Index m = it.neurons();
+  const MatrixXd a_z_a = it.a_transposed_times(z_a);
+  const MatrixXd a_y_a = it.a_transposed_times(y_a);
+  MatrixXd schur(m + 1, m + 1);
+  const auto e_z_a = z_a.bottomRows(m).array();
+  const MatrixXd cross = e_z_a * y_a.bottomRows(m).transpose().array();
+  schur.bottomRightCorner(m, m) = cross + cross.transpose();
+  schur.bottomRightCorner(m, m).array() += z.bottomRightCorner(m, m).array() * a_y_a.array();
+  schur.bottomRightCorner(m, m).array() += a_z_a.array() * y.bottomRightCorner(m, m).array();
+  const VectorXd edge = -((z_a.topRows(n0).array() * y.topRightCorner(n0, m).array()).colwise().sum() +
+                          (z.topRightCorner(n0, m).array() * y_a.topRows(n0).array()).colwise().sum())
+                             .transpose();
+  schur.col(0).tail(m) = edge;
+  schur.row(0).tail(m) = edge.transpose();
+  schur(0, 0) = (z.topLeftCorner(n0, n0).array() * y.topLeftCorner(n0, n0).array()).sum();
+  return schur;
+}
+
+/// Solves M v = rhs for a symmetric positive definite M that may be badly scaled.
+class SchurSolver {
+ public:
+  explicit SchurSolver(const MatrixXd& schur) : scale_(schur.diagonal().cwiseSqrt().cwiseInverse()) {
+    scaled_ = scale_.asDiagonal() * schur * scale_.asDiagonal();
+    for (double regularisation = 1e-15; regularisation < 1e-6; regularisation *= 100) {
+      MatrixXd shifted = scaled_;
+      shifted.diagonal().array() += regularisation;
+      factor_ = cholesky(shifted);
+      if (factor_.size() > 0) break;
+    }
+  }
+  bool good() const { return factor_.size() > 0 && scale_.allFinite(); }
+  VectorXd solve(const VectorXd& rhs) const {
+    const VectorXd b = scale_.cwiseProduct(rhs);
+    VectorXd v = b;
+    solve_cholesky(factor_, v);
+    for (int i = 0; i < 2; ++i) {  // undoes the regularisation
+      VectorXd residual = b;
+      add_symmetric_product(residual, -1.0, scaled_, v);
+      solve_cholesky(factor_, residual);
+      v += residual;
+    }
+    return scale_.cwiseProduct(v);
+  }
+
+ private:
+  VectorXd scale_;
+  MatrixXd scaled_;
+  MatrixXd factor_;
+};
+
+}  // namespace
+
+const char* name(LipSdpStop stop) {
+  switch (stop) {
+    case LipSdpStop::kGapReached:
+      return "gap reached";
+    case LipSdpStop::kIterationLimit:
+      return "iteration limit";
+    case LipSdpStop::kNumericalLimit:
+      return "numerical limit";
+    case LipSdpStop::kCancelled:
+      return "cancelled";
+    case LipSdpStop::kNothingRun:
+      break;
+  }
+  return "nothing run";
+}
+
+InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
+                             const InteriorPointOptions& options) {
+  use_one_blas_thread();
+  const Index n = it.size();
+  const Index m = it.neurons();
+  VectorXd y = start;
+  MatrixXd s = it.slack(y);
+  MatrixXd s_factor = cholesky(s);
+  if (s_factor.size() == 0) {
+    InteriorPointResult result;
+    result.stop = LipSdpStop::kNumericalLimit;
+    return result;
+  }
+  // Z = mu S^-1 with trace 1 over the inputs: on the central path but for the constraints of the neurons.
+  MatrixXd z = inverse_from_cholesky(s_factor);
+  z /= z.diagonal().head(it.inputs()).sum();
+  MatrixXd z_factor = cholesky(z);
+
+  VectorXd b = VectorXd::Zero(m + 1);
+  b(0) = 1;
+  InteriorPointResult result;
+  result.points.push_back(y);
+  result.gaps.push_back(kInfinity);
+  result.stop = LipSdpStop::kIterationLimit;
+  if (z_factor.size() == 0) {
+    result.stop = LipSdpStop::kNumericalLimit;
+    return result;
+  }
+  for (; result.iterations < options.max_iterations; ++result.iterations) {
+    if (options.cancelled != nullptr && *options.cancelled) {
+      result.stop = LipSdpStop::kCancelled;
+      break;
+    }
+    const MatrixXd s_inverse = inverse_from_cholesky(s_factor);
+    const MatrixXd z_a = it.times_a(z);
+    const MatrixXd y_a = it.times_a(s_inverse);
+    const VectorXd residual = b - functionals(it, z, z_a);
+    const double mu = z.cwiseProduct(s).sum() / static_cast<double>(n);
+    // Dual objective <C, Z>; with a feasible Z it is below the optimum.
+    const double infeasibility = residual.cwiseAbs().maxCoeff();
+    const double gap = static_cast<double>(n) * mu / y(0);
+    if (infeasibility < 1e-9)
+      result.best_dual = std::max(result.best_dual, y(0) - static_cast<double>(n) * mu);
+    if (gap < options.relative_gap && infeasibility < options.infeasibility) {
+      result.stop = LipSdpStop::kGapReached;
+      break;
+    }
+
+    const SchurSolver schur(schur_complement(it, z, z_a, s_inverse, y_a));
+    if (!schur.good()) {
+      result.stop = LipSdpStop::kNumericalLimit;
+      break;
+    }
+    const VectorXd inverse_functionals = functionals(it, s_inverse, y_a);
+
+    // Predictor.
+    const VectorXd dy_a = schur.solve(-b);
+    const MatrixXd ds_a = it.linear(dy_a);
+    MatrixXd dz_a = -z;
+    add_product(dz_a, it.times_patterned(-z, ds_a), s_inverse);
+    symmetrise(dz_a);
+    const double primal_a = step_length(z_factor, dz_a, 1.0, kRough);
+    const double dual_a = step_length(s_factor, ds_a, 1.0, kRough);
+    const double mu_a = (z + primal_a * dz_a).cwiseProduct(s + dual_a * ds_a).sum() / static_cast<double>(n);
+    const double ratio = std::clamp(mu_a / mu, 0.0, 1.0);
+    const double sigma = std::max(1e-6, ratio * ratio * (primal_a > 0.1 && dual_a > 0.1 ? ratio : 1.0));
+
+    // Corrector.
+    const MatrixXd q = it.times_patterned(dz_a, ds_a);
+    VectorXd rhs = sigma * mu * inverse_functionals - b;
+    const MatrixXd a_q = it.a_transposed_times(q);
+    rhs.tail(m) += (q.bottomRows(m).array() * y_a.transpose().array()).rowwise().sum().matrix() +
+                   (a_q.array() * s_inverse.bottomRows(m).array()).rowwise().sum().matrix();
+    rhs(0) -= (q.topRows(it.inputs()).array() * s_inverse.topRows(it.inputs()).array()).sum();
+    const VectorXd dy = schur.solve(rhs);
+    const MatrixXd ds = it.linear(dy);
+    MatrixXd dz = sigma * mu * s_inverse - z;
+    add_product(dz, it.times_patterned(-z, ds) - q, s_inverse);
+    symmetrise(dz);
+    const double fraction = std::min(0.98, 0.9 + 0.09 * std::min(primal_a, dual_a));
+    const double primal = step_length(z_factor, dz, fraction, kFine);
+    const double dual = step_length(s_factor, ds, fraction, kFine);
+
+    const VectorXd y_before = y;
+    s_factor = backtrack(dual, [&](double step) {
+      y = y_before + step * dy;
+      s = it.slack(y);
+      return cholesky(s);
+    });
+    const MatrixXd z_before = z;
+    z_factor = backtrack(primal, [&](double step) {
+      z = z_before + step * dz;
+      return cholesky(z);
+    });
+    if (s_factor.size() == 0 || z_factor.size() == 0 || !y.allFinite()) {
+      y = y_before;
+      result.stop = LipSdpStop::kNumericalLimit;
+      break;
+    }
+    result.points.push_back(y);
+    result.gaps.push_back(gap);
+  }
+  return result;
+}
+
+}  // namespace swarmcert::lipschitz

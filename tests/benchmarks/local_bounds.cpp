@@ -1,0 +1,107 @@
+// Bounds on a box side by side: branch and bound with its checked proof, the bound for all inputs, and the norm of the
+// interval Jacobian over the whole box. Usage: benchmark_local_bounds [SECONDS], per function (default 60); the recorded
+// networks where they are present, else the bundled one. One thread. "witness": a slope attained in the box.
+#include <fmt/core.h>
+
+#include <Eigen/SVD>
+#include <chrono>
+#include <cstdlib>
+
+#include "data.h"
+#include "lipschitz/branch/local_bound.h"
+#include "lipschitz/lower_bound.h"
+#include "lipschitz/sdp_bound.h"
+#include "lipschitz/stages.h"
+
+namespace {
+
+using namespace swarmcert;
+using Eigen::MatrixXd;
+
+double since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// |mid J| + |rad J| for J = W_K D_K-1 ... D_1 W_1, the D in {0}, {1} or [0, 1] as the box decides; the relaxation that
+/// branch and bound starts from, without a semidefinite program.
+double interval_jacobian(const files::Weights& weights, const lipschitz::Box& box) {
+  const lipschitz::ReachNetwork network = lipschitz::reach_network(weights);
+  const lipschitz::Reach reach(network, box);
+  MatrixXd middle = network.front().weights, radius = MatrixXd::Zero(middle.rows(), middle.cols());
+  for (std::size_t k = 0; k + 1 < network.size(); ++k) {
+    const lipschitz::Bounds& bounds = reach.before_relu(k);
+    for (Eigen::Index i = 0; i < middle.rows(); ++i) {
+      if (bounds.lower(i) >= 0) continue;
+      if (bounds.upper(i) <= 0) {
+        middle.row(i).setZero();
+        radius.row(i).setZero();
+        continue;
+      }
+      const Eigen::RowVectorXd low = (middle.row(i) - radius.row(i)).cwiseMin(0.0);
+      const Eigen::RowVectorXd high = (middle.row(i) + radius.row(i)).cwiseMax(0.0);
+      middle.row(i) = (low + high) / 2;
+      radius.row(i) = (high - low) / 2;
+    }
+    const MatrixXd& w = network[k + 1].weights;
+    radius = w.cwiseAbs() * radius;
+    middle = w * middle;
+  }
+  return middle.jacobiSvd().singularValues()(0) + radius.jacobiSvd().singularValues()(0);
+}
+
+void run(const std::string& name, const files::Network& network, const std::string& function, double seconds) {
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::string part = function == "network" ? "network" : "phi:default";
+  const files::Weights& weights = *parts.at(part);
+  lipschitz::Box box;
+  const std::size_t positions = weights.inputs() == 4 ? 1 : 3;  // the ground sees its height and its velocity
+  for (std::size_t k = 0; k < static_cast<std::size_t>(weights.inputs()); ++k) {
+    box.upper.push_back(k < positions ? 1 : 2);
+    box.lower.push_back(-box.upper.back());
+  }
+  lipschitz::Claim claim;
+  claim.function = function;
+  claim.domain = "box";
+  const lipschitz::FoundSlope slope = lipschitz::lower_bound(network, claim, {{part, box}}, {});
+  const double witness = slope.witness ? slope.witness->slope.value() : 0;
+  const lipschitz::SdpBound global = lipschitz::sdp_bound(check::stages(network, function));
+
+  lipschitz::BranchOptions options;
+  options.nodes = 1'000'000;
+  options.seconds = seconds;
+  options.known = witness;
+  const auto start = std::chrono::steady_clock::now();
+  const lipschitz::LocalBound bound = lipschitz::local_bound(network, claim, box, global.proof->t, options);
+  const double total = since(start);
+  const double jacobian = function == "network" ? interval_jacobian(weights, box) : 0;
+  fmt::print("{:<12} {:>9.4f} {:>9.4f} {:>8.4f} {:>9.4f} {:>7.3f} {:>9.1f} {:>8.1f} {:>8}\n", name, bound.upper.value(),
+             witness, witness > 0 ? bound.upper.value() / witness : 0, global.proof->upper.value(),
+             global.proof->upper.value() / bound.upper.value(), jacobian, total, bound.nodes);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const double seconds = argc > 1 ? std::atof(argv[1]) : 60;
+  fmt::print("{:<12} {:>9} {:>9} {:>8} {:>9} {:>7} {:>9} {:>8} {:>8}\n", "function", "branch", "witness", "ratio",
+             "all x", "gain", "interval", "s+check", "boxes");
+  const auto weights = [](const std::string& name) { return files::load_weights(tests::data_path("weights/zip_f32/" + name)); };
+  if (!tests::data_is_present()) {
+    files::NetworkArguments demo;
+    demo.phi = tests::source_path("nn/networks/demo/phi.safetensors");
+    demo.rho = tests::source_path("nn/networks/demo/rho.safetensors");
+    run("demo set", files::load_network(demo), "set:default:default", seconds);
+    return 0;
+  }
+  for (const char* const name : {"phi_G", "phi_L", "phi_S"}) {
+    files::Network network;
+    network.plain = weights(std::string(name) + ".pth");
+    run(name, network, "network", seconds);
+  }
+  for (const char* const kind : {"L", "S"}) {
+    files::Network network;
+    network.phi["default"] = weights(std::string("phi_") + kind + ".pth");
+    network.rho["default"] = weights(std::string("rho_") + kind + ".pth");
+    run(std::string("set ") + kind, network, "set:default:default", seconds);
+  }
+}
