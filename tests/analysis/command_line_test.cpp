@@ -184,7 +184,7 @@ TEST_F(CommandLine, OptionsThatAskForWhatTheNetworkHasNotAreUsageErrors) {
   expect("certify " + net + " --neighbours many", 2, {"--neighbours many", "small=1"});
   expect("certify " + net + " --neighbours a=1", 2, {"\"a\""});
   expect("certify " + net + " --range", 2, {"--domain"});
-  expect("certify " + net + " --method branch", 2, {"branch", "not part of this version"});
+  expect("certify " + net + " --method branch", 2, {"branch and bound needs a box", "--domain"});
   expect("certify " + net + " --as float16", 2, {"--as"});
   write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1]\nupper = [1, 2]\n");
   expect("certify " + net + " --domain box.toml", 3, {"box.toml", "line 2", "2 inputs"});

@@ -49,7 +49,8 @@ double interval_jacobian(const files::Weights& weights, const lipschitz::Box& bo
   return middle.jacobiSvd().singularValues()(0) + radius.jacobiSvd().singularValues()(0);
 }
 
-void run(const std::string& name, const files::Network& network, const std::string& function, double seconds) {
+void run(const std::string& name, const files::Network& network, const std::string& function,
+         double seconds) {
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::string part = function == "network" ? "network" : "phi:default";
   const files::Weights& weights = *parts.at(part);
@@ -74,18 +75,21 @@ void run(const std::string& name, const files::Network& network, const std::stri
   const lipschitz::LocalBound bound = lipschitz::local_bound(network, claim, box, global.proof->t, options);
   const double total = since(start);
   const double jacobian = function == "network" ? interval_jacobian(weights, box) : 0;
-  fmt::print("{:<12} {:>9.4f} {:>9.4f} {:>8.4f} {:>9.4f} {:>7.3f} {:>9.1f} {:>8.1f} {:>8}\n", name, bound.upper.value(),
-             witness, witness > 0 ? bound.upper.value() / witness : 0, global.proof->upper.value(),
-             global.proof->upper.value() / bound.upper.value(), jacobian, total, bound.nodes);
+  fmt::print("{:<12} {:>9.4f} {:>9.4f} {:>8.4f} {:>9.4f} {:>7.3f} {:>9.1f} {:>8.1f} {:>8}\n", name,
+             bound.upper.value(), witness, witness > 0 ? bound.upper.value() / witness : 0,
+             global.proof->upper.value(), global.proof->upper.value() / bound.upper.value(), jacobian, total,
+             bound.nodes);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 60;
-  fmt::print("{:<12} {:>9} {:>9} {:>8} {:>9} {:>7} {:>9} {:>8} {:>8}\n", "function", "branch", "witness", "ratio",
-             "all x", "gain", "interval", "s+check", "boxes");
-  const auto weights = [](const std::string& name) { return files::load_weights(tests::data_path("weights/zip_f32/" + name)); };
+  fmt::print("{:<12} {:>9} {:>9} {:>8} {:>9} {:>7} {:>9} {:>8} {:>8}\n", "function", "branch", "witness",
+             "ratio", "all x", "gain", "interval", "s+check", "boxes");
+  const auto weights = [](const std::string& name) {
+    return files::load_weights(tests::data_path("weights/zip_f32/" + name));
+  };
   if (!tests::data_is_present()) {
     files::NetworkArguments demo;
     demo.phi = tests::source_path("nn/networks/demo/phi.safetensors");

@@ -68,7 +68,7 @@ def leaves(value, path=()):
 
 def mutated(value, generator):
     """Another value in its place: near it, of the same type, or of another."""
-    if isinstance(value, str) and value.startswith(("0x", "-0x")):
+    if isinstance(value, str) and value.startswith(("0x", "-0x")) and " " not in value:
         number = second.hex_float(value)
         return generator.choice([(number * (1 - 2 ** -20)).hex(), (-number).hex(), (0.0).hex(), "0x1p5000", "1.5", ""])
     if isinstance(value, str) and value[:2] in ("s0", "s1", "s2", "s3", "s4", "s5"):  # a tree
