@@ -99,7 +99,10 @@ Constants largest(const Bounds& bounds, const Function& function, const Upper& u
     double& constant = is_ground ? result.own : result.neighbour;
     constant = std::max(constant, newtons(unit(bound), upper(bound), path));
   }
-  if (result.neighbour < 0) throw InputError({path, "", "bounds", "", "has none of a composed function", ""});
+  if (result.neighbour < 0)
+    throw InputError({path, "", "bounds", "",
+                      "has no bound of a whole network for all inputs and all their coordinates",
+                      "certify without --domain, --blocks and --scale"});
   return result;
 }
 

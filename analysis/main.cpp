@@ -1,7 +1,10 @@
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 
 #include "analysis/commands/command.h"
 #include "nn/files/input_error.h"
@@ -49,6 +52,20 @@ void declare_common(CLI::App& app, CommonOptions& common) {
   app.add_flag("-q,--quiet", common.quiet, "No progress on standard error");
 }
 
+/// Range checks let NaN pass, and no option means anything by it.
+void refuse_nan(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_type_name().rfind("FLOAT", 0) != 0) continue;
+    for (std::string value : option->results()) {
+      std::transform(value.begin(), value.end(), value.begin(),
+                     [](unsigned char c) { return std::tolower(c); });
+      if (value.substr(value.find_first_not_of("+-") == std::string::npos ? 0 : value.find_first_not_of("+-"),
+                       3) == "nan")
+        throw swarmcert::analysis::UsageError(option->get_name() + " " + value + ": give a number");
+    }
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Formal verification and analysis for learned multirotor controllers.", "swarmcert");
   app.require_subcommand(1);
@@ -74,6 +91,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "swarmcert: {}\n", explain(app, error, argc, argv));
     return swarmcert::analysis::kUsage;
   }
+  for (const CLI::App* sub : app.get_subcommands()) refuse_nan(*sub);
   swarmcert::analysis::remember_command_line(argc, argv);
   return action(common);
 }
@@ -89,6 +107,9 @@ int main(int argc, char** argv) {
   } catch (const swarmcert::analysis::UsageError& error) {
     fmt::print(stderr, "swarmcert: {}\n", error.what());
     return swarmcert::analysis::kUsage;
+  } catch (const std::filesystem::filesystem_error& error) {
+    fmt::print(stderr, "swarmcert: {}: {}\n", error.path1().string(), error.code().message());
+    return swarmcert::analysis::kBadInput;
   } catch (const std::exception& error) {
     fmt::print(stderr, "swarmcert: internal error: {}\n", error.what());
     return swarmcert::analysis::kInternal;

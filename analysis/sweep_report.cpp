@@ -176,7 +176,7 @@ void print_sweep(const MergedSweep& sweep) {
   if (!sweep.front.empty()) fmt::print("  Pareto front: {} cells\n", sweep.front.size());
 }
 
-std::string write_sweep_report(const MergedSweep& sweep, const std::string& folder) {
+std::string write_sweep_report(const MergedSweep& sweep, const std::string& folder, bool overwrite) {
   Report report("Sweep of " + sweep.grid_path);
   for (std::size_t q = 0; q < sweep.compute.size(); ++q) add_plane(report, sweep, q);
   add_front(report, sweep);
@@ -187,7 +187,7 @@ std::string write_sweep_report(const MergedSweep& sweep, const std::string& fold
     for (const auto& [reason, count] : why) rows.push_back({reason, std::to_string(count)});
     report.table({"reason", "cells"}, rows);
   }
-  return report.write(folder, true);
+  return report.write(folder, overwrite);
 }
 
 }  // namespace swarmcert::analysis

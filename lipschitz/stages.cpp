@@ -52,6 +52,8 @@ LocalFunction local_function(const files::Network& network, const std::string& p
     for (int j = 0; j < last.inputs; ++j) transposed(j, i) = w(i, j);
   f.gram = product(transposed, q.rows == 0 ? w : product(q, w));
   f.coordinates = files::block_coordinates(network, part, block);
+  if (!scale.empty() && scale.size() != static_cast<std::size_t>(layers.front().inputs))
+    throw std::invalid_argument("scale has not one number per input of " + part);
   for (const int k : f.coordinates)
     f.weight.push_back(scale.empty() ? 1.0 : scale.at(static_cast<std::size_t>(k)));
   return f;

@@ -42,9 +42,10 @@ int run(const Options& options, const CommonOptions& common) {
 
 Command check_command() {
   return {"check", "Verify a certificate against the weights, independently of what wrote it",
-          "Rebuilds every matrix inequality from the weights and verifies it in exact integer arithmetic; "
-          "uses no\n"
-          "optimiser and no floating point. Accepted: exit 0. Rejected, with the reason: exit 1.\n\n"
+          "Rebuilds every matrix inequality from the weights and verifies it in exact integer arithmetic, "
+          "proofs on a box\n"
+          "in double with every rounding accounted for; uses no optimiser. Accepted: exit 0. Rejected, with "
+          "the reason: exit 1.\n\n"
           "Example: swarmcert check cert.json nn/networks/demo/network.toml",
           [](CLI::App& app) {
             const auto options = std::make_shared<Options>();

@@ -63,8 +63,16 @@ files::Network load_net(const files::NetworkArguments& arguments) {
 }
 
 void remember_command_line(int argc, const char* const* argv) {
-  static const std::set<std::string> with_value = {"--jobs", "-j", "--json", "-o", "--output", "--report"};
+  static const std::set<std::string> with_value = {"--jobs",   "-j",       "--json", "-o",
+                                                   "--output", "--report", "--csv",  "--fitted"};
   static const std::set<std::string> flags = {"-q", "--quiet", "--force"};
+  // "-j2", "-qj2", "-qj 2", "-ofile": one dash, then flags, then perhaps an option with its value.
+  const auto short_options = [](const std::string& word) {
+    if (word.size() < 3 || word[0] != '-' || word[1] == '-') return std::string::npos;
+    std::size_t at = 1;
+    while (at < word.size() && word[at] == 'q') ++at;
+    return at == word.size() || word[at] == 'j' || word[at] == 'o' ? at : std::string::npos;
+  };
   std::vector<std::string>& words = command_line();
   words = {"swarmcert"};
   for (int i = 1; i < argc; ++i) {
@@ -72,6 +80,10 @@ void remember_command_line(int argc, const char* const* argv) {
     if (flags.count(word) == 1) continue;
     if (with_value.count(word) == 1) {
       ++i;
+      continue;
+    }
+    if (const std::size_t at = short_options(word); at != std::string::npos) {
+      if (at + 1 == word.size()) ++i;  // its value is the next word
       continue;
     }
     const std::string before_equals = word.substr(0, word.find('='));
@@ -88,7 +100,8 @@ files::Json result_head(const std::string& command, const std::vector<std::strin
   return {{"schema", "swarmcert/" + command + "/1"},
           {"tool", "swarmcert " SWARMCERT_VERSION},
           {"command_line", command_line()},
-          {"inputs", std::move(inputs)}};
+          {"inputs", std::move(inputs)},
+          {"seed", nullptr}};
 }
 
 void refuse_to_replace(const CommonOptions& common, const std::string& path) {

@@ -57,7 +57,7 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 files::Network load_net(const files::NetworkArguments& arguments);
 
 /// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line
-/// without what may not change the result (--jobs, -q, --json, -o, --report, --force).
+/// without what may not change the result (--jobs, -q, --force and where output goes). `seed` is null until it is set.
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files);
 
 /// Remembers the command line for result_head().

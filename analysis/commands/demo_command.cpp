@@ -35,8 +35,11 @@ int run(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, certificate_path);
   std::filesystem::create_directories(folder);
 
-  fmt::print("1. Certify the bundled network: swarmcert certify {} -o {}\n", arguments.file,
-             certificate_path);
+  const auto say = [&common](const std::string& text) {
+    if (common.prints_text()) fmt::print("{}\n", text);
+  };
+  say(fmt::format("1. Certify the bundled network: swarmcert certify {} -o {}", arguments.file,
+                  certificate_path));
   const files::Network network = files::load_network(arguments);
   lipschitz::CertifyOptions certify_options;
   certify_options.jobs = common.jobs;
@@ -47,22 +50,22 @@ int run(const Options& options, const CommonOptions& common) {
   const lipschitz::Certification found = certify(network, certify_options);
   files::write_file(certificate_path, files::to_text(certificate(network, found)), common.force);
   for (const lipschitz::CertifiedBound& bound : found.bounds) {
-    fmt::print("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}\n", bound.function,
-               bound.upper.value(), bound.lower.witness ? bound.lower.witness->slope.value() : 0.0,
-               files::unit(network, bound.function));
+    say(fmt::format("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}", bound.function,
+                    bound.upper.value(), bound.lower.witness ? bound.lower.witness->slope.value() : 0.0,
+                    files::unit(network, bound.function)));
   }
 
-  fmt::print("2. Check the certificate: swarmcert check {} {}\n", certificate_path, arguments.file);
+  say(fmt::format("2. Check the certificate: swarmcert check {} {}", certificate_path, arguments.file));
   const check::CheckResult checked =
       check::check(files::read_json(certificate_path, check::kCertificateSchema), network);
-  fmt::print("   {}: {}\n", checked.accepted ? "accepted" : "rejected", checked.reason);
+  say(fmt::format("   {}: {}", checked.accepted ? "accepted" : "rejected", checked.reason));
 
   const std::string report = write_certify_report(network, found, lipschitz::Verdict::kProved,
                                                   (folder / "report").string(), common.force);
-  fmt::print("3. Look at the report: {}\n", report);
+  say("3. Look at the report: " + report);
 
   files::Json result = result_head("demo", input_files(network));
-  result["certificate"] = certificate_path;
+  result["certificate_sha256"] = files::sha256(files::read_file(certificate_path));
   result["accepted"] = checked.accepted;
   write_result(common, result);
   return checked.accepted ? kDone : kViolated;

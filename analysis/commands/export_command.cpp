@@ -99,8 +99,7 @@ Command export_command() {
         declare_network(app, options->network);
         app.add_option("-o,--output", options->output, "Folder for the source")->required();
         declare_as(app, options->as);
-        app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source")
-            ->check(CLI::ExistingFile);
+        app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source");
         app.add_option("--most-neighbours", options->source.most_neighbours, "Neighbours of one evaluation")
             ->check(CLI::Range(1, 64))
             ->capture_default_str();

@@ -24,16 +24,11 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
         ->required();
   } else {
     app.add_option("FLIGHTS", options.words, "Flight logs or folders of them");
-    app.add_option("--model", options.models, "model.toml")
-        ->required()
-        ->allow_extra_args(false)
-        ->check(CLI::ExistingFile);
+    app.add_option("--model", options.models, "model.toml")->required()->allow_extra_args(false);
   }
   app.add_option("--flights", options.fleet,
-                 "flights.toml: vehicles with their models (default: the published ones)")
-      ->check(CLI::ExistingFile);
-  app.add_option("--columns", options.columns, "columns.toml: what the columns of CSV logs mean")
-      ->check(CLI::ExistingFile);
+                 "flights.toml: vehicles with their models (default: the published ones)");
+  app.add_option("--columns", options.columns, "columns.toml: what the columns of CSV logs mean");
 }
 
 residuals::Inputs read_flights(const FlightOptions& options, bool own_models) {

@@ -8,6 +8,8 @@
 #include "analysis/logs/read_log.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
+#include "nn/files/toml.h"
+#include "stability/model.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -78,6 +80,39 @@ files::Json inspect_network(const std::string& path, const std::string& key, boo
   return {{"file", path}, {"kind", "network"}, {"networks", std::move(parts)}};
 }
 
+bool is_model(const std::string& path) {
+  if (path.size() < 5 || path.compare(path.size() - 5, 5, ".toml") != 0) return false;
+  const toml::table document = files::parse_toml(files::read_file(path), path);
+  return document["schema"].value_or(std::string()).rfind("swarmcert/model/", 0) == 0;
+}
+
+files::Json inspect_model(const std::string& path, bool print) {
+  const stability::Model model = stability::read_model(path);
+  files::Json effects = files::Json::array();
+  for (const stability::EffectSpec& effect : model.effects) {
+    effects.push_back({{"effect", effect.name}, {"parameters", effect.parameters}});
+    if (!effect.vehicle.empty()) effects.back()["vehicle"] = effect.vehicle;
+  }
+  const stability::ThrustMap& map = model.thrust;
+  if (print) {
+    fmt::print("{}: model of kind {}: {} kg, arm {} m, at most {:.3f} N per rotor\n", path, model.kind,
+               model.mass_kg, model.arm_m, map.largest_N(stability::kFullBattery_V));
+    for (const files::Json& effect : effects) fmt::print("  {}\n", effect.dump());
+    if (effects.empty()) fmt::print("  no effects\n");
+  }
+  return {{"file", path},
+          {"kind", "model"},
+          {"vehicle",
+           {{"kind", model.kind},
+            {"mass_kg", model.mass_kg},
+            {"inertia_kg_m2", model.inertia_kg_m2},
+            {"arm_m", model.arm_m},
+            {"torque_per_thrust_m", model.torque_per_thrust_m},
+            {"thrust",
+             {{"c00", map.c00}, {"c10", map.c10}, {"c01", map.c01}, {"c20", map.c20}, {"c11", map.c11}}}}},
+          {"effects", std::move(effects)}};
+}
+
 files::Json inspect_log(const std::string& path, const Options& options, const CommonOptions& common) {
   const logs::Log log = options.columns.empty() ? logs::read_log(path)
                                                 : logs::read_log(path, logs::read_columns(options.columns));
@@ -126,6 +161,7 @@ int run(const Options& options, const CommonOptions& common) {
   if (!options.csv.empty()) {
     if (options.files.size() != 1 || !logs::looks_like_log(options.files[0]))
       throw UsageError("--csv takes one flight log");
+    if (!(options.t0_s < options.t1_s)) throw UsageError("--t0 must be before --t1");
     refuse_to_replace(common, options.csv);
   }
   files::Json result = result_head("inspect", options.files);
@@ -133,6 +169,10 @@ int run(const Options& options, const CommonOptions& common) {
   for (const std::string& path : options.files) {
     if (logs::looks_like_log(path)) {
       result["files"].push_back(inspect_log(path, options, common));
+      continue;
+    }
+    if (is_model(path)) {
+      result["files"].push_back(inspect_model(path, common.prints_text()));
       continue;
     }
     result["files"].push_back(is_json(path) ? inspect_certificate(path, common.prints_text())
@@ -145,7 +185,8 @@ int run(const Options& options, const CommonOptions& common) {
 }  // namespace
 
 Command inspect_command() {
-  return {"inspect", "What is in a weight file, network.toml, certificate or flight log, and is it sound",
+  return {"inspect",
+          "What is in a weight file, network.toml, model, certificate or flight log, and is it sound",
           "Exit 0 if every file can be read, else 3 with what is wrong and where. Damage inside a flight log "
           "is skipped,\n"
           "counted and shown.\n\n"
@@ -154,13 +195,12 @@ Command inspect_command() {
           [](CLI::App& app) {
             const auto options = std::make_shared<Options>();
             app.add_option("FILE", options->files,
-                           "Weight files, network.toml files, certificates, flight logs")
+                           "Weight files, network.toml and model.toml files, certificates, flight logs")
                 ->required();
             app.add_option("--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
             app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
             app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
-            app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean")
-                ->check(CLI::ExistingFile);
+            app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
             app.add_option("--key", options->key,
                            "Where the state dict lies inside a nested checkpoint, e.g. model");
             return [options](const CommonOptions& common) { return run(*options, common); };

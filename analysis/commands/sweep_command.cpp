@@ -43,7 +43,8 @@ int finish(const std::string& command, const std::string& folder, const std::vec
   const std::string text = files::to_text(points);
   const bool is_there = std::filesystem::exists(path) && files::read_file(path) == text;
   if (!is_there) files::write_file(path, text, common.force || may_replace);
-  const std::string report = write_sweep_report(sweep, (std::filesystem::path(folder) / "report").string());
+  const std::string report = write_sweep_report(sweep, (std::filesystem::path(folder) / "report").string(),
+                                                common.force || may_replace || is_there);
   files::Json result = result_head(command, inputs);
   for (const char* key : {"axes", "compute", "pareto", "points"}) result[key] = points[key];
   write_result(common, result);

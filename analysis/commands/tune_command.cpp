@@ -7,6 +7,7 @@
 #include "analysis/commands/command.h"
 #include "analysis/progress.h"
 #include "analysis/tracking_input.h"
+#include "nn/files/input_error.h"
 #include "stability/sweep/tune.h"
 
 namespace swarmcert::analysis {
@@ -128,7 +129,8 @@ int run(Options options, const CommonOptions& common) {
   if (!loop) {
     const std::optional<stability::AxisLoop> continuous = axis_loop(input.gains, input.plant, axis);
     if (!continuous) throw UsageError("Lambda or K couples axes: there are no gains of one axis to tune");
-    throw UsageError(options.tracking.gains + " has no rate_hz: the noise of the command depends on it");
+    throw files::InputError({options.tracking.gains, "", "position.rate_hz", "", "is missing",
+                             "the noise of the command depends on the rate of the loop"});
   }
   if (!(loop->plant.Ki > 0)) throw UsageError("Ki of axis " + options.axis + " is 0: tune needs a PID law");
   options.tune.objective = options.objective == "amplitude" ? stability::TuneObjective::kAmplitude

@@ -5,7 +5,9 @@
 #include <set>
 
 #include "analysis/residuals/force_residual.h"
+#include "nn/files/functions.h"
 #include "nn/files/input_error.h"
+#include "nn/files/network.h"
 
 namespace swarmcert::residuals {
 namespace {
@@ -104,7 +106,13 @@ Inputs read_inputs(const InputArguments& arguments) {
   };
   for (stability::Model& model : inputs.models) complete(model);
   for (auto& [vehicle, model] : inputs.vehicle_models) complete(model);
-  if (!arguments.network.empty()) inputs.named_files.push_back(arguments.network);
+  if (!arguments.network.empty()) {
+    inputs.named_files.push_back(arguments.network);
+    files::NetworkArguments network;
+    network.file = arguments.network;
+    for (const auto& [name, weights] : files::parts(files::load_network(network)))
+      inputs.named_files.push_back(weights->path);
+  }
   for (const stability::Model& model : inputs.models) add_kind(inputs.kinds, model.kind, model.mass_kg);
   inputs.fallback_kind = inputs.models[0].kind;
   if (inputs.models.size() == 1 && !flown.empty() && flown.count(inputs.fallback_kind) == 0) {

@@ -10,7 +10,7 @@ namespace swarmcert::lipschitz {
 namespace {
 
 /// A constant function has no slope, a proof needs rho > 0.
-constexpr double kLeastRho = 1e-150;
+constexpr double kLeastRho = 1e-100;
 
 check::Matrix exact(const Eigen::MatrixXd& q) {
   check::Matrix result(static_cast<int>(q.rows()), static_cast<int>(q.cols()));

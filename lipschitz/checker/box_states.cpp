@@ -40,6 +40,8 @@ void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
     ++form.terms;
   }
   form.error += 1.01 * (layer.outputs + 2) * kUnit * error;
+  if (!std::all_of(next.begin(), next.end(), [](double c) { return std::isfinite(c); }))
+    form.error = kInfinity;
   form.coefficients = std::move(next);
 }
 
@@ -97,6 +99,7 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lo
       for (std::size_t j = 0; j < magnitude.size(); ++j)
         sum += std::abs(layer.weights[i * magnitude.size() + j]) * magnitude[j];
       term.back()[i] = (1 + 2 * kUnit * static_cast<double>(magnitude.size() + 4)) * sum + kTiny;
+      if (!(term.back()[i] <= kLargestInput)) term.back()[i] = kInfinity;
     }
     bounds.lower.push_back(around != nullptr ? around->lower[k] : Row(rows, -kInfinity));
     bounds.upper.push_back(around != nullptr ? around->upper[k] : Row(rows, kInfinity));

@@ -106,12 +106,9 @@ class Checker {
     require(certificate_["laws"].is_array(), "laws is not an array");
     for (const Json& bound : certificate_["bounds"]) check_bound(bound);
     for (const Json& law : certificate_["laws"]) check_law(law);
-    return {true,
-            "every statement verified in exact arithmetic",
-            spectral_norms_,
-            upper_bounds_,
-            lower_bounds_,
-            on_a_box_};
+    std::string reason = "every statement verified in exact arithmetic";
+    if (on_a_box_ > 0) reason += ", those on a box in double with every rounding accounted for";
+    return {true, reason, spectral_norms_, upper_bounds_, lower_bounds_, on_a_box_};
   }
 
  private:
@@ -221,6 +218,7 @@ class Checker {
       require(lower_end[k] <= upper_end[k], where + ": the box is empty");
     }
     TreeProof tree{proof["tree"].get<std::string>(), {}};
+    require(proof["multipliers"].is_array(), where + ": multipliers is not an array");
     for (const Json& words : proof["multipliers"]) tree.multipliers.push_back(hex_floats_in(words));
     const TreeVerdict verdict =
         check_tree(local_function(network_, moved, bound["block"].get<std::string>(), scale, q), lower_end,

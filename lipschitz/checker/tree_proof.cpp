@@ -1,8 +1,10 @@
 #include "lipschitz/checker/tree_proof.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace swarmcert::check {
@@ -11,8 +13,16 @@ namespace {
 using Row = std::vector<double>;
 
 constexpr double kUnit = 0x1p-53;
+/// More than what a product, or flushing its result to zero, loses below the range of normal numbers.
+constexpr double kLost = 0x1p-1000;
+/// Numbers of a proof stay within 2^-kRange .. 2^kRange, so that kLost is small beside what they make.
+constexpr int kRange = 400;
+
 /// Halving a coordinate more often than this leaves nothing to halve; and a hostile tree must not take all memory.
 constexpr std::size_t kDeepest = 2000;
+
+static_assert(std::numeric_limits<double>::is_iec559 && FLT_EVAL_METHOD == 0,
+              "the error bounds here are those of IEEE double arithmetic");
 
 /// A matrix whose entries are off by at most `radius`, both row-major.
 struct Rounded {
@@ -50,10 +60,11 @@ class PartInequality {
       trace += std::abs(s(i, i));
       double row = 0;
       for (int j = 0; j < n_; ++j) row += excess_[static_cast<std::size_t>(i) * n_ + j];
-      excess = std::max(excess, row);
+      if (!(row <= excess)) excess = row;  // keeps a NaN
     }
     // Sums of nonnegative doubles of at most n terms are too small by at most n u of themselves.
     const double shift = 1.001 * excess + 1.01 * (n_ + 4) * kUnit * trace + 0x1p-900;
+    if (!std::isfinite(shift)) return false;
     for (int i = 0; i < n_; ++i) s(i, i) = std::nextafter(s(i, i) - shift, -1e300);
     return cholesky_runs_through();
   }
@@ -83,7 +94,8 @@ class PartInequality {
           const double product = t * row[j];
           s(variable, j) -= product;
           s(j, variable) = s(variable, j);
-          excess(variable, j) += t * radius[j] + kUnit * std::abs(product) + kUnit * std::abs(s(variable, j));
+          excess(variable, j) +=
+              t * radius[j] + kUnit * std::abs(product) + kUnit * std::abs(s(variable, j)) + kLost;
           excess(j, variable) = excess(variable, j);
         }
         s(variable, variable) += 2 * t;  // exact: nothing else is there yet
@@ -110,7 +122,7 @@ class PartInequality {
         y.at(i)[j] = layer.weights[static_cast<std::size_t>(i) * layer.inputs + column] *
                      f_.weight[static_cast<std::size_t>(j)];
         y.radius_at(i)[j] =
-            f_.weight[static_cast<std::size_t>(j)] == 1 ? 0 : 2 * kUnit * std::abs(y.at(i)[j]);
+            f_.weight[static_cast<std::size_t>(j)] == 1 ? 0 : 2 * kUnit * std::abs(y.at(i)[j]) + kLost;
       }
     return y;
   }
@@ -139,7 +151,7 @@ class PartInequality {
         const double size = std::abs(w[c]);
         for (int j = 0; j < variable; ++j) {
           row[j] += w[c] * zc[j];
-          radius[j] += size * (1.01 * zr[j] + gamma * std::abs(zc[j]));
+          radius[j] += size * (1.01 * zr[j] + gamma * std::abs(zc[j]) + kLost) + kLost;
         }
       }
       for (int j = 0; j < variable; ++j) radius[j] *= 1.01;  // what rounding of the radii themselves may lack
@@ -164,9 +176,9 @@ class PartInequality {
         for (const int j : support[static_cast<std::size_t>(c)]) {
           h.at(i)[j] += g * z.at(c)[j];
           h.radius_at(i)[j] +=
-              1.01 * (g_size * z.radius_at(c)[j] + gram.radius_at(i)[c] * std::abs(z.at(c)[j]));
+              1.01 * (g_size * z.radius_at(c)[j] + gram.radius_at(i)[c] * std::abs(z.at(c)[j])) + kLost;
           size[static_cast<std::size_t>(i) * n_ + j] +=
-              1.01 * g_size * (std::abs(z.at(c)[j]) + z.radius_at(c)[j]);
+              1.01 * g_size * (std::abs(z.at(c)[j]) + z.radius_at(c)[j]) + kLost;
         }
       }
     for (int c = 0; c < rows; ++c)
@@ -177,14 +189,14 @@ class PartInequality {
           const double product = f * h.at(c)[j];
           s(i, j) -= product;
           excess(i, j) +=
-              1.01 * (f_size * h.radius_at(c)[j] +
-                      (z.radius_at(c)[i] + gamma * f_size) * size[static_cast<std::size_t>(c) * n_ + j]) +
-              kUnit * std::abs(s(i, j));
+              1.01 * (f_size * h.radius_at(c)[j] + (z.radius_at(c)[i] + gamma * f_size + kLost) *
+                                                       size[static_cast<std::size_t>(c) * n_ + j]) +
+              kLost + kUnit * std::abs(s(i, j));
         }
       }
     for (int i = 0; i < n_; ++i)  // the two halves were rounded apart
       for (int j = 0; j < i; ++j) {
-        excess(i, j) = excess(j, i) = std::max(excess(i, j), excess(j, i)) + std::abs(s(i, j) - s(j, i));
+        excess(i, j) = excess(j, i) = excess(i, j) + excess(j, i) + std::abs(s(i, j) - s(j, i));
         s(j, i) = s(i, j);
       }
   }
@@ -259,7 +271,20 @@ TreeVerdict check_tree(const LocalFunction& f, const Row& lower, const Row& uppe
     if (t.size() != neurons ||
         !std::all_of(t.begin(), t.end(), [](double x) { return x >= 0 && std::isfinite(x); }))
       return {false, "multipliers are not one nonnegative number per hidden neuron", 0};
-  if (!(rho > 0) || !std::isfinite(rho)) return {false, "rho is not positive", 0};
+  const auto in_range = [](double x) {
+    return std::ldexp(1.0, -kRange) <= x && x <= std::ldexp(1.0, kRange);
+  };
+  if (!in_range(rho)) return {false, "rho is not positive, or out of range", 0};
+  const auto usable_weight = [](double w) { return 0x1p-200 <= w && w <= 0x1p200; };
+  if (f.weight.size() != f.coordinates.size() ||
+      !std::all_of(f.weight.begin(), f.weight.end(), usable_weight))
+    return {false, "scale is out of range", 0};
+  if (f.hidden.empty() || lower.size() != upper.size() ||
+      lower.size() != static_cast<std::size_t>(f.hidden[0].inputs))
+    return {false, "the box has another size", 0};
+  for (std::size_t k = 0; k < lower.size(); ++k)
+    if (!(std::abs(lower[k]) <= kLargestInput && std::abs(upper[k]) <= kLargestInput && lower[k] <= upper[k]))
+      return {false, "the box is empty or too large", 0};
   const Rounded gram = rounded(f.gram);
 
   std::vector<Part> open;  // what preorder has still to visit, the next one last
@@ -271,7 +296,8 @@ TreeVerdict check_tree(const LocalFunction& f, const Row& lower, const Row& uppe
     const char kind = *at++;
     std::size_t index = 0;
     const auto [rest, error] = std::from_chars(at, end, index);
-    if (error != std::errc() || (rest != end && *rest != ' ') || (kind != 's' && kind != 't'))
+    if (error != std::errc() || (rest != end && (*rest != ' ' || rest + 1 == end)) || rest - at > 15 ||
+        (kind != 's' && kind != 't'))
       return {false, where + " is neither a split nor a leaf", verdict.leaves};
     at = rest == end ? end : rest + 1;
     if (open.empty()) return {false, where + ": the box is covered already", verdict.leaves};

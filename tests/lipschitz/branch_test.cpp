@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "data.h"
 #include "lipschitz/branch/local_bound.h"
@@ -253,6 +254,29 @@ TEST(TreeProof, IsRefusedWhereWordsOrMultipliersAreMissingOrWrong) {
     if (!made.accepts(kBox, proof.rho, changed)) ++refused_multipliers;
   }
   EXPECT_GE(refused_multipliers, 5) << "of " << proof.tree.multipliers.front().size();
+}
+
+TEST(TreeProof, UnderflowProvesNothing) {
+  // 64 neurons that are on, slope 64 / 8 / 8 = 1; in units in which every product of the inequality underflows.
+  const std::vector<double> eighths(64, 0.125), ones(64, 1.0);
+  const files::Network network =
+      plain(weights({{"fc1", 64, 1, eighths, ones}, {"fc2", 1, 64, eighths, {0}}}));
+  check::LocalFunction f = check::local_function(network, "network", "all", {}, check::Matrix(0, 0));
+  const check::TreeProof tree{"t0", {std::vector<double>(64, 0.0)}};
+  ASSERT_TRUE(check::check_tree(f, {0}, {1}, 1 + 1e-9, tree).holds);
+  ASSERT_FALSE(check::check_tree(f, {0}, {1}, 1 - 1e-9, tree).holds);
+  for (const int exponent : {-100, -180, -200, -201, -535}) {
+    f.weight = {std::ldexp(1.0, exponent)};
+    EXPECT_FALSE(check::check_tree(f, {0}, {1}, std::ldexp(0.25, 2 * exponent), tree).holds) << exponent;
+  }
+}
+
+TEST(TreeProof, IsRefusedForBoxesThatAreNone) {
+  const Proved made = example();
+  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
+  for (const Box& box : {Box{{1, 1, 1}, {0, 0, 0}}, Box{{0, 0}, {1, 1}}, Box{{0, 0, nan}, {1, 1, 1}},
+                         Box{{0, 0, -infinity}, {1, 1, 1}}, Box{{0, 0, 0}, {1, 1, 1e200}}})
+    EXPECT_FALSE(made.accepts(box, made.proof.rho, made.proof.tree));
 }
 
 // --- the published networks

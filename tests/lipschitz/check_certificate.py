@@ -854,7 +854,9 @@ class Checker:
         if self.network.clamp and names[0] != "phi:ground":
             clamp = list(zip(*self.network.clamp))
             low, high = ([min(max(x, a), b) for x, (a, b) in zip(side, clamp)] for side in (low, high))
-        require(all(a <= b for a, b in zip(low, high)), f"{where}: the box is empty")
+        require(all(-2.0 ** 100 <= a <= b <= 2.0 ** 100 for a, b in zip(low, high)), f"{where}: the box is empty or too large")
+        require(2.0 ** -400 <= rho <= 2.0 ** 400, f"{where}: rho is out of range")
+        require(all(2.0 ** -200 <= w <= 2.0 ** 200 for w in weight), f"{where}: scale is out of range")
         hidden = [([[Fraction(w) for w in layer.weights[i * layer.inputs:(i + 1) * layer.inputs]]
                     for i in range(layer.outputs)], [Fraction(b) for b in layer.biases]) for layer in layers[:-1]]
         multipliers = []
