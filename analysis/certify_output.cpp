@@ -289,8 +289,9 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
 
 void print_laws(const files::Network& network, const Certification& found) {
   if (found.laws.empty()) return;
-  fmt::print("\nSeveral neighbours at once{}\n",
-             network.phi.count(files::kGroundKind) == 1 ? ", and the ground's input with them" : "");
+  fmt::print("\nSeveral neighbours at once{}{}\n",
+             network.phi.count(files::kGroundKind) == 1 ? ", and the ground's input with them" : "",
+             found.laws.front().domain == "box" ? ", all in the box" : "");
   for (const lipschitz::CertifiedLaw& law : found.laws) {
     const char* meaning = law.law == lipschitz::LawKind::kAllStacked ? "|df| <= L sqrt(sum_j |dx_j|^2)"
                           : law.law == lipschitz::LawKind::kAllMax   ? "|df| <= L max_j |dx_j|"

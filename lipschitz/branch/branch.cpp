@@ -84,7 +84,6 @@ class Search {
       nodes_[static_cast<std::size_t>(top.index)].first_child = static_cast<int>(nodes_.size()) - 2;
       if (options_.progress && result_.nodes % 256 < 2) options_.progress(result_.nodes, bound(queue.top()));
     }
-    result_.bound = bound(queue.top());
     const double rho = queue.top().rho * (1 + kRhoMargin);
     result_.tree.rho = chain_.unscaled_rho(rho);
     for (; !queue.empty(); queue.pop())
@@ -159,7 +158,6 @@ class Search {
 
   /// Multipliers of the part's own.
   void solve(Part& part) {
-    ++result_.programs;
     const NodeInequality inequality(chain_, part.states);
     const Index m = inequality.neurons();
     VectorXd start(1 + m);

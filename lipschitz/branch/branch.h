@@ -33,9 +33,7 @@ struct BranchOptions {
 
 struct BranchResult {
   BranchTree tree;
-  int nodes = 0;     ///< boxes looked at
-  int programs = 0;  ///< semidefinite programs solved
-  double bound = 0;  ///< sqrt(tree.rho): an estimate until the tree is checked
+  int nodes = 0;  ///< boxes looked at
 };
 
 /// Best-first search. Each box bounds its neurons by linear relaxation (Reach), takes out those that it decides, and

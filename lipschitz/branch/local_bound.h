@@ -23,7 +23,6 @@ struct LocalBound {
   std::optional<LocalProof> proof;  ///< nothing where the checker did not accept what the search found
   UpperBound upper{0};              ///< sqrt(rho), rounded up
   int nodes = 0;                    ///< boxes looked at
-  int programs = 0;                 ///< semidefinite programs solved
   long leaves = 0;
 };
 
