@@ -14,7 +14,7 @@ files::Json json_of(const identification::Budget& budget);
 
 void print(const identification::Budget& budget);
 
-/// FOLDER/<vehicle>.toml for each vehicle, and a flights.toml that names them.
+/// `FOLDER/<vehicle>.toml` for each vehicle, and a flights.toml that names them.
 void write_fitted(const identification::Budget& budget, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

@@ -6,6 +6,7 @@
 #include <exception>
 #include <filesystem>
 
+#include "analysis/command_pages.h"
 #include "analysis/commands/command.h"
 #include "nn/files/input_error.h"
 #include "nn/files/suggest.h"
@@ -74,6 +75,14 @@ int run(int argc, char** argv) {
       "Exit codes: 0 done or holds; 1 a limit is violated, or something is refuted or rejected; 2 usage; 3 "
       "bad input;\n"
       "4 inconclusive; 70 a fault of this tool.  'swarmcert COMMAND --help' shows options and an example.");
+  const auto print_and_end = [&app](const std::string& name, std::string (*page)(const CLI::App&),
+                                    const std::string& description) {
+    app.add_flag_callback(
+        name, [&app, page] { throw CLI::CallForVersion(page(app), 0); }, description);
+  };
+  print_and_end("--man-page", swarmcert::analysis::man_page, "Print the manual page");
+  print_and_end("--bash-completion", swarmcert::analysis::bash_completion,
+                "Print the completion for bash: source <(swarmcert --bash-completion)");
   CommonOptions common;
   std::function<int(const CommonOptions&)> action;
   for (const Command& command : swarmcert::analysis::commands()) {

@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -209,7 +209,9 @@ Command simulate_command() {
               "      --gains controller/gains/crazyflie-small.toml -o flights",
           [](CLI::App& app) {
             auto options = std::make_shared<Options>();
-            app.add_option("TASK", options->task, "hover, swap, random-walk, circle or takeoff")->required();
+            app.add_option("TASK", options->task, "What to fly, see above")
+                ->type_name(fmt::format("{{{}}}", fmt::join(stability::task_names(), ",")))
+                ->required();
             app.add_option("--vehicles", options->vehicles, "How many")->check(CLI::Range(1, 1000));
             app.add_option("--model", options->models, "model.toml: one for all vehicles, or one for each")
                 ->required();

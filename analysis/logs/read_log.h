@@ -21,7 +21,7 @@ Log parse_log(std::istream& in, const std::string& path, const SignalMap& map = 
 /// True if the file is named like a log or as CSV, or starts like a micro-SD log.
 bool looks_like_log(const std::string& path);
 
-/// True for [<prefix>_]cf<id>_<run>, with or without ".csv".
+/// True for `[<prefix>_]cf<id>_<run>`, with or without ".csv".
 bool is_log_name(const std::string& name);
 
 /// The authors' 30 columns with their names, digits and units, for samples with t0 <= time < t1 in seconds of the

@@ -21,7 +21,7 @@ struct FoundFlights {
   std::vector<std::string> skipped;  ///< files in the folders that are no logs
 };
 
-/// Files and folders, searched recursively. A log is named [<prefix>_]cf<id>_<run>, with or without ".csv"; folder,
+/// Files and folders, searched recursively. A log is named `[<prefix>_]cf<id>_<run>`, with or without ".csv"; folder,
 /// prefix and run name the flight. Where a vehicle has a binary log and a CSV, the binary log is taken.
 /// @throws files::InputError if a path does not exist, a file that was named is no log, or nothing is left.
 FoundFlights find_flights(const std::vector<std::string>& paths);
