@@ -1,0 +1,73 @@
+// %% [markdown]
+// # 01 Certify a file
+//
+// How fast can the output of the networks in these files change, provably?
+//
+//     |f(x) - f(y)| <= L |x - y|  for all x, y
+//     L <= |W_1| |W_2| ... |W_K|                      product of spectral norms
+//     L <= sqrt(rho) where M(rho, T) <= 0, T >= 0     LipSDP-Neuron: usually much smaller
+//     L >= |f(x) - f(y)| / |x - y|                    any two points
+//
+// Upper bounds are proved in exact arithmetic, lower bounds are slopes between two float32 points.
+
+// %%
+#include <fmt/format.h>
+
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
+#include "nn/files/content_hash.h"
+#include "notebooks_cpp/notebook.h"
+
+using namespace swarmcert;
+
+int main() {
+  const files::Network network = files::load_network({"nn/networks/demo/network.toml", "", "", ""});
+  lipschitz::CertifyOptions options;
+  options.lower.rounds = 4;  // a short search for steep slopes
+  const lipschitz::Certification found = lipschitz::certify(network, options);
+
+  // %% [markdown]
+  // Every layer was trained to keep its spectral norm at or below gamma = 3. Does it, for the weights as stored?
+
+  // %%
+  for (const lipschitz::CertifiedLayer& layer : found.layers) {
+    fmt::print("{:<10} {}  {:.6f} .. {:.6f}  {}\n", layer.network, layer.name, layer.norm.norm.lower.value(),
+               layer.norm.norm.upper.value(), lipschitz::name(*layer.respects_gamma));
+  }
+
+  // %% [markdown]
+  // The bounds. The set function is rho(sum of phi): its input is one neighbour that moves.
+
+  // %%
+  std::string data;
+  for (const lipschitz::CertifiedBound& bound : found.bounds) {
+    const double witnessed = bound.lower.witness->slope.value();
+    fmt::print("{:<16} {:8.2f} <= L <= {:8.2f}   (product of norms: {:.1f})\n", bound.function, witnessed,
+               bound.upper.value(), bound.product.value());
+    data += fmt::format("\"{}\" {:.3f} {:.4g} {:.4g}\n", bound.function, witnessed, bound.upper.value(),
+                        bound.product.value());
+  }
+  notebook::plot("bounds", data,
+                 "set style data histogram\nset style fill solid 0.8\nset logscale y\nset key top left\n"
+                 "set ylabel 'Lipschitz constant (gf, hidden units per m, m/s)'\n"
+                 "plot 'bounds.dat' using 2:xtic(1) title 'witnessed' linecolor rgb '#0072b2', "
+                 "'' using 3 title 'proved' linecolor rgb '#d55e00', "
+                 "'' using 4 title 'product of norms' linecolor rgb '#999999'\n");
+
+  // %% [markdown]
+  // The certificate holds the proofs. A small checker verifies it against the weights and trusts no optimiser. A bound one
+  // percent below what was proved may even be true, but its proof does not hold, and a new hash does not help.
+
+  // %%
+  files::Json certificate = lipschitz::certificate(network, found);
+  const check::CheckResult sound = check::check(certificate, network);
+  fmt::print("as written: {}\n", sound.accepted ? "accepted" : "refused");
+
+  const double upper = 0.99 * found.bounds[0].upper.value();
+  certificate["bounds"][0]["upper"] = upper;
+  certificate["bounds"][0]["upper_hex"] = files::hex_float(upper);
+  certificate["bounds"][0]["proof"]["rho"] = files::hex_float(0.999 * upper * upper);
+  certificate["content_sha256"] = files::content_sha256(certificate);
+  const check::CheckResult forged = check::check(certificate, network);
+  fmt::print("forged:     {}: {}\n", forged.accepted ? "accepted" : "refused", forged.reason);
+}

@@ -1,0 +1,56 @@
+// %% [markdown]
+// # 04 Compare with a flight
+//
+// Where is the model wrong? The residual is what the accelerometer feels and the model does not explain:
+//
+//     r = m a_specific - f_u - f_model        (a_specific: specific force in the world frame; f_u: thrust from PWM and battery)
+//
+// The flight is simulated: the truth has motor lag, downwash, drag and ground effect, the model has none of them.
+
+// %%
+#include <fmt/format.h>
+
+#include "analysis/residuals/comparison.h"
+#include "notebooks_cpp/flights.h"
+#include "notebooks_cpp/notebook.h"
+
+using namespace swarmcert;
+
+int main() {
+  notebook::simulate_flights("stability/models/crazyflie-small-effects.toml", 2, 2, 30, "flights");
+  residuals::InputArguments arguments;
+  arguments.models = {"stability/models/crazyflie-small.toml"};
+  arguments.flights = {"flights"};
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  const residuals::Comparison comparison = residuals::compare(inputs, 0, [](int, int) {});
+
+  // %%
+  const double gf = 1 / stability::kGramForce_N;
+  const residuals::ErrorStatistics& all = comparison.overall.statistics;
+  fmt::print("records {}\n", all.samples);
+  fmt::print("RMSE (gf)  x {:.2f}  y {:.2f}  z {:.2f}\n", all.rmse.x * gf, all.rmse.y * gf, all.rmse.z * gf);
+  fmt::print("bias (gf)  x {:+.2f}  y {:+.2f}  z {:+.2f}\n", all.bias.x * gf, all.bias.y * gf,
+             all.bias.z * gf);
+
+  // %% [markdown]
+  // In which regions is it worst? The words come from cuts of the flight by height, speed, neighbours and thrust.
+
+  // %%
+  for (std::size_t i = 0; i < 3 && i < comparison.regions.size(); ++i) {
+    fmt::print("{:4.1f} % of the squared residual: {}\n", 100 * comparison.regions[i].share,
+               comparison.regions[i].words);
+  }
+
+  // %% [markdown]
+  // The vertical residual of one vehicle over time: the other one passes above.
+
+  // %%
+  std::string data;
+  const residuals::TrackErrors& track = comparison.tracks.front();
+  for (std::size_t i = 0; i < track.series.size(); i += 4) {
+    data += fmt::format("{:.2f} {:.2f}\n", track.series[i][0], static_cast<double>(track.series[i][3]) * gf);
+  }
+  notebook::plot("residual", data,
+                 "set xlabel 'time (s)'\nset ylabel 'vertical residual (gf)'\nset grid\n"
+                 "plot 'residual.dat' using 1:2 with lines linecolor rgb '#0072b2' notitle\n");
+}

@@ -1,0 +1,55 @@
+// %% [markdown]
+// # 06 Add it and watch the error fall
+//
+// Does the new model predict flights that it has not seen? Flights are split as wholes: some for the fit, one to decide
+// whether an effect stays, one that decides nothing and is scored once at the end.
+//
+//     accepted if RMSE(select) falls by at least half a percent;   reported: RMSE(test)
+
+// %%
+#include <fmt/format.h>
+
+#include "analysis/identification/ladder.h"
+#include "nn/files/file_io.h"
+#include "notebooks_cpp/flights.h"
+#include "notebooks_cpp/notebook.h"
+
+using namespace swarmcert;
+
+int main() {
+  notebook::simulate_flights("stability/models/crazyflie-small-effects.toml", 2, 5, 20, "flights");
+  residuals::InputArguments arguments;
+  arguments.models = {"stability/models/crazyflie-small.toml"};
+  arguments.flights = {"flights"};
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  identification::LadderOptions options;
+  options.automatic = false;
+  options.effects = {"downwash", "motor_lag", "drag_linear"};
+  const identification::Ladder ladder = identification::climb(inputs, options, 0, [](int, int) {});
+
+  // %%
+  std::string data;
+  for (const stability::LadderRow& row : ladder.rows) {
+    fmt::print("{:<12} fit {:.4f}  select {:.4f}  test {:.4f} N  {}\n", row.effect, row.fit_rmse_N,
+               row.select_rmse_N, row.test_rmse_N, row.accepted ? "" : row.note);
+    data +=
+        fmt::format("\"{}\" {:.4f} {:.4f} {:.4f}\n", row.effect == "nominal" ? row.effect : "+ " + row.effect,
+                    row.fit_rmse_N, row.test_rmse_N, row.noise_floor_N);
+  }
+  notebook::plot("ladder", data,
+                 "set style data linespoints\nset yrange [0:*]\nset grid y\nset ylabel 'RMSE of the force "
+                 "residual (N)'\n"
+                 "plot 'ladder.dat' using 0:2:xtic(1) linecolor rgb '#0072b2' title 'flights of the fit', "
+                 "'' using 0:3 linecolor rgb '#d55e00' title 'test flights', "
+                 "'' using 0:4 with lines dashtype 2 linecolor rgb '#999999' title 'noise floor'\n");
+
+  // %% [markdown]
+  // The new model is a file that every command reads; it remembers how it came about.
+
+  // %%
+  files::write_file("fitted.toml", stability::to_toml(ladder.model), true);
+  for (const stability::EffectSpec& effect : stability::read_model("fitted.toml").effects) {
+    for (const auto& [name, value] : effect.parameters)
+      fmt::print("{}.{} = {:.3g}\n", effect.name, name, value);
+  }
+}

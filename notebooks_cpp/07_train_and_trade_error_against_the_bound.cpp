@@ -1,0 +1,71 @@
+// %% [markdown]
+// # 07 Train and trade error against the bound
+//
+// What does a smaller Lipschitz bound cost in accuracy? Every layer is trained under
+//
+//     |W_k| <= gamma       so that  L <= gamma^K  for K layers,  and LipSDP proves less
+//
+// Small gamma: a slow, safe prediction that misses the jet. Large gamma: the reverse.
+
+// %%
+#include <fmt/format.h>
+
+#include "analysis/learning/projection.h"
+#include "analysis/learning/training_run.h"
+#include "lipschitz/certify.h"
+#include "notebooks_cpp/flights.h"
+#include "notebooks_cpp/notebook.h"
+
+using namespace swarmcert;
+
+/// The trained vector of parameters as the network that certify() takes.
+files::Network network_of(const learning::LearningData& data, const training::Vector& theta) {
+  files::Network network;
+  for (std::size_t part = 0; part < data.layout.parts().size(); ++part) {
+    const std::string& name = data.layout.parts()[part].name;  // "phi:small"
+    auto& group = name.rfind("phi:", 0) == 0 ? network.phi : network.rho;
+    group[name.substr(4)] = data.layout.stored(theta, static_cast<int>(part));
+  }
+  return network;
+}
+
+int main() {
+  notebook::simulate_flights("stability/models/crazyflie-small-effects.toml", 2, 5, 30, "flights");
+  residuals::InputArguments arguments;
+  arguments.models = {"stability/models/crazyflie-small.toml"};
+  arguments.flights = {"flights"};
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  const learning::NetworkSizes sizes{{16, 16}, {16}, 8, true};
+  const learning::LearningData data =
+      learning::load_learning_data(inputs, nullptr, sizes, 0, [](int, int) {});
+  fmt::print("{} samples; predicting nothing leaves {:.2f} gf on the test flights\n", data.tracks.back().end,
+             learning::rmse_of_nothing_gf(data, learning::Use::kTest));
+
+  // %%
+  std::string rows;
+  for (const double gamma : {1.0, 1.5, 2.0, 3.0, 4.0}) {
+    learning::RunOptions options;
+    options.epochs = 16;
+    options.patience = 16;
+    options.trainer.batch = 128;
+    options.trainer.learning_rate = 4e-3;
+    options.trainer.gamma.value = gamma;
+    const learning::Run run = learning::run_training(data, options);
+    const double error_gf = learning::rmse_gf(data, run.theta, learning::Use::kTest, 0);
+    lipschitz::CertifyOptions certify_options;
+    certify_options.lower.rounds = 0;
+    const lipschitz::Certification found = lipschitz::certify(network_of(data, run.theta), certify_options);
+    for (const lipschitz::CertifiedBound& bound : found.bounds) {
+      if (bound.function != "set:small:small") continue;
+      fmt::print(
+          "gamma {:.1f}: test RMSE {:.2f} gf, proved L <= {:.3g} gf/(m, m/s), product of norms {:.3g}\n",
+          gamma, error_gf, bound.upper.value(), bound.product.value());
+      rows += fmt::format("{:.1f} {:.2f} {:.3g}\n", gamma, error_gf, bound.upper.value());
+    }
+  }
+  notebook::plot("trade", rows,
+                 "set logscale x\nset grid\nset xlabel 'proved Lipschitz bound of the set (gf per m, m/s)'\n"
+                 "set ylabel 'test RMSE (gf)'\nset offsets graph 0.1, graph 0.1, graph 0.1, graph 0.1\n"
+                 "plot 'trade.dat' using 3:2 with linespoints pointtype 7 linecolor rgb '#0072b2' notitle, "
+                 "'' using 3:2:1 with labels offset 0,1 notitle\n");
+}

@@ -1,0 +1,89 @@
+// %% [markdown]
+// # 08 Write your own effect
+//
+// The library does not know your physics: a soft net at the side of the flying space, say, that pushes back.
+//
+//     f_x = -k max(0, x - x0)         k in N/m, x0 in m
+//
+// An effect says what one unit of each coefficient does, and where it would be noticed. The simulator and the
+// identification use these columns and nothing else.
+
+// %%
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "analysis/identification/diagnose.h"
+#include "analysis/residuals/force_residual.h"
+#include "nn/files/file_io.h"
+#include "notebooks_cpp/flights.h"
+#include "notebooks_cpp/notebook.h"
+#include "stability/effects/registry.h"
+
+using namespace swarmcert;
+using namespace swarmcert::stability;
+
+class Net : public Effect {
+ public:
+  Net() : Effect(describe()) {}
+  static EffectInfo describe() {
+    return {"net",
+            "f_x = -k max(0, x - x0)",
+            "this guide",
+            "net",
+            "fly against it at several speeds",
+            {{"stiffness_N_m", "k", 1, 0, 10}},
+            {{"edge_m", "x0", 0.02, -1, 1, {-0.04, -0.02, 0, 0.02, 0.04}}}};
+  }
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override {
+    columns[0] = {{-std::max(0.0, now.p_W_m.x() - shape[0]), 0, 0}, Eigen::Vector3d::Zero()};
+  }
+  bool in_support(const Instant& now, const double* shape) const override { return now.p_W_m.x() > shape[0]; }
+};
+
+int main() {
+  register_effect(Net::describe(),
+                  [](const EffectSpec&, const EffectContext&) { return std::make_unique<Net>(); });
+
+  // %% [markdown]
+  // Model files may now name it. The truth has it, the model that is diagnosed has not.
+
+  // %%
+  files::write_file("truth.toml",
+                    files::read_file("stability/models/crazyflie-small.toml") +
+                        "\n[[effect]]\nname = \"net\"\nparameters = { stiffness_N_m = 1.0, edge_m = 0.02 }\n",
+                    true);
+  notebook::simulate_flights("truth.toml", 1, 3, 40, "flights");
+  residuals::InputArguments arguments;
+  arguments.models = {"stability/models/crazyflie-small.toml"};
+  arguments.flights = {"flights"};
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  for (const identification::Missing& one : identification::missing_effects(
+           inputs, "small", identification::every_flight(inputs), 0, [](int, int) {})) {
+    fmt::print("{}: RMSE {:.4f} -> {:.4f} N\n", one.effect, one.finding.rmse_before_N,
+               one.finding.rmse_after_N);
+    for (const auto& [name, value] : one.parameters) fmt::print("  {} = {:.3g}\n", name, value);
+  }
+
+  // %% [markdown]
+  // What the vehicle felt: the residual along x, over x, and the force of the truth.
+
+  // %%
+  std::vector<std::string> problems;
+  std::string data;
+  for (const residuals::Track& track : inputs.load(0, problems)) {
+    const std::vector<Eigen::Vector3d> residual_N =
+        residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
+    for (std::size_t i = 0; i < residual_N.size(); i += 20) {
+      if (track.cut[i] != residuals::Cut::kNone) continue;
+      const double x_m = track.instants[i].p_W_m.x();
+      data += fmt::format("{:.3f} {:.4f} {:.4f}\n", x_m, residual_N[i].x(), -std::max(0.0, x_m - 0.02));
+    }
+  }
+  notebook::plot(
+      "net", data,
+      "set xlabel 'x (m)'\nset ylabel 'force along x (N)'\nset grid\n"
+      "plot 'net.dat' using 1:2 with points pointtype 7 pointsize 0.4 linecolor rgb '#0072b2' title "
+      "'residual', "
+      "'' using 1:3 with points pointtype 7 pointsize 0.4 linecolor rgb '#d55e00' title 'truth'\n");
+}

@@ -1,0 +1,33 @@
+/// @file A guide that ran: cells with what they printed and drew, as .ipynb and as HTML.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nn/files/json.h"
+#include "notebooks_cpp/cells.h"
+
+namespace swarmcert::notebook {
+
+/// What a code cell left: text, or a plot.
+struct Output {
+  std::string text;  ///< standard output; of a plot: a line that stands in its place
+  std::string data;  ///< of a plot
+  std::string svg, png;
+  bool is_plot() const { return !data.empty(); }
+};
+
+struct RunCell : Cell {
+  std::vector<Output> outputs;
+};
+
+/// Notebook format 4.5. A plot is one display_data with SVG, PNG and text; its data stand in its metadata.
+files::Json to_ipynb(const std::vector<RunCell>& cells);
+
+/// One self-contained page that loads nothing.
+std::string to_html(const std::string& title, const std::vector<RunCell>& cells);
+
+/// Where two notebooks differ, images aside: the first cell with both texts; empty if nowhere. Both must have the images.
+std::string first_difference(const files::Json& committed, const files::Json& fresh);
+
+}  // namespace swarmcert::notebook
