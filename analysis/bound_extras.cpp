@@ -9,6 +9,7 @@
 #include "nn/files/input_error.h"
 #include "stability/bounds/uncertain_norms.h"
 #include "stability/bounds/verified_norms.h"
+#include "stability/bounds/verified_sampled_norms.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -99,32 +100,28 @@ std::string pair_text(const Json& pair) { return number_text(pair[0]) + " .. " +
 
 namespace {
 
-/// What the sampled loop reaches at the corners and the middle of the box: no supremum, which has no enclosure here.
-Json sampled_reached_json(const Tracking& input, const UncertainPlant& plant, int axis, Channel channel) {
-  GainNorms most;
-  for (int corner = 0; corner <= 16; ++corner) {
-    const auto at = [&](const Range& range, int bit) {
-      return corner == 16 ? (range.from + range.to) / 2 : (corner >> bit) % 2 == 0 ? range.from : range.to;
-    };
-    AxisLoop loop = fixed_part(input, axis);
-    const double mass_kg = at(plant.mass_kg, 0);
-    const double scale = at(plant.thrust_scale, 1) * loop.mass_kg / mass_kg;
-    loop.mass_kg = mass_kg;
-    loop.Kp *= scale;
-    loop.Kd *= scale;
-    loop.Ki *= scale;
-    loop.lags_s.insert(loop.lags_s.begin(), at(plant.lag_s, 2));
-    loop.delay_s = at(plant.delay_s, 3);
-    const GainNorms norms = sampled_norms({loop, 1 / input.gains.rate_hz, input.gains.integrator_step_s},
-                                          channel, Instants::kSampling);
-    most = {std::max(most.rate, norms.rate), std::max(most.amplitude, norms.amplitude),
-            std::max(most.edge, norms.edge), std::max(most.impulse, norms.impulse)};
+Json uncertain_row(int axis, Channel channel, Loop loop, const UncertainNorms& norms) {
+  return {{"axis", axis_name(axis)},
+          {"channel", name(channel)},
+          {"loop", name(loop)},
+          {"status", "enclosed"},
+          {"rate", gain_json(norms.rate)},
+          {"amplitude", gain_json(norms.amplitude)},
+          {"edge", gain_json(norms.edge)},
+          {"impulse", gain_json(norms.impulse)},
+          {"worst_rate", worst_json(norms.rate)},
+          {"worst_amplitude", worst_json(norms.amplitude)},
+          {"worst_edge", worst_json(norms.edge)},
+          {"worst_impulse", worst_json(norms.impulse)}};
+}
+
+/// Rows of the axis before, for an axis that is the same.
+void repeat_rows(Json& rows, std::size_t count, int axis) {
+  for (std::size_t i = 0; i < count; ++i) {
+    Json row = rows[rows.size() - count];
+    row["axis"] = axis_name(axis);
+    rows.push_back(std::move(row));
   }
-  const auto reached = [](double value) { return Json{finite(value), nullptr}; };
-  return {{"axis", axis_name(axis)},    {"channel", name(channel)},
-          {"loop", "sampled"},          {"status", "reached at corners, not enclosed"},
-          {"rate", reached(most.rate)}, {"amplitude", reached(most.amplitude)},
-          {"edge", reached(most.edge)}, {"impulse", reached(most.impulse)}};
 }
 
 }  // namespace
@@ -138,33 +135,19 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
     if (!axis_loop(input.gains, input.plant, axis)) continue;
     if (axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
         is_same(fixed_part(input, axis), fixed_part(input, axis - 1))) {
-      const std::size_t count = input.gains.rate_hz > 0 ? 4 : 2;
-      for (std::size_t i = 0; i < count; ++i) {
-        Json row = gains[gains.size() - count];
-        row["axis"] = axis_name(axis);
-        gains.push_back(std::move(row));
-      }
+      repeat_rows(gains, input.gains.rate_hz > 0 ? 4 : 2, axis);
       progress(done += 2, 6);
       continue;
     }
+    const AxisLoop fixed = fixed_part(input, axis);
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-      // With a delay an evaluation takes ten times as long: fewer parts, wider enclosures.
-      const int evaluations = plant.delay_s.to > 0 ? 100 : 1500;
-      const UncertainNorms norms =
-          uncertain_norms(fixed_part(input, axis), plant, channel, 0.01, evaluations);
-      gains.push_back({{"axis", axis_name(axis)},
-                       {"channel", name(channel)},
-                       {"loop", "continuous"},
-                       {"status", "enclosed"},
-                       {"rate", gain_json(norms.rate)},
-                       {"amplitude", gain_json(norms.amplitude)},
-                       {"edge", gain_json(norms.edge)},
-                       {"impulse", gain_json(norms.impulse)},
-                       {"worst_rate", worst_json(norms.rate)},
-                       {"worst_amplitude", worst_json(norms.amplitude)},
-                       {"worst_edge", worst_json(norms.edge)},
-                       {"worst_impulse", worst_json(norms.impulse)}});
-      if (input.gains.rate_hz > 0) gains.push_back(sampled_reached_json(input, plant, axis, channel));
+      gains.push_back(
+          uncertain_row(axis, channel, Loop::kContinuous, uncertain_norms(fixed, plant, channel)));
+      if (input.gains.rate_hz > 0) {
+        const SampledLoop sampled = {fixed, 1 / input.gains.rate_hz, input.gains.integrator_step_s};
+        gains.push_back(
+            uncertain_row(axis, channel, Loop::kSampled, uncertain_norms(sampled, plant, channel)));
+      }
       progress(++done, 6);
     }
   }
@@ -184,46 +167,60 @@ void print_uncertain(const Json& uncertain) {
       "\nWorst over mass {} kg, thrust scale {}, motor lag {} s, delay {} s: reached .. never exceeded\n",
       text("mass_kg"), text("thrust_scale"), text("lag_s"), text("delay_s"));
   for (const Json& g : uncertain["gains"]) {
-    if (g["loop"] == "sampled") {
-      fmt::print(
-          "  {} {:<8} sampled    reached at corners, not enclosed: amplitude {}  impulse {}  rate {}\n",
-          g["axis"].get<std::string>(), g["channel"].get<std::string>(), number_text(g["amplitude"][0]),
-          number_text(g["impulse"][0]), number_text(g["rate"][0]));
-      continue;
-    }
-    fmt::print("  {} {:<8} continuous amplitude {}  impulse {}  rate {}\n", g["axis"].get<std::string>(),
-               g["channel"].get<std::string>(), pair_text(g["amplitude"]), pair_text(g["impulse"]),
+    fmt::print("  {} {:<8} {:<10} amplitude {}  impulse {}\n{:25}edge {}  rate {}\n",
+               g["axis"].get<std::string>(), g["channel"].get<std::string>(), g["loop"].get<std::string>(),
+               pair_text(g["amplitude"]), pair_text(g["impulse"]), "", pair_text(g["edge"]),
                pair_text(g["rate"]));
   }
 }
 
+namespace {
+
+Json enclosure_json(const Interval& x) { return {finite(x.lo), finite(x.hi)}; }
+
+Json verified_gains_json(const VerifiedNorms& norms) {
+  return {{"rate", enclosure_json(norms.rate)},
+          {"amplitude", enclosure_json(norms.amplitude)},
+          {"edge", enclosure_json(norms.edge)},
+          {"impulse", enclosure_json(norms.impulse)}};
+}
+
+}  // namespace
+
 Json verified_json(const Tracking& input) {
   Json rows = Json::array();
+  std::optional<AxisLoop> last;
   for (int axis = 0; axis < 3; ++axis) {
     const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
     if (!loop) continue;
+    const std::optional<SampledLoop> sampled = sampled_axis_loop(input.gains, input.plant, axis);
+    if (axis > 0 && last && is_same(*loop, *last)) {
+      repeat_rows(rows, sampled ? 4 : 2, axis);
+      continue;
+    }
+    last = loop;
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
       Json row = {{"axis", axis_name(axis)}, {"channel", name(channel)}, {"loop", "continuous"}};
       const std::optional<VerifiedNorms> norms = verified_norms(*loop, channel);
       row["status"] = norms ? "proved" : "inconclusive";
       if (norms) {
-        row["rate"] = {norms->rate.lo, norms->rate.hi};
-        row["amplitude"] = {norms->amplitude.lo, norms->amplitude.hi};
-        row["edge"] = {norms->edge.lo, norms->edge.hi};
-        row["impulse"] = {norms->impulse.lo, norms->impulse.hi};
+        row.update(verified_gains_json(*norms));
       } else {
-        row["why"] = loop->delay_s > 0 ? "a delay has no interval method here"
-                     : !(loop->Ki > 0) ? "without Ki the rate gain is infinite"
+        row["why"] = loop->delay_s > 0 ? "a delay has no interval method for the continuous loop"
                                        : "stability could not be verified in intervals";
       }
       rows.push_back(std::move(row));
-      if (input.gains.rate_hz > 0) {
-        rows.push_back({{"axis", axis_name(axis)},
-                        {"channel", name(channel)},
-                        {"loop", "sampled"},
-                        {"status", "inconclusive"},
-                        {"why", "no interval method: its gains are sums computed to about 1e-10"}});
+      if (!sampled) continue;
+      row = {{"axis", axis_name(axis)}, {"channel", name(channel)}, {"loop", "sampled"}};
+      const std::optional<VerifiedSampledNorms> held = verified_sampled_norms(*sampled, channel);
+      row["status"] = held ? "proved" : "inconclusive";
+      if (held) {
+        row.update(verified_gains_json(held->at_samples));
+        row["between_samples"] = verified_gains_json(held->all_times);
+      } else {
+        row["why"] = "stability could not be verified in intervals";
       }
+      rows.push_back(std::move(row));
     }
   }
   return rows;
@@ -239,6 +236,7 @@ void print_verified(const Json& verified) {
       continue;
     }
     const auto text = [&row](const char* key) {
+      if (row[key][0].is_null()) return fmt::format("{} unbounded", key);
       return fmt::format("{} [{:.13g}, {:.13g}]", key, row[key][0].get<double>(), row[key][1].get<double>());
     };
     fmt::print("{}  {}\n                        {}  {}\n", text("rate"), text("amplitude"), text("edge"),
@@ -253,8 +251,16 @@ Json tube_json(const Tracking& input, const DisturbanceSource& source, int count
   for (int axis = 0; axis < 3; ++axis) {
     const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
     const Disturbance& d = source.axis[axis];
-    if (!loop || !is_stable(*loop) || !(std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s)))
+    if (!loop) continue;
+    if (!is_stable(*loop) || !(std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s))) {
+      rows.push_back({{"axis", axis_name(axis)},
+                      {"channel", "force"},
+                      {"loop", "continuous"},
+                      {"status", "inconclusive"},
+                      {"why", is_stable(*loop) ? "neither amplitude nor impulse is known" : "unstable"},
+                      {"at", Json::array()}});
       continue;
+    }
     const double step_s = kHorizon_s / (kSamples - 1);
     const std::vector<double> kernel =
         sampled_response(impulse_transfer(*loop, Channel::kForce), step_s, kSamples);

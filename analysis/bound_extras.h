@@ -9,8 +9,7 @@
 
 namespace swarmcert::analysis {
 
-/// --uncertain: suprema of the continuous gains over intervals, enclosed, per axis and channel; of the sampled gains what
-/// the corners reach, which proves nothing about the rest.
+/// --uncertain: suprema of the gains over intervals, enclosed, per axis, channel and loop, and where they are reached.
 /// @param words "mass=0.032:0.037" and the like: mass (kg), thrust (ratio), lag (s), delay (s), battery (V). What is not
 ///   named varies by 5 % (mass), 10 % (thrust), 20 % (lag, delay) about the model and the gains.
 /// @throws UsageError for words that are not understood.
@@ -18,7 +17,7 @@ files::Json uncertain_json(const Tracking& input, const std::vector<std::string>
                            const std::function<void(int done, int total)>& progress);
 void print_uncertain(const files::Json& uncertain);
 
-/// --verified: enclosures of the continuous gains, per axis and channel; sampled rows say that they have none.
+/// --verified: enclosures of the gains, per axis, channel and loop; a continuous loop with a delay has none and says so.
 files::Json verified_json(const Tracking& input);
 void print_verified(const files::Json& verified);
 

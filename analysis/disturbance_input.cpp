@@ -151,7 +151,8 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
         found.bounds, [](const lipschitz::CertifiedBound& b) { return b.function; },
         [](const lipschitz::CertifiedBound& b) { return b.upper.value(); },
         [&](const lipschitz::CertifiedBound& b) { return files::unit(network, b.function); },
-        arguments.network.file);
+        arguments.network.file.empty() ? arguments.network.phi + ", " + arguments.network.rho
+                                       : arguments.network.file);
   }
   // A neighbour's input moves at |(v_rel, a_rel)|, and every neighbour adds its own; the ground's input is the own state.
   if (arguments.acceleration < 0) notes.emplace_back("neighbours fly at constant velocity: no --accel");
@@ -181,14 +182,17 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--impulse", arguments.impulse, "int |eps| dt of one pass, N s")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--bias", arguments.bias, "Constant part of the force error, N");
-  app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
-      ->check(CLI::PositiveNumber);
+  auto* passes = app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
+                     ->check(CLI::PositiveNumber);
   app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::NonNegativeNumber)
+      ->needs(passes);
   app.add_option("--pass-length", arguments.pass_s, "How long one pass lasts, s")
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--from", arguments.from, "Result of compare: measured quantiles of the learning error");
-  app.add_option("--quantile", arguments.quantile, "Which quantile of --from (default p99)");
+      ->check(CLI::NonNegativeNumber)
+      ->needs(passes);
+  auto* from =
+      app.add_option("--from", arguments.from, "Result of compare: measured quantiles of the learning error");
+  app.add_option("--quantile", arguments.quantile, "Which quantile of --from (default p99)")->needs(from);
   app.add_option("--certificate", arguments.certificate,
                  "Certificate of --network: bounds the rate of f_hat");
   app.add_option("--network", arguments.network.file, "network.toml or weight file of f_hat");
@@ -200,24 +204,61 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--neighbours", arguments.neighbours, "How many neighbours at once (default 1)")
       ->check(CLI::PositiveNumber);
-  app.add_option("--truth", arguments.truth, "model.toml whose effects are declared to be the true force");
-  app.add_option("--gap", arguments.gap, "Of --truth: height differences between vehicles, FROM:TO in m");
+  auto* truth = app.add_option("--truth", arguments.truth,
+                               "model.toml whose effects are declared to be the true force");
+  app.add_option("--gap", arguments.gap, "Of --truth: height differences between vehicles, FROM:TO in m")
+      ->needs(truth);
   app.add_option("--own-speed", arguments.own_speed, "Largest speed of any vehicle, m/s")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--own-accel", arguments.own_accel, "Largest acceleration of any vehicle, m/s^2")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--thrust-rate", arguments.thrust_rate, "Of --truth: sup |d/dt (thrust vector)|, N/s")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::NonNegativeNumber)
+      ->needs(truth);
   app.add_option("--least-height", arguments.least_height, "Of --truth: lowest height, m (default 0)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::NonNegativeNumber)
+      ->needs(truth);
   app.add_option("--largest-height", arguments.largest_height, "Of --truth: largest height, m")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::NonNegativeNumber)
+      ->needs(truth);
   app.add_option("--neighbour-mass", arguments.neighbour_mass,
                  "Of --truth: mass of the heaviest neighbour, kg (default: that of the truth's vehicle)")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::PositiveNumber)
+      ->needs(truth);
 }
 
+namespace {
+
+/// Refuses options that would change nothing: a user who gave them expects that they do.
+void refuse_alone(const DisturbanceArguments& arguments) {
+  const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
+  if (!has_network && arguments.certificate.empty() && arguments.truth.empty()) {
+    const std::pair<const char*, bool> motions[] = {{"--speed", arguments.speed >= 0},
+                                                    {"--accel", arguments.acceleration >= 0},
+                                                    {"--own-speed", arguments.own_speed >= 0},
+                                                    {"--own-accel", arguments.own_accel >= 0},
+                                                    {"--neighbours", arguments.neighbours != 1}};
+    for (const auto& [option, is_given] : motions) {
+      if (is_given) {
+        throw UsageError(std::string(option) +
+                         " says how vehicles move, which matters to a learned or a declared force only: add "
+                         "--network NET or --truth MODEL");
+      }
+    }
+  }
+  if (arguments.passes > 1 && arguments.every_s <= 0) throw UsageError("--passes needs --every S");
+  if (arguments.passes > 1 && !arguments.from.empty()) {
+    throw UsageError("--passes: the windows of --from already follow one another");
+  }
+  if (arguments.passes > 1 && arguments.impulse < 0) {
+    throw UsageError("--passes repeats the impulse of one pass: add --impulse J");
+  }
+}
+
+}  // namespace
+
 LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const Tracking& tracking) {
+  refuse_alone(arguments);
   LoadedDisturbance result;
   DisturbanceSource& source = result.source;
   const bool is_declared =
@@ -237,10 +278,6 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
     }
     if (arguments.rate >= 0) source.rate_norm_N_s = arguments.rate;
     source.note = "as given";
-  }
-  if (arguments.passes > 1 && arguments.every_s <= 0) throw UsageError("--passes needs --every S");
-  if (arguments.passes > 1 && !arguments.from.empty()) {
-    throw UsageError("--passes: the windows of --from already follow one another");
   }
   for (stability::Disturbance& d : source.axis) {
     d.passes = arguments.passes;

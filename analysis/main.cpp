@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <regex>
 
 #include "analysis/command_pages.h"
 #include "analysis/commands/command.h"
@@ -15,6 +18,22 @@ namespace {
 
 using swarmcert::analysis::Command;
 using swarmcert::analysis::CommonOptions;
+
+/// The parser shows an open range with all digits of the largest number: the same in words, or nothing if it is not one.
+std::string explain_range(const CLI::App& scope, const std::string& message) {
+  static const std::regex pattern("(-[^:]*): Value (.*) not in range .* to [0-9]{19,}(\\.0*)?");
+  std::smatch found;
+  if (!std::regex_match(message, found, pattern)) return "";
+  const std::string name = found[1];
+  const std::string value = found[2];
+  char* end = nullptr;
+  const double number = std::strtod(value.c_str(), &end);
+  if (end == value.c_str() || *end != '\0') return fmt::format("{} {}: is not a number", name, value);
+  if (!std::isfinite(number)) return fmt::format("{} {}: must be a finite number", name, value);
+  const CLI::Option* option = scope.get_option_no_throw(name);
+  const bool is_positive = option != nullptr && option->get_type_name().find("POSITIVE") != std::string::npos;
+  return fmt::format("{} {}: must {}", name, value, is_positive ? "be positive" : "not be negative");
+}
 
 /// What the parser did not understand, with the option or command that was perhaps meant.
 std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
@@ -33,7 +52,10 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc,
   for (const CLI::Option* option : scope->get_options()) {
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
   }
-  if (extras == nullptr) return error.what();
+  if (extras == nullptr) {
+    const std::string range = explain_range(*scope, error.what());
+    return range.empty() ? error.what() : range;
+  }
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     const std::string name = word.substr(0, word.find('='));

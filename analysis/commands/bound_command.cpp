@@ -1,5 +1,7 @@
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "analysis/bound_extras.h"
@@ -33,6 +35,11 @@ int run(const Options& options, const CommonOptions& common) {
   const LoadedDisturbance disturbance = load_disturbance(options.disturbance, input);
   const stability::DisturbanceSource& source = disturbance.source;
   inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
+  if (options.tube && std::none_of(std::begin(source.axis), std::end(source.axis), [](const auto& d) {
+        return std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s);
+      })) {
+    throw UsageError("--tube needs a force of known size: --amplitude E or --impulse J, --from or --truth");
+  }
   const stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
 
   files::Json result = result_head("bound", inputs);
@@ -69,6 +76,10 @@ int run(const Options& options, const CommonOptions& common) {
     if (disturbance.truth) print_truth(*disturbance.truth);
     if (options.is_uncertain) print_uncertain(result["uncertain"]);
     if (options.verified) print_verified(result["verified"]);
+    if (!report.transient && (options.initial.position_m != 0 || options.initial.velocity_m_s != 0 ||
+                              options.initial.learning_error_N != 0)) {
+      fmt::print("\nInitial errors enter the theorem's transient bound; these gains have none.\n");
+    }
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
     if (!options.swarm.empty()) print_swarm(result["swarm"]);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
@@ -105,8 +116,7 @@ Command bound_command() {
                                          "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")
                               ->expected(0, -1)
                               ->default_str("default");
-        app.add_flag("--verified", options->verified,
-                     "Rigorous enclosures of the continuous gains (intervals)");
+        app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
         app.add_flag("--tube", options->tube, "Bound of |e(t)| over time, from rest (JSON)");
         app.add_option("--swarm", options->swarm, "swarm.toml: do the vehicles' mutual forces stay bounded?");
         app.add_option("--report", options->report, "Write an HTML report with plots into this folder");

@@ -25,7 +25,7 @@ Json vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 const char* verdict(const IssCheck& check) {
   if (check.violations > 0) return "refuted";
-  return check.cancelled ? "inconclusive" : "none_found";
+  return check.cancelled || !check.theorem_applies ? "inconclusive" : "none_found";
 }
 
 struct KindSummary {
@@ -162,8 +162,10 @@ void print(const Options& options, const IssCheck& check, const std::vector<stab
                check.violations, run.kind, run.largest_m, run.at_s,
                run.ratio > 0 ? run.ratio : run.transient_ratio, run.ratio > 0 ? "ball" : "transient bound");
   } else {
-    fmt::print("No violation found in {} runs{}. That is no proof.\n", options.check.runs,
-               check.cancelled ? ", which were interrupted" : "");
+    fmt::print("No violation found in {} runs{}. {}\n", options.check.runs,
+               check.cancelled ? ", which were interrupted" : "",
+               check.theorem_applies ? "That is no proof."
+                                     : "Inconclusive: no theorem supports the ball for these gains.");
   }
 }
 
@@ -182,7 +184,7 @@ int run(Options options, const CommonOptions& common) {
   write_result(common, result_json(options, check, flown));
   if (common.prints_text()) print(options, check, flown);
   if (check.violations > 0) return kViolated;
-  return check.cancelled ? kInconclusive : kDone;
+  return check.cancelled || !check.theorem_applies ? kInconclusive : kDone;
 }
 
 }  // namespace
@@ -195,7 +197,9 @@ Command iss_check_command() {
           "NLopt. Errors are\n"
           "held against the ball d_m / (lambda_min(Lambda)^2 lambda_min(K)) and the transient bound. Exit "
           "code 1 with\n"
-          "the disturbance if one is exceeded. No violation is no proof: `bound` has the proved numbers.\n"
+          "the disturbance if one is exceeded; 4 if none is, but the theorem does not apply. No violation is "
+          "no proof:\n"
+          "`bound` has the proved numbers.\n"
           "Example\n"
           "  swarmcert iss-check --gains controller/gains/composite.toml \\\n"
           "      --model stability/models/crazyflie-small.toml",

@@ -45,7 +45,7 @@ int finish(const std::string& command, const std::string& folder, const std::vec
   if (!is_there) files::write_file(path, text, common.force || may_replace);
   const std::string report = write_sweep_report(sweep, (std::filesystem::path(folder) / "report").string(),
                                                 common.force || may_replace || is_there);
-  files::Json result = result_head(command, inputs);
+  files::Json result = result_head(command, command == "merge" ? sweep.files : inputs);
   for (const char* key : {"axes", "compute", "pareto", "points"}) result[key] = points[key];
   write_result(common, result);
   if (!common.prints_text()) return kDone;
@@ -99,7 +99,9 @@ Command sweep_command() {
             const auto options = std::make_shared<Options>();
             app.add_option("GRID", options->grid, "grid.toml: axes and what to compute")->required();
             app.add_option("-o,--output", options->folder, "Folder for the results")->required();
-            app.add_option("--shard", options->shard, "I/N: compute only the I-th of N parts");
+            app.add_option(
+                "--shard", options->shard,
+                "I/N: compute only the I-th of N parts; I counts 0 .. N-1 or 1 .. N, N being the same as 0");
             app.add_flag("--resume", options->resume, "Keep the cells that the shard's file already has");
             return [options](const CommonOptions& common) { return run_sweep(*options, common); };
           }};

@@ -97,10 +97,11 @@ std::optional<ContractingSystem> contracting(const TransferFunction& h) {
   IntervalVector antiderivative(n);  // -(a_1 x_0 + ... + a_n x_(n-1))/a_0
   for (std::size_t k = 0; k < n; ++k) antiderivative[k] = -a[k + 1] / a[0];
   system.rows[0] = antiderivative * *R_inverse;
+  IntervalVector derivative(n);
+  derivative[0] = 1;
   for (std::size_t d = 0; d < 3; ++d) {
-    IntervalVector unit(n);
-    unit[d] = 1;
-    system.rows[d + 1] = unit * *R_inverse;
+    system.rows[d + 1] = derivative * *R_inverse;
+    derivative = derivative * companion;
   }
   // Back to seconds: y^(k) = scale^k x_k, int dt = (1/scale) int; powers of two are exact.
   const double factors[] = {1 / scale, 1, scale, scale * scale};

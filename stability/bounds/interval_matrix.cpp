@@ -7,11 +7,11 @@ namespace swarmcert::stability {
 using Eigen::MatrixXd;
 
 IntervalMatrix operator*(const IntervalMatrix& a, const IntervalMatrix& b) {
-  IntervalMatrix result(a.size());
+  IntervalMatrix result(a.size(), b.columns());
   for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t j = 0; j < a.size(); ++j) {
+    for (std::size_t j = 0; j < b.columns(); ++j) {
       Interval total;
-      for (std::size_t k = 0; k < a.size(); ++k) total += a(i, k) * b(k, j);
+      for (std::size_t k = 0; k < a.columns(); ++k) total += a(i, k) * b(k, j);
       result(i, j) = total;
     }
   }
@@ -19,8 +19,8 @@ IntervalMatrix operator*(const IntervalMatrix& a, const IntervalMatrix& b) {
 }
 
 IntervalVector operator*(const IntervalVector& row, const IntervalMatrix& m) {
-  IntervalVector result(row.size());
-  for (std::size_t j = 0; j < row.size(); ++j) {
+  IntervalVector result(m.columns());
+  for (std::size_t j = 0; j < m.columns(); ++j) {
     for (std::size_t k = 0; k < row.size(); ++k) result[j] += row[k] * m(k, j);
   }
   return result;

@@ -13,19 +13,23 @@ using IntervalVector = std::vector<Interval>;
 
 class IntervalMatrix {
  public:
-  explicit IntervalMatrix(std::size_t n) : n_(n), entries_(n * n) {}
-  explicit IntervalMatrix(const Eigen::MatrixXd& m) : IntervalMatrix(static_cast<std::size_t>(m.rows())) {
-    for (std::size_t i = 0; i < n_; ++i) {
-      for (std::size_t j = 0; j < n_; ++j)
+  explicit IntervalMatrix(std::size_t n) : IntervalMatrix(n, n) {}
+  IntervalMatrix(std::size_t rows, std::size_t columns)
+      : rows_(rows), columns_(columns), entries_(rows * columns) {}
+  explicit IntervalMatrix(const Eigen::MatrixXd& m)
+      : IntervalMatrix(static_cast<std::size_t>(m.rows()), static_cast<std::size_t>(m.cols())) {
+    for (std::size_t i = 0; i < rows_; ++i) {
+      for (std::size_t j = 0; j < columns_; ++j)
         (*this)(i, j) = m(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
-  std::size_t size() const { return n_; }
-  Interval& operator()(std::size_t i, std::size_t j) { return entries_[i * n_ + j]; }
-  Interval operator()(std::size_t i, std::size_t j) const { return entries_[i * n_ + j]; }
+  std::size_t size() const { return rows_; }
+  std::size_t columns() const { return columns_; }
+  Interval& operator()(std::size_t i, std::size_t j) { return entries_[i * columns_ + j]; }
+  Interval operator()(std::size_t i, std::size_t j) const { return entries_[i * columns_ + j]; }
 
  private:
-  std::size_t n_;
+  std::size_t rows_, columns_;
   std::vector<Interval> entries_;
 };
 

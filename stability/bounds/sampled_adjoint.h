@@ -26,6 +26,7 @@ class SampledAdjoint {
   /// kernels, and gains count as infinite.
   bool is_stable() const { return is_stable_; }
   double period_s() const { return period_s_; }
+  const SampledModel& model() const { return model_; }
   static constexpr double kMostPeriods = 3e6;
 
   /// Calls visit(start, slope, length): the kernel from a force to the output is start + slope u, u growing backwards in
@@ -34,8 +35,12 @@ class SampledAdjoint {
   /// `ratio` times the kernel of the one before, and finish(start, slope, length, ratio) is called with the next one.
   template <class Visit, class Finish>
   void force_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
-    const Eigen::RowVectorXd after = output_after_control(phase_s);
     if (output_ == Output::kError) visit(0.0, 1.0, phase_s);
+    force_kernel(output_after_control(phase_s), visit, finish);
+  }
+  /// The same for any output, a row over the state after control that no force of its own period moves.
+  template <class Visit, class Finish>
+  void force_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
     const std::vector<double> rest = walk(
         after * model_.control(), [&](const std::vector<double>& row) { visit(row[1], row[0], period_s_); });
     if (ratio_ > 0) finish(rest[1], rest[0], period_s_, ratio_);
@@ -45,7 +50,10 @@ class SampledAdjoint {
   /// and finish(kernel, ratio) as above.
   template <class Visit, class Finish>
   void command_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
-    const Eigen::RowVectorXd after = output_after_control(phase_s);
+    command_kernel(output_after_control(phase_s), visit, finish);
+  }
+  template <class Visit, class Finish>
+  void command_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
     const Eigen::VectorXd from_command = model_.hold().col(model_.command_index());
     const auto kernel_of = [&](const std::vector<double>& row) {
       double kernel = 0;
@@ -59,9 +67,10 @@ class SampledAdjoint {
     if (ratio_ > 0) finish(kernel_of(rest), ratio_);
   }
 
- private:
+  /// The output as a row over the state after control.
   Eigen::RowVectorXd output_after_control(double phase_s) const;
 
+ private:
   /// row <- row * map, on plain arrays: this loop runs up to a million times. Returns the row after the last visited.
   template <class Visit>
   std::vector<double> walk(const Eigen::RowVectorXd& first, const Visit& visit) const {

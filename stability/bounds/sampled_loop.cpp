@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "stability/bounds/kernel_sum.h"
 #include "stability/bounds/sampled_adjoint.h"
 #include "stability/bounds/sampled_model.h"
 
@@ -20,59 +21,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<double GainNorms::*, 4> kAllGains = {&GainNorms::rate, &GainNorms::amplitude,
                                                           &GainNorms::edge, &GainNorms::impulse};
 
-/// Adds up |kernel|, |its integral| and their extrema backwards in time from the moment looked at.
-class KernelSum {
- public:
-  /// A stretch of `length` on which the kernel is slope u + start, u growing backwards in time.
-  void add_linear(double start, double slope, double length) {
-    norms_.impulse = std::max({norms_.impulse, std::abs(start), std::abs(start + slope * length)});
-    const double root = slope != 0 ? -start / slope : -1;
-    if (root > 0 && root < length) {
-      add_signed(start, slope, root);
-      add_signed(0, slope, length - root);
-    } else {
-      add_signed(start, slope, length);
-    }
-  }
-
-  /// That stretch, then again and again `ratio` times smaller; the integral, too, falls in proportion.
-  void add_series(double start, double slope, double length, double ratio) {
-    const GainNorms before = norms_;
-    add_linear(start, slope, length);
-    norms_.rate = before.rate + (norms_.rate - before.rate) / (1 - ratio);
-    norms_.amplitude = before.amplitude + (norms_.amplitude - before.amplitude) / (1 - ratio);
-  }
-
-  const GainNorms& norms() const { return norms_; }
-
- private:
-  /// No change of sign of the kernel inside, so its integral is monotonic and has at most one zero.
-  void add_signed(double start, double slope, double length) {
-    const double before = integral_;
-    const double part = (start + slope * length / 2) * length;
-    const double after = before + part;
-    norms_.amplitude += std::abs(part);
-    norms_.edge = std::max(norms_.edge, std::abs(after));
-    const auto area = [&](double u) { return (before + (start / 2 + slope * u / 6) * u) * u; };
-    if (before * after < 0) {
-      double from = 0;
-      double to = length;
-      for (int i = 0; i < 60; ++i) {  // the quadratic formula cancels where slope is tiny
-        const double middle = (from + to) / 2;
-        const double here = before + (start + slope * middle / 2) * middle;
-        (here * before > 0 ? from : to) = middle;
-      }
-      norms_.rate += std::abs(area(from)) + std::abs(area(length) - area(from));
-    } else {
-      norms_.rate += std::abs(area(length));
-    }
-    integral_ = after;
-  }
-
-  GainNorms norms_;
-  double integral_ = 0;
-};
-
 /// Gains to e at one phase of the period; per unit of acceleration.
 class PhaseGains {
  public:
@@ -81,34 +29,12 @@ class PhaseGains {
   bool stable() const { return adjoint_.is_stable(); }
 
   GainNorms at(double phase_s) const {
-    const double period_s = adjoint_.period_s();
-    if (channel_ == Channel::kForce) {
-      KernelSum force;
-      adjoint_.force_kernel(
-          phase_s, [&](double start, double slope, double length) { force.add_linear(start, slope, length); },
-          [&](double start, double slope, double length, double ratio) {
-            force.add_series(start, slope, length, ratio);
-          });
-      return force.norms();
-    }
-    GainNorms command;
-    double step = 0;
-    const auto add = [&](double kernel) {
-      step += kernel;
-      command.amplitude += std::abs(kernel);
-      command.impulse = std::max(command.impulse, std::abs(kernel) / period_s);
-      command.edge = std::max(command.edge, std::abs(step));
-      command.rate += std::abs(step) * period_s;
-    };
-    adjoint_.command_kernel(phase_s, add, [&](double kernel, double ratio) {
-      // The step returns to zero in proportion to the kernel.
-      const double rate = command.rate;
-      const double amplitude = command.amplitude;
-      add(kernel);
-      command.rate = rate + (command.rate - rate) / (1 - ratio);
-      command.amplitude = amplitude + (command.amplitude - amplitude) / (1 - ratio);
-    });
-    return command;
+    const RowVectorXd after = adjoint_.output_after_control(phase_s);
+    if (channel_ == Channel::kCommand) return command_gains(adjoint_, after);
+    KernelSum sum;
+    sum.add_linear(0, 1, phase_s);
+    add_force_kernel(adjoint_, after, sum);
+    return sum.norms();
   }
 
  private:

@@ -1,9 +1,8 @@
 /// @file Worst gains over intervals of mass, thrust, lag and delay, enclosed from both sides.
 #pragma once
 
-#include <array>
-
 #include "stability/bounds/axis_loop.h"
+#include "stability/bounds/sampled_loop.h"
 
 namespace swarmcert::stability {
 
@@ -30,13 +29,16 @@ struct UncertainNorms {
   int evaluations = 0;
 };
 
-/// Supremum of each gain over the box, by subdivision. On a part around a centre, the true loop is the centre's with
-/// its command multiplied by 1 + Delta, so by small gain in the sup norm every gain is at most the centre's over
-/// 1 - |T Delta|_1, T the loop from command to command: |Delta| <= relative change of thrust/mass + 2 |dlag|/lag, and a
-/// change of delay enters as |ddelay| |T'|_1. Parts are refined until upper <= (1 + gap) lower or the budget is spent.
-/// The norms of the centres are those of continuous_norms(), to rounding. Infinite upper: not proved stable.
+/// Supremum of each gain over the box, by subdivision of (thrust/mass, lag, delay). On a part, the true loop is that of
+/// its centre with the acceleration a that its actuators give changed to (1 + Delta) a; see uncertain_norms.cpp for the
+/// small-gain bounds. Parts are refined until upper <= (1 + gap) lower or the budget is spent. The norms of the centres
+/// are those of continuous_norms(), to rounding. Infinite upper: not proved stable.
 /// @param loop mass: what the controller was told; gains as written; lags: those that do not vary (attitude).
 UncertainNorms uncertain_norms(const AxisLoop& loop, const UncertainPlant& plant, Channel channel,
                                double relative_gap = 0.01, int most_evaluations = 1500);
+
+/// The same for the sampled loop: `lower` is reached at the sampling instants, `upper` holds at all times.
+UncertainNorms uncertain_norms(const SampledLoop& loop, const UncertainPlant& plant, Channel channel,
+                               double relative_gap = 0.03, int most_evaluations = 400);
 
 }  // namespace swarmcert::stability

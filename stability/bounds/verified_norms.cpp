@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "stability/bounds/contracting_system.h"
 
@@ -127,8 +128,9 @@ class Enclosure {
     step_remainder_ = 2 * std::pow(0.2500001, kTerms) / 6.4e15;  // 0.25^18/18! and what follows it
   }
 
-  /// |row|_1, |row'|_1 as total variation, sup|row|, where `row` is 1 for y and 2 for y'.
-  VerifiedNorms run() {
+  /// @param y which row is h': 2 with an integral, whose system's response is h; 1 without.
+  /// @param settled what h tends to.
+  VerifiedNorms run(std::size_t y, Interval settled) {
     const std::size_t n = system_.A.size();
     std::vector<double> w(n);
     double error = 0;
@@ -150,18 +152,21 @@ class Enclosure {
         local[r].remainder = up(remainder_norm_[r] * size * (1 + 1e-12));
         local[r].error = up(row_norm_[r] * error);
       }
-      rate.add(local[1], local[0], 0, length_, kDepth);
-      amplitude.add(local[2], local[1], 0, length_, kDepth);
-      extremum(local[1], local[2], 0, length_, kDepth, best_value, norms.edge);
-      extremum(local[2], local[3], 0, length_, kDepth, best_slope, norms.impulse);
+      local[y - 1].c[0] += settled;
+      if (y == 2) rate.add(local[1], local[0], 0, length_, kDepth);
+      amplitude.add(local[y], local[y - 1], 0, length_, kDepth);
+      extremum(local[y - 1], local[y], 0, length_, kDepth, best_value, norms.edge);
+      extremum(local[y], local[y + 1], 0, length_, kDepth, best_slope, norms.impulse);
       advance(w, error);
       size = length(w) + error;
     }
     const double tail = up(size / system_.alpha);
-    norms.rate = rate.finish() + Interval(0, up(row_norm_[1] * tail));
-    norms.amplitude = amplitude.finish() + Interval(0, up(row_norm_[2] * tail));
-    norms.edge = {norms.edge.lo, std::max(norms.edge.hi, up(row_norm_[1] * size))};
-    norms.impulse = {norms.impulse.lo, std::max(norms.impulse.hi, up(row_norm_[2] * size))};
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    norms.rate = y == 2 ? rate.finish() + Interval(0, up(row_norm_[1] * tail)) : Interval(kInfinity);
+    norms.amplitude = amplitude.finish() + Interval(0, up(row_norm_[y] * tail));
+    norms.edge = {std::max(norms.edge.lo, settled.mig()),
+                  std::max(norms.edge.hi, up(settled.mag() + up(row_norm_[y - 1] * size)))};
+    norms.impulse = {norms.impulse.lo, std::max(norms.impulse.hi, up(row_norm_[y] * size))};
     return norms;
   }
 
@@ -230,12 +235,14 @@ class Enclosure {
 }  // namespace
 
 std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel) {
-  if (loop.delay_s > 0 || !(loop.Ki > 0)) return std::nullopt;
-  const TransferFunction y = step_transfer(loop, channel);
+  if (loop.delay_s > 0) return std::nullopt;
+  const bool integrates = loop.Ki > 0;
+  const TransferFunction y = integrates ? step_transfer(loop, channel) : impulse_transfer(loop, channel);
   const std::optional<ContractingSystem> system =
       contracting({y.numerator, sum(y.denominator, y.feedback), {}, 0});
   if (!system) return std::nullopt;
-  return Enclosure(*system).run();
+  if (integrates) return Enclosure(*system).run(2, Interval(0));
+  return Enclosure(*system).run(1, Interval(y.numerator[0]) / Interval(y.feedback[0]));
 }
 
 }  // namespace swarmcert::stability

@@ -9,12 +9,13 @@
 namespace swarmcert::stability {
 
 /// Each holds the exact value, in real arithmetic, for the transfer function whose coefficients are the doubles of
-/// step_transfer(): they round mass and products of lags once each.
+/// step_transfer() (without Ki: impulse_transfer()): they round mass and products of lags once each.
 struct VerifiedNorms {
   Interval rate, amplitude, edge, impulse;
 };
 
-/// Encloses the gains of a loop without delay and with Ki > 0. Nothing where stability could not be verified.
+/// Encloses the gains of a loop without delay; without Ki the rate gain is infinite. Nothing where stability could not
+/// be verified.
 ///
 /// Coordinates w = R x are chosen so that the symmetric part of A = R companion R^-1 is verified to lie below -alpha I
 /// (interval Cholesky): then |exp(At)|_2 <= e^(-alpha t), so errors of the computed trajectory never grow and its tail

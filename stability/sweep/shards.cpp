@@ -92,6 +92,21 @@ auto reading(const std::string& file, const Read& read) {
   }
 }
 
+/// A folder that is not empty and has nothing of a sweep is someone else's. Shards may start at the same time, so files
+/// that are still being written count, too.
+void refuse_foreign(const std::string& folder) {
+  if (!fs::is_directory(folder) || fs::is_empty(folder)) return;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.find("shard-") != std::string::npos || name.rfind("sweep", 0) == 0 ||
+        name.rfind("swarmcert-sweep", 0) == 0) {
+      return;
+    }
+  }
+  throw InputError({folder, "", "", "", "is not empty, and nothing in it is of a sweep",
+                    "name another folder, or --force writes beside what is there"});
+}
+
 }  // namespace
 
 SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepOptions& options) {
@@ -101,6 +116,7 @@ SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepO
                   ("shard-" + std::to_string(shard) + "-of-" + std::to_string(options.count) + ".json"))
                      .string();
   const Json head = shard_head(grid, options);
+  if (!options.overwrite) refuse_foreign(folder);
   std::map<long, Cell> done;
   if (fs::exists(outcome.file)) {
     if (options.resume) {
@@ -184,6 +200,7 @@ MergedSweep read_shards(const std::string& folder) {
     });
   }
   MergedSweep sweep;
+  sweep.files = paths;
   const long total = reading(paths.front(), [&] {
     sweep.grid_path = first.at("grid").get<std::string>();
     sweep.grid_sha256 = first.at("grid_sha256").get<std::string>();

@@ -66,6 +66,32 @@ TEST(BoundCommand, WhatFloat32CostsIsPartOfTheErrorBudget) {
   }
 }
 
+TEST(BoundCommand, NumbersOutOfRangeAreExplainedInWords) {
+  const ScratchFolder folder;
+  for (const auto& [options, words] :
+       {std::pair(" --amplitude 1e400", "must be a finite number"),
+        std::pair(" --amplitude -1", "must not be negative"),
+        std::pair(" --amplitude abc", "is not a number"), std::pair(" --battery 0", "must be positive"),
+        std::pair(" --passes 0", "must be positive")}) {
+    const Outcome outcome = run_shell("swarmcert bound" + kFlown + options, folder.path());
+    EXPECT_EQ(outcome.exit_code, 2) << options;
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
+    EXPECT_LT(outcome.output.size(), 200u) << outcome.output;
+  }
+}
+
+TEST(BoundCommand, OptionsThatWouldChangeNothingAreRefused) {
+  const ScratchFolder folder;
+  for (const char* options :
+       {" --speed 1", " --amplitude 0.1 --accel 1", " --neighbours 2", " --quantile p50",
+        " --amplitude 0.1 --gap 0.1:0.4", " --thrust-rate 1", " --impulse 0.1 --every 3",
+        " --amplitude 0.1 --passes 3 --every 2", " --tube", " --rate 1 --tube"}) {
+    const Outcome outcome = run_shell("swarmcert bound" + kFlown + options, folder.path());
+    EXPECT_EQ(outcome.exit_code, 2) << options << outcome.output;
+    EXPECT_NE(outcome.output.find("--"), std::string::npos) << options << outcome.output;
+  }
+}
+
 TEST(BoundCommand, TheReportPlotsTheErrorInsideTheBallAndTheTube) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
@@ -209,20 +235,26 @@ TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
       EXPECT_GE(result["uncertain"]["gains"][i][gain][1].get<double>(), exact[gain].get<double>()) << gain;
     }
   }
-  // A sampled loop has neither enclosure, and says so.
+  // The sampled loop as well, at its samples.
   const Json sampled = json_of(folder, "bound" + kFlown +
                                            " --verified --uncertain mass=0.034:0.0341 thrust=1:1 "
                                            "lag=0.0575:0.0575 delay=0:0");
-  int rows = 0;
-  for (const Json& row : sampled["verified"]) {
-    rows += row["loop"] == "sampled";
-    EXPECT_EQ(row["status"], row["loop"] == "sampled" ? "inconclusive" : "proved");
+  for (std::size_t i = 0; i < 12; ++i) {
+    const Json& exact = sampled["exact"][i];
+    const Json& verified = sampled["verified"][i];
+    const Json& uncertain = sampled["uncertain"]["gains"][i];
+    ASSERT_EQ(verified["loop"], exact["loop"]);
+    ASSERT_EQ(uncertain["loop"], exact["loop"]);
+    EXPECT_EQ(verified["status"], "proved");
+    EXPECT_EQ(uncertain["status"], "enclosed");
+    for (const char* gain : {"rate", "amplitude", "edge", "impulse"}) {
+      const double value = exact[gain].get<double>();
+      EXPECT_LE(verified[gain][0].get<double>(), value * (1 + 1e-9)) << gain;
+      EXPECT_GE(verified[gain][1].get<double>(), value * (1 - 1e-9)) << gain;
+      EXPECT_LT(verified[gain][1].get<double>() - verified[gain][0].get<double>(), 1e-5 * value) << gain;
+      EXPECT_GE(uncertain[gain][1].get<double>(), value) << gain;
+    }
   }
-  for (const Json& row : sampled["uncertain"]["gains"]) {
-    rows += row["loop"] == "sampled";
-    EXPECT_EQ(row["amplitude"][1].is_null(), row["loop"] == "sampled");
-  }
-  EXPECT_EQ(rows, 12);
   EXPECT_EQ(run_shell("swarmcert bound" + gains + " --uncertain weight=1:2", folder.path()).exit_code, 2);
 }
 
@@ -292,7 +324,7 @@ TEST(SweepCommand, ShardsMergeToTheBytesOfAnUndividedRun) {
       EXPECT_NE(early.output.find("are missing"), std::string::npos) << early.output;
     }
   }
-  ASSERT_EQ(run_shell("swarmcert merge parts", folder.path()).exit_code, 0);
+  EXPECT_EQ(json_of(folder, "merge parts")["inputs"].size(), 3u);
   EXPECT_EQ(read_text(folder / "whole/sweep.json"), read_text(folder / "parts/sweep.json"));
   EXPECT_EQ(read_text(folder / "whole/report/report.html"), read_text(folder / "parts/report/report.html"));
   const Json points = files::parse_json(read_text(folder / "whole/sweep.json"), "sweep.json")["points"];
@@ -322,6 +354,16 @@ TEST(SweepCommand, AnExistingShardIsKeptUnlessToldOtherwise) {
   const Outcome twice = run_shell("swarmcert merge parts", folder.path());
   EXPECT_EQ(twice.exit_code, 3);
   EXPECT_NE(twice.output.find("another shard has too"), std::string::npos) << twice.output;
+}
+
+TEST(SweepCommand, AFolderWithOtherThingsIsLeftAlone) {
+  const ScratchFolder folder;
+  write_grid(folder);
+  std::filesystem::create_directory(folder / "photos");
+  write_text(folder / "photos/holiday.txt", "not of a sweep");
+  EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o photos -q", folder.path()).exit_code, 3);
+  EXPECT_FALSE(std::filesystem::exists(folder / "photos/sweep.json"));
+  EXPECT_EQ(run_shell("swarmcert sweep grid.toml -o photos -q --force", folder.path()).exit_code, 0);
 }
 
 /// The variables are those that Slurm sets; the array may start anywhere.

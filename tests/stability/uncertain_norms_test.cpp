@@ -18,7 +18,7 @@ AxisLoop at(double mass, double scale, double lag_s, double delay_s) {
 
 TEST(UncertainNorms, EncloseEveryLoopOfTheBox) {
   constexpr double kGap = 0.05;
-  constexpr int kBudget = 20000;
+  constexpr int kBudget = 3000;
   const UncertainPlant box = {{0.032, 0.036}, {0.92, 1.08}, {0.05, 0.065}, {0, 0}};
   for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
     const UncertainNorms norms = uncertain_norms(kLoop, box, channel, kGap, kBudget);
@@ -42,6 +42,53 @@ TEST(UncertainNorms, EncloseEveryLoopOfTheBox) {
                     .amplitude,
                 worst.lower, 1e-9 * worst.lower);
   }
+}
+
+/// The same with a delay, an uncertain lag from zero and either loop.
+TEST(UncertainNorms, NoSampledLoopOfTheBoxExceedsItsSupremum) {
+  struct Box {
+    UncertainPlant plant;
+    double period_s, step_s, gap;
+  };
+  const Box boxes[] = {{{{0.032, 0.036}, {0.92, 1.08}, {0.05, 0.065}, {0, 0}}, 0.01, 0.002, 0.06},
+                       {{{0.032, 0.036}, {0.95, 1.05}, {0.05, 0.06}, {0.002, 0.009}}, 0.004, 0.004, 0.25},
+                       {{{0.033, 0.035}, {0.97, 1.03}, {0, 0.02}, {0, 0.005}}, 0.01, 0.01, 0.2}};
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(0, 1);
+  const auto in = [&](const Range& r) { return r.from + unit(random) * (r.to - r.from); };
+  for (const Box& box : boxes) {
+    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+      const SampledLoop told = {kLoop, box.period_s, box.step_s};
+      const UncertainNorms norms = uncertain_norms(told, box.plant, channel, box.gap, 700);
+      SCOPED_TRACE(testing::Message() << box.period_s << " s, " << norms.evaluations << " evaluations");
+      for (int i = 0; i < 15; ++i) {
+        const SampledLoop loop = {
+            at(in(box.plant.mass_kg), in(box.plant.thrust_scale), in(box.plant.lag_s), in(box.plant.delay_s)),
+            box.period_s, box.step_s};
+        const GainNorms found = sampled_norms(loop, channel, Instants::kAll);
+        ASSERT_LE(found.rate, norms.rate.upper);
+        ASSERT_LE(found.amplitude, norms.amplitude.upper);
+        ASSERT_LE(found.edge, norms.edge.upper);
+        ASSERT_LE(found.impulse, norms.impulse.upper);
+      }
+      for (const UncertainGain* gain : {&norms.rate, &norms.amplitude, &norms.edge, &norms.impulse}) {
+        EXPECT_LE(gain->upper, (1 + box.gap) * gain->lower);
+        EXPECT_GT(gain->upper, gain->lower);
+      }
+      const UncertainGain& worst = norms.rate;
+      const SampledLoop there = {at(worst.mass_kg, worst.thrust_scale, worst.lag_s, worst.delay_s),
+                                 box.period_s, box.step_s};
+      EXPECT_NEAR(sampled_norms(there, channel, Instants::kSampling).rate, worst.lower, 1e-9 * worst.lower);
+    }
+  }
+}
+
+TEST(UncertainNorms, ADelayIsRefinedToTheGapAskedFor) {
+  const UncertainPlant box = {{0.033, 0.035}, {0.95, 1.05}, {0.05, 0.06}, {0.002, 0.006}};
+  const UncertainNorms norms = uncertain_norms(kLoop, box, Channel::kForce, 0.1, 600);
+  EXPECT_LE(norms.amplitude.upper, 1.1 * norms.amplitude.lower);
+  EXPECT_LE(norms.impulse.upper, 1.1 * norms.impulse.lower);
+  EXPECT_LT(norms.evaluations, 600);
 }
 
 TEST(UncertainNorms, APointIsItsOwnSupremum) {

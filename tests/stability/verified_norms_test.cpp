@@ -61,6 +61,23 @@ TEST(VerifiedNorms, TheEstimateLiesInsideForLoopsOfAnyPolePattern) {
   }
 }
 
+TEST(VerifiedNorms, WithoutIntegralTheOtherGainsAreEnclosed) {
+  for (const double lag_s : {0.0, 0.0575}) {
+    const AxisLoop loop = {kMass_kg, 10, 5, 0, {lag_s}, 0};
+    const auto norms = verified_norms(loop, Channel::kForce);
+    ASSERT_TRUE(norms.has_value());
+    const GainNorms estimate = continuous_norms(loop, Channel::kForce);
+    EXPECT_TRUE(std::isinf(norms->rate.lo));
+    EXPECT_TRUE(encloses(norms->amplitude, estimate.amplitude, 1e-8));
+    EXPECT_TRUE(encloses(norms->edge, estimate.edge, 1e-8));
+    EXPECT_TRUE(encloses(norms->impulse, estimate.impulse, 1e-8));
+  }
+  // Critically damped: no overshoot, so the edge gain is that of a constant force, 1/(m Kp).
+  const auto norms = verified_norms({kMass_kg, 9, 6, 0, {}, 0}, Channel::kForce);
+  ASSERT_TRUE(norms.has_value());
+  EXPECT_TRUE(encloses(norms->edge, 1 / (kMass_kg * 9), 1e-8));
+}
+
 TEST(VerifiedNorms, AnUnstableLoopIsNotVerified) {
   EXPECT_FALSE(verified_norms({kMass_kg, 1, 0.1, 10, {}, 0}, Channel::kForce).has_value());
 }
