@@ -1,13 +1,19 @@
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <regex>
+#include <system_error>
 
 #include "analysis/command_pages.h"
 #include "analysis/commands/command.h"
@@ -127,11 +133,29 @@ int run(int argc, char** argv) {
   return action(common);
 }
 
+/// Descriptors 0 to 2 must be taken: where a caller closed one, the next file opened would get its number, and with it
+/// what is printed.
+void hold_standard_streams() {
+  int descriptor;
+  do descriptor = ::open("/dev/null", O_RDWR);
+  while (descriptor >= 0 && descriptor <= STDERR_FILENO);
+  if (descriptor >= 0) ::close(descriptor);
+}
+
+/// A verdict that nobody could read is none.
+int after_printing(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  fmt::print(stderr, "swarmcert: standard output: cannot be written ({})\n", std::strerror(errno));
+  return code == swarmcert::analysis::kDone ? swarmcert::analysis::kBadInput : code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  hold_standard_streams();
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error of writing, with its message
   try {
-    return run(argc, argv);
+    return after_printing(run(argc, argv));
   } catch (const swarmcert::files::InputError& error) {
     fmt::print(stderr, "swarmcert: {}\n", error.what());
     return swarmcert::analysis::kBadInput;
@@ -140,6 +164,9 @@ int main(int argc, char** argv) {
     return swarmcert::analysis::kUsage;
   } catch (const std::filesystem::filesystem_error& error) {
     fmt::print(stderr, "swarmcert: {}: {}\n", error.path1().string(), error.code().message());
+    return swarmcert::analysis::kBadInput;
+  } catch (const std::system_error& error) {  // fmt's word for a full disk under standard output
+    fmt::print(stderr, "swarmcert: {}\n", error.what());
     return swarmcert::analysis::kBadInput;
   } catch (const std::exception& error) {
     fmt::print(stderr, "swarmcert: internal error: {}\n", error.what());

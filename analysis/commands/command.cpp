@@ -105,7 +105,9 @@ files::Json result_head(const std::string& command, const std::vector<std::strin
 }
 
 void refuse_to_replace(const CommonOptions& common, const std::string& path) {
-  if (path.empty() || path == "-" || common.force || !std::filesystem::exists(path)) return;
+  if (path.empty() || path == "-" || common.force) return;
+  const auto status = std::filesystem::status(path);  // devices and pipes are written to, not replaced
+  if (!std::filesystem::is_regular_file(status) && !std::filesystem::is_directory(status)) return;
   throw files::InputError({path, "", "", "", "the file exists", "--force replaces it"});
 }
 

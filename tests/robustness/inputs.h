@@ -1,0 +1,37 @@
+/// @file Sound inputs of every kind, small, for runs of the whole tool.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "analysis/run.h"
+
+namespace swarmcert::tests {
+
+/// Copies and makes in `folder`: phi.safetensors, rho.safetensors, network.toml, box.toml, gains.toml, model.toml,
+/// grid.toml, flights/<run>/cf<vehicle>_00, log.csv, cert.json (of phi), set.json (of the network), firmware/.
+inline void make_inputs(const std::filesystem::path& folder) {
+  const std::filesystem::path source = SWARMCERT_SOURCE_DIR;
+  for (const char* name : {"phi.safetensors", "rho.safetensors", "network.toml", "box.toml"})
+    std::filesystem::copy_file(source / "nn/networks/demo" / name, folder / name);
+  std::filesystem::copy_file(source / "controller/gains/crazyflie-small.toml", folder / "gains.toml");
+  std::filesystem::copy_file(source / "stability/models/crazyflie-small-effects.toml", folder / "model.toml");
+  write_text((folder / "grid.toml").string(),
+             "schema = \"swarmcert/grid/1\"\ngains = \"gains.toml\"\nmodel = \"model.toml\"\naxis = \"z\"\n"
+             "compute = [\"amplitude\", \"impulse\"]\npareto = [\"impulse\"]\n[axes]\n"
+             "Kp = {from = 2, to = 40, steps = 3, scale = \"log\"}\nKd = {from = 2, to = 20, steps = 2}\n");
+  const Outcome made = run_shell(
+      "for run in 1 2 3; do swarmcert simulate random-walk --vehicles 2 --duration 8 --model model.toml "
+      "--gains gains.toml "
+      "--seed $run -o flights/$run -q || exit 1; done >/dev/null; "
+      "swarmcert inspect flights/1/cf1_00 --csv log.csv >/dev/null && "
+      "swarmcert certify phi.safetensors --nodes 1 -q -o cert.json >/dev/null && "
+      "swarmcert certify network.toml --nodes 0 --method product -q -o set.json >/dev/null && "
+      "swarmcert export network.toml -o firmware >/dev/null",
+      folder);
+  ASSERT_EQ(made.exit_code, 0) << made.output;
+}
+
+}  // namespace swarmcert::tests
