@@ -34,12 +34,14 @@ std::vector<std::string> split_names(const std::string& text) {
 void check(const std::vector<std::string>& names, const stability::Model& model) {
   if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
   const std::vector<std::string> known = identification::candidate_names(model);
+  std::vector<std::string> all = known;
+  all.insert(all.end(), {"auto", "deep_set", "show", "torque_bias", "undo"});
   for (const std::string& name : names) {
     if (name == "deep_set" || name == "torque_bias")
       throw UsageError("the effect " + name +
                        " cannot be fitted to the force of a flight; write it into the model file");
     if (std::find(known.begin(), known.end(), name) == known.end())
-      throw UsageError("unknown effect " + name + ": " + files::did_you_mean(name, known));
+      throw UsageError("unknown effect " + name + ": " + files::did_you_mean(name, all));
     if (identification::is_taken(name, model))
       throw UsageError("the model has the effect " + name +
                        " already; remove it from the file to fit it anew");
@@ -159,11 +161,6 @@ int climb(const Options& options, const CommonOptions& common) {
   Progress progress(common.quiet);
   const Ladder ladder = identification::climb(
       inputs, what, common.jobs, [&](int done, int total) { progress.show(done, total, "flights"); });
-  // Measured residuals are never exactly zero: there was none.
-  if (ladder.rows.front().fit_rmse_N <= 0) {
-    fmt::print(stderr, "no usable record: nothing was fitted; 'swarmcert compare' says what was cut\n");
-    return kInconclusive;
-  }
   if (ladder.any_accepted) {
     files::write_file(options.output,
                       stability::to_toml(ladder.model, {"Effects fitted to flights by swarmcert add."}),
@@ -179,7 +176,12 @@ int climb(const Options& options, const CommonOptions& common) {
                      {"test", names_of(inputs, ladder.split.test)}};
   result["effects"] = json_of(ladder.model.effects);
   result["written"] = ladder.any_accepted;
+  if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;
   write_result(common, result);
+  if (!ladder.too_poor.empty()) {
+    fmt::print(stderr, "inconclusive: {}; 'swarmcert compare' says what was cut\n", ladder.too_poor);
+    return kInconclusive;
+  }
   if (common.prints_text()) {
     print(ladder);
     if (ladder.any_accepted)

@@ -63,8 +63,8 @@ files::Network load_net(const files::NetworkArguments& arguments) {
 }
 
 void remember_command_line(int argc, const char* const* argv) {
-  static const std::set<std::string> with_value = {"--jobs",   "-j",       "--json", "-o",
-                                                   "--output", "--report", "--csv",  "--fitted"};
+  static const std::set<std::string> with_value = {"--jobs",   "-j",    "--json",   "-o",      "--output",
+                                                   "--report", "--csv", "--fitted", "--inject"};
   static const std::set<std::string> flags = {"-q", "--quiet", "--force"};
   // "-j2", "-qj2", "-qj 2", "-ofile": one dash, then flags, then perhaps an option with its value.
   const auto short_options = [](const std::string& word) {

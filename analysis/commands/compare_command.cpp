@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -10,6 +11,9 @@
 #include "analysis/compare_report.h"
 #include "analysis/progress.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/injected_log.h"
+#include "nn/files/file_io.h"
+#include "nn/files/suggest.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -20,6 +24,7 @@ struct Options {
   std::vector<std::string> gains;
   std::vector<std::string> budget;
   std::string fitted;
+  std::string inject;
 };
 
 /// "FILE" for every kind, "KIND=FILE" for one.
@@ -33,6 +38,17 @@ residuals::GainsOfKinds read_gains(const std::vector<std::string>& words) {
       throw UsageError("--gains names " + (kind.empty() ? "every kind" : "the kind " + kind) + " twice");
   }
   return gains;
+}
+
+/// @throws UsageError where gains are for a kind that no vehicle of the comparison has.
+void check_kinds(const residuals::GainsOfKinds& gains, const residuals::Inputs& inputs) {
+  std::vector<std::string> kinds;
+  for (const stability::Model& model : inputs.models) kinds.push_back(model.kind);
+  for (const auto& [kind, file] : gains) {
+    if (kind.empty() || std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) continue;
+    throw UsageError("--gains is for kind " + kind +
+                     ", which no vehicle has: " + files::did_you_mean(kind, kinds));
+  }
 }
 
 /// The fit sees the models and rules of the comparison, and other flights.
@@ -58,14 +74,43 @@ identification::Budget budget_of(const Options& options, const residuals::Inputs
                                       [&](int done, int total) { progress.show(done, total, "passes"); });
 }
 
+/// Writes every log with what the model's effects would have added to its accelerometer; those of vehicles without a
+/// model as they are. Same folder names and file names, so that flights stay flights.
+files::Json inject(const residuals::Inputs& inputs, const std::string& folder, bool overwrite) {
+  namespace fs = std::filesystem;
+  files::Json injected = files::Json::array(), unchanged = files::Json::array();
+  for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
+    std::vector<std::string> problems;
+    for (const residuals::Track& track : inputs.load(i, problems)) {
+      const fs::path from = fs::absolute(track.path);
+      const std::string place = from.parent_path().filename() / from.filename();
+      fs::path to = fs::path(folder) / place;
+      if (!track.position_only) to.replace_extension();
+      fs::create_directories(to.parent_path());
+      files::write_file(to.string(),
+                        track.position_only ? files::read_file(track.path)
+                                            : stability::to_usd_log(residuals::injected_log(inputs, track)),
+                        overwrite);
+      (track.position_only ? unchanged : injected).push_back(place);
+    }
+  }
+  return {{"loop", "open: vehicles do not react"},
+          {"logs", std::move(injected)},
+          {"unchanged", std::move(unchanged)}};
+}
+
 int run(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  if (!options.inject.empty() &&
+      !(std::filesystem::is_directory(options.inject) && std::filesystem::is_empty(options.inject)))
+    refuse_to_replace(common, options.inject);
   if (!options.fitted.empty()) {
     if (options.budget.empty()) throw UsageError("--fitted writes what --budget fits: name its flights");
     refuse_to_replace(common, (std::filesystem::path(options.fitted) / "flights.toml").string());
   }
   const residuals::GainsOfKinds gains = read_gains(options.gains);
   const residuals::Inputs inputs = read_flights(options.flights, true);
+  check_kinds(gains, inputs);
   Progress progress(common.quiet);
   const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };
   const residuals::Comparison comparison = residuals::compare(inputs, common.jobs, show, gains);
@@ -86,6 +131,7 @@ int run(const Options& options, const CommonOptions& common) {
     result["budget"] = json_of(*budget);
     if (!options.fitted.empty()) write_fitted(*budget, options.fitted, common.force);
   }
+  if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
   write_result(common, result);
   if (common.prints_text()) print_comparison(comparison, inputs, own ? &*own : nullptr);
   if (common.prints_text() && budget) print(*budget);
@@ -110,6 +156,7 @@ Command compare_command() {
       "Example: swarmcert compare stability/models/crazyflie-small.toml flights/ --report out\n"
       "         swarmcert compare flights/ --network network.toml --published-filter\n"
       "         swarmcert compare test/ --budget development/ --network network.toml\n"
+      "         swarmcert compare truth.toml flights/ --inject injected\n"
       "         swarmcert compare flights/ --gains small=small.toml --gains large=large.toml",
       [](CLI::App& app) {
         const auto options = std::make_shared<Options>();
@@ -129,6 +176,10 @@ Command compare_command() {
             ->allow_extra_args(false);
         app.add_option("--fitted", options->fitted,
                        "Folder for what --budget fitted: a model per vehicle and their flights.toml");
+        app.add_option(
+            "--inject", options->inject,
+            "Write FLIGHTS into this folder as if the model's effects had acted on them besides what "
+            "did: their force is added to the accelerometer, open loop, nothing else changes");
         app.add_flag(
             "--published-filter", options->flights.published_filter,
             "Cut and filter as the networks' authors did: 32 g (small) and 67 g (large), thrust lag 0.16 "

@@ -5,6 +5,7 @@
 
 #include "analysis/commands/effect_output.h"
 #include "analysis/commands/flight_options.h"
+#include "analysis/diagnose_report.h"
 #include "analysis/identification/diagnose.h"
 #include "analysis/progress.h"
 
@@ -16,6 +17,7 @@ using identification::Missing;
 
 struct Options {
   FlightOptions flights;
+  std::string report;
 };
 
 constexpr const char* kDetectableMeaning =
@@ -91,8 +93,8 @@ void print(const Missing& missing, int flights) {
 void print(const Diagnosis& diagnosis) {
   fmt::print("Vehicles of kind {}: {} records, {} blocks of 2 s.\n", diagnosis.kind, diagnosis.records,
              diagnosis.blocks);
-  if (diagnosis.inconclusive) {
-    fmt::print("  Too few for an answer: at least ten blocks are needed.\n");
+  if (!diagnosis.too_poor.empty()) {
+    fmt::print("  No answer: {}.\n", diagnosis.too_poor);
     return;
   }
   if (diagnosis.ranking.empty()) fmt::print("  No effect of the library is missing above the sizes below.\n");
@@ -102,6 +104,10 @@ void print(const Diagnosis& diagnosis) {
         "  Not counted: {} fits, but not along the set points: the controller's answer to something else\n",
         effect);
   }
+  for (const std::string& effect : diagnosis.suspected)
+    fmt::print(
+        "  Not counted: {} fits, but explains little beside what is left, or set points do not confirm it\n",
+        effect);
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
     fmt::print("  Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f})\n",
@@ -129,7 +135,9 @@ files::Json json_of(const Diagnosis& diagnosis) {
                       {"flights", diagnosis.flights},
                       {"rmse_before", diagnosis.rmse_before_N},
                       {"rmse_after", diagnosis.rmse_after_N},
-                      {"closed_loop_artefacts", diagnosis.contradicted}};
+                      {"too_poor", diagnosis.too_poor},
+                      {"closed_loop_artefacts", diagnosis.contradicted},
+                      {"suspected", diagnosis.suspected}};
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
     kind["thrust_scale"] = {{"least_squares", 1 + scale.least_squares},
@@ -156,14 +164,21 @@ int run(const Options& options, const CommonOptions& common) {
   files::Json ranking = files::Json::array(), detectable = files::Json::array(), kinds = files::Json::array();
   bool flag = false, inconclusive = true;
   double ratio = 0;
+  std::string reasons;
   files::Json depends_on = files::Json::array();
+  std::vector<Diagnosis> diagnoses;
   for (const stability::Model& model : inputs.models) {
     Progress progress(common.quiet);
     const Diagnosis diagnosis =
         identification::diagnose(inputs, model.kind, identification::every_flight(inputs), common.jobs,
                                  [&](int done, int total) { progress.show(done, total, "flights"); });
     if (common.prints_text()) print(diagnosis);
-    inconclusive = inconclusive && diagnosis.inconclusive;
+    if (diagnosis.too_poor.empty()) {
+      inconclusive = false;
+    } else {
+      reasons += fmt::format("{}vehicles of kind {}: {}", reasons.empty() ? "" : "; ", model.kind,
+                             diagnosis.too_poor);
+    }
     for (const Missing& missing : diagnosis.ranking) ranking.push_back(json_of(missing));
     for (const identification::Detectable& entry : diagnosis.detectable)
       detectable.push_back(json_of(entry, diagnosis.kind));
@@ -172,6 +187,7 @@ int run(const Options& options, const CommonOptions& common) {
     ratio = std::max(ratio, rest.ratio);
     for (const std::string& variable : rest.depends_on) depends_on.push_back(variable);
     kinds.push_back(json_of(diagnosis));
+    diagnoses.push_back(diagnosis);
   }
   result["verdict"] = inconclusive ? "inconclusive" : ranking.empty() ? "nothing_missing" : "missing_effect";
   result["ranking"] = std::move(ranking);
@@ -179,7 +195,13 @@ int run(const Options& options, const CommonOptions& common) {
   result["detectable"] = std::move(detectable);
   result["detectable_meaning"] = kDetectableMeaning;
   result["kinds"] = std::move(kinds);
+  if (inconclusive) result["reason"] = reasons;
   write_result(common, result);
+  if (!options.report.empty()) {
+    const std::string path = write_diagnose_report(diagnoses, options.report, common.force);
+    if (common.prints_text()) fmt::print("Report: {}\n", path);
+  }
+  if (inconclusive) fmt::print(stderr, "inconclusive: {}\n", reasons);
   return inconclusive ? kInconclusive : kDone;
 }
 
@@ -192,10 +214,11 @@ Command diagnose_command() {
           "stands out from the scatter between blocks of 2 s, and set points do not contradict it. What "
           "remains is "
           "tested separately.\n\n"
-          "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/",
+          "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out",
           [](CLI::App& app) {
             const auto options = std::make_shared<Options>();
             declare_flights(app, options->flights, true);
+            app.add_option("--report", options->report, "Write an HTML report into this folder");
             return [options](const CommonOptions& common) { return run(*options, common); };
           }};
 }

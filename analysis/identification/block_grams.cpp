@@ -73,6 +73,24 @@ void add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
 
 }  // namespace
 
+Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns) {
+  Eigen::VectorXd part(static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t i = 0; i < columns.size(); ++i) part[static_cast<Eigen::Index>(i)] = all[columns[i]];
+  return part;
+}
+
+Eigen::MatrixXd part_of_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns) {
+  const auto n = static_cast<int>(columns.size());
+  Eigen::MatrixXd g(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      g(i, j) = g(j, i) =
+          packed[Grams::packed(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)])];
+    }
+  }
+  return g;
+}
+
 Grams columns_of(std::vector<Candidate> candidates) {
   Grams grams;
   grams.candidates = std::move(candidates);

@@ -44,6 +44,10 @@ struct Grams {
   }
 };
 
+/// Rows and columns `columns` of a packed Gram matrix; elements `columns` of a vector.
+Eigen::MatrixXd part_of_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns);
+Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns);
+
 /// The columns of `candidates`, without any flight.
 Grams columns_of(std::vector<Candidate> candidates);
 

@@ -1,12 +1,13 @@
 #include "analysis/identification/budget.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <set>
 
 #include "analysis/identification/block_grams.h"
+#include "analysis/identification/box_least_squares.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
@@ -67,42 +68,14 @@ JointFit solve(const std::map<std::string, Sum>& sums, const std::vector<int>& c
   }
   // A column that is nowhere active would make the matrix singular.
   for (Eigen::Index k = 0; k < size; ++k) gram(k, k) += 1e-9 + 1e-9 * gram(k, k);
-  Eigen::VectorXd c = Eigen::VectorXd::Zero(size);
-  std::vector<char> fixed(static_cast<std::size_t>(size), 0);
-  for (Eigen::Index round = 0; round <= shared; ++round) {
-    std::vector<Eigen::Index> open;
-    for (Eigen::Index k = 0; k < size; ++k) {
-      if (fixed[static_cast<std::size_t>(k)] == 0) open.push_back(k);
-    }
-    const Eigen::VectorXd at_bounds = gram * c;
-    Eigen::MatrixXd part(open.size(), open.size());
-    Eigen::VectorXd right(open.size());
-    for (std::size_t i = 0; i < open.size(); ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      right[row] = b[open[i]] - at_bounds[open[i]];
-      for (std::size_t j = 0; j < open.size(); ++j)
-        part(row, static_cast<Eigen::Index>(j)) = gram(open[i], open[j]);
-    }
-    const Eigen::VectorXd found = part.ldlt().solve(right);
-    bool inside = true;
-    Eigen::VectorXd next = c;
-    for (std::size_t i = 0; i < open.size(); ++i) next[open[i]] += found[static_cast<Eigen::Index>(i)];
-    for (Eigen::Index k = 0; k < shared; ++k) {
-      const stability::Parameter& p = bounds[static_cast<std::size_t>(k)];
-      if (fixed[static_cast<std::size_t>(k)] != 0 || (next[k] >= p.lower && next[k] <= p.upper)) continue;
-      fixed[static_cast<std::size_t>(k)] = 1;
-      c.setZero();
-      inside = false;
-    }
-    if (inside) {
-      c = next;
-      break;
-    }
-    for (Eigen::Index k = 0; k < shared; ++k) {
-      const stability::Parameter& p = bounds[static_cast<std::size_t>(k)];
-      if (fixed[static_cast<std::size_t>(k)] != 0) c[k] = std::clamp(next[k], p.lower, p.upper);
-    }
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd lower = Eigen::VectorXd::Constant(size, -kInfinity);
+  Eigen::VectorXd upper = Eigen::VectorXd::Constant(size, kInfinity);
+  for (Eigen::Index k = 0; k < shared; ++k) {
+    lower[k] = bounds[static_cast<std::size_t>(k)].lower;
+    upper[k] = bounds[static_cast<std::size_t>(k)].upper;
   }
+  const Eigen::VectorXd c = box_least_squares(gram, b, lower, upper);
   JointFit fit;
   fit.shared = c.head(shared);
   fit.square = y - 2 * c.dot(b) + c.dot(gram * c);

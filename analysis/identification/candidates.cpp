@@ -1,10 +1,13 @@
 #include "analysis/identification/candidates.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <stdexcept>
 
+#include "analysis/identification/column_run.h"
 #include "nn/files/parallel.h"
 #include "stability/effects/registry.h"
 
@@ -66,6 +69,13 @@ Candidate vehicle_offset(const stability::Model& model, const Coverage& coverage
 
 }  // namespace
 
+std::string Coverage::too_poor() const {
+  if (blocks >= kFewestBlocks) return "";
+  return fmt::format(
+      "{} usable records make {} blocks of 2 s without a cut; an answer needs at least {} blocks", records,
+      blocks, kFewestBlocks);
+}
+
 Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
                   int jobs) {
   using residuals::Track;
@@ -82,6 +92,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
     for (const Track& track :
          inputs.load(static_cast<std::size_t>(which[static_cast<std::size_t>(i)]), problems)) {
       if (track.position_only || track.kind != kind) continue;
+      part.covered.blocks += cut_into_blocks(track).blocks.size();
       for (std::size_t s = 0; s < track.instants.size(); ++s) {
         if (track.cut[s] != residuals::Cut::kNone) continue;
         const stability::Instant& now = track.instants[s];
@@ -104,6 +115,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
     all.range.z_max_m = std::max(all.range.z_max_m, part.covered.range.z_max_m);
     all.most_neighbours = std::max(all.most_neighbours, part.covered.most_neighbours);
     all.records += part.covered.records;
+    all.blocks += part.covered.blocks;
     squares += part.squares;
     vehicles.insert(part.vehicles.begin(), part.vehicles.end());
   }

@@ -20,13 +20,20 @@ struct Candidate {
   int columns() const { return static_cast<int>(info.linear.size()); }
 };
 
+/// Fewer blocks of 2 s give no answer.
+inline constexpr std::size_t kFewestBlocks = 10;
+
 /// What the flights of one kind of vehicle cover.
 struct Coverage {
   stability::FlightRange range;
   int most_neighbours = 0;
   double speed_rms_m_s = 0;
   std::size_t records = 0;
+  std::size_t blocks = 0;             ///< of cut_into_blocks()
   std::vector<std::string> vehicles;  ///< of the kind that flew, without those used for their position only
+
+  /// Why these flights are too few for an answer; empty if they are not.
+  std::string too_poor() const;
 };
 
 /// Coverage of the flights `which` (indices into inputs.found.flights) by vehicles of `kind`.

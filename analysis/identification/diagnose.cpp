@@ -75,6 +75,7 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates) {
         moved = true;
       }
     }
+    widen_by_bias(result.checks, result.refined);
     if (!moved || now == named || passes.records > kManyRecords) break;
     named = now;
   }
@@ -123,6 +124,64 @@ std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) 
   return ranking;
 }
 
+/// Thrust answers whatever disturbs the vehicle: what its history seems to do needs another witness.
+bool is_of_thrust(const Candidate& candidate) {
+  const std::string& name = candidate.name;
+  return candidate.info.remembers || name == "thrust_ratio" || name == "battery" || name == "inflow";
+}
+
+/// The instrument says the same of the effect's coefficient.
+bool is_confirmed(const std::vector<InstrumentedValue>& check) {
+  constexpr double kAlike = 0.25;
+  return std::all_of(check.begin(), check.end(), [](const InstrumentedValue& value) {
+    return value.is_strong() &&
+           std::abs(value.instrument - value.least_squares) <= kAlike * std::abs(value.least_squares);
+  });
+}
+
+/// Names of selected effects that are no match for a loud remainder, see Diagnosis::suspected.
+std::set<std::string> suspects(const Selected& selected) {
+  constexpr double kShare = 0.1;
+  const Selection selection(selected.grams);
+  const double square = selection.mean_square(selected.members);
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < selected.members.size(); ++i) {
+    const Candidate& candidate = selected.refined[i].candidate;
+    const bool small = square > (1 - kShare) * selection.mean_square(without(selected.members, i));
+    const bool unconfirmed =
+        is_of_thrust(candidate) && (selected.checks.empty() || !is_confirmed(selected.checks[i]));
+    if (small || unconfirmed) names.insert(candidate.name);
+  }
+  return names;
+}
+
+/// What is selected once nothing of it is suspect.
+struct Settled {
+  Selected selected;
+  std::vector<Missing> ranking;
+  Remainder rest;
+  std::vector<std::string> suspected;
+};
+
+Settled settle(const Passes& passes, const Coverage& covered) {
+  constexpr int kMostRounds = 8;
+  std::vector<Candidate> candidates = all_candidates(*passes.inputs.model_of(passes.kind), covered);
+  Settled result;
+  for (int round = 0; round < kMostRounds; ++round) {
+    result.selected = select(passes, candidates);
+    result.ranking = ranking_of(passes, result.selected);
+    result.rest = remainder(passes, specs_of(result.ranking));
+    if (result.rest.ratio <= kLoudRatio) break;
+    const std::set<std::string> names = suspects(result.selected);
+    if (names.empty()) break;
+    result.suspected.insert(result.suspected.end(), names.begin(), names.end());
+    candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
+                                    [&](const Candidate& c) { return names.count(c.name) == 1; }),
+                     candidates.end());
+  }
+  return result;
+}
+
 ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   const auto checks = instrument(
@@ -161,21 +220,23 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   Diagnosis result;
   result.kind = kind;
   const Coverage covered = coverage(inputs, kind, which, jobs);
-  const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
-  const Selected selected = select(passes, all_candidates(*inputs.model_of(kind), covered));
-  const Selection selection(selected.grams);
   result.records = covered.records;
   result.flights = static_cast<int>(which.size());
-  result.blocks = selected.grams.blocks.size();
-  result.inconclusive = !selection.is_sound();
-  if (result.inconclusive) return result;
-  result.ranking = ranking_of(passes, selected);
+  result.blocks = covered.blocks;
+  result.too_poor = covered.too_poor();
+  if (!result.too_poor.empty()) return result;
+  const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
+  Settled settled = settle(passes, covered);
+  const Selected& selected = settled.selected;
+  const Selection selection(selected.grams);
+  result.ranking = std::move(settled.ranking);
   result.contradicted = selected.contradicted;
+  result.suspected = std::move(settled.suspected);
   result.rmse_before_N = std::sqrt(selection.mean_square({}));
   result.rmse_after_N = std::sqrt(selection.mean_square(selected.members));
   result.detectable = detectable(selected.grams, selected.members);
   result.thrust_scale = thrust_scale(passes, covered);
-  result.remainder = remainder(passes, specs_of(result.ranking));
+  result.remainder = std::move(settled.rest);
   return result;
 }
 
@@ -183,8 +244,7 @@ std::vector<Missing> missing_effects(const residuals::Inputs& inputs, const std:
                                      const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress) {
   const Coverage covered = coverage(inputs, kind, which, jobs);
-  const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
-  return ranking_of(passes, select(passes, all_candidates(*inputs.model_of(kind), covered)));
+  return settle({inputs, kind, which, covered.records, jobs, progress}, covered).ranking;
 }
 
 std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::string& kind,
@@ -209,6 +269,8 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
     }
   }
   selected.refined = refine(passes, selected.grams, selected.members);
+  selected.checks = instrument(passes, candidates_of(selected.refined));
+  widen_by_bias(selected.checks, selected.refined);
   return ranking_of(passes, selected);
 }
 

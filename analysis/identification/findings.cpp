@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "analysis/identification/covariance.h"
 #include "analysis/residuals/statistics.h"
 
 namespace swarmcert::identification {

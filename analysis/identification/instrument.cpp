@@ -87,6 +87,33 @@ bool InstrumentedValue::contradicts() const {
          instrument * least_squares < kMost * least_squares * least_squares;
 }
 
+double InstrumentedValue::bias() const {
+  if (!is_strong() || std::abs(difference_z) <= 1) return 0;
+  return std::abs(instrument - least_squares) * std::sqrt(1 - 1 / (difference_z * difference_z));
+}
+
+void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks, std::vector<Refined>& refined) {
+  // By the bias to both sides, and to where the instrument's own interval ends.
+  const auto widen = [](Interval& interval, const InstrumentedValue& check, double scale,
+                        const stability::Parameter& parameter) {
+    if (!check.is_strong()) return;
+    const double by = scale * check.bias();
+    interval.first = std::max(std::min(interval.first - by, scale * check.interval.first), parameter.lower);
+    interval.second =
+        std::min(std::max(interval.second + by, scale * check.interval.second), parameter.upper);
+  };
+  for (std::size_t i = 0; i < checks.size(); ++i) {
+    Refined& effect = refined[i];
+    const stability::EffectInfo& info = effect.candidate.info;
+    if (info.remembers) {
+      widen(effect.shape_intervals[0], checks[i][0], effect.theta[0], info.shape[0]);
+      continue;
+    }
+    for (std::size_t c = 0; c < checks[i].size(); ++c)
+      widen(effect.linear_intervals[c], checks[i][c], 1, info.linear[c]);
+  }
+}
+
 std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
                                                        const std::vector<Candidate>& effects) {
   const Grams columns = columns_of(effects);

@@ -22,7 +22,15 @@ struct InstrumentedValue {
   bool is_strong() const;
   /// ... and says that most of it is not there.
   bool contradicts() const;
+  /// How far least squares seems to be off: what of the difference is more than its standard error. 0 where the
+  /// instrument is weak.
+  double bias() const;
 };
+
+/// Widens the intervals of `refined` by the bias of each coefficient, and so that they hold the instrument's where that
+/// is strong; what concerns a lag's gain falls on its time, since c (L_tau T - T) is about (L_(c tau) T - T).
+/// @param checks of the same effects, see instrument(); may be empty.
+void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks, std::vector<Refined>& refined);
 
 /// Both estimates of all coefficients of `effects` together, without bounds, effect by effect. Empty where a log has
 /// no set points, or nothing moves.

@@ -73,6 +73,18 @@ std::map<std::string, double> values_of(const stability::Model& model) {
   return values;
 }
 
+/// Why the flights are too few to fit, to select or to test; empty if they are not.
+std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, const Split& split, int jobs) {
+  const std::string poor = coverage(inputs, kind, split.fit, jobs).too_poor();
+  if (!poor.empty()) return "flights for the fit: " + poor;
+  if (!split.by_flight) return "";
+  for (const auto& [name, which] : {std::pair("select", &split.select), std::pair("test", &split.test)}) {
+    if (coverage(inputs, kind, *which, jobs).records == 0)
+      return fmt::format("the flights to {} have no usable record of kind {}", name, kind);
+  }
+  return "";
+}
+
 /// One candidate on top of the model of the last accepted row.
 struct Trial {
   LadderRow row;
@@ -104,6 +116,8 @@ Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int 
   ladder.split = split_flights(inputs);
   const stability::Model& nominal = inputs.models[0];
   const std::string& kind = nominal.kind;
+  ladder.too_poor = too_poor(inputs, kind, ladder.split, jobs);
+  if (!ladder.too_poor.empty()) return ladder;
   ladder.earlier = nominal.ladder;
   ladder.test_looks = looks_so_far(nominal) + 1;
   std::vector<std::string> wanted = options.effects;

@@ -25,7 +25,8 @@ struct Ladder {
   stability::Model model;                     ///< with what was accepted, and with all rows
   std::vector<Missing> fitted;                ///< what was fitted and accepted, as of the last row
   bool any_accepted = false;
-  int test_looks = 0;  ///< including this ladder
+  std::string too_poor;  ///< why nothing was fitted; empty if something was. The rest is then empty as well.
+  int test_looks = 0;    ///< including this ladder
 };
 
 struct LadderOptions {
@@ -34,7 +35,7 @@ struct LadderOptions {
   bool keep_anyway = false;
 };
 
-/// Fits and accepts effects for inputs' only model: an effect is accepted if the RMSE of the select flights falls by
+/// Fits and accepts effects for inputs' only model, where the flights suffice: an effect is accepted if the RMSE of the select flights falls by
 /// at least half a percent. Coefficients of all effects that were accepted so far are fitted anew with each step. The
 /// test flights are scored once, after the last step: their errors decide nothing.
 Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,

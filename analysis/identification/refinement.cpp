@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "analysis/identification/box_least_squares.h"
+#include "analysis/identification/covariance.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -217,9 +218,7 @@ class Refinement {
       const bool at_end = u.is_shape && (value <= parameter(u).lower || value >= parameter(u).upper);
       if (!held && !at_end && best.gram(i, i) > 0) free.push_back(static_cast<int>(k));
     }
-    const Eigen::MatrixXd covariance = sandwich(best.blocks, free, best.coefficients, ridge(best));
-    const double freedom = static_cast<double>(best.blocks.size()) - static_cast<double>(free.size());
-    const double quantile = boost::math::quantile(boost::math::students_t(std::max(freedom, 1.0)), 0.95);
+    const Jackknife spread = jackknife(best.blocks, free, best.coefficients, ridge(best));
     std::vector<Refined> refined;
     for (std::size_t m = 0; m < candidates_.size(); ++m) {
       refined.push_back({candidates_[m], {}, best.thetas[m], {}, {}});
@@ -230,7 +229,8 @@ class Refinement {
       const Unknown& u = unknowns_[k];
       const auto i = static_cast<Eigen::Index>(k);
       Refined& to = refined[u.member];
-      const double half = quantile * std::sqrt(std::max(0.0, covariance(i, i)));
+      const double half = boost::math::quantile(boost::math::students_t(spread.freedom[i]), 0.95) *
+                          std::sqrt(spread.variance[i]);
       const double value = u.is_shape ? to.theta[u.index] : best.coefficients[i];
       const Interval interval = {std::max(value - half, parameter(u).lower),
                                  std::min(value + half, parameter(u).upper)};

@@ -11,7 +11,7 @@ namespace swarmcert::identification {
 struct Refined {
   Candidate candidate;  ///< its only theta is the best one
   std::vector<double> coefficients, theta;
-  /// 90 %, from the sandwich of coefficients and free shapes together; equal ends where a number was held.
+  /// 90 %, from the jackknife of coefficients and free shapes together; equal ends where a number was held.
   std::vector<Interval> linear_intervals, shape_intervals;
 };
 

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "analysis/identification/box_least_squares.h"
+#include "analysis/identification/covariance.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -16,24 +17,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Whole flights are left out where there are this many.
 constexpr std::size_t kFewestFlights = 5;
-
-Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns) {
-  Eigen::VectorXd part(static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t i = 0; i < columns.size(); ++i) part[static_cast<Eigen::Index>(i)] = all[columns[i]];
-  return part;
-}
-
-Eigen::MatrixXd sub_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns) {
-  const auto n = static_cast<int>(columns.size());
-  Eigen::MatrixXd g(n, n);
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      g(i, j) = g(j, i) =
-          packed[Grams::packed(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)])];
-    }
-  }
-  return g;
-}
 
 }  // namespace
 
@@ -45,49 +28,6 @@ Members without(Members members, std::size_t index) {
 Members with(Members members, const Member& added) {
   members.push_back(added);
   return members;
-}
-
-double paired_z(const std::vector<double>& before, const std::vector<double>& after) {
-  const auto n = static_cast<double>(before.size());
-  double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    const double d = before[i] - after[i];
-    sum += d;
-    squares += d * d;
-  }
-  const double variance = squares / n - (sum / n) * (sum / n);
-  return variance > 0 ? sum / n / std::sqrt(variance / n) : 0;
-}
-
-Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int>& free,
-                         const Eigen::VectorXd& c, const Eigen::VectorXd& ridge) {
-  const auto n = static_cast<Eigen::Index>(free.size());
-  std::vector<int> all;
-  for (int i = 0; i < c.size(); ++i) all.push_back(i);
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n), bread = meat;
-  Eigen::VectorXd last = Eigen::VectorXd::Zero(n);
-  for (const Block& block : blocks) {
-    const Eigen::MatrixXd gram = sub_gram(block.gram, all);
-    const Eigen::VectorXd score = part_of(block.b - gram * c, free);
-    meat += score * score.transpose();
-    if (block.follows) meat += 0.5 * (score * last.transpose() + last * score.transpose());
-    last = score;
-    bread += sub_gram(block.gram, free);
-  }
-  for (Eigen::Index i = 0; i < n; ++i) {
-    bread(i, i) += 1e-10 * bread(i, i) + 1e-18;
-    if (ridge.size() > 0) bread(i, i) += ridge[free[static_cast<std::size_t>(i)]];
-  }
-  const Eigen::MatrixXd inverse = bread.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  const auto count = static_cast<double>(blocks.size());
-  const Eigen::MatrixXd inner =
-      inverse * meat * inverse * (count / std::max(1.0, count - static_cast<double>(n)));
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(c.size(), c.size());
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j)
-      covariance(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]) = inner(i, j);
-  }
-  return covariance;
 }
 
 Selection::Selection(const Grams& grams, Thresholds thresholds) : grams_(grams), thresholds_(thresholds) {
@@ -176,7 +116,7 @@ Eigen::VectorXd Selection::solve(const Sum& sum, const Members& members) const {
       upper[i++] = p.upper;
     }
   }
-  return box_least_squares(sub_gram(sum.gram, all), part_of(sum.b, all), lower, upper);
+  return box_least_squares(part_of_gram(sum.gram, all), part_of(sum.b, all), lower, upper);
 }
 
 std::vector<Eigen::VectorXd> Selection::fold_coefficients(const Members& members) const {
@@ -196,7 +136,7 @@ double Selection::mean_square(const Members& members, const Folds& folds) const 
     error += folds.inside[f].y;
     if (all.empty()) continue;
     const Eigen::VectorXd c = solve(folds.outside[f], members);
-    error += c.dot(sub_gram(folds.inside[f].gram, all) * c) - 2 * c.dot(part_of(folds.inside[f].b, all));
+    error += c.dot(part_of_gram(folds.inside[f].gram, all) * c) - 2 * c.dot(part_of(folds.inside[f].b, all));
   }
   return total_.records > 0 ? error / total_.records : kInfinity;
 }
@@ -215,7 +155,7 @@ std::vector<double> Selection::block_errors(const Members& members, const Folds&
     double error = block.y;
     if (!all.empty()) {
       const Eigen::VectorXd& c = fits[static_cast<std::size_t>(folds.of_block[i])];
-      error += c.dot(sub_gram(block.gram, all) * c) - 2 * c.dot(part_of(block.b, all));
+      error += c.dot(part_of_gram(block.gram, all) * c) - 2 * c.dot(part_of(block.b, all));
     }
     errors.push_back(std::max(error, 0.0));
   }
@@ -232,7 +172,7 @@ Fit Selection::fit(const Members& members) const {
     Block small;
     small.follows = block.follows;
     small.b = part_of(block.b, all);
-    const Eigen::MatrixXd gram = sub_gram(block.gram, all);
+    const Eigen::MatrixXd gram = part_of_gram(block.gram, all);
     small.gram.resize(gram.rows() * (gram.rows() + 1) / 2);
     for (int j = 0; j < gram.rows(); ++j)
       small.gram.segment(Eigen::Index(j) * (j + 1) / 2, j + 1) = gram.col(j).head(j + 1);
@@ -253,16 +193,28 @@ double Selection::wald(const Members& members) const {
   return std::sqrt(std::max(0.0, statistic - 3 * static_cast<double>(p - 1)));
 }
 
+bool Selection::is_held(const Members& members) const {
+  if (!candidate(members.back()).info.remembers) return false;
+  const Eigen::VectorXd c = solve(total_, members);
+  return std::abs(c[c.size() - 1] - 1) > 0.999 * kMemoryTolerance;
+}
+
 Member Selection::best_theta(const Members& members, int which) const {
   Member best{which, 0};
   double least = kInfinity;
+  bool best_is_held = true;
   const auto thetas = static_cast<int>(grams_.candidates[static_cast<std::size_t>(which)].thetas.size());
   for (int t = 0; t < thetas; ++t) {
     const Member member{which, t};
-    const double square = mean_square(with(members, member));
-    if (square < least) {
+    const Members after = with(members, member);
+    // A coarse grid's neighbour may fit better with a gain at its bound, but that is no lag.
+    const bool held = is_held(after);
+    if (held && !best_is_held) continue;
+    const double square = mean_square(after);
+    if (square < least || (best_is_held && !held)) {
       least = square;
       best = member;
+      best_is_held = held;
     }
   }
   return best;
@@ -278,12 +230,11 @@ bool Selection::is_acceptable(const Members& before, const Member& added, double
                               double after_square, const Folds& folds) const {
   if (!(after_square <= (1 - thresholds_.gain) * before_square)) return false;
   const Support& where = support(added);
-  if (where.records < thresholds_.support_records || where.blocks < thresholds_.support_blocks) return false;
+  const bool is_plain = after_square <= (1 - thresholds_.plain_gain) * before_square;
+  const std::size_t blocks = is_plain ? thresholds_.plain_support_blocks : thresholds_.support_blocks;
+  if (where.records < thresholds_.support_records || where.blocks < blocks) return false;
   const Members after = with(before, added);
-  if (candidate(added).info.remembers) {
-    const Eigen::VectorXd c = solve(total_, after);
-    if (std::abs(c[c.size() - 1] - 1) > 0.999 * kMemoryTolerance) return false;  // held by its bounds
-  }
+  if (is_held(after)) return false;
   const double z = paired_z(block_errors(before, folds), block_errors(after, folds));
   return z >= thresholds_.paired_z || (z >= thresholds_.least_paired_z && wald(after) >= thresholds_.wald_z);
 }

@@ -17,6 +17,9 @@ struct Thresholds {
   double swap_gain = 0.003;
   double removal_share = 0.7;  ///< of `gain`: an effect that loses less than this is removed
   std::size_t support_records = 100, support_blocks = 5;
+  /// What lowers the mean square of blocks left out by this much was predicted there from elsewhere: fewer will do.
+  double plain_gain = 0.3;
+  std::size_t plain_support_blocks = 2;
 };
 
 /// An effect with a theta of its grid.
@@ -35,15 +38,6 @@ struct Fit {
   Eigen::VectorXd coefficients;
   Eigen::MatrixXd covariance;  ///< see sandwich()
 };
-
-/// Covariance of least-squares coefficients `c` of the columns `free`, robust to correlation within blocks and between
-/// neighbouring ones (Bartlett weight 1/2, Newey and West 1987). Rows and columns of the others are zero.
-/// @param ridge added to the diagonal of G, [columns] or empty.
-Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int>& free,
-                         const Eigen::VectorXd& c, const Eigen::VectorXd& ridge = {});
-
-/// Mean difference of two lists of errors over its standard error.
-double paired_z(const std::vector<double>& before, const std::vector<double>& after);
 
 class Selection {
  public:
@@ -71,7 +65,7 @@ class Selection {
   /// True where the data show that `added` belongs to `before`.
   bool is_acceptable(const Members& before, const Member& added) const;
   /// Enough blocks for an answer.
-  bool is_sound() const { return grams_.blocks.size() >= 10; }
+  bool is_sound() const { return grams_.blocks.size() >= kFewestBlocks; }
   /// Coefficients of the fits without one fold each.
   std::vector<Eigen::VectorXd> fold_coefficients(const Members& members) const;
 
@@ -106,6 +100,8 @@ class Selection {
   Eigen::VectorXd solve(const Sum& sum, const Members& members) const;
   bool is_acceptable(const Members& before, const Member& added, double before_square, double after_square,
                      const Folds& folds) const;
+  /// The last member is a lag or delay whose gain is at a bound.
+  bool is_held(const Members& members) const;
   bool swap_one(Members& members) const;
   bool remove_one(Members& members) const;
 

@@ -110,8 +110,8 @@ Inputs read_inputs(const InputArguments& arguments) {
     inputs.named_files.push_back(arguments.network);
     files::NetworkArguments network;
     network.file = arguments.network;
-    for (const auto& [name, weights] : files::parts(files::load_network(network)))
-      inputs.named_files.push_back(weights->path);
+    const files::Network loaded = files::load_network(network);
+    for (const auto& [name, weights] : files::parts(loaded)) inputs.named_files.push_back(weights->path);
   }
   for (const stability::Model& model : inputs.models) add_kind(inputs.kinds, model.kind, model.mass_kg);
   inputs.fallback_kind = inputs.models[0].kind;

@@ -167,8 +167,8 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
   } else if (name == "constant_force") {
     const char* const axes[] = {"force_x_N", "force_y_N", "force_z_N"};
     for (int i = 0; i < 3; ++i) result.bias_N[i] = std::abs(value(axes[i]));
-  } else if (name == "downwash" && value("tail") != 0) {
-    nothing_known("a wake with a tail has no enclosure here: only tail = 0");
+  } else if ((name == "downwash" || name == "ceiling") && value("tail") != 0) {
+    nothing_known("a wake or ceiling with a tail has no enclosure here: only tail = 0");
   } else if (name == "downwash" || name == "upper_lift") {
     bound_wake(name, value, motion, result);
   } else if (name == "drag_linear" || name == "drag_quadratic" || name == "drag_rotor" || name == "inflow") {

@@ -6,24 +6,28 @@
 namespace swarmcert::stability {
 namespace {
 
-enum Shape { kDecay, kHeight };
+enum Shape { kDecay, kHeight, kTail };
 
 }  // namespace
 
 EffectInfo Ceiling::describe() {
   return {"ceiling",
-          "f = a T exp(-(h - z) / b) b3",
-          "rotors near a surface above them: Sanchez-Cuevas, Heredia and Ollero 2017, in exponential form",
+          "f = a T (1 + q x)^(-1/q) b3, x = (h - z) / b; exp(-x) for q = 0",
+          "rotors near a surface above them: Sanchez-Cuevas, Heredia and Ollero 2017: their rational form "
+          "falls like an inverse square, q = 0.5",
           "ceiling",
           "a fifth of the time within two rotor radii of the ceiling",
           {{"amplitude", "relative thrust gained at the height h", 0, 0, 1}},
           {{"decay_m", "b", 0.05, 0.005, 0.5, {0.03, 0.05, 0.08, 0.12, 0.2}},
-           {"height_m", "h: of the ceiling; a and h only count as a exp(-h / b)", 2.5, 0, 20}}};
+           {"height_m", "h: of the ceiling; with q = 0, a and h only count as a exp(-h / b)", 2.5, 0, 20},
+           {"tail", "q: 0 is exponential, 0.5 an inverse square", 0, 0, 1, {0, 0.5}}}};
 }
 
 void Ceiling::columns(const Instant& now, const double* shape, Wrench* columns) const {
   const double gap_m = std::max(shape[kHeight] - now.p_W_m.z(), 0.0);
-  columns[0] = {now.thrust_N * std::exp(-gap_m / shape[kDecay]) * now.b3_W(), Eigen::Vector3d::Zero()};
+  const double x = gap_m / shape[kDecay], tail = shape[kTail];
+  const double gain = tail == 0 ? std::exp(-x) : std::exp(-std::log1p(tail * x) / tail);
+  columns[0] = {now.thrust_N * gain * now.b3_W(), Eigen::Vector3d::Zero()};
 }
 
 bool Ceiling::in_support(const Instant& now, const double* shape) const {
@@ -33,7 +37,10 @@ bool Ceiling::in_support(const Instant& now, const double* shape) const {
 std::vector<std::vector<double>> Ceiling::grid(const FlightRange& range) const {
   // Flights cannot tell the ceiling's height from the amplitude: the height is taken just above the highest point.
   std::vector<std::vector<double>> thetas;
-  for (const double decay_m : info().shape[kDecay].grid) thetas.push_back({decay_m, range.z_max_m + 0.05});
+  for (const double tail : info().shape[kTail].grid) {
+    for (const double decay_m : info().shape[kDecay].grid)
+      thetas.push_back({decay_m, range.z_max_m + 0.05, tail});
+  }
   return thetas;
 }
 

@@ -1,4 +1,4 @@
-/// @file Ceiling effect: f = a T exp(-(h - z) / b) b3.
+/// @file Ceiling effect: f = a T exp(-(h - z) / b) b3, or with a tail that falls like a power.
 #pragma once
 
 #include "stability/effects/effect.h"

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "analysis/identification/box_least_squares.h"
+#include "analysis/identification/covariance.h"
 #include "analysis/identification/injection.h"
 #include "analysis/identification/selection.h"
 #include "stability/effects/registry.h"
@@ -103,6 +104,34 @@ TEST(Detectable, SizesAreWhereInjectionsBeginToShow) {
     const Grams injected = noise.grams(factor * sizes[0].size);
     EXPECT_EQ(Selection(injected).is_acceptable({}, {0, 0}), factor > 1) << factor;
   }
+}
+
+TEST(Jackknife, IsTheVarianceOfWhiteNoiseAndKnowsWhenFewBlocksTell) {
+  const WhiteNoise noise;
+  Grams grams = noise.grams(0);
+  double energy = 0, product = 0;
+  for (const Block& block : grams.blocks) {
+    energy += block.gram[0];
+    product += block.b[0];
+  }
+  const Eigen::VectorXd c = Eigen::VectorXd::Constant(1, product / energy);
+  const double white = 0.01 * 0.01 / energy;
+  const Jackknife even = jackknife(grams.blocks, {0}, c);
+  EXPECT_NEAR(even.variance[0], white, 0.5 * white);  // 40 blocks: 22 % standard error
+  EXPECT_GT(even.freedom[0], 35);
+  // Of 40 blocks four tell something.
+  for (std::size_t k = 4; k < grams.blocks.size(); ++k) {
+    grams.blocks[k].gram[0] = 0;
+    grams.blocks[k].b[0] = 0;
+  }
+  energy = product = 0;
+  for (const Block& block : grams.blocks) {
+    energy += block.gram[0];
+    product += block.b[0];
+  }
+  const Eigen::VectorXd few = Eigen::VectorXd::Constant(1, product / energy);
+  EXPECT_NEAR(jackknife(grams.blocks, {0}, few).freedom[0], 3, 0.1);
+  EXPECT_GT(jackknife(grams.blocks, {0}, few).variance[0], sandwich(grams.blocks, {0}, few)(0, 0));
 }
 
 TEST(Sandwich, IsTheVarianceOfWhiteNoiseAndGrowsWhereBlocksAreAlike) {

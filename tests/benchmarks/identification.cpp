@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -84,6 +85,7 @@ void speed(const std::string& folder, int count) {
 void coverage(const std::string& folder, int count) {
   struct Count {
     int hits = 0, runs = 0;
+    double sum = 0, squares = 0, half_widths = 0;  ///< of the errors; of the intervals
   };
   std::map<std::string, Count> counts;
   tests::Truth truth = drag_lag_ground();
@@ -103,13 +105,21 @@ void coverage(const std::string& folder, int count) {
         Count& c = counts[name];
         ++c.runs;
         c.hits += interval.first <= value->second && value->second <= interval.second;
+        const double error = missing.parameters.at(name) - value->second;
+        c.sum += error;
+        c.squares += error * error;
+        c.half_widths += (interval.second - interval.first) / 2;
       }
     }
   }
   fmt::print("nominal 90 % intervals under a gust of 0.006 N rms and 0.5 s:\n");
   for (const auto& [name, c] : counts)
-    fmt::print("  {:<12} {:>3} of {} hold the true value ({:.2f})\n", name, c.hits, c.runs,
-               double(c.hits) / c.runs);
+    fmt::print(
+        "  {:<12} {:>3} of {} hold the true value ({:.2f}); mean error {:.4f}, scatter {:.4f}, mean half "
+        "{:.4f}\n",
+        name, c.hits, c.runs, double(c.hits) / c.runs, c.sum / c.runs,
+        std::sqrt(std::max(0.0, c.squares / c.runs - c.sum * c.sum / c.runs / c.runs)),
+        c.half_widths / c.runs);
 }
 
 }  // namespace

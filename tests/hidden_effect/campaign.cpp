@@ -183,6 +183,19 @@ std::vector<Hidden> single_effects() {
       force("Lorentzian jet", jet_lorentzian, {"downwash"}),
       valued(force("Gaussian jet", [](const Moment& now) { return jet_gaussian(now, 0.09); }, {"downwash"}),
              "amplitude_N", 0.09, 0.15),
+      valued(force("lift of an upper jet",
+                   [](const Moment& now) {
+                     double sum_N = 0;
+                     for (const Moment::Other& other : now.others) {
+                       const double below_m = -other.dp_m.z();
+                       if (below_m > 0.05)
+                         sum_N += 0.03 * std::sqrt(0.3 / std::max(below_m, 0.12)) *
+                                  std::exp(-other.dp_m.head<2>().squaredNorm() / (2 * 0.1 * 0.1));
+                     }
+                     return Vector3d(0, 0, sum_N);
+                   },
+                   {"upper_lift"}),
+             "amplitude_N", 0.03, 0.15),
       valued(force(
                  "wind", [](const Moment&) { return Vector3d(0.02, 0.01, 0); }, constant),
              "force_x_N", 0.02),
@@ -223,13 +236,23 @@ std::vector<Hidden> foreign_forces() {
   return all;
 }
 
-std::vector<std::vector<Hidden>> pairs() {
+Hidden named(const std::string& name) {
   const std::vector<Hidden> all = single_effects();
-  const auto named = [&](const std::string& name) {
-    const auto found = std::find_if(all.begin(), all.end(), [&](const Hidden& h) { return h.name == name; });
-    if (found == all.end()) throw std::logic_error("no effect " + name);
-    return *found;
-  };
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Hidden& h) { return h.name == name; });
+  if (found == all.end()) throw std::logic_error("no effect " + name);
+  return *found;
+}
+
+std::vector<std::vector<Hidden>> disturbed() {
+  Hidden gust = foreign_forces()[0];
+  gust.truth.gust_N = 0.012;
+  std::vector<std::vector<Hidden>> result;
+  for (const char* name : {"mass", "motor lag", "linear drag", "ground with a dip", "Gaussian jet", "wind"})
+    result.push_back({named(name), gust});
+  return result;
+}
+
+std::vector<std::vector<Hidden>> pairs() {
   std::vector<std::vector<Hidden>> result;
   const std::pair<const char*, const char*> wanted[] = {{"mass", "linear drag"},
                                                         {"motor lag", "ground with a dip"},
@@ -273,7 +296,10 @@ Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s
   const files::Json result = files::read_json(folder + "/result.json", "swarmcert/diagnose/1");
   std::set<std::string> allowed;
   std::size_t found = 0;
-  for (const files::Json& entry : result["ranking"]) answer.named.push_back(entry["effect"]);
+  for (const files::Json& entry : result["ranking"]) {
+    answer.named.push_back(entry["effect"]);
+    answer.drops.push_back(entry["drop"]);
+  }
   const auto is_named = [&](const std::string& name) {
     return std::find(answer.named.begin(), answer.named.end(), name) != answer.named.end();
   };

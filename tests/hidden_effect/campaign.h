@@ -28,6 +28,8 @@ struct Hidden {
 std::vector<Hidden> single_effects();
 /// Gusts and forces that no effect of the library has.
 std::vector<Hidden> foreign_forces();
+/// Single effects in a gust: both must be said.
+std::vector<std::vector<Hidden>> disturbed();
 /// Pairs of `single_effects()` at once.
 std::vector<std::vector<Hidden>> pairs();
 
@@ -35,6 +37,7 @@ std::vector<std::vector<Hidden>> pairs();
 struct Answer {
   std::string label;
   std::vector<std::string> named;  ///< in the ranking's order
+  std::vector<double> drops;       ///< of each, relative fall of the RMSE
   bool first_right = false, exact = false, all_found = false;
   bool claims_falsely = false;  ///< names something that is not there
   bool flagged = false;

@@ -1,5 +1,6 @@
-/// Runs the campaigns of hidden effects and prints every answer and the shares: singles, pairs, foreign forces, nulls.
-///   hidden_effect_campaign [singles|pairs|foreign|null] [first seed] [seeds] [program]
+/// Runs the campaigns of hidden effects and prints every answer and the shares: singles, pairs, singles in gusts, foreign forces,
+/// nulls.
+///   hidden_effect_campaign [singles|pairs|disturbed|foreign|null] [first seed] [seeds] [program]
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -25,7 +26,8 @@ struct Tally {
     valued += answer.has_value ? 1 : 0;
     right += answer.value_right ? 1 : 0;
     std::string named;
-    for (const std::string& name : answer.named) named += " " + name;
+    for (std::size_t i = 0; i < answer.named.size(); ++i)
+      named += fmt::format(" {} {:.1f} %", answer.named[i], 100 * answer.drops[i]);
     fmt::print("{:<40} {:>6} {} {} {} ratio {:.2f}{}  [{} ]{}\n", answer.label, seed,
                answer.first_right ? "first" : "-----", answer.exact ? "exact" : "-----",
                answer.flagged ? "FLAG" : "    ", answer.ratio,
@@ -57,6 +59,7 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(folder);
   std::vector<std::vector<Hidden>> cases;
   if (what == "pairs") cases = pairs();
+  if (what == "disturbed") cases = disturbed();
   if (what == "singles")
     for (const Hidden& h : single_effects()) cases.push_back({h});
   if (what == "foreign")

@@ -1,0 +1,34 @@
+/// @file How far coefficients may be off, where errors within a block and between neighbouring blocks are alike.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "analysis/identification/block_grams.h"
+
+namespace swarmcert::identification {
+
+/// Covariance of least-squares coefficients `c` of the columns `free`, robust to correlation within blocks and between
+/// neighbouring ones (Bartlett weight 1/2, Newey and West 1987). Rows and columns of the others are zero.
+/// @param ridge added to the diagonal of G, [columns] or empty.
+Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int>& free,
+                         const Eigen::VectorXd& c, const Eigen::VectorXd& ridge = {});
+
+/// For intervals: what a block weighs is measured by leaving it out.
+struct Jackknife {
+  Eigen::VectorXd variance;  ///< 0 of columns that are not free
+  /// Of Student's distribution: blocks that carry a coefficient's information, less one. An effect that acts in few
+  /// blocks has few.
+  Eigen::VectorXd freedom;
+};
+
+/// As sandwich(), with the influence (G - G_b)^-1 (b_b - G_b c) of each block b instead of G^-1 (b_b - G_b c), which is
+/// too small where a block carries much of a coefficient (MacKinnon and White 1985, HC3). Freedom: n_eff - 1 with
+/// n_eff = (sum h_b)^2 / sum h_b^2 and h_b the diagonal of G^-1 G_b G^-1.
+Jackknife jackknife(const std::vector<Block>& blocks, const std::vector<int>& free, const Eigen::VectorXd& c,
+                    const Eigen::VectorXd& ridge = {});
+
+/// Mean difference of two lists of errors over its standard error.
+double paired_z(const std::vector<double>& before, const std::vector<double>& after);
+
+}  // namespace swarmcert::identification
