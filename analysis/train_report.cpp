@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "analysis/report.h"
 
@@ -115,10 +116,14 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
     }
   }
   report.heading("Flights");
-  std::vector<std::vector<std::string>> rows;
+  std::map<std::vector<std::string>, Index> samples;  // blocks of one flight together
   for (const learning::TrackSamples& track : data.tracks)
-    rows.push_back({track.flight, track.vehicle, track.composition, name(track.use),
-                    std::to_string(track.end - track.begin)});
+    samples[{track.flight, track.vehicle, track.composition, name(track.use)}] += track.end - track.begin;
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [words, count] : samples) {
+    rows.push_back(words);
+    rows.back().push_back(std::to_string(count));
+  }
   report.table({"flight", "vehicle", "neighbours > vehicle", "use", "samples"}, rows);
   return report.write(folder, overwrite);
 }

@@ -37,7 +37,7 @@ int main() {
   const residuals::Inputs inputs = residuals::read_inputs(arguments);
   const learning::NetworkSizes sizes{{16, 16}, {16}, 8, true};
   const learning::LearningData data =
-      learning::load_learning_data(inputs, nullptr, sizes, 0, [](int, int) {});
+      learning::load_learning_data({&inputs}, sizes, learning::SplitBy::kAuto, 0, [](int, int) {});
   fmt::print("{} samples; predicting nothing leaves {:.2f} gf on the test flights\n", data.tracks.back().end,
              learning::rmse_of_nothing_gf(data, learning::Use::kTest));
 

@@ -29,6 +29,7 @@ const std::vector<Command>& commands() {
       add_command(),              //
       train_command(),            //
       simulate_command(),         //
+      reproduce_command(),        //
       bound_command(),            //
       spacing_command(),          //
       sweep_command(),            //

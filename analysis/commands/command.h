@@ -85,6 +85,7 @@ Command inspect_command();
 Command iss_check_command();
 Command match_command();
 Command merge_command();
+Command reproduce_command();
 Command simulate_command();
 Command spacing_command();
 Command sweep_command();

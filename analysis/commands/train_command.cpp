@@ -2,15 +2,16 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
+#include <set>
 
 #include "analysis/commands/flight_options.h"
+#include "analysis/learning/trained_network.h"
 #include "analysis/learning/training_run.h"
 #include "analysis/progress.h"
 #include "analysis/train_report.h"
-#include "lipschitz/certify.h"
-#include "nn/files/file_io.h"
-#include "nn/files/functions.h"
 #include "nn/files/input_error.h"
 
 namespace swarmcert::analysis {
@@ -20,60 +21,19 @@ namespace fs = std::filesystem;
 using learning::LearningData;
 using learning::Use;
 
+const std::map<std::string, learning::SplitBy> kSplits = {{"auto", learning::SplitBy::kAuto},
+                                                          {"flights", learning::SplitBy::kFlights},
+                                                          {"blocks", learning::SplitBy::kBlocks}};
+
 struct Options {
   FlightOptions flights;
-  std::vector<std::string> test;
-  std::string output, report;
+  std::vector<std::string> select, test;
+  std::string output, report, split = "auto";
   learning::NetworkSizes sizes;
   learning::RunOptions run;
   std::string gamma_scope = "layer", gamma_mode = "clip";
   bool no_ground = false;
 };
-
-std::string file_of(const std::string& part) {
-  std::string name = part;
-  name[name.find(':')] = '_';
-  return name + ".safetensors";
-}
-
-std::string network_toml(const LearningData& data, const files::GammaStatement& gamma) {
-  std::string text = fmt::format(
-      "schema = \"swarmcert/network/1\"\noutput = {{ quantity = \"force_z\", unit = \"gf\" }}\n"
-      "gamma = {{ value = {}, scope = \"{}\", mode = \"{}\" }}\n"
-      "[input]\norder = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]\n",
-      gamma.value, gamma.scope == files::GammaStatement::Scope::kLayer ? "layer" : "network",
-      gamma.mode == files::GammaStatement::Mode::kClip ? "clip" : "equal");
-  for (const training::Part& part : data.layout.parts()) {
-    const std::size_t colon = part.name.find(':');
-    text += fmt::format("[{}.{}]\nweights = \"{}\"\n", part.name.substr(0, colon),
-                        part.name.substr(colon + 1), file_of(part.name));
-  }
-  return text;
-}
-
-/// The vehicles' models with the new network as one more effect: what compare and simulate take.
-void write_models(const residuals::Inputs& inputs, const LearningData& data, const fs::path& folder) {
-  for (stability::Model model : inputs.models) {
-    if (data.layout.find("rho:" + model.kind) < 0) continue;
-    stability::EffectSpec effect;
-    effect.name = "deep_set";
-    effect.network = "network.toml";
-    model.effects.push_back(std::move(effect));
-    files::write_file((folder / ("model-" + model.kind + ".toml")).string(),
-                      to_toml(model, {"With the network in this folder."}), true);
-  }
-}
-
-files::Network write_networks(const LearningData& data, const training::Vector& theta,
-                              const files::GammaStatement& gamma, const fs::path& folder) {
-  for (std::size_t p = 0; p < data.layout.parts().size(); ++p) {
-    files::save_safetensors(data.layout.stored(theta, static_cast<int>(p)),
-                            (folder / file_of(data.layout.parts()[p].name)).string(), true);
-  }
-  const std::string path = (folder / "network.toml").string();
-  files::write_file(path, network_toml(data, gamma), true);
-  return files::load_network({path, "", "", ""});
-}
 
 struct Scores {
   double nothing_gf = 0, network_gf = 0;
@@ -102,8 +62,7 @@ struct Outcome {
   learning::Run run;
   double test_gf = 0, nothing_gf = 0;
   std::map<std::string, Scores> compositions;
-  std::vector<std::pair<std::string, double>> lipschitz;  ///< per set function, gf per unit of input
-  lipschitz::Verdict gamma = lipschitz::Verdict::kProved;
+  learning::Certified certified;
 };
 
 files::Json result_of(const Options& options, const std::vector<std::string>& inputs,
@@ -114,7 +73,7 @@ files::Json result_of(const Options& options, const std::vector<std::string>& in
   json["samples"] = {{"fit", data.indices(Use::kFit).size()},
                      {"select", data.indices(Use::kSelect).size()},
                      {"test", data.indices(Use::kTest).size()}};
-  json["split"] = data.split_by_time ? "time" : "flights";
+  json["split"] = data.split_by_blocks ? "blocks" : "flights";
   json["test_rmse"] = number_or_null(outcome.test_gf * stability::kGramForce_N);
   json["test_rmse_gf"] = number_or_null(outcome.test_gf);
   json["test_rmse_of_nothing"] = number_or_null(outcome.nothing_gf * stability::kGramForce_N);
@@ -124,14 +83,11 @@ files::Json result_of(const Options& options, const std::vector<std::string>& in
                             {"rmse", scores.network_gf * stability::kGramForce_N},
                             {"rmse_of_nothing", scores.nothing_gf * stability::kGramForce_N}});
   }
-  double largest = 0;
   json["bounds"] = files::Json::array();
-  for (const auto& [function, upper] : outcome.lipschitz) {
-    largest = std::max(largest, upper);
+  for (const auto& [function, upper] : outcome.certified.set_bounds)
     json["bounds"].push_back({{"function", function}, {"upper", upper}, {"unit", "gf per unit of input"}});
-  }
-  json["lipschitz"] = largest;
-  json["gamma_verdict"] = name(outcome.gamma);
+  json["lipschitz"] = outcome.certified.largest();
+  json["gamma_verdict"] = name(outcome.certified.gamma);
   json["best_epoch"] = outcome.run.best_epoch + 1;
   json["epochs"] = files::Json::array();
   for (const learning::Epoch& epoch : outcome.run.epochs)
@@ -148,17 +104,17 @@ void print(const Options& options, const LearningData& data, const Outcome& outc
              data.samples.samples(), data.indices(Use::kFit).size(), flights[0].size(),
              data.indices(Use::kSelect).size(), flights[1].size(), data.indices(Use::kTest).size(),
              flights[2].size());
-  if (data.split_by_time)
-    fmt::print("too few flights to split by flight: parts of the same flight test, and look too good\n");
+  if (data.split_by_blocks)
+    fmt::print("blocks of the flights that are fitted select or test: these errors look too good\n");
   fmt::print("best of {} epochs: {}\n\n", outcome.run.epochs.size(), outcome.run.best_epoch + 1);
   fmt::print("{:<34}{:>16}{:>16}\n", "vertical force on test flights", "no network [gf]", "network [gf]");
   for (const auto& [composition, scores] : outcome.compositions)
     fmt::print("{:<34}{:>16.3f}{:>16.3f}\n", composition, scores.nothing_gf, scores.network_gf);
   fmt::print("{:<34}{:>16.3f}{:>16.3f}\n\n", "all", outcome.nothing_gf, outcome.test_gf);
-  for (const auto& [function, upper] : outcome.lipschitz)
+  for (const auto& [function, upper] : outcome.certified.set_bounds)
     fmt::print("Lipschitz constant of {}: at most {:.8g} gf per unit of input, proved\n", function, upper);
   fmt::print("gamma {} in every {}: {}\n", options.run.trainer.gamma.value, options.gamma_scope,
-             name(outcome.gamma));
+             name(outcome.certified.gamma));
   for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
@@ -169,6 +125,31 @@ void refuse_to_mix(const Options& options, const CommonOptions& common) {
   if (!is_used || common.force || options.run.resumes) return;
   throw files::InputError({options.output, "", "-o", "", "the folder is not empty",
                            "--resume goes on with the run in it, --force replaces it"});
+}
+
+/// Flights that are not fitted, with the same models; nothing where none are named.
+std::optional<residuals::Inputs> others(const Options& options, const std::vector<std::string>& words) {
+  if (words.empty()) return std::nullopt;
+  FlightOptions chosen = options.flights;
+  chosen.words = words;
+  for (const std::string& word : options.flights.words) {
+    if (fs::path(word).extension() == ".toml") chosen.models.push_back(word);
+  }
+  return read_flights(chosen);
+}
+
+/// A flight that is fitted and judges as well would make errors look too good without a word.
+void refuse_twice(const learning::LearningFlights& flights) {
+  std::set<std::string> seen;
+  for (const residuals::Inputs* inputs : {flights.fit, flights.select, flights.test}) {
+    if (inputs == nullptr) continue;
+    for (const residuals::FlightFiles& flight : inputs->found.flights) {
+      const std::string file = fs::weakly_canonical(flight.logs[0].second).string();
+      if (!seen.insert(file).second)
+        throw UsageError("one flight for two uses: " + flight.logs[0].second +
+                         " is named to fit, to select or to test more than once");
+    }
+  }
 }
 
 int run(Options options, const CommonOptions& common) {
@@ -183,18 +164,13 @@ int run(Options options, const CommonOptions& common) {
   trainer.jobs = common.jobs;
 
   const residuals::Inputs inputs = read_flights(options.flights);
-  residuals::Inputs test;
-  if (!options.test.empty()) {
-    FlightOptions chosen = options.flights;
-    chosen.words = options.test;
-    for (const std::string& word : options.flights.words) {
-      if (fs::path(word).extension() == ".toml") chosen.models.push_back(word);
-    }
-    test = read_flights(chosen);
-  }
+  const std::optional<residuals::Inputs> select = others(options, options.select);
+  const std::optional<residuals::Inputs> test = others(options, options.test);
+  const learning::LearningFlights flights = {&inputs, select ? &*select : nullptr, test ? &*test : nullptr};
+  refuse_twice(flights);
   Progress loading(common.quiet);
   const LearningData data =
-      learning::load_learning_data(inputs, options.test.empty() ? nullptr : &test, options.sizes, common.jobs,
+      learning::load_learning_data(flights, options.sizes, kSplits.at(options.split), common.jobs,
                                    [&](int done, int total) { loading.show(done, total, "flights"); });
   fs::create_directories(options.output);
   options.run.checkpoint = (fs::path(options.output) / "checkpoint.json").string();
@@ -211,29 +187,21 @@ int run(Options options, const CommonOptions& common) {
     return kInconclusive;
   }
 
-  const files::Network network = write_networks(data, outcome.run.theta, trainer.gamma, options.output);
-  write_models(inputs, data, options.output);
+  const files::Network network =
+      learning::write_network(data.layout, outcome.run.theta, trainer.gamma, options.output);
+  learning::write_models(inputs, data.layout, options.output);
   lipschitz::CertifyOptions certify_options;
   certify_options.jobs = common.jobs;
   certify_options.lower.seed = trainer.seed;
-  const lipschitz::Certification found = lipschitz::certify(network, certify_options);
-  files::write_file((fs::path(options.output) / "certificate.json").string(),
-                    files::to_text(lipschitz::certificate(network, found)), true);
-  for (const lipschitz::CertifiedLayer& layer : found.layers) {
-    if (layer.respects_gamma && *layer.respects_gamma != lipschitz::Verdict::kProved)
-      outcome.gamma = *layer.respects_gamma;
-  }
-  for (const lipschitz::CertifiedBound& bound : found.bounds) {
-    if (bound.function.rfind("set:", 0) == 0)
-      outcome.lipschitz.emplace_back(bound.function, bound.upper.value());
-  }
+  outcome.certified = learning::write_certificate(network, options.output, certify_options);
   outcome.test_gf = learning::rmse_gf(data, outcome.run.theta, Use::kTest, common.jobs);
   outcome.nothing_gf = learning::rmse_of_nothing_gf(data, Use::kTest);
   outcome.compositions = scores_by_composition(data, outcome.run.theta, common.jobs);
 
   std::vector<std::string> files = inputs.files();
-  if (!options.test.empty()) {
-    for (const std::string& file : test.files()) {
+  for (const residuals::Inputs* more : {flights.select, flights.test}) {
+    if (more == nullptr) continue;
+    for (const std::string& file : more->files()) {
       if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
     }
   }
@@ -258,7 +226,8 @@ Command train_command() {
       "fit, select "
       "and test;\nthe epoch with the least error on the selecting flights is kept, and projected so that "
       "gamma holds "
-      "in exact\narithmetic. An interrupted run goes on with --resume.\n\n"
+      "in exact\narithmetic. An interrupted run goes on with --resume. Forces along x and y and torques are "
+      "not learned: not done.\n\n"
       "Example: swarmcert train flights/ --epochs 20 -o trained",
       [](CLI::App& app) {
         const auto options = std::make_shared<Options>();
@@ -268,6 +237,13 @@ Command train_command() {
         app.add_option("-o,--output", options->output, "Folder for networks, certificate and models")
             ->required();
         app.add_option("--test", options->test, "Flights that only test; without it every fifth flight does");
+        app.add_option("--select", options->select,
+                       "Flights that only decide when training ends; without it every fifth flight does");
+        app.add_option("--split", options->split,
+                       "How FLIGHTS are held back where --select or --test name none: whole flights, or "
+                       "blocks of 2 s of each (auto: blocks where there are too few flights)")
+            ->check(CLI::IsMember({"auto", "flights", "blocks"}))
+            ->capture_default_str();
         app.add_option("--gamma", trainer.gamma.value, "Limit of the spectral norms")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();

@@ -360,7 +360,10 @@ Budget error_budget(const Inputs& given_fit, const Inputs& given_test, const std
       budget.fitted[vehicle] = stages[4].vehicle_models.at(vehicle);
   }
   const char* const kNames[] = {"lag", "offset", "ground", "jet", "rest"};
-  for (std::size_t k = 0; k < stages.size(); ++k) budget.rows.push_back(judged(kNames[k], stages[k], jobs));
+  for (std::size_t k = 0; k < stages.size(); ++k) {
+    budget.rows.push_back(judged(kNames[k], stages[k], jobs));
+    budget.rows.back().models = stages[k].vehicle_models;
+  }
   if (!network.empty()) {
     Inputs learned = test;
     learned.rules.published_signals = true;

@@ -17,6 +17,7 @@ namespace swarmcert::identification {
 struct BudgetRow {
   std::string name;  ///< "nominal", "lag", "offset", "ground", "jet", "rest"
   std::map<std::string, residuals::ErrorStatistics> of;  ///< by composition, "kind <name>", and "all"
+  std::map<std::string, stability::Model> models;        ///< by vehicle; empty for "nominal" and "network"
 };
 
 struct Budget {

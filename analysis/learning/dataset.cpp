@@ -1,6 +1,7 @@
 #include "analysis/learning/dataset.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <mutex>
 #include <set>
@@ -17,11 +18,13 @@ using Eigen::Index;
 using residuals::Track;
 
 constexpr int kNeighbourInputs = 6;
+constexpr double kBlock_s = 2, kPurge_s = 0.15;
 
 /// Samples of one track before the kinds of all flights are known.
 struct RawTrack {
   TrackSamples about;
   std::string kind;
+  std::vector<double> time_s;
   std::vector<float> force_gf;
   std::vector<std::array<float, 4>> own;  ///< -z, -v
   std::vector<std::size_t> first = {0};
@@ -34,11 +37,12 @@ RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs) {
   raw.about = {track.flight, track.scenario, track.vehicle, "", Use::kFit, 0, 0};
   raw.kind = track.kind;
   const std::vector<Eigen::Vector3d> residual =
-      residuals::force_residual(*inputs.model_of(track.kind), inputs.kinds, inputs.rules, track);
+      residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
   std::multiset<std::string> kinds;
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     if (track.cut[i] != residuals::Cut::kNone) continue;
     const stability::Instant& now = track.instants[i];
+    raw.time_s.push_back(now.time_s);
     raw.force_gf.push_back(static_cast<float>(residual[i].z() / stability::kGramForce_N));
     const Eigen::Vector3f v = now.v_W_m_s.cast<float>();
     raw.own.push_back({static_cast<float>(-now.p_W_m.z()), -v.x(), -v.y(), -v.z()});
@@ -77,14 +81,22 @@ std::vector<std::vector<RawTrack>> load(const residuals::Inputs& inputs, int job
   return flights;
 }
 
-Use use_of(std::size_t flight, std::size_t flights, bool has_test) {
-  if (has_test)
-    return flight % 5 == 4 || (flights < 5 && flight + 1 == flights && flights > 1) ? Use::kSelect
-                                                                                    : Use::kFit;
-  if (flights < 5)
-    return flight + 1 == flights ? Use::kTest : flight + 2 == flights ? Use::kSelect : Use::kFit;
-  return flight % 5 == 2 ? Use::kSelect : flight % 5 == 4 ? Use::kTest : Use::kFit;
-}
+/// Whether the flights to fit must select and test as well.
+struct HeldBack {
+  bool select, test;
+
+  Use of_five(std::size_t index) const {
+    if (select && index % 5 == 2) return Use::kSelect;
+    if (test && index % 5 == 4) return Use::kTest;
+    return Use::kFit;
+  }
+  Use of_flight(std::size_t flight, std::size_t flights) const {
+    if (flights >= 5) return of_five(flight);
+    if (test && flight + 1 == flights && flights > 1) return Use::kTest;
+    if (select && flight + (test ? 2 : 1) == flights && flights > 1) return Use::kSelect;
+    return Use::kFit;
+  }
+};
 
 /// Which networks there are: a phi per kind that was ever a neighbour, a rho per kind whose force is known.
 training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vector<std::string>& kinds,
@@ -127,7 +139,7 @@ void balance(LearningData& data) {
 
 void append(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds, std::size_t from,
             std::size_t to, Use use) {
-  if (from >= to) return;
+  if (from >= to) return;  // a block without records
   TrackSamples about = raw.about;
   about.use = use;
   about.begin = data.samples.samples();
@@ -145,6 +157,22 @@ void append(LearningData& data, const RawTrack& raw, const std::vector<std::stri
   data.tracks.push_back(std::move(about));
 }
 
+/// All of a track, its blocks of 2 s in turn fitted, selecting and testing.
+void append_blocks(LearningData& data, const RawTrack& raw, const std::vector<std::string>& kinds,
+                   HeldBack held_back) {
+  const std::size_t count = raw.time_s.size();
+  for (std::size_t from = 0; from < count;) {
+    const double block = std::floor(raw.time_s[from] / kBlock_s);
+    std::size_t to = from;
+    while (to < count && std::floor(raw.time_s[to] / kBlock_s) == block) ++to;
+    std::size_t first = from, last = to;
+    while (first < last && raw.time_s[first] < block * kBlock_s + kPurge_s) ++first;
+    while (last > first && raw.time_s[last - 1] > (block + 1) * kBlock_s - kPurge_s) --last;
+    append(data, raw, kinds, first, last, held_back.of_five(static_cast<std::size_t>(std::max(block, 0.0))));
+    from = to;
+  }
+}
+
 }  // namespace
 
 const char* name(Use use) { return use == Use::kFit ? "fit" : use == Use::kSelect ? "select" : "test"; }
@@ -158,13 +186,15 @@ std::vector<Index> LearningData::indices(Use use) const {
   return result;
 }
 
-LearningData load_learning_data(const residuals::Inputs& inputs, const residuals::Inputs* test,
-                                const NetworkSizes& sizes, int jobs, const Progress& progress) {
+LearningData load_learning_data(const LearningFlights& named, const NetworkSizes& sizes, SplitBy split,
+                                int jobs, const Progress& progress) {
   LearningData data;
+  const residuals::Inputs& inputs = *named.fit;
   std::mutex mutex;
-  int done = 0;
-  const int total =
-      static_cast<int>(inputs.found.flights.size() + (test != nullptr ? test->found.flights.size() : 0));
+  int done = 0, total = 0;
+  for (const residuals::Inputs* some : {named.fit, named.select, named.test}) {
+    if (some != nullptr) total += static_cast<int>(some->found.flights.size());
+  }
   const auto flight_done = [&] {
     const std::lock_guard<std::mutex> lock(mutex);
     progress(++done, total);
@@ -173,8 +203,6 @@ LearningData load_learning_data(const residuals::Inputs& inputs, const residuals
   flights.erase(
       std::remove_if(flights.begin(), flights.end(), [](const auto& tracks) { return tracks.empty(); }),
       flights.end());
-  std::vector<std::vector<RawTrack>> test_flights;
-  if (test != nullptr) test_flights = load(*test, jobs, flight_done, data.problems);
 
   std::vector<RawTrack> fitted;
   for (const auto& tracks : flights) fitted.insert(fitted.end(), tracks.begin(), tracks.end());
@@ -189,34 +217,37 @@ LearningData load_learning_data(const residuals::Inputs& inputs, const residuals
     refuse("no vehicle ever has a neighbour", "name flights of two or more vehicles");
   data.layout = layout_of(fitted, inputs.kinds.names, sizes);
 
-  data.split_by_time = flights.size() + test_flights.size() < 3;
+  const HeldBack held_back = {named.select == nullptr, named.test == nullptr};
+  const std::size_t needed = 1 + (held_back.select ? 1 : 0) + (held_back.test ? 1 : 0);
+  data.split_by_blocks =
+      split == SplitBy::kBlocks || (split == SplitBy::kAuto && flights.size() < needed && needed > 1);
   for (std::size_t f = 0; f < flights.size(); ++f) {
     for (const RawTrack& track : flights[f]) {
-      const std::size_t count = track.force_gf.size();
-      if (!data.split_by_time) {
-        append(data, track, inputs.kinds.names, 0, count, use_of(f, flights.size(), test != nullptr));
-        continue;
-      }
-      const std::size_t fit = count * 70 / 100, select = count * 85 / 100;
-      append(data, track, inputs.kinds.names, 0, fit, Use::kFit);
-      append(data, track, inputs.kinds.names, fit, select, Use::kSelect);
-      append(data, track, inputs.kinds.names, select, count, Use::kTest);
+      if (data.split_by_blocks)
+        append_blocks(data, track, inputs.kinds.names, held_back);
+      else
+        append(data, track, inputs.kinds.names, 0, track.force_gf.size(),
+               held_back.of_flight(f, flights.size()));
     }
   }
-  for (const auto& tracks : test_flights) {
-    for (const RawTrack& track : tracks) {
-      const bool known = data.layout.find("rho:" + track.kind) >= 0 &&
-                         std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), [&](int kind) {
-                           return data.layout.find("phi:" + test->kinds.names[kind]) >= 0;
-                         });
-      if (known) {
-        append(data, track, test->kinds.names, 0, track.force_gf.size(), Use::kTest);
-      } else {
-        data.problems.push_back(track.about.flight + " " + track.about.vehicle +
-                                ": a kind of vehicle that is not in the flights to learn from");
+  const auto append_all = [&](const residuals::Inputs* others, Use use) {
+    if (others == nullptr) return;
+    for (const auto& tracks : load(*others, jobs, flight_done, data.problems)) {
+      for (const RawTrack& track : tracks) {
+        const std::vector<std::string>& kinds = others->kinds.names;
+        const auto has_phi = [&](int kind) { return data.layout.find("phi:" + kinds[kind]) >= 0; };
+        if (data.layout.find("rho:" + track.kind) >= 0 &&
+            std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), has_phi)) {
+          append(data, track, kinds, 0, track.force_gf.size(), use);
+        } else {
+          data.problems.push_back(track.about.flight + " " + track.about.vehicle +
+                                  ": a kind of vehicle that is not in the flights to learn from");
+        }
       }
     }
-  }
+  };
+  append_all(named.select, Use::kSelect);
+  append_all(named.test, Use::kTest);
   balance(data);
   return data;
 }

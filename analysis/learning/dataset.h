@@ -10,7 +10,7 @@
 
 namespace swarmcert::learning {
 
-/// What a sample may be used for. Flights are split as wholes: neighbouring records of one flight are nearly the same.
+/// What a sample may be used for.
 enum class Use { kFit, kSelect, kTest };
 const char* name(Use use);
 
@@ -34,7 +34,7 @@ struct LearningData {
   training::Layout layout;  ///< parts "phi:<kind>", with "phi:ground", and "rho:<kind>"
   training::Dataset samples;
   std::vector<TrackSamples> tracks;
-  bool split_by_time = false;  ///< too few flights to split by flight: scores inside a flight are too good
+  bool split_by_blocks = false;  ///< blocks of flights that are fitted judge: scores are too good
   std::vector<std::string> problems;
 
   std::vector<Eigen::Index> indices(Use use) const;
@@ -43,17 +43,30 @@ struct LearningData {
 /// Shows progress: flights done of all.
 using Progress = std::function<void(int done, int total)>;
 
+/// How samples are held back from the fit.
+enum class SplitBy {
+  kAuto,     ///< by flights; by blocks where there are fewer than three
+  kFlights,  ///< as wholes: neighbouring records of one flight are nearly the same
+  kBlocks,   ///< blocks of 2 s of every flight, without the 0.15 s at both ends
+};
+
+/// Flights by what they are for. Pointers may be null but for `fit`.
+struct LearningFlights {
+  const residuals::Inputs* fit;
+  const residuals::Inputs* select = nullptr;  ///< decide when training ends
+  const residuals::Inputs* test = nullptr;    ///< decide nothing
+};
+
 /// Loads flights. The target of a sample is what the vehicle's model leaves of the vertical force, in gram-force;
 /// inputs are relative positions and velocities of the neighbours in the world frame (paper, section V-B), and own
 /// (-z, -v) for the ground. Among the samples to
 /// fit, every composition of kinds gets the same total weight; the others have weight 1.
 ///
-/// Split: where `test` has flights, those are the test flights and every fifth of `inputs` selects; else of every five
-/// flights, in order of names and runs, one selects and one tests; of three or four flights the last two do; one or two
-/// are split by time, 70 : 15 : 15.
-/// @param test may be null.
+/// What `select` and `test` do not name is held back from `fit`: of every five flights, in order of names and runs, the
+/// third selects and the fifth tests; of three or four flights the last two do. By blocks: of every five blocks of a
+/// flight, likewise.
 /// @throws files::InputError if no record of a vehicle with a model is left, or none has a neighbour.
-LearningData load_learning_data(const residuals::Inputs& inputs, const residuals::Inputs* test,
-                                const NetworkSizes& sizes, int jobs, const Progress& progress);
+LearningData load_learning_data(const LearningFlights& flights, const NetworkSizes& sizes, SplitBy split,
+                                int jobs, const Progress& progress);
 
 }  // namespace swarmcert::learning

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
+
 #include "analysis/run.h"
 #include "nn/files/json.h"
 
@@ -67,6 +69,28 @@ TEST_F(Train, SameSeedGivesTheSameFilesWhateverTheJobs) {
     EXPECT_EQ(read_text(folder_ / ("one/" + file)), read_text(folder_ / ("two/" + file))) << file;
     EXPECT_NE(read_text(folder_ / ("one/" + file)), read_text(folder_ / ("other/" + file))) << file;
   }
+}
+
+TEST_F(Train, HoldsBackNamedFlightsOrBlocksAndRefusesAFlightForTwoUses) {
+  const auto learn = [&](const std::string& words) {
+    return execute("swarmcert train nominal.toml " + words +
+                   " --phi 6 --rho 6 --features 4 --epochs 1 -o out --force --json result.json");
+  };
+  const auto samples = [&](const std::string& split) {
+    const Json result = files::read_json(folder_ / "result.json", "swarmcert/train/1");
+    EXPECT_EQ(result["split"], split);
+    return std::array<int, 3>{result["samples"]["fit"].get<int>(), result["samples"]["select"].get<int>(),
+                              result["samples"]["test"].get<int>()};
+  };
+  ASSERT_EQ(learn("flights/1 --select flights/2 --test flights/3").exit_code, 0);
+  for (const int count : samples("flights")) EXPECT_GT(count, 4000);
+  ASSERT_EQ(learn("flights/1 --split blocks").exit_code, 0);
+  const auto [fit, select, test] = samples("blocks");
+  EXPECT_GT(select, 500);
+  EXPECT_GT(test, 500);
+  EXPECT_GT(fit, 2 * select);
+  EXPECT_LT(fit + select + test, 5200) << "the ends of blocks are cut";
+  EXPECT_EQ(learn("flights/1 --select flights/2 --test flights/2").exit_code, 2);
 }
 
 TEST_F(Train, RefusesAFolderThatIsNotEmptyAndFlightsWithoutNeighbours) {

@@ -1,0 +1,85 @@
+#include "analysis/learning/trained_network.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "nn/files/file_io.h"
+
+namespace swarmcert::learning {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string file_of(const std::string& part) {
+  std::string name = part;
+  name[name.find(':')] = '_';
+  return name + ".safetensors";
+}
+
+std::string network_toml(const training::Layout& layout, const files::GammaStatement& gamma) {
+  std::string text = fmt::format(
+      "schema = \"swarmcert/network/1\"\noutput = {{ quantity = \"force_z\", unit = \"gf\" }}\n"
+      "gamma = {{ value = {}, scope = \"{}\", mode = \"{}\" }}\n"
+      "[input]\norder = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]\n",
+      gamma.value, gamma.scope == files::GammaStatement::Scope::kLayer ? "layer" : "network",
+      gamma.mode == files::GammaStatement::Mode::kClip ? "clip" : "equal");
+  for (const training::Part& part : layout.parts()) {
+    const std::size_t colon = part.name.find(':');
+    text += fmt::format("[{}.{}]\nweights = \"{}\"\n", part.name.substr(0, colon),
+                        part.name.substr(colon + 1), file_of(part.name));
+  }
+  return text;
+}
+
+}  // namespace
+
+files::Network write_network(const training::Layout& layout, const training::Vector& theta,
+                             const files::GammaStatement& gamma, const std::string& folder) {
+  for (std::size_t p = 0; p < layout.parts().size(); ++p) {
+    files::save_safetensors(layout.stored(theta, static_cast<int>(p)),
+                            (fs::path(folder) / file_of(layout.parts()[p].name)).string(), true);
+  }
+  const std::string path = (fs::path(folder) / "network.toml").string();
+  files::write_file(path, network_toml(layout, gamma), true);
+  return files::load_network({path, "", "", ""});
+}
+
+void write_models(const residuals::Inputs& inputs, const training::Layout& layout,
+                  const std::string& folder) {
+  for (stability::Model model : inputs.models) {
+    if (layout.find("rho:" + model.kind) < 0) continue;
+    stability::EffectSpec effect;
+    effect.name = "deep_set";
+    effect.network = "network.toml";
+    model.effects.push_back(std::move(effect));
+    files::write_file((fs::path(folder) / ("model-" + model.kind + ".toml")).string(),
+                      to_toml(model, {"With the network in this folder."}), true);
+  }
+}
+
+double Certified::largest() const {
+  double result = 0;
+  for (const auto& [function, upper] : set_bounds) result = std::max(result, upper);
+  return result;
+}
+
+Certified write_certificate(const files::Network& network, const std::string& folder,
+                            const lipschitz::CertifyOptions& options) {
+  Certified certified;
+  certified.found = lipschitz::certify(network, options);
+  files::write_file((fs::path(folder) / "certificate.json").string(),
+                    files::to_text(lipschitz::certificate(network, certified.found)), true);
+  for (const lipschitz::CertifiedLayer& layer : certified.found.layers) {
+    if (layer.respects_gamma && *layer.respects_gamma != lipschitz::Verdict::kProved)
+      certified.gamma = *layer.respects_gamma;
+  }
+  for (const lipschitz::CertifiedBound& bound : certified.found.bounds) {
+    if (bound.function.rfind("set:", 0) == 0)
+      certified.set_bounds.emplace_back(bound.function, bound.upper.value());
+  }
+  return certified;
+}
+
+}  // namespace swarmcert::learning

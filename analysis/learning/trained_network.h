@@ -1,0 +1,37 @@
+/// @file What a training run leaves behind: weights, network.toml, certificate, models that fly it.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/learning/dataset.h"
+#include "lipschitz/certify.h"
+
+namespace swarmcert::learning {
+
+/// Writes phi_<kind>.safetensors, rho_<kind>.safetensors and network.toml into `folder`, which exists; files of these
+/// names are replaced.
+/// @returns the network as read back.
+files::Network write_network(const training::Layout& layout, const training::Vector& theta,
+                             const files::GammaStatement& gamma, const std::string& folder);
+
+/// Writes model-<kind>.toml for every kind with a rho: the model of `inputs` with the network in `folder` as one more
+/// effect.
+void write_models(const residuals::Inputs& inputs, const training::Layout& layout, const std::string& folder);
+
+/// What is proved of a trained network.
+struct Certified {
+  lipschitz::Certification found;
+  std::vector<std::pair<std::string, double>>
+      set_bounds;  ///< "set:<phi>:<rho>": one neighbour moves; output unit/input
+  lipschitz::Verdict gamma = lipschitz::Verdict::kProved;  ///< kProved if every layer is
+
+  double largest() const;  ///< of the set bounds; 0 without any
+};
+
+/// Certifies what write_network() returned, and writes certificate.json beside it.
+Certified write_certificate(const files::Network& network, const std::string& folder,
+                            const lipschitz::CertifyOptions& options);
+
+}  // namespace swarmcert::learning

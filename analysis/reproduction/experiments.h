@@ -1,0 +1,35 @@
+/// @file The experiments behind the paper's table and figures, and those beyond it.
+#pragma once
+
+#include "analysis/reproduction/finding.h"
+#include "analysis/reproduction/setting.h"
+
+namespace swarmcert::reproduction {
+
+/// Section III-C: flights of two vehicles without a network, with it, then of more; how near they come, and whether
+/// labels depend on the compensation.
+Finding curriculum(const Setting& setting);
+/// Section V-B: error on flights not seen, over minutes of flight learned from.
+Finding minutes_of_data(const Setting& setting);
+/// tab:nnperf, with the errors along x and y.
+Finding performance(const Setting& setting);
+Finding figure_intro(const Setting& setting);
+Finding figure_swaps(const Setting& setting);
+Finding figure_heatmap(const Setting& setting);
+Finding figure_validation(const Setting& setting);
+/// f(a, b) - f(a) - f(b) of the truth, of a network and of recorded flights of three vehicles.
+Finding superposition(const Setting& setting);
+/// Test error against certified Lipschitz bound over gamma, and the tracking error predicted from it.
+Finding lipschitz_tradeoff(const Setting& setting);
+/// Training on the published flights beside the published networks; then physics first.
+Finding real_flights(const Setting& setting);
+
+struct Experiment {
+  std::string name, summary;
+  Finding (*run)(const Setting& setting);
+};
+
+/// All of them, in the order of --help.
+const std::vector<Experiment>& experiments();
+
+}  // namespace swarmcert::reproduction

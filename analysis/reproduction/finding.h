@@ -1,0 +1,31 @@
+/// @file What an experiment found: numbers for machines, tables and figures for people.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nn/files/json.h"
+
+namespace swarmcert::reproduction {
+
+struct Table {
+  std::string title;
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;
+};
+
+struct Figure {
+  std::string name, data;  ///< NAME.dat
+  std::string script;      ///< gnuplot, reads 'NAME.dat'
+  std::string caption;
+};
+
+struct Finding {
+  bool complete = true;  ///< false: other shards have not run yet
+  files::Json json;      ///< fields of the result, without its head
+  std::vector<std::string> notes;
+  std::vector<Table> tables;
+  std::vector<Figure> figures;
+};
+
+}  // namespace swarmcert::reproduction

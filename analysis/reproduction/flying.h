@@ -1,0 +1,68 @@
+/// @file Flights of a truth, with what happened at every position period.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/reproduction/setting.h"
+#include "nn/files/network.h"
+#include "stability/deep_set_force.h"
+#include "stability/effects/effect.h"
+#include "stability/flight_log.h"
+
+namespace swarmcert::reproduction {
+
+struct Plan {
+  std::string task;
+  int vehicles = 2;
+  double duration_s = 0;  ///< 0: the task's own
+  std::uint64_t seed = 0;
+};
+
+/// One vehicle at one position period, in the world.
+struct Moment {
+  float time_s = 0;
+  Eigen::Vector3f p_m, v_m_s, p_d_m;
+  float interaction_gf = 0;  ///< f_a,z of the truth that comes from neighbours
+  float prediction_gf = 0;   ///< f_hat_a,z as flown
+};
+
+struct Flown {
+  std::vector<std::vector<Moment>> vehicles;
+  std::vector<std::vector<stability::LogRecord>> logs;  ///< empty unless wanted
+  double saturated_share = 0;                           ///< of control periods, of the worst vehicle
+  bool diverged = false;                                ///< lost, more than 100 m away: the flight ends there
+};
+
+/// @param network feeds its prediction forward; nullptr: none.
+Flown fly(const Setting& setting, const Truth& truth, const Plan& plan, const files::Network* network,
+          bool keep_logs);
+
+/// Largest error along `axis` of any vehicle, m; infinite if the flight diverged.
+double largest_error_m(const Flown& flown, int axis);
+
+/// Distances from each vehicle to the nearest other one at each moment, m; ascending.
+std::vector<float> nearest_distances_m(const Flown& flown);
+
+/// Relative position and velocity of one neighbour, in the world.
+using Relative = std::array<double, 6>;
+
+/// What neighbours do to a vehicle along z, in gram-force, as a function of their relative states alone.
+class Interaction {
+ public:
+  explicit Interaction(const Truth& truth);
+  explicit Interaction(const files::Network& network);
+  Interaction(Interaction&&) noexcept;
+  ~Interaction();
+
+  double force_z_gf(const std::vector<Relative>& neighbours);
+
+ private:
+  std::vector<std::unique_ptr<stability::AppliedEffect>> effects_;
+  std::unique_ptr<stability::DeepSetForce> network_;
+  double mass_kg_ = 0.034;
+};
+
+}  // namespace swarmcert::reproduction

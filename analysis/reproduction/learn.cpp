@@ -1,0 +1,100 @@
+#include "analysis/reproduction/learn.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "analysis/learning/trained_network.h"
+#include "nn/files/file_io.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::reproduction {
+namespace {
+
+namespace fs = std::filesystem;
+using learning::Use;
+
+constexpr const char* kSchema = "swarmcert/learned/1";
+
+std::string text_of(const LearnOptions& options) {
+  std::string text =
+      fmt::format("{} {} {} {} {} {} {} {} {} {}", options.gamma.value, static_cast<int>(options.gamma.scope),
+                  static_cast<int>(options.gamma.mode), options.rate, options.batch, options.steps,
+                  options.epochs, options.seed, options.sizes.features, options.sizes.ground);
+  for (const int size : options.sizes.phi) text += fmt::format(" phi {}", size);
+  for (const int size : options.sizes.rho) text += fmt::format(" rho {}", size);
+  return text;
+}
+
+Learned read_back(const files::Json& file, const std::string& folder) {
+  Learned learned;
+  learned.folder = folder;
+  learned.network = files::load_network({(fs::path(folder) / "network.toml").string(), "", "", ""});
+  for (const files::Json& bound : file.at("set_bounds"))
+    learned.set_bounds.emplace_back(bound.at(0).get<std::string>(), bound.at(1).get<double>());
+  learned.bound = file.at("bound").get<double>();
+  learned.keeps_gamma = file.at("keeps_gamma").get<bool>();
+  learned.test_gf = file.at("test_gf").get<double>();
+  learned.nothing_gf = file.at("nothing_gf").get<double>();
+  learned.samples = file.at("samples").get<int>();
+  learned.epochs = file.at("epochs").get<int>();
+  learned.best_epoch = file.at("best_epoch").get<int>();
+  return learned;
+}
+
+}  // namespace
+
+Learned learn(const Setting& setting, const LearnOptions& options, const std::string& folder,
+              const std::string& key, const std::function<learning::LearningData()>& load) {
+  const std::string done = (fs::path(folder) / "learned.json").string();
+  const std::string whole_key = files::sha256(key + "|" + text_of(options));
+  if (fs::exists(done)) {
+    const files::Json file = files::read_json(done, kSchema);
+    if (file.at("key") == whole_key) return read_back(file, folder);
+  }
+  fs::create_directories(folder);
+  const learning::LearningData data = load();
+  learning::RunOptions run;
+  run.trainer.gamma = options.gamma;
+  run.trainer.learning_rate = options.rate;
+  run.trainer.batch = options.batch;
+  run.trainer.seed = options.seed;
+  run.trainer.jobs = setting.jobs;
+  const auto samples = static_cast<int>(data.indices(Use::kFit).size());
+  const int per_epoch = (samples + options.batch - 1) / options.batch;
+  run.epochs = options.steps > 0 ? std::max(1, (options.steps + per_epoch / 2) / per_epoch) : options.epochs;
+  run.patience = run.epochs;
+  run.checkpoint = (fs::path(folder) / ("checkpoint-" + whole_key.substr(0, 12) + ".json")).string();
+  run.resumes = fs::exists(run.checkpoint);
+  run.progress = [&](int epochs, int total, double select_gf) {
+    setting.progress(epochs, total, fmt::format("epochs, {:.3f} gf", select_gf));
+  };
+  const learning::Run trained = learning::run_training(data, run);
+  const files::Network network = learning::write_network(data.layout, trained.theta, options.gamma, folder);
+  lipschitz::CertifyOptions certify;
+  certify.jobs = setting.jobs;
+  certify.lower.rounds = 0;                                              // only upper bounds are shown
+  if (!setting.full) certify.method = lipschitz::UpperMethod::kProduct;  // looser, but at once
+  const learning::Certified certified = learning::write_certificate(network, folder, certify);
+  files::Json bounds = files::Json::array(), epochs = files::Json::array();
+  for (const auto& [function, upper] : certified.set_bounds) bounds.push_back({function, upper});
+  for (const learning::Epoch& epoch : trained.epochs)
+    epochs.push_back({epoch.fit_rmse_gf, epoch.select_rmse_gf});
+  const files::Json file = {{"schema", kSchema},
+                            {"key", whole_key},
+                            {"set_bounds", std::move(bounds)},
+                            {"bound", certified.largest()},
+                            {"keeps_gamma", certified.gamma == lipschitz::Verdict::kProved},
+                            {"test_gf", learning::rmse_gf(data, trained.theta, Use::kTest, setting.jobs)},
+                            {"nothing_gf", learning::rmse_of_nothing_gf(data, Use::kTest)},
+                            {"samples", samples},
+                            {"epochs", trained.epochs.size()},
+                            {"best_epoch", trained.best_epoch + 1},
+                            {"fit_and_select_gf", std::move(epochs)}};
+  files::write_file(done, files::to_text(file), true);
+  fs::remove(run.checkpoint);
+  return read_back(file, folder);
+}
+
+}  // namespace swarmcert::reproduction

@@ -1,0 +1,146 @@
+#include "analysis/reproduction/stages.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "nn/files/file_io.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::reproduction {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSchema = "swarmcert/flown/1";
+
+std::string weights_of(const files::Network& network) {
+  std::string text;
+  for (const auto& [kind, weights] : network.phi) text += weights.sha256;
+  for (const auto& [kind, weights] : network.rho) text += weights.sha256;
+  return text;
+}
+
+}  // namespace
+
+Flown fly_logged(const Setting& setting, const Truth& truth, const Plan& plan, const files::Network* network,
+                 const std::string& folder) {
+  Flown flown = fly(setting, truth, plan, network, true);
+  fs::create_directories(folder);
+  for (std::size_t i = 0; i < flown.logs.size(); ++i) {
+    files::write_file((fs::path(folder) / fmt::format("cf{}_00", i + 1)).string(),
+                      stability::to_usd_log(flown.logs[i]), true);
+  }
+  return flown;
+}
+
+residuals::Inputs read_simulated(const Truth& truth, const std::vector<std::string>& folders) {
+  const fs::path model = fs::path(folders.front()).parent_path() / "nominal.toml";
+  files::write_file(model.string(), stability::to_toml(nominal(truth)), true);
+  residuals::InputArguments arguments;
+  arguments.models = {model.string()};
+  arguments.flights = folders;
+  return residuals::read_inputs(arguments);
+}
+
+Stages::Stages(const Setting& setting, const Truth& truth, int training_seed)
+    : setting_(setting),
+      truth_(truth),
+      folder_((fs::path(setting.work) /
+               fmt::format("{}{}-{}", truth.name, setting.updraft ? "-updraft" : "", training_seed))
+                  .string()),
+      training_seed_(training_seed) {}
+
+std::uint64_t Stages::seed(const std::string& use, std::uint64_t number) const {
+  return seed_of(setting_.seed, fmt::format("{} {} {}", truth_.name, training_seed_, use), number);
+}
+
+LearnOptions Stages::learn_options() const {
+  LearnOptions options;
+  options.sizes.ground = false;  // the paper's networks see neighbours only
+  options.gamma.value = 3;       // per layer, as the published code clips
+  options.steps = scale_of(setting_).steps;
+  options.seed = seed("weights");
+  return options;
+}
+
+std::optional<files::Network> Stages::flown_network(int stage) {
+  if (stage == 0) return std::nullopt;
+  return learned(stage - 1).network;
+}
+
+std::string Stages::key(int stage) {
+  const std::optional<files::Network> network = flown_network(stage);
+  return files::sha256(
+      stability::to_toml(truth_.model) + files::read_file(setting_.gains) +
+      fmt::format("{} {} {} {} ", truth_.battery_V, stage, scale_of(setting_).task_s, seed("flights")) +
+      (network ? weights_of(*network) : ""));
+}
+
+StageFlights Stages::flights(int stage) {
+  const std::string folder = (fs::path(folder_) / fmt::format("stage{}", stage)).string();
+  const std::string done = (fs::path(folder) / "flown.json").string();
+  const std::string own_key = key(stage);
+  const auto read_back = [&](const files::Json& file) {
+    return StageFlights{folder, file.at("least_distance_m").get<double>(),
+                        file.at("percentile_distance_m").get<double>()};
+  };
+  if (fs::exists(done)) {
+    const files::Json file = files::read_json(done, kSchema);
+    if (file.at("key") == own_key) return read_back(file);
+  }
+  const std::optional<files::Network> network = flown_network(stage);
+  const double task_s = scale_of(setting_).task_s;
+  const int vehicles = kStages[stage].vehicles;
+  // Stages 0 and 1 fly the same set points: what differs is the compensation.
+  const std::uint64_t number = static_cast<std::uint64_t>(vehicles);
+  const std::vector<std::pair<std::string, Plan>> plans = {
+      {"fit/random-walk", {"random-walk", vehicles, task_s, seed("fit", number)}},
+      {"fit/swap", {"swap", vehicles, task_s, seed("fit swap", number)}},
+      {"select/random-walk", {"random-walk", vehicles, task_s / 3, seed("select", number)}},
+      {"test/random-walk", {"random-walk", vehicles, task_s / 2, seed("test", number)}},
+      {"test/swap", {"swap", vehicles, 13.5, seed("test swap", number)}}};
+  std::vector<float> distances;
+  for (std::size_t k = 0; k < plans.size(); ++k) {
+    setting_.progress(static_cast<int>(k), static_cast<int>(plans.size()),
+                      fmt::format("flights of {} vehicles", vehicles));
+    const Flown flown = fly_logged(setting_, truth_, plans[k].second, network ? &*network : nullptr,
+                                   (fs::path(folder) / plans[k].first).string());
+    if (plans[k].first != "fit/random-walk") continue;
+    distances = nearest_distances_m(flown);
+  }
+  const files::Json file = {
+      {"schema", kSchema},
+      {"key", own_key},
+      {"least_distance_m", static_cast<double>(distances.front())},
+      {"percentile_distance_m", static_cast<double>(distances[distances.size() / 100])}};
+  files::write_file(done, files::to_text(file), true);
+  return read_back(file);
+}
+
+residuals::Inputs Stages::inputs(const std::vector<int>& stages, const std::string& use) {
+  std::vector<std::string> folders;
+  for (const int stage : stages) folders.push_back((fs::path(flights(stage).folder) / use).string());
+  return read_simulated(truth_, folders);
+}
+
+Learned Stages::learned(int stage) {
+  std::vector<int> from = {stage};
+  if (stage == 1) from = {0, 1};
+  std::string origin;
+  for (const int some : from) {
+    flights(some);
+    origin += key(some);
+  }
+  const LearnOptions options = learn_options();
+  const std::string folder = (fs::path(folder_) / fmt::format("stage{}", stage) / "network").string();
+  return learn(setting_, options, folder, origin, [&] {
+    const residuals::Inputs fit = inputs(from, "fit"), select = inputs(from, "select"),
+                            test = inputs({stage}, "test");
+    return learning::load_learning_data({&fit, &select, &test}, options.sizes, learning::SplitBy::kFlights,
+                                        setting_.jobs, [](int, int) {});
+  });
+}
+
+}  // namespace swarmcert::reproduction

@@ -1,0 +1,188 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "analysis/reproduction/experiments.h"
+#include "analysis/reproduction/residual_blocks.h"
+#include "analysis/reproduction/stages.h"
+#include "analysis/residuals/force_residual.h"
+
+namespace swarmcert::reproduction {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Both vehicles above push by at least this much, each alone, as far as two-vehicle flights know.
+constexpr double kActing_gf = 1;
+constexpr double kBlock_s = 2;
+
+/// Sums over one block of one vehicle, by name of what is summed.
+using Sums = std::map<std::string, BlockMean>;
+using Blocks = std::map<std::string, Sums>;
+
+void add(Blocks& blocks, const std::string& block, const std::string& name, double value) {
+  BlockMean& mean = blocks[block][name];
+  mean.sum += value;
+  mean.count += 1;
+}
+
+Estimate estimate(const Blocks& blocks, const std::string& name) {
+  std::vector<BlockMean> means;
+  for (const auto& [block, sums] : blocks) {
+    const auto found = sums.find(name);
+    if (found != sums.end()) means.push_back(found->second);
+  }
+  return mean_of(means);
+}
+
+struct Defect {
+  double together_gf = 0, apart_gf = 0;
+
+  Defect(Interaction& f, const Relative& a, const Relative& b) {
+    const double nobody = f.force_z_gf({});
+    together_gf = f.force_z_gf({a, b}) - nobody;
+    apart_gf = f.force_z_gf({a}) + f.force_z_gf({b}) - 2 * nobody;
+  }
+};
+
+void add_row(const std::string& who, const Blocks& blocks, const std::string& name, std::size_t records,
+             Table& table, Finding& finding) {
+  const Estimate together = estimate(blocks, name + " together"), apart = estimate(blocks, name + " apart"),
+                 defect = estimate(blocks, name + " defect");
+  table.rows.push_back({who, std::to_string(records), fmt::format("{:.2f}", together.value_gf),
+                        fmt::format("{:.2f}", apart.value_gf), fmt::format("{:+.2f}", defect.value_gf),
+                        fmt::format("{:+.2f} .. {:+.2f}", defect.interval.lower, defect.interval.upper)});
+  finding.json["rows"].push_back({{"function", who},
+                                  {"records", records},
+                                  {"f_ab_gf", together.value_gf},
+                                  {"f_a_plus_f_b_gf", apart.value_gf},
+                                  {"defect_gf", defect.value_gf},
+                                  {"interval_gf", {defect.interval.lower, defect.interval.upper}}});
+}
+
+/// Simulated flights of three: the truth and the network at the states that were flown.
+void add_simulated(const Setting& setting, const Truth& truth, Table& table, Finding& finding) {
+  Stages stages(setting, truth, 0);
+  const Learned learned = stages.learned(stage_of(3));
+  Interaction actual(truth), predicted(learned.network);
+  Blocks blocks;
+  std::size_t records = 0;
+  for (int flight = 0; flight < (setting.full ? 4 : 1); ++flight) {
+    const Flown flown =
+        fly(setting, truth,
+            {"random-walk", 3, 60, stages.seed("superposition", static_cast<std::uint64_t>(flight))},
+            &learned.network, false);
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t k = 0; k < flown.vehicles[i].size(); ++k) {
+        Relative others[2];
+        for (std::size_t o = 0; o < 2; ++o) {
+          const Moment& own = flown.vehicles[i][k];
+          const Moment& other = flown.vehicles[(i + 1 + o) % 3][k];
+          for (int c = 0; c < 3; ++c) {
+            others[o][static_cast<std::size_t>(c)] = static_cast<double>(other.p_m[c] - own.p_m[c]);
+            others[o][static_cast<std::size_t>(c) + 3] = static_cast<double>(other.v_m_s[c] - own.v_m_s[c]);
+          }
+        }
+        if (std::max(actual.force_z_gf({others[0]}), actual.force_z_gf({others[1]})) > -kActing_gf) continue;
+        ++records;
+        const std::string block =
+            fmt::format("{} {} {}", flight, i, std::floor(static_cast<double>(k) / 100 / kBlock_s));
+        for (const auto& [name, function] : {std::pair{"truth", &actual}, std::pair{"network", &predicted}}) {
+          const Defect defect(*function, others[0], others[1]);
+          add(blocks, block, std::string(name) + " together", defect.together_gf);
+          add(blocks, block, std::string(name) + " apart", defect.apart_gf);
+          add(blocks, block, std::string(name) + " defect", defect.together_gf - defect.apart_gf);
+        }
+      }
+    }
+  }
+  if (records == 0) return;
+  add_row(fmt::format("truth \"{}\"", truth.name), blocks, "truth", records, table, finding);
+  add_row(fmt::format("network trained with 3 on it"), blocks, "network", records, table, finding);
+}
+
+/// Recorded flights of three small vehicles: the measured force, less what two-vehicle flights say of each neighbour.
+void add_recorded(const Setting& setting, const Truth& truth, Table& table, Finding& finding) {
+  if (!fs::exists(fs::path(setting.recorded) / "flights")) {
+    finding.notes.push_back("No recorded flights: " + setting.recorded + " is not there.");
+    return;
+  }
+  residuals::InputArguments arguments;
+  for (const char* const folder : {"development", "visible_test"}) {
+    for (const char* const scenario : {"21_randomwalk_sss", "21_swap_sss"})
+      arguments.flights.push_back((fs::path(setting.recorded) / "flights" / folder / scenario).string());
+  }
+  arguments.fleet = setting.fleet;
+  residuals::Inputs inputs = residuals::read_inputs(arguments);
+  for (stability::Model& model : inputs.models) model.effects = nominal(truth).effects;
+  Interaction pair(truth);
+  Blocks blocks;
+  std::size_t records = 0;
+  for (std::size_t f = 0; f < inputs.found.flights.size(); ++f) {
+    for (const residuals::Track& track : inputs.load(f, finding.notes)) {
+      if (track.position_only) continue;
+      const std::vector<Eigen::Vector3d> residual =
+          residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
+      // Trim: what is left where nobody is above.
+      BlockMean trim;
+      std::vector<std::pair<std::size_t, std::array<Relative, 2>>> acting;
+      for (std::size_t k = 0; k < residual.size(); ++k) {
+        const stability::Instant& now = track.instants[k];
+        if (track.cut[k] != residuals::Cut::kNone || now.num_neighbours != 2) continue;
+        std::array<Relative, 2> others;
+        double forces[2];
+        for (std::size_t o = 0; o < 2; ++o) {
+          const stability::Neighbour& other = now.neighbours[o];
+          for (int c = 0; c < 3; ++c) {
+            others[o][static_cast<std::size_t>(c)] = other.dp_W_m[c];
+            others[o][static_cast<std::size_t>(c) + 3] = other.dv_W_m_s[c];
+          }
+          forces[o] = pair.force_z_gf({others[o]});
+        }
+        if (std::max(forces[0], forces[1]) < -kActing_gf) acting.emplace_back(k, others);
+        if (std::min(forces[0], forces[1]) > -0.05) {
+          trim.sum += residual[k].z();
+          trim.count += 1;
+        }
+      }
+      if (trim.count < 200) continue;
+      for (const auto& [k, others] : acting) {
+        const double together = (residual[k].z() - trim.sum / trim.count) / stability::kGramForce_N;
+        const double apart = pair.force_z_gf({others[0]}) + pair.force_z_gf({others[1]});
+        const std::string block = fmt::format("{} {} {}", track.flight, track.vehicle,
+                                              std::floor(track.instants[k].time_s / kBlock_s));
+        add(blocks, block, "recorded together", together);
+        add(blocks, block, "recorded apart", apart);
+        add(blocks, block, "recorded defect", together - apart);
+        ++records;
+      }
+    }
+  }
+  if (records > 0) add_row("recorded flights of three", blocks, "recorded", records, table, finding);
+}
+
+}  // namespace
+
+Finding superposition(const Setting& setting) {
+  Finding finding;
+  finding.json["rows"] = files::Json::array();
+  Table table = {fmt::format("Two vehicles above that push by more than {:g} gf each", kActing_gf),
+                 {"function", "records", "f(a,b) [gf]", "f(a) + f(b) [gf]", "defect [gf]", "90 %"},
+                 {}};
+  const std::vector<Truth> all = truths(setting);
+  for (const Truth& truth : all) add_simulated(setting, truth, table, finding);
+  add_recorded(setting, all.front(), table, finding);
+  finding.tables.push_back(std::move(table));
+  finding.notes.push_back(
+      "The defect is f(a,b) - f(a) - f(b), all relative to f of no neighbour. For recorded flights f(a) and "
+      "f(b) are the "
+      "downwash fitted to flights of two vehicles, and f(a,b) is the measured force less the vehicle's mean "
+      "where nobody "
+      "is above. Intervals: 90 %, blocks of 2 s.");
+  return finding;
+}
+
+}  // namespace swarmcert::reproduction

@@ -1,0 +1,129 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "analysis/reproduction/experiments.h"
+#include "analysis/reproduction/stages.h"
+#include "stability/bounds/tracking_bounds.h"
+
+namespace swarmcert::reproduction {
+namespace {
+
+constexpr int kVehicles = 3;
+constexpr double kSwap_s = 4.5, kMove_s = 3;
+
+/// The force that the position loop is left with: the truth less the prediction behind the motors' lag.
+std::vector<double> remainder_N(const std::vector<Moment>& moments, double lag_s) {
+  std::vector<double> remainder;
+  double lagged = static_cast<double>(moments.front().prediction_gf);
+  for (std::size_t k = 0; k < moments.size(); ++k) {
+    const double step_s = k == 0 ? 0 : static_cast<double>(moments[k].time_s - moments[k - 1].time_s);
+    lagged += (1 - std::exp(-step_s / lag_s)) * (static_cast<double>(moments[k].prediction_gf) - lagged);
+    remainder.push_back((static_cast<double>(moments[k].interaction_gf) - lagged) * stability::kGramForce_N);
+  }
+  return remainder;
+}
+
+/// What was seen of the remainder of one vehicle in a flight of swaps.
+stability::Disturbance measured(const std::vector<Moment>& moments, double lag_s) {
+  const std::vector<double> f = remainder_N(moments, lag_s);
+  stability::Disturbance seen;
+  seen.amplitude_N = seen.rate_N_s = seen.variation_N = seen.impulse_N_s = 0;
+  std::vector<double> impulses;
+  for (std::size_t k = 0; k < f.size(); ++k) {
+    const double step_s = k == 0 ? 0.01 : static_cast<double>(moments[k].time_s - moments[k - 1].time_s);
+    const double change = k == 0 ? f[0] : f[k] - f[k - 1];
+    seen.amplitude_N = std::max(seen.amplitude_N, std::abs(f[k]));
+    seen.variation_N += std::abs(change);
+    seen.rate_N_s = std::max(seen.rate_N_s, std::abs(change) / step_s);
+    const auto swap = static_cast<std::size_t>(static_cast<double>(moments[k].time_s) / kSwap_s);
+    impulses.resize(std::max(impulses.size(), swap + 1));
+    impulses[swap] += std::abs(f[k]) * step_s;
+  }
+  seen.impulse_N_s = *std::max_element(impulses.begin(), impulses.end());
+  seen.passes = static_cast<int>(impulses.size());
+  seen.pass_period_s = kSwap_s;
+  seen.pass_length_s = kMove_s;
+  return seen;
+}
+
+}  // namespace
+
+Finding lipschitz_tradeoff(const Setting& setting) {
+  Finding finding;
+  const Truth truth = truths(setting).front();
+  Stages stages(setting, truth, 0);
+  const int stage = stage_of(kVehicles);
+  const stability::Gains gains = stability::load_gains(setting.gains);
+  const std::optional<stability::AxisLoop> loop = stability::axis_loop(gains, {truth.model.mass_kg, 1, 0}, 2);
+  finding.json["truth"] = truth.name;
+  finding.json["trained_with"] = kVehicles;
+  finding.json["curve"] = files::Json::array();
+  Table table = {
+      "Networks trained with three, gamma in every layer",
+      {"gamma", "proved bound [gf/unit]", "test RMSE [gf]", "predicted z-error [m]", "by", "flown [m]"},
+      {}};
+  std::string data;
+  const std::vector<double> gammas =
+      setting.full ? std::vector<double>{1, 1.5, 2, 2.5, 3, 4, 6} : std::vector<double>{1.5, 3};
+  for (const double gamma : gammas) {
+    LearnOptions options = stages.learn_options();
+    options.gamma.value = gamma;
+    options.steps = setting.full ? 6000 : 600;
+    const std::string folder =
+        (std::filesystem::path(stages.flights(stage).folder) / fmt::format("gamma-{:g}", gamma)).string();
+    const Learned learned = learn(setting, options, folder, stages.key(stage), [&] {
+      const residuals::Inputs fit = stages.inputs({stage}, "fit"), select = stages.inputs({stage}, "select"),
+                              test = stages.inputs({stage}, "test");
+      return learning::load_learning_data({&fit, &select, &test}, options.sizes, learning::SplitBy::kFlights,
+                                          setting.jobs, [](int, int) {});
+    });
+    double predicted_m = 0, flown_m = 0;
+    std::string by;
+    for (int k = 0; k < scale_of(setting).flight_seeds; ++k) {
+      const Flown flown =
+          fly(setting, truth,
+              {"swap", kVehicles, 0, seed_of(setting.seed, "table", static_cast<std::uint64_t>(k))},
+              &learned.network, false);
+      flown_m = std::max(flown_m, largest_error_m(flown, 2));
+      for (const auto& moments : flown.vehicles) {
+        const stability::DisturbanceBounds bounds = stability::disturbance_bounds(
+            *loop, stability::Channel::kForce, measured(moments, gains.motor_lag_s));
+        if (bounds.least() > predicted_m) {
+          predicted_m = bounds.least();
+          by = bounds.which();
+        }
+      }
+    }
+    table.rows.push_back({fmt::format("{:g}", gamma), fmt::format("{:.1f}", learned.bound),
+                          fmt::format("{:.2f}", learned.test_gf), fmt::format("{:.3f}", predicted_m), by,
+                          fmt::format("{:.3f}", flown_m)});
+    finding.json["curve"].push_back({{"gamma", gamma},
+                                     {"gamma_proved", learned.keeps_gamma},
+                                     {"bound_gf_per_unit", learned.bound},
+                                     {"test_rmse_gf", learned.test_gf},
+                                     {"predicted_z_error_m", predicted_m},
+                                     {"predicted_by", by},
+                                     {"flown_z_error_m", flown_m}});
+    data += fmt::format("{} {} {} {}\n", learned.bound, learned.test_gf, 100 * predicted_m, 100 * flown_m);
+  }
+  finding.tables.push_back(std::move(table));
+  finding.notes.push_back(
+      "Predicted: the loop's exact gains times what was measured of the force that the prediction, behind "
+      "the motors' "
+      "lag, leaves in swaps of three. It bounds the linear loop, for these flights: noise and saturation "
+      "come on top.");
+  finding.figures.push_back(
+      {"lipschitz", data,
+       "set logscale x\nset grid\nset key top right\nset xlabel 'proved Lipschitz bound [gf per m "
+       "or m/s]'\nset ylabel 'test RMSE [gf]'\nset y2label 'largest z-error [cm]'\nset y2tics\nset "
+       "yrange [0:*]\nset y2range [0:*]\nplot 'lipschitz.dat' using 1:2 with linespoints lw 2 "
+       "title 'test RMSE', '' using 1:3 axes x1y2 with linespoints title 'predicted z-error', '' "
+       "using 1:4 axes x1y2 with linespoints title 'flown z-error'\n",
+       "Test error and tracking error over the proved Lipschitz bound."});
+  return finding;
+}
+
+}  // namespace swarmcert::reproduction

@@ -1,0 +1,103 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+
+#include "analysis/run.h"
+#include "data.h"
+#include "nn/files/json.h"
+
+namespace swarmcert {
+namespace {
+
+using files::Json;
+using tests::Outcome;
+using tests::read_text;
+
+class Reproduction : public testing::Test {
+ protected:
+  Outcome reproduce(const std::string& words) {
+    const Outcome outcome = tests::run_shell("swarmcert reproduce " + words, folder_.path());
+    EXPECT_EQ(outcome.exit_code, 0) << words << "\n" << outcome.output;
+    return outcome;
+  }
+  Json result(const std::string& experiment, const std::string& root = "out") {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / (root + "/" + experiment + "/report.html"))) << experiment;
+    return files::read_json(folder_ / (root + "/" + experiment + "/result.json"), "swarmcert/reproduce/1");
+  }
+
+  tests::ScratchFolder folder_;
+};
+
+/// One test, because the experiments share flights and networks: each of them would make its own.
+TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
+  // Shards, one after the other; the last call puts them together.
+  EXPECT_NE(reproduce("table -o out --shard 1/2").output.find("Part 1 of 2"), std::string::npos);
+  reproduce("table -o out --shard 2/2 --force");
+  reproduce("table -o out --force");
+  const Json table = result("table");
+  EXPECT_TRUE(table["complete"].get<bool>());
+  ASSERT_EQ(table["columns"].size(), 2u);
+  EXPECT_TRUE(table["columns"][0]["knobs"].empty());
+  EXPECT_FALSE(table["columns"][1]["knobs"].empty());
+  EXPECT_LT(table["columns"][1]["baseline_farthest_from_paper"].get<double>(), 0.15);
+  for (const Json& column : table["columns"]) {
+    EXPECT_EQ(column["max_z"].size(), 16u);
+    EXPECT_EQ(column["flights"].size(), 16u * 2);
+  }
+
+  reproduce("curriculum -o out");
+  const Json curriculum = result("curriculum");
+  ASSERT_EQ(curriculum["stages"].size(), 4u);
+  for (const Json& stage : curriculum["stages"]) {
+    EXPECT_TRUE(stage["gamma_proved"].get<bool>());
+    EXPECT_LT(stage["test_rmse_gf"].get<double>(), 0.7 * stage["test_rmse_of_nothing_gf"].get<double>());
+  }
+  ASSERT_GT(curriculum["labels"].size(), 3u);
+  EXPECT_LT(curriculum["labels_rms_difference_gf"].get<double>(), 0.5);
+
+  reproduce("data -o out");
+  EXPECT_EQ(result("data")["curve"].size(), 6u);
+  for (const std::string figure : {"intro", "swaps", "heatmap", "validation"}) reproduce(figure + " -o out");
+  EXPECT_EQ(result("heatmap")["maps"].size(), 6u);
+  EXPECT_GT(result("validation")["vehicles"][0]["correlation"].get<double>(), 0.8);
+  reproduce("superposition -o out");
+  for (const Json& row : result("superposition")["rows"]) {
+    EXPECT_LE(row["interval_gf"][0].get<double>(), row["defect_gf"].get<double>());
+    EXPECT_GE(row["interval_gf"][1].get<double>(), row["defect_gf"].get<double>());
+  }
+  reproduce("lipschitz -o out");
+  const Json curve = result("lipschitz")["curve"];
+  ASSERT_EQ(curve.size(), 2u);
+  EXPECT_LT(curve[0]["bound_gf_per_unit"].get<double>(), curve[1]["bound_gf_per_unit"].get<double>());
+
+  // Made anew elsewhere, the same bytes.
+  reproduce("intro -o again -j 1");
+  EXPECT_EQ(read_text(folder_ / "out/small/flights-0/stage1/network/phi_small.safetensors"),
+            read_text(folder_ / "again/small/flights-0/stage1/network/phi_small.safetensors"));
+  EXPECT_EQ(result("intro")["controllers"], result("intro", "again")["controllers"]);
+}
+
+TEST_F(Reproduction, RecordedFlightsAreLearnedBesideThePublishedNetworks) {
+  SWARMCERT_NEEDS_DATA();
+  reproduce("real-flights -o out --recorded '" + tests::data_path("") + "'");
+  const Json found = result("real-flights");
+  EXPECT_TRUE(found["gamma_proved"].get<bool>());
+  EXPECT_EQ(found["compositions"].size(), 2u);  // alone, and with another small vehicle
+  EXPECT_TRUE(found["published_networks_saw_test_flights"].get<bool>());
+  const Json& ladder = found["physics_first"];
+  EXPECT_LT(ladder.back()["rms_gf"].get<double>(), ladder.front()["rms_gf"].get<double>());
+}
+
+TEST_F(Reproduction, RefusesUnknownExperimentsAndShards) {
+  const auto exit_code = [&](const std::string& words) {
+    return tests::run_shell("swarmcert reproduce " + words + " -o out", folder_.path()).exit_code;
+  };
+  EXPECT_EQ(exit_code("tabel"), 2);
+  EXPECT_EQ(exit_code("table --shard 3/2"), 2);
+  EXPECT_EQ(exit_code("table --shard 1"), 2);
+  EXPECT_EQ(exit_code("real-flights --recorded nowhere"), 3);
+}
+
+}  // namespace
+}  // namespace swarmcert
