@@ -40,7 +40,7 @@ struct Job {
 
 const Job kJobs[] = {
     {"certify",
-     "certify phi.safetensors --nodes 0 -o out/cert.json --json out/result.json --report out/report", 1},
+     "certify phi.safetensors --nodes 0 -o out/cert.json --json out/result.json --report out/report", 3},
     {"simulate",
      "simulate hover --vehicles 2 --duration 0.5 --model model.toml --gains gains.toml -o out/flights --json "
      "out/result.json",
@@ -50,7 +50,7 @@ const Job kJobs[] = {
     {"sweep", "sweep grid.toml -o out/sweep --json out/result.json", 3},
     {"add",
      "add drag_linear --keep-anyway --model model.toml flights -o out/fitted.toml --json out/result.json", 1},
-    {"train",
+    {"train_slow",
      "train model.toml flights --phi 4 --rho 4 --features 4 --epochs 2 -o out/trained --json out/result.json",
      5},
 };
