@@ -1,13 +1,7 @@
 #include <fmt/core.h>
 
-#include <cmath>
-
 #include "analysis/bound_extras.h"
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/toml.h"
-#include "stability/bounds/small_gain.h"
-#include "stability/bounds/unstable_swarm.h"
+#include "stability/bounds/coupled_swarm.h"
 
 namespace swarmcert::analysis {
 
@@ -15,60 +9,18 @@ using files::Json;
 using namespace stability;  // NOLINT: every name below is of that library
 
 Json swarm_json(const Tracking& input, const std::string& path) {
-  const std::string text = files::read_file(path);
-  const auto document = files::parse_toml(text, path);
-  const files::TomlTable top(document, path);
-  constexpr char kSchema[] = "swarmcert/swarm/1";
-  if (top.text("schema") != kSchema) {
-    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema));
-  }
-  top.allow_only({"schema", "vehicles", "coupling"});
-  const double vehicles = top.number("vehicles");
-  if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {
-    top.refuse("vehicles", fmt::format("{}", vehicles), "must be a whole number from 1 to 200");
-  }
-  std::vector<Coupling> couplings;
-  for (const files::TomlTable& table : top.tables("coupling")) {
-    table.allow_only({"on", "by", "position_N_m", "velocity_N_s_m", "speed_m_s", "acceleration_m_s2",
-                      "cross_rate_N_s", "direction"});
-    const auto vehicle = [&](const char* key) {
-      const double value = table.number(key);
-      if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
-        table.refuse(key, fmt::format("{}", value),
-                     fmt::format("must be a vehicle from 0 to {}", vehicles - 1));
-      }
-      return static_cast<int>(value);
-    };
-    const auto number = [&](const char* key) {
-      const double value = table.has(key) ? table.number(key) : 0;
-      if (value < 0) table.refuse(key, fmt::format("{}", value), "must not be negative");
-      return value;
-    };
-    Coupling c{vehicle("on"),           vehicle("by"),
-               number("position_N_m"),  number("velocity_N_s_m"),
-               number("speed_m_s"),     number("acceleration_m_s2"),
-               number("cross_rate_N_s")};
-    if (table.has("direction")) c.direction = table.choice("direction", {"apart", "together"}) == 0 ? 1 : -1;
-    if (c.on == c.by) table.refuse("by", std::to_string(c.by), "is the vehicle itself");
-    couplings.push_back(c);
-  }
-  const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, 2);
-  if (!loop) throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
-  AxisLoop acting = *loop;
-  if (const auto sampled = sampled_axis_loop(input.gains, input.plant, 2)) acting.Ki = effective_Ki(*sampled);
-  const RateGains gains = rate_gains(acting);
-  const std::vector<LoopGains> loops(static_cast<std::size_t>(vehicles),
-                                     {gains.position, gains.velocity, gains.acceleration});
-  const SmallGain found = small_gain(loops, couplings);
+  const CoupledSwarm swarm = read_coupled_swarm(path);
+  if (!axis_loop(input.gains, input.plant, 2))
+    throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
+  const CoupledVerdict verdict = couple(swarm, input.gains, input.plant);
+  const SmallGain& found = verdict.small_gain;
   Json entries = Json::array();
-  for (std::size_t i = 0; i < couplings.size(); ++i) {
-    entries.push_back({{"on", couplings[i].on},
-                       {"by", couplings[i].by},
+  for (std::size_t i = 0; i < swarm.couplings.size(); ++i) {
+    entries.push_back({{"on", swarm.couplings[i].on},
+                       {"by", swarm.couplings[i].by},
                        {"missing_factor", found.proved ? Json() : Json(found.missing_factor_of[i])}});
   }
-  // Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
-  std::optional<UnstableSwarm> unstable;
-  if (!found.proved) unstable = find_unstable_swarm(acting, static_cast<int>(vehicles), couplings);
+  const std::optional<UnstableSwarm>& unstable = verdict.unstable;
   Json witness;
   if (unstable) {
     witness = {{"of", unstable->is_declared ? "the swarm as declared" : "one swarm of the class"},
@@ -77,10 +29,9 @@ Json swarm_json(const Tracking& input, const std::string& path) {
                {"simulated_s", unstable->seconds},
                {"error_over_initial", unstable->largest_error}};
   }
-  const bool is_refuted = unstable && unstable->is_declared;
-  return {{"verdict", found.proved ? "proved"
-                      : is_refuted ? "refuted"
-                                   : "inconclusive"},
+  return {{"verdict", found.proved           ? "proved"
+                      : verdict.is_refuted() ? "refuted"
+                                             : "inconclusive"},
           {"witness", std::move(witness)},
           {"loop", "continuous"},
           {"axis", "z"},

@@ -1,9 +1,5 @@
 #include "analysis/tracking_input.h"
 
-#include <fmt/core.h>
-
-#include "stability/effects/registry.h"
-
 namespace swarmcert::analysis {
 
 void declare_tracking(CLI::App& app, TrackingArguments& arguments) {
@@ -14,29 +10,7 @@ void declare_tracking(CLI::App& app, TrackingArguments& arguments) {
 }
 
 Tracking load_tracking(const TrackingArguments& arguments) {
-  Tracking result;
-  result.gains = stability::load_gains(arguments.gains);
-  result.model = stability::read_model(arguments.model);
-  result.plant.mass_kg = result.model.mass_kg;
-  result.plant.largest_thrust_N = 4 * result.model.thrust.largest_N(arguments.battery_V);
-  for (const stability::EffectSpec& effect : result.model.effects) {
-    if (effect.is_expression()) continue;
-    const auto first = [&](bool shape) {
-      const stability::EffectValues values = effect_values(stability::effect_info(effect.name), effect);
-      return shape ? values.shape.at(0) : values.linear.at(0);
-    };
-    if (effect.name == "motor_lag" && result.gains.motor_lag_s == 0) {
-      result.gains.motor_lag_s = first(true);
-      result.notes.push_back(fmt::format("motor lag {} s of the model", result.gains.motor_lag_s));
-    } else if (effect.name == "delay" && result.gains.delay_s == 0) {
-      result.gains.delay_s = first(true);
-      result.notes.push_back(fmt::format("delay {} s of the model", result.gains.delay_s));
-    } else if (effect.name == "thrust_ratio") {
-      result.plant.thrust_scale = 1 + first(false);
-      result.notes.push_back(fmt::format("thrust scale {} of the model", result.plant.thrust_scale));
-    }
-  }
-  return result;
+  return stability::load_tracking_setup(arguments.gains, arguments.model, arguments.battery_V);
 }
 
 }  // namespace swarmcert::analysis

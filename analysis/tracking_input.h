@@ -2,11 +2,9 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "analysis/commands/command.h"
-#include "stability/bounds/tracking_bounds.h"
-#include "stability/model.h"
+#include "stability/tracking_setup.h"
 
 namespace swarmcert::analysis {
 
@@ -18,15 +16,9 @@ struct TrackingArguments {
 /// Declares --gains, --model, --battery.
 void declare_tracking(CLI::App& app, TrackingArguments& arguments);
 
-struct Tracking {
-  stability::Gains gains;
-  stability::Model model;
-  stability::Plant plant;
-  std::vector<std::string> notes;  ///< what of the model entered the loop
-};
+using Tracking = stability::TrackingSetup;
 
-/// Reads both files. The model's effects motor_lag, delay and thrust_ratio enter the loop where gains.toml states no
-/// lag or delay of its own.
+/// stability::load_tracking_setup() of what was declared.
 Tracking load_tracking(const TrackingArguments& arguments);
 
 }  // namespace swarmcert::analysis

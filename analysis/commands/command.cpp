@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 
+#include "analysis/commands/gate_command.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
 #include "nn/files/input_error.h"
@@ -39,6 +40,8 @@ const std::vector<Command>& commands() {
       identify_thrust_command(),  //
       export_command(),           //
       match_command(),            //
+      gate_command(),             //
+      verify_bundle_command(),    //
       demo_command(),
   };
   return all;
@@ -64,9 +67,10 @@ files::Network load_net(const files::NetworkArguments& arguments) {
 }
 
 void remember_command_line(int argc, const char* const* argv) {
-  static const std::set<std::string> with_value = {"--jobs",   "-j",    "--json",   "-o",      "--output",
-                                                   "--report", "--csv", "--fitted", "--inject"};
-  static const std::set<std::string> flags = {"-q", "--quiet", "--force"};
+  static const std::set<std::string> with_value = {
+      "--jobs",   "-j",       "--json",  "-o",      "--output",   "--report", "--csv",
+      "--fitted", "--inject", "--junit", "--sarif", "--markdown", "--bundle"};
+  static const std::set<std::string> flags = {"-q", "--quiet", "--force", "--github"};
   // "-j2", "-qj2", "-qj 2", "-ofile": one dash, then flags, then perhaps an option with its value.
   const auto short_options = [](const std::string& word) {
     if (word.size() < 3 || word[0] != '-' || word[1] == '-') return std::string::npos;

@@ -211,6 +211,7 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   errors.clock_offset_s = track.clock_offset_s;
   errors.clock_onsets = track.clock_onsets;
   errors.findings = logs::findings(track.health);
+  errors.is_sound = logs::is_sound(track.health);
   if (track.position_only) {
     errors.trajectory.refused = errors.torque.refused = "position only";
     return result;

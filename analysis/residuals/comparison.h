@@ -39,6 +39,7 @@ struct TrackErrors {
   double clock_offset_s = 0;
   int clock_onsets = 0;
   std::vector<std::string> findings;  ///< what was wrong with the log
+  bool is_sound = true;               ///< nothing in the log is damaged; gaps in time are no damage
   GroupErrors errors;
   TrajectoryErrors trajectory;
   TorqueErrors torque;

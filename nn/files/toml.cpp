@@ -96,7 +96,7 @@ class AsciiWriter {
   std::string result_;
 };
 
-std::string line(const toml::source_region& source) {
+std::string line_words(const toml::source_region& source) {
   return source.begin.line == 0 ? "" : "line " + std::to_string(source.begin.line);
 }
 
@@ -133,9 +133,14 @@ void TomlTable::allow_only(const std::vector<std::string>& known) const {
   for (const auto& [key, node] : *table_) {
     const std::string name(key.str());
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    throw InputError(
-        {path_, line(key.source()), prefix_ + name, "", "is not a known key", did_you_mean(name, known)});
+    throw InputError({path_, line_words(key.source()), prefix_ + name, "", "is not a known key",
+                      did_you_mean(name, known)});
   }
+}
+
+int TomlTable::line(const std::string& key) const {
+  const toml::node* const found = key.empty() ? table_ : table_->get(key);
+  return found == nullptr ? 0 : static_cast<int>(found->source().begin.line);
 }
 
 std::vector<std::string> TomlTable::keys() const {
@@ -147,7 +152,7 @@ std::vector<std::string> TomlTable::keys() const {
 void TomlTable::refuse(const std::string& key, const std::string& value, const std::string& what,
                        const std::string& mend) const {
   const toml::node* const found = key.empty() ? table_ : table_->get(key);
-  const std::string where = line((found == nullptr ? table_ : found)->source());
+  const std::string where = line_words((found == nullptr ? table_ : found)->source());
   std::string field = prefix_ + key;
   if (key.empty() && !field.empty()) field.pop_back();
   throw InputError({path_, where, field, value, what, mend});

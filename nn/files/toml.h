@@ -21,6 +21,8 @@ class TomlTable {
   /// @throws InputError at the first key that is not one of `known`, with a did-you-mean.
   void allow_only(const std::vector<std::string>& known) const;
 
+  /// Line of the value of `key`, or of the table itself where `key` is empty; 0 where there is none.
+  int line(const std::string& key = "") const;
   bool has(const std::string& key) const { return table_->contains(key); }
   /// In alphabetical order: toml++ keeps no other.
   std::vector<std::string> keys() const;

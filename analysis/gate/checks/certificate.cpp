@@ -1,0 +1,30 @@
+#include <fmt/core.h>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/evidence.h"
+#include "lipschitz/checker/check.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+
+Run read_certificate(const files::TomlTable& table, Policy& policy) {
+  table.allow_only({});
+  if (!policy.release.has_network()) require_file(table, "", "network");
+  require_file(table, policy.release.certificate, "certificate");
+  policy.judges_certificate = true;
+  return [line = table.line()](Evidence& evidence, Checks& checks) {
+    Check check = row("certificate", line);
+    const std::string why_not = evidence.why_not_certified();
+    const check::CheckResult& verdict = evidence.certificate_verdict();
+    if (why_not.empty()) {
+      pass(check);
+      check.witness = fmt::format("{} spectral norms, {} upper bounds, {} lower bounds verified",
+                                  verdict.spectral_norms, verdict.upper_bounds, verdict.lower_bounds);
+    } else {
+      fail(check, why_not);
+    }
+    checks.push_back(std::move(check));
+  };
+}
+
+}  // namespace swarmcert::gate

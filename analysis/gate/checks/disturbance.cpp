@@ -1,0 +1,114 @@
+#include "analysis/gate/checks/disturbance.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/residuals/comparison.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using residuals::LearningError;
+
+const residuals::Axes& quantile_of(const LearningError::Quantiles& all, const std::string& quantile) {
+  return quantile == "p50" ? all.p50 : quantile == "p95" ? all.p95 : quantile == "p99" ? all.p99 : all.max;
+}
+
+double of_axis(const residuals::Axes& axes, int axis) {
+  return axis == 0 ? axes.x : axis == 1 ? axes.y : axes.z;
+}
+
+stability::DisturbanceSource measured(const LearningError& error, const std::string& quantile) {
+  stability::DisturbanceSource source;
+  double square = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto get = [&](const LearningError::Quantiles& all) {
+      return std::abs(of_axis(quantile_of(all, quantile), axis));
+    };
+    stability::Disturbance& d = source.axis[axis];
+    d.rate_N_s = get(error.rate_N_s);
+    d.amplitude_N = get(error.amplitude_N);
+    d.variation_N = get(error.variation_N);
+    d.impulse_N_s = get(error.impulse_N_s);
+    // Variation and impulse are those of one window, and every window of the flight may bring as much again.
+    d.passes = stability::Disturbance::kManyPasses;
+    d.pass_period_s = d.pass_length_s = LearningError::kWindow_s;
+    d.variation_per_pass = true;
+    source.bias_N[axis] = get(error.bias_N);
+    square += d.rate_N_s * d.rate_N_s;
+  }
+  source.rate_norm_N_s = std::sqrt(square);  // at least the vector's where the axes' largest rates coincide
+  source.kind = "measured";
+  source.note = fmt::format("{} over windows of {} s", quantile, LearningError::kWindow_s);
+  return source;
+}
+
+}  // namespace
+
+std::vector<std::string> disturbance_keys() {
+  return {"rate_N_s", "amplitude_N", "variation_N", "impulse_N_s", "bias_N", "quantile"};
+}
+
+DisturbanceTable read_disturbance(const files::TomlTable& table) {
+  DisturbanceTable result;
+  const auto number = [&](const char* key, double otherwise) {
+    if (!table.has(key)) return otherwise;
+    const double value = table.number(key);
+    if (value < 0) table.refuse(key, fmt::format("{}", value), "must not be negative");
+    result.declared.kind = "declared";
+    return value;
+  };
+  const double unknown = std::numeric_limits<double>::infinity();
+  const double rate = number("rate_N_s", unknown), amplitude = number("amplitude_N", unknown),
+               variation = number("variation_N", unknown), impulse = number("impulse_N_s", unknown);
+  const bool has_bias = table.has("bias_N");
+  if (has_bias && !result.is_declared())
+    table.refuse("bias_N", "", "stands alone",
+                 "declare rate_N_s, amplitude_N, variation_N or impulse_N_s too");
+  const double bias = number("bias_N", 0);
+  for (int axis = 0; axis < 3; ++axis) {
+    stability::Disturbance& d = result.declared.axis[axis];
+    d.rate_N_s = rate;
+    d.amplitude_N = amplitude;
+    d.variation_N = variation;
+    d.impulse_N_s = impulse;
+    result.declared.bias_N[axis] = bias;
+  }
+  result.declared.rate_norm_N_s = rate;
+  result.declared.note = "as the policy declares";
+  if (table.has("quantile")) {
+    if (result.is_declared())
+      table.refuse("quantile", "", "stands beside a declared force error", "give one");
+    const std::vector<std::string> names = {"p50", "p95", "p99", "max"};
+    result.quantile = names[table.choice("quantile", names)];
+  }
+  return result;
+}
+
+stability::DisturbanceSource disturbance(const DisturbanceTable& table, Evidence& evidence) {
+  if (table.is_declared()) return table.declared;
+  const residuals::Comparison& comparison =
+      evidence.policy().wants_guard_factor ? evidence.comparison() : evidence.residual_comparison();
+  if (comparison.learning_error.windows == 0)
+    throw Unfounded(fmt::format("the reference flights have no window of {} s to measure the force error on",
+                                LearningError::kWindow_s));
+  return measured(comparison.learning_error, table.quantile);
+}
+
+std::string words(const stability::DisturbanceSource& source, int axis) {
+  const stability::Disturbance& d = source.axis[axis];
+  std::string text = source.kind;
+  const auto add = [&text](const char* what, double value, const char* unit) {
+    if (std::isfinite(value)) text += fmt::format(", {} {:.4g} {}", what, value, unit);
+  };
+  add("rate", d.rate_N_s, "N/s");
+  add("amplitude", d.amplitude_N, "N");
+  add("variation", d.variation_N, "N");
+  add("impulse", d.impulse_N_s, "N s");
+  return text;
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,108 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/evidence.h"
+#include "nn/files/functions.h"
+#include "nn/files/input_error.h"
+#include "nn/files/json.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using files::Json;
+
+struct Wanted {
+  std::string name;  ///< of the row
+  std::vector<std::string>
+      path;  ///< members of the facts down to the number, or to a pair: the larger one counts
+  Limit limit;
+};
+
+[[noreturn]] void refuse(const std::string& file, const std::string& field, const std::string& what) {
+  throw files::InputError({file, "", field, "", what, "build the target firmware_facts again"});
+}
+
+double number_at(const Json& facts, const std::vector<std::string>& path, const std::string& file) {
+  const Json* at = &facts;
+  std::string field;
+  for (const std::string& member : path) {
+    field += (field.empty() ? "" : ".") + member;
+    if (!at->is_object() || !at->contains(member)) refuse(file, field, "is missing");
+    at = &(*at)[member];
+  }
+  const Json& value = at->is_array() && !at->empty() ? at->back() : *at;
+  if (!value.is_number() || !(value.get<double>() >= 0)) refuse(file, field, "is not a number from 0 on");
+  return value.get<double>();
+}
+
+/// Why the facts are not those of the network; empty if they are.
+std::string why_of_another(Evidence& evidence, const Json& facts, const std::string& file) {
+  const files::Network& network = evidence.flown();
+  if (!facts.contains("network") || !facts["network"].is_object() || !facts["network"].contains("weights") ||
+      !facts["network"]["weights"].is_object())
+    refuse(file, "network.weights", "is missing");
+  const Json& weights = facts["network"]["weights"];
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  if (facts["network"].value("sha256", Json()) != Json(network.sha256)) return "another network.toml";
+  if (weights.size() != parts.size()) return "other networks";
+  for (const auto& [name, part] : parts) {
+    if (!weights.contains(name) || !weights[name].is_object() ||
+        weights[name].value("sha256", Json()) != Json(part->sha256))
+      return "other weights of " + name;
+  }
+  return "";
+}
+
+}  // namespace
+
+Run read_firmware_facts(const files::TomlTable& table, Policy& policy) {
+  table.allow_only(
+      {"max_flash_bytes", "max_ram_bytes", "max_stack_bytes", "stack_bytes", "parts_us", "functions_us"});
+  if (!policy.release.has_network()) require_file(table, "", "network");
+  require_file(table, policy.release.facts, "facts");
+  std::vector<Wanted> all;
+  const auto add = [&](const char* key, const std::string& name, std::vector<std::string> path) {
+    if (const auto limit = gate::limit(table, key, "bytes"))
+      all.push_back({"firmware_facts." + name, std::move(path), *limit});
+  };
+  add("max_flash_bytes", "flash", {"flash_bytes"});
+  add("max_ram_bytes", "ram", {"ram_bytes"});
+  for (const char* entry : {"network_task", "controller", "self_test"})
+    add("max_stack_bytes", std::string("stack.") + entry, {"stack", entry, "bytes"});
+  const auto add_table = [&](const char* key, const char* name, const char* member, const char* last,
+                             const char* unit) {
+    if (!table.has(key)) return;
+    const files::TomlTable inner = table.table(key);
+    for (const std::string& one : inner.keys())
+      all.push_back(
+          {fmt::format("firmware_facts.{}.{}", name, one), {member, one, last}, *limit(inner, one, unit)});
+  };
+  add_table("stack_bytes", "stack", "stack", "bytes", "bytes");
+  add_table("parts_us", "parts", "parts", "modelled_us", "us");
+  add_table("functions_us", "functions", "functions", "modelled_us", "us");
+  if (all.empty()) refuse_without_limit(table, "max_flash_bytes = 65536");
+  return [all, line = table.line()](Evidence& evidence, Checks& checks) {
+    const std::string& file = evidence.release().facts;
+    const Json facts = files::read_json(file, "swarmcert/firmware-facts/1");
+    Check same = row("firmware_facts", line);
+    const std::string why = why_of_another(evidence, facts, file);
+    if (why.empty()) {
+      pass(same);
+      same.witness = "facts of these weights";
+    } else {
+      fail(same, "facts of " + why + ": build the target firmware_facts for this network");
+    }
+    checks.push_back(std::move(same));
+    for (const Wanted& wanted : all) {
+      Check check = row(wanted.name, wanted.limit);
+      const double value = number_at(facts, wanted.path, file);
+      judge(check, wanted.limit, value, value);
+      checks.push_back(std::move(check));
+    }
+  };
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,45 @@
+#include "lipschitz/float32_error.h"
+
+#include <fmt/core.h>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/checks/force_unit.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+
+Run read_float32_error(const files::TomlTable& table, Policy& policy) {
+  std::vector<std::string> known = force_keys("max_error");
+  known.insert(known.end(), {"neighbours", "input_step"});
+  table.allow_only(known);
+  if (!policy.release.has_network()) require_file(table, "", "network");
+  const std::optional<Limit> limit = force_limit(table, "max_error");
+  if (!limit) refuse_without_limit(table, "max_error_gf = 0.05");
+  lipschitz::Float32Options options;
+  options.neighbours = whole_number(table, "neighbours", 1);
+  options.input_step = table.has("input_step") ? table.number("input_step") : 0;
+  if (options.input_step < 0) table.refuse("input_step", "", "must not be negative");
+  return [limit = *limit, options](Evidence& evidence, Checks& checks) mutable {
+    if (!evidence.release().is_float32) throw Unfounded("the policy says that float64 flies");
+    options.jobs = evidence.settings().jobs;
+    const auto errors =
+        lipschitz::float32_errors(evidence.flown(), evidence.domain(), evidence.global_bounds(), options);
+    Check check = row("float32_error", limit);
+    const double scale = force_scale(evidence, limit);
+    double worst = -1;
+    for (const lipschitz::Float32Error& error : errors) {
+      const double total = scale == 1 ? error.total.value() : round_up(error.total.value() * scale);
+      if (total <= worst) continue;
+      worst = total;
+      check.witness = fmt::format("{}, up to {} neighbours", error.function, error.neighbours_at_most);
+    }
+    if (errors.empty()) {
+      check.reason = "the network has no function that flies";
+    } else {
+      judge(check, limit, worst, nothing_attained(limit));
+    }
+    checks.push_back(std::move(check));
+  };
+}
+
+}  // namespace swarmcert::gate

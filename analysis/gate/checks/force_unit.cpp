@@ -1,0 +1,24 @@
+#include "analysis/gate/checks/force_unit.h"
+
+#include <cmath>
+#include <limits>
+
+#include "stability/model.h"
+
+namespace swarmcert::gate {
+
+double force_scale(Evidence& evidence, const Limit& limit) {
+  if (limit.unit_N == 0) return 1;
+  const std::string& unit = evidence.flown().output_unit;
+  if (unit.empty())
+    throw Unfounded("network.toml states no output.unit, so that a limit in " + limit.unit +
+                    " means nothing");
+  if (unit == limit.unit) return 1;
+  return (unit == "gf" ? stability::kGramForce_N : 1.0) / limit.unit_N;
+}
+
+// Three roundings (gf in newton, the quotient, the product) lose less than 2^-51, relatively.
+double round_up(double value) { return value + std::abs(value) * 0x1p-50; }
+double round_down(double value) { return value - std::abs(value) * 0x1p-50; }
+
+}  // namespace swarmcert::gate

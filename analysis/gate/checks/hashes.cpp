@@ -1,0 +1,40 @@
+#include <filesystem>
+
+#include "analysis/gate/checks/checks.h"
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+
+Run read_hashes(const files::TomlTable& table, Policy& policy) {
+  struct Approved {
+    std::string path, sha256;
+    int line;
+  };
+  std::vector<Approved> all;
+  for (const std::string& file : table.keys()) {
+    const std::string sha256 = table.text(file);
+    if (sha256.size() != 64 || sha256.find_first_not_of("0123456789abcdef") != std::string::npos)
+      table.refuse(file, files::in_quotes(sha256), "must be a SHA-256 of 64 lower-case hex digits",
+                   "sha256sum prints it");
+    const std::filesystem::path folder = std::filesystem::path(policy.path).parent_path();
+    all.push_back({(folder / file).lexically_normal().string(), sha256, table.line(file)});
+  }
+  if (all.empty()) refuse_without_limit(table, "\"gains.toml\" = \"<sha256>\"");
+  return [all, line = table.line()](Evidence&, Checks& checks) {
+    Check check = row("hashes", line);
+    pass(check);
+    for (const Approved& file : all) {
+      const std::string found = files::sha256(files::read_file(file.path));
+      if (found == file.sha256) continue;
+      fail(check, file.path + " is not the approved file");
+      check.line = file.line;
+      check.witness = "SHA-256 " + found;
+      break;
+    }
+    checks.push_back(std::move(check));
+  };
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,101 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/checks/force_unit.h"
+#include "analysis/gate/evidence.h"
+#include "lipschitz/box.h"
+#include "nn/files/json.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+namespace {
+
+struct Wanted {
+  std::string name;      ///< of the row
+  std::string function;  ///< empty: the plain network and every set function
+  std::string block;
+  Limit limit;
+};
+
+bool is_whole(const std::string& function) { return function == "network" || function.rfind("set:", 0) == 0; }
+
+/// Whether the box of the certificate, on which its bounds hold, contains that of the release.
+void require_certified_box(Evidence& evidence) {
+  if (evidence.release().certificate.empty()) throw Unfounded("bounds on a box need a certificate");
+  const files::Json& certified = evidence.certificate()["box"];
+  for (const auto& [part, box] : evidence.domain()) {
+    if (!certified.is_object() || !certified.contains(part))
+      throw Unfounded("the certificate has no box for " + part);
+    const std::vector<double> lower = files::parse_hex_floats(certified[part]["lower"]);
+    const std::vector<double> upper = files::parse_hex_floats(certified[part]["upper"]);
+    bool is_inside = lower.size() == box.lower.size();
+    for (std::size_t k = 0; is_inside && k < lower.size(); ++k)
+      is_inside = lower[k] <= box.lower[k] && box.upper[k] <= upper[k];
+    if (!is_inside) throw Unfounded("the certificate's box does not contain the release's, for " + part);
+  }
+}
+
+void judge_bounds(Evidence& evidence, const Wanted& wanted, bool on_box, Checks& checks) {
+  Check check = row(wanted.name, wanted.limit);
+  double upper = -1, lower = -1;
+  for (const LipschitzBound& bound : evidence.bounds()) {
+    if (bound.block != wanted.block || (bound.domain != "global" && !on_box)) continue;
+    if (wanted.function.empty() ? !is_whole(bound.function) : bound.function != wanted.function) continue;
+    const double scale = wanted.limit.unit_N > 0 ? force_scale(evidence, wanted.limit) : 1;
+    if (bound.lower) lower = std::max(lower, round_down(*bound.lower * scale));
+    const double scaled = scale == 1 ? bound.upper : round_up(bound.upper * scale);
+    check.unit =
+        wanted.limit.unit_N > 0
+            ? wanted.limit.unit + bound.unit.substr(std::min(bound.unit.size(), bound.unit.find('/')))
+            : bound.unit;
+    if (scaled <= upper) continue;
+    upper = scaled;
+    check.witness =
+        bound.lower ? fmt::format("{}: a slope of {:.6g} is attained", bound.function, *bound.lower * scale)
+                    : bound.function;
+  }
+  if (upper < 0) {
+    check.reason = fmt::format(
+        "no {}bound of {} for the block {} is proved: certify with --blocks={}", on_box ? "" : "global ",
+        wanted.function.empty() ? "the whole network" : wanted.function, wanted.block, wanted.block);
+  } else {
+    judge(check, wanted.limit, upper, lower);
+  }
+  checks.push_back(std::move(check));
+}
+
+}  // namespace
+
+Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
+  std::vector<std::string> known = {"domain", "functions"};
+  for (const auto& keys :
+       {force_keys("max_joint"), force_keys("max_position", "_m"), force_keys("max_velocity", "_s_m")})
+    known.insert(known.end(), keys.begin(), keys.end());
+  table.allow_only(known);
+  if (!policy.release.has_network()) require_file(table, "", "network");
+  std::vector<Wanted> all;
+  const auto add = [&all](const char* name, const char* block, const std::optional<Limit>& limit) {
+    if (limit) all.push_back({name, "", block, *limit});
+  };
+  add("lipschitz", "all", force_limit(table, "max_joint"));
+  add("lipschitz.position", "position", force_limit(table, "max_position", "_m"));
+  add("lipschitz.velocity", "velocity", force_limit(table, "max_velocity", "_s_m"));
+  for (const Wanted& wanted : all)
+    if (wanted.block != "all") policy.blocks.push_back(wanted.block);
+  if (table.has("functions")) {
+    const files::TomlTable functions = table.table("functions");
+    for (const std::string& function : functions.keys())
+      all.push_back({"lipschitz." + function, function, "all", *limit(functions, function, "")});
+  }
+  if (all.empty()) refuse_without_limit(table, "max_joint_gf = 500");
+  const bool on_box = table.has("domain") && table.choice("domain", {"global", "box"}) == 1;
+  return [all, on_box](Evidence& evidence, Checks& checks) {
+    if (on_box) require_certified_box(evidence);
+    for (const Wanted& wanted : all) judge_bounds(evidence, wanted, on_box, checks);
+  };
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,102 @@
+#include "lipschitz/range.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/checks/force_unit.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using lipschitz::Attained;
+using lipschitz::CertifiedRange;
+
+std::string words(const CertifiedRange& range, const Attained& attained) {
+  std::string text = fmt::format("{} attains {:.6g}", range.function, attained.value);
+  for (std::size_t j = 0; j < attained.points.size(); ++j) {
+    text += fmt::format("{} {} (", j == 0 ? " at" : ",", attained.networks[j]);
+    for (std::size_t k = 0; k < attained.points[j].size(); ++k)
+      text += fmt::format("{}{:.4g}", k == 0 ? "" : ", ", attained.points[j][k]);
+    text += ")";
+  }
+  return text;
+}
+
+/// What one limit bounds.
+enum class Quantity { kLargest, kLeast, kGreatest, kJump };
+
+struct Wanted {
+  std::string name;
+  Quantity quantity;
+  Limit limit;
+};
+
+void judge_range(Evidence& evidence, const Wanted& wanted, const std::vector<CertifiedRange>& ranges,
+                 Checks& checks) {
+  Check check = row(wanted.name, wanted.limit);
+  const double scale = force_scale(evidence, wanted.limit);
+  bool is_first = true;
+  double proved = 0, attained = nothing_attained(wanted.limit);
+  const double sign = wanted.limit.is_most ? 1 : -1;
+  for (const CertifiedRange& range : ranges) {
+    const Attained& reached =
+        wanted.quantity == Quantity::kLeast                                                  ? range.least
+        : wanted.quantity == Quantity::kLargest && -range.least.value > range.greatest.value ? range.least
+                                                                                             : range.greatest;
+    const double bound = wanted.quantity == Quantity::kLeast      ? range.lower
+                         : wanted.quantity == Quantity::kGreatest ? range.upper
+                         : wanted.quantity == Quantity::kJump     ? range.jump
+                                                                  : range.largest();
+    double value = reached.value * scale;
+    if (wanted.quantity == Quantity::kLargest) value = std::abs(value);
+    if (wanted.quantity != Quantity::kJump && sign * value > sign * attained) {
+      attained = sign > 0 ? round_down(value) : round_up(value);
+      check.witness = words(range, reached);
+    }
+    const double scaled = scale == 1 ? bound : sign > 0 ? round_up(bound * scale) : round_down(bound * scale);
+    if (is_first || sign * scaled > sign * proved) proved = scaled;
+    is_first = false;
+  }
+  if (is_first) {
+    check.reason = "the network has no function to bound";
+  } else {
+    judge(check, wanted.limit, proved, attained);
+  }
+  checks.push_back(std::move(check));
+}
+
+}  // namespace
+
+Run read_range(const files::TomlTable& table, Policy& policy) {
+  std::vector<std::string> known = {"neighbours"};
+  for (const char* stem : {"max_abs_force", "max_force", "min_force", "max_jump"}) {
+    const std::vector<std::string> keys = force_keys(stem);
+    known.insert(known.end(), keys.begin(), keys.end());
+  }
+  table.allow_only(known);
+  if (!policy.release.has_network()) require_file(table, "", "network");
+  std::vector<Wanted> all;
+  const auto add = [&](const char* name, const char* stem, Quantity quantity, bool is_most) {
+    if (const auto limit = force_limit(table, stem, "", is_most)) all.push_back({name, quantity, *limit});
+  };
+  add("range", "max_abs_force", Quantity::kLargest, true);
+  add("range.max_force", "max_force", Quantity::kGreatest, true);
+  add("range.min_force", "min_force", Quantity::kLeast, false);
+  add("range.jump", "max_jump", Quantity::kJump, true);
+  if (all.empty()) refuse_without_limit(table, "max_abs_force_gf = 80");
+  lipschitz::RangeOptions options;
+  options.neighbours = whole_number(table, "neighbours", 1);
+  return [all, options](Evidence& evidence, Checks& checks) mutable {
+    options.jobs = evidence.settings().jobs;
+    std::map<std::string, double> rho;
+    for (const auto& [function, bound] : evidence.global_bounds())
+      if (function.rfind("rho:", 0) == 0) rho[function.substr(4)] = bound;
+    const auto ranges = lipschitz::ranges(evidence.flown(), evidence.domain(), rho, options);
+    for (const Wanted& wanted : all) judge_range(evidence, wanted, ranges, checks);
+  };
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,79 @@
+#include <fmt/core.h>
+
+#include <cmath>
+#include <limits>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/evidence.h"
+#include "nn/files/input_error.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+namespace {
+
+/// By how many percent of the baseline's value a value is worse; 0 if it is not.
+double worse_percent(const Check& check, double baseline) {
+  const double change = (check.more_is_worse ? 1 : -1) * (*check.value - baseline);
+  if (change <= 0) return 0;
+  return baseline == 0 ? std::numeric_limits<double>::infinity() : 100 * change / std::abs(baseline);
+}
+
+}  // namespace
+
+Run read_regression(const files::TomlTable& table, Policy&) {
+  table.allow_only({"max_increase_percent", "percent_of"});
+  const std::optional<Limit> most = limit(table, "max_increase_percent", "%");
+  if (!most) refuse_without_limit(table, "max_increase_percent = 5");
+  if (most->value < 0)
+    table.refuse("max_increase_percent", fmt::format("{}", most->value), "must not be negative");
+  std::map<std::string, Limit> own;
+  if (table.has("percent_of")) {
+    const files::TomlTable inner = table.table("percent_of");
+    for (const std::string& name : inner.keys()) own[name] = *limit(inner, name, "%");
+  }
+  return [most = *most, own](Evidence& evidence, Checks& checks) {
+    const std::map<std::string, double>* const baseline = evidence.baseline();
+    if (baseline == nullptr) {
+      if (evidence.settings().may_lack_baseline) return;  // this release becomes the first baseline
+      throw files::InputError({evidence.policy().path, "", "regression", "",
+                               "has no baseline to compare with",
+                               "give --baseline FILE; --update-baseline writes the first one"});
+    }
+    Check check = row("regression", most);
+    double worst = 0, excess = -std::numeric_limits<double>::infinity();
+    int compared = 0;
+    std::string missing;
+    for (const Check& now : checks) {
+      if (!now.limit || now.is_bad_input) continue;
+      const auto before = baseline->find(now.name);
+      if (before == baseline->end()) continue;
+      ++compared;
+      if (!now.value || std::isnan(*now.value)) {
+        missing += (missing.empty() ? "" : ", ") + now.name;
+        continue;
+      }
+      const double percent = worse_percent(now, before->second);
+      const auto found = own.find(now.name);
+      const Limit& limit = found == own.end() ? most : found->second;
+      if (!(percent - limit.value > excess)) continue;
+      excess = percent - limit.value;
+      worst = percent;
+      check.line = limit.line;
+      check.limit = limit.value;
+      check.witness = fmt::format("{}: {:.6g} before, {:.6g} now", now.name, before->second, *now.value);
+    }
+    if (compared == 0) {
+      check.reason = "the baseline has none of this policy's numbers";
+    } else if (!missing.empty()) {
+      check.value = worst;
+      check.reason = "has a baseline, but no value now: " + missing;
+    } else {
+      Limit limit = most;
+      limit.value = *check.limit;
+      judge(check, limit, worst, worst);
+    }
+    checks.push_back(std::move(check));
+  };
+}
+
+}  // namespace swarmcert::gate

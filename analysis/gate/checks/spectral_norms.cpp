@@ -1,0 +1,68 @@
+#include <fmt/core.h>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/evidence.h"
+#include "lipschitz/certify.h"
+#include "lipschitz/spectral_norm.h"
+#include "nn/files/functions.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using files::GammaStatement;
+using lipschitz::Enclosure;
+
+void judge_norms(Evidence& evidence, const std::optional<Limit>& own, int line, Checks& checks) {
+  const files::Network& network = evidence.flown();
+  std::optional<GammaStatement> gamma = network.gamma;
+  if (own) gamma = GammaStatement{own->value};
+  Check check = row("spectral_norms", line);
+  if (own) check.line = own->line;
+  if (!gamma) {
+    fail(check, "network.toml declares no gamma: declare it, or state max in [spectral_norms]");
+    checks.push_back(std::move(check));
+    return;
+  }
+  check.limit = gamma->value;
+  pass(check);
+  double largest = 0;
+  for (const auto& [part, weights] : files::parts(network)) {
+    std::vector<Enclosure> norms;
+    for (const files::Layer& layer : weights->layers)
+      norms.push_back(lipschitz::spectral_norm(layer, gamma->value).norm);
+    const std::vector<lipschitz::Verdict> verdicts = lipschitz::respects_gamma(*gamma, norms);
+    const bool of_network = gamma->scope == GammaStatement::Scope::kNetwork;
+    if (of_network) {
+      std::vector<lipschitz::UpperBound> factors;
+      for (const Enclosure& norm : norms) factors.push_back(norm.upper);
+      largest = std::max(largest, lipschitz::product_up(factors).value());
+    }
+    for (std::size_t k = 0; k < norms.size(); ++k) {
+      if (!of_network) largest = std::max(largest, norms[k].upper.value());
+      if (verdicts[k] == lipschitz::Verdict::kProved || check.verdict == Verdict::kFail) continue;
+      const bool is_refuted = verdicts[k] == lipschitz::Verdict::kRefuted;
+      check.verdict = is_refuted ? Verdict::kFail : Verdict::kInconclusive;
+      check.reason = fmt::format("{} {} {} gamma {}", part, weights->layers[k].name,
+                                 is_refuted ? "breaks" : "is too near to", gamma->value);
+      check.witness = fmt::format("{} {}: {:.15g} .. {:.15g}", part, weights->layers[k].name,
+                                  norms[k].lower.value(), norms[k].upper.value());
+    }
+  }
+  check.value = largest;
+  checks.push_back(std::move(check));
+}
+
+}  // namespace
+
+Run read_spectral_norms(const files::TomlTable& table, Policy& policy) {
+  table.allow_only({"max"});
+  if (!policy.release.has_network()) require_file(table, "", "network");
+  const std::optional<Limit> own = limit(table, "max", "");
+  if (own && !(own->value > 0)) table.refuse("max", fmt::format("{}", own->value), "must be positive");
+  return [own, line = table.line()](Evidence& evidence, Checks& checks) {
+    judge_norms(evidence, own, line, checks);
+  };
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,49 @@
+#include <fmt/core.h>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/checks/disturbance.h"
+#include "nn/files/toml.h"
+#include "stability/tracking_setup.h"
+
+namespace swarmcert::gate {
+
+Run read_theorem(const files::TomlTable& table, Policy& policy) {
+  std::vector<std::string> known = disturbance_keys();
+  known.emplace_back("max_ball_m");
+  table.allow_only(known);
+  require_file(table, policy.release.gains, "gains");
+  require_file(table, policy.release.model, "model");
+  const DisturbanceTable declared = read_disturbance(table);
+  const std::optional<Limit> ball = limit(table, "max_ball_m", "m");
+  if (ball && !declared.is_declared() && policy.release.flights.empty())
+    table.refuse("max_ball_m", "", "needs a force error", "state rate_N_s, or name flights in [release]");
+  return [declared, ball, line = table.line()](Evidence& evidence, Checks& checks) {
+    const stability::TrackingSetup& setup = evidence.tracking();
+    stability::DisturbanceSource source = declared.declared;
+    if (ball) source = disturbance(declared, evidence);
+    const stability::TrackingReport report = tracking_bounds(setup.gains, setup.plant, source, {});
+    Check check = row("theorem", line);
+    if (report.theorem.applies) {
+      pass(check);
+      check.witness = fmt::format("lambda_min(Lambda) {:.6g} 1/s, lambda_min(K) {:.6g} kg/s",
+                                  report.theorem.min_Lambda, report.theorem.min_K);
+    } else {
+      std::string why;
+      for (const std::string& one : report.theorem.why_not) why += (why.empty() ? "" : "; ") + one;
+      fail(check, why);
+    }
+    checks.push_back(check);
+    if (!ball) return;
+    Check of_ball = row("theorem.ball", *ball);
+    if (report.ball_m) {
+      judge(of_ball, *ball, *report.ball_m, *report.ball_m);
+      of_ball.witness =
+          fmt::format("rate of the force error {:.4g} N/s, {}", source.rate_norm_N_s, source.kind);
+    } else {
+      of_ball.reason = "the theorem gives no ball for these gains and this force error";
+    }
+    checks.push_back(std::move(of_ball));
+  };
+}
+
+}  // namespace swarmcert::gate

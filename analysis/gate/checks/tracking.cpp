@@ -1,0 +1,142 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/gate/checks/checks.h"
+#include "analysis/gate/checks/disturbance.h"
+#include "analysis/gate/plant_box.h"
+#include "analysis/residuals/comparison.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using stability::Range;
+
+/// What is uncertain: an interval where stated, else so much about model and gains.
+struct Uncertainty {
+  std::optional<Range> mass_kg, thrust_scale, lag_s, delay_s;
+};
+
+struct Guard {
+  std::optional<double> declared;
+  std::string quantile = "p95";
+};
+
+std::optional<Range> interval(const files::TomlTable& table, const char* key, bool is_positive) {
+  if (!table.has(key)) return std::nullopt;
+  const std::vector<double> ends = table.numbers(key);
+  if (ends.size() != 2 || !(ends[0] <= ends[1]) || !(is_positive ? ends[0] > 0 : ends[0] >= 0))
+    table.refuse(key, "",
+                 is_positive ? "must be two positive numbers, from and to"
+                             : "must be two numbers from 0 on, from and to");
+  return Range{ends[0], ends[1]};
+}
+
+Uncertainty read_uncertainty(const files::TomlTable& table) {
+  if (!table.has("uncertainty")) return {};
+  const files::TomlTable inner = table.table("uncertainty");
+  inner.allow_only({"mass_kg", "thrust_scale", "lag_s", "delay_s"});
+  return {interval(inner, "mass_kg", true), interval(inner, "thrust_scale", true),
+          interval(inner, "lag_s", false), interval(inner, "delay_s", false)};
+}
+
+stability::UncertainPlant box_of(const stability::TrackingSetup& setup, const Uncertainty& stated) {
+  const auto about = [](double value, double share) {
+    return Range{value * (1 - share), value * (1 + share)};
+  };
+  return {stated.mass_kg.value_or(about(setup.plant.mass_kg, 0.05)),
+          stated.thrust_scale.value_or(about(setup.plant.thrust_scale, 0.1)),
+          stated.lag_s.value_or(about(setup.gains.motor_lag_s, 0.2)),
+          stated.delay_s.value_or(about(setup.gains.delay_s, 0.2))};
+}
+
+/// How far peaks that were measured exceed those of the loop pushed by the measured residual; at least 1.
+double guard_factor(Evidence& evidence, const Guard& guard, int axis) {
+  if (guard.declared) return *guard.declared;
+  const residuals::Trajectories& flown = evidence.comparison().trajectories;
+  if (flown.peak_ratio.tracks == 0)
+    throw Unfounded("no guard factor: no track of the reference flights could be flown again" +
+                    (flown.refused.empty() ? std::string() : ": " + flown.refused));
+  if (flown.diverged > 0)
+    throw Unfounded(
+        fmt::format("no guard factor: {} tracks diverge when they are flown again", flown.diverged));
+  const residuals::Axes& ratio = guard.quantile == "p50"   ? flown.peak_ratio.p50
+                                 : guard.quantile == "p95" ? flown.peak_ratio.p95
+                                                           : flown.peak_ratio.max;
+  const double value = axis == 0 ? ratio.x : axis == 1 ? ratio.y : ratio.z;
+  return std::isnan(value) ? value : std::max(1.0, value);
+}
+
+void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const Uncertainty& uncertainty,
+                    const Guard& guard, const Limit& limit, Checks& checks) {
+  const stability::TrackingSetup& setup = evidence.tracking();
+  const stability::DisturbanceSource source = disturbance(declared, evidence);
+  const BoxBound bound = bound_over(setup, box_of(setup, uncertainty), source);
+  Check check = row("tracking", limit);
+  double proved = 0, attained = -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double factor = guard_factor(evidence, guard, axis);
+    const double reached = bound.reached_m[axis] * factor;
+    const double value = bound.is_enclosed ? bound.enclosed_m[axis] * factor : reached;
+    if (!(value <= proved)) proved = value;
+    if (!std::isnan(proved) && !(reached <= attained)) {
+      attained = reached;
+      check.witness = fmt::format(
+          "axis {}: {}; guard factor {:.4g}; force error {}; {}", stability::axis_name(axis),
+          bound.where[axis], factor, words(source, axis),
+          bound.is_enclosed ? "enclosed over the box" : "at the corners of the box, not enclosed");
+    }
+    if (std::isnan(proved)) break;
+  }
+  if (std::isnan(proved)) {
+    check.reason = "Lambda or K couples the axes, or a number is missing: no bound per axis";
+  } else if (!std::isfinite(proved)) {
+    judge(check, limit, proved, std::isfinite(attained) ? attained : -1);
+    check.value.reset();
+    if (check.verdict == Verdict::kInconclusive)
+      check.reason =
+          "nothing bounds the error: the loop is unstable in the box, the integrator's clamp may act, or "
+          "the force error's amplitude is not known";
+  } else {
+    judge(check, limit, proved, attained);
+  }
+  checks.push_back(std::move(check));
+}
+
+}  // namespace
+
+Run read_tracking(const files::TomlTable& table, Policy& policy) {
+  std::vector<std::string> known = disturbance_keys();
+  known.insert(known.end(), {"max_error_m", "guard_factor", "guard_quantile", "uncertainty"});
+  table.allow_only(known);
+  require_file(table, policy.release.gains, "gains");
+  require_file(table, policy.release.model, "model");
+  const std::optional<Limit> limit = gate::limit(table, "max_error_m", "m");
+  if (!limit) refuse_without_limit(table, "max_error_m = 0.15");
+  const DisturbanceTable declared = read_disturbance(table);
+  Guard guard;
+  if (table.has("guard_factor")) {
+    guard.declared = table.number("guard_factor");
+    if (!(*guard.declared >= 1))
+      table.refuse("guard_factor", fmt::format("{}", *guard.declared), "must be at least 1");
+  } else if (table.has("guard_quantile")) {
+    const std::vector<std::string> names = {"p50", "p95", "max"};
+    guard.quantile = names[table.choice("guard_quantile", names)];
+  }
+  if (!declared.is_declared())
+    require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(),
+                 "flights (or state rate_N_s, amplitude_N, ... here)");
+  if (!guard.declared) {
+    require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(),
+                 "flights (or state guard_factor here)");
+    policy.wants_guard_factor = true;
+  }
+  return [declared, uncertainty = read_uncertainty(table), guard, limit = *limit](Evidence& evidence,
+                                                                                  Checks& checks) {
+    judge_tracking(evidence, declared, uncertainty, guard, limit, checks);
+  };
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,197 @@
+#include "analysis/gate/evidence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/gate/baseline.h"
+#include "analysis/residuals/comparison.h"
+#include "analysis/residuals/inputs.h"
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
+#include "lipschitz/range.h"
+#include "nn/files/functions.h"
+#include "nn/files/input_error.h"
+#include "stability/tracking_setup.h"
+
+namespace swarmcert::gate {
+namespace {
+
+bool is_stored_as_float32(const files::Network& network) {
+  for (const auto& [name, weights] : files::parts(network))
+    if (weights->precision != files::Precision::kFloat32) return false;
+  return true;
+}
+
+}  // namespace
+
+Evidence::Evidence(const Policy& policy, const GateSettings& settings)
+    : policy_(policy), settings_(settings) {}
+Evidence::~Evidence() = default;
+
+const files::Network& Evidence::flown() {
+  if (!network_) {
+    files::Network network = files::load_network(release().network);
+    if (release().is_float32 && !is_stored_as_float32(network))
+      network = files::as_float32(std::move(network));
+    network_ = std::make_unique<files::Network>(std::move(network));
+  }
+  return *network_;
+}
+
+const files::Json& Evidence::certificate() {
+  if (!certificate_) {
+    certificate_ =
+        std::make_unique<files::Json>(files::read_json(release().certificate, check::kCertificateSchema));
+  }
+  return *certificate_;
+}
+
+const check::CheckResult& Evidence::certificate_verdict() {
+  if (!verdict_) {
+    const files::Network stored = files::load_network(release().network);
+    verdict_ = std::make_unique<check::CheckResult>(check::check(certificate(), stored));
+  }
+  return *verdict_;
+}
+
+std::string Evidence::why_not_certified() {
+  const check::CheckResult& verdict = certificate_verdict();
+  if (!verdict.accepted) return verdict.reason;
+  const files::Json& as = certificate()["network"]["as"];
+  const bool is_stored_float32 = is_stored_as_float32(files::load_network(release().network));
+  if (release().is_float32 && !is_stored_float32 && as != "float32")
+    return "it is about the float64 weights as stored, but float32 flies: certify --as float32";
+  if (!release().is_float32 && as == "float32")
+    return "it is about weights rounded to float32, but the policy says that float64 flies";
+  return "";
+}
+
+void Evidence::compute_bounds() {
+  if (computed_) return;
+  const files::Network& network = flown();
+  lipschitz::CertifyOptions options;
+  options.blocks = policy_.blocks;
+  options.jobs = settings_.jobs;
+  options.progress = settings_.progress;
+  const lipschitz::Certification found = certify(network, options);
+  computed_ = std::make_unique<std::vector<LipschitzBound>>();
+  for (const lipschitz::CertifiedBound& bound : found.bounds) {
+    LipschitzBound one{bound.function,      bound.block,  bound.domain,
+                       bound.upper.value(), std::nullopt, files::unit(network, bound.function, bound.block)};
+    if (bound.lower.witness) one.lower = bound.lower.witness->slope.value();
+    computed_->push_back(std::move(one));
+  }
+}
+
+const std::vector<LipschitzBound>& Evidence::bounds() {
+  if (bounds_) return *bounds_;
+  const std::string rejected = release().certificate.empty() ? "" : why_not_certified();
+  if (release().certificate.empty() || (!rejected.empty() && policy_.judges_certificate)) {
+    compute_bounds();
+    return *computed_;
+  }
+  if (!rejected.empty()) throw Unfounded("the certificate is rejected: " + rejected);
+  auto bounds = std::make_unique<std::vector<LipschitzBound>>();
+  for (const files::Json& bound : certificate()["bounds"]) {
+    if (!bound["scale"].empty()) continue;
+    const auto function = bound["function"].get<std::string>();
+    const auto block = bound["block"].get<std::string>();
+    LipschitzBound one{function,
+                       block,
+                       bound["domain"].get<std::string>(),
+                       bound["upper"].get<double>(),
+                       std::nullopt,
+                       files::unit(flown(), function, block)};
+    if (bound["lower"].is_number()) one.lower = bound["lower"].get<double>();
+    bounds->push_back(std::move(one));
+  }
+  bounds_ = std::move(bounds);
+  return *bounds_;
+}
+
+std::map<std::string, double> Evidence::global_bounds() {
+  const auto all_of = [](const std::vector<LipschitzBound>& bounds) {
+    std::map<std::string, double> result;
+    for (const LipschitzBound& bound : bounds)
+      if (bound.block == "all" && bound.domain == "global") result[bound.function] = bound.upper;
+    return result;
+  };
+  std::map<std::string, double> result = all_of(bounds());
+  for (const std::string& function : files::functions(flown())) {
+    if (result.count(function) == 1) continue;
+    compute_bounds();
+    return all_of(*computed_);
+  }
+  return result;
+}
+
+std::map<std::string, lipschitz::Box> Evidence::domain() {
+  if (!release().box.empty()) return lipschitz::read_domain(release().box, flown());
+  std::map<std::string, lipschitz::Box> clamp = lipschitz::clamp_domain(flown());
+  if (clamp.empty()) throw Unfounded("no box: name box in [release], or clamp the inputs in network.toml");
+  return clamp;
+}
+
+const stability::TrackingSetup& Evidence::tracking() {
+  if (!tracking_) {
+    tracking_ = std::make_unique<stability::TrackingSetup>(
+        stability::load_tracking_setup(release().gains, release().model, release().battery_V));
+  }
+  return *tracking_;
+}
+
+void Evidence::load_comparison(bool with_loop) {
+  residuals::InputArguments arguments;
+  arguments.models = {release().model};
+  arguments.flights = release().flights;
+  arguments.fleet = release().vehicles;
+  arguments.columns = release().columns;
+  if (release().feed_forward) arguments.network = release().network.file;
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  residuals::GainsOfKinds gains;
+  if (with_loop) gains.emplace("", stability::load_gains(release().gains));
+  const auto progress = [this](int done, int total) {
+    if (settings_.progress) settings_.progress(done, total, "flights");
+  };
+  auto found =
+      std::make_unique<residuals::Comparison>(residuals::compare(inputs, settings_.jobs, progress, gains));
+  std::string damaged;
+  for (const std::string& problem : found->problems) damaged += (damaged.empty() ? "" : "; ") + problem;
+  for (const residuals::TrackErrors& track : found->tracks) {
+    if (track.is_sound) continue;
+    damaged += (damaged.empty() ? "" : "; ") + track.path + ":";
+    for (const std::string& finding : track.findings) damaged += " " + finding;
+  }
+  if (!damaged.empty()) {
+    throw files::InputError({release().flights.front(), "", "flights", "",
+                             "a reference flight is damaged: " + damaged, "restore the log"});
+  }
+  (with_loop ? comparison_ : residual_comparison_) = std::move(found);
+}
+
+const residuals::Comparison& Evidence::comparison() {
+  if (!comparison_) load_comparison(true);
+  return *comparison_;
+}
+
+const residuals::Comparison& Evidence::residual_comparison() {
+  if (!comparison_ && !residual_comparison_ && policy_.wants_guard_factor) {
+    try {
+      load_comparison(true);
+    } catch (const files::InputError&) {
+      load_comparison(false);  // the guard factor's check says what is wrong with the loop
+    }
+  }
+  if (comparison_) return *comparison_;
+  if (!residual_comparison_) load_comparison(false);
+  return *residual_comparison_;
+}
+
+const std::map<std::string, double>* Evidence::baseline() {
+  if (!baseline_ && !settings_.baseline.empty()) {
+    baseline_ = read_baseline(settings_.baseline, settings_.may_lack_baseline);
+  }
+  return baseline_.get();
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,142 @@
+#include "analysis/gate/plant_box.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stability/bounds/theorem.h"
+#include "stability/float_errors.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using namespace stability;  // NOLINT: every name below is of that library
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// What the firmware commands as PID gains, so that the true mass may differ from the one it was told.
+bool as_pid(const TrackingSetup& setup, Gains& gains) {
+  PidGains pid{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const std::optional<AxisGains> one = axis_gains(setup.gains, setup.plant.mass_kg, axis);
+    if (!one) return false;
+    pid.Kp[i] = one->Kp;
+    pid.Kd[i] = one->Kd;
+    pid.Ki[i] = one->Ki;
+  }
+  gains = setup.gains;
+  gains.composite.reset();
+  gains.pid = pid;
+  return true;
+}
+
+/// The points of the box at which bounds are evaluated: its middle, then its corners, each once.
+std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
+  const Range ranges[] = {box.mass_kg, box.thrust_scale, box.lag_s, box.delay_s};
+  std::vector<std::array<double, 4>> points(1);
+  for (std::size_t k = 0; k < 4; ++k) points[0][k] = (ranges[k].from + ranges[k].to) / 2;
+  for (unsigned corner = 0; corner < 16; ++corner) {
+    std::array<double, 4> point{};
+    for (std::size_t k = 0; k < 4; ++k) point[k] = (corner >> k) % 2 == 0 ? ranges[k].from : ranges[k].to;
+    if (std::find(points.begin(), points.end(), point) == points.end()) points.push_back(point);
+  }
+  return points;
+}
+
+void add_reached(const TrackingSetup& setup, const UncertainPlant& box, const DisturbanceSource& source,
+                 const double (&of_float)[3], BoxBound& result) {
+  Gains pid;
+  as_pid(setup, pid);
+  const Loop flown = pid.rate_hz > 0 ? Loop::kSampled : Loop::kContinuous;
+  for (const std::array<double, 4>& point : points_of(box)) {
+    Gains gains = pid;
+    gains.motor_lag_s = point[2];
+    gains.delay_s = point[3];
+    Plant plant = setup.plant;
+    plant.mass_kg = point[0];
+    plant.thrust_scale = point[1] * setup.plant.mass_kg / point[0];
+    for (const AxisBounds& row : tracking_bounds(gains, plant, source, {}).bounds) {
+      if (row.loop != flown) continue;
+      const auto i = static_cast<std::size_t>(row.axis);
+      const double bound = row.least() + row.staircase_m + of_float[i];
+      if (bound <= result.reached_m[i]) continue;  // NaN is taken
+      result.reached_m[i] = bound;
+      result.where[i] = fmt::format(
+          "{} channel, {} loop, mass {:.4g} kg, thrust scale {:.4g}, motor lag {:.4g} s, delay {:.4g} s",
+          stability::name(row.channel), stability::name(row.loop), point[0], point[1], point[2], point[3]);
+    }
+  }
+}
+
+double times(double gain, double size) { return size == 0 ? 0 : gain * size; }  // no infinity times zero
+
+/// Largest bound of one axis and channel in the box.
+double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
+                const DisturbanceSource& source, int axis, Channel channel) {
+  const auto i = static_cast<std::size_t>(axis);
+  Plant told = setup.plant;
+  told.thrust_scale = 1;
+  AxisLoop loop = *axis_loop(pid, told, axis);
+  loop.lags_s.clear();
+  if (axis < 2 && pid.attitude_lag_s > 0) loop.lags_s.push_back(pid.attitude_lag_s);
+  loop.delay_s = 0;
+  const int evaluations = box.delay_s.to > 0 ? 100 : 1500;
+  const Disturbance& d = source.axis[axis];
+  const double bias = std::abs(source.bias_N[axis]);
+  const double limit_m_s = pid.integrator_limit_m_s[i];
+  const double Ki = loop.Ki;
+  if (Ki > 0 && std::isfinite(limit_m_s)) {
+    loop.Ki = 0;
+    const UncertainNorms norms = uncertain_norms(loop, box, channel, 0.01, evaluations);
+    const UncertainNorms command = channel == Channel::kCommand
+                                       ? norms
+                                       : uncertain_norms(loop, box, Channel::kCommand, 0.01, evaluations);
+    return times(norms.amplitude.upper, d.amplitude_N + bias) +
+           times(command.amplitude.upper, told.mass_kg * Ki * limit_m_s);
+  }
+  const UncertainNorms norms = uncertain_norms(loop, box, channel, 0.01, evaluations);
+  const double constant = Ki > 0 ? 0 : times(norms.amplitude.upper, bias);
+  double least = std::min(times(norms.rate.upper, d.rate_N_s), times(norms.amplitude.upper, d.amplitude_N));
+  if (d.passes == 1) {
+    least =
+        std::min({least, times(norms.edge.upper, d.variation_N), times(norms.impulse.upper, d.impulse_N_s)});
+  }
+  return least + constant;
+}
+
+}  // namespace
+
+BoxBound bound_over(const TrackingSetup& setup, const UncertainPlant& box, const DisturbanceSource& source) {
+  BoxBound result;
+  Gains pid;
+  if (!as_pid(setup, pid)) {
+    std::fill(std::begin(result.reached_m), std::end(result.reached_m),
+              std::numeric_limits<double>::quiet_NaN());
+    return result;
+  }
+  const FloatErrors float32 = float_errors(setup, tracking_bounds(setup.gains, setup.plant, source, {}));
+  add_reached(setup, box, source, float32.tracking_error_m, result);
+  result.is_enclosed = pid.rate_hz == 0;
+  for (int axis = 0; axis < 3 && result.is_enclosed; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const bool repeats = axis > 0 && pid.pid->Kp[i] == pid.pid->Kp[i - 1] &&
+                         pid.pid->Kd[i] == pid.pid->Kd[i - 1] && pid.pid->Ki[i] == pid.pid->Ki[i - 1] &&
+                         pid.integrator_limit_m_s[i] == pid.integrator_limit_m_s[i - 1] &&
+                         (axis < 2 || pid.attitude_lag_s == 0) &&
+                         source.axis[axis] == source.axis[axis - 1] &&
+                         source.bias_N[axis] == source.bias_N[axis - 1];
+    if (repeats) {
+      result.enclosed_m[i] = result.enclosed_m[i - 1];
+      continue;
+    }
+    const double both = std::max(enclosed(setup, pid, box, source, axis, Channel::kForce),
+                                 enclosed(setup, pid, box, source, axis, Channel::kCommand));
+    result.enclosed_m[i] = std::isfinite(both) ? both + float32.tracking_error_m[i] : kInfinity;
+  }
+  return result;
+}
+
+}  // namespace swarmcert::gate

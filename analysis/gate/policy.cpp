@@ -1,0 +1,140 @@
+#include "analysis/gate/policy.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/toml.h"
+#include "stability/model.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using files::TomlTable;
+
+constexpr char kSchema[] = "swarmcert/policy/1";
+
+/// Of the policy's folder, unless it is absolute.
+std::string resolve(const std::string& policy, const std::string& path) {
+  return (std::filesystem::path(policy).parent_path() / path).lexically_normal().string();
+}
+
+Release read_release(const TomlTable& table, const std::string& policy) {
+  table.allow_only({"network", "phi", "rho", "key", "precision", "certificate", "box", "gains", "model",
+                    "source", "elf", "facts", "swarm", "vehicles", "columns", "flights", "battery_V",
+                    "feed_forward"});
+  Release release;
+  const auto file = [&](const char* key) {
+    if (!table.has(key)) return std::string();
+    if (table.text(key).empty()) table.refuse(key, "\"\"", "names no file");
+    return resolve(policy, table.text(key));
+  };
+  release.network.file = file("network");
+  release.network.phi = file("phi");
+  release.network.rho = file("rho");
+  if (table.has("key")) release.network.key = table.text("key");
+  if (release.network.phi.empty() != release.network.rho.empty())
+    table.refuse(release.network.phi.empty() ? "rho" : "phi", "", "needs both phi and rho");
+  if (!release.network.phi.empty() && !release.network.file.empty())
+    table.refuse("network", "", "stands beside phi and rho", "name one or the other");
+  if (table.has("precision")) release.is_float32 = table.choice("precision", {"float32", "float64"}) == 0;
+  release.certificate = file("certificate");
+  release.box = file("box");
+  release.gains = file("gains");
+  release.model = file("model");
+  release.source = file("source");
+  release.elf = file("elf");
+  release.facts = file("facts");
+  release.swarm = file("swarm");
+  release.vehicles = file("vehicles");
+  release.columns = file("columns");
+  if (table.has("flights")) {
+    const std::vector<std::string> words =
+        table.is_list("flights") ? table.texts("flights") : std::vector<std::string>{table.text("flights")};
+    if (words.empty()) table.refuse("flights", "[]", "names no flight");
+    for (const std::string& word : words) release.flights.push_back(resolve(policy, word));
+  }
+  if (table.has("battery_V")) release.battery_V = table.number("battery_V");
+  if (!(release.battery_V > 0)) table.refuse("battery_V", "", "must be positive");
+  if (table.has("feed_forward")) release.feed_forward = table.flag("feed_forward");
+  if (release.feed_forward && release.network.file.empty())
+    table.refuse("feed_forward", "true", "needs a network");
+  return release;
+}
+
+}  // namespace
+
+Policy read_policy(const std::string& path) {
+  const std::string text = files::read_file(path);
+  const auto document = files::parse_toml(text, path);
+  const TomlTable top(document, path);
+  if (top.text("schema") != kSchema)
+    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema));
+  std::vector<std::string> known = {"schema", "release"};
+  for (const CheckKind& kind : check_kinds()) known.emplace_back(kind.name);
+  top.allow_only(known);
+  Policy policy;
+  policy.path = path;
+  policy.release = read_release(top.table("release"), path);
+  policy.release_line = top.line("release");
+  for (const CheckKind& kind : check_kinds()) {
+    if (!top.has(kind.name)) {
+      policy.not_run.emplace_back(kind.name);
+      continue;
+    }
+    const TomlTable table = top.table(kind.name);
+    policy.checks.push_back({kind.name, table.line(), kind.read(table, policy)});
+  }
+  if (policy.checks.empty()) top.refuse("", "", "asks for no check", "add a table, such as [certificate]");
+  return policy;
+}
+
+std::optional<Limit> limit(const TomlTable& table, const std::string& key, const std::string& unit,
+                           bool is_most) {
+  if (!table.has(key)) return std::nullopt;
+  Limit result;
+  result.value = table.number(key);
+  result.line = table.line(key);
+  result.unit = unit;
+  result.is_most = is_most;
+  return result;
+}
+
+std::vector<std::string> force_keys(const std::string& stem, const std::string& suffix) {
+  return {stem + "_gf" + suffix, stem + "_N" + suffix, stem};
+}
+
+std::optional<Limit> force_limit(const TomlTable& table, const std::string& stem, const std::string& suffix,
+                                 bool is_most) {
+  std::optional<Limit> found;
+  const std::vector<std::string> keys = force_keys(stem, suffix);
+  const std::string units[] = {"gf", "N", ""};
+  const double unit_N[] = {stability::kGramForce_N, 1, 0};
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (!table.has(keys[i])) continue;
+    if (found) table.refuse(keys[i], "", "states the limit twice", "give it in one unit");
+    found = limit(table, keys[i], units[i], is_most);
+    found->unit_N = unit_N[i];
+  }
+  return found;
+}
+
+int whole_number(const TomlTable& table, const std::string& key, int otherwise) {
+  if (!table.has(key)) return otherwise;
+  const double value = table.number(key);
+  if (!(value >= 1 && value <= 1000) || value != std::floor(value))
+    table.refuse(key, "", "must be a whole number from 1 to 1000");
+  return static_cast<int>(value);
+}
+
+void require_file(const TomlTable& table, const std::string& file, const std::string& key) {
+  if (file.empty())
+    table.refuse("", "", "needs a file that [release] does not name", "add " + key + " there");
+}
+
+void refuse_without_limit(const TomlTable& table, const std::string& example) {
+  table.refuse("", "", "states no limit", "add one, such as " + example);
+}
+
+}  // namespace swarmcert::gate

@@ -1,0 +1,78 @@
+#include "stability/bounds/coupled_swarm.h"
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
+#include "nn/files/toml.h"
+
+namespace swarmcert::stability {
+namespace {
+
+std::string text_of(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+}  // namespace
+
+CoupledSwarm read_coupled_swarm(const std::string& path) {
+  const std::string text = files::read_file(path);
+  const auto document = files::parse_toml(text, path);
+  const files::TomlTable top(document, path);
+  constexpr char kSchema[] = "swarmcert/swarm/1";
+  if (top.text("schema") != kSchema) {
+    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema));
+  }
+  top.allow_only({"schema", "vehicles", "coupling"});
+  const double vehicles = top.number("vehicles");
+  if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {
+    top.refuse("vehicles", text_of(vehicles), "must be a whole number from 1 to 200");
+  }
+  CoupledSwarm swarm;
+  swarm.vehicles = static_cast<int>(vehicles);
+  for (const files::TomlTable& table : top.tables("coupling")) {
+    table.allow_only({"on", "by", "position_N_m", "velocity_N_s_m", "speed_m_s", "acceleration_m_s2",
+                      "cross_rate_N_s", "direction"});
+    const auto vehicle = [&](const char* key) {
+      const double value = table.number(key);
+      if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
+        table.refuse(key, text_of(value), "must be a vehicle from 0 to " + text_of(vehicles - 1));
+      }
+      return static_cast<int>(value);
+    };
+    const auto number = [&](const char* key) {
+      const double value = table.has(key) ? table.number(key) : 0;
+      if (value < 0) table.refuse(key, text_of(value), "must not be negative");
+      return value;
+    };
+    Coupling c{vehicle("on"),           vehicle("by"),
+               number("position_N_m"),  number("velocity_N_s_m"),
+               number("speed_m_s"),     number("acceleration_m_s2"),
+               number("cross_rate_N_s")};
+    if (table.has("direction")) c.direction = table.choice("direction", {"apart", "together"}) == 0 ? 1 : -1;
+    if (c.on == c.by) table.refuse("by", std::to_string(c.by), "is the vehicle itself");
+    swarm.couplings.push_back(c);
+  }
+  return swarm;
+}
+
+CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant) {
+  const std::optional<AxisLoop> loop = axis_loop(gains, plant, 2);
+  if (!loop) throw std::invalid_argument("Lambda or K couples the z axis to others");
+  AxisLoop acting = *loop;
+  if (const auto sampled = sampled_axis_loop(gains, plant, 2)) acting.Ki = effective_Ki(*sampled);
+  const RateGains rate = rate_gains(acting);
+  const std::vector<LoopGains> loops(static_cast<std::size_t>(swarm.vehicles),
+                                     {rate.position, rate.velocity, rate.acceleration});
+  CoupledVerdict verdict;
+  verdict.small_gain = small_gain(loops, swarm.couplings);
+  if (!verdict.small_gain.proved)
+    verdict.unstable = find_unstable_swarm(acting, swarm.vehicles, swarm.couplings);
+  return verdict;
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,36 @@
+/// @file swarm.toml: vehicles of one kind whose forces depend on each other's motion, and whether their errors stay bounded.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/small_gain.h"
+#include "stability/bounds/tracking_bounds.h"
+#include "stability/bounds/unstable_swarm.h"
+
+namespace swarmcert::stability {
+
+struct CoupledSwarm {
+  int vehicles = 0;
+  std::vector<Coupling> couplings;
+};
+
+/// Reads swarm.toml (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m,
+/// speed_m_s, acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" where the force's sign is known.
+/// @throws files::InputError with line, key, value and mend.
+CoupledSwarm read_coupled_swarm(const std::string& path);
+
+struct CoupledVerdict {
+  SmallGain small_gain;
+  /// Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
+  std::optional<UnstableSwarm> unstable;
+  bool is_refuted() const { return unstable && unstable->is_declared; }
+};
+
+/// Small gain of the z loops (continuous, command channel, the integrator as it acts when sampled) of vehicles that all
+/// have these gains.
+/// @throws std::invalid_argument if Lambda or K couples the z axis to others.
+CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant);
+
+}  // namespace swarmcert::stability

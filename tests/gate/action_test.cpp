@@ -1,0 +1,64 @@
+// The GitHub action: what its step runs, run as GitHub runs it.
+#include <gtest/gtest.h>
+
+#include "data.h"
+#include "gate/release.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::tests {
+namespace {
+
+/// The environment that action.yml gives its step, from its `env:` lines, with these inputs.
+std::string environment(const std::string& action, const std::map<std::string, std::string>& inputs) {
+  std::string words;
+  std::istringstream lines(action);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t name = line.find("GATE_"), colon = line.find(": ${{ inputs.");
+    if (name == std::string::npos || colon == std::string::npos) continue;
+    const std::size_t from = colon + 13;
+    const std::string input = line.substr(from, line.find(" }}", from) - from);
+    EXPECT_NE(action.find("\n  " + input + ":\n"), std::string::npos) << input << " is no input of the action";
+    const auto given = inputs.find(input);
+    words += line.substr(name, colon - name) + "='" + (given == inputs.end() ? "" : given->second) + "' ";
+  }
+  return words;
+}
+
+/// The shell line of the action's step.
+std::string run_line(const std::string& action) {
+  const std::size_t at = action.find("      run: '");
+  if (at == std::string::npos) return "";
+  return action.substr(at + 12, action.find("'\n", at) - at - 12);
+}
+
+TEST(GateAction, RunsAsGitHubRunsItAndLeavesAnnotationsSummaryAndBundle) {
+  const std::string action = read_text(source_path("analysis/ci/action.yml"));
+  ASSERT_FALSE(run_line(action).empty());
+  const ReleaseFolder release;
+  release.policy({{"regression", ""}, {"float32_error", ""}, {"range", ""}});
+  const std::string github = "GITHUB_ACTIONS=true GITHUB_ACTION_PATH='" + source_path("analysis/ci") +
+                             "' GITHUB_STEP_SUMMARY=summary.md GITHUB_OUTPUT=out.txt ";
+  const auto step = [&](const std::map<std::string, std::string>& inputs) {
+    return release.run("env " + github + environment(action, inputs) + "bash -c '" + run_line(action) + "'");
+  };
+  const Outcome good = step({{"policy", "policy.toml"}, {"output", "my gate"}});
+  EXPECT_EQ(good.exit_code, 0) << good.output;
+  EXPECT_EQ(good.output.find("::error"), std::string::npos) << good.output;
+  EXPECT_EQ(read_text(release / "out.txt"), "verdict=pass\n");
+  EXPECT_NE(read_text(release / "summary.md").find("| pass | certificate |"), std::string::npos);
+  for (const std::string file : {"gate.json", "gate.xml", "gate.sarif", "gate.md", "bundle/manifest.json"})
+    EXPECT_TRUE(std::filesystem::exists(release / ("my gate/" + file))) << file;
+
+  release.write_facts(70000);
+  const Outcome bad = step({{"policy", "policy.toml"}});
+  EXPECT_EQ(bad.exit_code, 1) << bad.output;
+  EXPECT_NE(bad.output.find("::error file=policy.toml,line="), std::string::npos) << bad.output;
+  EXPECT_NE(bad.output.find("title=swarmcert gate%3A firmware_facts.flash::"), std::string::npos) << bad.output;
+  EXPECT_EQ(read_text(release / "out.txt"), "verdict=pass\nverdict=fail\n");
+  EXPECT_FALSE(std::filesystem::exists(release / "gate/bundle"));
+  EXPECT_EQ(step({{"policy", "nothing.toml"}}).exit_code, 3);
+  EXPECT_NE(step({}).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
