@@ -1,3 +1,5 @@
+#include "analysis/commands/gate_command.h"
+
 #include <fmt/core.h>
 
 #include <cstdlib>
@@ -5,7 +7,6 @@
 #include <fstream>
 #include <memory>
 
-#include "analysis/commands/gate_command.h"
 #include "analysis/gate/baseline.h"
 #include "analysis/gate/bundle.h"
 #include "analysis/gate/gate.h"
@@ -161,7 +162,7 @@ Command gate_command() {
       "if all pass, 3 "
       "for\n"
       "a file that is missing or damaged, else 1. Paths in a policy are relative to it.\n\n"
-      "Example: swarmcert gate analysis/gate/policies/example.toml --baseline baseline.json --junit gate.xml",
+      "Example: swarmcert gate policy.toml --baseline baseline.json --junit gate.xml",
       [](CLI::App& app) {
         const auto options = std::make_shared<Options>();
         app.add_option("POLICY", options->policy, "policy.toml (schema swarmcert/policy/1)")->required();

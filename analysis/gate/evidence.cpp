@@ -148,6 +148,13 @@ void Evidence::load_comparison(bool with_loop) {
   arguments.columns = release().columns;
   if (release().feed_forward) arguments.network = release().network.file;
   const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  std::size_t logs = 0;
+  for (const residuals::FlightFiles& flight : inputs.found.flights) logs += flight.logs.size();
+  if (logs != static_cast<std::size_t>(release().logs)) {
+    throw files::InputError({release().flights.front(), "", "flights", std::to_string(logs) + " logs",
+                             "are not the " + std::to_string(release().logs) + " that the policy states",
+                             "restore them"});
+  }
   residuals::GainsOfKinds gains;
   if (with_loop) gains.emplace("", stability::load_gains(release().gains));
   const auto progress = [this](int done, int total) {

@@ -3,9 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
+#include "stability/bounds/sampled_bounds.h"
 #include "stability/bounds/theorem.h"
 #include "stability/float_errors.h"
 
@@ -13,8 +15,6 @@ namespace swarmcert::gate {
 namespace {
 
 using namespace stability;  // NOLINT: every name below is of that library
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// What the firmware commands as PID gains, so that the true mass may differ from the one it was told.
 bool as_pid(const TrackingSetup& setup, Gains& gains) {
@@ -46,11 +46,36 @@ std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
   return points;
 }
 
-void add_reached(const TrackingSetup& setup, const UncertainPlant& box, const DisturbanceSource& source,
-                 const double (&of_float)[3], BoxBound& result) {
-  Gains pid;
-  as_pid(setup, pid);
-  const Loop flown = pid.rate_hz > 0 ? Loop::kSampled : Loop::kContinuous;
+/// What AxisBounds::least() is for one plant: the loop that flies, at all times.
+double nominal_bound(const Gains& gains, const Plant& plant, const DisturbanceSource& source, int axis,
+                     Channel channel) {
+  const Disturbance& d = source.axis[axis];
+  const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
+  AxisBounds row;
+  if (const std::optional<SampledLoop> sampled = sampled_axis_loop(gains, plant, axis)) {
+    row.bounds = disturbance_bounds(*sampled, channel, sampled_norms(*sampled, channel, Instants::kAll), d);
+    row.clamp = clamp_bounds(*sampled, channel, d, source.bias_N[axis], limit_m_s);
+  } else {
+    const AxisLoop loop = *axis_loop(gains, plant, axis);
+    row.bounds = disturbance_bounds(loop, channel, d);
+    row.clamp = clamp_bounds(loop, channel, d, source.bias_N[axis], limit_m_s);
+  }
+  return row.least();
+}
+
+/// Whether an axis has the loop and the force error of the one before it.
+bool repeats(const Gains& pid, const DisturbanceSource& source, int axis) {
+  if (axis == 0) return false;
+  const auto i = static_cast<std::size_t>(axis);
+  return pid.pid->Kp[i] == pid.pid->Kp[i - 1] && pid.pid->Kd[i] == pid.pid->Kd[i - 1] &&
+         pid.pid->Ki[i] == pid.pid->Ki[i - 1] &&
+         pid.integrator_limit_m_s[i] == pid.integrator_limit_m_s[i - 1] &&
+         (axis < 2 || pid.attitude_lag_s == 0) && source.axis[axis] == source.axis[axis - 1] &&
+         source.bias_N[axis] == source.bias_N[axis - 1];
+}
+
+void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
+                 const DisturbanceSource& source, BoxBound& result) {
   for (const std::array<double, 4>& point : points_of(box)) {
     Gains gains = pid;
     gains.motor_lag_s = point[2];
@@ -58,15 +83,22 @@ void add_reached(const TrackingSetup& setup, const UncertainPlant& box, const Di
     Plant plant = setup.plant;
     plant.mass_kg = point[0];
     plant.thrust_scale = point[1] * setup.plant.mass_kg / point[0];
-    for (const AxisBounds& row : tracking_bounds(gains, plant, source, {}).bounds) {
-      if (row.loop != flown) continue;
-      const auto i = static_cast<std::size_t>(row.axis);
-      const double bound = row.least() + row.staircase_m + of_float[i];
-      if (bound <= result.reached_m[i]) continue;  // NaN is taken
-      result.reached_m[i] = bound;
-      result.where[i] = fmt::format(
-          "{} channel, {} loop, mass {:.4g} kg, thrust scale {:.4g}, motor lag {:.4g} s, delay {:.4g} s",
-          stability::name(row.channel), stability::name(row.loop), point[0], point[1], point[2], point[3]);
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<std::size_t>(axis);
+      if (repeats(pid, source, axis)) {
+        result.reached_m[i] = result.reached_m[i - 1];
+        result.where[i] = result.where[i - 1];
+        continue;
+      }
+      for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+        const double bound = nominal_bound(gains, plant, source, axis, channel);
+        if (bound <= result.reached_m[i]) continue;  // NaN is taken
+        result.reached_m[i] = bound;
+        result.where[i] = fmt::format(
+            "{} channel, {} loop, mass {:.4g} kg, thrust scale {:.4g}, motor lag {:.4g} s, delay {:.4g} s",
+            stability::name(channel), pid.rate_hz > 0 ? "sampled" : "continuous", point[0], point[1],
+            point[2], point[3]);
+      }
     }
   }
 }
@@ -117,24 +149,21 @@ BoxBound bound_over(const TrackingSetup& setup, const UncertainPlant& box, const
               std::numeric_limits<double>::quiet_NaN());
     return result;
   }
-  const FloatErrors float32 = float_errors(setup, tracking_bounds(setup.gains, setup.plant, source, {}));
-  add_reached(setup, box, source, float32.tracking_error_m, result);
+  add_reached(setup, pid, box, source, result);
   result.is_enclosed = pid.rate_hz == 0;
-  for (int axis = 0; axis < 3 && result.is_enclosed; ++axis) {
+  const FloatErrors float32 = float_errors(setup, tracking_bounds(setup.gains, setup.plant, {}, {}));
+  for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    const bool repeats = axis > 0 && pid.pid->Kp[i] == pid.pid->Kp[i - 1] &&
-                         pid.pid->Kd[i] == pid.pid->Kd[i - 1] && pid.pid->Ki[i] == pid.pid->Ki[i - 1] &&
-                         pid.integrator_limit_m_s[i] == pid.integrator_limit_m_s[i - 1] &&
-                         (axis < 2 || pid.attitude_lag_s == 0) &&
-                         source.axis[axis] == source.axis[axis - 1] &&
-                         source.bias_N[axis] == source.bias_N[axis - 1];
-    if (repeats) {
+    if (result.is_enclosed && repeats(pid, source, axis)) {
       result.enclosed_m[i] = result.enclosed_m[i - 1];
-      continue;
+    } else if (result.is_enclosed) {
+      result.enclosed_m[i] = std::max(enclosed(setup, pid, box, source, axis, Channel::kForce),
+                                      enclosed(setup, pid, box, source, axis, Channel::kCommand));
     }
-    const double both = std::max(enclosed(setup, pid, box, source, axis, Channel::kForce),
-                                 enclosed(setup, pid, box, source, axis, Channel::kCommand));
-    result.enclosed_m[i] = std::isfinite(both) ? both + float32.tracking_error_m[i] : kInfinity;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    result.reached_m[i] += float32.tracking_error_m[i];
+    result.enclosed_m[i] += float32.tracking_error_m[i];
   }
   return result;
 }

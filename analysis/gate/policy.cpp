@@ -22,7 +22,7 @@ std::string resolve(const std::string& policy, const std::string& path) {
 
 Release read_release(const TomlTable& table, const std::string& policy) {
   table.allow_only({"network", "phi", "rho", "key", "precision", "certificate", "box", "gains", "model",
-                    "source", "elf", "facts", "swarm", "vehicles", "columns", "flights", "battery_V",
+                    "source", "elf", "facts", "swarm", "vehicles", "columns", "flights", "logs", "battery_V",
                     "feed_forward"});
   Release release;
   const auto file = [&](const char* key) {
@@ -54,6 +54,13 @@ Release read_release(const TomlTable& table, const std::string& policy) {
         table.is_list("flights") ? table.texts("flights") : std::vector<std::string>{table.text("flights")};
     if (words.empty()) table.refuse("flights", "[]", "names no flight");
     for (const std::string& word : words) release.flights.push_back(resolve(policy, word));
+    if (!table.has("logs"))
+      table.refuse("logs", "", "is missing",
+                   "say how many logs the flights are, so that none is lost unnoticed");
+    const double logs = table.number("logs");
+    if (!(logs >= 1 && logs <= 1e6) || logs != std::floor(logs))
+      table.refuse("logs", "", "must be a whole number from 1 on");
+    release.logs = static_cast<int>(logs);
   }
   if (table.has("battery_V")) release.battery_V = table.number("battery_V");
   if (!(release.battery_V > 0)) table.refuse("battery_V", "", "must be positive");

@@ -62,7 +62,7 @@ bool appears(const std::string& shown, const std::vector<std::string>& printed, 
 
 TEST(Readme, EveryCommandWorksAndPrintsWhatIsShown) {
   const tests::ScratchFolder folder;
-  for (const std::string name : {"controller", "nn", "stability"})
+  for (const std::string name : {"analysis", "controller", "nn", "stability"})
     std::filesystem::create_directory_symlink(tests::source_path(name), folder.path() / name);
   int commands = 0;
   for (const Example& example : examples(tests::read_text(tests::source_path("README.md")))) {

@@ -17,7 +17,8 @@ std::string environment(const std::string& action, const std::map<std::string, s
     if (name == std::string::npos || colon == std::string::npos) continue;
     const std::size_t from = colon + 13;
     const std::string input = line.substr(from, line.find(" }}", from) - from);
-    EXPECT_NE(action.find("\n  " + input + ":\n"), std::string::npos) << input << " is no input of the action";
+    EXPECT_NE(action.find("\n  " + input + ":\n"), std::string::npos)
+        << input << " is no input of the action";
     const auto given = inputs.find(input);
     words += line.substr(name, colon - name) + "='" + (given == inputs.end() ? "" : given->second) + "' ";
   }
@@ -53,7 +54,8 @@ TEST(GateAction, RunsAsGitHubRunsItAndLeavesAnnotationsSummaryAndBundle) {
   const Outcome bad = step({{"policy", "policy.toml"}});
   EXPECT_EQ(bad.exit_code, 1) << bad.output;
   EXPECT_NE(bad.output.find("::error file=policy.toml,line="), std::string::npos) << bad.output;
-  EXPECT_NE(bad.output.find("title=swarmcert gate%3A firmware_facts.flash::"), std::string::npos) << bad.output;
+  EXPECT_NE(bad.output.find("title=swarmcert gate%3A firmware_facts.flash::"), std::string::npos)
+      << bad.output;
   EXPECT_EQ(read_text(release / "out.txt"), "verdict=pass\nverdict=fail\n");
   EXPECT_FALSE(std::filesystem::exists(release / "gate/bundle"));
   EXPECT_EQ(step({{"policy", "nothing.toml"}}).exit_code, 3);

@@ -12,7 +12,8 @@ namespace {
 
 /// Control characters, markup of every format, broken UTF-8, a workflow command.
 const std::string kHostile =
-    "a<b>&\"'|`]]>\x01\x1b[31m\xff\xc3\n::error::owned\r\n%0A*_{}\\<script>alert(1)</script>, line: 7 \xe2\x98\x83";
+    "a<b>&\"'|`]]>\x01\x1b[31m\xff\xc3\n::error::owned\r\n%0A*_{}\\<script>alert(1)</script>, line: 7 "
+    "\xe2\x98\x83";
 
 GateResult hostile_result() {
   GateResult result;
@@ -35,9 +36,8 @@ GateResult hostile_result() {
 }
 
 bool has_controls(const std::string& text) {
-  return std::any_of(text.begin(), text.end(), [](char c) {
-    return static_cast<unsigned char>(c) < 0x20 && c != '\n';
-  });
+  return std::any_of(text.begin(), text.end(),
+                     [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\n'; });
 }
 
 /// A reader of the XML that to_junit() writes: elements nest, attributes are quoted, no other markup.
@@ -48,7 +48,8 @@ testing::AssertionResult is_well_formed(const std::string& text) {
     const char c = text[at];
     if (c == '>' || c == '"') return testing::AssertionFailure() << "stray " << c << " at " << at;
     if (c == '&' && text.compare(at, 4, "&lt;") != 0 && text.compare(at, 4, "&gt;") != 0 &&
-        text.compare(at, 5, "&amp;") != 0 && text.compare(at, 6, "&quot;") != 0 && text.compare(at, 6, "&apos;") != 0)
+        text.compare(at, 5, "&amp;") != 0 && text.compare(at, 6, "&quot;") != 0 &&
+        text.compare(at, 6, "&apos;") != 0)
       return testing::AssertionFailure() << "bare & at " << at;
     if (c != '<') {
       ++at;
@@ -60,16 +61,19 @@ testing::AssertionResult is_well_formed(const std::string& text) {
       if (end > at && text[end] == '<') return testing::AssertionFailure() << "< inside a tag at " << end;
     }
     const std::string tag = text.substr(at + 1, end - at - 1);
-    const std::string name = tag.substr(tag[0] == '/' ? 1 : 0, tag.find_first_of(" /", 1) - (tag[0] == '/' ? 1 : 0));
+    const std::string name =
+        tag.substr(tag[0] == '/' ? 1 : 0, tag.find_first_of(" /", 1) - (tag[0] == '/' ? 1 : 0));
     if (tag[0] == '/') {
-      if (open.empty() || open.back() != name) return testing::AssertionFailure() << "</" << name << "> closes nothing";
+      if (open.empty() || open.back() != name)
+        return testing::AssertionFailure() << "</" << name << "> closes nothing";
       open.pop_back();
     } else if (tag.back() != '/') {
       open.push_back(name);
     }
     at = end + 1;
   }
-  return open.empty() ? testing::AssertionSuccess() : testing::AssertionFailure() << open.back() << " is not closed";
+  return open.empty() ? testing::AssertionSuccess()
+                      : testing::AssertionFailure() << open.back() << " is not closed";
 }
 
 int count(const std::string& text, const std::string& what) {
@@ -139,7 +143,8 @@ TEST(GateOutputs, MarkdownTerminalAndJsonKeepTheirFrameWhateverTheNamesHold) {
   for (std::string line; std::getline(lines, line);) {
     if (line.rfind("| ", 0) != 0) continue;
     int bars = 0;
-    for (std::size_t k = 0; k < line.size(); ++k) bars += line[k] == '|' && (k == 0 || line[k - 1] != '\\') ? 1 : 0;
+    for (std::size_t k = 0; k < line.size(); ++k)
+      bars += line[k] == '|' && (k == 0 || line[k - 1] != '\\') ? 1 : 0;
     EXPECT_EQ(bars, 8) << line;
     ++rows;
   }

@@ -63,7 +63,7 @@ Run read_regression(const files::TomlTable& table, Policy&) {
       check.witness = fmt::format("{}: {:.6g} before, {:.6g} now", now.name, before->second, *now.value);
     }
     if (compared == 0) {
-      check.reason = "the baseline has none of this policy's numbers";
+      fail(check, "the baseline has none of this policy's numbers");
     } else if (!missing.empty()) {
       check.value = worst;
       check.reason = "has a baseline, but no value now: " + missing;

@@ -1,0 +1,190 @@
+// Policies: what is refused, with which line and mend; and what each check's limits mean.
+#include "analysis/gate/policy.h"
+
+#include <gtest/gtest.h>
+
+#include "data.h"
+#include "gate/release.h"
+#include "nn/files/input_error.h"
+
+namespace swarmcert::tests {
+namespace {
+
+std::string refusal(const TempFolder& folder, const std::string& text) {
+  write_text(folder / "policy.toml", text);
+  try {
+    gate::read_policy(folder / "policy.toml");
+  } catch (const files::InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(GatePolicy, IsRefusedWithLineValueAndMend) {
+  const TempFolder folder;
+  const std::string head = "schema = \"swarmcert/policy/1\"\n[release]\nnetwork = \"n.toml\"\n";
+  const struct {
+    std::string text;
+    std::vector<std::string> words;
+  } cases[] = {
+      {"schema = \"swarmcert/policy/2\"\n", {"line 1", "schema", "swarmcert/policy/1"}},
+      {head, {"asks for no check"}},
+      {head + "[lipshitz]\n", {"line 4", "lipshitz", "did you mean \"lipschitz\"?"}},
+      {head + "[lipschitz]\nmax_jonit_gf = 3\n",
+       {"line 5", "max_jonit_gf", "did you mean \"max_joint_gf\"?"}},
+      {head + "[lipschitz]\n", {"line 4", "lipschitz", "states no limit", "max_joint_gf"}},
+      {head + "[lipschitz]\nmax_joint_gf = \"much\"\n", {"line 5", "must be a number"}},
+      {head + "[lipschitz]\nmax_joint_gf = nan\n", {"line 5", "must be finite"}},
+      {head + "[lipschitz]\nmax_joint_gf = 3\nmax_joint_N = 3\n", {"states the limit twice"}},
+      {head + "[certificate]\n", {"line 4", "does not name", "certificate"}},
+      {head + "[match]\n", {"line 4", "source or elf"}},
+      {head + "[certificate]\naccepted = true\n", {"line 5", "accepted", "is not a known key"}},
+      {head + "gain = \"g.toml\"\n[spectral_norms]\n", {"line 4", "gain", "did you mean \"gains\"?"}},
+      {head + "flights = [\"f\"]\n[spectral_norms]\n", {"logs", "how many"}},
+      {head + "flights = []\n[spectral_norms]\n", {"line 4", "names no flight"}},
+      {head + "gains = \"g\"\nmodel = \"m\"\n[tracking]\nmax_error_m = 0.1\n", {"line 6", "flights"}},
+      {head + "gains = \"g\"\nmodel = \"m\"\n[tracking]\nmax_error_m = 1\nrate_N_s = -1\n",
+       {"line 8", "negative"}},
+      {head + "gains = \"g\"\nmodel = \"m\"\n[tracking]\nmax_error_m = 1\nrate_N_s = 1\nguard_factor = 0.9\n",
+       {"line 9", "at least 1"}},
+      {head + "[hashes]\n\"n.toml\" = \"12\"\n", {"line 5", "SHA-256", "sha256sum"}},
+      {head + "[regression]\n", {"line 4", "max_increase_percent"}},
+      {"schema = \"swarmcert/policy/1\"\n[spectral_norms]\n", {"release", "is missing"}},
+  };
+  for (const auto& one : cases) {
+    const std::string message = refusal(folder, one.text);
+    for (const std::string& word : one.words)
+      EXPECT_NE(message.find(word), std::string::npos) << word << " in\n" << message << "\nfor\n" << one.text;
+  }
+}
+
+TEST(GatePolicy, TheExampleThatShipsIsUnderstood) {
+  const gate::Policy policy = gate::read_policy(source_path("analysis/gate/example.toml"));
+  EXPECT_GE(policy.checks.size(), 8u);
+}
+
+TEST(GateChecks, LimitsInNewtonMeanTheSameAsInGramForce) {
+  const ReleaseFolder release;
+  const auto value = [&](const std::string& table, const std::string& name) {
+    const gate::GateResult result = release.judge(release.policy_of({table}));
+    for (const gate::Check& check : result.checks)
+      if (check.name == name) return check.value.value_or(-1);
+    return -1.0;
+  };
+  const std::pair<std::string, std::string> tables[] = {{"lipschitz\nmax_joint_", "lipschitz"},
+                                                        {"float32_error\nmax_error_", "float32_error"},
+                                                        {"range\nmax_abs_force_", "range"}};
+  for (const auto& [table, name] : tables) {
+    const double gf = value(table + "gf = 1000", name), newton = value(table + "N = 1000", name);
+    EXPECT_GT(gf, 0);
+    EXPECT_GE(newton, gf * 0.00981);  // rounded up
+    EXPECT_NEAR(newton, gf * 0.00981, 1e-13 * gf);
+  }
+}
+
+TEST(GateChecks, TheGuardFactorOfTheFlightsWidensTheMeasuredBound) {
+  const ReleaseFolder release;
+  // Flown with downwash, which the model lacks: the residual pushes the loop again.
+  std::filesystem::remove_all(release / "flights");
+  const std::string source = SWARMCERT_SOURCE_DIR;
+  ASSERT_EQ(release
+                .run("swarmcert simulate swap --vehicles 2 --duration 15 -q --model " + source +
+                     "/stability/models/crazyflie-small-effects.toml --gains gains.toml -o flights/1")
+                .exit_code,
+            0);
+  const auto row_of = [&](const std::string& body) {
+    return release.judge(release.policy_of({"tracking\nmax_error_m = 10\n" + body})).checks.at(0);
+  };
+  const gate::Check measured = row_of(""), bare = row_of("guard_factor = 1"),
+                    wider = row_of("guard_factor = 3");
+  ASSERT_EQ(measured.verdict, gate::Verdict::kPass) << measured.reason << measured.witness;
+  EXPECT_GE(*measured.value, *bare.value);
+  EXPECT_NEAR(*wider.value, 3 * *bare.value, 1e-12);
+  EXPECT_NE(measured.witness.find("measured"), std::string::npos) << measured.witness;
+  EXPECT_LT(
+      *bare.value,
+      *row_of("guard_factor = 1\nquantile = \"max\"\n[tracking.uncertainty]\nmass_kg = [0.03, 0.04]").value);
+}
+
+TEST(GateChecks, AnUnstablePlantInTheBoxNeverPasses) {
+  const ReleaseFolder release;
+  const gate::GateResult result =
+      release.judge(release.policy_of({"tracking\nmax_error_m = 1000\namplitude_N = 0.01\nguard_factor = "
+                                       "1\nuncertainty = { lag_s = [0, 1] }"}));
+  EXPECT_NE(result.checks.at(0).verdict, gate::Verdict::kPass) << told(result);
+}
+
+TEST(GateChecks, ACertificateOfFloat64WeightsIsNoneOfWhatFlies) {
+  const ReleaseFolder release;
+  for (const std::string part : {"phi", "rho"}) {
+    const std::string path = release / ("network/" + part + ".safetensors");
+    files::Weights weights = files::load_weights(path);
+    weights.precision = files::Precision::kFloat64;
+    for (files::Layer& layer : weights.layers)
+      for (double& w : layer.weights) w *= 1 + 0x1p-40;
+    files::save_safetensors(weights, path, true);
+  }
+  const std::string certify = "swarmcert certify network/network.toml --nodes 0 -q --force -o cert.json";
+  ASSERT_EQ(release.run(certify).exit_code, 0);
+  gate::GateResult result = release.judge(release.policy_of({"certificate"}));
+  ASSERT_EQ(caught(result), std::vector<std::string>{"certificate"});
+  EXPECT_NE(result.checks[0].reason.find("--as float32"), std::string::npos) << result.checks[0].reason;
+  ASSERT_EQ(release.run(certify + " --as float32").exit_code, 0);
+  result = release.judge(release.policy_of({"certificate"}));
+  EXPECT_TRUE(caught(result).empty()) << told(result);
+}
+
+TEST(GateChecks, WhatRestsOnARejectedCertificateFailsUnlessThatIsJudgedByItself) {
+  const ReleaseFolder release;
+  std::string text = read_text(release / "cert.json");
+  text.replace(text.find("\"lower\": "), 9, "\"lower\": 1");
+  write_text(release / "cert.json", text);
+  const std::string limit = "lipschitz\nmax_joint_gf = 1000";
+  EXPECT_EQ(caught(release.judge(release.policy_of({limit}))), std::vector<std::string>{"lipschitz"});
+  EXPECT_EQ(caught(release.judge(release.policy_of({"certificate", limit}))),
+            std::vector<std::string>{"certificate"});
+}
+
+TEST(GateCommand, InconclusiveFailsUnlessItIsAllowed) {
+  const ReleaseFolder release;
+  // Between the slope that is attained and the bound that is proved.
+  const gate::Check check =
+      release.judge(release.policy_of({"float32_error\nmax_error_gf = 1e-12"})).checks.at(0);
+  EXPECT_EQ(check.verdict, gate::Verdict::kInconclusive);
+  EXPECT_EQ(release.run("swarmcert gate policy.toml -q").exit_code, 1);
+  EXPECT_EQ(release.run("swarmcert gate policy.toml -q --allow-inconclusive").exit_code, 0);
+  EXPECT_EQ(release.run("swarmcert gate nothing.toml -q").exit_code, 3);
+  EXPECT_EQ(release.run("swarmcert gate policy.toml -q --github --json -").exit_code, 2);
+}
+
+TEST(GateCommand, SameBytesForAnyNumberOfThreadsAndWhereverOutputGoes) {
+  const ReleaseFolder release;
+  release.policy({{"regression", ""}});
+  ASSERT_EQ(release.run("swarmcert gate policy.toml -q -j1 --json a.json").exit_code, 0);
+  ASSERT_EQ(release.run("swarmcert gate policy.toml -q -j3 --junit x.xml --json b.json").exit_code, 0);
+  EXPECT_EQ(read_text(release / "a.json"), read_text(release / "b.json"));
+}
+
+TEST(GateCommand, ABaselineIsReplacedOnlyByAReleaseThatPasses) {
+  const ReleaseFolder release;
+  release.policy();
+  const std::string command = "swarmcert gate policy.toml -q --baseline old.json";
+  EXPECT_EQ(release.run(command).exit_code, 3) << "no baseline to compare with";
+  release.write_facts(70000);
+  EXPECT_EQ(release.run(command + " --update-baseline").exit_code, 1);
+  EXPECT_FALSE(std::filesystem::exists(release / "old.json"));
+  release.write_facts(21000);
+  EXPECT_EQ(release.run(command + " --update-baseline").exit_code, 0);
+  const std::string first = read_text(release / "old.json");
+  release.write_facts(30000);  // within its limit, but 43 % worse
+  const Outcome worse = release.run(command);
+  EXPECT_EQ(worse.exit_code, 1);
+  EXPECT_NE(worse.output.find("firmware_facts.flash: 21000 before, 30000 now"), std::string::npos)
+      << worse.output;
+  EXPECT_EQ(read_text(release / "old.json"), first);
+  release.run(command + " --update-baseline");
+  EXPECT_EQ(release.run(command).exit_code, 0) << "accepted as the new baseline";
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
