@@ -12,6 +12,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <map>
 #include <regex>
 #include <system_error>
 
@@ -47,6 +48,11 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc,
   const CLI::App* scope = &app;
   for (const CLI::App* sub : app.get_subcommands()) scope = sub;
   std::vector<std::string> known;
+  if (scope == &app && argc > 1 && argv[1][0] == '-') {
+    for (const CLI::Option* option : app.get_options())
+      for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    return fmt::format("unknown option {}: {}", argv[1], swarmcert::files::did_you_mean(argv[1], known));
+  }
   if (scope == &app) {
     for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
       known.push_back(sub->get_name());
@@ -95,6 +101,24 @@ void refuse_nan(const CLI::App& command) {
   }
 }
 
+/// Two results in one file: one of them would be lost.
+void refuse_shared_output(const CLI::App& command) {
+  std::map<std::string, std::string> written_by;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const char* name :
+         {"--json", "-o", "--report", "--csv", "--fitted", "--junit", "--sarif", "--markdown", "--bundle"}) {
+      if (!option->check_name(name) || option->count() == 0) continue;
+      const std::string& path = option->results().back();
+      const std::string target =
+          path == "-" ? path : std::filesystem::weakly_canonical(std::filesystem::absolute(path)).string();
+      const auto [other, is_new] = written_by.emplace(target, name);
+      if (!is_new)
+        throw swarmcert::analysis::UsageError(
+            fmt::format("{} and {} both write {}: name two files", other->second, name, path));
+    }
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Formal verification and analysis for learned multirotor controllers.", "swarmcert");
   app.require_subcommand(1);
@@ -128,7 +152,10 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "swarmcert: {}\n", explain(app, error, argc, argv));
     return swarmcert::analysis::kUsage;
   }
-  for (const CLI::App* sub : app.get_subcommands()) refuse_nan(*sub);
+  for (const CLI::App* sub : app.get_subcommands()) {
+    refuse_nan(*sub);
+    refuse_shared_output(*sub);
+  }
   swarmcert::analysis::remember_command_line(argc, argv);
   return action(common);
 }

@@ -8,6 +8,7 @@
 #include "analysis/logs/read_log.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
+#include "nn/files/input_error.h"
 #include "nn/files/toml.h"
 #include "stability/model.h"
 
@@ -40,26 +41,79 @@ bool is_json(const std::string& path) {
   return first != std::string::npos && text[first] == '{';
 }
 
+/// A member as people read it; nothing in it can reach the terminal unescaped.
+std::string cell(const files::Json& object, const char* key) {
+  if (!object.is_object() || !object.contains(key) || object[key].is_null()) return "-";
+  const files::Json& value = object[key];
+  if (value.is_number_float()) return fmt::format("{:.10g}", value.get<double>());
+  const std::string text = value.dump();
+  return value.is_string() ? text.substr(1, text.size() - 2) : text;
+}
+
+void print_bound_row(const std::string& function, const files::Json& bound) {
+  fmt::print("  {:<22} {:<10} {:<8} {:<14} {:>14} {:<8} {:>14}  {}\n", function, cell(bound, "block"),
+             cell(bound, "domain"), cell(bound, "law"), cell(bound, "upper"), cell(bound, "upper_method"),
+             cell(bound, "lower"), cell(bound, "unit"));
+}
+
 files::Json inspect_certificate(const std::string& path, bool print) {
   const files::Json certificate = files::read_json(path, "swarmcert/certificate/1");
   files::Json bounds = files::Json::array();
-  if (print) fmt::print("{}: certificate, not checked here ('swarmcert check' does)\n", path);
+  if (print) {
+    fmt::print("{}: certificate, not checked here ('swarmcert check' does)\n", path);
+    fmt::print("  {:<22} {:<10} {:<8} {:<14} {:>14} {:<8} {:>14}  {}\n", "function", "block", "domain", "law",
+               "upper", "method", "witnessed", "unit");
+  }
   for (const files::Json& bound : certificate.value("bounds", files::Json::array())) {
     files::Json line = files::Json::object();
     for (const char* key :
          {"function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_method", "lower"}) {
       if (bound.contains(key)) line[key] = bound[key];
     }
-    if (print) fmt::print("  {}\n", line.dump());
+    if (print) print_bound_row(cell(bound, "function"), bound);
     bounds.push_back(std::move(line));
   }
   for (const files::Json& law : certificate.value("laws", files::Json::array())) {
     files::Json line = law;
     if (line.is_object()) line.erase("upper_hex");
-    if (print) fmt::print("  {}\n", line.dump());
+    if (print) print_bound_row("rho:" + cell(law, "rho") + " " + cell(law, "neighbours"), law);
     bounds.push_back(std::move(line));
   }
   return {{"file", path}, {"kind", "certificate"}, {"bounds", std::move(bounds)}};
+}
+
+/// What network.toml says beyond its weights, null where it says nothing.
+files::Json description(const files::Network& network) {
+  using Gamma = files::GammaStatement;
+  files::Json gamma, clamp;
+  if (network.gamma) {
+    gamma = {{"value", network.gamma->value},
+             {"scope", network.gamma->scope == Gamma::Scope::kLayer ? "layer" : "network"},
+             {"mode", network.gamma->mode == Gamma::Mode::kClip ? "clip" : "equal"}};
+  }
+  if (network.clamp) clamp = {{"lower", network.clamp->lower}, {"upper", network.clamp->upper}};
+  return {{"output", {{"quantity", network.output_quantity}, {"unit", network.output_unit}}},
+          {"gamma", std::move(gamma)},
+          {"input", {{"order", network.input_order}, {"clamp", std::move(clamp)}}}};
+}
+
+void print_description(const files::Network& network) {
+  if (network.path.empty()) return;
+  fmt::print("{}: output {} in {}", network.path,
+             network.output_quantity.empty() ? "not stated" : network.output_quantity,
+             network.output_unit.empty() ? "no stated unit" : network.output_unit);
+  if (network.gamma) {
+    const bool is_layer = network.gamma->scope == files::GammaStatement::Scope::kLayer;
+    const bool is_clip = network.gamma->mode == files::GammaStatement::Mode::kClip;
+    fmt::print("; gamma {} {} per {}", is_clip ? "at most" : "equal to", network.gamma->value,
+               is_layer ? "layer" : "network");
+  }
+  fmt::print("\n");
+  for (std::size_t k = 0; k < network.input_order.size(); ++k) {
+    fmt::print("  input {}: {}", k, network.input_order[k]);
+    if (network.clamp) fmt::print(", clamped to {} .. {}", network.clamp->lower[k], network.clamp->upper[k]);
+    fmt::print("\n");
+  }
 }
 
 files::Json inspect_network(const std::string& path, const std::string& key, bool print) {
@@ -67,6 +121,7 @@ files::Json inspect_network(const std::string& path, const std::string& key, boo
   arguments.file = path;
   arguments.key = key;
   const files::Network network = files::load_network(arguments);
+  if (print) print_description(network);
   files::Json parts = files::Json::object();
   for (const auto& [name, weights] : files::parts(network)) {
     parts[name] = describe(*weights);
@@ -77,7 +132,10 @@ files::Json inspect_network(const std::string& path, const std::string& key, boo
       fmt::print("  {:<10} {} -> {}\n", layer.name, layer.inputs, layer.outputs);
     }
   }
-  return {{"file", path}, {"kind", "network"}, {"networks", std::move(parts)}};
+  files::Json json = {{"file", path}, {"kind", "network"}};
+  json.update(description(network));
+  json["networks"] = std::move(parts);
+  return json;
 }
 
 bool is_model(const std::string& path) {
@@ -157,6 +215,13 @@ files::Json inspect_log(const std::string& path, const Options& options, const C
             {"checksum_failed", health.checksum_failed}}}};
 }
 
+files::Json inspect(const std::string& path, const Options& options, const CommonOptions& common) {
+  if (logs::looks_like_log(path)) return inspect_log(path, options, common);
+  if (is_model(path)) return inspect_model(path, common.prints_text());
+  return is_json(path) ? inspect_certificate(path, common.prints_text())
+                       : inspect_network(path, options.key, common.prints_text());
+}
+
 int run(const Options& options, const CommonOptions& common) {
   if (!options.csv.empty()) {
     if (options.files.size() != 1 || !logs::looks_like_log(options.files[0]))
@@ -164,22 +229,22 @@ int run(const Options& options, const CommonOptions& common) {
     if (!(options.t0_s < options.t1_s)) throw UsageError("--t0 must be before --t1");
     refuse_to_replace(common, options.csv);
   }
-  files::Json result = result_head("inspect", options.files);
-  result["files"] = files::Json::array();
+  files::Json found = files::Json::array();
+  std::vector<std::string> readable;
   for (const std::string& path : options.files) {
-    if (logs::looks_like_log(path)) {
-      result["files"].push_back(inspect_log(path, options, common));
+    try {
+      found.push_back(inspect(path, options, common));
+    } catch (const files::InputError& error) {
+      fmt::print(stderr, "swarmcert: {}\n", error.what());
+      found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
       continue;
     }
-    if (is_model(path)) {
-      result["files"].push_back(inspect_model(path, common.prints_text()));
-      continue;
-    }
-    result["files"].push_back(is_json(path) ? inspect_certificate(path, common.prints_text())
-                                            : inspect_network(path, options.key, common.prints_text()));
+    readable.push_back(path);
   }
+  files::Json result = result_head("inspect", readable);
+  result["files"] = std::move(found);
   write_result(common, result);
-  return kDone;
+  return readable.size() == options.files.size() ? kDone : kBadInput;
 }
 
 }  // namespace

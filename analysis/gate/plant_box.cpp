@@ -105,38 +105,46 @@ void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPl
 
 double times(double gain, double size) { return size == 0 ? 0 : gain * size; }  // no infinity times zero
 
+bool has_clamp(const Gains& pid, int axis) {
+  const auto i = static_cast<std::size_t>(axis);
+  return pid.pid->Ki[i] > 0 && std::isfinite(pid.integrator_limit_m_s[i]);
+}
+
+UncertainNorms norms_over(const Gains& pid, const AxisLoop& loop, const UncertainPlant& box,
+                          Channel channel) {
+  if (pid.rate_hz == 0) return uncertain_norms(loop, box, channel);
+  return uncertain_norms(SampledLoop{loop, 1 / pid.rate_hz, pid.integrator_step_s}, box, channel);
+}
+
 /// Largest bound of one axis and channel in the box.
 double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
                 const DisturbanceSource& source, int axis, Channel channel) {
-  const auto i = static_cast<std::size_t>(axis);
   Plant told = setup.plant;
   told.thrust_scale = 1;
   AxisLoop loop = *axis_loop(pid, told, axis);
   loop.lags_s.clear();
   if (axis < 2 && pid.attitude_lag_s > 0) loop.lags_s.push_back(pid.attitude_lag_s);
   loop.delay_s = 0;
-  const int evaluations = box.delay_s.to > 0 ? 100 : 1500;
   const Disturbance& d = source.axis[axis];
   const double bias = std::abs(source.bias_N[axis]);
-  const double limit_m_s = pid.integrator_limit_m_s[i];
-  const double Ki = loop.Ki;
-  if (Ki > 0 && std::isfinite(limit_m_s)) {
-    loop.Ki = 0;
-    const UncertainNorms norms = uncertain_norms(loop, box, channel, 0.01, evaluations);
-    const UncertainNorms command = channel == Channel::kCommand
-                                       ? norms
-                                       : uncertain_norms(loop, box, Channel::kCommand, 0.01, evaluations);
-    return times(norms.amplitude.upper, d.amplitude_N + bias) +
-           times(command.amplitude.upper, told.mass_kg * Ki * limit_m_s);
-  }
-  const UncertainNorms norms = uncertain_norms(loop, box, channel, 0.01, evaluations);
-  const double constant = Ki > 0 ? 0 : times(norms.amplitude.upper, bias);
+  const UncertainNorms norms = norms_over(pid, loop, box, channel);
   double least = std::min(times(norms.rate.upper, d.rate_N_s), times(norms.amplitude.upper, d.amplitude_N));
-  if (d.passes == 1) {
+  if (d.passes == 1)
     least =
         std::min({least, times(norms.edge.upper, d.variation_N), times(norms.impulse.upper, d.impulse_N_s)});
-  }
-  return least + constant;
+  const double Ki = loop.Ki;
+  if (!has_clamp(pid, axis)) return least + (Ki > 0 ? 0 : times(norms.amplitude.upper, bias));
+  // int e answers to f as e does to its integral: |int e| <= |h|_1 sup|f|, and a bias is cancelled by as much as it takes.
+  const double limit_m_s = pid.integrator_limit_m_s[static_cast<std::size_t>(axis)];
+  const double demand_m_s = times(norms.rate.upper, d.amplitude_N) +
+                            bias / (told.mass_kg * Ki * std::min(1.0, box.thrust_scale.from));
+  if (demand_m_s <= limit_m_s) return least;
+  loop.Ki = 0;
+  const UncertainNorms without = norms_over(pid, loop, box, channel);
+  const UncertainNorms command =
+      channel == Channel::kCommand ? without : norms_over(pid, loop, box, Channel::kCommand);
+  return times(without.amplitude.upper, d.amplitude_N + bias) +
+         times(command.amplitude.upper, told.mass_kg * Ki * limit_m_s);
 }
 
 }  // namespace
@@ -150,7 +158,7 @@ BoxBound bound_over(const TrackingSetup& setup, const UncertainPlant& box, const
     return result;
   }
   add_reached(setup, pid, box, source, result);
-  result.is_enclosed = pid.rate_hz == 0;
+  result.is_enclosed = pid.rate_hz == 0 || !(has_clamp(pid, 0) || has_clamp(pid, 1) || has_clamp(pid, 2));
   const FloatErrors float32 = float_errors(setup, tracking_bounds(setup.gains, setup.plant, {}, {}));
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);

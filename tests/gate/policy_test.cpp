@@ -167,7 +167,7 @@ TEST(GateCommand, SameBytesForAnyNumberOfThreadsAndWhereverOutputGoes) {
 
 TEST(GateCommand, ABaselineIsReplacedOnlyByAReleaseThatPasses) {
   const ReleaseFolder release;
-  release.policy();
+  release.policy({{"regression", "max_increase_percent = 5"}});
   const std::string command = "swarmcert gate policy.toml -q --baseline old.json";
   EXPECT_EQ(release.run(command).exit_code, 3) << "no baseline to compare with";
   release.write_facts(70000);
