@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "analysis/bound_report.h"
 #include "nn/files/input_error.h"
+#include "nn/files/parallel.h"
 #include "stability/bounds/uncertain_norms.h"
 #include "stability/bounds/verified_norms.h"
 #include "stability/bounds/verified_sampled_norms.h"
@@ -126,29 +128,54 @@ void repeat_rows(Json& rows, std::size_t count, int axis) {
 
 }  // namespace
 
-Json uncertain_json(const Tracking& input, const std::vector<std::string>& words,
+Json uncertain_json(const Tracking& input, const std::vector<std::string>& words, int jobs,
                     const std::function<void(int done, int total)>& progress) {
   const UncertainPlant plant = intervals_of(input, words);
+  const std::size_t rows_per_axis = input.gains.rate_hz > 0 ? 4 : 2;
+  const auto repeats = [&](int axis) {
+    return axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
+           is_same(fixed_part(input, axis), fixed_part(input, axis - 1));
+  };
+  struct Task {
+    int axis;
+    Channel channel;
+    Loop loop;
+  };
+  std::vector<Task> tasks;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!axis_loop(input.gains, input.plant, axis) || repeats(axis)) continue;
+    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+      tasks.push_back({axis, channel, Loop::kContinuous});
+      if (input.gains.rate_hz > 0) tasks.push_back({axis, channel, Loop::kSampled});
+    }
+  }
+  std::vector<UncertainNorms> found(tasks.size());
+  std::atomic<int> done{0};
+  const int total = static_cast<int>(tasks.size());
+  files::parallel_for(total, jobs, [&](int i) {
+    const Task& task = tasks[static_cast<std::size_t>(i)];
+    const AxisLoop fixed = fixed_part(input, task.axis);
+    UncertainNorms& norms = found[static_cast<std::size_t>(i)];
+    if (task.loop == Loop::kSampled) {
+      norms = uncertain_norms(SampledLoop{fixed, 1 / input.gains.rate_hz, input.gains.integrator_step_s},
+                              plant, task.channel);
+    } else {
+      // With a delay an evaluation takes longer by far: wider enclosures.
+      norms = plant.delay_s.to > 0 ? uncertain_norms(fixed, plant, task.channel, 0.05, 100)
+                                   : uncertain_norms(fixed, plant, task.channel);
+    }
+    progress(++done, total);
+  });
   Json gains = Json::array();
-  int done = 0;
+  std::size_t next = 0;
   for (int axis = 0; axis < 3; ++axis) {
     if (!axis_loop(input.gains, input.plant, axis)) continue;
-    if (axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
-        is_same(fixed_part(input, axis), fixed_part(input, axis - 1))) {
-      repeat_rows(gains, input.gains.rate_hz > 0 ? 4 : 2, axis);
-      progress(done += 2, 6);
+    if (repeats(axis)) {
+      repeat_rows(gains, rows_per_axis, axis);
       continue;
     }
-    const AxisLoop fixed = fixed_part(input, axis);
-    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-      gains.push_back(
-          uncertain_row(axis, channel, Loop::kContinuous, uncertain_norms(fixed, plant, channel)));
-      if (input.gains.rate_hz > 0) {
-        const SampledLoop sampled = {fixed, 1 / input.gains.rate_hz, input.gains.integrator_step_s};
-        gains.push_back(
-            uncertain_row(axis, channel, Loop::kSampled, uncertain_norms(sampled, plant, channel)));
-      }
-      progress(++done, 6);
+    for (std::size_t i = 0; i < rows_per_axis; ++i, ++next) {
+      gains.push_back(uncertain_row(axis, tasks[next].channel, tasks[next].loop, found[next]));
     }
   }
   const auto range = [](const Range& r) { return Json{r.from, r.to}; };

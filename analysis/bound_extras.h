@@ -13,7 +13,7 @@ namespace swarmcert::analysis {
 /// @param words "mass=0.032:0.037" and the like: mass (kg), thrust (ratio), lag (s), delay (s), battery (V). What is not
 ///   named varies by 5 % (mass), 10 % (thrust), 20 % (lag, delay) about the model and the gains.
 /// @throws UsageError for words that are not understood.
-files::Json uncertain_json(const Tracking& input, const std::vector<std::string>& words,
+files::Json uncertain_json(const Tracking& input, const std::vector<std::string>& words, int jobs,
                            const std::function<void(int done, int total)>& progress);
 void print_uncertain(const files::Json& uncertain);
 

@@ -58,9 +58,9 @@ int run(const Options& options, const CommonOptions& common) {
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
   if (options.is_uncertain) {
     Progress progress(common.quiet);
-    result["uncertain"] = uncertain_json(input, options.uncertain, [&progress](int done, int total) {
-      progress.show(done, total, "loops over the intervals");
-    });
+    result["uncertain"] = uncertain_json(
+        input, options.uncertain, common.jobs,
+        [&progress](int done, int total) { progress.show(done, total, "loops over the intervals"); });
   }
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);

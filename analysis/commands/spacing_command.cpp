@@ -54,6 +54,9 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
 }
 
 int run(const Options& options, const CommonOptions& common) {
+  if (options.question.steps > 1 && !(options.question.from_m < options.question.to_m)) {
+    throw UsageError("--from is a smaller height gap than --to");
+  }
   refuse_to_replace(common, common.json);
   const Tracking input = load_tracking(options.tracking);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};

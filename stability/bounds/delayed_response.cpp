@@ -13,8 +13,8 @@ namespace swarmcert::stability {
 namespace {
 
 constexpr int kTerms = 14;
-/// Longest stretch in units of 1/rate: 0.1^14/14! is far below rounding, and so a stretch has few zeros.
-constexpr double kStretch = 0.1;
+/// Longest stretch in units of 1/rate: 0.4^14/14! is below rounding, and so a stretch has few zeros.
+constexpr double kStretch = 0.4;
 /// The response has ended where a whole second of slow time stays below this part of its peak.
 constexpr double kNegligible = 1e-17;
 constexpr long kMostPieces = 20'000'000;
@@ -30,15 +30,28 @@ double rate_of(const TransferFunction& y) {
   return rate;
 }
 
-/// Derivative `order` of the Taylor polynomial p, as a polynomial.
-Polynomial derivative(const Polynomial& p, std::size_t order) {
-  Polynomial result;
-  for (std::size_t i = order; i < p.size(); ++i) {
-    double factor = p[i];
-    for (std::size_t j = 0; j < order; ++j) factor *= static_cast<double>(i - j);
-    result.push_back(factor);
-  }
+/// (i + k)! / i!: what k derivatives make of the coefficient of u^(i + k).
+double rising(std::size_t i, std::size_t k) {
+  double result = 1;
+  for (std::size_t j = 1; j <= k; ++j) result *= static_cast<double>(i + j);
   return result;
+}
+
+/// Adds `factor` times derivative `order` of p to `to`, as far as `to` reaches. No heap: this runs a million times.
+void add_derivative(const Polynomial& p, std::size_t order, double factor, Polynomial& to) {
+  for (std::size_t i = 0; i + order < p.size() && i < to.size(); ++i) {
+    to[i] += factor * p[i + order] * rising(i, order);
+  }
+}
+
+/// The first `count` derivatives of p at u, by Horner's rule for all at once.
+void derivatives_at(const Polynomial& p, double u, std::size_t count, double* out) {
+  std::fill(out, out + count, 0.0);
+  for (std::size_t i = p.size(); i-- > 0;) {
+    for (std::size_t k = count; k-- > 1;) out[k] = out[k] * u + out[k - 1];
+    out[0] = out[0] * u + p[i];
+  }
+  for (std::size_t k = 2; k < count; ++k) out[k] *= rising(0, k);
 }
 
 class Steps {
@@ -65,8 +78,7 @@ class Steps {
     Polynomial driven(terms, 0.0);  // sum_j b_j z^(j)(t - T)
     if (past_.size() == static_cast<std::size_t>(per_delay_)) {
       for (std::size_t j = 0; j < y_.feedback.size(); ++j) {
-        const Polynomial part = derivative(past_.front(), j);
-        for (std::size_t i = 0; i < part.size(); ++i) driven[i] += y_.feedback[j] * part[i];
+        add_derivative(past_.front(), j, y_.feedback[j], driven);
       }
     }
     const double leading = y_.denominator[order_];
@@ -76,24 +88,15 @@ class Steps {
       for (std::size_t k = 0; k < order_; ++k) right -= y_.denominator[k] * z[i + k] * rising(i, k);
       z[i + order_] = right / (leading * rising(i, order_));
     }
-    for (std::size_t k = 0; k < order_; ++k) state_[k] = value(derivative(z, k), length_);
+    derivatives_at(z, length_, order_, state_.data());
     past_.push_back(z);
     if (past_.size() > static_cast<std::size_t>(per_delay_)) past_.pop_front();
-    Polynomial result;
-    for (std::size_t k = 0; k < y_.numerator.size(); ++k) {
-      result = sum(std::move(result), scaled(derivative(z, k), y_.numerator[k]));
-    }
+    Polynomial result(terms, 0.0);
+    for (std::size_t k = 0; k < y_.numerator.size(); ++k) add_derivative(z, k, y_.numerator[k], result);
     return result;
   }
 
  private:
-  /// (i + k)! / i!
-  static double rising(std::size_t i, std::size_t k) {
-    double result = 1;
-    for (std::size_t j = 1; j <= k; ++j) result *= static_cast<double>(i + j);
-    return result;
-  }
-
   const TransferFunction& y_;
   std::size_t order_;
   int per_delay_ = 1;
@@ -102,9 +105,7 @@ class Steps {
   std::deque<Polynomial> past_;
 };
 
-void four_derivatives(const Polynomial& p, double u, double* out) {
-  for (std::size_t k = 0; k < 4; ++k) out[k] = value(derivative(p, k), u);
-}
+void four_derivatives(const Polynomial& p, double u, double* out) { derivatives_at(p, u, 4, out); }
 
 }  // namespace
 

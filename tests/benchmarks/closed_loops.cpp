@@ -43,18 +43,22 @@ const Model& vehicle() {
   return model;
 }
 
-Gains gains() {
-  return parse_gains(
+const Gains& gains() {
+  static const Gains read = parse_gains(
       "schema = \"swarmcert/gains/1\"\n[position]\nKp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, "
       "10]\nrate_hz = "
       "100\n[attitude]\nlaw = \"lee\"\n",
       "gains.toml");
+  return read;
 }
 
-Gains continuous_gains() {
-  Gains result = gains();
-  result.rate_hz = 0;
-  return result;
+const Gains& continuous_gains() {
+  static const Gains read = [] {
+    Gains result = gains();
+    result.rate_hz = 0;
+    return result;
+  }();
+  return read;
 }
 
 /// What one would write without this project: the sampled loop's plant under odeint's fixed-step RK4, every pair of
