@@ -12,6 +12,7 @@
 #include "lipschitz/lower_bound.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/stages.h"
+#include "nn/files/functions.h"
 
 namespace {
 

@@ -14,8 +14,10 @@
 #include "benchmarks/sdpa_export.h"
 #include "data.h"
 #include "lipschitz/checker/check.h"
+#include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/spectral_norm.h"
+#include "lipschitz/stages.h"
 #include "nn/files/functions.h"
 
 namespace {
