@@ -48,8 +48,9 @@ void branch_further(const Network& network, const std::map<std::string, Box>& do
   branch.known = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
   branch.cancelled = options.cancelled;
   if (options.progress) {
-    branch.progress = [&options, &bound, &branch](int nodes, double upper) {
-      options.progress(nodes, branch.nodes,
+    branch.progress = [&options, &bound](double share, double upper) {
+      constexpr int kSteps = 1000;
+      options.progress(static_cast<int>(share * kSteps), kSteps,
                        bound.function + " " + bound.block + " at most " + std::to_string(upper));
     };
   }
@@ -59,6 +60,18 @@ void branch_further(const Network& network, const std::map<std::string, Box>& do
   LocalBound local = local_bound(network, bound, domain.at(files::networks_of(bound.function).front()),
                                  global != nullptr ? global->t : std::vector<double>(), branch);
   bound.nodes = local.nodes;
+  LowerBoundOptions lower = options.lower;
+  lower.cancelled = options.cancelled;
+  lower.starts = std::move(local.steep_centres);
+  FoundSlope steeper = lower_bound(network, bound, options.domain, lower);
+  steeper.rounds += bound.lower.rounds;
+  const bool is_steeper = steeper.witness && (!bound.lower.witness || steeper.witness->slope.value() >
+                                                                          bound.lower.witness->slope.value());
+  if (is_steeper) {
+    bound.lower = std::move(steeper);
+  } else {
+    bound.lower.rounds = steeper.rounds;
+  }
   if (!local.proof || !(local.upper.value() < bound.upper.value())) return;
   bound.upper = local.upper;
   bound.method = UpperMethod::kBranch;

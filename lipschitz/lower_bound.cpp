@@ -80,6 +80,8 @@ SlopeWitness search_scaled(const SlopeFunction& f, const Claim& claim, SlopeSear
     search.box->lower[k] /= claim.scale[k];
     search.box->upper[k] /= claim.scale[k];
   }
+  for (Eigen::VectorXd& start : search.starts)
+    for (Eigen::Index k = 0; k < start.size(); ++k) start(k) /= claim.scale[static_cast<std::size_t>(k)];
   SlopeWitness found = search_slope(scaled, search);
   const auto back = [&](std::vector<float>& x) {
     for (std::size_t k = 0; k < x.size(); ++k) {
@@ -112,6 +114,7 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const std::ma
     search.rounds = (rounds + cases - 1) / cases;
     search.seconds = options.seconds / cases;
     search.cancelled = options.cancelled;
+    search.starts = options.starts;
     if (claim.block != "all") search.block = files::block_coordinates(network, claim.function, claim.block);
     if (claim.domain == "box") {
       search.box = domain.at(names[0]);

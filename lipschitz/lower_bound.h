@@ -1,6 +1,7 @@
 /// @file Lower bounds for the claims about NET: which function is searched, with how many neighbours and for how long.
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <cstdint>
 #include <map>
@@ -21,6 +22,7 @@ struct LowerBoundOptions {
   std::optional<int> rounds;
   double seconds = 0;  ///< per claim; stops at the end of a round; 0: no limit
   const std::atomic<bool>* cancelled = nullptr;
+  std::vector<Eigen::VectorXd> starts;  ///< as SlopeSearchOptions has them
 };
 
 /// Two points that prove a lower bound for a claim.

@@ -99,9 +99,10 @@ double power_iteration(const MatrixXd& matrix, VectorXd v, int steps) {
 
 }  // namespace
 
-RegionWalk::RegionWalk(const SearchNetwork& network, std::uint64_t seed)
+RegionWalk::RegionWalk(const SearchNetwork& network, std::uint64_t seed, const std::vector<VectorXd>& starts)
     : network_(network),
       random_(seed),
+      starts_(starts.rbegin(), starts.rend()),
       all_move_(std::all_of(network.stages.begin(), network.stages.end(),
                             [](const SearchStage& stage) { return stage.moved == stage.weights.rows(); })) {}
 
@@ -124,6 +125,14 @@ VectorXd RegionWalk::random_point() {
   return z;
 }
 
+void RegionWalk::move_to(const VectorXd& x, VectorXd& z) const {
+  for (int v = 0; v < network_.moved_variables(); ++v) {
+    const int k = network_.coordinate[static_cast<std::size_t>(v)];
+    z[v] = (x[k] - network_.centre[v]) / network_.scale[v];
+    if (network_.boxed[v]) z[v] = std::clamp(z[v], -1 + 1e-9, 1 - 1e-9);
+  }
+}
+
 void RegionWalk::start_walk() {
   queue_ = {};
   queued_.clear();
@@ -133,9 +142,11 @@ void RegionWalk::start_walk() {
   Candidate start{-1, VectorXd(), true};
   for (int i = 0; i < kStarts; ++i) {
     VectorXd z = random_point();
+    if (!starts_.empty()) move_to(starts_.back(), z);
     const double slope = local_slope(network_, z).slope;
     if (slope > start.slope) start = {slope, std::move(z), true};
   }
+  if (!starts_.empty()) starts_.pop_back();
   queue_.push(std::move(start));
 }
 

@@ -40,7 +40,10 @@ class RegionWalk {
     double slope = -1;
   };
 
-  RegionWalk(const SearchNetwork& network, std::uint64_t seed);
+  /// @param starts moved vectors at which the first walks start; the other neighbours are where the slope is steepest
+  ///   among some random places.
+  RegionWalk(const SearchNetwork& network, std::uint64_t seed,
+             const std::vector<Eigen::VectorXd>& starts = {});
 
   /// Enters up to `regions` regions, continuing the current walk and starting new ones. Stops early if `cancelled`.
   void enter(int regions, const std::atomic<bool>* cancelled);
@@ -59,6 +62,7 @@ class RegionWalk {
   };
 
   Eigen::VectorXd random_point();
+  void move_to(const Eigen::VectorXd& x, Eigen::VectorXd& z) const;
   void start_walk();
   /// Takes the steepest candidate from the queue, once evaluated; false where it was entered before.
   bool take_steepest(Eigen::VectorXd& z);
@@ -73,6 +77,7 @@ class RegionWalk {
 
   const SearchNetwork& network_;
   files::Random random_;
+  std::vector<Eigen::VectorXd> starts_;  ///< still to be used, the first one last
   bool all_move_;     ///< every neuron depends on the moved vector, so that what lies behind a facet is exact
   double reach_ = 1;  ///< R of the current walk
   std::priority_queue<Candidate> queue_;

@@ -44,6 +44,11 @@ std::vector<std::optional<Box>> check(const SlopeFunction& f, const SlopeSearchO
   check_function(f);
   if (options.rounds < 1) refuse("rounds = " + std::to_string(options.rounds) + " is below 1");
   if (!(options.seconds >= 0)) refuse("seconds = " + std::to_string(options.seconds) + " is negative");
+  for (const VectorXd& start : options.starts) {
+    if (start.size() != f.moved.network->inputs())
+      refuse("a start has " + std::to_string(start.size()) + " inputs instead of " +
+             std::to_string(f.moved.network->inputs()));
+  }
   std::vector<int> block = options.block;
   std::sort(block.begin(), block.end());
   if (std::adjacent_find(block.begin(), block.end()) != block.end()) refuse("block names a coordinate twice");
@@ -195,7 +200,7 @@ SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& opti
   if (!network.block.empty() && network.neurons() == 0) {
     try_region(network, VectorXd::Zero(network.variables()), witnesses);  // f is affine: one region
   } else if (!network.block.empty()) {
-    RegionWalk walk(network, options.seed);
+    RegionWalk walk(network, options.seed, options.starts);
     while (rounds_done < options.rounds) {
       walk.enter(kRegionsPerRound, options.cancelled);
       if (options.cancelled != nullptr && *options.cancelled) break;

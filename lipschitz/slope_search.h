@@ -1,6 +1,7 @@
 /// @file Search for a steep pair of points: the lower bounds on Lipschitz constants.
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -30,6 +31,9 @@ struct SlopeSearchOptions {
   std::vector<std::optional<Box>> other_boxes;
   std::vector<int> block;  ///< coordinates of x that move; empty: all
 
+  /// Points x where the first walks start instead of at random ones, [inputs of the moved network] each.
+  std::vector<Eigen::VectorXd> starts;
+
   const std::atomic<bool>* cancelled =
       nullptr;  ///< ends the search early, with a valid witness of what was found
   /// Called after each round with the steepest slope so far.
@@ -51,8 +55,8 @@ struct SlopeWitness : SlopePoints {
 /// Where f does not depend on the block, and where the boxes hold no two float32 points that differ in the block only,
 /// the slope is 0; in the latter case there are no points either (x and y are empty).
 /// @throws std::invalid_argument if the function's sizes do not fit, rounds < 1, seconds is negative or NaN, a box
-///   has the wrong size, is empty, NaN or open to one side only, other_boxes is missing or has the wrong size, or
-///   block names a coordinate twice or one that does not exist.
+///   has the wrong size, is empty, NaN or open to one side only, other_boxes is missing or has the wrong size, a start
+///   has the wrong size, or block names a coordinate twice or one that does not exist.
 SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& options = {});
 
 }  // namespace swarmcert::lipschitz

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <memory>
 #include <queue>
 
@@ -22,9 +25,9 @@ constexpr double kStateMargin = 1e-9;
 constexpr double kRhoMargin = 1e-8;
 /// A part gets multipliers of its own once its undecided neurons are fewer than this share of those for which the
 /// inherited ones were computed.
-constexpr double kLazy = 0.75;
-/// Programs are solved this well: what is lost weighs less than what the next halving gains.
-constexpr double kGap = 1e-2;
+constexpr double kLazy = 0.97;
+/// Programs are solved this well: the next one starts where this one stopped.
+constexpr double kGap = 0.1;
 /// A program starts at the inherited multipliers, drawn this far towards a point well inside.
 constexpr double kInwards = 0.01;
 
@@ -52,15 +55,17 @@ class Search {
     Part root = part(box_, nullptr, 0);
     solve(root);
     queue.push(std::move(root));
-    const double enough = options_.known * (1 + options_.tolerance);
-    const auto expired = [&] {
-      return options_.seconds > 0 &&
-             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >
-                 options_.seconds;
+    const auto enough = [&] {
+      const double attained = std::max(options_.known, std::sqrt(chain_.unscaled_rho(steepest())));
+      return attained * (1 + options_.tolerance);
     };
-    while (result_.nodes + 2 <= options_.nodes && !expired() &&
+    const auto share_of_time = [&] {
+      const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+      return options_.seconds > 0 ? elapsed.count() / options_.seconds : 0;
+    };
+    while (result_.nodes + 2 <= options_.nodes && share_of_time() < 1 &&
            !(options_.cancelled != nullptr && *options_.cancelled)) {
-      if (bound(queue.top()) <= enough) break;
+      if (bound(queue.top()) <= enough()) break;
       Part top = queue.top();
       queue.pop();
       if (top.undecided < kLazy * top.undecided_then) {
@@ -82,13 +87,17 @@ class Search {
         queue.push(part(half, &top, index));
       }
       nodes_[static_cast<std::size_t>(top.index)].first_child = static_cast<int>(nodes_.size()) - 2;
-      if (options_.progress && result_.nodes % 256 < 2) options_.progress(result_.nodes, bound(queue.top()));
+      if (options_.progress && result_.nodes % 256 < 2) {
+        const double share = std::max(share_of_time(), 1.0 * result_.nodes / options_.nodes);
+        options_.progress(std::min(share, 1.0), bound(queue.top()));
+      }
     }
     const double rho = queue.top().rho * (1 + kRhoMargin);
     result_.tree.rho = chain_.unscaled_rho(rho);
     for (; !queue.empty(); queue.pop())
       nodes_[static_cast<std::size_t>(queue.top().index)].multipliers = queue.top().multipliers;
     write_preorder(0);
+    for (const auto& [slope, centre] : steep_) result_.steep_centres.push_back(centre);
     return std::move(result_);
   }
 
@@ -99,8 +108,22 @@ class Search {
 
   double bound(const Part& part) const { return std::sqrt(chain_.unscaled_rho(part.rho)); }
 
+  /// The largest squared slope at a centre so far, in the chain's units.
+  double steepest() const { return steep_.empty() ? 0 : steep_.begin()->first; }
+
+  void look_at_centre(const Box& box) {
+    VectorXd centre(chain_.inputs());
+    for (Index j = 0; j < centre.size(); ++j) {
+      const auto k = static_cast<std::size_t>(j);
+      centre(j) = box.lower[k] + (box.upper[k] - box.lower[k]) / 2;
+    }
+    steep_.emplace(chain_.squared_slope(centre), centre);
+    if (steep_.size() > kSteepCentres) steep_.erase(std::prev(steep_.end()));
+  }
+
   Part part(const Box& box, const Part* parent, int index) {
     ++result_.nodes;
+    look_at_centre(box);
     Part part;
     part.index = index;
     std::vector<MatrixXd> slopes;
@@ -229,6 +252,7 @@ class Search {
   std::vector<TreeNode> nodes_;
   std::vector<VectorXd> scaled_;  ///< multipliers in the chain's units
   VectorXd interior_;
+  std::multimap<double, VectorXd, std::greater<>> steep_;  ///< centres by their squared slope
   BranchResult result_;
 };
 

@@ -1,6 +1,7 @@
 /// @file Branch and bound for the Lipschitz constant on a box: halve the box where that decides neurons.
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <functional>
 #include <vector>
@@ -27,18 +28,23 @@ struct BranchOptions {
   double known = 0;         ///< a Lipschitz constant that is attained: no need to go below
   double tolerance = 1e-3;  ///< stop when the bound is within this of `known`, relatively
   const std::atomic<bool>* cancelled = nullptr;
-  /// After every so many nodes: boxes looked at, bound so far.
-  std::function<void(int nodes, double bound)> progress;
+  /// After every so many nodes: share of the nodes or of the time that is used up, bound so far.
+  std::function<void(double share, double bound)> progress;
 };
 
 struct BranchResult {
   BranchTree tree;
   int nodes = 0;  ///< boxes looked at
+  /// Centres of boxes, by falling slope at the centre, at most kSteepCentres: where a search for lower bounds may start.
+  std::vector<Eigen::VectorXd> steep_centres;
 };
+
+inline constexpr std::size_t kSteepCentres = 8;
 
 /// Best-first search. Each box bounds its neurons by linear relaxation (Reach), takes out those that it decides, and
 /// inherits the multipliers of an ancestor; the box that dominates gets multipliers of its own once enough of its
-/// neurons are decided, and is halved otherwise. The result depends on the options only, not on the machine's load
+/// neurons are decided, and is halved otherwise. The slope at each box's centre says how far the bound can fall at most.
+/// The result depends on the options only, not on the machine's load
 /// (seconds unset). It can be used whenever the search stops.
 BranchResult branch(const LocalChain& chain, const Box& box, const BranchOptions& options);
 

@@ -53,6 +53,7 @@ LocalBound local_bound(const files::Network& network, const Claim& claim, const 
       local_chain(reach_network(*files::parts(network).at(names.front())), q, f.coordinates, f.weight);
   BranchResult found = branch(chain, box, options);
   result.nodes = found.nodes;
+  result.steep_centres = std::move(found.steep_centres);
   proof.tree.tree = preorder(found.tree);
   proof.tree.multipliers = std::move(found.tree.multipliers);
   // The search rounds, the checker rounds otherwise: where a part is lost to that, a little more is claimed.

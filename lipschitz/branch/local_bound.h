@@ -24,6 +24,7 @@ struct LocalBound {
   UpperBound upper{0};              ///< sqrt(rho), rounded up
   int nodes = 0;                    ///< boxes looked at
   long leaves = 0;
+  std::vector<Eigen::VectorXd> steep_centres;  ///< as BranchResult has them
 };
 
 /// Bound of `claim` for inputs in `box`, both ends of the slope: of a plain network or of phi; of a set function with one

@@ -23,6 +23,21 @@ double LocalChain::unscaled_multiplier(double t, std::size_t layer) const {
   return std::ldexp(t, 2 * (output_exponent - exponents[layer]));
 }
 
+double LocalChain::squared_slope(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd h = x;
+  MatrixXd jacobian = MatrixXd::Zero(inputs(), static_cast<Index>(block.size()));
+  for (std::size_t k = 0; k < block.size(); ++k) jacobian(block[k], static_cast<Index>(k)) = weight[k];
+  for (const ReachLayer& layer : hidden) {
+    h = (layer.weights * h + layer.bias).eval();
+    jacobian = (layer.weights * jacobian).eval();
+    for (Index i = 0; i < h.size(); ++i)
+      if (!(h(i) > 0)) jacobian.row(i).setZero();
+    h = h.cwiseMax(0.0);
+  }
+  const MatrixXd square = jacobian.transpose() * gram * jacobian;
+  return Eigen::SelfAdjointEigenSolver<MatrixXd>(square, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
+}
+
 LocalChain local_chain(const ReachNetwork& layers, const MatrixXd& form, const std::vector<int>& block,
                        const std::vector<double>& weight) {
   LocalChain chain;

@@ -27,6 +27,9 @@ struct LocalChain {
   /// rho of the network for rho here, and the other way round for multipliers of layer k.
   double unscaled_rho(double rho) const;
   double unscaled_multiplier(double t, std::size_t layer) const;
+
+  /// |df|^2 per |dx|^2 in the steepest direction at x [inputs], in the units of `rho` here: an estimate from below.
+  double squared_slope(const Eigen::VectorXd& x) const;
 };
 
 /// @param layers the network's layers in double, the last one without ReLU, at least two.

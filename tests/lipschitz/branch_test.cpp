@@ -142,6 +142,41 @@ TEST(LocalBound, OfADeepSetHoldsWhereverTheOtherNeighboursAre) {
   EXPECT_GT(closest, 0.3);
 }
 
+TEST(LocalBound, SteepCentresHaveTheSlopesThatDifferencesShow) {
+  std::mt19937 generator(8);
+  double closest = 0;
+  for (int i = 0; i < 10; ++i) {
+    const files::Network network = plain(tests::random_network({3, 8, 8, 2}, generator));
+    const LocalChain chain = local_chain(reach_network(*network.plain), {}, {}, {});
+    const LocalBound bound = local_bound(network, claim_of("network"), kBox, {}, boxes(200));
+    ASSERT_FALSE(bound.steep_centres.empty());
+    const files::Evaluator<double> f(*network.plain);
+    double last = std::numeric_limits<double>::infinity();
+    for (const Eigen::VectorXd& x : bound.steep_centres) {
+      const double slope = std::sqrt(chain.unscaled_rho(chain.squared_slope(x)));
+      EXPECT_LE(slope, last) << "steepest first";
+      EXPECT_LE(slope, bound.upper.value());
+      last = slope;
+      const std::vector<double> at(x.data(), x.data() + x.size());
+      for (int direction = 0; direction < 500; ++direction) {
+        std::vector<double> to = at;
+        double length = 0;
+        for (double& coordinate : to) {
+          const double step = 1e-6 * std::normal_distribution<double>()(generator);
+          coordinate += step;
+          length = std::hypot(length, step);
+        }
+        const std::vector<double> fx = f(at), fy = f(to);
+        double rise = 0;
+        for (std::size_t k = 0; k < fx.size(); ++k) rise = std::hypot(rise, fx[k] - fy[k]);
+        EXPECT_LE(rise / length, slope * (1 + 1e-6));
+        closest = std::max(closest, rise / length / slope);
+      }
+    }
+  }
+  EXPECT_GT(closest, 0.99) << "no direction came near the steepest";
+}
+
 TEST(LocalBound, SurvivesNetworksThatNeverChange) {
   const files::Network constant = plain(weights({layer(2, 3, {0, 0, 0, 0, 0, 0}), layer(1, 2, {1, 1})}));
   EXPECT_LT(proved_on(constant, kBox, 5), 1e-6);
