@@ -10,13 +10,13 @@
 
 namespace swarmcert::learning {
 
-/// Writes phi_<kind>.safetensors, rho_<kind>.safetensors and network.toml into `folder`, which exists; files of these
+/// Writes `phi_<kind>.safetensors`, `rho_<kind>.safetensors` and network.toml into `folder`, which exists; files of these
 /// names are replaced.
 /// @returns the network as read back.
 files::Network write_network(const training::Layout& layout, const training::Vector& theta,
                              const files::GammaStatement& gamma, const std::string& folder);
 
-/// Writes model-<kind>.toml for every kind with a rho: the model of `inputs` with the network in `folder` as one more
+/// Writes `model-<kind>.toml` for every kind with a rho: the model of `inputs` with the network in `folder` as one more
 /// effect.
 void write_models(const residuals::Inputs& inputs, const training::Layout& layout, const std::string& folder);
 
