@@ -22,7 +22,7 @@ std::string to_junit(const GateResult& result);
 /// error; warning for what is inconclusive where that is allowed.
 std::string to_sarif(const GateResult& result, bool allow_inconclusive);
 
-/// GitHub workflow commands: one `::error` or `::warning` per check that does not pass.
+/// GitHub workflow commands: one error or warning per check that does not pass.
 std::string to_github(const GateResult& result, bool allow_inconclusive);
 
 /// GitHub-flavoured Markdown: verdict and table.
