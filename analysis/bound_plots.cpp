@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "analysis/report.h"
 
@@ -49,9 +50,9 @@ void add_theorem_plot(Report& report, const Tracking& input, const TrackingRepor
                         ramp.empty() ? "NaN" : fmt::format("{:.8g}", ramp[static_cast<std::size_t>(i)]));
   }
   report.figure("theorem", data,
-                "set xlabel 'time (s)'\nset ylabel 'error (m)'\nset grid\nset key bottom right\n"
+                "set xlabel 'time [s]'\nset ylabel 'error [m]'\n"
                 "plot 'theorem.dat' using 1:2 with lines linewidth 2 title 'transient bound', "
-                "'' using 1:3 with lines dashtype 2 title 'ball', "
+                "'' using 1:3 with lines title 'ball', "
                 "'' using 1:4 with lines title 'z from rest under a ramp of eps'\n",
                 "The theorem's closed-form transient and its ball, for the initial error given; and the "
                 "error from rest "
@@ -88,10 +89,10 @@ void add_tube_plot(Report& report, const Tracking& input, const Disturbance& dis
   const std::string name = std::string("tube_") + axis_name(axis);
   report.figure(
       name, data,
-      "set xlabel 'time (s)'\nset ylabel 'error (m)'\nset grid\nset key bottom right\nplot '" + name +
-          ".dat' using 1:2 with lines linewidth 2 title 'tube', '' using 1:(-$2) with lines linewidth 2 "
-          "linetype 1 notitle, '' using 1:3 with lines dashtype 2 title 'bound at all times', '' using "
-          "1:(-$3) with lines dashtype 2 linetype 2 notitle, '' using 1:4 with lines title 'worst force'\n",
+      "set xlabel 'time [s]'\nset ylabel 'error [m]'\nplot '" + name +
+          ".dat' using 1:2 with lines linewidth 2 title 'tube', '' using 1:(-$2) with lines "
+          "linetype 1 notitle, '' using 1:3 with lines linetype 2 title 'bound at all times', '' using "
+          "1:(-$3) with lines linetype 2 notitle, '' using 1:4 with lines linetype 3 title 'worst force'\n",
       fmt::format("Axis {}, continuous loop, forces of at most {:.6g} N from rest: what |e| can have reached "
                   "by each time, the bound at all times, and the error under the force that is worst at the "
                   "end.",
@@ -101,8 +102,10 @@ void add_tube_plot(Report& report, const Tracking& input, const Disturbance& dis
 }  // namespace
 
 std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
-                               const TrackingReport& tracking, const std::string& folder, bool overwrite) {
+                               const TrackingReport& tracking, const files::Json& result,
+                               const std::string& folder, bool overwrite) {
   Report report("Tracking bounds");
+  report.result(result);
   report.paragraph(fmt::format("Gains {} on model {}, {} kg. Disturbance: {}.", input.gains.path,
                                input.model.path, input.plant.mass_kg, disturbance.source.kind));
   report.heading("Theorem");
@@ -120,6 +123,15 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
   report.table(
       {"axis", "channel", "loop", "rate, m per N/s", "amplitude, m/N", "edge, m/N", "impulse, m per N s"},
       rows);
+  const auto label = [](const auto& row) {
+    return fmt::format("{} {} {}", axis_name(row.axis), name(row.channel), name(row.loop));
+  };
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Bar> gains;
+  for (const ExactGains& row : tracking.exact)
+    if (std::isfinite(row.norms.amplitude)) gains.push_back({label(row), row.norms.amplitude, kNone, kNone});
+  report.bars("gains", gains, "peak gain [m/N]",
+              "Peak gains: the largest error per newton of a force error that may change at will.");
   if (!tracking.bounds.empty()) {
     report.heading("Bounds on the error, m");
     rows.clear();
@@ -131,6 +143,10 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
     report.table(
         {"axis", "channel", "loop", "rate", "amplitude", "edge", "impulse", "both", "clamp acts", "least"},
         rows);
+    std::vector<Bar> least;
+    for (const AxisBounds& row : tracking.bounds)
+      if (std::isfinite(row.least())) least.push_back({label(row), row.least(), kNone, kNone});
+    report.bars("bounds", least, "bound on the error [m]", "The smallest bound of each row above.");
     for (int axis = 0; axis < 3; ++axis) add_tube_plot(report, input, disturbance.source.axis[axis], axis);
   }
   report.heading("Rests on");

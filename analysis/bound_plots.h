@@ -8,10 +8,11 @@
 namespace swarmcert::analysis {
 
 /// Writes FOLDER/report.html; returns its path. Plots: the theorem's transient with the response to a ramp inside the
-/// ball, and per axis the response to the worst force of the amplitude class inside its tube.
+/// ball, per axis the response to the worst force of the amplitude class inside its tube, the gains and the bounds.
+/// The JSON `result` goes into the page.
 /// @throws files::InputError as Report::write().
 std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
-                               const stability::TrackingReport& report, const std::string& folder,
-                               bool overwrite);
+                               const stability::TrackingReport& report, const files::Json& result,
+                               const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

@@ -15,6 +15,7 @@ using lipschitz::Attained;
 using lipschitz::Certification;
 using lipschitz::CertifiedBound;
 using lipschitz::CertifiedLayer;
+using lipschitz::coordinate_name;
 using lipschitz::Verdict;
 
 std::string output_unit(const files::Network& network) {
@@ -61,13 +62,13 @@ Json comparison_json(const CertifiedBound& bound, const lipschitz::Comparison& c
   return json;
 }
 
-Json witness_json(const CertifiedBound& bound) {
-  if (!bound.lower.witness) return nullptr;
+Json witness_json(const lipschitz::FoundSlope& found) {
+  if (!found.witness) return nullptr;
   Json others = Json::array();
-  for (std::size_t j = 0; j < bound.lower.witness->others.size(); ++j) {
-    others.push_back({{"network", bound.lower.other_networks[j]}, {"x", bound.lower.witness->others[j]}});
+  for (std::size_t j = 0; j < found.witness->others.size(); ++j) {
+    others.push_back({{"network", found.other_networks[j]}, {"x", found.witness->others[j]}});
   }
-  return {{"x", bound.lower.witness->x}, {"y", bound.lower.witness->y}, {"others", std::move(others)}};
+  return {{"x", found.witness->x}, {"y", found.witness->y}, {"others", std::move(others)}};
 }
 
 }  // namespace
@@ -111,6 +112,40 @@ std::vector<std::string> explain(const lipschitz::Comparison& comparison, double
   return words;
 }
 
+namespace {
+
+/// A cell's box holds the two coordinates of the map; the others are the same for all cells.
+Json map_json(const files::Network& network, const lipschitz::SlopeMapOptions& options,
+              const lipschitz::SlopeMap& map) {
+  const auto [first, second] = options.coordinates;
+  const std::string names[] = {coordinate_name(network, first), coordinate_name(network, second)};
+  const auto interval = [](const lipschitz::Box& box, int k) {
+    return Json{box.lower[static_cast<std::size_t>(k)], box.upper[static_cast<std::size_t>(k)]};
+  };
+  Json others = Json::object(), cells = Json::array();
+  const lipschitz::Box& any = map.cells.front().box;
+  for (int k = 0; k < static_cast<int>(any.lower.size()); ++k) {
+    if (k != first && k != second) others[coordinate_name(network, k)] = interval(any, k);
+  }
+  for (const lipschitz::SlopeCell& cell : map.cells) {
+    cells.push_back({{"box", {{names[0], interval(cell.box, first)}, {names[1], interval(cell.box, second)}}},
+                     {"upper", cell.upper.value()},
+                     {"upper_method", cell.is_local ? "branch" : "everywhere"},
+                     {"lower", cell.lower.witness ? Json(cell.lower.witness->slope.value()) : Json()},
+                     {"lower_witness", witness_json(cell.lower)}});
+  }
+  return {{"function", map.function},
+          {"coordinates", names},
+          {"shape", options.cells},
+          {"others", std::move(others)},
+          {"norm", "l2"},
+          {"unit", files::unit(network, map.function)},
+          {"nodes", options.nodes},
+          {"cells", std::move(cells)}};
+}
+
+}  // namespace
+
 Json certify_json(const files::Network& network, const CertifyOutput& output) {
   const Certification& found = output.found;
   Json layers = Json::array();
@@ -127,7 +162,7 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
   for (std::size_t i = 0; i < found.bounds.size(); ++i) {
     const CertifiedBound& bound = found.bounds[i];
     Json json = summary(network, bound);
-    json["lower_witness"] = witness_json(bound);
+    json["lower_witness"] = witness_json(bound.lower);
     json["product_upper"] = bound.product.value();
     json["search_rounds"] = bound.lower.rounds;
     if (bound.nodes > 0) {
@@ -150,6 +185,11 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
   result["max_lipschitz"] = output.max_lipschitz > 0 ? Json(output.max_lipschitz) : Json();
   result["layers"] = std::move(layers);
   result["bounds"] = std::move(bounds);
+  if (!output.maps.empty()) {
+    result["slope_maps"] = Json::array();
+    for (const lipschitz::SlopeMap& map : output.maps)
+      result["slope_maps"].push_back(map_json(network, output.map, map));
+  }
   result["range"] = Json::array();
   for (const lipschitz::CertifiedRange& range : output.ranges)
     result["range"].push_back(range_json(network, range));

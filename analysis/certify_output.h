@@ -10,6 +10,7 @@
 #include "lipschitz/comparison.h"
 #include "lipschitz/float32_error.h"
 #include "lipschitz/range.h"
+#include "lipschitz/slope_map.h"
 #include "nn/files/json.h"
 #include "nn/files/network.h"
 
@@ -25,6 +26,8 @@ struct CertifyOutput {
   double max_lipschitz = 0;  ///< 0: no limit was given
   std::uint64_t seed = 1;
   std::string domain_file;  ///< box.toml; empty: none
+  lipschitz::SlopeMapOptions map;
+  std::vector<lipschitz::SlopeMap> maps;
 };
 
 /// What the numbers mean, in sentences.

@@ -1,17 +1,16 @@
-/// @file The report of `certify`: bounds, norms and inputs, with a plot.
+/// @file The report of `certify`: bounds, norms, slope maps and inputs, with plots.
 #pragma once
 
 #include <string>
 
-#include "lipschitz/certify.h"
-#include "nn/files/network.h"
+#include "analysis/certify_output.h"
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html and its plot; returns the path of report.html. The numbers carry the guarantees that
-/// `found` has.
+/// Writes FOLDER/report.html and its plots; returns the path of report.html. The numbers carry the guarantees that
+/// `output` has; the JSON `result` goes into the page.
 /// @throws files::InputError if the folder is not empty and `overwrite` is false.
-std::string write_certify_report(const files::Network& network, const lipschitz::Certification& found,
-                                 lipschitz::Verdict verdict, const std::string& folder, bool overwrite);
+std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
+                                 const files::Json& result, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

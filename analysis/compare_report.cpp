@@ -64,13 +64,12 @@ void add_region_plot(Report& report, const residuals::Comparison& comparison, in
   }
   const std::string name = fmt::format("over_{}", variable);
   const std::string label = residuals::variable_name(variable);
-  report.figure(
-      name, data,
-      "set key outside top right\nset grid\nset xlabel '" + label + " " + unit +
-          "'\nset ylabel 'vertical residual [gf]'\nplot '" + name +
-          ".dat' using 1:2 with linespoints pt 7 title 'mean', '' using 1:3 with linespoints pt 6 title "
-          "'root mean square', 0 lc 'gray' notitle\n",
-      "Vertical residual over " + label + ".");
+  report.figure(name, data,
+                "set xlabel '" + label + " " + unit + "'\nset ylabel 'vertical residual [gf]'\nplot '" +
+                    name +
+                    ".dat' using 1:2 with linespoints title 'mean', '' using 1:3 with linespoints title "
+                    "'root mean square', 0 lc 'gray' notitle\n",
+                "Vertical residual over " + label + ".");
 }
 
 /// Mean vertical residual by the place of the nearest neighbour.
@@ -96,10 +95,10 @@ void add_neighbour_map(Report& report, const residuals::NeighbourMap& map) {
       "stats 'neighbours.dat' using 3 nooutput\n"
       "m = abs(STATS_min) > abs(STATS_max) ? abs(STATS_min) : abs(STATS_max)\n"
       "set xlabel 'lateral distance [m]'\nset ylabel 'height of the neighbour above the vehicle [m]'\n"
-      "set cblabel 'mean vertical residual [gf]'\nset palette defined (-1 '#2040a0', 0 '#f4f4f4', 1 "
-      "'#b02020')\nset xrange [0:0.6]\nset yrange [-1:1]\n"
+      "set cblabel 'mean vertical residual [gf]'\nset palette @signed_colours\nset xrange [0:0.6]\nset "
+      "yrange [-1:1]\n"
       "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\n"
-      "plot 'neighbours.dat' using 1:2:3 with image pixels notitle\n",
+      "plot 'neighbours.dat' using 1:2:3 with image notitle\n",
       "Mean vertical residual over the place of the laterally nearest neighbour; cells of fewer than 20 "
       "records are empty.");
 }
@@ -206,8 +205,9 @@ void add_learning_error(Report& report, const residuals::LearningError& learning
 }  // namespace
 
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
-                                 const std::string& folder, bool overwrite) {
+                                 const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Model against flights");
+  report.result(result);
   for (const stability::Model& model : inputs.models) {
     std::string effects;
     for (const stability::EffectSpec& effect : model.effects)
@@ -238,7 +238,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
                     fmt::format("{:.1f} %", 100 * region.share)});
   }
   report.table({"region", "records", "RMSE", "share of all squared residual in its mean"}, rows);
-  const char* const kUnits[] = {"[m]", "[m/s]", "", "[V]", "[s]", "[degrees]"};
+  const char* const kUnits[] = {"[m]", "[m/s]", "[-]", "[V]", "[s]", "[degrees]"};
   for (int variable = 0; variable < 6; ++variable)
     add_region_plot(report, comparison, variable, kUnits[variable]);
   add_neighbour_map(report, comparison.neighbours);

@@ -4,11 +4,12 @@
 #include <string>
 
 #include "analysis/residuals/comparison.h"
+#include "nn/files/json.h"
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with plots; returns its path. @throws as Report::write().
+/// Writes FOLDER/report.html with plots and the JSON `result`; returns its path. @throws as Report::write().
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
-                                 const std::string& folder, bool overwrite);
+                                 const files::Json& result, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/report.h"
+#include "analysis/report_text.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -34,14 +35,6 @@ std::string values_of(const Missing& missing) {
   return joined(values);
 }
 
-/// Names of formulas come from users: what separates columns in gnuplot's data becomes an underscore.
-std::string as_field(std::string name) {
-  std::replace_if(
-      name.begin(), name.end(), [](unsigned char c) { return c <= ' ' || c == '"' || c == '#' || c == 127; },
-      '_');
-  return name;
-}
-
 /// @param name of the figure.
 void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& name) {
   std::vector<std::vector<std::string>> rows;
@@ -58,7 +51,7 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
                     missing.equivalence_class == missing.effect ? "" : missing.equivalence_class,
                     joined(finding.confounded_with()), missing.excitation});
     data += fmt::format("{} {} {} {} {}\n", i, 100 * drop(missing), 100 * finding.drop_interval.first,
-                        100 * finding.drop_interval.second, as_field(missing.effect));
+                        100 * finding.drop_interval.second, plot_field(missing.effect));
   }
   report.table({"effect", "RMSE [N]", "fall, 90 %", "values, 90 %", "flights cannot tell apart",
                 "these flights cannot tell it from", "what separates them"},
@@ -66,7 +59,7 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
   // Kinds come from users: figures are numbered.
   report.figure(
       name, data,
-      "set termoption noenhanced\nset grid xtics\nunset key\nset xlabel 'fall of the error [%]'\n"
+      "unset key\nset xlabel 'fall of the error [%]'\n"
       "set yrange [*:*] reverse\nset offsets 0, 0, 0.5, 0.5\nset xrange [0:*]\n"
       "plot '" +
           name + ".dat' using 2:1:3:4:ytic(5) with xerrorbars pt 7 lw 2\n",
@@ -110,9 +103,10 @@ void add_left(Report& report, const Diagnosis& diagnosis) {
 
 }  // namespace
 
-std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses, const std::string& folder,
-                                  bool overwrite) {
+std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses, const files::Json& result,
+                                  const std::string& folder, bool overwrite) {
   Report report("Which physical effect is missing");
+  report.result(result);
   for (std::size_t i = 0; i < diagnoses.size(); ++i) {
     const Diagnosis& diagnosis = diagnoses[i];
     report.heading("Vehicles of kind " + diagnosis.kind);

@@ -5,12 +5,14 @@
 #include <vector>
 
 #include "analysis/identification/diagnose.h"
+#include "nn/files/json.h"
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with the ranking of every kind of vehicle as a plot; returns its path.
+/// Writes FOLDER/report.html with the ranking of every kind of vehicle as a plot and the JSON `result`; returns its
+/// path.
 /// @throws as Report::write().
 std::string write_diagnose_report(const std::vector<identification::Diagnosis>& diagnoses,
-                                  const std::string& folder, bool overwrite);
+                                  const files::Json& result, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

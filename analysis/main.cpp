@@ -16,6 +16,7 @@
 #include <regex>
 #include <system_error>
 
+#include "analysis/command_line.h"
 #include "analysis/command_pages.h"
 #include "analysis/commands/command.h"
 #include "nn/files/input_error.h"

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -19,20 +20,44 @@ struct TimeSeries {
   std::vector<Mark> marks;
 };
 
+/// One bar with its interval; NaN for an end that is not known.
+struct Bar {
+  std::string name;  ///< may come from users
+  double value, lower, upper;
+};
+
 /// Collects text, tables and figures, then writes a folder. Text is escaped: pass it as people should read it.
+///
+/// The page loads nothing: its policy admits its own style and scripts by their hashes. It depends on what it was given
+/// and on gnuplot, not on the folder or the machine.
 class Report {
  public:
   explicit Report(std::string title);
+
+  /// The result as JSON goes into the page.
+  void result(const nlohmann::ordered_json& result);
+
+  /// The command that made it, for a shell; without: command_to_copy().
+  void made_by(const std::string& command);
 
   void heading(const std::string& text);
   void paragraph(const std::string& text);
   /// @param rows cells as text, as many per row as `header` has.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
   /// @param name   file name without ending: NAME.dat and NAME.gp are written, NAME.svg is drawn.
-  /// @param data   what the script plots; names that come from users belong here, never in the script.
-  /// @param script gnuplot commands that read 'NAME.dat'; terminal and output are set before it.
+  /// @param data   what the script plots; names that come from users belong here, as plot_field(), never in the script.
+  /// @param script gnuplot commands that read 'NAME.dat'; terminal, key, grid, line types and the palette
+  ///               viridis are set before it, `set palette @signed_colours` is one for signed values. It runs
+  ///               a second time for narrow screens, on which the variable `narrow` exists.
+  /// @param caption says in words what the plot shows: it is the plot's text for those who do not see it.
+  /// @param height of the drawing of width 800
   void figure(const std::string& name, const std::string& data, const std::string& script,
-              const std::string& caption);
+              const std::string& caption, int height = 420);
+
+  /// Horizontal bars with intervals, the first on top.
+  /// @param quantity of the axis, with its unit in brackets
+  void bars(const std::string& name, const std::vector<Bar>& bars, const std::string& quantity,
+            const std::string& caption);
 
   /// Curves with zoom, one vehicle at a time; at most once per report. Where the tool was built without dygraphs, the
   /// report says so.
@@ -46,9 +71,13 @@ class Report {
  private:
   struct Figure {
     std::string name, data, script, caption;
+    int height;
   };
+  std::string drawn(const Figure& figure, const std::string& folder) const;
+
   std::string title_;
-  bool has_script_ = false;
+  std::string result_json_, command_;
+  bool has_time_series_ = false;
   std::vector<std::string> body_;  ///< HTML; "" where the next figure goes
   std::vector<Figure> figures_;
 };

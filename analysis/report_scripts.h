@@ -1,9 +1,12 @@
-/// @file What a report's time series need, embedded at build time.
+/// @file What a report's page needs, embedded at build time.
 #pragma once
 
 #include <string_view>
 
 namespace swarmcert::analysis {
+
+extern const std::string_view kPageScript;
+extern const std::string_view kPageStyle;
 
 /// dygraphs and this project's script behind it; empty where the build found no dygraphs (package libjs-dygraphs).
 extern const std::string_view kTimeSeriesScript;

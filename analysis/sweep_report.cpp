@@ -7,6 +7,7 @@
 #include <map>
 
 #include "analysis/report.h"
+#include "analysis/report_text.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -106,21 +107,21 @@ void add_plane(Report& report, const MergedSweep& sweep, std::size_t quantity) {
   if (axes.size() > 2) axes.resize(2);
   const std::string& name = sweep.compute[quantity];
   const std::string file = "sweep_" + name;
-  std::string script = "set xlabel '" + sweep.axis_names[axes[0]] + "' noenhanced\nset key off\n";
+  std::string script = "set xlabel " + plot_string(sweep.axis_names[axes[0]]) + "\nset key off\n";
   if (is_geometric(sweep.axis_values[axes[0]])) script += "set logscale x\n";
-  const std::string label = name + " (" + unit_of(name) + ")";
+  const std::string label = name + " [" + unit_of(name) + "]";
   if (axes.size() > 1) {
     if (is_geometric(sweep.axis_values[axes[1]])) script += "set logscale y\n";
-    script += "set ylabel '" + sweep.axis_names[axes[1]] + "' noenhanced\nset cblabel '" + label +
-              "' noenhanced\nset view map\nset pm3d map corners2color c1\nset palette viridis\n"
+    script += "set ylabel " + plot_string(sweep.axis_names[axes[1]]) + "\nset cblabel " + plot_string(label) +
+              "\nset view map\nset pm3d map corners2color c1\n"
               "splot '" +
               file + ".dat' using 1:2:3 with pm3d\n";
   } else {
-    script += "set ylabel '" + label + "' noenhanced\nset grid\nplot '" + file +
-              ".dat' using 1:2 with lines linewidth 2\n";
+    script +=
+        "set ylabel " + plot_string(label) + "\nplot '" + file + ".dat' using 1:2 with lines linewidth 2\n";
   }
   report.figure(file, plane_data(sweep, axes, quantity), script,
-                label + ". White: infeasible." +
+                label + ". Empty: infeasible." +
                     (varying(sweep).size() > 2 ? " Further axes at their first value." : ""));
 }
 
@@ -128,7 +129,7 @@ void add_front(Report& report, const MergedSweep& sweep) {
   if (sweep.front.empty()) return;
   report.heading("Pareto front");
   std::vector<std::string> header = sweep.axis_names;
-  for (const std::string& name : sweep.pareto) header.push_back(name + " (" + unit_of(name) + ")");
+  for (const std::string& name : sweep.pareto) header.push_back(name + " [" + unit_of(name) + "]");
   std::vector<std::vector<std::string>> rows;
   std::string data;
   const stability::Grid grid = axes_of(sweep);
@@ -146,11 +147,11 @@ void add_front(Report& report, const MergedSweep& sweep) {
     if (rows.size() < 200) rows.push_back(std::move(row));
   }
   if (sweep.pareto.size() >= 2) {
-    report.figure(
-        "pareto", data,
-        "set xlabel '" + sweep.pareto[0] + "' noenhanced\nset ylabel '" + sweep.pareto[1] +
-            "' noenhanced\nset key off\nset grid\nplot 'pareto.dat' using 1:2 with points pointtype 7\n",
-        "Cells that no other beats in every one of the listed quantities.");
+    report.figure("pareto", data,
+                  "set xlabel " + plot_string(sweep.pareto[0] + " [" + unit_of(sweep.pareto[0]) + "]") +
+                      "\nset ylabel " + plot_string(sweep.pareto[1] + " [" + unit_of(sweep.pareto[1]) + "]") +
+                      "\nset key off\nplot 'pareto.dat' using 1:2 with points pointtype 7\n",
+                  "Cells that no other beats in every one of the listed quantities.");
   }
   report.table(header, rows);
 }
@@ -178,6 +179,9 @@ void print_sweep(const MergedSweep& sweep) {
 
 std::string write_sweep_report(const MergedSweep& sweep, const std::string& folder, bool overwrite) {
   Report report("Sweep of " + sweep.grid_path);
+  report.result(sweep_json(sweep));
+  // Whether the cells came from one run or from shards put together: the page is the same.
+  report.made_by(shell_line({"swarmcert", "sweep", sweep.grid_path, "-o", "OUTPUT"}));
   for (std::size_t q = 0; q < sweep.compute.size(); ++q) add_plane(report, sweep, q);
   add_front(report, sweep);
   const std::map<std::string, int> why = reasons(sweep);

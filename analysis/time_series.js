@@ -3,35 +3,80 @@
   'use strict';
   var box = document.getElementById('time-series');
   var all = JSON.parse(document.getElementById('time-series-data').textContent);
-  var choice = document.createElement('select');
+  // Colours of the page by name; dygraphs draws on a canvas, which knows no variables.
+  function page(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
+  // Columns of a row: time, x, y, z, z without effects.
+  var views = [
+    {title: 'vertical force: model over measurement', labels: ['measured', 'model', 'residual'],
+     colors: ['--curve-w', '--curve-z', '--curve-x'], ylabel: 'vertical force beyond thrust [gf]',
+     row: function (r) {
+       var known = r[3] !== null && r[4] !== null;
+       return [r[0], r[4], known ? r[4] - r[3] : null, r[3]];
+     }, marked: 'residual'},
+    {title: 'force residual: x, y, z', labels: ['x', 'y', 'z'], colors: ['--curve-x', '--curve-y', '--curve-z'],
+     ylabel: 'force residual [gf]', row: function (r) { return [r[0], r[1], r[2], r[3]]; }, marked: 'z'}
+  ];
+  function selection(label, names) {
+    var choice = document.createElement('select');
+    choice.setAttribute('aria-label', label);
+    names.forEach(function (name, i) {
+      var option = document.createElement('option');
+      option.value = i;
+      option.textContent = name;
+      choice.appendChild(option);
+    });
+    choice.addEventListener('change', show);
+    box.appendChild(choice);
+    return choice;
+  }
+  var which = selection('log', all.map(function (series) { return series.name; }));
+  var how = selection('view', views.map(function (view) { return view.title; }));
+  var legend = document.createElement('div');
+  legend.className = 'legend';
+  box.appendChild(legend);
   var plot = document.createElement('div');
   plot.className = 'plot';
-  box.appendChild(choice);
   box.appendChild(plot);
-  all.forEach(function (series, i) {
-    var option = document.createElement('option');
-    option.value = i;
-    option.textContent = series.name;
-    choice.appendChild(option);
-  });
+  // The legend of dygraphs needs style attributes, which the page's policy forbids; this page has its own.
+  Dygraph.PLUGINS = Dygraph.PLUGINS.filter(function (plugin) { return plugin !== Dygraph.Plugins.Legend; });
   var graph = null;
-  function show(series) {
-    if (graph) graph.destroy();
-    // dygraphs writes labels and annotations as markup: only numbers and words of this file may reach it.
-    graph = new Dygraph(plot, series.rows, {
-      labels: ['time [s]', 'x', 'y', 'z', 'z without effects'],
-      colors: ['#d08a00', '#3a8f3a', '#1f4fb4', '#b0b0b0'],
-      ylabel: 'force residual [gf]',
-      xlabel: 'time on the log [s]',
-      legend: 'always',
-      showRangeSelector: true,
-      connectSeparatedPoints: false
+  // dygraphs' own legend and labels are markup: only numbers and words of this file may reach them.
+  function tell(view, time, values) {
+    legend.textContent = '';
+    view.labels.forEach(function (label, i) {
+      var entry = document.createElement('span');
+      entry.style.color = page(view.colors[i]);
+      entry.textContent = '\u25A0 ' + label +
+          (values && values[i] !== null ? ' ' + values[i].toFixed(2) + ' gf' : '') + '   ';
+      legend.appendChild(entry);
     });
+    if (values) legend.appendChild(document.createTextNode('at ' + time.toFixed(2) + ' s'));
+  }
+  function show() {
+    if (graph) graph.destroy();
+    var series = all[Number(which.value)];
+    var view = views[Number(how.value)];
+    var rows = series.rows.map(view.row);
+    graph = new Dygraph(plot, rows, {
+      labels: ['time'].concat(view.labels),
+      colors: view.colors.map(page),
+      ylabel: view.ylabel,
+      xlabel: 'time on the log [s]',
+      axisLineColor: page('--ink'),
+      gridLineColor: page('--line'),
+      rangeSelectorPlotStrokeColor: page('--curve-w'),
+      rangeSelectorPlotFillColor: page('--line'),
+      showRangeSelector: true,
+      connectSeparatedPoints: false,
+      highlightCallback: function (event, x, points, row) { tell(view, x, rows[row].slice(1)); },
+      unhighlightCallback: function () { tell(view); }
+    });
+    tell(view);
     graph.setAnnotations(series.marks.map(function (mark) {
-      return {series: 'z', x: Number(mark.time), shortText: String(Number(mark.rank)),
+      return {series: view.marked, x: Number(mark.time), shortText: String(Number(mark.rank)),
               text: 'worst moment ' + Number(mark.rank) + ': ' + Number(mark.gf).toFixed(1) + ' gf'};
     }));
   }
-  choice.addEventListener('change', function () { show(all[Number(choice.value)]); });
-  if (all.length > 0) show(all[0]);
+  if (all.length > 0) show();
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', function () { if (graph) show(); });
 })();

@@ -21,7 +21,7 @@ void add_curve(Report& report, const learning::Run& run) {
     data += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse_gf, run.epochs[e].select_rmse_gf);
   report.figure(
       "epochs", data,
-      "set key outside top right\nset grid\nset xlabel 'epoch'\nset ylabel 'RMSE [gf]'\nset yrange [0:*]\n"
+      "set xlabel 'epoch'\nset ylabel 'RMSE [gf]'\nset yrange [0:*]\n"
       "plot 'epochs.dat' using 1:2 with lines lw 2 title 'flights to fit', '' using 1:3 with lines lw 2 "
       "title 'flights to select'\n",
       fmt::format("Error over epochs. Kept: epoch {}.", run.best_epoch + 1));
@@ -51,7 +51,7 @@ void add_histogram(Report& report, const LearningData& data, const learning::Run
     text += fmt::format("{} {} {}\n", (b - kMiddle) * kWidth_gf, share[0][b], share[1][b]);
   report.figure(
       "residuals", text,
-      "set key outside top right\nset grid\nset xlabel 'vertical force [gf]'\nset ylabel 'samples [%]'\n"
+      "set xlabel 'vertical force [gf]'\nset ylabel 'samples [%]'\n"
       "plot 'residuals.dat' using 1:2 with steps lw 2 lc 'gray' title 'without the network', '' using 1:3 "
       "with "
       "steps lw 2 title 'left by the network'\n",
@@ -84,17 +84,16 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
     text += "\n";
   }
   const std::string name = fmt::format("map_{}_{}", phi, rho);
-  report.figure(
-      name, text,
-      "set view map\nset xlabel 'neighbour to the side [m]'\nset ylabel 'neighbour above [m]'\n"
-      "set cblabel 'vertical force [gf]'\nset palette defined (0 '#2166ac', 0.5 '#f7f7f7', 1 '#b2182b')\n"
-      "stats '" +
-          name +
-          ".dat' using 3 nooutput\nm = (abs(STATS_min) > abs(STATS_max)) ? abs(STATS_min) : "
-          "abs(STATS_max)\nset cbrange [-m:m]\nset size ratio 1.2\nplot '" +
-          name + ".dat' using 1:2:3 with image notitle\n",
-      data.layout.parts()[rho].name + " with one neighbour of " + data.layout.parts()[phi].name +
-          " at rest, 0.6 m above the ground.");
+  report.figure(name, text,
+                "set view map\nset xlabel 'neighbour to the side [m]'\nset ylabel 'neighbour above [m]'\n"
+                "set cblabel 'vertical force [gf]'\nset palette @signed_colours\n"
+                "stats '" +
+                    name +
+                    ".dat' using 3 nooutput\nm = (abs(STATS_min) > abs(STATS_max)) ? abs(STATS_min) : "
+                    "abs(STATS_max)\nset cbrange [-m:m]\nset size ratio 1.2\nplot '" +
+                    name + ".dat' using 1:2:3 with image notitle\n",
+                data.layout.parts()[rho].name + " with one neighbour of " + data.layout.parts()[phi].name +
+                    " at rest, 0.6 m above the ground.");
 }
 
 }  // namespace

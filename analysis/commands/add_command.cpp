@@ -6,6 +6,7 @@
 #include "analysis/commands/effect_output.h"
 #include "analysis/commands/flight_options.h"
 #include "analysis/identification/ladder.h"
+#include "analysis/ladder_report.h"
 #include "analysis/progress.h"
 #include "nn/files/file_io.h"
 #include "nn/files/suggest.h"
@@ -18,7 +19,7 @@ using stability::LadderRow;
 
 struct Options {
   FlightOptions flights;
-  std::string effects, output;
+  std::string effects, output, report;
   bool keep_anyway = false;
 };
 
@@ -110,6 +111,13 @@ void print(const Ladder& ladder) {
   }
 }
 
+void report_ladders(const Options& options, const CommonOptions& common, const files::Json& result,
+                    const std::vector<LadderOfModel>& ladders) {
+  if (options.report.empty()) return;
+  const std::string path = write_ladder_report(ladders, result, options.report, common.force);
+  if (common.prints_text()) fmt::print("report: {}\n", path);
+}
+
 /// `add undo`: back to the model before the last accepted effect.
 int undo(const Options& options, const CommonOptions& common) {
   if (options.flights.models.size() != 1) throw UsageError("add undo takes one --model");
@@ -126,6 +134,7 @@ int undo(const Options& options, const CommonOptions& common) {
     print(model.ladder);
     fmt::print("Written: {}\n", options.output);
   }
+  report_ladders(options, common, result, {{model.path, model.ladder, model.effects}});
   return kDone;
 }
 
@@ -133,15 +142,18 @@ int undo(const Options& options, const CommonOptions& common) {
 int show(const Options& options, const CommonOptions& common) {
   files::Json result = result_head("add", options.flights.models);
   result["ladders"] = files::Json::array();
+  std::vector<LadderOfModel> ladders;
   for (const std::string& path : options.flights.models) {
     const stability::Model model = stability::read_model(path);
     result["ladders"].push_back(
         {{"model", path}, {"ladder", json_of(model.ladder)}, {"effects", json_of(model.effects)}});
+    ladders.push_back({path, model.ladder, model.effects});
     if (!common.prints_text()) continue;
     fmt::print("{}{}\n", path, model.ladder.empty() ? ": no ladder" : "");
     if (!model.ladder.empty()) print(model.ladder);
   }
   write_result(common, result);
+  report_ladders(options, common, result, ladders);
   return kDone;
 }
 
@@ -190,11 +202,17 @@ int climb(const Options& options, const CommonOptions& common) {
       fmt::print("Nothing helped: {} is not written. --keep-anyway writes it all the same.\n",
                  options.output);
   }
+  std::vector<LadderOfModel> ladders;
+  if (!ladder.earlier.empty())
+    ladders.push_back({"The model's ladder so far, on the flights of then", ladder.earlier, {}});
+  ladders.push_back({"On these flights", ladder.rows, ladder.model.effects});
+  report_ladders(options, common, result, ladders);
   return kDone;
 }
 
 int run(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   if (options.effects == "undo") return undo(options, common);
   if (options.effects == "show") return show(options, common);
   return climb(options, common);
@@ -222,6 +240,8 @@ Command add_command() {
         declare_flights(app, options->flights, false);
         app.add_option("-o,--output", options->output, "The new model.toml");
         app.add_flag("--keep-anyway", options->keep_anyway, "Add also what does not help");
+        app.add_option("--report", options->report,
+                       "Write an HTML report with the error ladder into this folder");
         return [options](const CommonOptions& common) { return run(*options, common); };
       }};
 }

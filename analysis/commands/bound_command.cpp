@@ -29,6 +29,7 @@ struct Options {
 
 int run(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   const Tracking input = load_tracking(options.tracking);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
@@ -67,7 +68,7 @@ int run(const Options& options, const CommonOptions& common) {
   if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
   std::string report_path;
   if (!options.report.empty()) {
-    report_path = write_bound_report(input, disturbance, report, options.report, common.force);
+    report_path = write_bound_report(input, disturbance, report, result, options.report, common.force);
   }
   write_result(common, result);
   if (common.prints_text()) {

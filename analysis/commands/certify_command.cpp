@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <limits>
 #include <memory>
@@ -30,6 +31,7 @@ struct Options {
   std::string blocks;
   std::string neighbours;
   std::string domain;
+  std::string map, cells;
   bool range = false;
   bool explain = false;
   double input_step = 0;
@@ -39,6 +41,7 @@ struct Options {
   double seconds = 0;
   double gamma = 0;
   double max_lipschitz = 0;
+  lipschitz::SlopeMapOptions slope_map;
   lipschitz::CertifyOptions certify;
 };
 
@@ -149,14 +152,49 @@ void add_ranges(const files::Network& network, const Options& options, CertifyOu
   output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
 }
 
+/// "dp_x_m,dp_z_m" and "12" or "12,8".
+void parse_map(const Options& options, const files::Network& network, lipschitz::SlopeMapOptions& map) {
+  const auto halves = [](const std::string& text, const char* option, const char* form) {
+    const std::size_t comma = text.find(',');
+    if (comma == std::string::npos || text.find(',', comma + 1) != std::string::npos)
+      throw UsageError(fmt::format("{} {}: {}", option, text, form));
+    return std::array<std::string, 2>{text.substr(0, comma), text.substr(comma + 1)};
+  };
+  const auto names = halves(options.map, "--map", "name two inputs, e.g. dp_x_m,dp_z_m");
+  try {
+    for (std::size_t d = 0; d < 2; ++d) map.coordinates[d] = lipschitz::map_coordinate(network, names[d]);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--map: ") + error.what());
+  }
+  if (map.coordinates[0] == map.coordinates[1]) throw UsageError("--map: name two different inputs");
+  if (options.cells.empty()) return;
+  constexpr const char* kForm = "give 2 to 200 cells along each input, e.g. 12 or 12,8";
+  const auto counts = options.cells.find(',') == std::string::npos
+                          ? std::array<std::string, 2>{options.cells, options.cells}
+                          : halves(options.cells, "--cells", kForm);
+  for (std::size_t d = 0; d < 2; ++d) {
+    int& count = map.cells[d];
+    const char* const last = counts[d].data() + counts[d].size();
+    const auto [end, error] = std::from_chars(counts[d].data(), last, count);
+    if (error != std::errc() || end != last || count < 2 || count > 200)
+      throw UsageError(fmt::format("--cells {}: {}", options.cells, kForm));
+  }
+}
+
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
   parse_blocks(options.blocks, options.certify);
   files::Network network = load_net(options.network);
   if (options.as == "float32") network = files::as_float32(std::move(network));
   if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
+  lipschitz::SlopeMapOptions map = options.slope_map;
+  if (!options.map.empty()) {
+    if (options.domain.empty()) throw UsageError("--map needs the box of --domain");
+    parse_map(options, network, map);
+  }
   if (options.gamma != 0) options.certify.gamma = files::GammaStatement{options.gamma};
   options.certify.method = options.method == "branch"    ? lipschitz::UpperMethod::kBranch
                            : options.method == "sdp"     ? lipschitz::UpperMethod::kSdp
@@ -188,11 +226,21 @@ int run(Options options, const CommonOptions& common) {
   const Certification& found = output.found;
   if (options.explain) add_comparisons(network, options.certify, output);
   if (!options.domain.empty() || options.range) add_ranges(network, options, output);
+  if (!options.map.empty()) {
+    map.domain = options.certify.domain;
+    map.seed = options.certify.lower.seed;
+    map.jobs = common.jobs;
+    map.cancelled = interrupt.flag();
+    map.progress = [&progress](int done, int total) { progress.show(done, total, "cells of the map"); };
+    output.map = map;
+    output.maps = lipschitz::slope_maps(network, found, map);
+  }
   const Verdict verdict = output.verdict = judge(found, options.max_lipschitz);
   if (!options.output.empty()) {
     files::write_file(options.output, files::to_text(certificate(network, found)), common.force);
   }
-  write_result(common, certify_json(network, output));
+  const files::Json result = certify_json(network, output);
+  write_result(common, result);
   if (common.prints_text()) {
     print_certification(network, output);
     if (options.max_lipschitz > 0)
@@ -201,7 +249,7 @@ int run(Options options, const CommonOptions& common) {
     fmt::print("verdict: {}\n", name(verdict));
   }
   if (!options.report.empty()) {
-    const std::string path = write_certify_report(network, found, verdict, options.report, common.force);
+    const std::string path = write_certify_report(network, output, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
   return verdict == Verdict::kProved ? kDone : verdict == Verdict::kRefuted ? kViolated : kInconclusive;
@@ -243,6 +291,18 @@ Command certify_command() {
             "Laws for several neighbours: a number of each kind, or a group such as small=1,large=2");
         app.add_option("--domain", options->domain,
                        "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
+        auto* map = app.add_option("--map", options->map,
+                                   "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
+                                   "by cell; the slope in a "
+                                   "cell is proved above and witnessed below, the other inputs range over "
+                                   "the box (JSON and report)");
+        app.add_option("--cells", options->cells, "Cells of --map along each input (default: 12), e.g. 12,8")
+            ->needs(map);
+        app.add_option("--cell-nodes", options->slope_map.nodes,
+                       "Boxes that branch and bound looks at, per cell of --map")
+            ->needs(map)
+            ->check(CLI::Range(1, 1000000))
+            ->capture_default_str();
         app.add_flag("--range", options->range,
                      "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it");
         app.add_option("--input-step", options->input_step,

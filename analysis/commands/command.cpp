@@ -3,22 +3,14 @@
 #include <fmt/core.h>
 
 #include <filesystem>
-#include <set>
 
+#include "analysis/command_line.h"
 #include "analysis/commands/gate_command.h"
 #include "nn/files/file_io.h"
 #include "nn/files/functions.h"
 #include "nn/files/input_error.h"
 
 namespace swarmcert::analysis {
-namespace {
-
-std::vector<std::string>& command_line() {
-  static std::vector<std::string> words;
-  return words;
-}
-
-}  // namespace
 
 const std::vector<Command>& commands() {
   static const std::vector<Command> all = {
@@ -66,37 +58,6 @@ files::Network load_net(const files::NetworkArguments& arguments) {
   return files::load_network(arguments);
 }
 
-void remember_command_line(int argc, const char* const* argv) {
-  static const std::set<std::string> with_value = {
-      "--jobs",   "-j",       "--json",  "-o",      "--output",   "--report", "--csv",
-      "--fitted", "--inject", "--junit", "--sarif", "--markdown", "--bundle"};
-  static const std::set<std::string> flags = {"-q", "--quiet", "--force", "--github"};
-  // "-j2", "-qj2", "-qj 2", "-ofile": one dash, then flags, then perhaps an option with its value.
-  const auto short_options = [](const std::string& word) {
-    if (word.size() < 3 || word[0] != '-' || word[1] == '-') return std::string::npos;
-    std::size_t at = 1;
-    while (at < word.size() && word[at] == 'q') ++at;
-    return at == word.size() || word[at] == 'j' || word[at] == 'o' ? at : std::string::npos;
-  };
-  std::vector<std::string>& words = command_line();
-  words = {"swarmcert"};
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    if (flags.count(word) == 1) continue;
-    if (with_value.count(word) == 1) {
-      ++i;
-      continue;
-    }
-    if (const std::size_t at = short_options(word); at != std::string::npos) {
-      if (at + 1 == word.size()) ++i;  // its value is the next word
-      continue;
-    }
-    const std::string before_equals = word.substr(0, word.find('='));
-    if (before_equals != word && with_value.count(before_equals) == 1) continue;
-    words.push_back(word);
-  }
-}
-
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files) {
   files::Json inputs = files::Json::array();
   for (const std::string& path : input_files) {
@@ -114,6 +75,14 @@ void refuse_to_replace(const CommonOptions& common, const std::string& path) {
   const auto status = std::filesystem::status(path);  // devices and pipes are written to, not replaced
   if (!std::filesystem::is_regular_file(status) && !std::filesystem::is_directory(status)) return;
   throw files::InputError({path, "", "", "", "the file exists", "--force replaces it"});
+}
+
+void refuse_folder(const CommonOptions& common, const std::string& folder) {
+  std::error_code ignored;
+  if (folder.empty() || common.force || !std::filesystem::exists(folder, ignored)) return;
+  if (std::filesystem::is_directory(folder, ignored) && std::filesystem::is_empty(folder, ignored)) return;
+  throw files::InputError(
+      {folder, "", "", "", "exists and is not an empty folder", "--force writes into it"});
 }
 
 void write_result(const CommonOptions& common, const files::Json& result) {

@@ -60,11 +60,12 @@ files::Network load_net(const files::NetworkArguments& arguments);
 /// without what may not change the result (--jobs, -q, --force and where output goes). `seed` is null until it is set.
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files);
 
-/// Remembers the command line for result_head().
-void remember_command_line(int argc, const char* const* argv);
-
 /// Refuses early, before work that would be lost: throws InputError if `path` exists and --force is not given.
 void refuse_to_replace(const CommonOptions& common, const std::string& path);
+
+/// The same for a folder that is to be written into: throws InputError if `folder` is there, is not an empty folder, and
+/// --force is not given. "" is no folder.
+void refuse_folder(const CommonOptions& common, const std::string& folder);
 
 /// Writes `result` where --json says, if it says.
 void write_result(const CommonOptions& common, const files::Json& result);

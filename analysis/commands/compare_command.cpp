@@ -101,6 +101,7 @@ files::Json inject(const residuals::Inputs& inputs, const std::string& folder, b
 
 int run(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   if (!options.inject.empty() &&
       !(std::filesystem::is_directory(options.inject) && std::filesystem::is_empty(options.inject)))
     refuse_to_replace(common, options.inject);
@@ -136,7 +137,7 @@ int run(const Options& options, const CommonOptions& common) {
   if (common.prints_text()) print_comparison(comparison, inputs, own ? &*own : nullptr);
   if (common.prints_text() && budget) print(*budget);
   if (!options.report.empty()) {
-    const std::string path = write_compare_report(comparison, inputs, options.report, common.force);
+    const std::string path = write_compare_report(comparison, inputs, result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (comparison.overall.statistics.samples > 0) return kDone;

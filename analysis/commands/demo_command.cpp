@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "analysis/certify_output.h"
 #include "analysis/certify_report.h"
 #include "analysis/commands/command.h"
 #include "analysis/progress.h"
@@ -33,6 +34,7 @@ int run(const Options& options, const CommonOptions& common) {
   const std::filesystem::path folder = options.output;
   const std::string certificate_path = (folder / "cert.json").string();
   refuse_to_replace(common, certificate_path);
+  refuse_folder(common, (folder / "report").string());
   std::filesystem::create_directories(folder);
 
   const auto say = [&common](const std::string& text) {
@@ -60,13 +62,15 @@ int run(const Options& options, const CommonOptions& common) {
       check::check(files::read_json(certificate_path, check::kCertificateSchema), network);
   say(fmt::format("   {}: {}", checked.accepted ? "accepted" : "rejected", checked.reason));
 
-  const std::string report = write_certify_report(network, found, lipschitz::Verdict::kProved,
-                                                  (folder / "report").string(), common.force);
-  say("3. Look at the report: " + report);
-
   files::Json result = result_head("demo", input_files(network));
   result["certificate_sha256"] = files::sha256(files::read_file(certificate_path));
   result["accepted"] = checked.accepted;
+  CertifyOutput output;
+  output.found = found;
+  output.verdict = lipschitz::Verdict::kProved;
+  const std::string report =
+      write_certify_report(network, output, result, (folder / "report").string(), common.force);
+  say("3. Look at the report: " + report);
   write_result(common, result);
   return checked.accepted ? kDone : kViolated;
 }

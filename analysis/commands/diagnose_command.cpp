@@ -159,6 +159,7 @@ files::Json json_of(const identification::Detectable& entry, const std::string& 
 
 int run(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   const residuals::Inputs inputs = read_flights(options.flights);
   files::Json result = result_head("diagnose", inputs.files());
   files::Json ranking = files::Json::array(), detectable = files::Json::array(), kinds = files::Json::array();
@@ -198,7 +199,7 @@ int run(const Options& options, const CommonOptions& common) {
   if (inconclusive) result["reason"] = reasons;
   write_result(common, result);
   if (!options.report.empty()) {
-    const std::string path = write_diagnose_report(diagnoses, options.report, common.force);
+    const std::string path = write_diagnose_report(diagnoses, result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (inconclusive) fmt::print(stderr, "inconclusive: {}\n", reasons);

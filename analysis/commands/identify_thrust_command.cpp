@@ -4,6 +4,7 @@
 
 #include "analysis/commands/command.h"
 #include "analysis/thrust_identification.h"
+#include "analysis/thrust_report.h"
 #include "controller/battery.h"
 #include "controller/mixing.h"
 
@@ -11,7 +12,7 @@ namespace swarmcert::analysis {
 namespace {
 
 struct Options {
-  std::string file;
+  std::string file, report;
   int rotors = 1;
   double confidence = 0.95;
 };
@@ -60,6 +61,8 @@ void print(const ThrustData& data, const ThrustIdentification& result) {
 }
 
 int run(const Options& options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   const ThrustData data = load_thrust_data(options.file, options.rotors);
   const ThrustIdentification result = identify_thrust(data, options.confidence);
   const bool determined = result.thrust.determined && result.pwm.determined && result.max_thrust.determined;
@@ -86,6 +89,10 @@ int run(const Options& options, const CommonOptions& common) {
   }
   if (common.prints_text()) print(data, result);
   write_result(common, json);
+  if (!options.report.empty()) {
+    const std::string path = write_thrust_report(data, result, json, options.report, common.force);
+    if (common.prints_text()) fmt::print("\nreport: {}\n", path);
+  }
   return determined ? kDone : kInconclusive;
 }
 
@@ -106,6 +113,7 @@ Command identify_thrust_command() {
             ->check(CLI::Range(1, controller::kMostRotors));
         app.add_option("--confidence", options->confidence, "Of the coefficients' intervals (default: 0.95)")
             ->check(CLI::Range(0.5, 0.9999));
+        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run(*options, common); };
       }};
 }

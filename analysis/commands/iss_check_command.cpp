@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "analysis/commands/command.h"
+#include "analysis/iss_check_report.h"
 #include "analysis/progress.h"
 #include "stability/iss_full_loop.h"
 
@@ -15,7 +16,7 @@ using stability::IssCheck;
 using stability::IssRun;
 
 struct Options {
-  std::string gains, model;
+  std::string gains, model, report;
   stability::IssOptions check;
 };
 
@@ -171,6 +172,7 @@ void print(const Options& options, const IssCheck& check, const std::vector<stab
 
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   const stability::Gains gains = stability::load_gains(options.gains);
   const stability::Model model = stability::read_model(options.model);
   Progress progress(common.quiet);
@@ -181,8 +183,13 @@ int run(Options options, const CommonOptions& common) {
   const IssCheck check = stability::check_iss(gains, model, options.check);
   const std::vector<stability::FullLoopRun> flown =
       check.cancelled ? std::vector<stability::FullLoopRun>{} : stability::fly_full_loop(gains, model, check);
-  write_result(common, result_json(options, check, flown));
+  const Json result = result_json(options, check, flown);
+  write_result(common, result);
   if (common.prints_text()) print(options, check, flown);
+  if (!options.report.empty()) {
+    const std::string path = write_iss_check_report(check, result, options.report, common.force);
+    if (common.prints_text()) fmt::print("report: {}\n", path);
+  }
   if (check.violations > 0) return kViolated;
   return check.cancelled || !check.theorem_applies ? kInconclusive : kDone;
 }
@@ -213,6 +220,7 @@ Command iss_check_command() {
                            "d_m in N/s (default: a fifth of the weight over the settling time)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--seed", options->check.seed, "Of the random disturbances (default 0)");
+            app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
             return [options](const CommonOptions& common) { return run(*options, common); };
           }};
 }

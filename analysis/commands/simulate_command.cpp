@@ -36,15 +36,6 @@ Json axes(const std::array<double, 4>& values) {
 
 std::string log_name(int vehicle, int run) { return fmt::format("cf{}_{:02}", vehicle + 1, run); }
 
-/// An output folder that is new or empty, or --force.
-void refuse_folder(const CommonOptions& common, const std::string& folder) {
-  std::error_code ignored;
-  if (common.force || !std::filesystem::exists(folder, ignored)) return;
-  if (std::filesystem::is_directory(folder, ignored) && std::filesystem::is_empty(folder, ignored)) return;
-  throw files::InputError(
-      {folder, "", "", "", "exists and is not an empty folder", "--force writes into it"});
-}
-
 Json result_json(const Options& options, const std::vector<std::string>& inputs,
                  const stability::Simulation& flown, const stability::Task& task) {
   Json result = result_head("simulate", inputs);
@@ -90,8 +81,10 @@ void print(const Options& options, const stability::Simulation& flown, const sta
   if (flown.diverged) fmt::print("  DIVERGED at {:.2f} s: the flight ends there\n", flown.end_s);
 }
 
-void write_report(const Options& options, const CommonOptions& common, const stability::Simulation& flown) {
+void write_report(const Options& options, const CommonOptions& common, const stability::Simulation& flown,
+                  const Json& result) {
   Report report(fmt::format("{} with {} vehicles", options.task, flown.vehicles.size()));
+  report.result(result);
   report.paragraph(
       "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per "
       "control "
@@ -120,8 +113,8 @@ void write_report(const Options& options, const CommonOptions& common, const sta
   const auto script = [&](const std::string& name, const std::string& columns) {
     std::string plot = each;
     plot.replace(plot.find("NAME"), 4, name);
-    return "set grid\nset xlabel 'time [s]'\nset ylabel 'height error [m]'\nset key outside\nplot " + plot +
-           " using " + columns + " with lines title sprintf('cf%d', i + 1)\n";
+    return "set xlabel 'time [s]'\nset ylabel 'height error [m]'\nplot " + plot + " using " + columns +
+           " with lines title sprintf('cf%d', i + 1)\n";
   };
   report.figure("height_error", data, script("height_error", "1:4"),
                 "Height error p_z - p_d,z of each vehicle.");
@@ -139,6 +132,7 @@ int run(Options options, const CommonOptions& common) {
                                  options.models.size(), options.vehicles));
   }
   refuse_folder(common, options.output);
+  refuse_folder(common, options.report);
   refuse_to_replace(common, common.json);
   std::vector<stability::Model> models;
   std::vector<int> kind_of;
@@ -184,8 +178,9 @@ int run(Options options, const CommonOptions& common) {
     const auto path = std::filesystem::path(options.output) / log_name(static_cast<int>(i), options.run);
     files::write_file(path.string(), stability::to_usd_log(flown.logs[i]), common.force);
   }
-  if (!options.report.empty()) write_report(options, common, flown);
-  write_result(common, result_json(options, inputs, flown, *task));
+  const Json result = result_json(options, inputs, flown, *task);
+  if (!options.report.empty()) write_report(options, common, flown, result);
+  write_result(common, result);
   if (common.prints_text()) {
     print(options, flown, *task);
     fmt::print("Logs: {}\n", (std::filesystem::path(options.output) / log_name(0, options.run)).string());

@@ -5,6 +5,7 @@
 
 #include "analysis/bound_report.h"
 #include "analysis/commands/command.h"
+#include "analysis/spacing_report.h"
 #include "analysis/tracking_input.h"
 #include "nn/files/input_error.h"
 #include "stability/bounds/spacing.h"
@@ -19,6 +20,7 @@ struct Options {
   TrackingArguments tracking;
   std::string neighbour_model;
   stability::SpacingQuestion question;
+  std::string report;
 };
 
 /// The field of `neighbour` as `model` states it, or the effect's published fit where the model has no downwash.
@@ -58,6 +60,7 @@ int run(const Options& options, const CommonOptions& common) {
     throw UsageError("--from is a smaller height gap than --to");
   }
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   const Tracking input = load_tracking(options.tracking);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   double neighbour_mass_kg = input.model.mass_kg;
@@ -101,6 +104,9 @@ int run(const Options& options, const CommonOptions& common) {
                                {"thrust_margin_N", row.thrust_margin_N}});
   }
   write_result(common, result);
+  std::string report;
+  if (!options.report.empty())
+    report = write_spacing_report(options.question, found, result, options.report, common.force);
   if (common.prints_text()) {
     fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}\n\n",
                options.question.max_error_m, options.question.neighbours, source, options.question.guard);
@@ -126,6 +132,7 @@ int run(const Options& options, const CommonOptions& common) {
           "Peaks in ten recorded swaps were 1.0 to 2.6 times what such a model predicts: --guard covers "
           "that.\n");
     }
+    if (!report.empty()) fmt::print("report: {}\n", report);
   }
   return kDone;
 }
@@ -156,6 +163,7 @@ Command spacing_command() {
             app.add_option("--to", question.to_m, "Largest height gap, m (default 0.8)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--steps", question.steps, "Rows (default 27)")->check(CLI::Range(1, 10000));
+            app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
             return [options](const CommonOptions& common) { return run(*options, common); };
           }};
 }

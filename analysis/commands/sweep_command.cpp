@@ -15,7 +15,7 @@ namespace {
 using stability::MergedSweep;
 
 struct Options {
-  std::string grid, folder, shard;
+  std::string grid, folder, shard, report;
   bool resume = false;
 };
 
@@ -34,16 +34,20 @@ void read_shard(const std::string& text, stability::SweepOptions& options) {
   options.count = static_cast<int>(count);
 }
 
+std::string report_folder(const std::string& folder, const std::string& report) {
+  return report.empty() ? (std::filesystem::path(folder) / "report").string() : report;
+}
+
 /// Writes FOLDER/sweep.json and the report; what both commands do at their end.
-int finish(const std::string& command, const std::string& folder, const std::vector<std::string>& inputs,
-           const CommonOptions& common, bool may_replace) {
+int finish(const std::string& command, const std::string& folder, const std::string& report_wanted,
+           const std::vector<std::string>& inputs, const CommonOptions& common, bool may_replace) {
   const MergedSweep sweep = stability::read_shards(folder);
   const files::Json points = sweep_json(sweep);
   const std::string path = (std::filesystem::path(folder) / "sweep.json").string();
   const std::string text = files::to_text(points);
   const bool is_there = std::filesystem::exists(path) && files::read_file(path) == text;
   if (!is_there) files::write_file(path, text, common.force || may_replace);
-  const std::string report = write_sweep_report(sweep, (std::filesystem::path(folder) / "report").string(),
+  const std::string report = write_sweep_report(sweep, report_folder(folder, report_wanted),
                                                 common.force || may_replace || is_there);
   files::Json result = result_head(command, command == "merge" ? sweep.files : inputs);
   for (const char* key : {"axes", "compute", "pareto", "points"}) result[key] = points[key];
@@ -56,6 +60,9 @@ int finish(const std::string& command, const std::string& folder, const std::vec
 
 int run_sweep(const Options& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  if (options.shard.empty() && !options.resume)
+    refuse_folder(common, report_folder(options.folder, options.report));
   const stability::Grid grid = stability::load_grid(options.grid);
   stability::SweepOptions sweep;
   read_shard(options.shard, sweep);
@@ -74,7 +81,8 @@ int run_sweep(const Options& options, const CommonOptions& common) {
                outcome.done, outcome.total, outcome.file);
     return kInconclusive;
   }
-  if (sweep.count == 1) return finish("sweep", options.folder, grid.inputs, common, options.resume);
+  if (sweep.count == 1)
+    return finish("sweep", options.folder, options.report, grid.inputs, common, options.resume);
   files::Json result = result_head("sweep", grid.inputs);
   result["shard"] = {{"file", outcome.file}, {"cells", outcome.done}};
   write_result(common, result);
@@ -99,6 +107,8 @@ Command sweep_command() {
             const auto options = std::make_shared<Options>();
             app.add_option("GRID", options->grid, "grid.toml: axes and what to compute")->required();
             app.add_option("-o,--output", options->folder, "Folder for the results")->required();
+            app.add_option("--report", options->report,
+                           "Folder for the report (default: report in that folder)");
             app.add_option(
                 "--shard", options->shard,
                 "I/N: compute only the I-th of N parts; I counts 0 .. N-1 or 1 .. N, N being the same as 0");
@@ -114,11 +124,13 @@ Command merge_command() {
       "byte.\n\n"
       "Example: swarmcert merge sweep",
       [](CLI::App& app) {
-        const auto folder = std::make_shared<std::string>();
-        app.add_option("DIR", *folder, "Folder with the shard files")->required();
-        return [folder](const CommonOptions& common) {
+        const auto options = std::make_shared<Options>();
+        app.add_option("DIR", options->folder, "Folder with the shard files")->required();
+        app.add_option("--report", options->report, "Folder for the report (default: report in that folder)");
+        return [options](const CommonOptions& common) {
           refuse_to_replace(common, common.json);
-          return finish("merge", *folder, {}, common, false);
+          refuse_folder(common, options->report);
+          return finish("merge", options->folder, options->report, {}, common, false);
         };
       }};
 }

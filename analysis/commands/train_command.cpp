@@ -155,6 +155,7 @@ void refuse_twice(const learning::LearningFlights& flights) {
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_to_mix(options, common);
+  refuse_folder(common, options.report);
   options.sizes.ground = !options.no_ground;
   training::TrainerOptions& trainer = options.run.trainer;
   trainer.gamma.scope = options.gamma_scope == "layer" ? files::GammaStatement::Scope::kLayer

@@ -7,6 +7,7 @@
 #include "analysis/commands/command.h"
 #include "analysis/progress.h"
 #include "analysis/tracking_input.h"
+#include "analysis/tune_report.h"
 #include "nn/files/input_error.h"
 #include "stability/sweep/tune.h"
 
@@ -21,6 +22,7 @@ struct Options {
   stability::TuneOptions tune;
   std::string objective = "impulse";
   std::string axis = "z";
+  std::string report;
 };
 
 /// Part of the further lag that the shipped gains bear and that tuned ones must still bear, where nothing else is said.
@@ -72,9 +74,22 @@ files::Json firmware_json(const std::string& axis, const TuneResult& found) {
   return rows;
 }
 
-void print_row(const std::string& what, double before, double after, const char* unit) {
-  fmt::print("  {:<22} {:>12.6g} {:>12.6g} {:>+9.1f} %  {}\n", what, before, after,
-             100 * (after / before - 1), unit);
+std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult& found) {
+  const TunedPoint& a = found.shipped;
+  const TunedPoint& b = found.best;
+  std::vector<TunedQuantity> all;
+  for (const FirmwareGain& gain : kFirmwareGains)
+    all.push_back({fmt::format("{} {}", gain.name, axis), a.*gain.value, b.*gain.value, gain.unit});
+  all.insert(all.end(),
+             {{"rate", a.norms.rate, b.norms.rate, "m per N/s"},
+              {"amplitude", a.norms.amplitude, b.norms.amplitude, "m/N"},
+              {"edge", a.norms.edge, b.norms.edge, "m/N"},
+              {"impulse", a.norms.impulse, b.norms.impulse, "m per N s"},
+              {"impulse, sampled", found.shipped_sampled.impulse, found.best_sampled.impulse, "m per N s"},
+              {"noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2"},
+              {"further lag borne", a.lag_limit_s, b.lag_limit_s, "s"},
+              {"effort", a.effort, b.effort, "N/N"}});
+  return all;
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -105,17 +120,10 @@ void print_result(const Options& options, const TuneResult& found, const stabili
     return;
   }
   fmt::print("  {:<22} {:>12} {:>12}\n", "", "shipped", "tuned");
-  for (const FirmwareGain& gain : kFirmwareGains) {
-    print_row(fmt::format("{} {}", gain.name, options.axis), a.*gain.value, b.*gain.value, gain.unit);
+  for (const TunedQuantity& q : quantities(options.axis, found)) {
+    fmt::print("  {:<22} {:>12.6g} {:>12.6g} {:>+9.1f} %  {}\n", q.name, q.shipped, q.tuned,
+               100 * (q.tuned / q.shipped - 1), q.unit);
   }
-  print_row("rate", a.norms.rate, b.norms.rate, "m per N/s");
-  print_row("amplitude", a.norms.amplitude, b.norms.amplitude, "m/N");
-  print_row("edge", a.norms.edge, b.norms.edge, "m/N");
-  print_row("impulse", a.norms.impulse, b.norms.impulse, "m per N s");
-  print_row("impulse, sampled", found.shipped_sampled.impulse, found.best_sampled.impulse, "m per N s");
-  print_row("noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2");
-  print_row("further lag borne", a.lag_limit_s, b.lag_limit_s, "s");
-  print_row("effort", a.effort, b.effort, "N/N");
   fmt::print("\nactive constraints: {}\n", listed(found.active_constraints));
   if (!a.feasible) fmt::print("the shipped gains violate a constraint\n");
   fmt::print("search: {}; good gains, not proved to be the best\n", found.stopped);
@@ -123,6 +131,7 @@ void print_result(const Options& options, const TuneResult& found, const stabili
 
 int run(Options options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
   const Tracking input = load_tracking(options.tracking);
   const int axis = options.axis == "x" ? 0 : options.axis == "y" ? 1 : 2;
   std::optional<stability::SampledLoop> loop = sampled_axis_loop(input.gains, input.plant, axis);
@@ -174,6 +183,16 @@ int run(Options options, const CommonOptions& common) {
   result["stopped"] = found.stopped;
   write_result(common, result);
   if (common.prints_text()) print_result(options, found, limits);
+  if (!options.report.empty()) {
+    const std::string verdict = fmt::format(
+        "Axis {}, least {} gain: {}. Active constraints: {}. Good gains, not proved to be the best.",
+        options.axis, options.objective, result["verdict"].get<std::string>(),
+        listed(found.active_constraints));
+    const std::string path = write_tune_report(
+        verdict, best.feasible ? quantities(options.axis, found) : std::vector<TunedQuantity>(), result,
+        options.report, common.force);
+    if (common.prints_text()) fmt::print("report: {}\n", path);
+  }
   if (!best.feasible) return found.infeasible.empty() ? kInconclusive : kViolated;
   return kDone;
 }
@@ -217,6 +236,7 @@ Command tune_command() {
         app.add_option("--nodes", options->tune.global_evaluations, "Evaluations of the global search")
             ->check(CLI::PositiveNumber);
         app.add_option("--seed", options->tune.seed, "Seed of the global search (default 1)");
+        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run(*options, common); };
       }};
 }

@@ -210,8 +210,10 @@ TEST(CompareReport, IsOneFileInWhichHostileNamesAreTextAndOnlyItsOwnScriptRuns) 
   EXPECT_NE(html.find("&lt;i onload"), std::string::npos);
   EXPECT_EQ(html.find("Not drawn"), std::string::npos);
   EXPECT_EQ(html.find("'unsafe-eval'"), std::string::npos);
-  const bool has_script = html.find("script-src 'sha256-") != std::string::npos;
-  EXPECT_NE(has_script, html.find("built without dygraphs") != std::string::npos);
+  EXPECT_EQ(html.find("'unsafe-inline'"), std::string::npos);
+  EXPECT_NE(html.find("script-src 'sha256-"), std::string::npos);
+  const bool has_zoom = html.find("id=\"time-series-data\"") != std::string::npos;
+  EXPECT_NE(has_zoom, html.find("built without dygraphs") != std::string::npos);
 }
 
 TEST(TorqueResidual, IsGivenWhereTheLogIsAsFastAsTheLoopAndRefusedWhereItAliases) {

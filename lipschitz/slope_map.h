@@ -1,0 +1,56 @@
+/// @file Where a network is steep: its slope cell by cell over two input coordinates, from both sides.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "lipschitz/certify.h"
+
+namespace swarmcert::lipschitz {
+
+struct SlopeMapOptions {
+  std::array<int, 2> coordinates{};  ///< of the moving input, different
+  std::array<int, 2> cells{12, 12};  ///< along each, at least 1
+  std::map<std::string, Box>
+      domain;      ///< by part; finite. The other coordinates range over their whole intervals.
+  int nodes = 30;  ///< boxes that branch and bound looks at, per cell
+  int rounds = 3;  ///< of the search for steep points, per cell; 0: none
+  std::uint64_t seed = 1;
+  int jobs = 0;                                       ///< threads; 0: all. Results do not depend on it.
+  const std::atomic<bool>* cancelled = nullptr;       ///< cells not looked at keep the bound over all inputs
+  std::function<void(int done, int total)> progress;  ///< called from any thread
+};
+
+struct SlopeCell {
+  Box box;                ///< of the moving input
+  UpperBound upper{0};    ///< |f(x) - f(y)| <= upper |x - y| for all x and y in `box`
+  bool is_local = false;  ///< proved for this cell, and smaller than the bound that holds everywhere
+  FoundSlope lower;       ///< two points of the cell between which f is as steep
+};
+
+struct SlopeMap {
+  std::string function;          ///< "network" or "set:<phi kind>:<rho kind>"
+  std::vector<SlopeCell> cells;  ///< the second coordinate fastest; together they cover the domain's box
+};
+
+/// One map for each function of `found` that composes NET and moves such an input: the plain network, or each set
+/// function but the ground's, with one neighbour in the cell and any others anywhere. What is `upper` has been accepted
+/// by check::check_tree(), or is the bound of `found`; what the clamp maps to one point has been bounded after it.
+/// @param found certified with the same network: its bounds of block "all" and the Euclidean norm.
+/// @throws std::invalid_argument if a coordinate does not exist or both are the same, or a number of cells is not positive.
+std::vector<SlopeMap> slope_maps(const files::Network& network, const Certification& found,
+                                 const SlopeMapOptions& options);
+
+/// The index of the moving input that `name` names: as in network.toml's order, or "x<k>".
+/// @throws std::invalid_argument, with the names there are, if there is none.
+int map_coordinate(const files::Network& network, const std::string& name);
+
+/// The name of an input coordinate: as in network.toml's order, or "x<k>".
+std::string coordinate_name(const files::Network& network, int coordinate);
+
+}  // namespace swarmcert::lipschitz

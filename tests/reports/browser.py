@@ -1,0 +1,216 @@
+"""A headless Chromium that loads pages and says what is wrong with them. Python's standard library only."""
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+
+# Evaluated in the page. Returns a list of [kind, what]; see Browser.faults() for the kinds.
+CHECK = r"""
+(() => {
+  const faults = [];
+  const fault = (kind, what) => faults.push([kind, String(what).slice(0, 200)]);
+  const page = document.documentElement;
+  if (page.scrollWidth > innerWidth) {
+    const wide = [...document.body.querySelectorAll('*')].find(
+        e => !e.closest('.scroll') && e.getBoundingClientRect().right > innerWidth + 1);
+    fault('overflow', `${page.scrollWidth} px on a screen of ${innerWidth}: ${wide ? wide.outerHTML : '?'}`);
+  }
+  const shown = e => e.getClientRects().length > 0;
+  const middle = r => ({x: (r.left + r.right) / 2, y: (r.top + r.bottom) / 2});
+  for (const figure of document.querySelectorAll('figure.drawing')) {
+    const caption = figure.querySelector('figcaption');
+    if (!caption || !caption.textContent.trim()) fault('no caption', figure.outerHTML);
+    const drawings = [...figure.querySelectorAll('svg')].filter(shown);
+    if (drawings.length !== 1) { fault('missing plot', caption && caption.textContent); continue; }
+    const svg = drawings[0];
+    const box = svg.getBoundingClientRect();
+    if (box.width < 0.8 * figure.clientWidth || box.height < 80) fault('missing plot', `${box.width} x ${box.height}`);
+    if (!svg.getAttribute('aria-label')) fault('no caption', svg.outerHTML);
+    const area = r => r.width * r.height;
+    const shapes = [...svg.querySelectorAll('path,polygon,polyline,image,use,circle,rect')].filter(e => !e.closest('defs'));
+    const isData = e => e.closest('[id*="gnuplot_plot_"]');
+    // gnuplot draws a curve's sample in the key as part of the curve: what counts lies within the frame.
+    const frame = shapes.filter(e => !isData(e)).map(e => e.getBoundingClientRect()).reduce(
+        (a, b) => area(b) > area(a) && area(b) < 0.99 * area(box) ? b : a, new DOMRect());
+    const drawn = shapes.filter(isData).filter(e => {
+      const r = e.getBoundingClientRect(), m = middle(r);
+      return r.width + r.height > 0 && m.x >= frame.left - 1 && m.x <= frame.right + 1 && m.y >= frame.top - 1 &&
+             m.y <= frame.bottom + 1;
+    });
+    if (drawn.length === 0) fault('empty plot', caption && caption.textContent);
+    const texts = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim());
+    if (texts.length < 3) fault('empty plot', 'no text on its axes');
+    const scale = box.width / svg.viewBox.baseVal.width;
+    for (const text of texts) {
+      const size = parseFloat(getComputedStyle(text).fontSize) * scale;
+      if (size < 9) { fault('small text', `${size} px: ${text.textContent}`); break; }
+    }
+  }
+  const channel = c => (c /= 255, c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+  const light = color => {
+    const [r, g, b] = color.match(/[\d.]+/g).map(Number);
+    return 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
+  };
+  const paper = light(getComputedStyle(document.body).backgroundColor);
+  for (const e of document.querySelectorAll('p,td,th,h1,h2,figcaption,svg text')) {
+    if (!shown(e) || !e.textContent.trim()) continue;
+    const ink = light(getComputedStyle(e)[e.closest('svg') ? 'fill' : 'color']);
+    const contrast = (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
+    if (contrast < 4.5) { fault('contrast', `${contrast}: ${e.textContent}`); break; }
+  }
+  const series = document.getElementById('time-series');
+  if (series) {
+    const canvases = [...series.querySelectorAll('canvas')].filter(shown);
+    const hasInk = c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(x => x > 0);
+    if (!canvases.some(c => c.width > 50 && c.height > 50 && hasInk(c))) fault('empty plot', 'time series');
+  }
+  try {
+    if (!JSON.parse(document.getElementById('result').textContent).schema.startsWith('swarmcert/'))
+      fault('no result', 'another schema');
+  } catch (error) { fault('no result', error); }
+  const command = document.getElementById('command');
+  if (!command || !command.textContent.startsWith('swarmcert ')) fault('no command', '');
+  if (!document.querySelector('button[data-copies="command"]:not([hidden])')) fault('no command', 'no button to copy it');
+  if (window.pwned || document.title.includes('pwned')) fault('injection', document.title);
+  return faults.concat(window.policyFaults || []);
+})()
+"""
+
+WATCH = """window.policyFaults = [];
+document.addEventListener('securitypolicyviolation', e =>
+    window.policyFaults.push(['policy', e.violatedDirective + ' ' + e.blockedURI + ' ' + e.sample]));"""
+
+
+def find():
+    """The path of a Chromium, or None."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if path := shutil.which(name):
+            return path
+    return None
+
+
+class Browser:
+    """One browser, one tab. Use as a context manager."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def __enter__(self):
+        self._profile = tempfile.TemporaryDirectory(prefix="swarmcert-browser-")
+        to_browser, self._write = os.pipe()
+        self._read, from_browser = os.pipe()
+
+        def place():  # the protocol's file descriptors are 3 and 4
+            a, b = os.dup(to_browser), os.dup(from_browser)
+            os.dup2(a, 3)
+            os.dup2(b, 4)
+
+        self._process = subprocess.Popen(
+            [self._path, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-pipe",
+             "--disable-extensions", "--no-first-run", "--disable-background-networking",
+             f"--user-data-dir={self._profile.name}", "about:blank"],
+            preexec_fn=place, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(to_browser)
+        os.close(from_browser)
+        self._buffer, self._next, self._events, self._session = b"", 0, [], None
+        target = self._call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self._call(domain + ".enable")
+        self._call("Page.addScriptToEvaluateOnNewDocument", source=WATCH)
+        return self
+
+    def __exit__(self, *_):
+        self._process.terminate()
+        self._process.wait(20)
+        os.close(self._read)
+        os.close(self._write)
+        self._profile.cleanup()
+
+    def _message(self):
+        while b"\0" not in self._buffer:
+            part = os.read(self._read, 1 << 20)
+            if not part:
+                raise RuntimeError("the browser ended")
+            self._buffer += part
+        text, self._buffer = self._buffer.split(b"\0", 1)
+        return json.loads(text)
+
+    def _call(self, method, **parameters):
+        self._next += 1
+        request = {"id": self._next, "method": method, "params": parameters}
+        if self._session:
+            request["sessionId"] = self._session
+        os.write(self._write, json.dumps(request).encode() + b"\0")
+        while True:
+            message = self._message()
+            if message.get("id") == self._next:
+                if "error" in message:
+                    raise RuntimeError(f"{method}: {message['error']}")
+                return message["result"]
+            self._events.append(message)
+
+    def _evaluate(self, script):
+        answer = self._call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in answer:
+            raise RuntimeError(answer["exceptionDetails"])
+        return answer["result"].get("value")
+
+    def _load(self, page):
+        self._events = []
+        self._call("Page.navigate", url=pathlib.Path(page).resolve().as_uri())
+        while not any(e.get("method") == "Page.loadEventFired" for e in self._events):
+            self._events.append(self._message())
+            if self._events[-1].get("method") == "Page.javascriptDialogOpening":  # the page waits for an answer
+                self._call("Page.handleJavaScriptDialog", accept=True)
+        # A script that has drawn is a frame behind.
+        self._evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+    def _heard(self, page):
+        """Faults among the events since the page was asked for."""
+        url = pathlib.Path(page).resolve().as_uri()
+        for event in self._events:
+            method, p = event.get("method"), event.get("params", {})
+            if method == "Runtime.exceptionThrown":
+                yield ["console", p["exceptionDetails"].get("text", "exception")]
+            elif method == "Runtime.consoleAPICalled" and p["type"] in ("error", "warning", "assert"):
+                yield ["console", str(p["args"])[:200]]
+            elif method == "Log.entryAdded" and p["entry"]["level"] in ("error", "warning"):
+                kind = "policy" if "Content Security Policy" in p["entry"]["text"] else "console"
+                yield [kind, p["entry"]["text"][:200]]
+            elif method == "Network.requestWillBeSent":
+                wanted = p["request"]["url"]
+                if wanted != url and not wanted.startswith("data:"):
+                    yield ["network", wanted]
+            elif method == "Page.javascriptDialogOpening":
+                yield ["injection", p["message"]]
+
+    def faults(self, page, widths=(390, 768, 1280), schemes=("light", "dark")):
+        """[kind, width, what] of all that is wrong with a report: console, policy (of content), network, overflow, missing
+        plot, empty plot, no caption, small text, contrast, no result, no command, injection. The page is loaded at every
+        width; colour schemes and print are looked at on the widest."""
+        found = []
+        for width in widths:
+            self._call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+            self._load(page)
+            found += [[kind, width, what] for kind, what in self._evaluate(CHECK)]
+            found += [[kind, width, what] for kind, what in self._heard(page)]
+        for scheme in schemes:
+            self._call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            found += [[kind, scheme, what] for kind, what in self._evaluate(CHECK)]
+        self._call("Emulation.setEmulatedMedia", media="print", features=[])
+        found += [[kind, "print", what] for kind, what in self._evaluate(CHECK) if kind in ("missing plot", "contrast")]
+        self._call("Emulation.setEmulatedMedia", media="", features=[])
+        self._evaluate("document.querySelector('button[data-copies]')?.click()")
+        text = self._evaluate("new Promise(done => setTimeout(() => "
+                              "done(document.querySelector('button[data-copies]')?.textContent), 50))")
+        if text is not None and "opied" not in text:
+            found.append(["no command", widths[-1], "the button does nothing: " + text])
+        unique = []
+        for fault in found:
+            if fault not in unique:
+                unique.append(fault)
+        return unique

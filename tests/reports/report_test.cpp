@@ -1,0 +1,214 @@
+/// Reports: what users put into them stays text, in HTML, JSON, SVG, gnuplot and the shell.
+#include "analysis/report.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "analysis/command_line.h"
+#include "analysis/report_svg.h"
+#include "analysis/report_text.h"
+#include "analysis/run.h"
+#include "nn/files/file_io.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using tests::read_text;
+using tests::run_shell;
+using tests::ScratchFolder;
+
+/// A string of pieces that mean something to one of the languages of a report.
+std::string hostile(std::mt19937& generator) {
+  static const std::vector<std::string> kPieces = {"<script>",
+                                                   "</script>",
+                                                   "<!--",
+                                                   "-->",
+                                                   "<img src=x onerror=a()>",
+                                                   "\"",
+                                                   "'",
+                                                   "`touch pwned`",
+                                                   "$(touch pwned)",
+                                                   "\n",
+                                                   "\r\n",
+                                                   "\\",
+                                                   "\\n",
+                                                   "\\074",
+                                                   "&",
+                                                   "&lt;",
+                                                   "&#x3c;",
+                                                   "]]>",
+                                                   "' ; system 'touch pwned' ; '",
+                                                   "#",
+                                                   "{/Symbol a}",
+                                                   "@pwned",
+                                                   "\xff\xfe",
+                                                   "\x01",
+                                                   std::string(1, '\0'),
+                                                   "e\ne\nplot sin(x)",
+                                                   "--",
+                                                   "/* */",
+                                                   "{{",
+                                                   "javascript:",
+                                                   "\xE2\x80\xA8",
+                                                   "\x7f",
+                                                   "a",
+                                                   " ",
+                                                   "%s"};
+  std::string text;
+  for (unsigned long n = 1 + generator() % 6; n > 0; --n) text += kPieces[generator() % kPieces.size()];
+  return text;
+}
+
+Report report_with(const std::vector<std::string>& text) {
+  Report report(text[0]);
+  report.result({{"schema", "swarmcert/test/1"}, {"name", text[1]}});
+  report.heading(text[2]);
+  report.paragraph(text[3]);
+  report.table({text[4], "n"}, {{text[5], text[6]}});
+  report.figure(
+      "curve", "1 2 " + plot_field(text[7]) + "\n2 3 " + plot_field(text[8]) + "\n",
+      "set xlabel " + plot_string(text[9]) + "\nplot 'curve.dat' using 1:2:xtic(3) with lines title 't'\n",
+      text[10]);
+  report.bars("bars", {{text[11], 1, 0.5, 2}, {text[12], 2, NAN, NAN}}, text[13], text[14]);
+  TimeSeries series;
+  series.name = text[15];
+  series.rows = {{0, 1, 2, 3, 4}, {1, 2, 3, 4, 5}};
+  report.time_series({series}, text[16]);
+  return report;
+}
+
+/// The names of the page's tags in order, without what is inside of drawings and scripts: text may not change them.
+std::string skeleton(const std::string& html) {
+  std::string result, inside;
+  for (std::size_t at = html.find('<'); at != std::string::npos; at = html.find('<', at + 1)) {
+    const std::size_t end = html.find_first_of(" >\n", at);
+    const std::string name = html.substr(at + 1, end - at - 1);
+    if (!inside.empty() && name != "/" + inside) continue;
+    inside = name == "svg" || name == "script" || name == "style" ? name : "";
+    result += name + " ";
+  }
+  return result;
+}
+
+std::string element(const std::string& html, const std::string& id) {
+  const std::size_t begin = html.find('>', html.find("id=\"" + id + "\"")) + 1;
+  return html.substr(begin, html.find("</script>", begin) - begin);
+}
+
+bool has_gnuplot() { return run_shell("gnuplot --version", "/").exit_code == 0; }
+
+TEST(Report, HostileTextStaysTextAndRunsNothing) {
+  const ScratchFolder folder;
+  const std::string plain_page =
+      read_text(report_with(std::vector<std::string>(17, "plain")).write(folder / "plain", false));
+  std::mt19937 generator(31);
+  for (int i = 0; i < 12; ++i) {
+    std::vector<std::string> text;
+    for (int k = 0; k < 17; ++k) text.push_back(hostile(generator));
+    const std::string page =
+        read_text(report_with(text).write(folder / ("fuzzed" + std::to_string(i)), false));
+    EXPECT_EQ(skeleton(page), skeleton(plain_page)) << i;
+    EXPECT_EQ(files::parse_json(element(page, "result"), "result")["name"],
+              files::parse_json(files::to_text({{"name", text[1]}}), "text")["name"]);
+    EXPECT_EQ(page.find("Not drawn"), has_gnuplot() ? std::string::npos : page.find("Not drawn"));
+    for (const char* svg : {"/curve.svg", "/bars.svg"}) {
+      const std::string path = folder / ("fuzzed" + std::to_string(i) + svg);
+      EXPECT_EQ(read_text(path).find("<script"), std::string::npos) << path;
+    }
+  }
+  for (const auto& file : std::filesystem::recursive_directory_iterator(folder.path()))
+    EXPECT_EQ(file.path().string().find("pwned"), std::string::npos) << file.path();
+  EXPECT_FALSE(std::filesystem::exists("pwned"));
+}
+
+TEST(Report, FieldsOfDataFilesCannotEndEarly) {
+  std::mt19937 generator(32);
+  for (int i = 0; i < 2000; ++i) {
+    const std::string field = plot_field(hostile(generator));
+    ASSERT_GE(field.size(), 2u);
+    const std::string inside = field.substr(1, field.size() - 2);
+    EXPECT_EQ(field.front(), '"');
+    EXPECT_EQ(field.back(), '"');
+    EXPECT_LE(field.size(), 2u + 3 + 4 * 26);
+    for (const char c : inside)
+      EXPECT_TRUE(static_cast<unsigned char>(c) >= 0x20 && c != '"' && c != '\\') << inside;
+  }
+}
+
+TEST(Report, CommandsAreReadBackByTheShellAsTheSameWords) {
+  const ScratchFolder folder;
+  std::mt19937 generator(33);
+  for (int i = 0; i < 20; ++i) {
+    std::vector<std::string> words = {"printf", "%s|"};
+    std::string expected;
+    for (int k = 0; k < 4; ++k) {
+      std::string word = hostile(generator);
+      word.erase(std::remove(word.begin(), word.end(), '\0'), word.end());
+      words.push_back(word);
+      expected += word + "|";
+    }
+    EXPECT_EQ(run_shell(shell_line(words), folder.path()).output, expected);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "pwned"));
+}
+
+TEST(Report, CommandToCopyNamesOutputsButNotWhereTheyWent) {
+  const char* const words[] = {"swarmcert", "add",    "ground", "a b.toml", "-o",
+                               "x.toml",    "--jobs", "2",      "--report", "r"};
+  remember_command_line(10, words);
+  EXPECT_EQ(command_to_copy(), "swarmcert add ground 'a b.toml' -o OUTPUT --report REPORT");
+  const char* const others[] = {"swarmcert", "bound", "--report=r", "-q"};
+  remember_command_line(4, others);
+  EXPECT_EQ(command_to_copy(), "swarmcert bound --report REPORT");
+  const char* const demo[] = {"swarmcert", "demo"};
+  remember_command_line(2, demo);
+  EXPECT_EQ(command_to_copy(), "swarmcert demo");
+  const char* const none[] = {"swarmcert"};
+  remember_command_line(1, none);
+}
+
+TEST(Report, DrawingsKeepShapesAndTextOnly) {
+  const std::string svg = inline_svg(
+      "<?xml version=\"1.0\"?><svg viewBox=\"0 0 8 4\" "
+      "onload=\"a()\"><script>alert(1)</script><style>*{}</style>"
+      "<title>t<script>b</script></title><a href=\"javascript:c()\"><g color=\"black\"></g></a>"
+      "<g id='x' stroke='black' onclick='d()' style='color:red'><path d='M0,0 L1,1' fill='white'/>"
+      "<text><tspan>a &lt; b & c > d</tspan></text><image xlink:href='http://evil/'/><use xlink:href='#x'/>"
+      "<foreignObject><body>e</body></foreignObject></svg></div>",
+      "p-", "wide", "what \"it\" shows");
+  EXPECT_EQ(svg,
+            "<svg class=\"wide\" role=\"img\" aria-label=\"what &quot;it&quot; shows\" viewBox=\"0 0 8 4\">"
+            "<g id=\"p-x\" stroke=\"currentColor\"><path d=\"M0,0 L1,1\" fill=\"var(--paper)\"/>"
+            "<text><tspan>a &lt; b &amp; c &gt; d</tspan></text><image/><use href=\"#p-x\"/></g></svg>\n");
+  EXPECT_EQ(inline_svg("no drawing", "p-", "wide", ""), "");
+}
+
+TEST(Report, IsTheSameInAnotherFolderAndKeepsItsData) {
+  const ScratchFolder folder;
+  const std::vector<std::string> text(17, "text");
+  const std::string page = read_text(report_with(text).write(folder / "one", false));
+  EXPECT_EQ(read_text(report_with(text).write(folder / "another place", false)), page);
+  EXPECT_TRUE(std::filesystem::exists(folder / "one/curve.dat"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "one/curve.gp"));
+  EXPECT_THROW(report_with(text).write(folder / "one", false), std::exception);
+  report_with(text).write(folder / "one", true);
+}
+
+TEST(Report, SaysSoWithoutGnuplot) {
+  const ScratchFolder folder;
+  const std::string path = getenv("PATH");
+  setenv("PATH", "/nowhere", 1);
+  const std::string page =
+      read_text(report_with(std::vector<std::string>(17, "text")).write(folder / "r", false));
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_NE(page.find("Not drawn: gnuplot is missing or failed. The data are in curve.dat."),
+            std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(folder / "r/curve.dat"));
+}
+
+}  // namespace
+}  // namespace swarmcert::analysis

@@ -1,0 +1,184 @@
+"""Every command's report, in a browser: reports_test.py TOOL SOURCE_FOLDER
+
+Ends with 77 (skipped) where there is no Chromium. First a good report is damaged in every way that the browser must see.
+"""
+
+import json
+import os
+import pathlib
+import random
+import re
+import subprocess
+import sys
+import tempfile
+
+import browser
+
+# A folder, a subfolder and a prefix of logs, as a hostile uploader would name them. `touch` would leave a file behind.
+HOSTILE = ["a'b\"c`touch pwned`$(touch pwned)<", "script><script>window.pwned=1<", "script><img src=x onerror=alert(1)>"]
+HOSTILE_KIND = "k'\\\"`touch pwned`$(touch pwned)</script><script>window.pwned=1</script><!--\\n"
+
+
+class Reports:
+    def __init__(self, tool, source, folder):
+        self.tool, self.source, self.folder = tool, source, folder
+        self.pages = {}
+
+    def run(self, *words, expect=(0,)):
+        words = [self.tool, *map(str, words), "-q"]
+        done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, errors="replace")
+        if done.returncode not in expect:
+            sys.exit(f"exit code {done.returncode}: {' '.join(words)}\n{done.stdout}{done.stderr}")
+        return done
+
+    def report(self, name, *words, expect=(0,)):
+        self.run(*words, "--report", f"report {name}", expect=expect)
+        self.pages[name] = self.folder / f"report {name}" / "report.html"
+
+    def write(self, name, text):
+        (self.folder / name).write_text(text)
+        return name
+
+
+def network_with_hostile_kinds(r):
+    """The demo's network under a kind whose name is markup, shell and gnuplot at once."""
+    demo = r.source / "nn/networks/demo"
+    text = (demo / "network.toml").read_text()
+    kind = f'"{HOSTILE_KIND}"'
+    for part in ("phi", "rho"):
+        text = re.sub(rf"\[{part}\.[a-z]+\]", lambda _: f"[{part}.{kind}]", text)
+    text = re.sub(r'weights = "', f'weights = "{demo}/', text)
+    return r.write("hostile.toml", text)
+
+
+def thrust_table(r):
+    seeded = random.Random(1)
+    lines = ["pwm[ratio],vbat[V],thrust_gf"]
+    for _ in range(300):
+        p, volt = seeded.uniform(0.25, 1), seeded.uniform(3.2, 4.2)
+        v = volt / 4.2
+        gf = 11.09 - 39.08 * p - 9.53 * v + 20.57 * p * p + 38.43 * p * v
+        lines.append(f"{p:.6f},{volt:.5f},{gf + seeded.gauss(0, 0.1):.5f}")
+    return r.write("thrust.csv", "\n".join(lines) + "\n")
+
+
+def make(r):
+    """A report of every command that has one."""
+    demo = r.source / "nn/networks/demo"
+    model, gains = r.source / "stability/models/crazyflie-small.toml", r.source / "controller/gains/crazyflie-small.toml"
+    composite = r.source / "controller/gains/composite.toml"
+    r.report("certify", "certify", demo / "network.toml", "--domain", demo / "box.toml", "--map", "dp_x_m,dp_z_m",
+             "--cells", 2, "--nodes", 1, "--cell-nodes", 2)
+    r.report("certify-hostile", "certify", network_with_hostile_kinds(r), "--nodes", 1, "--method", "product",
+             expect=(0, 4))
+    r.report("bound", "bound", "--gains", composite, "--model", model, "--amplitude", 0.097, "--impulse", 0.02,
+             "--rate", 0.75)
+    r.report("bound-sampled", "bound", "--gains", gains, "--model", model, "--amplitude", 0.05)
+    r.report("spacing", "spacing", "--gains", gains, "--model", model, "--max-error", 0.1)
+    r.report("iss-check", "iss-check", "--gains", composite, "--model", model, "--runs", 10)
+    r.report("tune", "tune", "--gains", gains, "--model", model, "--nodes", 50, expect=(0, 4))
+    r.report("identify-thrust", "identify-thrust", thrust_table(r))
+    grid = r.write("grid.toml", f'''schema = "swarmcert/grid/1"
+gains = "{gains}"
+model = "{model}"
+axis = "z"
+compute = ["amplitude", "impulse", "noise_command_m_s2"]
+pareto = ["impulse", "noise_command_m_s2"]
+[axes]
+Kp = {{from = 2, to = 40, steps = 6, scale = "log"}}
+Kd = {{from = 0.5, to = 10, steps = 5}}
+''')
+    r.report("sweep", "sweep", grid, "-o", "sweep")
+    flights = pathlib.Path(*HOSTILE)
+    for run in range(2):
+        r.report(f"simulate-{run}", "simulate", "swap", "--vehicles", 2, "--model", model, "--gains", gains,
+                 "--duration", 8, "--seed", run, "--run", run, "-o", r.folder / flights / str(run))
+    r.report("compare-hostile", "compare", model, flights)
+    # The same logs under names with a hostile prefix.
+    prefixed = r.folder / "pre\nfixed"
+    for log in sorted((r.folder / flights).rglob("cf*")):
+        target = prefixed / log.parent.name / ("p`touch pwned`'<img src=x onerror=alert(2)>_" + log.name)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(log.read_bytes())
+    r.report("add-hostile", "add", "drag_linear,constant_force", "--model", model, prefixed, "--keep-anyway", "-o",
+             "fitted.toml", expect=(0, 4))
+    r.report("diagnose-hostile", "diagnose", model, flights, expect=(0, 4))
+    if pwned := [str(p) for p in r.folder.rglob("pwned*")]:
+        sys.exit(f"a name ran as a command: {pwned}")
+
+
+def refuse_full_folders(r):
+    """A report's folder that is not empty is refused before anything is read: here no input exists."""
+    full = r.folder / "full"
+    full.mkdir()
+    (full / "thesis.txt").write_text("mine")
+    model_and_gains = ["--model", "no.toml", "--gains", "no.toml"]
+    for words in (["certify", "no.toml"], ["bound", *model_and_gains], ["spacing", "--max-error", 1, *model_and_gains],
+                  ["iss-check", *model_and_gains], ["tune", *model_and_gains], ["identify-thrust", "no.csv"],
+                  ["sweep", "no.toml", "-o", "no"], ["merge", "no"], ["compare", "no"], ["diagnose", "no"],
+                  ["add", "auto", "--model", "no.toml", "no", "-o", "no.toml"], ["train", "no", "-o", "no"],
+                  ["simulate", "hover", "-o", "no", *model_and_gains]):
+        done = r.run(*words, "--report", full, expect=(3,))
+        if str(full) not in done.stderr or "--force" not in done.stderr:
+            sys.exit(f"{words[0]} does not refuse a full report folder before its work: {done.stderr}")
+    if os.listdir(full) != ["thesis.txt"]:
+        sys.exit("a refused report was written")
+
+
+def planted(good):
+    """A good page damaged in one way, with the kind of fault that must be seen."""
+    text = good.read_text()
+    policy = re.search(r'<meta http-equiv="Content-Security-Policy"[^>]*>', text).group()
+    lax = text.replace(policy, "")
+    end = "</body>"
+    assert text.count(end) == 1
+    drawing = re.search(r"<svg.*?</svg>\n<svg.*?</svg>", text, re.S).group()
+    without_curves = re.sub(r'(<g id="[^"]*gnuplot_plot_.*?)(?=<g id="[^"]*gnuplot_plot_|</svg>)', "", drawing, flags=re.S)
+    assert without_curves != drawing
+    yield "console", lax.replace(end, "<script>console.error('planted')</script>" + end)
+    yield "console", lax.replace(end, "<script>undefined.planted</script>" + end)
+    yield "policy", text.replace(end, "<p style='color:red'>planted</p>" + end)
+    yield "policy", text.replace(end, "<script>1</script>" + end)
+    yield "network", lax.replace(end, "<img src='http://127.0.0.1:9/planted.png'>" + end)
+    yield "overflow", text.replace(end, "<canvas width='2000'></canvas>" + end)
+    yield "missing plot", text.replace(drawing, "")
+    yield "empty plot", text.replace(drawing, without_curves)
+    yield "small text", text.replace('font-size="1', 'font-size="0')
+    yield "contrast", text.replace('fill="currentColor"', 'fill="#777777"')
+    yield "no caption", re.sub(r"<figcaption>.*?</figcaption>", "", text, flags=re.S)
+    yield "no result", text.replace('id="result"', 'id="other"')
+    yield "no command", text.replace('id="command"', 'id="other"')
+    yield "injection", lax.replace(end, "<script>window.pwned = 1</script>" + end)
+    yield "injection", lax.replace(end, "<script>alert(1)</script>" + end)
+
+
+def main():
+    tool, source = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve()
+    chromium = browser.find()
+    if chromium is None:
+        print("skipped: no Chromium here (package chromium); reports were not looked at")
+        return 77
+    faults = 0
+    with tempfile.TemporaryDirectory(prefix="swarmcert-reports-") as folder:
+        reports = Reports(tool, source, pathlib.Path(folder))
+        refuse_full_folders(reports)
+        make(reports)
+        with browser.Browser(chromium) as tab:
+            page = reports.folder / "planted.html"
+            for kind, text in planted(reports.pages["bound"]):
+                page.write_text(text)
+                seen = {fault[0] for fault in tab.faults(page, widths=(390,), schemes=())}
+                if kind not in seen:
+                    print(f"not seen: a planted fault of kind '{kind}' (seen: {sorted(seen)})")
+                    faults += 1
+            for name, page in reports.pages.items():
+                found = tab.faults(page)
+                faults += len(found)
+                print(f"{name}: {len(found)} faults, {page.stat().st_size // 1024} kB")
+                for fault in found:
+                    print("   ", json.dumps(fault))
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
