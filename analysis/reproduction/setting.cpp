@@ -45,20 +45,8 @@ std::vector<Truth> truths(const Setting& setting) {
 
   Truth calibrated = flights;
   calibrated.name = "calibrated";
-  stability::EffectSpec& downwash = effect(calibrated.model, "downwash");
-  downwash.parameters["norm_exponent"] = 1.3;
-  downwash.parameters["amplitude_N"] = 1.05 * 10.03299049 * stability::kGramForce_N;
-  // Thrust of 1.43 times the weight at most: the thrust map of a battery that far down, 2.8 V. The simulator's own battery
-  // ends at 3.2 V.
-  stability::ThrustMap& map = calibrated.model.thrust;
-  const double most_gf = 1.43 * calibrated.model.weight_N() / 4 / stability::kGramForce_N;
-  const double full = calibrated.battery_V / stability::kFullBattery_V;
-  const double down = full - (most_gf - map.c00 - map.c10 - map.c20) / (map.c01 + map.c11);
-  map.c00 -= map.c01 * down;
-  map.c10 -= map.c11 * down;
-  calibrated.knobs = {
-      "downwash.norm_exponent = 1.3 (flights: 1.85)", "downwash.amplitude_N x 1.05",
-      "thrust map of a battery so far down that thrust ends at 1.43 x weight (flights: 2.4 x)"};
+  effect(calibrated.model, "downwash").parameters["norm_exponent"] = 1.15;
+  calibrated.knobs = {"downwash.norm_exponent = 1.15 (flights: 1.85): wakes add up almost in full"};
   return {flights, calibrated};
 }
 

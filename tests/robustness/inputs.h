@@ -23,7 +23,7 @@ inline void make_inputs(const std::filesystem::path& folder) {
              "compute = [\"amplitude\", \"impulse\"]\npareto = [\"impulse\"]\n[axes]\n"
              "Kp = {from = 2, to = 40, steps = 3, scale = \"log\"}\nKd = {from = 2, to = 20, steps = 2}\n");
   const Outcome made = run_shell(
-      "for run in 1 2 3; do swarmcert simulate random-walk --vehicles 2 --duration 8 --model model.toml "
+      "for run in 1 2 3; do swarmcert simulate random-walk --vehicles 2 --duration 14 --model model.toml "
       "--gains gains.toml "
       "--seed $run -o flights/$run -q || exit 1; done >/dev/null; "
       "swarmcert inspect flights/1/cf1_00 --csv log.csv >/dev/null && "
