@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "stability/sampled_flight.h"
 #include "stability/tasks/task.h"
@@ -12,6 +13,25 @@ namespace {
 
 constexpr double kLost_m = 100;
 
+/// A task, flown higher above the floor.
+class Raised final : public stability::Task {
+ public:
+  Raised(std::unique_ptr<stability::Task> task, double higher_m)
+      : task_(std::move(task)), higher_m_(higher_m) {}
+  stability::Setpoint at(int vehicle, double time_s) const override {
+    stability::Setpoint setpoint = task_->at(vehicle, time_s);
+    setpoint.p_W_m.z() += higher_m_;
+    return setpoint;
+  }
+  double duration_s() const override { return task_->duration_s(); }
+  std::vector<double> knots_s() const override { return task_->knots_s(); }
+  bool starts_on_ground() const override { return task_->starts_on_ground(); }
+
+ private:
+  std::unique_ptr<stability::Task> task_;
+  double higher_m_;
+};
+
 Eigen::Vector3f three(const double* x) {
   return {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])};
 }
@@ -20,8 +40,8 @@ Eigen::Vector3f three(const double* x) {
 
 Flown fly(const Setting& setting, const Truth& truth, const Plan& plan, const files::Network* network,
           bool keep_logs) {
-  const std::unique_ptr<stability::Task> task =
-      stability::make_task(plan.task, {plan.vehicles, plan.duration_s, plan.seed});
+  const std::unique_ptr<stability::Task> task = std::make_unique<Raised>(
+      stability::make_task(plan.task, {plan.vehicles, plan.duration_s, plan.seed}), plan.higher_m);
   const stability::Gains gains = stability::load_gains(setting.gains);
   stability::Swarm swarm(truth.model, plan.vehicles);
   swarm.assume_lag(gains.motor_lag_s, gains.delay_s);

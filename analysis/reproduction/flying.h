@@ -19,6 +19,7 @@ struct Plan {
   int vehicles = 2;
   double duration_s = 0;  ///< 0: the task's own
   std::uint64_t seed = 0;
+  double higher_m = 0;  ///< set points are that much above the task's
 };
 
 /// One vehicle at one position period, in the world.

@@ -15,6 +15,9 @@
 namespace swarmcert::reproduction {
 namespace {
 
+/// Swaps are flown that much above the published heights.
+constexpr double kHigher_m = 0.3;
+
 namespace fs = std::filesystem;
 
 constexpr int kLeast = 2, kMost = 5;
@@ -57,8 +60,8 @@ constexpr const char* kSchema = "swarmcert/table-unit/1";
 void fly_unit(const Setting& setting, const Truth& truth, int training_seed, const std::string& file) {
   Stages stages(setting, truth, training_seed);
   std::array<std::optional<files::Network>, 4> networks;
-  std::string key =
-      fmt::format("{} {} ", setting.seed, scale_of(setting).flight_seeds) + stages.key(kNumStages - 1);
+  std::string key = fmt::format("{} {} {} ", kHigher_m, setting.seed, scale_of(setting).flight_seeds) +
+                    stages.key(kNumStages - 1);
   for (std::size_t c = 1; c < kControllers.size(); ++c) {
     networks[c] = stages.learned(stage_of(kControllers[c])).network;
     for (const auto& [kind, weights] : networks[c]->rho) key += weights.sha256;
@@ -82,7 +85,7 @@ void fly_unit(const Setting& setting, const Truth& truth, int training_seed, con
   files::parallel_for(static_cast<int>(cells.size()), setting.jobs, [&](int i) {
     Cell& cell = cells[static_cast<std::size_t>(i)];
     const std::size_t c = cell.controller == 0 ? 0 : static_cast<std::size_t>(cell.controller - 1);
-    fill(fly(setting, truth, {"swap", cell.vehicles, 0, cell.flight_seed},
+    fill(fly(setting, truth, {"swap", cell.vehicles, 0, cell.flight_seed, kHigher_m},
              networks[c] ? &*networks[c] : nullptr, false),
          cell);
   });
@@ -212,6 +215,11 @@ void add_truth(const Truth& truth, const files::Json& flights, Finding& finding)
 
 Finding performance(const Setting& setting) {
   Finding finding;
+  finding.notes.push_back(
+      fmt::format("Flown {:.1f} m higher than the published scripts do: the lowest of five flies at 0.3 m "
+                  "there, and the floor would end "
+                  "an error of the paper's size. The height is ours.",
+                  kHigher_m));
   finding.json["columns"] = files::Json::array();
   finding.json["swaps_per_flight"] = 6;
   const Scale scale = scale_of(setting);
