@@ -192,8 +192,8 @@ void RegionWalk::enter(VectorXd z) {
     const MatrixXd scaled = region.normals * inverse.asDiagonal();
     const VectorXd gradient = bounds.gradient - region.normals * inverse;
     const VectorXd newton = -BarrierHessian(scaled, bounds.hessian).solve(gradient);
+    if (!newton.allFinite()) break;  // z is on the edge of the box, as it is where a kink lies there
     const double decrement = std::sqrt(std::max(0.0, -newton.dot(gradient)));
-    if (!std::isfinite(decrement)) break;
     const double length = decrement < 0.25 ? 1.0 : 1 / (1 + decrement);
     z += length * newton;
     distances += length * (region.normals.transpose() * newton);

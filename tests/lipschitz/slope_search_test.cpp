@@ -190,6 +190,15 @@ TEST(SlopeSearch, OnlyTheBlockMoves) {
       << "a block is steeper than everything: the search over everything is poor";
 }
 
+TEST(SlopeSearch, AKinkOnTheEdgeOfTheBoxIsNoObstacle) {
+  // f(x, y) = 3 relu(x) where x >= 0.
+  const files::Weights net = network({{"fc1", 1, 2, {3, 0}, {0}}, {"fc2", 1, 1, {1}, {0}}});
+  SlopeSearchOptions options = few_rounds();
+  options.box = Box{{0, -1}, {0.5, -0.5}};
+  const SlopeWitness found = search_slope(plain(net), options);
+  EXPECT_NEAR(found.slope.value(), 3, 1e-6);
+}
+
 TEST(SlopeSearch, ABoxOfOneFloatHasNoWitness) {
   std::mt19937 generator(2);
   const files::Weights net = random_network({2, 4, 1}, generator);
