@@ -19,12 +19,12 @@ void add_curve(Report& report, const learning::Run& run) {
   std::string data;
   for (std::size_t e = 0; e < run.epochs.size(); ++e)
     data += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse_gf, run.epochs[e].select_rmse_gf);
-  report.figure(
-      "epochs", data,
-      "set xlabel 'epoch'\nset ylabel 'RMSE [gf]'\nset yrange [0:*]\n"
-      "plot 'epochs.dat' using 1:2 with lines lw 2 title 'flights to fit', '' using 1:3 with lines lw 2 "
-      "title 'flights to select'\n",
-      fmt::format("Error over epochs. Kept: epoch {}.", run.best_epoch + 1));
+  report.figure("epochs", data,
+                "set xlabel 'epoch'\nset ylabel 'RMSE [gf]'\nset yrange [0:*]\n"
+                "plot 'epochs.dat' using 1:2 with linespoints lw 2 title 'flights to fit', '' using 1:3 with "
+                "linespoints lw 2 "
+                "title 'flights to select'\n",
+                fmt::format("Error over epochs. Kept: epoch {}.", run.best_epoch + 1));
 }
 
 /// Share of the test samples per 0.5 gf, before and after.
@@ -98,9 +98,10 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
 
 }  // namespace
 
-std::string write_train_report(const LearningData& data, const learning::Run& run, const std::string& folder,
-                               bool overwrite) {
+std::string write_train_report(const LearningData& data, const learning::Run& run, const files::Json& result,
+                               const std::string& folder, bool overwrite) {
   Report report("Training of a deep set");
+  report.result(result);
   report.heading("Learning curve");
   add_curve(report, run);
   report.heading("What is left");

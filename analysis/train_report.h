@@ -4,11 +4,12 @@
 #include <string>
 
 #include "analysis/learning/training_run.h"
+#include "nn/files/json.h"
 
 namespace swarmcert::analysis {
 
-/// Writes it into `folder`; returns the path of the HTML file.
+/// Writes it into `folder`, with the command's result inside; returns the path of the HTML file.
 std::string write_train_report(const learning::LearningData& data, const learning::Run& run,
-                               const std::string& folder, bool overwrite);
+                               const files::Json& result, const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

@@ -206,10 +206,11 @@ int run(Options options, const CommonOptions& common) {
       if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
     }
   }
-  write_result(common, result_of(options, files, data, outcome));
+  const files::Json result = result_of(options, files, data, outcome);
+  write_result(common, result);
   if (common.prints_text()) print(options, data, outcome);
   if (!options.report.empty()) {
-    const std::string path = write_train_report(data, outcome.run, options.report, common.force);
+    const std::string path = write_train_report(data, outcome.run, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
   fs::remove(options.run.checkpoint);
