@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "data.h"
 #include "gate/release.h"
 #include "nn/files/input_error.h"
@@ -104,6 +106,24 @@ TEST(GateChecks, TheGuardFactorOfTheFlightsWidensTheMeasuredBound) {
   EXPECT_LT(
       *bare.value,
       *row_of("guard_factor = 1\nquantile = \"max\"\n[tracking.uncertainty]\nmass_kg = [0.03, 0.04]").value);
+}
+
+TEST(GateChecks, CornersPassForTheWholeBoxOnlyWhereThePolicySaysSo) {
+  const ReleaseFolder release;
+  std::filesystem::copy_file(source_path("controller/gains/crazyflie-small.toml"),
+                             release / "gains.toml", std::filesystem::copy_options::overwrite_existing);
+  const auto row_of = [&](const std::string& body) {
+    return release.judge(release.policy_of({"tracking\namplitude_N = 0.01\nguard_factor = 1\n" + body}))
+        .checks.at(0);
+  };
+  const gate::Check box = row_of("max_error_m = 10"),
+                    corners = row_of("max_error_m = 10\nover = \"corners\"");
+  EXPECT_EQ(box.verdict, gate::Verdict::kInconclusive) << box.reason;
+  EXPECT_FALSE(box.value.has_value());
+  EXPECT_EQ(corners.verdict, gate::Verdict::kPass) << corners.reason;
+  EXPECT_NE(corners.witness.find("not enclosed"), std::string::npos) << corners.witness;
+  EXPECT_EQ(row_of("max_error_m = 1e-4").verdict, gate::Verdict::kFail)
+      << "a corner beyond the limit is enough";
 }
 
 TEST(GateChecks, AnUnstablePlantInTheBoxNeverPasses) {
