@@ -14,8 +14,6 @@ namespace {
 using analysis::json_of;
 using residuals::Comparison;
 
-constexpr double kGramForce_N = stability::kGramForce_N;
-
 files::Json json_of(const Eigen::Vector3d& v) {
   // JSON has no NaN: null where a spectrum could not be had.
   const auto number = [](double x) { return std::isfinite(x) ? files::Json(x) : files::Json(nullptr); };
@@ -240,7 +238,7 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
 files::Json mean_squares_gf2(const Comparison& comparison) {
   files::Json json = files::Json::object();
   for (const auto& [name, group] : comparison.compositions)
-    json[name] = std::pow(group.statistics.rmse.z / kGramForce_N, 2);
+    json[name] = std::pow(group.statistics.rmse.z / stability::kGramForce_N, 2);
   return json;
 }
 
@@ -274,11 +272,11 @@ void print_compositions(const Comparison& comparison, const Comparison* own) {
              own != nullptr ? "   with own filter" : "");
   for (const auto& [name, group] : comparison.compositions) {
     fmt::print("{:<28}{:>9}{:>16.2f}", name, group.statistics.samples,
-               std::pow(group.statistics.rmse.z / kGramForce_N, 2));
+               std::pow(group.statistics.rmse.z / stability::kGramForce_N, 2));
     if (own != nullptr) {
       const auto same = own->compositions.find(name);
       if (same != own->compositions.end())
-        fmt::print("{:>18.2f}", std::pow(same->second.statistics.rmse.z / kGramForce_N, 2));
+        fmt::print("{:>18.2f}", std::pow(same->second.statistics.rmse.z / stability::kGramForce_N, 2));
     }
     fmt::print("\n");
   }
@@ -300,9 +298,10 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
   const auto line = [&](const std::string& name, const residuals::GroupErrors& group) {
     const residuals::ErrorStatistics& s = group.statistics;
     fmt::print("{:<28}{:>9}{:>8.2f}{:>7.2f}{:>7.2f}{:>8.2f}{:>7.2f}{:>7.2f}{:>10.2f}{:>9.2f}\n", name,
-               s.samples, s.rmse.x / kGramForce_N, s.rmse.y / kGramForce_N, s.rmse.z / kGramForce_N,
-               s.bias.x / kGramForce_N, s.bias.y / kGramForce_N, s.bias.z / kGramForce_N,
-               s.p999.z / kGramForce_N, s.max.z / kGramForce_N);
+               s.samples, s.rmse.x / stability::kGramForce_N, s.rmse.y / stability::kGramForce_N,
+               s.rmse.z / stability::kGramForce_N, s.bias.x / stability::kGramForce_N,
+               s.bias.y / stability::kGramForce_N, s.bias.z / stability::kGramForce_N,
+               s.p999.z / stability::kGramForce_N, s.max.z / stability::kGramForce_N);
   };
   for (const auto& [name, errors] : comparison.scenarios) line(name, errors);
   for (const auto& [name, errors] : comparison.vehicles) line(name, errors);
@@ -320,7 +319,7 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
   if (!comparison.moments.empty()) {
     const residuals::Moment& worst = comparison.moments[0];
     fmt::print("Worst moment: {} {} at {:.2f} s, {:.2f} gf\n", worst.flight, worst.vehicle, worst.time_s,
-               worst.residual_N.norm() / kGramForce_N);
+               worst.residual_N.norm() / stability::kGramForce_N);
   }
   print_trajectories(comparison.trajectories);
   for (const std::string& problem : comparison.problems) fmt::print("left out: {}\n", problem);

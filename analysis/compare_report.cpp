@@ -11,9 +11,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-constexpr double kGramForce_N = stability::kGramForce_N;
-
-std::string gf(double newton) { return fmt::format("{:.2f}", newton / kGramForce_N); }
+std::string gf(double newton) { return fmt::format("{:.2f}", newton / stability::kGramForce_N); }
 
 std::vector<std::string> row(const std::string& name, const residuals::GroupErrors& group) {
   const residuals::ErrorStatistics& s = group.statistics;
@@ -60,7 +58,7 @@ void add_region_plot(Report& report, const residuals::Comparison& comparison, in
   for (const residuals::RegionErrors* region : regions) {
     const residuals::ErrorStatistics& s = region->statistics;
     data += fmt::format("{} {} {}\n", residuals::region_middle(variable, region->region),
-                        s.bias.z / kGramForce_N, s.rmse.z / kGramForce_N);
+                        s.bias.z / stability::kGramForce_N, s.rmse.z / stability::kGramForce_N);
   }
   const std::string name = fmt::format("over_{}", variable);
   const std::string label = residuals::variable_name(variable);
@@ -131,7 +129,7 @@ void add_time_series(Report& report, const residuals::Comparison& comparison) {
       constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
       if (row[0] - last_s > kBreak_s) series.rows.push_back({(row[0] + last_s) / 2, kNaN, kNaN, kNaN, kNaN});
       last_s = row[0];
-      for (std::size_t k = 1; k < row.size(); ++k) row[k] /= static_cast<float>(kGramForce_N);
+      for (std::size_t k = 1; k < row.size(); ++k) row[k] /= static_cast<float>(stability::kGramForce_N);
       series.rows.push_back(row);
     }
     for (std::size_t k = 0; k < comparison.moments.size(); ++k) {
@@ -143,7 +141,7 @@ void add_time_series(Report& report, const residuals::Comparison& comparison) {
                    std::abs(static_cast<double>(b[0]) - moment.time_s);
           });
       series.marks.push_back(
-          {(*nearest)[0], static_cast<int>(k) + 1, moment.residual_N.norm() / kGramForce_N});
+          {(*nearest)[0], static_cast<int>(k) + 1, moment.residual_N.norm() / stability::kGramForce_N});
     }
     all.push_back(std::move(series));
   }

@@ -9,7 +9,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-std::string cell(double x) { return std::isfinite(x) ? fmt::format("{:.4g}", x) : "never"; }
+std::string cell_or_never(double x) { return std::isfinite(x) ? fmt::format("{:.4g}", x) : "never"; }
 
 std::string gap(double x) { return std::isfinite(x) ? fmt::format("{:.3f} m", x) : "none in range"; }
 
@@ -37,9 +37,10 @@ std::string write_spacing_report(const stability::SpacingQuestion& question, con
     passable += may_cross ? 1 : 0;
     speed += fmt::format("{:.6g} {}\n", row.height_gap_m,
                          may_cross ? fmt::format("{:.6g}", row.least_speed_m_s) : "NaN");
-    rows.push_back({fmt::format("{:.3f}", row.height_gap_m), cell(row.peak_force_N), cell(row.stay_error_m),
-                    row.may_stay ? "yes" : "no", cell(row.keep_out_radius_m),
-                    row.may_stay ? "may stay" : cell(row.least_speed_m_s), cell(row.thrust_margin_N)});
+    rows.push_back(
+        {fmt::format("{:.3f}", row.height_gap_m), cell_or_never(row.peak_force_N),
+         cell_or_never(row.stay_error_m), row.may_stay ? "yes" : "no", cell_or_never(row.keep_out_radius_m),
+         row.may_stay ? "may stay" : cell_or_never(row.least_speed_m_s), cell_or_never(row.thrust_margin_N)});
   }
   report.figure(
       "keep_out", shape,

@@ -130,7 +130,7 @@ std::map<std::string, Box> read_domain(const std::string& path, const files::Net
   const bool has_ground = network.phi.count(files::kGroundKind) == 1;
   if (!has_ground && top.has("ground")) top.refuse("ground", "", "the network has no ground term");
   if (!has_ground) return domain;
-  Box& ground = domain[std::string("phi:") + files::kGroundKind];
+  Box& ground = domain[files::kGroundPhi];
   if (top.has("ground")) {
     const files::TomlTable table = top.table("ground");
     table.allow_only({"lower", "upper"});

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <queue>
 #include <stdexcept>
@@ -12,6 +11,7 @@
 #include "lipschitz/reach.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/stages.h"
+#include "nn/files/doubles.h"
 #include "nn/files/functions.h"
 #include "nn/files/parallel.h"
 
@@ -22,16 +22,14 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using files::Network;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kUnit = 0x1p-24;
-const std::string kGround = std::string("phi:") + files::kGroundKind;
+constexpr double kFloatUnit = 0x1p-24;
 
 /// All sums here are of numbers that are not negative, with far fewer than 2^20 operations: their rounding in double is
 /// below this relative amount.
 double safely(double x) { return std::isnan(x) ? kInfinity : x * (1 + 0x1p-30) + 1e-300; }
 
-double gamma(Index n) {
-  const double nu = static_cast<double>(n) * kUnit;
+double float_gamma(Index n) {
+  const double nu = static_cast<double>(n) * kFloatUnit;
   return safely(nu / (1 - nu));
 }
 
@@ -57,7 +55,7 @@ double weighted_errors(const ReachNetwork& chain, const Reach& reach, std::size_
     const VectorXd taken = reach.input_magnitude(k) + before;
     const VectorXd bias = chain[k].bias.cwiseAbs() + chain[k].bias_radius;
     const VectorXd delta =
-        gamma(chain[k].weights.cols() + 1) * (size * taken + bias) +
+        float_gamma(chain[k].weights.cols() + 1) * (size * taken + bias) +
         VectorXd::Constant(bias.size(), 0x1p-149 * static_cast<double>(chain[k].weights.cols()));
     before = size * before + delta;  // ReLU does not enlarge it
     total += tail[k - begin] * delta.norm();
@@ -101,7 +99,7 @@ std::vector<double> input_errors(const Box& box, double step) {
   std::vector<double> result;
   for (std::size_t k = 0; k < box.lower.size(); ++k) {
     const double largest = std::max(std::abs(box.lower[k]), std::abs(box.upper[k]));
-    result.push_back(safely(step / 2 + kUnit * (largest + step) + 0x1p-149));
+    result.push_back(safely(step / 2 + kFloatUnit * (largest + step) + 0x1p-149));
   }
   return result;
 }
@@ -109,8 +107,8 @@ std::vector<double> input_errors(const Box& box, double step) {
 Box inflated(const Box& box, const std::vector<double>& by) {
   Box result = box;
   for (std::size_t k = 0; k < by.size(); ++k) {
-    result.lower[k] = std::nextafter(box.lower[k] - by[k], -kInfinity);
-    result.upper[k] = std::nextafter(box.upper[k] + by[k], kInfinity);
+    result.lower[k] = next_down(box.lower[k] - by[k]);
+    result.upper[k] = next_up(box.upper[k] + by[k]);
   }
   return result;
 }
@@ -133,7 +131,8 @@ class SetError {
   SetError(const Network& network, const std::string& function, const std::map<std::string, Box>& domain,
            int nodes)
       : names_(files::networks_of(function)), parts_(files::parts(network)), domain_(domain), nodes_(nodes) {
-    has_ground_ = names_.size() == 2 && names_[0] != kGround && parts_.count(kGround) == 1;
+    has_ground_ =
+        names_.size() == 2 && names_[0] != files::kGroundPhi && parts_.count(files::kGroundPhi) == 1;
     phi_ = reach_network(*parts_.at(names_[0]));
     const std::vector<double> whole = tails(check::stages(network, function));
     phi_tails_ = whole;
@@ -148,11 +147,11 @@ class SetError {
     neighbour_ = term(phi_, names_[0], phi_tails_);
     if (!has_ground_) return;
     std::vector<double> ground_tails =
-        tails(check::stages(network, "set:" + kGround.substr(4) + ":" + names_[1].substr(4)));
-    const ReachNetwork ground = reach_network(*parts_.at(kGround));
+        tails(check::stages(network, "set:" + std::string(files::kGroundKind) + ":" + names_[1].substr(4)));
+    const ReachNetwork ground = reach_network(*parts_.at(files::kGroundPhi));
     ground_tails.resize(ground.size() - 1);
     ground_tails.push_back(rho_bound_);
-    ground_ = term(ground, kGround, ground_tails);
+    ground_ = term(ground, files::kGroundPhi, ground_tails);
   }
 
   double plain() const {
@@ -189,7 +188,7 @@ class SetError {
 
   /// Adding n + 1 vectors one after the other: each partial sum is rounded; gamma_n of the sum of magnitudes.
   double sum_error(const VectorXd& magnitudes, int additions) const {
-    return safely(rho_bound_ * gamma(additions) * magnitudes.norm());
+    return safely(rho_bound_ * float_gamma(additions) * magnitudes.norm());
   }
 
   /// The terms one by one, then rho over the box of their sum.
@@ -209,7 +208,7 @@ class SetError {
       add(ground_, 1);
     }
     total += sum_error(magnitude, neighbours + 1);
-    error += gamma(neighbours + 1) * magnitude;
+    error += float_gamma(neighbours + 1) * magnitude;
     Box box;
     for (Index i = 0; i < hidden; ++i) {
       const double slack =
@@ -234,7 +233,7 @@ class SetError {
       const VectorXd magnitude =
           reach.input_magnitude(phi_.size()) + error;  // adding to zero is exact; to be safe
       total += sum_error(magnitude, 1);
-      error += gamma(1) * magnitude;
+      error += float_gamma(1) * magnitude;
       return safely(total + weighted_errors(chain, reach, phi_.size(), chain.size(), rho_tails_, error));
     });
   }
@@ -270,7 +269,7 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
   std::vector<std::string> functions;
   for (const std::string& function : files::functions(network)) {
     const bool is_set = function.rfind("set:", 0) == 0;
-    if (function == "network" || (is_set && files::networks_of(function)[0] != kGround))
+    if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
       functions.push_back(function);
   }
   std::vector<std::vector<Float32Error>> found(functions.size());
@@ -283,9 +282,9 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
       evaluation = std::max(evaluation, names.size() == 1 ? error.plain() : error.set(n));
       if (n == 0) continue;
       double inputs = n * lipschitz.at(function) * moved.at(names[0]);
-      if (names.size() == 2 && moved.count(kGround) == 1) {
-        const std::string ground = "set:" + kGround.substr(4) + ":" + names[1].substr(4);
-        inputs += lipschitz.at(ground) * moved.at(kGround);
+      if (names.size() == 2 && moved.count(files::kGroundPhi) == 1) {
+        const std::string ground = "set:" + std::string(files::kGroundKind) + ":" + names[1].substr(4);
+        inputs += lipschitz.at(ground) * moved.at(files::kGroundPhi);
       }
       Float32Error one;
       one.function = function;

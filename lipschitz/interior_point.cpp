@@ -3,9 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "lipschitz/dense_kernels.h"
+#include "nn/files/doubles.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -18,7 +18,6 @@ using Eigen::VectorXd;
 constexpr double kBacktrack = 0.8;
 /// Relative accuracy of that eigenvalue: for the centring parameter, which is a heuristic, and for the step.
 constexpr double kRough = 0.1, kFine = 0.02;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Largest alpha <= 1 with X + alpha D >= 0 kept at a distance, from the least eigenvalue of L^-1 D L^-T by Lanczos
 /// with full reorthogonalisation, stopped at a relative accuracy. `factor` is L with X = L L'.

@@ -3,8 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "nn/files/doubles.h"
 #include "nn/files/random.h"
 
 namespace swarmcert::lipschitz {
@@ -114,7 +114,6 @@ LocalSlope local_slope(const SearchNetwork& network, const VectorXd& z) {
 
 Chord chord(const SearchNetwork& network, const LinearRegion& region, const VectorXd& z,
             const VectorXd& direction) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Chord result{-kInfinity, kInfinity};
   const auto hit = [&](double t) {
     if (t > 0) result.upper = std::min(result.upper, t);

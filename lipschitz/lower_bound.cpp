@@ -21,7 +21,7 @@ std::vector<std::string> other_networks(const Network& network, const std::strin
   const std::vector<std::string> names = files::networks_of(function);
   std::vector<std::string> others;
   if (names.size() == 1) return others;
-  const std::string ground = std::string("phi:") + files::kGroundKind;
+  const std::string ground = files::kGroundPhi;
   const bool ground_moves = names[0] == ground;
   if (!ground_moves && files::parts(network).count(ground) == 1) others.push_back(ground);
   std::vector<std::string> kinds;

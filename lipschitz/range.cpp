@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "nn/files/doubles.h"
 #include "nn/files/functions.h"
 #include "nn/files/parallel.h"
 
@@ -15,11 +16,6 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 using files::Network;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-const std::string kGround = std::string("phi:") + files::kGroundKind;
-
-double up(double x) { return std::nextafter(x, kInfinity); }
-
 Box box_of(const Bounds& bounds) {
   return {{bounds.lower.begin(), bounds.lower.end()}, {bounds.upper.begin(), bounds.upper.end()}};
 }
@@ -27,8 +23,8 @@ Box box_of(const Bounds& bounds) {
 /// [a] + [b], rounded outwards.
 Bounds sum(const Bounds& a, const Bounds& b) {
   Bounds result{a.lower + b.lower, a.upper + b.upper};
-  for (double& x : result.lower) x = std::nextafter(x, -kInfinity);
-  for (double& x : result.upper) x = up(x);
+  for (double& x : result.lower) x = next_down(x);
+  for (double& x : result.upper) x = next_up(x);
   return result;
 }
 
@@ -41,7 +37,7 @@ void add_interval(ReachLayer& layer, const Bounds& bounds) {
     const double rounding =
         0x1p-50 * (std::abs(layer.bias(i)) + std::abs(bounds.lower(i)) + std::abs(bounds.upper(i)));
     layer.bias(i) = middle;
-    layer.bias_radius(i) = up(half + rounding);
+    layer.bias_radius(i) = next_up(half + rounding);
   }
 }
 
@@ -77,7 +73,7 @@ class Ranger {
         nodes_(nodes),
         function_(function) {
     const auto parts = files::parts(network);
-    has_ground_ = names_.size() == 2 && parts.count(kGround) == 1;
+    has_ground_ = names_.size() == 2 && parts.count(files::kGroundPhi) == 1;
     first_ = reach_network(*parts.at(names_[0]));
     if (names_.size() == 1) return;
     rho_ = reach_network(*parts.at(names_[1]));
@@ -85,8 +81,8 @@ class Ranger {
     const Index hidden = first_.back().bias.size();
     ground_ = {VectorXd::Zero(hidden), VectorXd::Zero(hidden)};
     if (!has_ground_) return;
-    ground_network_ = reach_network(*parts.at(kGround));
-    ground_ = hull(ground_network_, domain.at(kGround), 8 * nodes).bounds;
+    ground_network_ = reach_network(*parts.at(files::kGroundPhi));
+    ground_ = hull(ground_network_, domain.at(files::kGroundPhi), 8 * nodes).bounds;
   }
 
   Index outputs() const { return names_.size() == 1 ? first_.back().bias.size() : rho_.back().bias.size(); }
@@ -121,7 +117,7 @@ class Ranger {
       Attained one;
       for (std::size_t j = 0; j < candidate.size(); ++j) {
         const bool is_ground = has_ground_ && j + 1 == candidate.size();
-        one.networks.push_back(is_ground ? kGround : names_[0]);
+        one.networks.push_back(is_ground ? std::string(files::kGroundPhi) : names_[0]);
         one.points.push_back(float_point(candidate[j], domain_.at(one.networks.back())));
         if (!within(one.points.back(), domain_.at(one.networks.back())))
           return best;  // the box holds no float32
@@ -144,7 +140,7 @@ class Ranger {
 
   VectorXd ground_middle() const {
     if (!has_ground_) return {};
-    const Box& box = domain_.at(kGround);
+    const Box& box = domain_.at(files::kGroundPhi);
     VectorXd middle(files::kGroundInputs);
     for (Index k = 0; k < middle.size(); ++k) {
       const auto i = static_cast<std::size_t>(k);
@@ -163,7 +159,7 @@ class Ranger {
     ReachNetwork chain = ground_network_;
     chain.back().bias += evaluate_roughly(first_, x);
     chain.insert(chain.end(), rho_.begin(), rho_.end());
-    candidates.push_back({x, maximise(chain, direction, domain_.at(kGround), nodes_ / 4 + 2).x});
+    candidates.push_back({x, maximise(chain, direction, domain_.at(files::kGroundPhi), nodes_ / 4 + 2).x});
   }
 
   double by_support(const RowVectorXd& direction, int neighbours,
@@ -186,14 +182,15 @@ class Ranger {
       points.assign(static_cast<std::size_t>(neighbours), phi.x);
     }
     if (has_ground_) {
-      const Maximum ground = maximise(ground_network_, form.rows.row(0), domain_.at(kGround), nodes_);
+      const Maximum ground =
+          maximise(ground_network_, form.rows.row(0), domain_.at(files::kGroundPhi), nodes_);
       total += ground.upper;
       points.push_back(ground.x);
     }
     candidates.push_back(points);
     // Each addition above is off by at most half a unit of a partial sum: covered by 2^-50 of the terms.
     const double with_support =
-        up(total + 0x1p-50 * (std::abs(total) + std::abs(form.constants(0))) + 1e-300);
+        next_up(total + 0x1p-50 * (std::abs(total) + std::abs(form.constants(0))) + 1e-300);
     return std::isnan(with_support) ? from_box : std::min(from_box, with_support);
   }
 
@@ -239,7 +236,7 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
   std::vector<std::string> functions;
   for (const std::string& function : files::functions(network)) {
     const bool is_set = function.rfind("set:", 0) == 0;
-    if (function == "network" || (is_set && files::networks_of(function)[0] != kGround))
+    if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
       functions.push_back(function);
   }
   std::vector<std::vector<CertifiedRange>> found(functions.size());
@@ -256,7 +253,7 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
       range.lower = kInfinity;
       if (is_set) {
         const std::string rho = files::networks_of(function)[1].substr(4);
-        range.jump = up(ranger.jump_norm() * rho_bound.at(rho));
+        range.jump = next_up(ranger.jump_norm() * rho_bound.at(rho));
       }
       for (int n = is_set ? 0 : 1; n <= (is_set ? options.neighbours : 1); ++n) {
         range.upper = std::max(range.upper, ranger.largest(output, 1, n, high));

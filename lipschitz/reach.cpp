@@ -1,9 +1,10 @@
 #include "lipschitz/reach.h"
 
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <queue>
+
+#include "nn/files/doubles.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -12,12 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kUnit = 0x1p-53;
 constexpr double kUnderflow = 0x1p-900;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double up(double x) { return std::nextafter(x, kInfinity); }
-double down(double x) { return std::nextafter(x, -kInfinity); }
 
 /// gamma_n = n u / (1 - n u), and a little more, so that products with it round safely.
 double gamma(Index n) { return 1.001 * static_cast<double>(n + 2) * kUnit; }
@@ -105,7 +101,7 @@ LinearForms Reach::substituted(std::size_t top, MatrixXd lambda) const {
         continue;
       }
       const double slope = u / (u - l);
-      const double offset = std::max({0.0, up(u - down(slope * u)), up(-slope * l)});
+      const double offset = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
       const double below = u > -l ? 1.0 : 0.0;
       const double magnitude = std::max(u, -l);
       for (Index r = 0; r < rows; ++r) {
@@ -138,7 +134,7 @@ VectorXd Reach::largest(const LinearForms& forms) const {
   const VectorXd absolute = forms.rows.cwiseAbs() * largest_input(box_) + forms.constants.cwiseAbs();
   const double relative = 4 * static_cast<double>(forms.rows.cols() + 8) * kUnit;
   VectorXd result = value + relative * absolute + VectorXd::Constant(value.size(), kUnderflow);
-  for (double& x : result) x = std::isnan(x) ? kInfinity : up(x);
+  for (double& x : result) x = std::isnan(x) ? kInfinity : next_up(x);
   return result;
 }
 

@@ -4,15 +4,14 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "nn/files/doubles.h"
 
 namespace swarmcert::lipschitz {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Regions that a walk enters without finding a steeper one before it gives up.
 constexpr int kPatience = 100;

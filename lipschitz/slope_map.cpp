@@ -17,9 +17,8 @@ constexpr double kTolerance = 0.01;
 
 bool has_map(const CertifiedBound& bound) {
   if (bound.block != "all" || !bound.scale.empty()) return false;
-  return bound.function == "network" ||
-         (bound.function.rfind("set:", 0) == 0 &&
-          files::networks_of(bound.function).front() != std::string("phi:") + files::kGroundKind);
+  return bound.function == "network" || (bound.function.rfind("set:", 0) == 0 &&
+                                         files::networks_of(bound.function).front() != files::kGroundPhi);
 }
 
 int moving_inputs(const files::Network& network) {

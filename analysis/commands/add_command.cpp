@@ -17,7 +17,7 @@ namespace {
 using identification::Ladder;
 using stability::LadderRow;
 
-struct Options {
+struct AddOptions {
   FlightOptions flights;
   std::string effects, output, report;
   bool keep_anyway = false;
@@ -111,7 +111,7 @@ void print(const Ladder& ladder) {
   }
 }
 
-void report_ladders(const Options& options, const CommonOptions& common, const files::Json& result,
+void report_ladders(const AddOptions& options, const CommonOptions& common, const files::Json& result,
                     const std::vector<LadderOfModel>& ladders) {
   if (options.report.empty()) return;
   const std::string path = write_ladder_report(ladders, result, options.report, common.force);
@@ -119,7 +119,7 @@ void report_ladders(const Options& options, const CommonOptions& common, const f
 }
 
 /// `add undo`: back to the model before the last accepted effect.
-int undo(const Options& options, const CommonOptions& common) {
+int undo(const AddOptions& options, const CommonOptions& common) {
   if (options.flights.models.size() != 1) throw UsageError("add undo takes one --model");
   if (options.output.empty()) throw UsageError("add undo writes a new model: name it with -o");
   const std::string& path = options.flights.models[0];
@@ -139,7 +139,7 @@ int undo(const Options& options, const CommonOptions& common) {
 }
 
 /// `add show`: the ladders that model files keep, one below the other.
-int show(const Options& options, const CommonOptions& common) {
+int show(const AddOptions& options, const CommonOptions& common) {
   files::Json result = result_head("add", options.flights.models);
   result["ladders"] = files::Json::array();
   std::vector<LadderOfModel> ladders;
@@ -157,7 +157,7 @@ int show(const Options& options, const CommonOptions& common) {
   return kDone;
 }
 
-int climb(const Options& options, const CommonOptions& common) {
+int climb(const AddOptions& options, const CommonOptions& common) {
   if (options.output.empty()) throw UsageError("add writes a new model: name it with -o");
   if (options.flights.words.empty()) throw UsageError("add needs flights: name logs or folders of them");
   refuse_to_replace(common, options.output);
@@ -210,7 +210,7 @@ int climb(const Options& options, const CommonOptions& common) {
   return kDone;
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_add(const AddOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (options.effects == "undo") return undo(options, common);
@@ -234,7 +234,7 @@ Command add_command() {
       "Examples: swarmcert add auto --model stability/models/crazyflie-small.toml flights/ -o fitted.toml\n"
       "          swarmcert add undo --model fitted.toml -o before.toml",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<AddOptions>();
         app.add_option("EFFECT", options->effects, "Names of effects with commas between, auto, undo or show")
             ->required();
         declare_flights(app, options->flights, false);
@@ -242,7 +242,7 @@ Command add_command() {
         app.add_flag("--keep-anyway", options->keep_anyway, "Add also what does not help");
         app.add_option("--report", options->report,
                        "Write an HTML report with the error ladder into this folder");
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_add(*options, common); };
       }};
 }
 

@@ -15,7 +15,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct BoundOptions {
   TrackingArguments tracking;
   DisturbanceArguments disturbance;
   stability::InitialError initial;
@@ -27,7 +27,7 @@ struct Options {
   std::string report;
 };
 
-int run(const Options& options, const CommonOptions& common) {
+int run_bound(const BoundOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const Tracking input = load_tracking(options.tracking);
@@ -105,7 +105,7 @@ Command bound_command() {
       "stability/models/crazyflie-small.toml \\\n"
       "           --amplitude 0.097 --impulse 0.0202 --rate 0.75",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<BoundOptions>();
         declare_tracking(app, options->tracking);
         declare_disturbance(app, options->disturbance);
         app.add_option("--initial-error", options->initial.position_m, "|e| at t = 0, m, for the transient");
@@ -123,7 +123,7 @@ Command bound_command() {
         app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
         return [options, uncertain](const CommonOptions& common) {
           options->is_uncertain = uncertain->count() > 0;
-          return run(*options, common);
+          return run_bound(*options, common);
         };
       }};
 }

@@ -24,7 +24,7 @@ using lipschitz::CertifiedBound;
 using lipschitz::CertifiedLayer;
 using lipschitz::Verdict;
 
-struct Options {
+struct CertifyOptions {
   files::NetworkArguments network;
   std::string method = "auto";
   std::string as;
@@ -128,7 +128,7 @@ void add_comparisons(const files::Network& network, const lipschitz::CertifyOpti
 }
 
 /// Range and float32 error over the box of --domain, or over what the clamp lets through.
-void add_ranges(const files::Network& network, const Options& options, CertifyOutput& output) {
+void add_ranges(const files::Network& network, const CertifyOptions& options, CertifyOutput& output) {
   const std::map<std::string, lipschitz::Box> domain =
       options.domain.empty() ? lipschitz::clamp_domain(network) : options.certify.domain;
   if (domain.empty()) throw UsageError("--range needs a box: give --domain, or a clamp in network.toml");
@@ -153,7 +153,8 @@ void add_ranges(const files::Network& network, const Options& options, CertifyOu
 }
 
 /// "dp_x_m,dp_z_m" and "12" or "12,8".
-void parse_map(const Options& options, const files::Network& network, lipschitz::SlopeMapOptions& map) {
+void parse_map(const CertifyOptions& options, const files::Network& network,
+               lipschitz::SlopeMapOptions& map) {
   const auto halves = [](const std::string& text, const char* option, const char* form) {
     const std::size_t comma = text.find(',');
     if (comma == std::string::npos || text.find(',', comma + 1) != std::string::npos)
@@ -181,7 +182,7 @@ void parse_map(const Options& options, const files::Network& network, lipschitz:
   }
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_certify(CertifyOptions options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -269,7 +270,7 @@ Command certify_command() {
       "the gamma that a network.toml states.\n\n"
       "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<CertifyOptions>();
         declare_network(app, options->network);
         app.add_option("--method", options->method,
                        "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), auto, the smaller one, "
@@ -329,7 +330,7 @@ Command certify_command() {
             ->capture_default_str();
         app.add_option("-o,--output", options->output, "Where the certificate goes");
         app.add_option("--report", options->report, "Folder for an HTML report with its plots");
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_certify(*options, common); };
       }};
 }
 

@@ -8,12 +8,12 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct CheckOptions {
   std::string certificate;
   files::NetworkArguments network;
 };
 
-int run(const Options& options, const CommonOptions& common) {
+int run_check(const CheckOptions& options, const CommonOptions& common) {
   const files::Json certificate = files::read_json(options.certificate, check::kCertificateSchema);
   const files::Network network = load_net(options.network);
   const check::CheckResult verdict = check::check(certificate, network);
@@ -48,11 +48,11 @@ Command check_command() {
           "the reason: exit 1.\n\n"
           "Example: swarmcert check cert.json nn/networks/demo/network.toml",
           [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
+            const auto options = std::make_shared<CheckOptions>();
             app.add_option("CERTIFICATE", options->certificate, "Certificate that certify wrote with -o")
                 ->required();
             declare_network(app, options->network);
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_check(*options, common); };
           }};
 }
 

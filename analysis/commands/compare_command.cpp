@@ -18,7 +18,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct CompareOptions {
   FlightOptions flights;
   std::string report;
   std::vector<std::string> gains;
@@ -52,7 +52,7 @@ void check_kinds(const residuals::GainsOfKinds& gains, const residuals::Inputs& 
 }
 
 /// The fit sees the models and rules of the comparison, and other flights.
-identification::Budget budget_of(const Options& options, const residuals::Inputs& inputs,
+identification::Budget budget_of(const CompareOptions& options, const residuals::Inputs& inputs,
                                  const CommonOptions& common) {
   FlightOptions words = options.flights;
   words.words.clear();
@@ -99,7 +99,7 @@ files::Json inject(const residuals::Inputs& inputs, const std::string& folder, b
           {"unchanged", std::move(unchanged)}};
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_compare(const CompareOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (!options.inject.empty() &&
@@ -160,7 +160,7 @@ Command compare_command() {
       "         swarmcert compare truth.toml flights/ --inject injected\n"
       "         swarmcert compare flights/ --gains small=small.toml --gains large=large.toml",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<CompareOptions>();
         declare_flights(app, options->flights, true);
         app.add_option("--report", options->report, "Write an HTML report into this folder");
         app.add_option(
@@ -186,7 +186,7 @@ Command compare_command() {
             "Cut and filter as the networks' authors did: 32 g (small) and 67 g (large), thrust lag 0.16 "
             "per record, clocks as they are, |f_a,z| < 50 gf, contact kept; prints the mean squares with "
             "this project's own filter beside");
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_compare(*options, common); };
       }};
 }
 

@@ -15,7 +15,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct DemoOptions {
   std::string output = "swarmcert-demo";
 };
 
@@ -28,7 +28,7 @@ std::filesystem::path bundled_networks() {
   return std::filesystem::path(SWARMCERT_SOURCE_DIR) / "nn/networks";
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_demo(const DemoOptions& options, const CommonOptions& common) {
   files::NetworkArguments arguments;
   arguments.file = (bundled_networks() / "demo/network.toml").string();
   const std::filesystem::path folder = options.output;
@@ -82,9 +82,9 @@ Command demo_command() {
       "demo", "The main job end to end on bundled data",
       "Certifies a network that ships with the tool and checks the certificate.\n\nExample: swarmcert demo",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<DemoOptions>();
         app.add_option("-o,--output", options->output, "Folder for the results")->capture_default_str();
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_demo(*options, common); };
       }};
 }
 

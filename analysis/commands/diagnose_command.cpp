@@ -15,7 +15,7 @@ namespace {
 using identification::Diagnosis;
 using identification::Missing;
 
-struct Options {
+struct DiagnoseOptions {
   FlightOptions flights;
   std::string report;
 };
@@ -157,7 +157,7 @@ files::Json json_of(const identification::Detectable& entry, const std::string& 
           {"excitation", entry.excitation}};
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const residuals::Inputs inputs = read_flights(options.flights);
@@ -217,10 +217,10 @@ Command diagnose_command() {
           "tested separately.\n\n"
           "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out",
           [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
+            const auto options = std::make_shared<DiagnoseOptions>();
             declare_flights(app, options->flights, true);
             app.add_option("--report", options->report, "Write an HTML report into this folder");
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_diagnose(*options, common); };
           }};
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExportOptions {
   files::NetworkArguments network;
   std::string output, certificate, as;
   firmware::ExportOptions source;
@@ -49,7 +49,7 @@ std::string certificate_of(const files::Network& network, const std::string& pat
   return hash;
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_export(ExportOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   bool is_rounded = false;
   const files::Network network = load_flown_net(options.network, options.as, is_rounded);
@@ -95,7 +95,7 @@ Command export_command() {
       "weights.\n\n"
       "Example: swarmcert export nn/networks/demo/network.toml -o firmware",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<ExportOptions>();
         declare_network(app, options->network);
         app.add_option("-o,--output", options->output, "Folder for the source")->required();
         declare_as(app, options->as);
@@ -104,7 +104,7 @@ Command export_command() {
             ->check(CLI::Range(1, 64))
             ->capture_default_str();
         app.add_option("--seed", options->source.seed, "Of the golden vectors")->capture_default_str();
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_export(*options, common); };
       }};
 }
 

@@ -19,7 +19,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct GateOptions {
   std::string policy, baseline, junit, sarif, markdown, bundle;
   bool update_baseline = false;
   bool github = false;
@@ -73,7 +73,7 @@ bool may_become_baseline(const gate::GateResult& result) {
   return true;
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_gate(const GateOptions& options, const CommonOptions& common) {
   if (options.github && common.json == "-")
     throw UsageError("--github and --json - both print to standard output: give --json a file");
   if (options.update_baseline && options.baseline.empty())
@@ -164,7 +164,7 @@ Command gate_command() {
       "a file that is missing or damaged, else 1. Paths in a policy are relative to it.\n\n"
       "Example: swarmcert gate policy.toml --baseline baseline.json --junit gate.xml",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<GateOptions>();
         app.add_option("POLICY", options->policy, "policy.toml (schema swarmcert/policy/1)")->required();
         app.add_option("--baseline", options->baseline,
                        "Numbers of the last release, for the check regression");
@@ -182,7 +182,7 @@ Command gate_command() {
             "Copy all evidence of a release that passes into this folder, with a manifest of hashes");
         app.add_flag("--hashes", options->hashes,
                      "Print a table [hashes] of the release's files for the policy, and check nothing");
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_gate(*options, common); };
       }};
 }
 

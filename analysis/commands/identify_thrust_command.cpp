@@ -11,7 +11,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct IdentifyThrustOptions {
   std::string file, report;
   int rotors = 1;
   double confidence = 0.95;
@@ -60,7 +60,7 @@ void print(const ThrustData& data, const ThrustIdentification& result) {
   }
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_identify_thrust(const IdentifyThrustOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const ThrustData data = load_thrust_data(options.file, options.rotors);
@@ -107,14 +107,14 @@ Command identify_thrust_command() {
       "Exit 0 if the data determine all three polynomials, 4 if not (with what they lack).\n\n"
       "Example: swarmcert identify-thrust load_cell.csv --rotors 4 --json thrust.json",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<IdentifyThrustOptions>();
         app.add_option("CSV", options->file, "Load-cell recording")->required();
         app.add_option("--rotors", options->rotors, "Rotors that push on the load cell together (default: 1)")
             ->check(CLI::Range(1, controller::kMostRotors));
         app.add_option("--confidence", options->confidence, "Of the coefficients' intervals (default: 0.95)")
             ->check(CLI::Range(0.5, 0.9999));
         app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_identify_thrust(*options, common); };
       }};
 }
 

@@ -15,7 +15,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct InspectOptions {
   std::vector<std::string> files;
   std::string key;
   std::string csv;
@@ -171,7 +171,7 @@ files::Json inspect_model(const std::string& path, bool print) {
           {"effects", std::move(effects)}};
 }
 
-files::Json inspect_log(const std::string& path, const Options& options, const CommonOptions& common) {
+files::Json inspect_log(const std::string& path, const InspectOptions& options, const CommonOptions& common) {
   const logs::Log log = options.columns.empty() ? logs::read_log(path)
                                                 : logs::read_log(path, logs::read_columns(options.columns));
   const logs::LogHealth& health = log.health;
@@ -215,14 +215,14 @@ files::Json inspect_log(const std::string& path, const Options& options, const C
             {"checksum_failed", health.checksum_failed}}}};
 }
 
-files::Json inspect(const std::string& path, const Options& options, const CommonOptions& common) {
+files::Json inspect(const std::string& path, const InspectOptions& options, const CommonOptions& common) {
   if (logs::looks_like_log(path)) return inspect_log(path, options, common);
   if (is_model(path)) return inspect_model(path, common.prints_text());
   return is_json(path) ? inspect_certificate(path, common.prints_text())
                        : inspect_network(path, options.key, common.prints_text());
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_inspect(const InspectOptions& options, const CommonOptions& common) {
   if (!options.csv.empty()) {
     if (options.files.size() != 1 || !logs::looks_like_log(options.files[0]))
       throw UsageError("--csv takes one flight log");
@@ -258,7 +258,7 @@ Command inspect_command() {
           "Example: swarmcert inspect nn/networks/demo/network.toml\n"
           "         swarmcert inspect cf50_00 --csv cf50_00.csv --t0 2 --t1 12",
           [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
+            const auto options = std::make_shared<InspectOptions>();
             app.add_option("FILE", options->files,
                            "Weight files, network.toml and model.toml files, certificates, flight logs")
                 ->required();
@@ -268,7 +268,7 @@ Command inspect_command() {
             app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
             app.add_option("--key", options->key,
                            "Where the state dict lies inside a nested checkpoint, e.g. model");
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_inspect(*options, common); };
           }};
 }
 

@@ -15,7 +15,7 @@ using files::Json;
 using stability::IssCheck;
 using stability::IssRun;
 
-struct Options {
+struct IssCheckOptions {
   std::string gains, model, report;
   stability::IssOptions check;
 };
@@ -77,7 +77,7 @@ Json run_json(const IssRun& run) {
           {"pieces", std::move(pieces)}};
 }
 
-Json result_json(const Options& options, const IssCheck& check,
+Json result_json(const IssCheckOptions& options, const IssCheck& check,
                  const std::vector<stability::FullLoopRun>& flown) {
   Json result = result_head("iss-check", {options.gains, options.model});
   result["seed"] = options.check.seed;
@@ -124,7 +124,8 @@ Json result_json(const Options& options, const IssCheck& check,
   return result;
 }
 
-void print(const Options& options, const IssCheck& check, const std::vector<stability::FullLoopRun>& flown) {
+void print(const IssCheckOptions& options, const IssCheck& check,
+           const std::vector<stability::FullLoopRun>& flown) {
   if (check.theorem_applies) {
     fmt::print("The theorem's hypotheses hold for these gains.\n");
   } else {
@@ -170,7 +171,7 @@ void print(const Options& options, const IssCheck& check, const std::vector<stab
   }
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const stability::Gains gains = stability::load_gains(options.gains);
@@ -211,7 +212,7 @@ Command iss_check_command() {
           "  swarmcert iss-check --gains controller/gains/composite.toml \\\n"
           "      --model stability/models/crazyflie-small.toml",
           [](CLI::App& app) {
-            auto options = std::make_shared<Options>();
+            auto options = std::make_shared<IssCheckOptions>();
             app.add_option("--gains", options->gains, "gains.toml")->required();
             app.add_option("--model", options->model, "model.toml")->required();
             app.add_option("--runs", options->check.runs, "Integrations (default 200)")
@@ -221,7 +222,7 @@ Command iss_check_command() {
                 ->check(CLI::PositiveNumber);
             app.add_option("--seed", options->check.seed, "Of the random disturbances (default 0)");
             app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_iss_check(*options, common); };
           }};
 }
 

@@ -13,7 +13,7 @@
 namespace swarmcert::analysis {
 namespace {
 
-struct Options {
+struct MatchOptions {
   files::NetworkArguments network;
   std::vector<std::string> words;  ///< NET FILE, or FILE with --phi and --rho
   std::string file, as;
@@ -53,7 +53,7 @@ void print(const firmware::MatchResult& result, const std::string& file) {
   }
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_match(MatchOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   if (options.words.size() != (options.network.phi.empty() ? 2u : 1u))
     throw UsageError("match takes NET FILE, or --phi F --rho F FILE");
@@ -90,7 +90,7 @@ Command match_command() {
           "difference otherwise. With --phi and --rho, NET is those two files.\n\n"
           "Example: swarmcert match nn/networks/demo/network.toml firmware/swarmcert_network.cpp",
           [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
+            const auto options = std::make_shared<MatchOptions>();
             app.add_option("NET FILE", options->words, "The network, then the source file or ELF")
                 ->required()
                 ->expected(1, 2);
@@ -101,7 +101,7 @@ Command match_command() {
             app.add_option("--key", options->network.key,
                            "Where the state dict lies inside a nested checkpoint");
             declare_as(app, options->as);
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_match(*options, common); };
           }};
 }
 

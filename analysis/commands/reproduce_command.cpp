@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using reproduction::Experiment;
 using reproduction::Finding;
 
-struct Options {
+struct ReproduceOptions {
   std::string name, output, shard = "0/1";
   reproduction::Setting setting;
 };
@@ -65,7 +65,7 @@ void print(const Finding& finding) {
   for (const std::string& note : finding.notes) fmt::print("{}\n", note);
 }
 
-std::string write_report(const Options& options, const Finding& finding) {
+std::string write_report(const ReproduceOptions& options, const Finding& finding) {
   Report report("Reproduction: " + experiment(options.name).summary);
   for (const std::string& note : finding.notes) report.paragraph(note);
   for (const reproduction::Table& table : finding.tables) {
@@ -77,7 +77,7 @@ std::string write_report(const Options& options, const Finding& finding) {
   return report.write((fs::path(options.output) / options.name).string(), true);
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   const Experiment& chosen = experiment(options.name);
   read_shard(options.shard, options.setting);
   const fs::path result_file = fs::path(options.output) / options.name / "result.json";
@@ -143,7 +143,7 @@ Command reproduce_command() {
               "done.\n\nExample: swarmcert reproduce table -o reproduced\n"
               "         swarmcert reproduce table --full --shard 1/2 -o reproduced",
           [words](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
+            const auto options = std::make_shared<ReproduceOptions>();
             app.add_option("EXPERIMENT", options->name, "What to do, see above")
                 ->type_name(fmt::format("{{{}}}", fmt::join(words, ",")))
                 ->required();
@@ -157,7 +157,7 @@ Command reproduce_command() {
             app.add_option(
                 "--recorded", options->setting.recorded,
                 "Folder of the published data, with flights/ and weights/ (default: ../shared/data)");
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_reproduce(*options, common); };
           }};
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 using files::Json;
 
-struct Options {
+struct SimulateOptions {
   std::string task;
   std::vector<std::string> models;
   std::string gains, output, report;
@@ -36,7 +36,7 @@ Json axes(const std::array<double, 4>& values) {
 
 std::string log_name(int vehicle, int run) { return fmt::format("cf{}_{:02}", vehicle + 1, run); }
 
-Json result_json(const Options& options, const std::vector<std::string>& inputs,
+Json result_json(const SimulateOptions& options, const std::vector<std::string>& inputs,
                  const stability::Simulation& flown, const stability::Task& task) {
   Json result = result_head("simulate", inputs);
   result["seed"] = options.seed;
@@ -64,7 +64,7 @@ Json result_json(const Options& options, const std::vector<std::string>& inputs,
   return result;
 }
 
-void print(const Options& options, const stability::Simulation& flown, const stability::Task& task) {
+void print(const SimulateOptions& options, const stability::Simulation& flown, const stability::Task& task) {
   fmt::print(
       "{}: {} vehicles, {:g} s in the sampled loop (Runge-Kutta per control period, float32 control)\n",
       options.task, flown.vehicles.size(), task.duration_s());
@@ -81,8 +81,8 @@ void print(const Options& options, const stability::Simulation& flown, const sta
   if (flown.diverged) fmt::print("  DIVERGED at {:.2f} s: the flight ends there\n", flown.end_s);
 }
 
-void write_report(const Options& options, const CommonOptions& common, const stability::Simulation& flown,
-                  const Json& result) {
+void write_report(const SimulateOptions& options, const CommonOptions& common,
+                  const stability::Simulation& flown, const Json& result) {
   Report report(fmt::format("{} with {} vehicles", options.task, flown.vehicles.size()));
   report.result(result);
   report.paragraph(
@@ -121,7 +121,7 @@ void write_report(const Options& options, const CommonOptions& common, const sta
   report.write(options.report, common.force);
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_simulate(SimulateOptions options, const CommonOptions& common) {
   const std::vector<std::string> tasks = stability::task_names();
   if (std::find(tasks.begin(), tasks.end(), options.task) == tasks.end()) {
     throw UsageError("unknown task " + options.task + ": " + files::did_you_mean(options.task, tasks));
@@ -203,7 +203,7 @@ Command simulate_command() {
               "  swarmcert simulate swap --vehicles 2 --model stability/models/crazyflie-small.toml \\\n"
               "      --gains controller/gains/crazyflie-small.toml -o flights",
           [](CLI::App& app) {
-            auto options = std::make_shared<Options>();
+            auto options = std::make_shared<SimulateOptions>();
             app.add_option("TASK", options->task, "What to fly, see above")
                 ->type_name(fmt::format("{{{}}}", fmt::join(stability::task_names(), ",")))
                 ->required();
@@ -234,7 +234,7 @@ Command simulate_command() {
                            "one, a neighbour no longer counts")
                 ->check(CLI::Range(0.0, 1.0));
             app.add_flag("--no-noise", options->no_noise, "The controller sees the true state");
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_simulate(*options, common); };
           }};
 }
 

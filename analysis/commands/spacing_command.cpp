@@ -16,7 +16,7 @@ namespace {
 
 using stability::DownwashField;
 
-struct Options {
+struct SpacingOptions {
   TrackingArguments tracking;
   std::string neighbour_model;
   stability::SpacingQuestion question;
@@ -55,7 +55,7 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
   return field;
 }
 
-int run(const Options& options, const CommonOptions& common) {
+int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
   if (options.question.steps > 1 && !(options.question.from_m < options.question.to_m)) {
     throw UsageError("--from is a smaller height gap than --to");
   }
@@ -147,7 +147,7 @@ Command spacing_command() {
           "Example: swarmcert spacing --gains controller/gains/crazyflie-small.toml --model "
           "stability/models/crazyflie-small.toml \\\n           --max-error 0.1",
           [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
+            const auto options = std::make_shared<SpacingOptions>();
             declare_tracking(app, options->tracking);
             auto& question = options->question;
             app.add_option("--max-error", question.max_error_m, "Largest vertical error, m")
@@ -164,7 +164,7 @@ Command spacing_command() {
                 ->check(CLI::PositiveNumber);
             app.add_option("--steps", question.steps, "Rows (default 27)")->check(CLI::Range(1, 10000));
             app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
-            return [options](const CommonOptions& common) { return run(*options, common); };
+            return [options](const CommonOptions& common) { return run_spacing(*options, common); };
           }};
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 using stability::MergedSweep;
 
-struct Options {
+struct SweepOptions {
   std::string grid, folder, shard, report;
   bool resume = false;
 };
@@ -58,7 +58,7 @@ int finish(const std::string& command, const std::string& folder, const std::str
   return kDone;
 }
 
-int run_sweep(const Options& options, const CommonOptions& common) {
+int run_sweep(const SweepOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (options.shard.empty() && !options.resume)
@@ -104,7 +104,7 @@ Command sweep_command() {
           "'swarmcert merge' makes the same bytes of them as an undivided run. Ctrl-C keeps what is done.\n\n"
           "Example: swarmcert sweep grid.toml -o sweep",
           [](CLI::App& app) {
-            const auto options = std::make_shared<Options>();
+            const auto options = std::make_shared<SweepOptions>();
             app.add_option("GRID", options->grid, "grid.toml: axes and what to compute")->required();
             app.add_option("-o,--output", options->folder, "Folder for the results")->required();
             app.add_option("--report", options->report,
@@ -124,7 +124,7 @@ Command merge_command() {
       "byte.\n\n"
       "Example: swarmcert merge sweep",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<SweepOptions>();
         app.add_option("DIR", options->folder, "Folder with the shard files")->required();
         app.add_option("--report", options->report, "Folder for the report (default: report in that folder)");
         return [options](const CommonOptions& common) {

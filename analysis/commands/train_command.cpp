@@ -25,7 +25,7 @@ const std::map<std::string, learning::SplitBy> kSplits = {{"auto", learning::Spl
                                                           {"flights", learning::SplitBy::kFlights},
                                                           {"blocks", learning::SplitBy::kBlocks}};
 
-struct Options {
+struct TrainOptions {
   FlightOptions flights;
   std::vector<std::string> select, test;
   std::string output, report, split = "auto";
@@ -65,7 +65,7 @@ struct Outcome {
   learning::Certified certified;
 };
 
-files::Json result_of(const Options& options, const std::vector<std::string>& inputs,
+files::Json result_of(const TrainOptions& options, const std::vector<std::string>& inputs,
                       const LearningData& data, const Outcome& outcome) {
   files::Json json = result_head("train", inputs);
   json["seed"] = options.run.trainer.seed;
@@ -96,7 +96,7 @@ files::Json result_of(const Options& options, const std::vector<std::string>& in
   return json;
 }
 
-void print(const Options& options, const LearningData& data, const Outcome& outcome) {
+void print(const TrainOptions& options, const LearningData& data, const Outcome& outcome) {
   std::map<std::string, int> flights[3];
   for (const learning::TrackSamples& track : data.tracks)
     ++flights[static_cast<int>(track.use)][track.flight];
@@ -119,7 +119,7 @@ void print(const Options& options, const LearningData& data, const Outcome& outc
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
 
-void refuse_to_mix(const Options& options, const CommonOptions& common) {
+void refuse_to_mix(const TrainOptions& options, const CommonOptions& common) {
   const bool is_used =
       fs::exists(options.output) && (!fs::is_directory(options.output) || !fs::is_empty(options.output));
   if (!is_used || common.force || options.run.resumes) return;
@@ -128,7 +128,7 @@ void refuse_to_mix(const Options& options, const CommonOptions& common) {
 }
 
 /// Flights that are not fitted, with the same models; nothing where none are named.
-std::optional<residuals::Inputs> others(const Options& options, const std::vector<std::string>& words) {
+std::optional<residuals::Inputs> others(const TrainOptions& options, const std::vector<std::string>& words) {
   if (words.empty()) return std::nullopt;
   FlightOptions chosen = options.flights;
   chosen.words = words;
@@ -152,7 +152,7 @@ void refuse_twice(const learning::LearningFlights& flights) {
   }
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_train(TrainOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_to_mix(options, common);
   refuse_folder(common, options.report);
@@ -232,7 +232,7 @@ Command train_command() {
       "not learned: not done.\n\n"
       "Example: swarmcert train flights/ --epochs 20 -o trained",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<TrainOptions>();
         training::TrainerOptions& trainer = options->run.trainer;
         trainer.gamma.value = 3;
         declare_flights(app, options->flights, true);
@@ -285,7 +285,7 @@ Command train_command() {
         app.add_flag("--published-filter", options->flights.published_filter,
                      "Cut and filter as the networks' authors did, see compare");
         app.add_option("--report", options->report, "Write an HTML report into this folder");
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_train(*options, common); };
       }};
 }
 

@@ -17,7 +17,7 @@ namespace {
 using stability::TunedPoint;
 using stability::TuneResult;
 
-struct Options {
+struct TuneOptions {
   TrackingArguments tracking;
   stability::TuneOptions tune;
   std::string objective = "impulse";
@@ -98,7 +98,8 @@ std::string listed(const std::vector<std::string>& names) {
   return text.empty() ? "none" : text;
 }
 
-void print_result(const Options& options, const TuneResult& found, const stability::TuneConstraints& limits) {
+void print_result(const TuneOptions& options, const TuneResult& found,
+                  const stability::TuneConstraints& limits) {
   const TunedPoint& a = found.shipped;
   const TunedPoint& b = found.best;
   fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, further lag of {:.6g} s borne",
@@ -129,7 +130,7 @@ void print_result(const Options& options, const TuneResult& found, const stabili
   fmt::print("search: {}; good gains, not proved to be the best\n", found.stopped);
 }
 
-int run(Options options, const CommonOptions& common) {
+int run_tune(TuneOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const Tracking input = load_tracking(options.tracking);
@@ -212,7 +213,7 @@ Command tune_command() {
       "Example: swarmcert tune --gains controller/gains/crazyflie-small.toml --model "
       "stability/models/crazyflie-small.toml",
       [](CLI::App& app) {
-        const auto options = std::make_shared<Options>();
+        const auto options = std::make_shared<TuneOptions>();
         declare_tracking(app, options->tracking);
         app.add_option("--axis", options->axis, "x, y or z (default z)")
             ->check(CLI::IsMember({"x", "y", "z"}));
@@ -237,7 +238,7 @@ Command tune_command() {
             ->check(CLI::PositiveNumber);
         app.add_option("--seed", options->tune.seed, "Seed of the global search (default 1)");
         app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
-        return [options](const CommonOptions& common) { return run(*options, common); };
+        return [options](const CommonOptions& common) { return run_tune(*options, common); };
       }};
 }
 

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstring>
 #include <map>
 
 #include "analysis/firmware/flight_headers.h"
+#include "analysis/firmware/float_blocks.h"
 #include "analysis/firmware/golden_vectors.h"
 #include "nn/deep_set.h"
 #include "nn/files/functions.h"
@@ -89,12 +89,6 @@ std::string mlp(const std::string& id, const files::Weights& weights) {
   return fmt::format("{{{}_layers, {}}}", id, weights.layers.size());
 }
 
-std::uint32_t bits_of(float value) {
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, &value, sizeof bits);
-  return bits;
-}
-
 std::string list(const std::vector<float>& values) {
   std::string text;
   for (const float value : values) text += (text.empty() ? "" : ", ") + literal(value);
@@ -109,7 +103,7 @@ std::string golden_source(const std::vector<GoldenVector>& vectors) {
     for (const int kind : vector.kinds) kinds += std::to_string(kind) + ", ";
     text += fmt::format("    {{{}, {}, {}, {{{}}}, {{{}}}, DeepSetStatus({}), {:#010x}u}},\n",
                         vector.own_kind, vector.inputs.size(), list(vector.own), inputs, kinds,
-                        static_cast<int>(vector.status), bits_of(vector.force_N));
+                        static_cast<int>(vector.status), float_bits(vector.force_N));
   }
   return text + "};\n";
 }
@@ -119,8 +113,8 @@ std::uint32_t weights_hash(const files::Network& network) {
   std::uint32_t hash = 2166136261u;
   const auto add = [&](const files::Weights& weights) {
     for (const files::Layer& layer : weights.layers) {
-      for (const float number : in_blocks(layer)) hash = (hash ^ bits_of(number)) * 16777619u;
-      for (const float number : narrow(layer.biases)) hash = (hash ^ bits_of(number)) * 16777619u;
+      for (const float number : in_blocks(layer)) hash = (hash ^ float_bits(number)) * 16777619u;
+      for (const float number : narrow(layer.biases)) hash = (hash ^ float_bits(number)) * 16777619u;
     }
   };
   for (const std::string& kind : neighbour_kinds(network)) add(network.phi.at(kind));

@@ -11,12 +11,6 @@
 namespace swarmcert::firmware {
 namespace {
 
-std::uint32_t bits_of(float value) {
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, &value, sizeof bits);
-  return bits;
-}
-
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
 /// A literal at `at`, without its sign; false if none stands there, or it is no number that a float takes.
@@ -124,7 +118,7 @@ class SourceScanner {
       blocks_.back().name = member_.empty() ? variable_ : variable_ + "." + member_;
       starts_new_ = false;
     }
-    blocks_.back().bits.push_back(bits_of(value));
+    blocks_.back().bits.push_back(float_bits(value));
     blocks_.back().lines.push_back(line_);
   }
 

@@ -2,10 +2,18 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <vector>
 
 namespace swarmcert::firmware {
+
+/// As a compiler stores it.
+inline std::uint32_t float_bits(float value) {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits;
+}
 
 /// Numbers stored one after another under one name.
 struct FloatBlock {

@@ -11,14 +11,14 @@
 namespace swarmcert::gate {
 namespace {
 
-constexpr char kSchema[] = "swarmcert/baseline/1";
+constexpr char kBaselineSchema[] = "swarmcert/baseline/1";
 constexpr char kMend[] = "write it anew with swarmcert gate --update-baseline";
 
 }  // namespace
 
 std::unique_ptr<std::map<std::string, double>> read_baseline(const std::string& path, bool may_lack) {
   if (may_lack && !std::filesystem::exists(path)) return nullptr;
-  const files::Json document = files::read_json(path, kSchema);
+  const files::Json document = files::read_json(path, kBaselineSchema);
   try {
     files::require_keys(document, {"schema", "tool", "values", "content_sha256"}, "the baseline");
     if (document["content_sha256"] != files::content_sha256(document))
@@ -38,7 +38,7 @@ void write_baseline(const std::string& path, const Checks& checks) {
       values[check.name] = *check.value;
   }
   files::Json document = {
-      {"schema", kSchema}, {"tool", "swarmcert " SWARMCERT_VERSION}, {"values", std::move(values)}};
+      {"schema", kBaselineSchema}, {"tool", "swarmcert " SWARMCERT_VERSION}, {"values", std::move(values)}};
   document["content_sha256"] = files::content_sha256(document);
   files::write_file(path, files::to_text(document), true);
 }

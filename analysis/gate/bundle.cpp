@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 using files::InputError;
 using files::Json;
 
-constexpr char kSchema[] = "swarmcert/manifest/1";
+constexpr char kManifestSchema[] = "swarmcert/manifest/1";
 
 fs::path normal(const std::string& path) { return fs::absolute(path).lexically_normal(); }
 
@@ -50,7 +50,7 @@ Json manifest_of(const std::vector<Entry>& entries, const std::string& policy) {
         {{"path", entry.path}, {"role", entry.role}, {"bytes", entry.bytes}, {"sha256", entry.sha256}});
   }
   Json manifest = {
-      {"schema", kSchema},
+      {"schema", kManifestSchema},
       {"tool", "swarmcert " SWARMCERT_VERSION},
       {"statement",
        "These files, with these SHA-256, are one release that passed its gate: the policy, the weights, "
@@ -84,7 +84,7 @@ std::vector<Entry> read_manifest(const fs::path& folder, std::string& sha256, st
   const std::string path = (folder / "manifest.json").string();
   const std::string text = files::read_file(path);
   sha256 = files::sha256(text);
-  const Json manifest = files::parse_json(text, path, kSchema);
+  const Json manifest = files::parse_json(text, path, kManifestSchema);
   if (files::to_text(manifest) != text) reject("manifest.json is not as it was written");
   files::require_keys(manifest, {"schema", "tool", "statement", "policy", "files", "content_sha256"},
                       "manifest.json");

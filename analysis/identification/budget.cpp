@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <set>
 
 #include "analysis/identification/block_grams.h"
 #include "analysis/identification/box_least_squares.h"
+#include "nn/files/doubles.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
@@ -68,7 +68,6 @@ JointFit solve(const std::map<std::string, Sum>& sums, const std::vector<int>& c
   }
   // A column that is nowhere active would make the matrix singular.
   for (Eigen::Index k = 0; k < size; ++k) gram(k, k) += 1e-9 + 1e-9 * gram(k, k);
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Eigen::VectorXd lower = Eigen::VectorXd::Constant(size, -kInfinity);
   Eigen::VectorXd upper = Eigen::VectorXd::Constant(size, kInfinity);
   for (Eigen::Index k = 0; k < shared; ++k) {

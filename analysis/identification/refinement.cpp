@@ -10,7 +10,7 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr std::size_t kManyRecords = 400'000;
+constexpr std::size_t kTooManyToRefine = 400'000;
 constexpr double kDifference = 0.05;  ///< of a shape's scale, for derivatives
 constexpr double kLargestStep = 0.5;  ///< of a shape's scale
 constexpr double kSettled = 0.01;
@@ -70,7 +70,7 @@ class Refinement {
     Point best = evaluate(start_);
     const bool moves =
         std::any_of(unknowns_.begin(), unknowns_.end(), [](const Unknown& u) { return u.is_shape; });
-    const int steps = !moves ? 0 : passes_.records > kManyRecords ? 1 : 7;
+    const int steps = !moves ? 0 : passes_.records > kTooManyToRefine ? 1 : 7;
     double radius = kLargestStep;
     for (int i = 0; i < steps; ++i) {
       double length = 0;

@@ -3,17 +3,15 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <random>
 
 #include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/covariance.h"
+#include "nn/files/doubles.h"
 
 namespace swarmcert::identification {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Whole flights are left out where there are this many.
 constexpr std::size_t kFewestFlights = 5;

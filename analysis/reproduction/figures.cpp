@@ -16,7 +16,7 @@ Stages stages_of(const Setting& setting) { return {setting, truths(setting).fron
 
 std::uint64_t flight_seed(const Setting& setting) { return seed_of(setting.seed, "figures"); }
 
-std::string controller_name(int trained_with) {
+std::string curve_name(int trained_with) {
   return trained_with == 0 ? "baseline" : fmt::format("trained with {}", trained_with);
 }
 
@@ -47,7 +47,7 @@ Finding figure_intro(const Setting& setting) {
     const Flown flown = fly(setting, stages.truth(), {"swap", 2, 0, flight_seed(setting)},
                             network ? &*network : nullptr, false);
     const double largest_m = largest_error_m(flown, 2);
-    table.rows.push_back({controller_name(trained_with), fmt::format("{:.3f}", largest_m)});
+    table.rows.push_back({curve_name(trained_with), fmt::format("{:.3f}", largest_m)});
     finding.json["controllers"].push_back({{"trained_with", trained_with}, {"max_z_m", largest_m}});
     const std::string name = trained_with == 0 ? "intro_baseline" : "intro_network";
     finding.figures.push_back(
@@ -62,7 +62,7 @@ Finding figure_intro(const Setting& setting) {
              name +
              ".dat' index i using 2:3 with lines lw 2 title sprintf('vehicle %d', i + 1), for [i=0:1] '" +
              name + ".dat' index i using 2:4 with lines dt 2 lc 'gray' notitle\n",
-         fmt::format("Paths of two vehicles, {}; dashed: as commanded.", controller_name(trained_with))});
+         fmt::format("Paths of two vehicles, {}; dashed: as commanded.", curve_name(trained_with))});
   }
   finding.tables.push_back(std::move(table));
   return finding;
@@ -81,7 +81,7 @@ Finding figure_swaps(const Setting& setting) {
     if (trained_with > 0) network = stages.learned(stage_of(trained_with)).network;
     const Flown flown = fly(setting, stages.truth(), {"swap", 3, 9, flight_seed(setting)},
                             network ? &*network : nullptr, false);
-    std::vector<std::string> row = {controller_name(trained_with)};
+    std::vector<std::string> row = {curve_name(trained_with)};
     files::Json errors = files::Json::array();
     for (const auto& moments : flown.vehicles) {
       float largest = 0;
@@ -103,7 +103,7 @@ Finding figure_swaps(const Setting& setting) {
          "[i=0:2] '" +
              name + ".dat' index i with lines lw 2 title sprintf('vehicle %d', i + 1)\n",
          fmt::format("Height errors of three vehicles, {}; aligned at 3.0 s and 7.5 s.",
-                     controller_name(trained_with))});
+                     curve_name(trained_with))});
   }
   finding.tables.push_back(std::move(table));
   return finding;

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using learning::Use;
 
-constexpr const char* kSchema = "swarmcert/learned/1";
+constexpr const char* kLearnSchema = "swarmcert/learned/1";
 
 std::string text_of(const LearnOptions& options) {
   std::string text =
@@ -50,7 +50,7 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   const std::string done = (fs::path(folder) / "learned.json").string();
   const std::string whole_key = files::sha256(key + "|" + text_of(options));
   if (fs::exists(done)) {
-    const files::Json file = files::read_json(done, kSchema);
+    const files::Json file = files::read_json(done, kLearnSchema);
     if (file.at("key") == whole_key) return read_back(file, folder);
   }
   fs::create_directories(folder);
@@ -81,7 +81,7 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   for (const auto& [function, upper] : certified.set_bounds) bounds.push_back({function, upper});
   for (const learning::Epoch& epoch : trained.epochs)
     epochs.push_back({epoch.fit_rmse_gf, epoch.select_rmse_gf});
-  const files::Json file = {{"schema", kSchema},
+  const files::Json file = {{"schema", kLearnSchema},
                             {"key", whole_key},
                             {"set_bounds", std::move(bounds)},
                             {"bound", certified.largest()},

@@ -54,7 +54,7 @@ void fill(const Flown& flown, Cell& cell) {
 
 files::Json number(double value) { return std::isfinite(value) ? files::Json(value) : files::Json(); }
 
-constexpr const char* kSchema = "swarmcert/table-unit/1";
+constexpr const char* kPerformanceSchema = "swarmcert/table-unit/1";
 
 /// All flights of one truth and one training seed, into `file`, unless it holds them.
 void fly_unit(const Setting& setting, const Truth& truth, int training_seed, const std::string& file) {
@@ -67,7 +67,7 @@ void fly_unit(const Setting& setting, const Truth& truth, int training_seed, con
     for (const auto& [kind, weights] : networks[c]->rho) key += weights.sha256;
   }
   key = files::sha256(key);
-  if (fs::exists(file) && files::read_json(file, kSchema).at("key") == key) return;
+  if (fs::exists(file) && files::read_json(file, kPerformanceSchema).at("key") == key) return;
   std::vector<Cell> cells;
   for (const int controller : kControllers) {
     if (controller == 0 && training_seed > 0) continue;  // the baseline knows no training
@@ -104,7 +104,7 @@ void fly_unit(const Setting& setting, const Truth& truth, int training_seed, con
                        {"p95_y_m", cell.p95_m[1]},
                        {"saturated_share", cell.saturated_share}});
   }
-  const files::Json unit = {{"schema", kSchema}, {"key", key}, {"flights", std::move(flights)}};
+  const files::Json unit = {{"schema", kPerformanceSchema}, {"key", key}, {"flights", std::move(flights)}};
   files::write_file(file, files::to_text(unit), true);
 }
 
@@ -236,7 +236,7 @@ Finding performance(const Setting& setting) {
         finding.complete = false;
         continue;
       }
-      const files::Json unit_file = files::read_json(file, kSchema);
+      const files::Json unit_file = files::read_json(file, kPerformanceSchema);
       for (const files::Json& flight : unit_file.at("flights")) flights.push_back(flight);
     }
     if (!finding.complete) continue;

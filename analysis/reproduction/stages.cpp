@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSchema = "swarmcert/flown/1";
+constexpr const char* kStagesSchema = "swarmcert/flown/1";
 
 std::string weights_of(const files::Network& network) {
   std::string text;
@@ -87,7 +87,7 @@ StageFlights Stages::flights(int stage) {
                         file.at("percentile_distance_m").get<double>()};
   };
   if (fs::exists(done)) {
-    const files::Json file = files::read_json(done, kSchema);
+    const files::Json file = files::read_json(done, kStagesSchema);
     if (file.at("key") == own_key) return read_back(file);
   }
   const std::optional<files::Network> network = flown_network(stage);
@@ -111,7 +111,7 @@ StageFlights Stages::flights(int stage) {
     distances = nearest_distances_m(flown);
   }
   const files::Json file = {
-      {"schema", kSchema},
+      {"schema", kStagesSchema},
       {"key", own_key},
       {"least_distance_m", static_cast<double>(distances.front())},
       {"percentile_distance_m", static_cast<double>(distances[distances.size() / 100])}};

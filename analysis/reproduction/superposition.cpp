@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 /// Both vehicles above push by at least this much, each alone, as far as two-vehicle flights know.
 constexpr double kActing_gf = 1;
-constexpr double kBlock_s = 2;
+constexpr double kDefectBlock_s = 2;
 
 /// Sums over one block of one vehicle, by name of what is summed.
 using Sums = std::map<std::string, BlockMean>;
@@ -89,7 +89,7 @@ void add_simulated(const Setting& setting, const Truth& truth, Table& table, Fin
         if (std::max(actual.force_z_gf({others[0]}), actual.force_z_gf({others[1]})) > -kActing_gf) continue;
         ++records;
         const std::string block =
-            fmt::format("{} {} {}", flight, i, std::floor(static_cast<double>(k) / 100 / kBlock_s));
+            fmt::format("{} {} {}", flight, i, std::floor(static_cast<double>(k) / 100 / kDefectBlock_s));
         for (const auto& [name, function] : {std::pair{"truth", &actual}, std::pair{"network", &predicted}}) {
           const Defect defect(*function, others[0], others[1]);
           add(blocks, block, std::string(name) + " together", defect.together_gf);
@@ -153,7 +153,7 @@ void add_recorded(const Setting& setting, const Truth& truth, Table& table, Find
         const double together = (residual[k].z() - trim.sum / trim.count) / stability::kGramForce_N;
         const double apart = pair.force_z_gf({others[0]}) + pair.force_z_gf({others[1]});
         const std::string block = fmt::format("{} {} {}", track.flight, track.vehicle,
-                                              std::floor(track.instants[k].time_s / kBlock_s));
+                                              std::floor(track.instants[k].time_s / kDefectBlock_s));
         add(blocks, block, "recorded together", together);
         add(blocks, block, "recorded apart", apart);
         add(blocks, block, "recorded defect", together - apart);

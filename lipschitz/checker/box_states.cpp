@@ -2,19 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "nn/files/doubles.h"
 
 namespace swarmcert::check {
 namespace {
 
 using Row = std::vector<double>;
 
-constexpr double kUnit = 0x1p-53;
 constexpr double kTiny = 0x1p-900;  ///< covers what underflow may cost in sums of at most 10^6 terms
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double next_up(double x) { return std::nextafter(x, kInfinity); }
-double next_down(double x) { return std::nextafter(x, -kInfinity); }
 
 /// An upper bound on one neuron's (signed) value, as a linear form in some layer's y or in x.
 struct Form {

@@ -297,7 +297,7 @@ class Checker {
     const double upper = number(law["upper"], law["upper_hex"], where + " upper");
     std::map<std::string, long> terms = law["neighbours"].get<std::map<std::string, long>>();
     require(terms.count(files::kGroundKind) == 0, where + ": the ground is no neighbour");
-    if (parts_.count(std::string("phi:") + files::kGroundKind) == 1) terms[files::kGroundKind] = 1;
+    if (parts_.count(files::kGroundPhi) == 1) terms[files::kGroundKind] = 1;
     require(law["domain"] == "box" || law["domain"] == "global", where + ": unknown domain");
     Dyadic sum, sum_of_squares;
     for (const auto& [kind, count] : terms) {

@@ -7,12 +7,13 @@
 #include <limits>
 #include <stdexcept>
 
+#include "nn/files/doubles.h"
+
 namespace swarmcert::check {
 namespace {
 
 using Row = std::vector<double>;
 
-constexpr double kUnit = 0x1p-53;
 /// More than what a product, or flushing its result to zero, loses below the range of normal numbers.
 constexpr double kLost = 0x1p-1000;
 /// Numbers of a proof stay within 2^-kRange .. 2^kRange, so that kLost is small beside what they make.

@@ -18,7 +18,7 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool ends_with(const std::string& text, std::string_view suffix) {
+bool has_ending(const std::string& text, std::string_view suffix) {
   return text.size() > suffix.size() && text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0;
 }
 
@@ -129,9 +129,9 @@ struct Member {
   std::vector<double> values;  ///< in the order of the text
 };
 
-class Reader {
+class SourceReader {
  public:
-  Reader(const std::string& bytes, const std::string& path) : scanner_(bytes, path), path_(path) {}
+  SourceReader(const std::string& bytes, const std::string& path) : scanner_(bytes, path), path_(path) {}
 
   Weights run(const std::string& key) {
     while (!scanner_.at_end()) {
@@ -243,7 +243,7 @@ class Reader {
     for (const Member& member : members) {
       std::string name = member.name;
       for (const std::string_view part : {"weight", "bias"}) {
-        if (ends_with(name, "_" + std::string(part)))
+        if (has_ending(name, "_" + std::string(part)))
           name = name.substr(0, name.size() - part.size() - 1) + "." + std::string(part);
       }
       DeclaredTensor tensor{name, member.precision, "", member.shape};
@@ -281,7 +281,7 @@ bool looks_like_c_source(const std::string& bytes) {
 }
 
 Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key) {
-  return Reader(bytes, path).run(key);
+  return SourceReader(bytes, path).run(key);
 }
 
 }  // namespace swarmcert::files

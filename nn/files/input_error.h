@@ -28,6 +28,9 @@ class InputError : public std::runtime_error {
   InputFault fault_;
 };
 
+/// How to mend a binary file that ends early or contradicts itself.
+inline constexpr char kCopyAgain[] = "the file is truncated or damaged: copy it again";
+
 /// `text` in double quotes, cut with "..." after 80 bytes: for text that comes from a file of unknown origin.
 std::string in_quotes(std::string_view text);
 

@@ -51,9 +51,9 @@ struct Affine {
   std::size_t node_offset = 0;
 };
 
-class Reader {
+class OnnxReader {
  public:
-  Reader(const std::string& bytes, const std::string& path) : bytes_(bytes), path_(path) {}
+  OnnxReader(const std::string& bytes, const std::string& path) : bytes_(bytes), path_(path) {}
 
   Weights run() {
     read_model();
@@ -359,6 +359,8 @@ bool looks_like_onnx(const std::string& bytes) {
   return tags.find(bytes[2]) != std::string::npos;
 }
 
-Weights parse_onnx(const std::string& bytes, const std::string& path) { return Reader(bytes, path).run(); }
+Weights parse_onnx(const std::string& bytes, const std::string& path) {
+  return OnnxReader(bytes, path).run();
+}
 
 }  // namespace swarmcert::files

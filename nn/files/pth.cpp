@@ -16,7 +16,6 @@ namespace {
 using Kind = PickledValue::Kind;
 
 constexpr std::uint64_t kLargestPickle_bytes = std::uint64_t{16} << 20;
-constexpr char kCopyAgain[] = "the file is truncated or damaged: copy it again";
 /// PROTO, LONG1 of ten bytes, 0x1950a86a20f9469cfc6c, STOP. The byte behind PROTO is the pickle protocol.
 constexpr std::string_view kLegacyMagic("\x8a\x0a\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19.", 13);
 

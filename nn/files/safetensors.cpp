@@ -15,7 +15,6 @@ namespace {
 constexpr std::uint64_t kLargestHeader_bytes = std::uint64_t{4} << 20;
 /// Key in "__metadata__" with the names of our layers in order of evaluation: safetensors itself has no order.
 constexpr char kOrderKey[] = "swarmcert.layers";
-constexpr char kCopyAgain[] = "the file is truncated or damaged: copy it again";
 
 std::uint64_t header_length(const std::string& bytes) {
   std::uint64_t length = 0;

@@ -13,7 +13,6 @@ namespace swarmcert::files {
 namespace {
 
 constexpr std::uint64_t kMostEntries = 10'000;
-constexpr char kCopyAgain[] = "the file is truncated or damaged: copy it again";
 
 std::uint64_t little_endian_64(std::string_view bytes) {
   std::uint64_t value = 0;

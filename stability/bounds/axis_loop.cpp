@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "nn/files/doubles.h"
 
 namespace swarmcert::stability {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Polynomial lag_polynomial(const AxisLoop& loop) {
   Polynomial result = {1};

@@ -4,15 +4,11 @@
 #include <cmath>
 #include <complex>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/amplitude_and_rate.h"
 
 namespace swarmcert::stability {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// factor * what is known, where "nothing known" stays infinite even for a factor of 0.
-double times(double factor, double known) { return std::isinf(known) ? kInfinity : factor * known; }
 
 /// The response after `after_s` has passed, as a response of its own: same poles, new initial values.
 TransferFunction later(const TransferFunction& y, double after_s) {
@@ -97,7 +93,8 @@ double impulse_gain_after(const AxisLoop& loop, Channel channel, double after_s)
 double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double amplitude_N, double rate_N_s,
                                 int nodes) {
   const GainNorms gains = continuous_norms(loop, channel);
-  const double simple = std::min(times(gains.rate, rate_N_s), times(gains.amplitude, amplitude_N));
+  const double simple =
+      std::min(times_known(gains.rate, rate_N_s), times_known(gains.amplitude, amplitude_N));
   if (!std::isfinite(gains.rate) || !std::isfinite(amplitude_N) || !std::isfinite(rate_N_s)) return simple;
   if (amplitude_N == 0 || rate_N_s == 0) return 0;
   const TransferFunction h = step_transfer(loop, channel);
@@ -132,10 +129,10 @@ double felt_passes(const Disturbance& disturbance, const std::function<double(do
 DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance) {
   const GainNorms gains = continuous_norms(loop, channel);
   DisturbanceBounds bounds;
-  bounds.by_rate = times(gains.rate, disturbance.rate_N_s);
-  bounds.by_amplitude = times(gains.amplitude, disturbance.amplitude_N);
-  bounds.by_edges = times(gains.edge, disturbance.variation_N);
-  bounds.by_impulse = times(gains.impulse, disturbance.impulse_N_s);
+  bounds.by_rate = times_known(gains.rate, disturbance.rate_N_s);
+  bounds.by_amplitude = times_known(gains.amplitude, disturbance.amplitude_N);
+  bounds.by_edges = times_known(gains.edge, disturbance.variation_N);
+  bounds.by_impulse = times_known(gains.impulse, disturbance.impulse_N_s);
   bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
   if (!is_stable(loop)) return bounds;
   if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1) {
@@ -147,7 +144,7 @@ DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, cons
     bounds.by_edges = kInfinity;
     if (std::isfinite(disturbance.variation_N) && loop.Ki > 0) {
       bounds.by_edges =
-          times(gains.edge, disturbance.amplitude_N) +
+          times_known(gains.edge, disturbance.amplitude_N) +
           disturbance.variation_N * felt_passes(disturbance, FadingResponse(step_transfer(loop, channel)));
     }
   }
@@ -163,7 +160,7 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
   if (loop.Ki == 0 || std::isinf(limit_m_s)) return result;
   result.exists = true;
   const GainNorms gains = continuous_norms(loop, channel);
-  double demand_m_s = times(gains.rate, disturbance.amplitude_N);
+  double demand_m_s = times_known(gains.rate, disturbance.amplitude_N);
   if (std::isfinite(disturbance.impulse_N_s) && is_stable(loop)) {
     const double felt = disturbance.passes == 1
                             ? gains.edge
@@ -178,7 +175,7 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
   const GainNorms pd_command =
       channel == Channel::kCommand ? pd : continuous_norms(without, Channel::kCommand);
   const double constant_m = pd_command.amplitude * integral_N + pd.amplitude * std::abs(bias_N);
-  result.by_amplitude = times(pd.amplitude, disturbance.amplitude_N) + constant_m;
+  result.by_amplitude = times_known(pd.amplitude, disturbance.amplitude_N) + constant_m;
   if (std::isfinite(disturbance.impulse_N_s) && is_stable(without)) {
     const double felt = disturbance.passes == 1
                             ? pd.impulse

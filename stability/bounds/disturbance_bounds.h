@@ -1,6 +1,7 @@
 /// @file Bounds on the tracking error of one axis from what is known of a force error, and the smallest of them.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
@@ -29,6 +30,9 @@ struct Disturbance {
   }
   static constexpr int kManyPasses = 1000;  ///< stands for a flight of any length: older passes are not felt
 };
+
+/// factor * known, where "nothing known" stays infinite even for a factor of 0.
+inline double times_known(double factor, double known) { return std::isinf(known) ? known : factor * known; }
 
 /// Bounds on sup |e|, m. Infinite where a number is not known.
 struct DisturbanceBounds {

@@ -3,12 +3,12 @@
 #include <cmath>
 #include <queue>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/interval_functions.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTouching_m = 0.05;
 constexpr double kNearest_m = 0.12;
 constexpr double kFarSpreads = 7;

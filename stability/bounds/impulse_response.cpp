@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/response_pieces.h"
 
 namespace swarmcert::stability {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool has_delay(const TransferFunction& y) { return y.delay_s > 0 && !y.feedback.empty(); }
 

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/interval.h"
 
 namespace swarmcert::stability {
@@ -10,7 +11,6 @@ namespace swarmcert::stability {
 /// e^x of one double. With y = x/2^k, |y| <= 1/4: the Taylor polynomial of degree 13, whose remainder is below
 /// 1.3 |y|^14/14!, squared k times. Beyond +-700, where doubles end, [0, 1e-300] or [1e300, oo].
 inline Interval exp_of(double x) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (!(x > -700)) return {0, 1e-300};
   if (!(x < 700)) return {1e300, kInfinity};
   int halvings = 0;

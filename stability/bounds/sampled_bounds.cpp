@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/amplitude_and_rate.h"
 #include "stability/bounds/sampled_adjoint.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kPhases = 5;
-
-double times(double factor, double known) { return std::isinf(known) ? kInfinity : factor * known; }
 
 /// The kernel of one output at one phase, in cells that follow one another backwards in time; per unit of force.
 struct Kernel {
@@ -110,10 +108,10 @@ double worst_phase(const SampledLoop& loop, const Bound& bound) {
 DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
                                      const Disturbance& disturbance) {
   DisturbanceBounds bounds;
-  bounds.by_rate = times(gains.rate, disturbance.rate_N_s);
-  bounds.by_amplitude = times(gains.amplitude, disturbance.amplitude_N);
-  bounds.by_edges = times(gains.edge, disturbance.variation_N);
-  bounds.by_impulse = times(gains.impulse, disturbance.impulse_N_s);
+  bounds.by_rate = times_known(gains.rate, disturbance.rate_N_s);
+  bounds.by_amplitude = times_known(gains.amplitude, disturbance.amplitude_N);
+  bounds.by_edges = times_known(gains.edge, disturbance.variation_N);
+  bounds.by_impulse = times_known(gains.impulse, disturbance.impulse_N_s);
   bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
   const SampledAdjoint adjoint(loop);
   if (!adjoint.is_stable()) return bounds;
@@ -127,7 +125,7 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
   if (disturbance.variation_per_pass) {
     bounds.by_edges = kInfinity;
     if (std::isfinite(disturbance.variation_N) && loop.plant.Ki > 0) {
-      bounds.by_edges = times(gains.edge, disturbance.amplitude_N) +
+      bounds.by_edges = times_known(gains.edge, disturbance.amplitude_N) +
                         disturbance.variation_N * worst_phase(loop, [&](double phase_s) {
                           const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
                           return felt_passes(disturbance, FadingKernel(kernel, kernel.step_peak));
@@ -158,7 +156,7 @@ ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturb
   const SampledAdjoint integral(loop, SampledAdjoint::Output::kIntegral);
   if (integral.is_stable()) {
     const Kernel kernel = kernel_of(integral, channel, 0, mass_kg);
-    demand_m_s = times(kernel.area, disturbance.amplitude_N);
+    demand_m_s = times_known(kernel.area, disturbance.amplitude_N);
     if (std::isfinite(disturbance.impulse_N_s)) {
       demand_m_s = std::min(
           demand_m_s, disturbance.impulse_N_s * felt_passes(disturbance, FadingKernel(kernel, kernel.peak)));
@@ -174,7 +172,7 @@ ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturb
       channel == Channel::kCommand ? pd : sampled_norms(without, Channel::kCommand, Instants::kAll);
   const double constant_m =
       pd_command.amplitude * mass_kg * loop.plant.Ki * limit_m_s + pd.amplitude * std::abs(bias_N);
-  result.by_amplitude = times(pd.amplitude, disturbance.amplitude_N) + constant_m;
+  result.by_amplitude = times_known(pd.amplitude, disturbance.amplitude_N) + constant_m;
   if (std::isfinite(disturbance.impulse_N_s)) {
     result.by_impulse = constant_m + disturbance.impulse_N_s * worst_phase(without, [&](double phase_s) {
                                        const Kernel kernel = kernel_of(pd_adjoint, channel, phase_s, mass_kg);

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/kernel_sum.h"
 #include "stability/bounds/sampled_adjoint.h"
 #include "stability/bounds/sampled_model.h"
@@ -17,7 +17,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<double GainNorms::*, 4> kAllGains = {&GainNorms::rate, &GainNorms::amplitude,
                                                           &GainNorms::edge, &GainNorms::impulse};
 

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "nn/files/doubles.h"
+#include "stability/model.h"
 
 namespace swarmcert::stability {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kGravity_m_s2 = 9.81;
 
 /// Largest force, held for ever, under which the bounds give at most max_error: the clamp acts for larger ones.
 template <class ClampOf>

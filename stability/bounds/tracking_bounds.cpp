@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "stability/bounds/sampled_bounds.h"
+#include "stability/model.h"
 
 namespace swarmcert::stability {
 namespace {
 
 constexpr double kPositionNoise_m = 1e-3;
 constexpr double kVelocityNoise_m_s = 0.05;
-constexpr double kGravity_m_s2 = 9.81;
 
 bool same(const AxisLoop& a, const AxisLoop& b) {
   return a.mass_kg == b.mass_kg && a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s &&

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/field_slope.h"
 #include "stability/bounds/interval_functions.h"
 #include "stability/effects/registry.h"
@@ -10,10 +11,8 @@
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// Product of nonnegative numbers, rounded up, in which a factor of 0 wins over one that is not known.
-double times(double a, double b) { return a == 0 || b == 0 ? 0 : up(a * b); }
+double times_up(double a, double b) { return a == 0 || b == 0 ? 0 : up(a * b); }
 double plus(double a, double b) { return up(a + b); }
 
 /// 1/x from above.
@@ -49,16 +48,16 @@ double composed(int neighbours, double p) {
 void field_bounds(const WakeField& field, double strength_N, double composition, const MotionSet& motion,
                   EffectBounds& result) {
   const FieldSlopes slopes = field_slopes(field, motion.least_gap_m, motion.largest_gap_m);
-  const double factor = times(strength_N, composition);
-  result.amplitude_N[2] = times(factor, slopes.value.hi);
-  result.slope_across_N_m = times(strength_N, slopes.across.hi);
-  result.slope_along_N_m = times(strength_N, slopes.along.hi);
-  double rate = times(factor, times(slopes.total.hi, motion.relative_speed_m_s));
+  const double factor = times_up(strength_N, composition);
+  result.amplitude_N[2] = times_up(factor, slopes.value.hi);
+  result.slope_across_N_m = times_up(strength_N, slopes.across.hi);
+  result.slope_along_N_m = times_up(strength_N, slopes.along.hi);
+  double rate = times_up(factor, times_up(slopes.total.hi, motion.relative_speed_m_s));
   if (field.convection_s_m > 0) {
     // The wake's centre moves with the neighbour: r - k dz v_j changes by k |dz'| |v_j| + k dz |v_j'| more.
-    const double drift = plus(times(motion.relative_speed_m_s, motion.speed_m_s),
-                              times(motion.largest_gap_m, motion.acceleration_m_s2));
-    rate = plus(rate, times(times(factor, slopes.across.hi), times(field.convection_s_m, drift)));
+    const double drift = plus(times_up(motion.relative_speed_m_s, motion.speed_m_s),
+                              times_up(motion.largest_gap_m, motion.acceleration_m_s2));
+    rate = plus(rate, times_up(times_up(factor, slopes.across.hi), times_up(field.convection_s_m, drift)));
   }
   result.rate_N_s[2] = rate;
   if (std::isinf(slopes.total.hi)) {
@@ -86,9 +85,9 @@ void bound_wake(const std::string& name, const Values& value, const MotionSet& m
     field.convection_s_m = value("convection_s_m");
     composition = composed(motion.neighbours, value("norm_exponent"));
     const Interval mass = Interval(motion.neighbour_mass_kg) / Interval(0.034);
-    strength_N = times(strength_N, std::max(1.0, pow(mass, value("mass_exponent")).hi));
+    strength_N = times_up(strength_N, std::max(1.0, pow(mass, value("mass_exponent")).hi));
     if (motion.neighbour_mass_kg < 0.034)
-      strength_N = times(value("amplitude_N"), pow(mass, value("mass_exponent")).hi);
+      strength_N = times_up(value("amplitude_N"), pow(mass, value("mass_exponent")).hi);
   }
   field_bounds(field, strength_N, composition, motion, result);
 }
@@ -98,24 +97,24 @@ void bound_drag(const std::string& name, const Values& value, const Model& model
   double amplitude = 0;
   double rate = 0;
   if (name == "drag_linear") {
-    amplitude = times(value("drag_N_s_m"), m.speed_m_s);
-    rate = times(value("drag_N_s_m"), m.acceleration_m_s2);
+    amplitude = times_up(value("drag_N_s_m"), m.speed_m_s);
+    rate = times_up(value("drag_N_s_m"), m.acceleration_m_s2);
   } else if (name == "drag_quadratic") {
     // |(|v| v)'| <= 2 |v| |v'|
-    amplitude = times(value("drag_N_s2_m2"), times(m.speed_m_s, m.speed_m_s));
-    rate = times(value("drag_N_s2_m2"), times(2 * m.speed_m_s, m.acceleration_m_s2));
+    amplitude = times_up(value("drag_N_s2_m2"), times_up(m.speed_m_s, m.speed_m_s));
+    rate = times_up(value("drag_N_s2_m2"), times_up(2 * m.speed_m_s, m.acceleration_m_s2));
   } else if (name == "drag_rotor") {
     // (T (I - b b') v)' = T' (I - b b') v - T (b' b + b b')' v + T (I - b b') v', and |T'| + |T b'| <= sqrt(2) |(T b)'|
-    const double k = times(value("drag_N_s_m"), one_over(down(model.mass_kg * kGravity_m_s2)));
-    amplitude = times(k, times(m.largest_thrust_N, m.speed_m_s));
-    rate = times(k, plus(times(1.4142135623730952, times(m.thrust_rate_N_s, m.speed_m_s)),
-                         times(m.largest_thrust_N, m.acceleration_m_s2)));
+    const double k = times_up(value("drag_N_s_m"), one_over(down(model.mass_kg * kGravity_m_s2)));
+    amplitude = times_up(k, times_up(m.largest_thrust_N, m.speed_m_s));
+    rate = times_up(k, plus(times_up(1.4142135623730952, times_up(m.thrust_rate_N_s, m.speed_m_s)),
+                            times_up(m.largest_thrust_N, m.acceleration_m_s2)));
   } else {
     // inflow: (T (b'v) b)', each of b'v, b and T by its own rate
     const double k = value("loss_s_m");
-    amplitude = times(k, times(m.largest_thrust_N, m.speed_m_s));
-    rate = times(
-        k, plus(times(2 * m.thrust_rate_N_s, m.speed_m_s), times(m.largest_thrust_N, m.acceleration_m_s2)));
+    amplitude = times_up(k, times_up(m.largest_thrust_N, m.speed_m_s));
+    rate = times_up(k, plus(times_up(2 * m.thrust_rate_N_s, m.speed_m_s),
+                            times_up(m.largest_thrust_N, m.acceleration_m_s2)));
   }
   set_all(result.amplitude_N, amplitude);
   set_all(result.rate_N_s, rate);
@@ -133,11 +132,11 @@ void bound_surface(const std::string& name, const Values& value, const MotionSet
                                ? down(std::max(m.least_height_m, 0.0) - value("height_reference_m"))
                                : std::max(0.0, down(value("height_m") - m.largest_height_m));
   const double g = exp(-(Interval(nearest_m) / Interval(decay_m))).hi;
-  const double strength = times(value("amplitude"), g);
-  set_all(result.amplitude_N, times(strength, m.largest_thrust_N));
+  const double strength = times_up(value("amplitude"), g);
+  set_all(result.amplitude_N, times_up(strength, m.largest_thrust_N));
   set_all(result.rate_N_s,
-          times(strength,
-                plus(m.thrust_rate_N_s, times(m.largest_thrust_N, times(m.speed_m_s, one_over(decay_m))))));
+          times_up(strength, plus(m.thrust_rate_N_s,
+                                  times_up(m.largest_thrust_N, times_up(m.speed_m_s, one_over(decay_m))))));
   if (std::isinf(result.rate_N_s[2])) result.unbounded = "needs --own-speed and --thrust-rate";
 }
 

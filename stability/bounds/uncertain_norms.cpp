@@ -23,15 +23,14 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <vector>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/kernel_sum.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<double GainNorms::*, 4> kGains = {&GainNorms::rate, &GainNorms::amplitude,
                                                        &GainNorms::edge, &GainNorms::impulse};
 
@@ -55,7 +54,7 @@ struct Part {
 };
 
 /// x times a gain that may be infinite: nothing where x is nothing.
-double times(double x, double gain) { return x == 0 ? 0 : x * gain; }
+double scaled(double x, double gain) { return x == 0 ? 0 : x * gain; }
 
 AxisLoop plant_at(AxisLoop loop, const Point& p) {
   loop.mass_kg = 1;
@@ -92,7 +91,7 @@ void bound_continuous(const AxisLoop& fixed, Channel channel, Part& part, const 
   const double r = part.to[0] / part.centre()[0];
   const double by_ratio = part.ratio_change() * response.integral_abs;
   const double by_lag =
-      r * std::min(times(part.lag_change(), variation), part.lag_ratio() * response.integral_abs);
+      r * std::min(scaled(part.lag_change(), variation), part.lag_ratio() * response.integral_abs);
   const double by_delay = r * part.delay_change() * variation;
   part.share = {by_ratio, by_lag, by_delay};
   const double loop_gain = by_ratio + by_lag + by_delay;
@@ -209,7 +208,7 @@ void bound_sampled(const SampledLoop& fixed, Channel channel, Part& part) {
   const double G_e = e.force.amplitude;
   // What the further force does to a0 and to e, per sup of a0.
   const auto of_lag = [&](double G, double V) {
-    return r * std::min(times(part.lag_change(), V), times(part.lag_ratio(), G));
+    return r * std::min(scaled(part.lag_change(), V), scaled(part.lag_ratio(), G));
   };
   const auto of_delay = [&](double V) { return r * part.delay_change() * V; };
   part.share = {eps * G_e, of_lag(G_e, e.variation), of_delay(e.variation)};

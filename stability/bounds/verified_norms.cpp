@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/contracting_system.h"
 
 namespace swarmcert::stability {
@@ -161,7 +161,6 @@ class Enclosure {
       size = length(w) + error;
     }
     const double tail = up(size / system_.alpha);
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     norms.rate = y == 2 ? rate.finish() + Interval(0, up(row_norm_[1] * tail)) : Interval(kInfinity);
     norms.amplitude = amplitude.finish() + Interval(0, up(row_norm_[y] * tail));
     norms.edge = {std::max(norms.edge.lo, settled.mig()),

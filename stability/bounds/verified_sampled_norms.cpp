@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "nn/files/doubles.h"
 #include "stability/bounds/contracting_sampled_system.h"
 
 namespace swarmcert::stability {
@@ -13,7 +13,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Sums and products of a few positive doubles, computed to nearest, are below their exact value by less than this.
 constexpr double kOver = 1 + 1e-14;
 constexpr int kPhases = 4;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "nn/files/doubles.h"
 #include "nn/files/input_error.h"
 #include "nn/files/suggest.h"
 
@@ -31,7 +32,6 @@ EffectInfo describe(const EffectSpec& spec) {
     info.equation += (info.equation.empty() ? "" : "; ") + target + " = " + formula;
   }
   const auto parameter = [&](const std::string& name, double value) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     Parameter result = {name, "", value, -kInfinity, kInfinity};
     if (const auto bounds = spec.expression.bounds.find(name); bounds != spec.expression.bounds.end()) {
       result.lower = bounds->second.first;

@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
+#include "nn/files/doubles.h"
 #include "stability/sweep/grid.h"
 
 namespace swarmcert::stability {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The grid's gains and vehicle with the cell's values put in.
 struct Variant {

@@ -6,8 +6,9 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <memory>
+
+#include "nn/files/doubles.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -155,7 +156,6 @@ TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective) {
   point.Ki = loop.plant.Ki;
   AxisLoop acting = loop.plant;
   acting.Ki = effective_Ki(loop);
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const bool is_candidate = spectral_radius(loop) < 1 && !rings(acting);
   point.norms = is_candidate ? continuous_norms(acting, Channel::kForce)
                              : GainNorms{kInfinity, kInfinity, kInfinity, kInfinity};

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kTurn_s = 6;
 constexpr double kRadius_m = 0.5;
-constexpr double kHeight_m = 0.6;
+constexpr double kCircleHeight_m = 0.6;
 /// The speed rises from zero over this time; the angle follows the integral of a rest-to-rest ramp.
 constexpr double kRamp_s = 2;
 constexpr double kTwoPi = 6.28318530717958647692;
@@ -36,7 +36,7 @@ Setpoint Circle::at(int vehicle, double time_s) const {
   const Eigen::Vector3d along(-outward.y(), outward.x(), 0);
   Setpoint setpoint;
   setpoint.p_W_m = kRadius_m * outward;
-  setpoint.p_W_m.z() = kHeight_m;
+  setpoint.p_W_m.z() = kCircleHeight_m;
   setpoint.v_W_m_s = kRadius_m * rate_rad_s * along;
   setpoint.a_W_m_s2 = kRadius_m * (acceleration_rad_s2 * along - rate_rad_s * rate_rad_s * outward);
   return setpoint;

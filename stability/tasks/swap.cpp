@@ -9,7 +9,7 @@ namespace {
 
 // Published experiment: 3 s per swap, one every 4.5 s; between swaps the vehicles wait.
 constexpr double kPeriod_s = 4.5;
-constexpr double kMove_s = 3;
+constexpr double kSwap_s = 3;
 constexpr double kPi = 3.14159265358979323846;
 
 struct Geometry {
@@ -31,9 +31,9 @@ Swap::Swap(const TaskOptions& options) : TimedTask(options, 6 * kPeriod_s) {}
 Setpoint Swap::at(int vehicle, double time_s) const {
   const Geometry place = geometry(vehicles_);
   const double angle_rad = kPi * vehicle / vehicles_;
-  const double start_s = kPeriod_s - kMove_s;
+  const double start_s = kPeriod_s - kSwap_s;
   const int swaps = static_cast<int>(std::floor(time_s / kPeriod_s));
-  const RestToRest path((time_s - swaps * kPeriod_s - start_s) / kMove_s);
+  const RestToRest path((time_s - swaps * kPeriod_s - start_s) / kSwap_s);
   // From side +1 to side -1 in even swaps, back in odd ones.
   const double side = swaps % 2 == 0 ? 1 : -1;
   const Eigen::Vector3d radius_m =
@@ -41,15 +41,15 @@ Setpoint Swap::at(int vehicle, double time_s) const {
   Setpoint setpoint;
   setpoint.p_W_m = side * (1 - 2 * path.s) * radius_m;
   setpoint.p_W_m.z() = place.lowest_m + vehicle * place.step_m;
-  setpoint.v_W_m_s = -2 * side * path.ds / kMove_s * radius_m;
-  setpoint.a_W_m_s2 = -2 * side * path.dds / (kMove_s * kMove_s) * radius_m;
+  setpoint.v_W_m_s = -2 * side * path.ds / kSwap_s * radius_m;
+  setpoint.a_W_m_s2 = -2 * side * path.dds / (kSwap_s * kSwap_s) * radius_m;
   return setpoint;
 }
 
 std::vector<double> Swap::knots_s() const {
   std::vector<double> knots;
   for (int k = 0; k * kPeriod_s < duration_s_; ++k) {
-    knots.push_back((k + 1) * kPeriod_s - kMove_s);
+    knots.push_back((k + 1) * kPeriod_s - kSwap_s);
     knots.push_back((k + 1) * kPeriod_s);
   }
   return knots;

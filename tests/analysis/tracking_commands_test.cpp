@@ -12,9 +12,9 @@ namespace {
 
 using files::Json;
 
-const std::string kSource = SWARMCERT_SOURCE_DIR;
-const std::string kModel = " --model " + kSource + "/stability/models/crazyflie-small.toml";
-const std::string kFlown = " --gains " + kSource + "/controller/gains/crazyflie-small.toml" + kModel;
+const std::string kSourceFolder = SWARMCERT_SOURCE_DIR;
+const std::string kModel = " --model " + kSourceFolder + "/stability/models/crazyflie-small.toml";
+const std::string kFlown = " --gains " + kSourceFolder + "/controller/gains/crazyflie-small.toml" + kModel;
 
 Json json_of(const ScratchFolder& folder, const std::string& command) {
   const Outcome outcome = run_shell("swarmcert " + command + " --force --json out.json", folder.path());
@@ -125,7 +125,7 @@ TEST(BoundCommand, TheReportPlotsTheErrorInsideTheBallAndTheTube) {
 TEST(BoundCommand, ANetworkAloneBoundsTheRateOfFHatAndGivesNoBall) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
-  const std::string network = " --network " + kSource + "/nn/networks/demo/network.toml";
+  const std::string network = " --network " + kSourceFolder + "/nn/networks/demo/network.toml";
   const Json result = json_of(folder, "bound" + gains + network + " --speed 1 --accel 2");
   EXPECT_EQ(result["disturbance"]["source"], "rate of f_hat");
   EXPECT_GT(result["disturbance"]["f_hat_rate_N_s"].get<double>(), 0);
@@ -154,11 +154,11 @@ TEST(BoundCommand, MeasuredQuantilesAreTaggedMeasured) {
 /// Flights with an effect that the model lacks; what compare says of them bounds the errors that they had.
 TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
   const ScratchFolder folder;
-  const std::string truth = kSource + "/stability/models/crazyflie-small-effects.toml";
-  const std::string gains = kSource + "/controller/gains/crazyflie-small.toml";
+  const std::string truth = kSourceFolder + "/stability/models/crazyflie-small-effects.toml";
+  const std::string gains = kSourceFolder + "/controller/gains/crazyflie-small.toml";
   const Json flown =
       json_of(folder, "simulate swap --vehicles 2 --model " + truth + " --gains " + gains + " -o flights");
-  ASSERT_EQ(run_shell("swarmcert compare " + kSource +
+  ASSERT_EQ(run_shell("swarmcert compare " + kSourceFolder +
                           "/stability/models/crazyflie-small.toml flights --json compare.json",
                       folder.path())
                 .exit_code,
@@ -187,7 +187,7 @@ TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
 TEST(BoundCommand, ADeclaredTruthIsEnclosedAndGivesABall) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
-  const std::string truth = " --truth " + kSource +
+  const std::string truth = " --truth " + kSourceFolder +
                             "/stability/models/crazyflie-small-effects.toml --speed 1 --own-speed 1 "
                             "--own-accel 3 --thrust-rate 1 --least-height 0.3 --gap 0.15:0.8";
   const Json result = json_of(folder, "bound" + gains + truth);
@@ -205,12 +205,12 @@ TEST(BoundCommand, ADeclaredTruthIsEnclosedAndGivesABall) {
   }
   EXPECT_TRUE(proved);
   // A network that is to cancel it adds its own rate; without a bound on speed nothing is bounded.
-  const Json with_network = json_of(
-      folder, "bound" + gains + truth + " --accel 2 --network " + kSource + "/nn/networks/demo/network.toml");
+  const Json with_network = json_of(folder, "bound" + gains + truth + " --accel 2 --network " +
+                                                kSourceFolder + "/nn/networks/demo/network.toml");
   EXPECT_GT(with_network["theorem"]["ball"].get<double>(), result["theorem"]["ball"].get<double>());
-  const Outcome unknown = run_shell(
-      "swarmcert bound" + gains + " --truth " + kSource + "/stability/models/crazyflie-small-effects.toml",
-      folder.path());
+  const Outcome unknown = run_shell("swarmcert bound" + gains + " --truth " + kSourceFolder +
+                                        "/stability/models/crazyflie-small-effects.toml",
+                                    folder.path());
   EXPECT_EQ(unknown.exit_code, 0);
   EXPECT_NE(unknown.output.find("needs the relative speed: --speed"), std::string::npos) << unknown.output;
   EXPECT_EQ(run_shell("swarmcert bound" + gains + truth + " --rate 1", folder.path()).exit_code, 2);
@@ -261,7 +261,7 @@ TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
 TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");
-  const std::string swarms = kSource + "/stability/bounds/swarms/";
+  const std::string swarms = kSourceFolder + "/stability/bounds/swarms/";
   const Json one_way = json_of(folder, "bound" + gains + " --swarm " + swarms + "one-way-pair.toml")["swarm"];
   EXPECT_EQ(one_way["verdict"], "proved");
   EXPECT_NEAR(one_way["spectral_radius"][1].get<double>(), 0.145 * 4.996850736188977, 1e-9);
@@ -300,7 +300,7 @@ void write_grid(const ScratchFolder& folder) {
              "schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\nrate_hz = 500\n[lag]\n"
              "motor_s = 0.0575\n");
   write_text(folder / "grid.toml",
-             "schema = \"swarmcert/grid/1\"\ngains = \"gains.toml\"\nmodel = \"" + kSource +
+             "schema = \"swarmcert/grid/1\"\ngains = \"gains.toml\"\nmodel = \"" + kSourceFolder +
                  "/stability/models/crazyflie-small.toml\"\naxis = \"z\"\n"
                  "compute = [\"amplitude\", \"impulse\", \"noise_command_m_s2\", \"lag_limit_s\"]\n"
                  "pareto = [\"impulse\", \"noise_command_m_s2\", \"lag_limit_s\"]\n"
@@ -372,8 +372,8 @@ TEST(SweepCommand, TasksOfAJobArrayMergeToTheWhole) {
   write_grid(folder);
   for (int task = 7; task <= 9; ++task) {
     const Outcome outcome = run_shell("SLURM_ARRAY_TASK_ID=" + std::to_string(task) +
-                                          " SLURM_ARRAY_TASK_MIN=7 SLURM_ARRAY_TASK_COUNT=3 sh '" + kSource +
-                                          "/stability/sweep/sweep.sbatch' grid.toml array",
+                                          " SLURM_ARRAY_TASK_MIN=7 SLURM_ARRAY_TASK_COUNT=3 sh '" +
+                                          kSourceFolder + "/stability/sweep/sweep.sbatch' grid.toml array",
                                       folder.path());
     ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   }

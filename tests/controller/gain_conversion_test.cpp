@@ -9,18 +9,18 @@
 namespace swarmcert::controller {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+constexpr double kVehicleMass_kg = 0.034;
 
 AxisComposite<double> convert(double kp, double kd, double ki) {
-  return to_composite(AxisPid<double>{kp, kd, ki}, kMass_kg, 1e-6);
+  return to_composite(AxisPid<double>{kp, kd, ki}, kVehicleMass_kg, 1e-6);
 }
 
 TEST(GainConversion, ThereAndBackReturnsTheGains) {
   std::mt19937 generator(3);
   for (int i = 0; i < 1000; ++i) {
     const double lambda = tests::uniform(generator, 0.1, 10), k = tests::uniform(generator, 0.01, 1);
-    const AxisPid<double> pid = to_pid(lambda, k, kMass_kg);
-    const AxisComposite<double> back = to_composite(pid, kMass_kg, 1e-9);
+    const AxisPid<double> pid = to_pid(lambda, k, kVehicleMass_kg);
+    const AxisComposite<double> back = to_composite(pid, kVehicleMass_kg, 1e-9);
     ASSERT_EQ(back.status, ConversionStatus::kOk) << lambda << " " << k;
     EXPECT_NEAR(back.lambda_1_s, lambda, 1e-7 * lambda);
     EXPECT_NEAR(back.k_kg_s, k, 1e-6 * k);
@@ -33,26 +33,26 @@ TEST(GainConversion, BothFormsGiveTheSameForce) {
     const CompositeGains<double> composite{
         diagonal(Vector3<double>{1, 1, 1} + scaled(0.5, tests::random_vector(generator, 1))),
         diagonal(Vector3<double>{.2, .2, .2} + scaled(0.1, tests::random_vector(generator, 1)))};
-    const PidConversion<double> pid = to_pid(composite, kMass_kg);
+    const PidConversion<double> pid = to_pid(composite, kVehicleMass_kg);
     ASSERT_EQ(pid.status, ConversionStatus::kOk);
     const TrackingError<double> error{tests::random_vector(generator, 0.5),
                                       tests::random_vector(generator, 1)};
     const Vector3<double> integral = tests::random_vector(generator, 0.2);
     const FeedForward<double> forward{tests::random_vector(generator, 2),
                                       tests::random_vector(generator, 0.1)};
-    const Vector3<double> gap = desired_force(composite, kMass_kg, error, integral, forward) -
-                                desired_force(pid.gains, kMass_kg, error, integral, forward);
+    const Vector3<double> gap = desired_force(composite, kVehicleMass_kg, error, integral, forward) -
+                                desired_force(pid.gains, kVehicleMass_kg, error, integral, forward);
     EXPECT_LE(norm(gap), 1e-14);
   }
 }
 
 // s^3 + Kd s^2 + Kp s + Ki = (s + a)(s + l)^2 has a triple root for l = a; then both candidates for Lambda coincide.
 TEST(GainConversion, TripleRootConverts) {
-  const AxisPid<double> pid = to_pid(4.0, 4.0 * kMass_kg, kMass_kg);
+  const AxisPid<double> pid = to_pid(4.0, 4.0 * kVehicleMass_kg, kVehicleMass_kg);
   EXPECT_DOUBLE_EQ(pid.Kp_1_s2, 48.0);
   EXPECT_DOUBLE_EQ(pid.Kd_1_s, 12.0);
   EXPECT_DOUBLE_EQ(pid.Ki_1_s3, 64.0);
-  const AxisComposite<double> back = to_composite(pid, kMass_kg, 1e-9);
+  const AxisComposite<double> back = to_composite(pid, kVehicleMass_kg, 1e-9);
   EXPECT_EQ(back.status, ConversionStatus::kOk);
   EXPECT_NEAR(back.lambda_1_s, 4.0, 1e-4);
 }
@@ -76,10 +76,11 @@ TEST(GainConversion, RefusesWhatHasNoSuchForm) {
   EXPECT_EQ(convert(std::nan(""), 5, 1).status, ConversionStatus::kNotPositive);
   EXPECT_EQ(to_composite(AxisPid<double>{10, 10, 1}, 0.0, 1e-6).status, ConversionStatus::kMassNotPositive);
   const Matrix3<double> coupled{{1, 0.1, 0}, {0.1, 1, 0}, {0, 0, 1}};
-  EXPECT_EQ(to_pid(CompositeGains<double>{coupled, identity<double>()}, kMass_kg).status,
+  EXPECT_EQ(to_pid(CompositeGains<double>{coupled, identity<double>()}, kVehicleMass_kg).status,
             ConversionStatus::kNotDiagonal);
   EXPECT_EQ(
-      to_pid(CompositeGains<double>{identity<double>(), diagonal(Vector3<double>{1, 0, 1})}, kMass_kg).status,
+      to_pid(CompositeGains<double>{identity<double>(), diagonal(Vector3<double>{1, 0, 1})}, kVehicleMass_kg)
+          .status,
       ConversionStatus::kNotPositive);
 }
 

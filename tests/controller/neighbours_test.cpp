@@ -13,7 +13,7 @@
 namespace swarmcert::controller {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
 /// A deep set of small random networks with two kinds and a ground term.
 class Networks {
@@ -212,7 +212,7 @@ TEST_F(NeighboursTest, WhateverIsWrongThePredictionIsZeroWithAStatus) {
   EXPECT_EQ(p.status, PredictionStatus::kTooManyNeighbours);
   EXPECT_EQ(bits(p), 0u);
 
-  p = predict(networks_.set(), settings_, {kNaN, 0, 0}, {}, &good, 1, 10000, {0, 0, 0.5f},
+  p = predict(networks_.set(), settings_, {kNotANumber, 0, 0}, {}, &good, 1, 10000, {0, 0, 0.5f},
               networks_.workspace());
   EXPECT_EQ(p.status, PredictionStatus::kOwnStateInvalid);
   EXPECT_EQ(bits(p), 0u);
@@ -254,7 +254,7 @@ TEST(Velocity, JumpsAreHeldRepeatsIgnoredAndGapsStartAgain) {
   EXPECT_EQ(update(t, filter, {6, 0, 1}, 1010), TrackStatus::kRepeated);
   EXPECT_EQ(update(t, filter, {6, 0, 1}, 900), TrackStatus::kRepeated);
   EXPECT_EQ(t.position_W_m.x, 5.0f);
-  EXPECT_EQ(update(t, filter, {kNaN, 0, 1}, 1020), TrackStatus::kNotFinite);
+  EXPECT_EQ(update(t, filter, {kNotANumber, 0, 1}, 1020), TrackStatus::kNotFinite);
   EXPECT_EQ(update(t, filter, {2000, 0, 1}, 1020), TrackStatus::kOutOfRange);
   EXPECT_EQ(t.stamp_ms, 1010u);
   EXPECT_EQ(update(t, filter, {5, 0, 1}, 1511), TrackStatus::kStarted);

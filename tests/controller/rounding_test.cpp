@@ -30,7 +30,7 @@ RoundedLaw crazyflie(bool composite, bool robust, ThrustRule rule) {
 }
 
 /// What the laws see, in double.
-struct Situation {
+struct RoundedSituation {
   Vector3<double> p, p_d, v, v_d, integral, a_d, effect, omega, omega_R, omega_dot_R, rate_integral;
   double yaw_rad;
   Vector3<double> error_axis;
@@ -43,7 +43,7 @@ struct Outcome {
 };
 
 template <typename Scalar>
-Outcome evaluate(const RoundedLaw& law, const Situation& s, const Matrix3<double>& R_WB) {
+Outcome evaluate(const RoundedLaw& law, const RoundedSituation& s, const Matrix3<double>& R_WB) {
   const auto mass = static_cast<Scalar>(law.mass_kg);
   const TrackingError<Scalar> error{cast<Scalar>(s.p) - cast<Scalar>(s.p_d),
                                     cast<Scalar>(s.v) - cast<Scalar>(s.v_d)};
@@ -91,9 +91,9 @@ Outcome evaluate(const RoundedLaw& law, const Situation& s, const Matrix3<double
   return outcome;
 }
 
-Situation random_situation(std::mt19937& g, const FlightEnvelope& e, const RoundedLaw& law) {
+RoundedSituation random_situation(std::mt19937& g, const FlightEnvelope& e, const RoundedLaw& law) {
   using tests::random_vector;
-  Situation s;
+  RoundedSituation s;
   s.p_d = random_vector(g, e.position_m - e.position_error_m);
   s.p = s.p_d + random_vector(g, e.position_error_m);
   s.v_d = random_vector(g, e.velocity_m_s - e.velocity_error_m_s);
@@ -133,7 +133,7 @@ TEST_P(RoundingTest, NoStateExceedsTheBoundsAndTheyAreNotAbsurdlyLoose) {
   Outcome worst{};
   int tried = 0;
   for (int i = 0; i < 60000; ++i) {
-    const Situation s = random_situation(generator, e, law);
+    const RoundedSituation s = random_situation(generator, e, law);
     const Vector3<double> force = evaluate<double>(law, s, identity<double>()).force;
     if (!is_within_envelope(force, e)) continue;
     ++tried;

@@ -18,7 +18,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kLag_s = 0.06;
 
 /// Sanchez-Cuevas, Heredia and Ollero 2017: four rotors near the ground, R = 23.5 mm, arms of 46 mm.

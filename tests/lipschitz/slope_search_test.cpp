@@ -17,13 +17,13 @@ namespace {
 
 using tests::random_network;
 
-files::Weights network(std::vector<files::Layer> layers) {
+files::Weights chain_of(std::vector<files::Layer> layers) {
   files::Weights weights;
   weights.layers = std::move(layers);
   return weights;
 }
 
-SlopeFunction plain(const files::Weights& weights) { return {{&weights, nullptr}, {}, nullptr}; }
+SlopeFunction slope_of(const files::Weights& weights) { return {{&weights, nullptr}, {}, nullptr}; }
 
 SlopeSearchOptions few_rounds() {
   SlopeSearchOptions options;
@@ -65,8 +65,8 @@ TEST(SlopeSearch, StaysBelowTheProductOfSpectralNorms) {
       {1, 5, 1}, {2, 1, 3}, {6, 12, 10, 4}, {4, 9, 9, 9, 1}, {30, 8, 2}};
   for (const std::vector<int>& sizes : shapes) {
     const files::Weights net = random_network(sizes, generator);
-    const SlopeWitness found = search_slope(plain(net), few_rounds());
-    EXPECT_TRUE(proves_its_slope(plain(net), found));
+    const SlopeWitness found = search_slope(slope_of(net), few_rounds());
+    EXPECT_TRUE(proves_its_slope(slope_of(net), found));
     EXPECT_GT(found.slope.value(), 0);
     EXPECT_LE(found.slope.value(), product_of_norms({&net}));
     EXPECT_EQ(found.rounds_done, 2);
@@ -76,8 +76,8 @@ TEST(SlopeSearch, StaysBelowTheProductOfSpectralNorms) {
 TEST(SlopeSearch, FindsTheSteepestRegionOfANetworkOfOneInput) {
   // Slopes on the line, by pieces: 0, 1, -2 (on (1, 1.001), the narrow steepest piece), 0.5.
   const files::Weights net =
-      network({{"fc1", 3, 1, {1, 1, 1}, {0, -1, -1.001}}, {"fc2", 1, 3, {1, -3, 2.5}, {0}}});
-  EXPECT_NEAR(search_slope(plain(net), few_rounds()).slope.value(), 2, 1e-3);
+      chain_of({{"fc1", 3, 1, {1, 1, 1}, {0, -1, -1.001}}, {"fc2", 1, 3, {1, -3, 2.5}, {0}}});
+  EXPECT_NEAR(search_slope(slope_of(net), few_rounds()).slope.value(), 2, 1e-3);
 }
 
 TEST(SlopeSearch, AffineFunctionReachesItsSpectralNorm) {
@@ -86,11 +86,11 @@ TEST(SlopeSearch, AffineFunctionReachesItsSpectralNorm) {
        std::vector<std::pair<int, int>>{{1, 1}, {1, 9}, {9, 1}, {7, 5}, {20, 60}}) {
     const files::Weights net = random_network({inputs, outputs}, generator);
     const double norm = spectral_norm(net.layers[0]).norm.lower.value();
-    EXPECT_GE(search_slope(plain(net), few_rounds()).slope.value(), norm * (1 - 1e-7))
+    EXPECT_GE(search_slope(slope_of(net), few_rounds()).slope.value(), norm * (1 - 1e-7))
         << outputs << " x " << inputs;
     SlopeSearchOptions in_box = few_rounds();
     in_box.box = cube(inputs, 2, 3);
-    const SlopeWitness found = search_slope(plain(net), in_box);
+    const SlopeWitness found = search_slope(slope_of(net), in_box);
     EXPECT_GE(found.slope.value(), norm * (1 - 1e-7)) << outputs << " x " << inputs << " in a box";
     expect_within(found.x, *in_box.box);
     expect_within(found.y, *in_box.box);
@@ -103,20 +103,20 @@ TEST(SlopeSearch, DeadAndZeroNetworksHaveSlopeZeroAndStillAWitness) {
   for (double& weight : dead.layers[0].weights) weight = 0;
   files::Weights off = random_network({3, 6, 2}, generator);
   for (double& weight : off.layers[1].weights) weight = 0;
-  const files::Weights affine = network({{"fc", 2, 2, {0, 0, 0, 0}, {1, 2}}});
+  const files::Weights affine = chain_of({{"fc", 2, 2, {0, 0, 0, 0}, {1, 2}}});
   for (const files::Weights* net : std::vector<const files::Weights*>{&dead, &off, &affine}) {
-    const SlopeWitness found = search_slope(plain(*net), few_rounds());
+    const SlopeWitness found = search_slope(slope_of(*net), few_rounds());
     EXPECT_EQ(found.slope, LowerBound(0));
-    EXPECT_TRUE(proves_its_slope(plain(*net), found));
+    EXPECT_TRUE(proves_its_slope(slope_of(*net), found));
   }
 }
 
 TEST(SlopeSearch, SolvesTheCounterexampleToLipSdpNetwork) {
   // f(x) = 0.84741233 relu(1.50591384 x + 1) - 1.17624551 relu(1.0709144 x - 10), slope 1.27613 at 0; the published
   // "Network" variant of LipSDP claims 0.368624.
-  const files::Weights net = network(
+  const files::Weights net = chain_of(
       {{"fc1", 2, 1, {1.50591384, 1.0709144}, {1, -10}}, {"fc2", 1, 2, {0.84741233, -1.17624551}, {0}}});
-  const double found = search_slope(plain(net), few_rounds()).slope.value();
+  const double found = search_slope(slope_of(net), few_rounds()).slope.value();
   EXPECT_GE(found, 1.276);
   EXPECT_LE(found, 0.84741233 * 1.50591384 * (1 + 1e-12));
 }
@@ -126,22 +126,22 @@ TEST(SlopeSearch, DoesNotDependOnTheUnitsOfTheInputs) {
   const files::Weights net = random_network({3, 10, 10, 2}, generator);
   files::Weights scaled = net;  // every input in units 2^20 times smaller
   for (double& weight : scaled.layers[0].weights) weight *= 0x1p-20;
-  const double reference = search_slope(plain(net), few_rounds()).slope.value();
-  EXPECT_NEAR(search_slope(plain(scaled), few_rounds()).slope.value() * 0x1p20, reference, 1e-3 * reference);
+  const double reference = search_slope(slope_of(net), few_rounds()).slope.value();
+  EXPECT_NEAR(search_slope(slope_of(scaled), few_rounds()).slope.value() * 0x1p20, reference, 1e-3 * reference);
 }
 
 TEST(SlopeSearch, DuplicatedAndOppositeNeuronsAreFine) {
   // |x| = relu(x) + relu(-x), each twice; all four kinks coincide.
   const files::Weights net =
-      network({{"fc1", 4, 1, {1, -1, 1, -1}, {0, 0, 0, 0}}, {"fc2", 1, 4, {1, 1, 1, 1}, {0}}});
-  EXPECT_EQ(search_slope(plain(net), few_rounds()).slope.value(), 2);
+      chain_of({{"fc1", 4, 1, {1, -1, 1, -1}, {0, 0, 0, 0}}, {"fc2", 1, 4, {1, 1, 1, 1}, {0}}});
+  EXPECT_EQ(search_slope(slope_of(net), few_rounds()).slope.value(), 2);
 }
 
 TEST(SlopeSearch, SameSeedGivesTheSameBits) {
   std::mt19937 generator(5);
   const files::Weights net = random_network({4, 12, 12, 3}, generator);
-  const SlopeWitness first = search_slope(plain(net), few_rounds());
-  const SlopeWitness second = search_slope(plain(net), few_rounds());
+  const SlopeWitness first = search_slope(slope_of(net), few_rounds());
+  const SlopeWitness second = search_slope(slope_of(net), few_rounds());
   EXPECT_EQ(first.x, second.x);
   EXPECT_EQ(first.y, second.y);
   EXPECT_EQ(first.slope, second.slope);
@@ -154,7 +154,7 @@ TEST(SlopeSearch, MoreRoundsNeverFindLess) {
   for (const int rounds : {1, 3, 9}) {
     SlopeSearchOptions options;
     options.rounds = rounds;
-    const double found = search_slope(plain(net), options).slope.value();
+    const double found = search_slope(slope_of(net), options).slope.value();
     EXPECT_GE(found, last * (1 - 1e-6)) << rounds << " rounds";
     last = found;
   }
@@ -168,8 +168,8 @@ TEST(SlopeSearch, PointsStayInTheBox) {
   for (const Box& box : boxes) {
     SlopeSearchOptions options = few_rounds();
     options.box = box;
-    const SlopeWitness found = search_slope(plain(net), options);
-    EXPECT_TRUE(proves_its_slope(plain(net), found));
+    const SlopeWitness found = search_slope(slope_of(net), options);
+    EXPECT_TRUE(proves_its_slope(slope_of(net), found));
     EXPECT_GT(found.slope.value(), 0);
     expect_within(found.x, box);
     expect_within(found.y, box);
@@ -179,11 +179,11 @@ TEST(SlopeSearch, PointsStayInTheBox) {
 TEST(SlopeSearch, OnlyTheBlockMoves) {
   std::mt19937 generator(2);
   const files::Weights net = random_network({5, 12, 12, 3}, generator);
-  const double all = search_slope(plain(net), few_rounds()).slope.value();
+  const double all = search_slope(slope_of(net), few_rounds()).slope.value();
   SlopeSearchOptions options = few_rounds();
   options.block = {1, 3};
-  const SlopeWitness found = search_slope(plain(net), options);
-  EXPECT_TRUE(proves_its_slope(plain(net), found, options.block));
+  const SlopeWitness found = search_slope(slope_of(net), options);
+  EXPECT_TRUE(proves_its_slope(slope_of(net), found, options.block));
   for (const std::size_t k : {0u, 2u, 4u}) EXPECT_EQ(found.x[k], found.y[k]);
   EXPECT_GT(found.slope.value(), 0);
   EXPECT_LE(found.slope.value(), 1.01 * all)
@@ -192,10 +192,10 @@ TEST(SlopeSearch, OnlyTheBlockMoves) {
 
 TEST(SlopeSearch, AKinkOnTheEdgeOfTheBoxIsNoObstacle) {
   // f(x, y) = 3 relu(x) where x >= 0.
-  const files::Weights net = network({{"fc1", 1, 2, {3, 0}, {0}}, {"fc2", 1, 1, {1}, {0}}});
+  const files::Weights net = chain_of({{"fc1", 1, 2, {3, 0}, {0}}, {"fc2", 1, 1, {1}, {0}}});
   SlopeSearchOptions options = few_rounds();
   options.box = Box{{0, -1}, {0.5, -0.5}};
-  const SlopeWitness found = search_slope(plain(net), options);
+  const SlopeWitness found = search_slope(slope_of(net), options);
   EXPECT_NEAR(found.slope.value(), 3, 1e-6);
 }
 
@@ -205,7 +205,7 @@ TEST(SlopeSearch, ABoxOfOneFloatHasNoWitness) {
   SlopeSearchOptions options = few_rounds();
   for (const Box& box : {cube(2, 0.1, 0.1), cube(2, 0.5, 0.5), Box{{0.1, 0}, {0.1, 1}}}) {
     options.box = box;
-    const SlopeWitness found = search_slope(plain(net), options);
+    const SlopeWitness found = search_slope(slope_of(net), options);
     EXPECT_TRUE(found.x.empty());
     EXPECT_EQ(found.slope, LowerBound(0));
   }
@@ -229,9 +229,9 @@ TEST(SlopeSearch, ClampBoundsWhereItLooks) {
 
 TEST(SlopeSearch, DeepSetMovesOneNeighbourAndPlacesTheOthers) {
   // rho opens only if the other neighbour sits at x_2 > 5: a search that left it at 0 would find nothing.
-  const files::Weights phi = network({{"fc1", 1, 1, {1}, {0}}, {"fc2", 1, 1, {1}, {0}}});
-  const files::Weights other = network({{"fc", 1, 2, {1, 0}, {0}}});  // linear, of another kind and depth
-  const files::Weights rho = network({{"fc1", 2, 1, {1, 1}, {-6, -7}}, {"fc2", 1, 2, {3, -3}, {0}}});
+  const files::Weights phi = chain_of({{"fc1", 1, 1, {1}, {0}}, {"fc2", 1, 1, {1}, {0}}});
+  const files::Weights other = chain_of({{"fc", 1, 2, {1, 0}, {0}}});  // linear, of another kind and depth
+  const files::Weights rho = chain_of({{"fc1", 2, 1, {1, 1}, {-6, -7}}, {"fc2", 1, 2, {3, -3}, {0}}});
   const SlopeFunction f = {{&phi, nullptr}, {{&other, nullptr}}, &rho};
   SlopeSearchOptions options = few_rounds();
   options.box = cube(1, 0, 1);
@@ -252,9 +252,9 @@ TEST(SlopeSearch, WideInputsTakeSeconds) {
     options.rounds = 1;
     if (boxed) options.box = cube(784, 0, 1);
     const std::clock_t start = std::clock();
-    const SlopeWitness found = search_slope(plain(net), options);
+    const SlopeWitness found = search_slope(slope_of(net), options);
     EXPECT_LE(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 20);
-    EXPECT_TRUE(proves_its_slope(plain(net), found));
+    EXPECT_TRUE(proves_its_slope(slope_of(net), found));
     EXPECT_GT(found.slope.value(), 0.2 * product_of_norms({&net}));
   }
 }
@@ -271,14 +271,14 @@ TEST(SlopeSearch, StopsWhenToldTo) {
     rounds = done;
     cancelled = done == 3;
   };
-  const SlopeWitness found = search_slope(plain(net), options);
+  const SlopeWitness found = search_slope(slope_of(net), options);
   EXPECT_EQ(found.rounds_done, 3);
   EXPECT_EQ(rounds, 3);
-  EXPECT_TRUE(proves_its_slope(plain(net), found));
+  EXPECT_TRUE(proves_its_slope(slope_of(net), found));
   options.cancelled = nullptr;
   options.progress = nullptr;
   options.seconds = 1e-3;
-  EXPECT_LT(search_slope(plain(net), options).rounds_done, 1000000);
+  EXPECT_LT(search_slope(slope_of(net), options).rounds_done, 1000000);
 }
 
 TEST(SlopeSearch, RefusesDomainsThatDoNotFit) {
@@ -306,7 +306,7 @@ TEST(SlopeSearch, RefusesDomainsThatDoNotFit) {
       with([](auto& o) { o.other_boxes = {std::nullopt}; }),
   };
   for (std::size_t i = 0; i < wrong.size(); ++i) {
-    EXPECT_THROW(search_slope(plain(net), wrong[i]), std::invalid_argument) << "case " << i;
+    EXPECT_THROW(search_slope(slope_of(net), wrong[i]), std::invalid_argument) << "case " << i;
   }
   const SlopeFunction set = {{&net, nullptr}, {{&net, nullptr}}, &net};
   EXPECT_THROW(search_slope(set, few_rounds()), std::invalid_argument) << "rho has 2 inputs, phi 1 output";
@@ -335,9 +335,9 @@ TEST(SlopeSearch, PublishedNetworksReachTheBestKnownSlopesFromMostSeeds_slow) {
       SlopeSearchOptions options;
       options.seed = static_cast<std::uint64_t>(seed);
       const std::clock_t start = std::clock();
-      const SlopeWitness found = search_slope(plain(net), options);
+      const SlopeWitness found = search_slope(slope_of(net), options);
       EXPECT_LE(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 5) << "seed " << seed;
-      EXPECT_TRUE(proves_its_slope(plain(net), found));
+      EXPECT_TRUE(proves_its_slope(slope_of(net), found));
       reached += found.slope.value() >= target.slope;
     }
     EXPECT_GE(reached, 12);

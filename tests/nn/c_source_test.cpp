@@ -18,8 +18,8 @@ namespace {
 
 using namespace tests;
 
-testing::AssertionResult refused(const std::string& text, const std::vector<std::string>& pieces,
-                                 const std::string& key = "") {
+testing::AssertionResult source_is_refused(const std::string& text, const std::vector<std::string>& pieces,
+                                           const std::string& key = "") {
   return refuses([&] { parse_weights(text, "weights.c", key); }, pieces);
 }
 
@@ -102,8 +102,8 @@ TEST(CSource, SeveralNetworksAreChosenByKeyOrByNameOfTheFile) {
   const std::string text = "/* two */\n" + c_source(rho, "rho_L") + c_source(phi, "phi_L");
   expect_same_numbers(parse_weights(text, "weights.c", "phi_L"), phi);
   expect_same_numbers(parse_weights(text, "weights.c", "rho_L"), rho);
-  EXPECT_TRUE(refused(text, {"several networks: phi_L, rho_L", "weights.c#phi_L"}));
-  EXPECT_TRUE(refused(text, {"\"phi_l\"", "did you mean", "phi_L"}, "phi_l"));
+  EXPECT_TRUE(source_is_refused(text, {"several networks: phi_L, rho_L", "weights.c#phi_L"}));
+  EXPECT_TRUE(source_is_refused(text, {"\"phi_l\"", "did you mean", "phi_L"}, "phi_l"));
   const TempFolder folder;
   write_file(folder / "weights.c", text, true);
   NetworkArguments arguments;
@@ -130,34 +130,38 @@ TEST(CSource, PublishedNetworksComeBackBitForBitAndFloat64RoundsToWhatIsFlashed)
 }
 
 TEST(CSource, EverythingElseIsRefusedWithItsLine) {
-  EXPECT_TRUE(refused(changed("float fc1_bias", "int fc1_bias"), {"line 6", "neither float nor double"}));
-  EXPECT_TRUE(refused(changed("fc1_bias[3]", "fc1_bias[]"), {"line 6", "the size of an array"}));
-  EXPECT_TRUE(refused(changed("fc1_bias[3]", "fc1_bias[3"), {"expected ']'"}));
-  EXPECT_TRUE(refused(changed("fc1_bias[3]", "fc1_bias"), {"neither a matrix nor a vector"}));
-  EXPECT_TRUE(refused(changed("fc1_bias[3]", "fc1_bias[3][1][1]"), {"neither a matrix nor a vector"}));
-  EXPECT_TRUE(refused(changed("fc1_bias[3]", "fc1_bias[4]"), {"expected ','"}));
-  EXPECT_TRUE(refused(changed("fc1_weight[2][3]", "fc1_weight[0][3]"), {"impossible shape"}));
-  EXPECT_TRUE(refused(changed("fc1_weight[2][3]", "fc1_weight[99999999][99999999]"), {"impossible shape"}));
-  EXPECT_TRUE(refused(changed("-4.5", "x"), {"line 9", "expected a number"}));
-  EXPECT_TRUE(refused(changed("-4.5", "-inf"), {"expected a number"}));
-  EXPECT_TRUE(refused(changed("-4.5", "0x10"), {"expected a decimal number"}));
-  EXPECT_TRUE(refused(changed("-4.5", "1e39"), {"beyond the range"}));
-  EXPECT_TRUE(refused(changed("-4.5", "1e999"), {"beyond the range"}));
-  EXPECT_TRUE(refused(changed("-4.5", "1e39f"), {"beyond the range"}));
-  EXPECT_TRUE(refused(changed(",{-4.5,.5,6f}", ""), {"expected ','"}));
-  EXPECT_TRUE(refused(changed(".fc1_bias =", ".fc2_bias ="), {"weights_A.fc2_bias", "no member"}));
-  EXPECT_TRUE(refused(changed(".fc1_bias =", ".fc1_weight ="), {"initialised twice"}));
-  EXPECT_TRUE(refused(changed(",\n.fc1_bias = {0,1.e-05,-0.}", ""), {"fc1_bias", "is not initialised"}));
-  EXPECT_TRUE(refused(changed("struct A weights_A", "struct B weights_A"), {"unknown type \"B\""}));
-  EXPECT_TRUE(refused(std::string(kSmall) + kSmall, {"is defined twice"}));
-  EXPECT_TRUE(refused(std::string(kSmall) +
-                          "static const struct A weights_A = {.fc1_weight = {{1,2,3},{4,5,6}}, "
-                          ".fc1_bias = {1,2,3}};",
-                      {"weights_A", "is defined twice"}));
-  EXPECT_TRUE(refused(std::string(kSmall) + "int main() {}", {"expected a struct"}));
-  EXPECT_TRUE(refused("struct A { float a_weight[1][1]; };", {"holds no network"}));
-  EXPECT_TRUE(refused("struct A { float a_weight[1][1]; ", {"neither float nor double"}));
-  EXPECT_TRUE(refused(changed("fc1_weight[2]", "gain[2]").replace(0, 0, ""), {"no member"}));
+  EXPECT_TRUE(
+      source_is_refused(changed("float fc1_bias", "int fc1_bias"), {"line 6", "neither float nor double"}));
+  EXPECT_TRUE(source_is_refused(changed("fc1_bias[3]", "fc1_bias[]"), {"line 6", "the size of an array"}));
+  EXPECT_TRUE(source_is_refused(changed("fc1_bias[3]", "fc1_bias[3"), {"expected ']'"}));
+  EXPECT_TRUE(source_is_refused(changed("fc1_bias[3]", "fc1_bias"), {"neither a matrix nor a vector"}));
+  EXPECT_TRUE(
+      source_is_refused(changed("fc1_bias[3]", "fc1_bias[3][1][1]"), {"neither a matrix nor a vector"}));
+  EXPECT_TRUE(source_is_refused(changed("fc1_bias[3]", "fc1_bias[4]"), {"expected ','"}));
+  EXPECT_TRUE(source_is_refused(changed("fc1_weight[2][3]", "fc1_weight[0][3]"), {"impossible shape"}));
+  EXPECT_TRUE(
+      source_is_refused(changed("fc1_weight[2][3]", "fc1_weight[99999999][99999999]"), {"impossible shape"}));
+  EXPECT_TRUE(source_is_refused(changed("-4.5", "x"), {"line 9", "expected a number"}));
+  EXPECT_TRUE(source_is_refused(changed("-4.5", "-inf"), {"expected a number"}));
+  EXPECT_TRUE(source_is_refused(changed("-4.5", "0x10"), {"expected a decimal number"}));
+  EXPECT_TRUE(source_is_refused(changed("-4.5", "1e39"), {"beyond the range"}));
+  EXPECT_TRUE(source_is_refused(changed("-4.5", "1e999"), {"beyond the range"}));
+  EXPECT_TRUE(source_is_refused(changed("-4.5", "1e39f"), {"beyond the range"}));
+  EXPECT_TRUE(source_is_refused(changed(",{-4.5,.5,6f}", ""), {"expected ','"}));
+  EXPECT_TRUE(source_is_refused(changed(".fc1_bias =", ".fc2_bias ="), {"weights_A.fc2_bias", "no member"}));
+  EXPECT_TRUE(source_is_refused(changed(".fc1_bias =", ".fc1_weight ="), {"initialised twice"}));
+  EXPECT_TRUE(
+      source_is_refused(changed(",\n.fc1_bias = {0,1.e-05,-0.}", ""), {"fc1_bias", "is not initialised"}));
+  EXPECT_TRUE(source_is_refused(changed("struct A weights_A", "struct B weights_A"), {"unknown type \"B\""}));
+  EXPECT_TRUE(source_is_refused(std::string(kSmall) + kSmall, {"is defined twice"}));
+  EXPECT_TRUE(source_is_refused(std::string(kSmall) +
+                                    "static const struct A weights_A = {.fc1_weight = {{1,2,3},{4,5,6}}, "
+                                    ".fc1_bias = {1,2,3}};",
+                                {"weights_A", "is defined twice"}));
+  EXPECT_TRUE(source_is_refused(std::string(kSmall) + "int main() {}", {"expected a struct"}));
+  EXPECT_TRUE(source_is_refused("struct A { float a_weight[1][1]; };", {"holds no network"}));
+  EXPECT_TRUE(source_is_refused("struct A { float a_weight[1][1]; ", {"neither float nor double"}));
+  EXPECT_TRUE(source_is_refused(changed("fc1_weight[2]", "gain[2]").replace(0, 0, ""), {"no member"}));
 }
 
 TEST(CSource, EveryTruncationIsRefused) {

@@ -15,10 +15,11 @@ namespace {
 
 using namespace tests;
 
-testing::AssertionResult refused(const std::string& bytes, const std::vector<std::string>& pieces) {
+testing::AssertionResult archive_is_refused(const std::string& bytes,
+                                            const std::vector<std::string>& pieces) {
   return refuses([&] { parse_weights(bytes, "hostile.pth"); }, pieces);
 }
-std::string program(const std::string& ops) { return zip_file(pickle(ops), small_storages<float>()); }
+std::string small_program(const std::string& ops) { return zip_file(pickle(ops), small_storages<float>()); }
 
 std::string repeated(const std::string& text, std::size_t times) {
   std::string result;
@@ -116,21 +117,21 @@ TEST(HostileFile, EveryDamagedSmallFileStaysSmallInMemory) {
 
 TEST(HostileFile, CompressedEntriesAreRefusedUnread) {
   const std::string bomb = zip({{"archive/data.pkl", std::string(1000, 'x'), 8, 0xfffffffe}});
-  EXPECT_TRUE(refused(bomb, {"archive/data.pkl", "compressed", "save again with torch.save"}));
+  EXPECT_TRUE(archive_is_refused(bomb, {"archive/data.pkl", "compressed", "save again with torch.save"}));
   std::vector<ZipEntry> entries = {{"archive/data.pkl", pickle(state_dict_op(small_tensors(), false))}};
   for (const auto& [key, raw] : small_storages<float>())
     entries.push_back({"archive/data/" + key, raw, 8, 1 << 30});
-  EXPECT_TRUE(refused(zip(entries), {"archive/data/0", "compressed"}));
+  EXPECT_TRUE(archive_is_refused(zip(entries), {"archive/data/0", "compressed"}));
 }
 
 TEST(HostileFile, EntriesLargerThanTheFileAreRefused) {
-  EXPECT_TRUE(refused(zip({{"archive/data.pkl", "x", 0, 0xfffffff0}}), {"hostile.pth"}));
-  EXPECT_TRUE(refused(zip({{"archive/data.pkl", "x", 0, 1000}}), {"archive/data.pkl"}));
+  EXPECT_TRUE(archive_is_refused(zip({{"archive/data.pkl", "x", 0, 0xfffffff0}}), {"hostile.pth"}));
+  EXPECT_TRUE(archive_is_refused(zip({{"archive/data.pkl", "x", 0, 1000}}), {"archive/data.pkl"}));
 }
 
 TEST(HostileFile, ManyEntriesAreRefused) {
   std::vector<ZipEntry> entries(10'001, ZipEntry{"a", ""});
-  EXPECT_TRUE(refused(zip(entries), {"more than 10000 entries"}));
+  EXPECT_TRUE(archive_is_refused(zip(entries), {"more than 10000 entries"}));
 }
 
 TEST(HostileFile, ADirectoryThatDeclaresABillionEntriesIsRefused) {
@@ -145,30 +146,35 @@ TEST(HostileFile, ADirectoryThatDeclaresABillionEntriesIsRefused) {
     const std::string locator = "PK\6\7" + little_endian(0, 4) + little_endian(end, 8) + little_endian(1, 4);
     std::string bytes = good;
     bytes.insert(end, record + locator);
-    EXPECT_TRUE(refused(bytes, {"more than 10000 entries"}));
+    EXPECT_TRUE(archive_is_refused(bytes, {"more than 10000 entries"}));
   }
 }
 
 TEST(HostileFile, APickleThatContainsItselfEndsInARefusal) {
-  EXPECT_TRUE(refused(program(std::string("]q\0h\0a", 6)), {"not a state dict"}));
-  const std::string itself = program(std::string("}q\0", 3) + text_op("model") + std::string("h\0", 2) + "s");
-  EXPECT_TRUE(refused(itself, {"\"model\" = a dict", "is not a tensor"}));
+  EXPECT_TRUE(archive_is_refused(small_program(std::string("]q\0h\0a", 6)), {"not a state dict"}));
+  const std::string itself =
+      small_program(std::string("}q\0", 3) + text_op("model") + std::string("h\0", 2) + "s");
+  EXPECT_TRUE(archive_is_refused(itself, {"\"model\" = a dict", "is not a tensor"}));
   EXPECT_TRUE(refuses([&] { parse_weights(itself, "x", "model.model.model"); }, {"\"model\" = a dict"}));
 }
 
 TEST(HostileFile, DeepNestingNeedsNoDeepStack) {
-  EXPECT_TRUE(refused(program(repeated("(", 300'000) + repeated("t", 300'000)), {"not a state dict"}));
-  EXPECT_TRUE(refused(program(repeated("]", 300'000) + repeated("a", 299'999)), {"not a state dict"}));
+  EXPECT_TRUE(archive_is_refused(small_program(repeated("(", 300'000) + repeated("t", 300'000)),
+                                 {"not a state dict"}));
+  EXPECT_TRUE(archive_is_refused(small_program(repeated("]", 300'000) + repeated("a", 299'999)),
+                                 {"not a state dict"}));
 }
 
 TEST(HostileFile, EndlessOpcodesAreRefused) {
-  EXPECT_TRUE(refused(program(repeated("N", 1'100'000)), {"more opcodes than any state dict needs"}));
+  EXPECT_TRUE(archive_is_refused(small_program(repeated("N", 1'100'000)),
+                                 {"more opcodes than any state dict needs"}));
 }
 
 TEST(HostileFile, ALargeTupleIsNotCopiedByEveryCallThatGetsIt) {
-  EXPECT_TRUE(refused(program("(" + repeated("N", 100'000) + std::string("tq\0", 3) +
-                              global_op("torch._utils", "_rebuild_tensor_v2") + std::string("h\0R", 3)),
-                      {"more than 8 arguments"}));
+  EXPECT_TRUE(archive_is_refused(
+      small_program("(" + repeated("N", 100'000) + std::string("tq\0", 3) +
+                    global_op("torch._utils", "_rebuild_tensor_v2") + std::string("h\0R", 3)),
+      {"more than 8 arguments"}));
 }
 
 TEST(HostileFile, MalformedPicklesAreRefusedAtTheirOffset) {
@@ -205,18 +211,18 @@ TEST(HostileFile, MalformedPicklesAreRefusedAtTheirOffset) {
       {"i", "0x69: this pickle opcode is not part of a state dict"}};
   for (const auto& [ops, piece] : programs) {
     const std::string bytes = zip({{"archive/data.pkl", pickle(ops)}});
-    EXPECT_TRUE(refused(bytes, {"hostile.pth: offset ", "archive/data.pkl", piece})) << piece;
+    EXPECT_TRUE(archive_is_refused(bytes, {"hostile.pth: offset ", "archive/data.pkl", piece})) << piece;
   }
 }
 
 TEST(HostileFile, LegacyHeadersAreChecked) {
   const std::string magic = small_legacy().substr(0, 15);
-  EXPECT_TRUE(refused(magic + pickle(integer_op(1002)), {"protocol version", "must be 1001"}));
-  EXPECT_TRUE(refused(magic + pickle("N"), {"protocol version"}));
-  EXPECT_TRUE(refused(magic + pickle(integer_op(1001)) + pickle("N"), {"little_endian"}));
+  EXPECT_TRUE(archive_is_refused(magic + pickle(integer_op(1002)), {"protocol version", "must be 1001"}));
+  EXPECT_TRUE(archive_is_refused(magic + pickle("N"), {"protocol version"}));
+  EXPECT_TRUE(archive_is_refused(magic + pickle(integer_op(1001)) + pickle("N"), {"little_endian"}));
   const std::string system = pickle("}(" + text_op("little_endian") + "\x88u");
-  EXPECT_TRUE(refused(magic + pickle(integer_op(1001)) + system + pickle("}") + pickle("N"),
-                      {"list of storages", "is not a list"}));
+  EXPECT_TRUE(archive_is_refused(magic + pickle(integer_op(1001)) + system + pickle("}") + pickle("N"),
+                                 {"list of storages", "is not a list"}));
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace swarmcert {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
 /// y = 2 relu(x1 - x2) - 3 relu(x1 + x2 + 1) + 0.5
 files::Weights example() {
@@ -37,7 +37,7 @@ TEST(Mlp, OneLayerIsAffineAndNeedsNoScratch) {
 }
 
 TEST(Mlp, NotANumberReachesTheOutput) {
-  EXPECT_TRUE(std::isnan(files::Evaluator<float>(example())({kNaN, 0})[0]));
+  EXPECT_TRUE(std::isnan(files::Evaluator<float>(example())({kNotANumber, 0})[0]));
 }
 
 TEST(Mlp, ProductsAreRoundedBeforeTheSum) { EXPECT_FALSE(nn::arithmetic_is_fused()); }

@@ -42,7 +42,7 @@ Weights sized(const std::string& path) {
   return weights;
 }
 Network parse(const std::string& text) { return parse_network(text, "nets/network.toml", sized); }
-testing::AssertionResult refused(const std::string& text, const std::vector<std::string>& pieces) {
+testing::AssertionResult network_is_refused(const std::string& text, const std::vector<std::string>& pieces) {
   return refuses([&] { parse(text); }, pieces);
 }
 
@@ -94,100 +94,118 @@ TEST(NetworkToml, OtherStatementsAreRead) {
 }
 
 TEST(NetworkToml, UnknownKeysAreRefusedWithLineAndSuggestion) {
-  EXPECT_TRUE(refused(with("gamma = {", "gama = {"), {"nets/network.toml: line 3: gama", "\"gamma\"?"}));
-  EXPECT_TRUE(refused(with("unit =", "units ="), {"line 2: output.units", "did you mean \"unit\"?"}));
-  EXPECT_TRUE(refused(with("scope =", "zzz ="), {"line 3: gamma.zzz", "allowed: value, scope, mode"}));
-  EXPECT_TRUE(refused(with("order =", "ordr ="), {"line 5: input.ordr", "\"order\"?"}));
-  EXPECT_TRUE(refused(with("lower =", "low ="), {"line 6: input.clamp.low"}));
-  EXPECT_TRUE(refused(with("weights = \"4x20\"", "wieghts = \"4x20\""),
-                      {"line 10: phi.ground.wieghts", "\"weights\"?"}));
+  EXPECT_TRUE(
+      network_is_refused(with("gamma = {", "gama = {"), {"nets/network.toml: line 3: gama", "\"gamma\"?"}));
+  EXPECT_TRUE(
+      network_is_refused(with("unit =", "units ="), {"line 2: output.units", "did you mean \"unit\"?"}));
+  EXPECT_TRUE(
+      network_is_refused(with("scope =", "zzz ="), {"line 3: gamma.zzz", "allowed: value, scope, mode"}));
+  EXPECT_TRUE(network_is_refused(with("order =", "ordr ="), {"line 5: input.ordr", "\"order\"?"}));
+  EXPECT_TRUE(network_is_refused(with("lower =", "low ="), {"line 6: input.clamp.low"}));
+  EXPECT_TRUE(network_is_refused(with("weights = \"4x20\"", "wieghts = \"4x20\""),
+                                 {"line 10: phi.ground.wieghts", "\"weights\"?"}));
 }
 
 TEST(NetworkToml, MissingKeysAreRefused) {
-  EXPECT_TRUE(refused(with("schema = \"swarmcert/network/1\"", ""), {"schema: is missing"}));
-  EXPECT_TRUE(refused(with("network/1", "network/2"), {"line 1: schema", "must be \"swarmcert/network/1\""}));
-  EXPECT_TRUE(refused(with(", unit = \"gf\"", ""), {"line 2: output.unit: is missing"}));
-  EXPECT_TRUE(refused(with("value = 3.0, ", ""), {"line 3: gamma.value: is missing"}));
+  EXPECT_TRUE(network_is_refused(with("schema = \"swarmcert/network/1\"", ""), {"schema: is missing"}));
+  EXPECT_TRUE(network_is_refused(with("network/1", "network/2"),
+                                 {"line 1: schema", "must be \"swarmcert/network/1\""}));
+  EXPECT_TRUE(network_is_refused(with(", unit = \"gf\"", ""), {"line 2: output.unit: is missing"}));
+  EXPECT_TRUE(network_is_refused(with("value = 3.0, ", ""), {"line 3: gamma.value: is missing"}));
+  EXPECT_TRUE(network_is_refused(with("lower = [-1, -1, -1, -2, -2, -2], ", ""),
+                                 {"line 6: input.clamp.lower: is missing"}));
+  EXPECT_TRUE(network_is_refused(with("weights = \"6x20\"", ""), {"line 7: phi.small.weights: is missing"}));
   EXPECT_TRUE(
-      refused(with("lower = [-1, -1, -1, -2, -2, -2], ", ""), {"line 6: input.clamp.lower: is missing"}));
-  EXPECT_TRUE(refused(with("weights = \"6x20\"", ""), {"line 7: phi.small.weights: is missing"}));
-  EXPECT_TRUE(refused("schema = \"swarmcert/network/1\"\nphi.a.weights = \"3x5\"\n", {"rho: is missing"}));
-  EXPECT_TRUE(
-      refused("schema = \"swarmcert/network/1\"\n[phi]\n[rho]\n", {"line 2: phi", "no kind of vehicle"}));
+      network_is_refused("schema = \"swarmcert/network/1\"\nphi.a.weights = \"3x5\"\n", {"rho: is missing"}));
+  EXPECT_TRUE(network_is_refused("schema = \"swarmcert/network/1\"\n[phi]\n[rho]\n",
+                                 {"line 2: phi", "no kind of vehicle"}));
 }
 
 TEST(NetworkToml, ValuesOfAnotherTypeAreRefused) {
+  EXPECT_TRUE(network_is_refused(with("value = 3.0", "value = \"3\""),
+                                 {"line 3: gamma.value = \"3\": must be a number"}));
+  EXPECT_TRUE(network_is_refused(with("value = 3.0", "value = inf"), {"gamma.value = inf: must be finite"}));
+  EXPECT_TRUE(network_is_refused(with("value = 3.0", "value = nan"), {"gamma.value = nan: must be finite"}));
+  EXPECT_TRUE(network_is_refused(with("value = 3.0", "value = -3"), {"gamma.value", "positive"}));
+  EXPECT_TRUE(network_is_refused(with("value = 3.0", "value = 2020-01-01"),
+                                 {"gamma.value = 2020-01-01: must be a number"}));
+  EXPECT_TRUE(network_is_refused(with("\"layer\"", "\"layers\""),
+                                 {"line 3: gamma.scope = \"layers\"", "\"layer\"?"}));
+  EXPECT_TRUE(network_is_refused(with("\"clip\"", "true"), {"gamma.mode = true: must be text"}));
+  EXPECT_TRUE(network_is_refused(with("\"gf\"", "\"kg\""), {"output.unit = \"kg\"", "allowed: gf, N"}));
+  EXPECT_TRUE(network_is_refused(with("\"force_z\"", "\"force\""),
+                                 {"output.quantity = \"force\"", "allowed: force_z"}));
+  EXPECT_TRUE(network_is_refused(with("{ quantity = \"force_z\", unit = \"gf\" }", "[]"),
+                                 {"output = a list: must be a table"}));
   EXPECT_TRUE(
-      refused(with("value = 3.0", "value = \"3\""), {"line 3: gamma.value = \"3\": must be a number"}));
-  EXPECT_TRUE(refused(with("value = 3.0", "value = inf"), {"gamma.value = inf: must be finite"}));
-  EXPECT_TRUE(refused(with("value = 3.0", "value = nan"), {"gamma.value = nan: must be finite"}));
-  EXPECT_TRUE(refused(with("value = 3.0", "value = -3"), {"gamma.value", "positive"}));
+      network_is_refused(with("\"dp_x_m\",", "7,"), {"line 5: input.order = 7: must be a list of texts"}));
+  EXPECT_TRUE(network_is_refused(with("[-1, -1, -1, -2", "[\"-1\", -1, -1, -2"),
+                                 {"input.clamp.lower", "list of numbers"}));
+  EXPECT_TRUE(network_is_refused(with("[-1, -1, -1, -2", "[-inf, -1, -1, -2"),
+                                 {"input.clamp.lower = -inf: must be finite"}));
   EXPECT_TRUE(
-      refused(with("value = 3.0", "value = 2020-01-01"), {"gamma.value = 2020-01-01: must be a number"}));
-  EXPECT_TRUE(refused(with("\"layer\"", "\"layers\""), {"line 3: gamma.scope = \"layers\"", "\"layer\"?"}));
-  EXPECT_TRUE(refused(with("\"clip\"", "true"), {"gamma.mode = true: must be text"}));
-  EXPECT_TRUE(refused(with("\"gf\"", "\"kg\""), {"output.unit = \"kg\"", "allowed: gf, N"}));
-  EXPECT_TRUE(refused(with("\"force_z\"", "\"force\""), {"output.quantity = \"force\"", "allowed: force_z"}));
+      network_is_refused(with("lower = [-1, -1, -1, -2, -2, -2]", "lower = -1"), {"input.clamp.lower = -1"}));
+  EXPECT_TRUE(network_is_refused(with("weights = \"6x20\"", "weights = {}"),
+                                 {"phi.small.weights = a table: must be text"}));
+  EXPECT_TRUE(network_is_refused(with("weights = \"6x20\"", "weights = \"\""),
+                                 {"phi.small.weights", "not the name of a file"}));
   EXPECT_TRUE(
-      refused(with("{ quantity = \"force_z\", unit = \"gf\" }", "[]"), {"output = a list: must be a table"}));
-  EXPECT_TRUE(refused(with("\"dp_x_m\",", "7,"), {"line 5: input.order = 7: must be a list of texts"}));
-  EXPECT_TRUE(
-      refused(with("[-1, -1, -1, -2", "[\"-1\", -1, -1, -2"), {"input.clamp.lower", "list of numbers"}));
-  EXPECT_TRUE(
-      refused(with("[-1, -1, -1, -2", "[-inf, -1, -1, -2"), {"input.clamp.lower = -inf: must be finite"}));
-  EXPECT_TRUE(refused(with("lower = [-1, -1, -1, -2, -2, -2]", "lower = -1"), {"input.clamp.lower = -1"}));
-  EXPECT_TRUE(
-      refused(with("weights = \"6x20\"", "weights = {}"), {"phi.small.weights = a table: must be text"}));
-  EXPECT_TRUE(
-      refused(with("weights = \"6x20\"", "weights = \"\""), {"phi.small.weights", "not the name of a file"}));
-  EXPECT_TRUE(refused(with("6x20", "6x20\\u0000"), {"phi.small.weights", "not the name of a file"}));
+      network_is_refused(with("6x20", "6x20\\u0000"), {"phi.small.weights", "not the name of a file"}));
 }
 
 TEST(NetworkToml, InputsMustFitTogether) {
+  EXPECT_TRUE(network_is_refused(with(", \"dv_z_m_s\"", ""),
+                                 {"line 6: input.clamp.lower = 6 numbers", "there are 5 inputs"}));
+  EXPECT_TRUE(network_is_refused(with("2, 2, 2]", "2, 2]"),
+                                 {"line 6: input.clamp.upper = 5 numbers", "there are 6 inputs"}));
+  EXPECT_TRUE(network_is_refused(with("\"dp_y_m\"", "\"dp_x_m\""),
+                                 {"line 5: input.order = \"dp_x_m\": appears twice"}));
   EXPECT_TRUE(
-      refused(with(", \"dv_z_m_s\"", ""), {"line 6: input.clamp.lower = 6 numbers", "there are 5 inputs"}));
-  EXPECT_TRUE(
-      refused(with("2, 2, 2]", "2, 2]"), {"line 6: input.clamp.upper = 5 numbers", "there are 6 inputs"}));
-  EXPECT_TRUE(refused(with("\"dp_y_m\"", "\"dp_x_m\""), {"line 5: input.order = \"dp_x_m\": appears twice"}));
-  EXPECT_TRUE(refused(with("upper = [1, 1,", "upper = [1, -3,"), {"line 6", "entry 1 is above upper"}));
+      network_is_refused(with("upper = [1, 1,", "upper = [1, -3,"), {"line 6", "entry 1 is above upper"}));
   EXPECT_NO_THROW(parse(with("upper = [1, 1,", "upper = [1, -1,")));
 }
 
 TEST(NetworkToml, NetworksMustFitTogether) {
+  EXPECT_TRUE(network_is_refused(with("6x20", "5x20"),
+                                 {"line 8: phi.small.weights = 5 inputs", "must be 6", "input.order"}));
+  EXPECT_TRUE(network_is_refused(with("4x20", "6x20"),
+                                 {"line 10: phi.ground.weights = 6 inputs", "must be 4", "own"}));
+  EXPECT_TRUE(network_is_refused(with("6x20", "6x19"),
+                                 {"line 8: phi.small.weights = 19 outputs", "must be 20", "phi.ground"}));
   EXPECT_TRUE(
-      refused(with("6x20", "5x20"), {"line 8: phi.small.weights = 5 inputs", "must be 6", "input.order"}));
-  EXPECT_TRUE(refused(with("4x20", "6x20"), {"line 10: phi.ground.weights = 6 inputs", "must be 4", "own"}));
+      network_is_refused(with("20x1", "19x1"), {"line 12: rho.small.weights = 19 inputs", "must be 20"}));
   EXPECT_TRUE(
-      refused(with("6x20", "6x19"), {"line 8: phi.small.weights = 19 outputs", "must be 20", "phi.ground"}));
-  EXPECT_TRUE(refused(with("20x1", "19x1"), {"line 12: rho.small.weights = 19 inputs", "must be 20"}));
-  EXPECT_TRUE(refused(with("20x1", "20x3"), {"line 12: rho.small.weights = 3 outputs", "must be 1"}));
+      network_is_refused(with("20x1", "20x3"), {"line 12: rho.small.weights = 3 outputs", "must be 1"}));
   const std::string without_order =
       "schema = \"swarmcert/network/1\"\nphi.a.weights = \"3x5\"\nphi.b.weights = \"4x5\"\nrho.b.weights = "
       "\"5x2\"\n";
-  EXPECT_TRUE(refused(without_order, {"line 3: phi.b.weights = 4 inputs", "must be 3", "phi.a has as many"}));
-  EXPECT_TRUE(refused(without_order + "[input]\nclamp = { lower = [0, 0], upper = [1, 1] }\n",
-                      {"phi.a.weights = 3 inputs", "must be 2", "input.clamp"}));
+  EXPECT_TRUE(network_is_refused(without_order,
+                                 {"line 3: phi.b.weights = 4 inputs", "must be 3", "phi.a has as many"}));
+  EXPECT_TRUE(network_is_refused(without_order + "[input]\nclamp = { lower = [0, 0], upper = [1, 1] }\n",
+                                 {"phi.a.weights = 3 inputs", "must be 2", "input.clamp"}));
 }
 
 TEST(NetworkToml, TextThatIsNotTomlIsRefusedWithLineAndColumn) {
-  EXPECT_TRUE(refused("schema = \n", {"nets/network.toml: line 1, column", "is not TOML"}));
-  EXPECT_TRUE(refused("a = 1\na = 2\n", {"line 2", "is not TOML"}));
-  EXPECT_TRUE(refused(std::string(70'000, '\n'), {"larger than 64 KiB"}));
+  EXPECT_TRUE(network_is_refused("schema = \n", {"nets/network.toml: line 1, column", "is not TOML"}));
+  EXPECT_TRUE(network_is_refused("a = 1\na = 2\n", {"line 2", "is not TOML"}));
+  EXPECT_TRUE(network_is_refused(std::string(70'000, '\n'), {"larger than 64 KiB"}));
 }
 
 TEST(NetworkToml, TextThatTomlPlusPlusReadsInUndefinedWaysIsRefusedBefore) {
   // Found by fuzzing toml++ 3.3 under the sanitizers: letters beyond ASCII outside of what it takes for a text.
-  EXPECT_TRUE(refused("\xc5\xb0", {"nets/network.toml: line 1, column 1", "in double quotes only"}));
-  EXPECT_TRUE(refused("a = 1\n\xc3\xa4 = 2\n", {"line 2, column 1", "in double quotes only"}));
-  EXPECT_TRUE(refused("a = '\xc3\xa4'\n", {"line 1, column 6", "in double quotes only"}));
-  EXPECT_TRUE(refused("a = 77f\"-\xef\xbb\xbf\"\n", {"line 1", "is not TOML"}));
-  EXPECT_TRUE(refused("c=7[\"\xef\xbb\x9f", {"line 1", "is not TOML"}));
+  EXPECT_TRUE(
+      network_is_refused("\xc5\xb0", {"nets/network.toml: line 1, column 1", "in double quotes only"}));
+  EXPECT_TRUE(network_is_refused("a = 1\n\xc3\xa4 = 2\n", {"line 2, column 1", "in double quotes only"}));
+  EXPECT_TRUE(network_is_refused("a = '\xc3\xa4'\n", {"line 1, column 6", "in double quotes only"}));
+  EXPECT_TRUE(network_is_refused("a = 77f\"-\xef\xbb\xbf\"\n", {"line 1", "is not TOML"}));
+  EXPECT_TRUE(network_is_refused("c=7[\"\xef\xbb\x9f", {"line 1", "is not TOML"}));
 }
 
 TEST(NetworkToml, TextThatIsNotUtf8IsRefused) {
   for (const char* const bad : {"\x80", "\xc1\x80", "\xc3", "\xc3\"", "\xe0\x80\x80", "\xed\xa0\x80",
                                 "\xf0\x80\x80\x80", "\xf4\x90\x80\x80", "\xf8\x80\x80\x80", "\xff"}) {
-    EXPECT_TRUE(refused("a = \"" + std::string(bad) + "\"\n", {"line 1, column 6", "is not UTF-8"}));
+    EXPECT_TRUE(
+        network_is_refused("a = \"" + std::string(bad) + "\"\n", {"line 1, column 6", "is not UTF-8"}));
   }
 }
 
@@ -219,13 +237,13 @@ TEST(NetworkToml, DeepNestingIsRefused) {
   for (const int depth : {3'990, 4'010, 30'000}) {  // toml++ would overflow the stack on the last
     std::string keys = "a";
     for (int i = 0; i < depth; ++i) keys += ".a";
-    EXPECT_TRUE(refused(keys + " = 1\n", {"nets/network.toml"}));
-    EXPECT_TRUE(refused("[" + keys + "]\n", {"nets/network.toml"}));
+    EXPECT_TRUE(network_is_refused(keys + " = 1\n", {"nets/network.toml"}));
+    EXPECT_TRUE(network_is_refused("[" + keys + "]\n", {"nets/network.toml"}));
   }
-  EXPECT_TRUE(refused("a = " + std::string(60'000, '[') + "\n", {"is not TOML"}));
+  EXPECT_TRUE(network_is_refused("a = " + std::string(60'000, '[') + "\n", {"is not TOML"}));
   std::string tables = "a = ";
   for (int i = 0; i < 10'000; ++i) tables += "{a=";
-  EXPECT_TRUE(refused(tables, {"is not TOML"}));
+  EXPECT_TRUE(network_is_refused(tables, {"is not TOML"}));
 }
 
 /// Weight files and a network.toml on disk.

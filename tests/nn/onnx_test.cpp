@@ -47,7 +47,7 @@ std::string bytes_of(const std::string& hex) {
   return bytes;
 }
 
-testing::AssertionResult refused(const std::string& bytes, const std::vector<std::string>& pieces) {
+testing::AssertionResult onnx_is_refused(const std::string& bytes, const std::vector<std::string>& pieces) {
   return refuses([&] { parse_weights(bytes, "net.onnx"); }, pieces);
 }
 
@@ -109,7 +109,7 @@ TEST(Onnx, GraphsThatAreNoChainOfLinearLayersAreRefusedByNode) {
   };
   const std::string gemm = onnx_node("Gemm", {"x", "w", "b"}, {"h"});
   const auto expect = [&](const std::vector<std::string>& nodes, const std::string& piece) {
-    EXPECT_TRUE(refused(with(nodes), {"net.onnx: offset ", piece}));
+    EXPECT_TRUE(onnx_is_refused(with(nodes), {"net.onnx: offset ", piece}));
   };
   expect({onnx_node("Tanh", {"x"}, {"y"})}, "Tanh: is not Gemm");
   expect({gemm, onnx_node("Tanh", {"h"}, {"y"})}, "is not Gemm, MatMul");
@@ -144,25 +144,26 @@ TEST(Onnx, TensorsThatCannotBeWeightsAreRefused) {
   };
   const std::string data = raw_numbers(std::vector<float>{1, 2, 3, 4});
   const std::string good = onnx_raw("w", {2, 2}, {1, 2, 3, 4});
-  EXPECT_TRUE(refused(with({good, good}), {"\"w\"", "appears twice"}));
-  EXPECT_TRUE(refused(with({onnx_tensor("w", {2, 2}, 10, onnx_text(9, data))}),
-                      {"data type 10", "float32 or float64"}));
+  EXPECT_TRUE(onnx_is_refused(with({good, good}), {"\"w\"", "appears twice"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_tensor("w", {2, 2}, 10, onnx_text(9, data))}),
+                              {"data type 10", "float32 or float64"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_raw("w", {2, 3}, {1, 2, 3, 4})}),
+                              {"16 bytes of numbers for the shape [2, 3]"}));
   EXPECT_TRUE(
-      refused(with({onnx_raw("w", {2, 3}, {1, 2, 3, 4})}), {"16 bytes of numbers for the shape [2, 3]"}));
-  EXPECT_TRUE(refused(with({onnx_raw("w", {1u << 31, 1u << 31}, {1})}), {"bytes of numbers for the shape"}));
-  EXPECT_TRUE(refused(with({onnx_tensor("w", {2, ~std::uint64_t{0}}, 1, onnx_text(9, data))}),
-                      {"dimension below 0"}));
-  EXPECT_TRUE(refused(with({onnx_raw("w", {4}, {1, 2, 3, 4})}), {"two dimensions"}));
-  EXPECT_TRUE(refused(
+      onnx_is_refused(with({onnx_raw("w", {1u << 31, 1u << 31}, {1})}), {"bytes of numbers for the shape"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_tensor("w", {2, ~std::uint64_t{0}}, 1, onnx_text(9, data))}),
+                              {"dimension below 0"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_raw("w", {4}, {1, 2, 3, 4})}), {"two dimensions"}));
+  EXPECT_TRUE(onnx_is_refused(
       with({good.substr(0, 0) + onnx_tensor("w", {2, 2}, 1, onnx_text(4, data) + onnx_text(9, data))}),
       {"bytes of numbers"}));
-  EXPECT_TRUE(refused(with({onnx_tensor("w", {2, 2}, 1, onnx_text(9, data) + onnx_text(9, data))}),
-                      {"not in one piece"}));
-  EXPECT_TRUE(refused(with({onnx_tensor("w", {2, 2}, 1, onnx_text(9, data) + onnx_text(13, "x"))}),
-                      {"another file"}));
-  EXPECT_TRUE(refused(with({onnx_tensor("w", {2, 2}, 1, onnx_text(9, data) + onnx_varint_field(14, 1))}),
-                      {"another file"}));
-  EXPECT_TRUE(refused(with({onnx_raw("w", {2, 2}, {1, 2, 3, NAN})}), {"not finite"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_tensor("w", {2, 2}, 1, onnx_text(9, data) + onnx_text(9, data))}),
+                              {"not in one piece"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_tensor("w", {2, 2}, 1, onnx_text(9, data) + onnx_text(13, "x"))}),
+                              {"another file"}));
+  EXPECT_TRUE(onnx_is_refused(
+      with({onnx_tensor("w", {2, 2}, 1, onnx_text(9, data) + onnx_varint_field(14, 1))}), {"another file"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_raw("w", {2, 2}, {1, 2, 3, NAN})}), {"not finite"}));
 }
 
 TEST(Onnx, ModelsWithoutOneGraphInputAndOutputAreRefused) {
@@ -171,41 +172,41 @@ TEST(Onnx, ModelsWithoutOneGraphInputAndOutputAreRefused) {
   model.tensors = {onnx_raw("w", {2, 2}, {1, 2, 3, 4})};
   OnnxModel other = model;
   other.inputs = {"x", "z"};
-  EXPECT_TRUE(refused(other.bytes(), {"has 2 inputs, not one"}));
+  EXPECT_TRUE(onnx_is_refused(other.bytes(), {"has 2 inputs, not one"}));
   other = model;
   other.inputs = {};
-  EXPECT_TRUE(refused(other.bytes(), {"has 0 inputs"}));
+  EXPECT_TRUE(onnx_is_refused(other.bytes(), {"has 0 inputs"}));
   other = model;
   other.inputs = {"x", "w"};  // old exporters list the weights
   EXPECT_EQ(parse_weights(other.bytes(), "net.onnx").layers.size(), 1u);
   other = model;
   other.outputs = {"y", "z"};
-  EXPECT_TRUE(refused(other.bytes(), {"more than one output"}));
+  EXPECT_TRUE(onnx_is_refused(other.bytes(), {"more than one output"}));
   other = model;
   other.graph_extra = onnx_text(15, "");
-  EXPECT_TRUE(refused(other.bytes(), {"sparse"}));
-  EXPECT_TRUE(refused(model.bytes() + onnx_text(7, ""), {"graph", "appears twice"}));
-  EXPECT_TRUE(refused(onnx_varint_field(1, 8) + onnx_text(2, "pytorch"), {"graph", "is missing"}));
+  EXPECT_TRUE(onnx_is_refused(other.bytes(), {"sparse"}));
+  EXPECT_TRUE(onnx_is_refused(model.bytes() + onnx_text(7, ""), {"graph", "appears twice"}));
+  EXPECT_TRUE(onnx_is_refused(onnx_varint_field(1, 8) + onnx_text(2, "pytorch"), {"graph", "is missing"}));
   EXPECT_TRUE(refuses([&] { parse_weights(model.bytes(), "net.onnx", "model"); },
                       {"--key", "ONNX files are not nested"}));
   OnnxModel many;
   many.nodes.assign(10'001, onnx_node("Relu", {"x"}, {"y"}));
-  EXPECT_TRUE(refused(many.bytes(), {"more than 10000 nodes"}));
+  EXPECT_TRUE(onnx_is_refused(many.bytes(), {"more than 10000 nodes"}));
 }
 
 TEST(Onnx, DamagedProtobufIsRefusedAtItsOffset) {
   const std::string head = onnx_varint_field(1, 8) + onnx_text(2, "p");
-  EXPECT_TRUE(refused(head + "\x3a\xff", {"offset ", "cut off or too long"}));
-  EXPECT_TRUE(refused(head + "\x3a\x7f", {"longer than what holds it"}));
-  EXPECT_TRUE(refused(head + "\x0b", {"not a protobuf field type"}));
-  EXPECT_TRUE(refused(head + std::string("\x00\x00", 2), {"not a protobuf field number"}));
-  EXPECT_TRUE(refused(head + "\x08" + std::string(10, '\xff') + "\x01", {"cut off or too long"}));
-  EXPECT_TRUE(refused(head + "\x0d\x01", {"longer than what holds it"}));
-  EXPECT_TRUE(refused(head + onnx_varint_field(7, 1), {"a message is stored as a number"}));
-  EXPECT_TRUE(
-      refused(head + onnx_text(7, onnx_text(1, onnx_varint_field(4, 1))), {"a name is stored as a number"}));
-  EXPECT_TRUE(
-      refused(head + onnx_text(7, onnx_text(5, onnx_text(1, "\xff"))), {"packed numbers are cut off"}));
+  EXPECT_TRUE(onnx_is_refused(head + "\x3a\xff", {"offset ", "cut off or too long"}));
+  EXPECT_TRUE(onnx_is_refused(head + "\x3a\x7f", {"longer than what holds it"}));
+  EXPECT_TRUE(onnx_is_refused(head + "\x0b", {"not a protobuf field type"}));
+  EXPECT_TRUE(onnx_is_refused(head + std::string("\x00\x00", 2), {"not a protobuf field number"}));
+  EXPECT_TRUE(onnx_is_refused(head + "\x08" + std::string(10, '\xff') + "\x01", {"cut off or too long"}));
+  EXPECT_TRUE(onnx_is_refused(head + "\x0d\x01", {"longer than what holds it"}));
+  EXPECT_TRUE(onnx_is_refused(head + onnx_varint_field(7, 1), {"a message is stored as a number"}));
+  EXPECT_TRUE(onnx_is_refused(head + onnx_text(7, onnx_text(1, onnx_varint_field(4, 1))),
+                              {"a name is stored as a number"}));
+  EXPECT_TRUE(onnx_is_refused(head + onnx_text(7, onnx_text(5, onnx_text(1, "\xff"))),
+                              {"packed numbers are cut off"}));
 }
 
 TEST(Onnx, EveryTruncationAndFlippedBitIsRefusedOrGivesASoundNetwork) {

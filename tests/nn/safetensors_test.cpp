@@ -19,7 +19,8 @@ using tests::refuses;
 std::string safetensors(const std::string& header, const std::string& data = "") {
   return little_endian(header.size(), 8) + header + data;
 }
-testing::AssertionResult refused(const std::string& bytes, const std::vector<std::string>& pieces) {
+testing::AssertionResult safetensors_is_refused(const std::string& bytes,
+                                                const std::vector<std::string>& pieces) {
   return refuses([&] { parse_weights(bytes, "net.safetensors"); }, pieces);
 }
 
@@ -101,45 +102,53 @@ TEST(Safetensors, OffsetsThatOverlapLeaveGapsOrLeaveTheFileAreRefused) {
     return R"({"fc.weight":{"dtype":"F32","shape":)" + shape + R"(,"data_offsets":)" + offsets + "}}";
   };
   const std::string eight(8, '\0');
-  EXPECT_TRUE(refused(safetensors(one("[0,8]"), eight + "x"), {"1 bytes", "belong to no tensor"}));
   EXPECT_TRUE(
-      refused(safetensors(one("[0,8]"), "x"), {"fc.weight\".data_offsets = [0, 8]", "1 bytes of data"}));
-  EXPECT_TRUE(refused(safetensors(one("[8,0]"), eight), {"data_offsets = [8, 0]", "not a range"}));
-  EXPECT_TRUE(refused(safetensors(one("[1,9]"), eight + "x"), {"leaves a gap"}));
-  EXPECT_TRUE(refused(safetensors(one("[0,18446744073709551615]"), eight), {"not a range"}));
-  EXPECT_TRUE(refused(safetensors(one("[0]"), eight), {"not a range"}));
-  EXPECT_TRUE(refused(safetensors(one("[-1,8]"), eight), {"non-negative integer"}));
-  EXPECT_TRUE(refused(safetensors(one("[0,8.5]"), eight), {"non-negative integer"}));
-  EXPECT_TRUE(refused(safetensors(one("[0,8]", "[3,1]"), eight), {"shape = [3, 1]", "8 bytes"}));
-  EXPECT_TRUE(refused(safetensors(one("[0,8]", "[1000000000,1000000000]"), eight), {"does not fit"}));
-  EXPECT_TRUE(refused(safetensors(one("[0,0]", "[0,4294967296]")), {"size 0"}));
+      safetensors_is_refused(safetensors(one("[0,8]"), eight + "x"), {"1 bytes", "belong to no tensor"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(one("[0,8]"), "x"),
+                                     {"fc.weight\".data_offsets = [0, 8]", "1 bytes of data"}));
+  EXPECT_TRUE(
+      safetensors_is_refused(safetensors(one("[8,0]"), eight), {"data_offsets = [8, 0]", "not a range"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(one("[1,9]"), eight + "x"), {"leaves a gap"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(one("[0,18446744073709551615]"), eight), {"not a range"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(one("[0]"), eight), {"not a range"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(one("[-1,8]"), eight), {"non-negative integer"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(one("[0,8.5]"), eight), {"non-negative integer"}));
+  EXPECT_TRUE(
+      safetensors_is_refused(safetensors(one("[0,8]", "[3,1]"), eight), {"shape = [3, 1]", "8 bytes"}));
+  EXPECT_TRUE(
+      safetensors_is_refused(safetensors(one("[0,8]", "[1000000000,1000000000]"), eight), {"does not fit"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(one("[0,0]", "[0,4294967296]")), {"size 0"}));
   const std::string overlap = R"({"a.weight":{"dtype":"F32","shape":[2,1],"data_offsets":[0,8]},)"
                               R"("b.weight":{"dtype":"F32","shape":[2,2],"data_offsets":[4,20]}})";
-  EXPECT_TRUE(refused(safetensors(overlap, std::string(20, '\0')), {"\"b.weight\"", "overlaps"}));
+  EXPECT_TRUE(
+      safetensors_is_refused(safetensors(overlap, std::string(20, '\0')), {"\"b.weight\"", "overlaps"}));
 }
 
 TEST(Safetensors, OtherTypesAreRefused) {
   const std::string header = R"({"fc.weight":{"dtype":"BF16","shape":[2,1],"data_offsets":[0,4]}})";
-  EXPECT_TRUE(refused(safetensors(header, "abcd"), {"fc.weight = BF16", "model.float()"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(header, "abcd"), {"fc.weight = BF16", "model.float()"}));
 }
 
 TEST(Safetensors, BrokenHeadersAreRefused) {
-  EXPECT_TRUE(refused(little_endian(1000, 8) + "{}", {"the header is longer than the file"}));
-  EXPECT_TRUE(refused(safetensors("{]"), {"net.safetensors: line 1, column", "not JSON"}));
-  EXPECT_TRUE(refused(safetensors("{}"), {"holds no tensor"}));
-  EXPECT_TRUE(refused(safetensors(R"({"fc.weight":1})"), {"not an object"}));
-  EXPECT_TRUE(refused(safetensors(R"({"fc.weight":{}})"), {"has no dtype"}));
+  EXPECT_TRUE(safetensors_is_refused(little_endian(1000, 8) + "{}", {"the header is longer than the file"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors("{]"), {"net.safetensors: line 1, column", "not JSON"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors("{}"), {"holds no tensor"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(R"({"fc.weight":1})"), {"not an object"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(R"({"fc.weight":{}})"), {"has no dtype"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(R"({"fc.weight":{"dtype":"F32","strides":[1]}})"),
+                                     {"\"strides\"", "known key"}));
   EXPECT_TRUE(
-      refused(safetensors(R"({"fc.weight":{"dtype":"F32","strides":[1]}})"), {"\"strides\"", "known key"}));
-  EXPECT_TRUE(refused(safetensors(R"({"fc.weight":{"dtype":"F32"}})"), {"shape", "not a list"}));
-  EXPECT_TRUE(refused(safetensors(R"({"a":{"dtype":"F32"},"a":{}})"), {"\"a\"", "appears twice"}));
-  EXPECT_TRUE(refused(safetensors(R"({"__metadata__":3})"), {"__metadata__", "not an object"}));
+      safetensors_is_refused(safetensors(R"({"fc.weight":{"dtype":"F32"}})"), {"shape", "not a list"}));
   EXPECT_TRUE(
-      refused(safetensors(R"({"__metadata__":{"swarmcert.layers":3}})"), {"swarmcert.layers", "not text"}));
+      safetensors_is_refused(safetensors(R"({"a":{"dtype":"F32"},"a":{}})"), {"\"a\"", "appears twice"}));
   EXPECT_TRUE(
-      refused(safetensors(R"({"__metadata__":{"swarmcert.layers":"[3]"}})"), {"not a list of layers"}));
+      safetensors_is_refused(safetensors(R"({"__metadata__":3})"), {"__metadata__", "not an object"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(R"({"__metadata__":{"swarmcert.layers":3}})"),
+                                     {"swarmcert.layers", "not text"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(R"({"__metadata__":{"swarmcert.layers":"[3]"}})"),
+                                     {"not a list of layers"}));
   const std::string many_sizes = R"({"a":{"dtype":"F32","shape":[1,1,1,1,1,1,1,1,1],"data_offsets":[0,0]}})";
-  EXPECT_TRUE(refused(safetensors(many_sizes), {"more than 8 entries"}));
+  EXPECT_TRUE(safetensors_is_refused(safetensors(many_sizes), {"more than 8 entries"}));
 }
 
 TEST(Safetensors, NamesThatAreNotUtf8AreNotWritten) {

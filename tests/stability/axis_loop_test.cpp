@@ -7,10 +7,13 @@
 #include <random>
 #include <string>
 
+#include "stability/vehicle.h"
+
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+using tests::kMass_kg;
+
 constexpr double kMotorLag_s = 1 / 17.4;
 
 AxisLoop pid(double Kp, double Kd, double Ki, double lag_s = 0) { return {kMass_kg, Kp, Kd, Ki, {lag_s}, 0}; }

@@ -6,13 +6,18 @@
 #include <cmath>
 #include <random>
 
+#include "stability/vehicle.h"
+
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+using tests::kMass_kg;
+
 constexpr double kLag_s = 1 / 17.4;
 
-AxisLoop pid(double Kp, double Kd, double Ki, double lag_s = 0) { return {kMass_kg, Kp, Kd, Ki, {lag_s}, 0}; }
+AxisLoop pid_loop(double Kp, double Kd, double Ki, double lag_s = 0) {
+  return {kMass_kg, Kp, Kd, Ki, {lag_s}, 0};
+}
 
 Disturbance known(double rate, double amplitude, double variation, double impulse) {
   Disturbance d;
@@ -24,7 +29,7 @@ Disturbance known(double rate, double amplitude, double variation, double impuls
 }
 
 TEST(DisturbanceBounds, FlyUnderEventsOfTheReference) {
-  const AxisLoop z2 = pid(10, 5, 2, kLag_s);
+  const AxisLoop z2 = pid_loop(10, 5, 2, kLag_s);
   const double E[] = {.0970, .1635, .2077, .2687}, d[] = {.748, 1.209, 1.421, 1.764};
   const double J[] = {.0202, .0354, .0485, .0662};
   const double B1[] = {11.0, 17.8, 20.9, 25.9}, B2[] = {.541, .912, 1.158, 1.499},
@@ -42,7 +47,7 @@ TEST(DisturbanceBounds, FlyUnderEventsOfTheReference) {
 }
 
 TEST(DisturbanceBounds, EarlierPassesAreStillFelt) {
-  const AxisLoop z2 = pid(10, 5, 2, kLag_s), z10 = pid(10, 5, 10, kLag_s);
+  const AxisLoop z2 = pid_loop(10, 5, 2, kLag_s), z10 = pid_loop(10, 5, 10, kLag_s);
   EXPECT_NEAR(impulse_gain_after(z2, Channel::kForce, 4), .3356, 5e-5);
   EXPECT_NEAR(impulse_gain_after(z2, Channel::kForce, 8.5), .1225, 5e-5);
   EXPECT_NEAR(impulse_gain_after(z2, Channel::kForce, 0), 4.686499723003938, 1e-11);
@@ -60,7 +65,7 @@ TEST(DisturbanceBounds, EarlierPassesAreStillFelt) {
 /// h >= 0 with one hump: the best split cuts the hump off where it is 2E/d wide (bang-bang with ramps of that length).
 TEST(DisturbanceBounds, AmplitudeAndRateTogetherHaveTheirClosedFormForOneHump) {
   const double a = 3, m = kMass_kg;
-  const AxisLoop triple = pid(3 * a * a, 3 * a, a * a * a);
+  const AxisLoop triple = pid_loop(3 * a * a, 3 * a, a * a * a);
   const double E = 1, d = 4;
   // h = t^2 e^(-at)/(2m). Level c whose width is 2E/d by bisection.
   const auto h = [&](double t) { return t * t * std::exp(-a * t) / (2 * m); };
@@ -87,7 +92,7 @@ TEST(DisturbanceBounds, AmplitudeAndRateTogetherHaveTheirClosedFormForOneHump) {
 }
 
 TEST(DisturbanceBounds, AmplitudeAndRateTogetherTendToEachAlone) {
-  const AxisLoop loop = pid(10, 5, 10, kLag_s);
+  const AxisLoop loop = pid_loop(10, 5, 10, kLag_s);
   const GainNorms gains = continuous_norms(loop, Channel::kForce);
   EXPECT_NEAR(amplitude_and_rate_bound(loop, Channel::kForce, 1, 1e4), gains.amplitude,
               1e-2 * gains.amplitude);
@@ -99,7 +104,7 @@ TEST(DisturbanceBounds, AmplitudeAndRateTogetherTendToEachAlone) {
 /// Ten thousand random forces of each class, each convolved with the kernel: none exceeds the bound of its class, and
 /// the worst input of each class comes near it.
 TEST(DisturbanceBounds, NoneOfTenThousandRandomInputsOfEachClassExceedsItsBound) {
-  const AxisLoop loop = pid(10, 5, 10, kLag_s);
+  const AxisLoop loop = pid_loop(10, 5, 10, kLag_s);
   const GainNorms gains = continuous_norms(loop, Channel::kForce);
   constexpr double kStep_s = 0.02;
   constexpr int kCount = 900;

@@ -7,11 +7,10 @@
 
 #include "data.h"
 #include "stability/iss_full_loop.h"
+#include "stability/vehicle.h"
 
 namespace swarmcert::stability {
 namespace {
-
-Model small() { return read_model(tests::source_path("stability/models/crazyflie-small.toml")); }
 
 Gains composite(const std::string& lambda, const std::string& k, const std::string& more = "") {
   return parse_gains(
@@ -35,7 +34,7 @@ double worst_of(const IssCheck& check, const std::string& kind) {
 
 TEST(IssCheck, IsotropicGainsReachTheBallByARampAndNothingExceedsIt) {
   for (const auto& [lambda, k] : {std::pair{"4", "0.136"}, std::pair{"2", "0.2"}, std::pair{"1", "0.5"}}) {
-    const IssCheck check = check_iss(composite(lambda, k), small(), {});
+    const IssCheck check = check_iss(composite(lambda, k), tests::small_vehicle(), {});
     EXPECT_TRUE(check.theorem_applies);
     EXPECT_EQ(check.violations, 0);
     EXPECT_GT(worst_of(check, "ramp"), 0.999);
@@ -47,22 +46,22 @@ TEST(IssCheck, IsotropicGainsReachTheBallByARampAndNothingExceedsIt) {
 
 TEST(IssCheck, HasTheBallOfTheTables) {
   // Reference 1.2, A1 and A2: unit d_m, 0.45955882352941174 and 1.25 m per N/s.
-  const IssCheck a1 = check_iss(composite("4", "0.136"), small(), with_runs(5));
+  const IssCheck a1 = check_iss(composite("4", "0.136"), tests::small_vehicle(), with_runs(5));
   EXPECT_NEAR(a1.ball_m / a1.rate_N_s, 0.45955882352941174, 1e-12);
-  const IssCheck a2 = check_iss(composite("2", "0.2"), small(), with_runs(5));
+  const IssCheck a2 = check_iss(composite("2", "0.2"), tests::small_vehicle(), with_runs(5));
   EXPECT_NEAR(a2.ball_m / a2.rate_N_s, 1.25, 1e-12);
 }
 
 TEST(IssCheck, AnisotropicGainsStayInsideWhereTheTheoremIsConservative) {
   // Reference 1.1, V3: theorem 5.0, exact 2-norm peak gain 1.2503991779, ratio 0.25008.
-  const IssCheck check = check_iss(composite("[2, 2, 4]", "[0.2, 0.2, 0.05]"), small(), {});
+  const IssCheck check = check_iss(composite("[2, 2, 4]", "[0.2, 0.2, 0.05]"), tests::small_vehicle(), {});
   EXPECT_EQ(check.violations, 0);
   EXPECT_LE(check.worst_ratio, 0.25008 + 1e-4);
   EXPECT_GT(check.worst_ratio, 0.95 * 0.25008);
 }
 
 TEST(IssCheck, NoneOfTenThousandOfEachKindLeavesBallOrTransient_slow) {
-  const IssCheck check = check_iss(composite("4", "0.136"), small(), with_runs(63000));
+  const IssCheck check = check_iss(composite("4", "0.136"), tests::small_vehicle(), with_runs(63000));
   std::map<std::string, int> count;
   for (const IssRun& run : check.runs) ++count[run.kind];
   for (const char* const kind : {"ramp", "worst_linear", "bang_bang", "random", "initial_state"}) {
@@ -86,7 +85,7 @@ TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
   };
   for (const auto& [what, gains] : broken) {
     SCOPED_TRACE(what);
-    const IssCheck check = check_iss(gains, small(), with_runs(45));
+    const IssCheck check = check_iss(gains, tests::small_vehicle(), with_runs(45));
     EXPECT_FALSE(check.theorem_applies);
     EXPECT_FALSE(check.why_not.empty());
     EXPECT_GT(check.violations, 0);
@@ -98,20 +97,20 @@ TEST(IssCheck, DoesNotDependOnJobsOrOnTheRate) {
   IssOptions options;
   options.runs = 60;
   options.jobs = 1;
-  const IssCheck one = check_iss(composite("2", "0.2"), small(), options);
+  const IssCheck one = check_iss(composite("2", "0.2"), tests::small_vehicle(), options);
   options.jobs = 3;
-  const IssCheck three = check_iss(composite("2", "0.2"), small(), options);
+  const IssCheck three = check_iss(composite("2", "0.2"), tests::small_vehicle(), options);
   ASSERT_EQ(one.runs.size(), three.runs.size());
   for (std::size_t i = 0; i < one.runs.size(); ++i) EXPECT_EQ(one.runs[i].largest_m, three.runs[i].largest_m);
   options.rate_N_s = one.rate_N_s / 7;
-  const IssCheck slower = check_iss(composite("2", "0.2"), small(), options);
+  const IssCheck slower = check_iss(composite("2", "0.2"), tests::small_vehicle(), options);
   EXPECT_NEAR(slower.worst_ratio, one.worst_ratio, 1e-6) << "the unsaturated loop is linear";
 }
 
 TEST(IssCheck, VerticalRampsReachTheBallInTheFullLoopToo) {
   const Gains gains = composite("4", "0.136", "[attitude]\nlaw = \"lee\"\n");
-  const IssCheck check = check_iss(gains, small(), with_runs(30));
-  const std::vector<FullLoopRun> flown = fly_full_loop(gains, small(), check);
+  const IssCheck check = check_iss(gains, tests::small_vehicle(), with_runs(30));
+  const std::vector<FullLoopRun> flown = fly_full_loop(gains, tests::small_vehicle(), check);
   ASSERT_EQ(flown.size(), 6u);
   double vertical = 0, tilt = 0;
   for (const FullLoopRun& run : flown) {

@@ -10,19 +10,21 @@
 
 #include "stability/bounds/disturbance_bounds.h"
 #include "stability/bounds/sampled_bounds.h"
+#include "stability/vehicle.h"
 #include "stepped_loop.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
-constexpr double kStep_s = 0.0025;
-constexpr int kCount = 2400;  // 6 s
+using tests::kMass_kg;
+
+constexpr double kInputStep_s = 0.0025;
+constexpr int kInputSteps = 2400;  // 6 s
 
 /// A force, linear on each step, with jumps between steps.
 struct Input {
   std::vector<double> from, to;
-  Input() : from(kCount), to(kCount) {}
+  Input() : from(kInputSteps), to(kInputSteps) {}
   void constant(int step, double value) {
     from[static_cast<std::size_t>(step)] = to[static_cast<std::size_t>(step)] = value;
   }
@@ -37,7 +39,7 @@ class Inputs {
   Input amplitude(double E) {
     const std::vector<double> sign = signs(kernel_);
     Input f;
-    for (int i = 0; i < kCount; ++i) f.constant(i, E * sign[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < kInputSteps; ++i) f.constant(i, E * sign[static_cast<std::size_t>(i)]);
     return f;
   }
   Input rate(double d) {
@@ -52,11 +54,11 @@ class Inputs {
     std::vector<double> share = shares(jumps);
     std::vector<std::pair<int, double>> events;
     for (const double s : share)
-      events.emplace_back(static_cast<int>(kCount * unit()), (unit() < 0.5 ? -1 : 1) * s);
+      events.emplace_back(static_cast<int>(kInputSteps * unit()), (unit() < 0.5 ? -1 : 1) * s);
     std::sort(events.begin(), events.end());
     double value = 0;
     std::size_t next = 0;
-    for (int i = 0; i < kCount; ++i) {
+    for (int i = 0; i < kInputSteps; ++i) {
       while (next < events.size() && events[next].first <= i) value += variation * events[next++].second;
       f.constant(i, value);
     }
@@ -66,19 +68,19 @@ class Inputs {
   /// `passes` of int |f| dt = J each, of a length of at most `length` steps, `period` steps apart.
   Input impulses(double J, int passes, int period, int length) {
     Input f;
-    const int first = static_cast<int>((kCount - passes * period) * unit());
+    const int first = static_cast<int>((kInputSteps - passes * period) * unit());
     for (int k = 0; k < passes; ++k) {
       const int start = first + k * period;
       const int used = 1 + static_cast<int>(length * unit() * unit());
       const double tilt = unit() < 0.5 ? 1 : 2 * unit() - 1;  // a part of it pushes the other way
       double total = 0;
-      for (int i = 0; i < used && start + i < kCount; ++i) {
+      for (int i = 0; i < used && start + i < kInputSteps; ++i) {
         const double value = (i < used * std::abs(tilt) ? 1 : -1) * (0.2 + unit());
         f.constant(start + i, value);
-        total += std::abs(value) * kStep_s;
+        total += std::abs(value) * kInputStep_s;
       }
       const double sign = unit() < 0.5 ? -1 : 1;
-      for (int i = 0; i < used && start + i < kCount; ++i) {
+      for (int i = 0; i < used && start + i < kInputSteps; ++i) {
         f.constant(start + i, sign * f.from[static_cast<std::size_t>(start + i)] * J / total);
       }
     }
@@ -99,22 +101,22 @@ class Inputs {
   std::vector<double> step_of_kernel() const {
     std::vector<double> step(kernel_.size());
     double total = 0;
-    for (std::size_t i = 0; i < step.size(); ++i) step[i] = total += kernel_[i] * kStep_s;
+    for (std::size_t i = 0; i < step.size(); ++i) step[i] = total += kernel_[i] * kInputStep_s;
     return step;
   }
 
   std::vector<double> signs(const std::vector<double>& kernel) {
-    std::vector<double> sign(kCount);
+    std::vector<double> sign(kInputSteps);
     const double switches = 0.2 + 6 * unit();  // per second
     const bool follows = unit() < 0.5;
     const double mistakes = unit() < 0.3 ? 0 : 0.2 * unit();
     double value = unit() < 0.5 ? -1 : 1;
-    for (int i = 0; i < kCount; ++i) {
+    for (int i = 0; i < kInputSteps; ++i) {
       if (follows) {
-        const double k = kernel[static_cast<std::size_t>(kCount - 1 - i)];
+        const double k = kernel[static_cast<std::size_t>(kInputSteps - 1 - i)];
         value = k < 0 ? -1 : 1;
         if (unit() < mistakes) value = -value;
-      } else if (unit() < switches * kStep_s) {
+      } else if (unit() < switches * kInputStep_s) {
         value = -value;
       }
       sign[static_cast<std::size_t>(i)] = value;
@@ -128,7 +130,7 @@ class Inputs {
     double value = 0;
     for (std::size_t i = 0; i < sign.size(); ++i) {
       f.from[i] = value;
-      value = std::clamp(value + d * sign[i] * kStep_s, -E, E);
+      value = std::clamp(value + d * sign[i] * kInputStep_s, -E, E);
       f.to[i] = value;
     }
     return f;
@@ -141,7 +143,8 @@ class Inputs {
 double largest_error(SteppedLoop& loop, const Input& f) {
   loop.reset();
   double most = 0;
-  for (std::size_t i = 0; i < kCount; ++i) most = std::max(most, std::abs(loop.step(f.from[i], f.to[i])));
+  for (std::size_t i = 0; i < kInputSteps; ++i)
+    most = std::max(most, std::abs(loop.step(f.from[i], f.to[i])));
   return most;
 }
 
@@ -158,11 +161,11 @@ std::map<std::string, double> largest_ratios(
   known.impulse_N_s = J;
   const DisturbanceBounds one = bounds(known);
   known.passes = kPasses;
-  known.pass_period_s = kPeriod * kStep_s;
-  known.pass_length_s = kLength * kStep_s;
+  known.pass_period_s = kPeriod * kInputStep_s;
+  known.pass_length_s = kLength * kInputStep_s;
   const DisturbanceBounds several = bounds(known);
 
-  std::vector<double> kernel(kCount);
+  std::vector<double> kernel(kInputSteps);
   loop.reset();
   loop.place(0, 1 / kMass_kg);
   for (double& k : kernel) k = loop.step(0, 0);
@@ -203,13 +206,13 @@ void check(int runs) {
     }
   };
   for (const AxisLoop* loop : {&z, &xy}) {
-    show("continuous", largest_ratios({*loop, kStep_s}, 1, runs, [&](const Disturbance& known) {
+    show("continuous", largest_ratios({*loop, kInputStep_s}, 1, runs, [&](const Disturbance& known) {
            return disturbance_bounds(*loop, Channel::kForce, known);
          }));
   }
   for (const SampledLoop* loop : {&at_100Hz, &at_400Hz, &short_step}) {
     const GainNorms gains = sampled_norms(*loop, Channel::kForce, Instants::kAll);
-    const int steps = static_cast<int>(std::lround(loop->period_s / kStep_s));
+    const int steps = static_cast<int>(std::lround(loop->period_s / kInputStep_s));
     show("sampled", largest_ratios({*loop, steps}, 2, runs, [&](const Disturbance& known) {
            return disturbance_bounds(*loop, Channel::kForce, gains, known);
          }));

@@ -6,10 +6,13 @@
 #include <cmath>
 #include <random>
 
+#include "stability/vehicle.h"
+
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+using tests::kMass_kg;
+
 constexpr int kParts = 4;  ///< of a period, on each of which a force is constant
 
 SampledLoop loop_of(double Kp, double Kd, double Ki, double rate_hz, double step_s = 0) {

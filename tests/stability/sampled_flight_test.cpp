@@ -7,14 +7,13 @@
 #include "data.h"
 #include "stability/effects/registry.h"
 #include "stability/simulate.h"
+#include "stability/vehicle.h"
 
 namespace swarmcert::stability {
 namespace {
 
-Model small() { return read_model(tests::source_path("stability/models/crazyflie-small.toml")); }
-
 Model with_effects(const std::vector<std::pair<std::string, std::map<std::string, double>>>& effects) {
-  Model model = small();
+  Model model = tests::small_vehicle();
   for (const auto& [name, parameters] : effects) {
     EffectSpec spec;
     spec.name = name;
@@ -148,7 +147,7 @@ TEST(SampledFlight, AVehicleFliesTheSameBitsAloneAndAmongOthers) {
 
 TEST(SampledFlight, HoversWhereItShouldAndFloatFliesLikeDouble) {
   for (const bool flies_float : {true, false}) {
-    Swarm swarm(small(), 2);
+    Swarm swarm(tests::small_vehicle(), 2);
     const auto task = make_task("hover", {2, 5, 0});
     SampledFlightOptions options;
     options.flies_float = flies_float;

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <random>
 
+#include "stability/vehicle.h"
+
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+using tests::kMass_kg;
 
 SampledLoop sampled(double Kp, double Kd, double Ki, double rate_hz, double step_s = 0, double delay_s = 0,
                     double lag_s = 0) {

@@ -8,14 +8,16 @@
 
 #include "stability/bounds/interval_functions.h"
 #include "stability/effects/registry.h"
+#include "stability/vehicle.h"
 
 namespace swarmcert::stability {
 namespace {
 
+using tests::kMass_kg;
+
 using Eigen::Vector3d;
 
-constexpr double kMass_kg = 0.034;
-constexpr double kStep_s = 1e-6;
+constexpr double kDifference_s = 1e-6;
 
 Model vehicle(const std::string& effect) {
   return parse_model(
@@ -67,9 +69,9 @@ Seen seen_of_wake(const EffectSpec& spec, const MotionSet& motion, double sign, 
       n.mass_kg = motion.neighbour_mass_kg;
       n.kind = 0;
       before.push_back(n);
-      n.dp_W_m += kStep_s * n.dv_W_m_s;
+      n.dp_W_m += kDifference_s * n.dv_W_m_s;
       if (std::isfinite(motion.acceleration_m_s2))
-        n.v_W_m_s += kStep_s * motion.acceleration_m_s2 * random.direction();
+        n.v_W_m_s += kDifference_s * motion.acceleration_m_s2 * random.direction();
       if (std::abs(n.dp_W_m.z()) < motion.least_gap_m) n.dp_W_m.z() = before.back().dp_W_m.z();
       after.push_back(n);
     }
@@ -80,7 +82,7 @@ Seen seen_of_wake(const EffectSpec& spec, const MotionSet& motion, double sign, 
     const double f = effect.wrench(now).force_W_N.z();
     now.neighbours = after.data();
     seen.amplitude_N = std::max(seen.amplitude_N, std::abs(f));
-    seen.rate_N_s = std::max(seen.rate_N_s, std::abs(effect.wrench(now).force_W_N.z() - f) / kStep_s);
+    seen.rate_N_s = std::max(seen.rate_N_s, std::abs(effect.wrench(now).force_W_N.z() - f) / kDifference_s);
   }
   return seen;
 }
@@ -167,12 +169,13 @@ TEST(TruthBounds, EncloseDragInflowAndSurfacesOnRandomMotions) {
       };
       const Vector3d before = point(thrust);
       const double height_m = now.p_W_m.z();
-      now.p_W_m += kStep_s * now.v_W_m_s;
+      now.p_W_m += kDifference_s * now.v_W_m_s;
       if (now.p_W_m.z() < motion.least_height_m || now.p_W_m.z() > motion.largest_height_m)
         now.p_W_m.z() = height_m;
-      now.v_W_m_s += kStep_s * motion.acceleration_m_s2 * random.direction();
+      now.v_W_m_s += kDifference_s * motion.acceleration_m_s2 * random.direction();
       const Vector3d rate =
-          (point(thrust + kStep_s * motion.thrust_rate_N_s * random.direction()) - before) / kStep_s;
+          (point(thrust + kDifference_s * motion.thrust_rate_N_s * random.direction()) - before) /
+          kDifference_s;
       for (int i = 0; i < 3; ++i) {
         ASSERT_LE(std::abs(before[i]), bounds.amplitude_N[i] * (1 + 1e-9));
         ASSERT_LE(std::abs(rate[i]), bounds.rate_N_s[i] * (1 + 1e-4));

@@ -5,10 +5,13 @@
 #include <cmath>
 #include <random>
 
+#include "stability/vehicle.h"
+
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+using tests::kMass_kg;
+
 const AxisLoop kLoop = {kMass_kg, 10, 5, 10, {}, 0};
 
 AxisLoop at(double mass, double scale, double lag_s, double delay_s) {

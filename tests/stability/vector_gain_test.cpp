@@ -7,11 +7,12 @@
 #include <random>
 
 #include "stability/bounds/theorem.h"
+#include "stability/vehicle.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+using tests::kMass_kg;
 
 Matrix3 diagonal(double x, double y, double z) { return {x, 0, 0, 0, y, 0, 0, 0, z}; }
 

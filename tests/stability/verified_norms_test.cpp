@@ -5,10 +5,12 @@
 #include <cmath>
 #include <random>
 
+#include "stability/vehicle.h"
+
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kMass_kg = 0.034;
+using tests::kMass_kg;
 
 testing::AssertionResult encloses(const Interval& interval, double value, double relative_width) {
   if (!(interval.lo <= value && value <= interval.hi)) {

@@ -13,7 +13,7 @@
 namespace swarmcert::gate {
 namespace {
 
-struct Wanted {
+struct WantedBound {
   std::string name;      ///< of the row
   std::string function;  ///< empty: the plain network and every set function
   std::string block;
@@ -38,7 +38,7 @@ void require_certified_box(Evidence& evidence) {
   }
 }
 
-void judge_bounds(Evidence& evidence, const Wanted& wanted, bool on_box, Checks& checks) {
+void judge_bounds(Evidence& evidence, const WantedBound& wanted, bool on_box, Checks& checks) {
   Check check = row(wanted.name, wanted.limit);
   double upper = -1, lower = -1;
   for (const LipschitzBound& bound : evidence.bounds()) {
@@ -76,14 +76,14 @@ Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
     known.insert(known.end(), keys.begin(), keys.end());
   table.allow_only(known);
   if (!policy.release.has_network()) require_file(table, "", "network");
-  std::vector<Wanted> all;
+  std::vector<WantedBound> all;
   const auto add = [&all](const char* name, const char* block, const std::optional<Limit>& limit) {
     if (limit) all.push_back({name, "", block, *limit});
   };
   add("lipschitz", "all", force_limit(table, "max_joint"));
   add("lipschitz.position", "position", force_limit(table, "max_position", "_m"));
   add("lipschitz.velocity", "velocity", force_limit(table, "max_velocity", "_s_m"));
-  for (const Wanted& wanted : all)
+  for (const WantedBound& wanted : all)
     if (wanted.block != "all") policy.blocks.push_back(wanted.block);
   if (table.has("functions")) {
     const files::TomlTable functions = table.table("functions");
@@ -94,7 +94,7 @@ Run read_lipschitz(const files::TomlTable& table, Policy& policy) {
   const bool on_box = table.has("domain") && table.choice("domain", {"global", "box"}) == 1;
   return [all, on_box](Evidence& evidence, Checks& checks) {
     if (on_box) require_certified_box(evidence);
-    for (const Wanted& wanted : all) judge_bounds(evidence, wanted, on_box, checks);
+    for (const WantedBound& wanted : all) judge_bounds(evidence, wanted, on_box, checks);
   };
 }
 

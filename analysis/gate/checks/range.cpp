@@ -14,7 +14,7 @@ namespace {
 using lipschitz::Attained;
 using lipschitz::CertifiedRange;
 
-std::string words(const CertifiedRange& range, const Attained& attained) {
+std::string range_words(const CertifiedRange& range, const Attained& attained) {
   std::string text = fmt::format("{} attains {:.6g}", range.function, attained.value);
   for (std::size_t j = 0; j < attained.points.size(); ++j) {
     text += fmt::format("{} {} (", j == 0 ? " at" : ",", attained.networks[j]);
@@ -26,15 +26,15 @@ std::string words(const CertifiedRange& range, const Attained& attained) {
 }
 
 /// What one limit bounds.
-enum class Quantity { kLargest, kLeast, kGreatest, kJump };
+enum class RangeQuantity { kLargest, kLeast, kGreatest, kJump };
 
-struct Wanted {
+struct WantedRange {
   std::string name;
-  Quantity quantity;
+  RangeQuantity quantity;
   Limit limit;
 };
 
-void judge_range(Evidence& evidence, const Wanted& wanted, const std::vector<CertifiedRange>& ranges,
+void judge_range(Evidence& evidence, const WantedRange& wanted, const std::vector<CertifiedRange>& ranges,
                  Checks& checks) {
   Check check = row(wanted.name, wanted.limit);
   const double scale = force_scale(evidence, wanted.limit);
@@ -43,18 +43,19 @@ void judge_range(Evidence& evidence, const Wanted& wanted, const std::vector<Cer
   const double sign = wanted.limit.is_most ? 1 : -1;
   for (const CertifiedRange& range : ranges) {
     const Attained& reached =
-        wanted.quantity == Quantity::kLeast                                                  ? range.least
-        : wanted.quantity == Quantity::kLargest && -range.least.value > range.greatest.value ? range.least
-                                                                                             : range.greatest;
-    const double bound = wanted.quantity == Quantity::kLeast      ? range.lower
-                         : wanted.quantity == Quantity::kGreatest ? range.upper
-                         : wanted.quantity == Quantity::kJump     ? range.jump
-                                                                  : range.largest();
+        wanted.quantity == RangeQuantity::kLeast ? range.least
+        : wanted.quantity == RangeQuantity::kLargest && -range.least.value > range.greatest.value
+            ? range.least
+            : range.greatest;
+    const double bound = wanted.quantity == RangeQuantity::kLeast      ? range.lower
+                         : wanted.quantity == RangeQuantity::kGreatest ? range.upper
+                         : wanted.quantity == RangeQuantity::kJump     ? range.jump
+                                                                       : range.largest();
     double value = reached.value * scale;
-    if (wanted.quantity == Quantity::kLargest) value = std::abs(value);
-    if (wanted.quantity != Quantity::kJump && sign * value > sign * attained) {
+    if (wanted.quantity == RangeQuantity::kLargest) value = std::abs(value);
+    if (wanted.quantity != RangeQuantity::kJump && sign * value > sign * attained) {
       attained = sign > 0 ? round_down(value) : round_up(value);
-      check.witness = words(range, reached);
+      check.witness = range_words(range, reached);
     }
     const double scaled = scale == 1 ? bound : sign > 0 ? round_up(bound * scale) : round_down(bound * scale);
     if (is_first || sign * scaled > sign * proved) proved = scaled;
@@ -78,14 +79,14 @@ Run read_range(const files::TomlTable& table, Policy& policy) {
   }
   table.allow_only(known);
   if (!policy.release.has_network()) require_file(table, "", "network");
-  std::vector<Wanted> all;
-  const auto add = [&](const char* name, const char* stem, Quantity quantity, bool is_most) {
+  std::vector<WantedRange> all;
+  const auto add = [&](const char* name, const char* stem, RangeQuantity quantity, bool is_most) {
     if (const auto limit = force_limit(table, stem, "", is_most)) all.push_back({name, quantity, *limit});
   };
-  add("range", "max_abs_force", Quantity::kLargest, true);
-  add("range.max_force", "max_force", Quantity::kGreatest, true);
-  add("range.min_force", "min_force", Quantity::kLeast, false);
-  add("range.jump", "max_jump", Quantity::kJump, true);
+  add("range", "max_abs_force", RangeQuantity::kLargest, true);
+  add("range.max_force", "max_force", RangeQuantity::kGreatest, true);
+  add("range.min_force", "min_force", RangeQuantity::kLeast, false);
+  add("range.jump", "max_jump", RangeQuantity::kJump, true);
   if (all.empty()) refuse_without_limit(table, "max_abs_force_gf = 80");
   lipschitz::RangeOptions options;
   options.neighbours = whole_number(table, "neighbours", 1);
@@ -95,7 +96,7 @@ Run read_range(const files::TomlTable& table, Policy& policy) {
     for (const auto& [function, bound] : evidence.global_bounds())
       if (function.rfind("rho:", 0) == 0) rho[function.substr(4)] = bound;
     const auto ranges = lipschitz::ranges(evidence.flown(), evidence.domain(), rho, options);
-    for (const Wanted& wanted : all) judge_range(evidence, wanted, ranges, checks);
+    for (const WantedRange& wanted : all) judge_range(evidence, wanted, ranges, checks);
   };
 }
 

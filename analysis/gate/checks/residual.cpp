@@ -12,25 +12,25 @@
 namespace swarmcert::gate {
 namespace {
 
-enum class Quantity { kRmse, kRmseZ, kBias, kP95, kRecords };
+enum class ResidualQuantity { kRmse, kRmseZ, kBias, kP95, kRecords };
 
-struct Wanted {
+struct WantedResidual {
   std::string name;
-  Quantity quantity;
+  ResidualQuantity quantity;
   Limit limit;
 };
 
-double value_of(const residuals::ErrorStatistics& s, Quantity quantity) {
+double value_of(const residuals::ErrorStatistics& s, ResidualQuantity quantity) {
   switch (quantity) {
-    case Quantity::kRmse:
+    case ResidualQuantity::kRmse:
       return s.rmse.total;
-    case Quantity::kRmseZ:
+    case ResidualQuantity::kRmseZ:
       return s.rmse.z;
-    case Quantity::kBias:
+    case ResidualQuantity::kBias:
       return std::max({std::abs(s.bias.x), std::abs(s.bias.y), std::abs(s.bias.z)});
-    case Quantity::kP95:
+    case ResidualQuantity::kP95:
       return s.p95.total;
-    case Quantity::kRecords:
+    case ResidualQuantity::kRecords:
       break;
   }
   return static_cast<double>(s.samples);
@@ -58,21 +58,21 @@ Run read_residual(const files::TomlTable& table, Policy& policy) {
   table.allow_only(known);
   require_file(table, policy.release.model, "model");
   require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(), "flights");
-  std::vector<Wanted> all;
-  const auto add = [&](const char* name, const char* stem, Quantity quantity) {
+  std::vector<WantedResidual> all;
+  const auto add = [&](const char* name, const char* stem, ResidualQuantity quantity) {
     if (const auto limit = force_limit(table, stem)) all.push_back({name, quantity, *limit});
   };
-  add("residual", "max_rmse", Quantity::kRmse);
-  add("residual.rmse_z", "max_rmse_z", Quantity::kRmseZ);
-  add("residual.bias", "max_bias", Quantity::kBias);
-  add("residual.p95", "max_p95", Quantity::kP95);
+  add("residual", "max_rmse", ResidualQuantity::kRmse);
+  add("residual.rmse_z", "max_rmse_z", ResidualQuantity::kRmseZ);
+  add("residual.bias", "max_bias", ResidualQuantity::kBias);
+  add("residual.p95", "max_p95", ResidualQuantity::kP95);
   if (all.empty()) refuse_without_limit(table, "max_rmse_N = 0.03");
   if (const auto least = limit(table, "min_records", "records", false))
-    all.push_back({"residual.records", Quantity::kRecords, *least});
+    all.push_back({"residual.records", ResidualQuantity::kRecords, *least});
   return [all](Evidence& evidence, Checks& checks) {
     const residuals::Comparison& comparison = evidence.residual_comparison();
     const residuals::ErrorStatistics& s = comparison.overall.statistics;
-    for (const Wanted& wanted : all) {
+    for (const WantedResidual& wanted : all) {
       Check check = row(wanted.name, wanted.limit);
       check.witness = worst_track(comparison);
       const double in_unit = wanted.limit.unit_N > 0 ? wanted.limit.unit_N : 1;
