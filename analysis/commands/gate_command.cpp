@@ -12,6 +12,7 @@
 #include "analysis/gate/gate.h"
 #include "analysis/gate/outputs.h"
 #include "analysis/gate/text.h"
+#include "analysis/gate_report.h"
 #include "analysis/progress.h"
 #include "nn/files/file_io.h"
 #include "nn/files/input_error.h"
@@ -20,7 +21,7 @@ namespace swarmcert::analysis {
 namespace {
 
 struct GateOptions {
-  std::string policy, baseline, junit, sarif, markdown, bundle;
+  std::string policy, baseline, junit, sarif, markdown, bundle, report;
   bool update_baseline = false;
   bool github = false;
   bool allow_inconclusive = false;
@@ -80,6 +81,7 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
     throw UsageError("--update-baseline replaces the file of --baseline: name it");
   for (const std::string& path : {common.json, options.junit, options.sarif, options.markdown})
     refuse_to_replace(common, path);
+  refuse_folder(common, options.report);
   if (!options.bundle.empty() && std::filesystem::exists(options.bundle) && !common.force &&
       !(std::filesystem::is_directory(options.bundle) && std::filesystem::is_empty(options.bundle)))
     throw files::InputError({options.bundle, "", "", "", "the folder is not empty", "--force replaces it"});
@@ -102,8 +104,11 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
   if (!options.junit.empty()) files::write_file(options.junit, to_junit(result), common.force);
   if (!options.sarif.empty()) files::write_file(options.sarif, to_sarif(result, allow), common.force);
   if (!options.markdown.empty()) files::write_file(options.markdown, to_markdown(result), common.force);
+  std::string report;
+  if (!options.report.empty()) report = write_gate_report(result, json, options.report, common.force);
   write_result(common, json);
   if (common.prints_text()) fmt::print("{}", to_table(result));
+  if (common.prints_text() && !report.empty()) fmt::print("report: {}\n", report);
   if (options.github) {
     fmt::print("{}", to_github(result, allow));
     append_summary(to_markdown(result));
@@ -175,6 +180,7 @@ Command gate_command() {
         app.add_option("--junit", options->junit, "Write JUnit XML to this file");
         app.add_option("--sarif", options->sarif, "Write SARIF 2.1.0 to this file");
         app.add_option("--markdown", options->markdown, "Write a Markdown table to this file");
+        app.add_option("--report", options->report, "Write an HTML report into this folder");
         app.add_flag("--github", options->github,
                      "Print GitHub annotations, and append to the step summary ($GITHUB_STEP_SUMMARY)");
         app.add_option(

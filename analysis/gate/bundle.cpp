@@ -1,12 +1,16 @@
 #include "analysis/gate/bundle.h"
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <set>
+#include <system_error>
 
 #include "analysis/gate/checks/checks.h"
 #include "nn/files/content_hash.h"
@@ -72,7 +76,20 @@ class Unfinished {
   Unfinished(const Unfinished&) = delete;
   Unfinished& operator=(const Unfinished&) = delete;
   const fs::path& path() const { return path_; }
-  void keep() { path_.clear(); }
+  /// Puts the folder where `target` is; what was there is removed. Whoever looks sees all of the old or all of the new one.
+  void move_to(const fs::path& target) {
+    const unsigned flags = fs::exists(target) ? RENAME_EXCHANGE : RENAME_NOREPLACE;
+    if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(), flags) == 0) {
+      if (flags == RENAME_NOREPLACE) path_.clear();
+      return;
+    }
+    if (errno != EINVAL && errno != ENOSYS)
+      throw InputError({target.string(), "", "", "",
+                        fmt::format("cannot be written ({})", std::generic_category().message(errno)), ""});
+    fs::remove_all(target);  // a file system that cannot exchange
+    fs::rename(path_, target);
+    path_.clear();
+  }
 
  private:
   fs::path path_;
@@ -241,9 +258,7 @@ std::string write_bundle(const std::string& folder, const Policy& policy, const 
     throw InputError({policy.path, "", "", "", std::string("cannot be bundled: ") + error.what(),
                       "name files by paths relative to the file that names them"});
   }
-  if (fs::exists(target)) fs::remove_all(target);
-  fs::rename(unfinished.path(), target);
-  unfinished.keep();
+  unfinished.move_to(target);
   return files::sha256(manifest);
 }
 

@@ -127,7 +127,8 @@ TEST(SlopeSearch, DoesNotDependOnTheUnitsOfTheInputs) {
   files::Weights scaled = net;  // every input in units 2^20 times smaller
   for (double& weight : scaled.layers[0].weights) weight *= 0x1p-20;
   const double reference = search_slope(slope_of(net), few_rounds()).slope.value();
-  EXPECT_NEAR(search_slope(slope_of(scaled), few_rounds()).slope.value() * 0x1p20, reference, 1e-3 * reference);
+  EXPECT_NEAR(search_slope(slope_of(scaled), few_rounds()).slope.value() * 0x1p20, reference,
+              1e-3 * reference);
 }
 
 TEST(SlopeSearch, DuplicatedAndOppositeNeuronsAreFine) {

@@ -19,7 +19,7 @@ files::Weights network(std::vector<files::Layer> layers) {
   return weights;
 }
 
-SlopeFunction plain(const files::Weights& weights) { return {{&weights, nullptr}, {}, nullptr}; }
+SlopeFunction slope_function(const files::Weights& weights) { return {{&weights, nullptr}, {}, nullptr}; }
 
 /// f(x) = (3 relu(x1 - x2) - relu(x2), relu(x2)) with x = (x1, x2).
 files::Weights tiny() {
@@ -40,8 +40,8 @@ files::Weights irregular() {
 TEST(Witness, SlopeOfATinyNetworkIsTheHandComputedRational) {
   const files::Weights net = tiny();
   // f(2, 1) = (3 - 1, 1) = (2, 1); f(0, 4) = (-4, 4); |df|^2 = 36 + 9 = 45; |dx|^2 = 4 + 9 = 13.
-  EXPECT_EQ(slope_squared(plain(net), {{2, 1}, {0, 4}, {}}), mpq_class(45, 13));
-  const double lower = slope(plain(net), {{2, 1}, {0, 4}, {}}).value();
+  EXPECT_EQ(slope_squared(slope_function(net), {{2, 1}, {0, 4}, {}}), mpq_class(45, 13));
+  const double lower = slope(slope_function(net), {{2, 1}, {0, 4}, {}}).value();
   EXPECT_LE(mpq_class(lower) * mpq_class(lower), mpq_class(45, 13));
   const double next = std::nextafter(lower, 9.0);
   EXPECT_GT(mpq_class(next) * mpq_class(next), mpq_class(45, 13)) << "not the largest such double";
@@ -51,24 +51,24 @@ TEST(Witness, NothingIsRoundedWhereDoublesWouldRound) {
   // relu(2^60 x + 1) - relu(2^60 x) + 2 relu(x): 7 at x = 3, where the first sum needs 62 bits, and 0 at x = -1.
   const double big = std::ldexp(1.0, 60);
   const files::Weights net = network({layer(3, 1, {big, big, 1}, {1, 0, 0}), layer(1, 3, {1, -1, 2}, {0})});
-  EXPECT_EQ(slope_squared(plain(net), {{3}, {-1}, {}}), mpq_class(49, 16));
+  EXPECT_EQ(slope_squared(slope_function(net), {{3}, {-1}, {}}), mpq_class(49, 16));
 }
 
 TEST(Witness, KinksAndSubnormalWeightsAreFine) {
   const double tiny_weight = std::numeric_limits<double>::denorm_min();
   const files::Weights net = network({layer(2, 1, {1, -1}, {0, 0}), layer(1, 2, {1, tiny_weight}, {0})});
-  EXPECT_EQ(slope_squared(plain(net), {{0}, {1}, {}}), mpq_class(1));
+  EXPECT_EQ(slope_squared(slope_function(net), {{0}, {1}, {}}), mpq_class(1));
   const mpq_class w(tiny_weight);
-  EXPECT_EQ(slope_squared(plain(net), {{0}, {-1}, {}}), w * w);
-  EXPECT_EQ(slope(plain(net), {{0}, {-1}, {}}).value(), tiny_weight);
+  EXPECT_EQ(slope_squared(slope_function(net), {{0}, {-1}, {}}), w * w);
+  EXPECT_EQ(slope(slope_function(net), {{0}, {-1}, {}}).value(), tiny_weight);
 }
 
 TEST(Witness, ReversedItGivesTheSameSlope) {
   const files::Weights net = irregular();
   const std::vector<float> x = {0.3f, -1.7f, 2.9f};
   const std::vector<float> y = {-0.1f, 0.6f, 1.1f};
-  EXPECT_GT(slope_squared(plain(net), {x, y, {}}), 0);
-  EXPECT_EQ(slope_squared(plain(net), {x, y, {}}), slope_squared(plain(net), {y, x, {}}));
+  EXPECT_GT(slope_squared(slope_function(net), {x, y, {}}), 0);
+  EXPECT_EQ(slope_squared(slope_function(net), {x, y, {}}), slope_squared(slope_function(net), {y, x, {}}));
 }
 
 TEST(Witness, PermutedAndRescaledNeuronsLeaveItUnchanged) {
@@ -86,7 +86,7 @@ TEST(Witness, PermutedAndRescaledNeuronsLeaveItUnchanged) {
     other.layers[1].weights[i * 4 + 2] *= 8;
   }
   const SlopePoints points = {{0.3f, -1.7f, 2.9f}, {-0.1f, 0.6f, 1.1f}, {}};
-  EXPECT_EQ(slope_squared(plain(net), points), slope_squared(plain(other), points));
+  EXPECT_EQ(slope_squared(slope_function(net), points), slope_squared(slope_function(other), points));
 }
 
 TEST(Witness, DeepSetKeepsTheOthersFixed) {
@@ -112,19 +112,21 @@ TEST(Witness, ClampIsPartOfTheFunction) {
 
 TEST(Witness, BlockRefusesOtherCoordinatesThatMove) {
   const files::Weights net = irregular();
-  EXPECT_NO_THROW(slope_squared(plain(net), {{1, 2, 3}, {2, 2, 3}, {}}, {0}));
-  EXPECT_THROW(slope_squared(plain(net), {{1, 2, 3}, {2, 2, 4}, {}}, {0}), std::invalid_argument);
-  EXPECT_THROW(slope_squared(plain(net), {{1, 2, 3}, {2, 2, 3}, {}}, {3}), std::invalid_argument);
+  EXPECT_NO_THROW(slope_squared(slope_function(net), {{1, 2, 3}, {2, 2, 3}, {}}, {0}));
+  EXPECT_THROW(slope_squared(slope_function(net), {{1, 2, 3}, {2, 2, 4}, {}}, {0}), std::invalid_argument);
+  EXPECT_THROW(slope_squared(slope_function(net), {{1, 2, 3}, {2, 2, 3}, {}}, {3}), std::invalid_argument);
 }
 
 TEST(Witness, RefusesWhatIsNoWitness) {
   const files::Weights net = irregular();
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THROW(slope_squared(plain(net), {{1, 2, 3}, {1, 2, 3}, {}}), std::invalid_argument) << "x == y";
-  EXPECT_THROW(slope_squared(plain(net), {{0, 2, 3}, {-0.0f, 2, 3}, {}}), std::invalid_argument) << "0 == -0";
-  EXPECT_THROW(slope_squared(plain(net), {{1, 2}, {1, 2, 3}, {}}), std::invalid_argument);
-  EXPECT_THROW(slope_squared(plain(net), {{1, 2, nan}, {1, 2, 3}, {}}), std::invalid_argument);
-  EXPECT_THROW(slope_squared(plain(net), {{1, 2, 4}, {1, 2, 3}, {{1}}}), std::invalid_argument);
+  EXPECT_THROW(slope_squared(slope_function(net), {{1, 2, 3}, {1, 2, 3}, {}}), std::invalid_argument)
+      << "x == y";
+  EXPECT_THROW(slope_squared(slope_function(net), {{0, 2, 3}, {-0.0f, 2, 3}, {}}), std::invalid_argument)
+      << "0 == -0";
+  EXPECT_THROW(slope_squared(slope_function(net), {{1, 2}, {1, 2, 3}, {}}), std::invalid_argument);
+  EXPECT_THROW(slope_squared(slope_function(net), {{1, 2, nan}, {1, 2, 3}, {}}), std::invalid_argument);
+  EXPECT_THROW(slope_squared(slope_function(net), {{1, 2, 4}, {1, 2, 3}, {{1}}}), std::invalid_argument);
   const SlopeFunction sum_without_rho = {{&net, nullptr}, {{&net, nullptr}}, nullptr};
   EXPECT_THROW(slope_squared(sum_without_rho, {{1, 2, 4}, {1, 2, 3}, {{1, 2, 3}}}), std::invalid_argument);
 }

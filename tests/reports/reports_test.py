@@ -51,6 +51,29 @@ def network_with_hostile_kinds(r):
     return r.write("hostile.toml", text)
 
 
+def hostile_policy(r):
+    """A release that passes one check and fails one, whose files have hostile names."""
+    demo, flights = r.source / "nn/networks/demo", pathlib.Path(*HOSTILE)
+    model, gains = r.source / "stability/models/crazyflie-small.toml", r.source / "controller/gains/crazyflie-small.toml"
+    named = r.folder / "gains'`touch pwned`<img src=x onerror=alert(3)>.toml"
+    named.write_text(gains.read_text())
+    return r.write("policy.toml", f"""schema = "swarmcert/policy/1"
+[release]
+network = {json.dumps(str(demo / "network.toml"))}
+gains = {json.dumps(str(named))}
+model = "{model}"
+flights = [{json.dumps(str(flights))}]
+[spectral_norms]
+[tracking]
+over = "corners"
+amplitude_N = 0.1
+guard_factor = 1
+max_error_m = 1e-3
+[residual]
+max_rmse_N = 1
+""")
+
+
 def thrust_table(r):
     seeded = random.Random(1)
     lines = ["pwm[ratio],vbat[V],thrust_gf"]
@@ -103,6 +126,9 @@ Kd = {{from = 0.5, to = 10, steps = 5}}
     r.report("add-hostile", "add", "drag_linear,constant_force", "--model", model, prefixed, "--keep-anyway", "-o",
              "fitted.toml", expect=(0, 4))
     r.report("diagnose-hostile", "diagnose", model, flights, expect=(0, 4))
+    r.report("train-hostile", "train", model, flights, "--phi", 4, "--rho", 4, "--features", 4, "--epochs", 3, "-o",
+             "trained", expect=(0, 4))
+    r.report("gate-hostile", "gate", hostile_policy(r), expect=(1,))
     if pwned := [str(p) for p in r.folder.rglob("pwned*")]:
         sys.exit(f"a name ran as a command: {pwned}")
 

@@ -50,6 +50,10 @@ const Job kJobs[] = {
     {"sweep", "sweep grid.toml -o out/sweep --json out/result.json", 3},
     {"add",
      "add drag_linear --keep-anyway --model model.toml flights -o out/fitted.toml --json out/result.json", 1},
+    {"gate_slow",
+     "gate policy.toml --baseline baseline.json --bundle out/bundle --junit out/gate.xml --sarif "
+     "out/gate.sarif --markdown out/gate.md --report out/report --json out/result.json",
+     4},
     {"train_slow",
      "train model.toml flights --phi 4 --rho 4 --features 4 --epochs 2 -o out/trained --json out/result.json",
      5},

@@ -23,7 +23,7 @@ Model with_effects(const std::vector<std::pair<std::string, std::map<std::string
   return model;
 }
 
-Gains gains(const std::string& position = "Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\n") {
+Gains parsed_gains(const std::string& position = "Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\n") {
   return parse_gains(
       "schema = \"swarmcert/gains/1\"\n[position]\n" + position + "[attitude]\nlaw = \"lee\"\n",
       "gains.toml");
@@ -38,7 +38,7 @@ SampledFlightOptions exact() {
 TEST(SampledFlight, KeepsRotationsOrthogonalFor60s) {
   Swarm swarm(with_effects({{"downwash", {}}, {"motor_lag", {}}}), 3);
   const auto task = make_task("swap", {3, 60, 0});
-  SampledFlight loop(swarm, gains(), *task, exact());
+  SampledFlight loop(swarm, parsed_gains(), *task, exact());
   double drift = 0, turned = 0;
   while (loop.time_s() < 60) {
     loop.step();
@@ -64,7 +64,7 @@ TEST(SampledFlight, OneAndFourSubstepsAgree) {
     const auto task = make_task("swap", {2, 9, 0});
     SampledFlightOptions options = exact();
     options.substeps = substeps;
-    SampledFlight loop(swarm, gains(), *task, options);
+    SampledFlight loop(swarm, parsed_gains(), *task, options);
     Eigen::VectorXd path((swarm.size()) * 3 * 900);
     int k = 0;
     while (loop.time_s() < 9 - 1e-9) {
@@ -151,7 +151,7 @@ TEST(SampledFlight, HoversWhereItShouldAndFloatFliesLikeDouble) {
     const auto task = make_task("hover", {2, 5, 0});
     SampledFlightOptions options;
     options.flies_float = flies_float;
-    SampledFlight loop(swarm, gains(), *task, options);
+    SampledFlight loop(swarm, parsed_gains(), *task, options);
     while (loop.time_s() < 5) loop.step();
     for (int i = 0; i < 2; ++i) {
       const Eigen::Map<const Eigen::Vector3d> p(loop.state() + i * kVehicleStateSize);
@@ -167,7 +167,8 @@ TEST(SampledFlight, SteadyForceIsCancelledByTheIntegralUpToItsClamp) {
   const auto task = make_task("hover", {1, 40, 0});
   SampledFlight loop(
       swarm,
-      gains("Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\nintegrator_limit = [0.1, 0.1, 0.1]\n"),
+      parsed_gains(
+          "Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\nintegrator_limit = [0.1, 0.1, 0.1]\n"),
       *task, exact());
   while (loop.time_s() < 40) loop.step();
   EXPECT_NEAR(0.6 - loop.state()[2], (0.0883 / 0.034 - 10 * 0.1) / 10, 1e-6);
@@ -176,7 +177,7 @@ TEST(SampledFlight, SteadyForceIsCancelledByTheIntegralUpToItsClamp) {
 TEST(SampledFlight, ADelayOfOneAndAHalfPeriodsHoldsCommandsThatLong) {
   Swarm swarm(with_effects({{"delay", {{"delay_s", 0.003}}}}), 1);
   const auto task = make_task("circle", {1, 20, 0});
-  SampledFlight loop(swarm, gains(), *task, exact());
+  SampledFlight loop(swarm, parsed_gains(), *task, exact());
   std::vector<double> commands;
   for (int k = 0; k < 2000; ++k) {
     loop.step();
@@ -192,7 +193,7 @@ TEST(SampledFlight, MotorLagAddsWhatItsColumnSays) {
   // The defining property for effects that remember: applied thrust minus command = gain times the stream's column.
   Swarm swarm(with_effects({{"motor_lag", {{"gain", 0.8}, {"tau_s", 0.05}}}}), 1);
   const auto task = make_task("takeoff", {1, 12, 0});
-  SampledFlight loop(swarm, gains(), *task, exact());
+  SampledFlight loop(swarm, parsed_gains(), *task, exact());
   // The rotors see a staircase; the stream is exact for lines between samples, so it is given both ends of each step.
   const auto lag = make_effect(swarm.model(0).effects[0], {"small", {"small"}, ""});
   const double tau_s = 0.05;
@@ -226,8 +227,8 @@ TEST(SampledFlight, LinearConvolutionPredictsTheSwap) {
   const auto task = make_task("swap", {2, 27, 0});
   SampledFlight loop(
       swarm,
-      gains("Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\nintegrator_limit = [0.1, 0.1, "
-            "0.1]\nrate_hz = 100\nintegrator_step_s = 0.002\n"),
+      parsed_gains("Kp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, 10]\nintegrator_limit = [0.1, 0.1, "
+                   "0.1]\nrate_hz = 100\nintegrator_step_s = 0.002\n"),
       *task, exact());
   // m Delta e = s (tau s + 1) f, Delta = (tau s + 1) s^3 + Kd s^2 + Kp s + Ki: states of its controllable form.
   const double tau = 1 / 17.4, m = 0.034, Kp = 10, Kd = 5, Ki = 2;
@@ -263,7 +264,7 @@ TEST(SampledFlight, LinearConvolutionPredictsTheSwap) {
 }
 
 TEST(SampledFlight, PredictedForceIsAStaircaseThatComesLate) {
-  Gains slow = gains();
+  Gains slow = parsed_gains();
   slow.network_rate_hz = 50;
   slow.network_latency_s = 0.03;
   const auto network = files::load_network({tests::source_path("nn/networks/demo/network.toml"), "", "", ""});
@@ -294,7 +295,7 @@ TEST(SampledFlight, ANeighbourThatFallsSilentFadesOutWithin500ms) {
     SampledFlightOptions options = exact();
     options.radio = radio;
     options.seed = seed;
-    SampledFlight loop(swarm, gains(), *task, options, &network);
+    SampledFlight loop(swarm, parsed_gains(), *task, options, &network);
     std::vector<double> result;
     while (loop.time_s() < 6) {
       loop.step();
@@ -331,7 +332,7 @@ TEST(SampledFlight, ANeighbourThatFallsSilentFadesOutWithin500ms) {
 TEST(Simulation, TakesOffFromTheGroundAndLands) {
   Swarm swarm(with_effects({{"ground", {{"amplitude", 0.164}}}}), 1);
   const auto task = make_task("takeoff", {1, 0, 0});
-  const Simulation flown = simulate(swarm, gains(), *task, {});
+  const Simulation flown = simulate(swarm, parsed_gains(), *task, {});
   EXPECT_FALSE(flown.diverged);
   EXPECT_LT(flown.vehicles[0].error.max_m[2], 0.1);
   EXPECT_GE(flown.vehicles[0].smallest_height_m, 0.05 - 1e-9);
@@ -344,7 +345,7 @@ TEST(Simulation, SameSeedGivesTheSameLogsAndAnotherSeedOthers) {
     SimulationOptions options;
     options.loop.seed = seed;
     options.loop.noise = true;
-    const Simulation flown = simulate(swarm, gains(), *task, options);
+    const Simulation flown = simulate(swarm, parsed_gains(), *task, options);
     return to_usd_log(flown.logs[0]) + to_usd_log(flown.logs[1]);
   };
   EXPECT_EQ(logs(1), logs(1));

@@ -7,6 +7,7 @@
 
 #include "stability/bounds/small_gain.h"
 #include "stability/bounds/unstable_swarm.h"
+#include "stability/vehicle.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -154,14 +155,14 @@ TEST(SmallGain, OneDirectionalDownwashClosesWhereBothDirectionsWouldNot) {
 
 /// Largest |e| in the last of `seconds` of two vehicles whose learning errors are +-(Lp/8) sin(8 (relative position)).
 double pair_error(double Lp, double Kp, double Kd, double Ki, double seconds) {
-  constexpr double kMass_kg = 0.034, kStep_s = 1e-3;
+  constexpr double kStep_s = 1e-3;
   double e[2] = {1e-6, -1e-6}, v[2] = {}, integral[2] = {};
   double largest = 0;
   for (double t = 0; t < seconds; t += kStep_s) {
     const double force = Lp / 8 * std::sin(8 * (e[0] - e[1]));  // pushes them apart
     for (int i = 0; i < 2; ++i) {
       integral[i] += kStep_s * e[i];
-      const double a = (i == 0 ? force : -force) / kMass_kg - Kp * e[i] - Kd * v[i] - Ki * integral[i];
+      const double a = (i == 0 ? force : -force) / tests::kMass_kg - Kp * e[i] - Kd * v[i] - Ki * integral[i];
       v[i] += kStep_s * a;
       e[i] += kStep_s * v[i];
       if (t > seconds - 1) largest = std::max(largest, std::abs(e[i]));

@@ -5,23 +5,14 @@
 #include <cmath>
 #include <random>
 
+#include "stability/enclosure.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {
 namespace {
 
+using tests::encloses;
 using tests::kMass_kg;
-
-testing::AssertionResult encloses(const Interval& interval, double value, double relative_width) {
-  if (!(interval.lo <= value && value <= interval.hi)) {
-    return testing::AssertionFailure()
-           << value << " is not in [" << interval.lo << ", " << interval.hi << "]";
-  }
-  if (!(interval.hi > interval.lo)) return testing::AssertionFailure() << "no width at " << value;
-  const double width = (interval.hi - interval.lo) / value;
-  if (!(width < relative_width)) return testing::AssertionFailure() << "width " << width;
-  return testing::AssertionSuccess();
-}
 
 TEST(VerifiedNorms, EncloseClosedFormsAndAreNarrow) {
   // To the eight digits that the command line prints. Triple pole: |h|_1 = 1/(m a^3), |h|_oo = 2 e^-2/(m a^2), |h'|_1 twice that.

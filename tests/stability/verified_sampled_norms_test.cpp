@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "stability/enclosure.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {
@@ -12,16 +13,10 @@ namespace {
 
 using tests::kMass_kg;
 
-testing::AssertionResult encloses(const Interval& interval, double value, double relative_width,
-                                  double estimate_error = 1e-10) {
-  if (!(interval.lo <= value * (1 + estimate_error) && value * (1 - estimate_error) <= interval.hi)) {
-    return testing::AssertionFailure()
-           << value << " is not in [" << interval.lo << ", " << interval.hi << "]";
-  }
-  if (!(interval.hi > interval.lo)) return testing::AssertionFailure() << "no width at " << value;
-  const double width = (interval.hi - interval.lo) / value;
-  if (!(width < relative_width)) return testing::AssertionFailure() << "width " << width;
-  return testing::AssertionSuccess();
+/// For values that are themselves computed.
+testing::AssertionResult encloses_estimate(const Interval& interval, double value, double relative_width,
+                                           double estimate_error = 1e-10) {
+  return tests::encloses(interval, value, relative_width, estimate_error);
 }
 
 void expect_enclosures(const SampledLoop& loop, Channel channel, double width, double width_between) {
@@ -29,18 +24,18 @@ void expect_enclosures(const SampledLoop& loop, Channel channel, double width, d
   ASSERT_TRUE(norms.has_value());
   const GainNorms at = sampled_norms(loop, channel, Instants::kSampling);
   const GainNorms all = sampled_norms(loop, channel, Instants::kAll);
-  EXPECT_TRUE(encloses(norms->at_samples.amplitude, at.amplitude, width));
-  EXPECT_TRUE(encloses(norms->at_samples.edge, at.edge, width));
-  EXPECT_TRUE(encloses(norms->at_samples.impulse, at.impulse, width));
-  EXPECT_TRUE(encloses(norms->all_times.amplitude, all.amplitude, width_between));
-  EXPECT_TRUE(encloses(norms->all_times.edge, all.edge, width_between));
-  EXPECT_TRUE(encloses(norms->all_times.impulse, all.impulse, width_between));
+  EXPECT_TRUE(encloses_estimate(norms->at_samples.amplitude, at.amplitude, width));
+  EXPECT_TRUE(encloses_estimate(norms->at_samples.edge, at.edge, width));
+  EXPECT_TRUE(encloses_estimate(norms->at_samples.impulse, at.impulse, width));
+  EXPECT_TRUE(encloses_estimate(norms->all_times.amplitude, all.amplitude, width_between));
+  EXPECT_TRUE(encloses_estimate(norms->all_times.edge, all.edge, width_between));
+  EXPECT_TRUE(encloses_estimate(norms->all_times.impulse, all.impulse, width_between));
   if (loop.plant.Ki == 0) {
     EXPECT_TRUE(std::isinf(norms->at_samples.rate.lo));
     return;
   }
-  EXPECT_TRUE(encloses(norms->at_samples.rate, at.rate, width));
-  EXPECT_TRUE(encloses(norms->all_times.rate, all.rate, width_between));
+  EXPECT_TRUE(encloses_estimate(norms->at_samples.rate, at.rate, width));
+  EXPECT_TRUE(encloses_estimate(norms->all_times.rate, all.rate, width_between));
 }
 
 TEST(VerifiedSampledNorms, EncloseThePublishedTableToItsDigits) {
@@ -57,8 +52,8 @@ TEST(VerifiedSampledNorms, EncloseThePublishedTableToItsDigits) {
         Row{z, 0.01, 0.002, 14.705882353, 5.501886995}, Row{a1, 0.01, 0.01, 0.45955882, 0.995138042}}) {
     const auto norms = verified_sampled_norms({row.loop, row.period_s, row.step_s}, Channel::kForce);
     ASSERT_TRUE(norms.has_value());
-    EXPECT_TRUE(encloses(norms->at_samples.rate, row.rate, 1e-8, 1e-8));
-    EXPECT_TRUE(encloses(norms->at_samples.amplitude, row.amplitude, 1e-8, 2e-8));
+    EXPECT_TRUE(encloses_estimate(norms->at_samples.rate, row.rate, 1e-8, 1e-8));
+    EXPECT_TRUE(encloses_estimate(norms->at_samples.amplitude, row.amplitude, 1e-8, 2e-8));
   }
 }
 
