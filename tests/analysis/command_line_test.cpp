@@ -59,11 +59,25 @@ TEST_F(CommandLine, HelpShowsEveryCommandAndEachHasAnExample) {
 TEST_F(CommandLine, MisspeltCommandsAndOptionsAreUsageErrorsWithASuggestion) {
   expect("certfy x", 2, {"certfy", "did you mean", "certify"});
   expect("certify x --gama 3", 2, {"--gama", "did you mean", "--gamma"});
+  expect("--hepl", 2, {"--hepl", "did you mean \"--help\""});
   expect("certify x --max-lipschtz=3", 2, {"--max-lipschtz", "--max-lipschitz"});
   expect("", 2, {"subcommand"});
   expect("certify x --gamma minus", 2, {"--gamma", "minus"});
   expect("certify x --gamma -1", 2, {"--gamma", "-1"});
   expect("certify --phi a", 2, {"--rho"});
+}
+
+TEST_F(CommandLine, TwoOutputsIntoOneFileAreRefusedBeforeAnyWork) {
+  expect("certify nowhere.pth -o one.json --json ./one.json", 2,
+         {"--json and -o both write", "name two files"});
+  expect("gate nowhere.toml --junit a.xml --sarif a.xml", 2, {"--junit and --sarif both write a.xml"});
+}
+
+TEST_F(CommandLine, InspectGoesOnAfterABadFileAndSaysSoInItsExitCode) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  expect("certify " + net + " -o cert.json", 0, {"proved"});
+  expect("inspect nowhere.toml cert.json " + net, 3,
+         {"nowhere.toml: cannot be opened", "cert.json: certificate", "fc2"});
 }
 
 TEST_F(CommandLine, NoNetworkIsAUsageErrorThatSaysWhatToGive) {
