@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "analysis/report.h"
+#include "analysis/tube_output.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -102,8 +103,8 @@ void add_tube_plot(Report& report, const Tracking& input, const Disturbance& dis
 }  // namespace
 
 std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
-                               const TrackingReport& tracking, const files::Json& result,
-                               const std::string& folder, bool overwrite) {
+                               const TrackingReport& tracking, const std::optional<LocalTube>& local_tube,
+                               const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Tracking bounds");
   report.result(result);
   report.paragraph(fmt::format("Gains {} on model {}, {} kg. Disturbance: {}.", input.gains.path,
@@ -149,6 +150,7 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
     report.bars("bounds", least, "bound on the error [m]", "The smallest bound of each row above.");
     for (int axis = 0; axis < 3; ++axis) add_tube_plot(report, input, disturbance.source.axis[axis], axis);
   }
+  if (local_tube) add_local_tube_plot(report, *local_tube, result["local_tube"]);
   report.heading("Rests on");
   rows.clear();
   for (const Assumption& a : tracking.assumptions) rows.push_back({a.status, a.name, a.note});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "analysis/bound_extras.h"
 #include "analysis/bound_plots.h"
@@ -11,6 +12,7 @@
 #include "analysis/disturbance_input.h"
 #include "analysis/float_errors.h"
 #include "analysis/progress.h"
+#include "analysis/tube_output.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -23,6 +25,7 @@ struct BoundOptions {
   bool is_uncertain = false;
   bool verified = false;
   bool tube = false;
+  TubeArguments task;
   std::string swarm;
   std::string report;
 };
@@ -33,14 +36,22 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   const Tracking input = load_tracking(options.tracking);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
-  const LoadedDisturbance disturbance = load_disturbance(options.disturbance, input);
+  const bool has_task = !options.task.task.empty();
+  if (has_task && !options.tube) throw UsageError("--task is that of a tube: add --tube");
+  DisturbanceArguments told = options.disturbance;
+  // The tube makes its own bounds of how vehicles move; without --speed there are no others.
+  if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
+  const LoadedDisturbance disturbance = load_disturbance(told, input);
   const stability::DisturbanceSource& source = disturbance.source;
   inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
-  if (options.tube && std::none_of(std::begin(source.axis), std::end(source.axis), [](const auto& d) {
+  if (options.tube && !has_task &&
+      std::none_of(std::begin(source.axis), std::end(source.axis), [](const auto& d) {
         return std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s);
       })) {
     throw UsageError("--tube needs a force of known size: --amplitude E or --impulse J, --from or --truth");
   }
+  std::optional<LocalTube> local;
+  if (has_task) local = load_local_tube(options.task, options.disturbance, input, common, inputs);
   const stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
 
   files::Json result = result_head("bound", inputs);
@@ -65,10 +76,11 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   }
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
+  if (local) result["local_tube"] = local_tube_json(options.task, *local);
   if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
   std::string report_path;
   if (!options.report.empty()) {
-    report_path = write_bound_report(input, disturbance, report, result, options.report, common.force);
+    report_path = write_bound_report(input, disturbance, report, local, result, options.report, common.force);
   }
   write_result(common, result);
   if (common.prints_text()) {
@@ -81,12 +93,15 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
                               options.initial.learning_error_N != 0)) {
       fmt::print("\nInitial errors enter the theorem's transient bound; these gains have none.\n");
     }
+    if (local) print_local_tube(result["local_tube"]);
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
     if (!options.swarm.empty()) print_swarm(result["swarm"]);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
+  if (!options.swarm.empty() && result["swarm"]["verdict"] == "refuted") return kViolated;
+  if (local && !local->proved) return kInconclusive;
   if (options.swarm.empty() || result["swarm"]["verdict"] == "proved") return kDone;
-  return result["swarm"]["verdict"] == "refuted" ? kViolated : kInconclusive;
+  return kInconclusive;
 }
 
 }  // namespace
@@ -103,7 +118,11 @@ Command bound_command() {
       "really is, and encloses its constants; --from takes measured quantiles.\n\n"
       "Example: swarmcert bound --gains controller/gains/crazyflie-small.toml --model "
       "stability/models/crazyflie-small.toml \\\n"
-      "           --amplitude 0.097 --impulse 0.0202 --rate 0.75",
+      "           --amplitude 0.097 --impulse 0.0202 --rate 0.75\n"
+      "         swarmcert bound --gains controller/gains/composite.toml --model "
+      "stability/models/crazyflie-small.toml --tube --task swap \\\n"
+      "           --network nn/networks/demo/network.toml --truth "
+      "stability/models/crazyflie-small-effects.toml",
       [](CLI::App& app) {
         const auto options = std::make_shared<BoundOptions>();
         declare_tracking(app, options->tracking);
@@ -118,7 +137,10 @@ Command bound_command() {
                               ->expected(0, -1)
                               ->default_str("default");
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
-        app.add_flag("--tube", options->tube, "Bound of |e(t)| over time, from rest (JSON)");
+        app.add_flag("--tube", options->tube,
+                     "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "
+                     "trajectories that the network and the truth prove");
+        declare_tube(app, options->task);
         app.add_option("--swarm", options->swarm, "swarm.toml: do the vehicles' mutual forces stay bounded?");
         app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
         return [options, uncertain](const CommonOptions& common) {

@@ -11,6 +11,7 @@ class Hover : public TimedTask {
   static constexpr char kSummary[] = "stay in place, 0.5 m apart";
   explicit Hover(const TaskOptions& options);
   Setpoint at(int vehicle, double time_s) const override;
+  std::optional<SetpointRange> over(int vehicle, double from_s, double to_s) const override;
 };
 
 }  // namespace swarmcert::stability

@@ -1,8 +1,10 @@
 #include "stability/tasks/swap.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "stability/tasks/polynomial.h"
+#include "stability/tasks/polynomial_range.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -44,6 +46,40 @@ Setpoint Swap::at(int vehicle, double time_s) const {
   setpoint.v_W_m_s = -2 * side * path.ds / kSwap_s * radius_m;
   setpoint.a_W_m_s2 = -2 * side * path.dds / (kSwap_s * kSwap_s) * radius_m;
   return setpoint;
+}
+
+std::optional<SetpointRange> Swap::over(int vehicle, double from_s, double to_s) const {
+  const Setpoint lowest = at(vehicle, 0);  // of the swap's first period, at rest
+  const double start_s = kPeriod_s - kSwap_s;
+  std::optional<SetpointRange> result;
+  for (int swap = static_cast<int>(std::floor(from_s / kPeriod_s)); swap * kPeriod_s <= to_s; ++swap) {
+    const double begin_s = std::max(from_s, swap * kPeriod_s) - swap * kPeriod_s;
+    const double end_s = std::min(to_s, (swap + 1) * kPeriod_s) - swap * kPeriod_s;
+    const RestToRestRange path((Interval(begin_s, end_s) + Interval(-1e-12, 1e-12) - Interval(start_s)) /
+                               Interval(kSwap_s));
+    const Interval side(swap % 2 == 0 ? 1 : -1);
+    const Interval rate = Interval(1) / Interval(kSwap_s);
+    SetpointRange range;
+    for (int axis = 0; axis < 2; ++axis) {
+      const Interval radius_m = side * Interval(lowest.p_W_m[axis]);
+      range.p_W_m[axis] = (Interval(1) - Interval(2) * path.s) * radius_m;
+      range.v_W_m_s[axis] = Interval(-2) * path.ds * rate * radius_m;
+      range.a_W_m_s2[axis] = Interval(-2) * path.dds * rate * rate * radius_m;
+      range.jerk_W_m_s3[axis] = Interval(-2) * path.ddds * rate * rate * rate * radius_m;
+    }
+    range.p_W_m[2] = lowest.p_W_m[2];
+    if (!result) {
+      result = range;
+      continue;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      result->p_W_m[axis] = hull(result->p_W_m[axis], range.p_W_m[axis]);
+      result->v_W_m_s[axis] = hull(result->v_W_m_s[axis], range.v_W_m_s[axis]);
+      result->a_W_m_s2[axis] = hull(result->a_W_m_s2[axis], range.a_W_m_s2[axis]);
+      result->jerk_W_m_s3[axis] = hull(result->jerk_W_m_s3[axis], range.jerk_W_m_s3[axis]);
+    }
+  }
+  return result;
 }
 
 std::vector<double> Swap::knots_s() const {

@@ -11,6 +11,7 @@ class Swap : public TimedTask {
   static constexpr char kSummary[] = "cross over the centre of a circle at different heights, as published";
   explicit Swap(const TaskOptions& options);
   Setpoint at(int vehicle, double time_s) const override;
+  std::optional<SetpointRange> over(int vehicle, double from_s, double to_s) const override;
   std::vector<double> knots_s() const override;
 };
 

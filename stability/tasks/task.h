@@ -4,8 +4,11 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "stability/bounds/interval.h"
 
 namespace swarmcert::stability {
 
@@ -16,6 +19,11 @@ struct Setpoint {
   Eigen::Vector3d a_W_m_s2 = Eigen::Vector3d::Zero();
 };
 
+/// Everything that a set point takes on over a stretch of time, axis by axis.
+struct SetpointRange {
+  Interval p_W_m[3], v_W_m_s[3], a_W_m_s2[3], jerk_W_m_s3[3];
+};
+
 /// Trajectories of a number of vehicles. Positions are continuous; velocities jump at most at knots().
 class Task {
  public:
@@ -24,6 +32,9 @@ class Task {
   virtual double duration_s() const = 0;
   /// Times at which some vehicle's acceleration or its derivative jumps: integrators should stop there.
   virtual std::vector<double> knots_s() const { return {}; }
+  /// Encloses at(), and the derivative of its acceleration, over [from_s, to_s], where the acceleration is continuous
+  /// there; nothing from tasks that have no enclosure.
+  virtual std::optional<SetpointRange> over(int vehicle, double from_s, double to_s) const;
   /// Vehicles stand on the ground at the start, below their first set point.
   virtual bool starts_on_ground() const { return false; }
 };

@@ -30,6 +30,38 @@ TEST(Tasks, VelocityAndAccelerationAreDerivativesOfThePosition) {
   }
 }
 
+TEST(Tasks, RangesHoldEverySetPointOfTheirTimeAndAreNarrow) {
+  for (const char* const name : {"swap", "hover"}) {
+    const auto task = make_task(name, {3, 0, 0});
+    const auto in = [](Interval range, double x, double rounding) {
+      return range.lo - rounding <= x && x <= range.hi + rounding;
+    };
+    double widest_m = 0;
+    for (int k = 0; k < 400; ++k) {
+      const double from_s = 0.0371 * k;
+      const double to_s = from_s + (k % 5 == 0 ? 1.7 : 0.02);  // also over several knots
+      for (int vehicle = 0; vehicle < 3; ++vehicle) {
+        const auto range = task->over(vehicle, from_s, to_s);
+        ASSERT_TRUE(range);
+        for (int i = 0; i <= 20; ++i) {
+          const double t = from_s + (to_s - from_s) * i / 20;
+          const Setpoint now = task->at(vehicle, t), after = task->at(vehicle, t + 1e-6);
+          for (int axis = 0; axis < 3; ++axis) {
+            ASSERT_TRUE(in(range->p_W_m[axis], now.p_W_m[axis], 1e-15)) << name << t;
+            ASSERT_TRUE(in(range->v_W_m_s[axis], now.v_W_m_s[axis], 1e-15)) << name << t;
+            ASSERT_TRUE(in(range->a_W_m_s2[axis], now.a_W_m_s2[axis], 1e-14)) << name << t;
+            const double jerk = (after.a_W_m_s2[axis] - now.a_W_m_s2[axis]) / 1e-6;
+            ASSERT_TRUE(in(range->jerk_W_m_s3[axis], jerk, 1e-4)) << name << t;
+          }
+        }
+        if (k % 5 != 0) widest_m = std::max(widest_m, range->p_W_m[0].hi - range->p_W_m[0].lo);
+      }
+    }
+    EXPECT_LT(widest_m, 0.02 * 0.6) << "at most the peak speed times the time";
+  }
+  EXPECT_FALSE(make_task("circle", {2, 0, 0})->over(0, 0, 1)) << "no enclosure, no claim";
+}
+
 TEST(Tasks, SwapHasThePublishedGeometryAndTiming) {
   // multi_cfs_swap.py: two vehicles at 0.6 and 0.9 m on a circle of 0.3 m, 3 s per swap every 4.5 s, peak speed
   // 2.1875 D / T.

@@ -1,0 +1,58 @@
+/// @file How far vehicles stray from a task when they fly a network in the world of a declared truth: proved, and compared
+/// with what Lipschitz constants of the network alone would have proved.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/tube/force_constants.h"
+#include "analysis/tube/least_tube.h"
+#include "stability/bounds/tracking_bounds.h"
+
+namespace swarmcert::analysis {
+
+struct LocalTubeOptions {
+  EnclosureOptions enclosure;  ///< its progress is set here
+  int nodes = 100;             ///< boxes of branch and bound per local constant
+  /// Steps done, of how many; what is being done. From any thread.
+  std::function<void(int done, int total, const std::string& what)> progress;
+};
+
+/// The force error of one vehicle along z within the tube, and what each bound of the reference makes of it. All hold in
+/// real arithmetic for the continuous loop of error_loops.h, from rest, up to the end of the task.
+struct ForceErrorBounds {
+  int vehicle = 0;
+  double amplitude_N = 0, rate_N_s = 0, variation_N = 0,
+         impulse_N_s = 0;  ///< sup|eps|, sup|eps'|, TV, int|eps| dt
+  double lag_m = 0;        ///< what the lag of the feed-forward adds to each of the following
+  double by_rate_m = 0, by_amplitude_m = 0, by_edges_m = 0, by_impulse_m = 0;  ///< B1 .. B4
+  double by_slices_m = 0;  ///< B2 and B4 slice by slice: see convolved()
+  double least_m() const;
+};
+
+/// One way to bound the force error, and the tube that it proves.
+struct TubeRow {
+  std::string name;                       ///< "product", "global" or "local"
+  std::vector<ForceConstants> constants;  ///< per vehicle
+  LeastTube tube;
+};
+
+struct LocalTube {
+  bool proved = false;
+  std::string why;  ///< where not proved
+  LeastTube tube;  ///< from the difference of both forces, or from the local constants where these are better
+  std::vector<TubeRow> rows;
+  std::vector<ForceErrorBounds> bounds;              ///< per vehicle; empty where nothing is proved
+  std::vector<std::array<ErrorHistory, 3>> history;  ///< per vehicle and axis, likewise
+  double slice_s = 0, duration_s = 0;
+  bool cancelled = false;
+  std::vector<stability::Assumption> assumptions;
+};
+
+LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,
+                     const files::Network& network, const stability::Task& task, int vehicles,
+                     const LocalTubeOptions& options);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,37 @@
+/// @file A task cut into slices of time: where vehicles should be in each, relative to one another.
+#pragma once
+
+#include <vector>
+
+#include "stability/bounds/interval.h"
+#include "stability/tasks/task.h"
+
+namespace swarmcert::analysis {
+
+using stability::Interval;
+
+/// What one vehicle should do during slices that ask for the same: everything encloses the set points of these slices and
+/// of `memory_s` before them.
+struct Stretch {
+  int vehicle = 0;
+  std::vector<Interval>
+      state;  ///< see learned_force.h: offsets and relative velocities, own height and velocity
+  double acceleration_m_s2[3] = {0, 0, 0};  ///< largest |a_d| per axis
+  double jerk_m_s3[3] = {0, 0, 0};
+  std::vector<double> relative_acceleration_m_s2;  ///< per neighbour, largest |a_j - a|
+};
+
+struct Motion {
+  int vehicles = 0;
+  double slice_s = 0;
+  int slices = 0;
+  std::vector<Stretch> stretches;            ///< each once, of all vehicles
+  std::vector<std::vector<int>> stretch_of;  ///< [vehicle][slice]: index into `stretches`
+};
+
+/// Slices of at most 25 ms that begin and end with the task's knots where these are multiples of it.
+/// @param memory_s how old the states are that a controller may act upon.
+/// @returns no slices where the task has no enclosure.
+Motion sliced(const stability::Task& task, int vehicles, double memory_s);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,69 @@
+/// @file The declared truth on a set of states: what force it can be there, and how it changes with the positions.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/interval.h"
+#include "stability/model.h"
+
+namespace swarmcert::analysis {
+
+using stability::Interval;
+using Offset = std::array<Interval, 3>;  ///< of a neighbour from the vehicle, world axes, m
+
+/// Forces of one vehicle's declared effects, enclosed in real arithmetic.
+class TruthForce {
+ public:
+  /// @param truth its effects act on every vehicle, its mass is that of every neighbour. Effects that act through the
+  ///   loop or on rotation alone are no force here.
+  /// @param largest_thrust_N of all rotors.
+  TruthForce(const stability::Model& truth, double largest_thrust_N);
+
+  /// Why this truth has no enclosure; empty where it has one.
+  const std::string& refusal() const { return refusal_; }
+
+  /// Force along z of the neighbours' wakes (downwash, upper_lift).
+  struct Wake {
+    Interval value_N;
+    std::vector<Offset> gradient_N_m;  ///< per neighbour, of every point of the set
+    /// false: the field may jump inside the set, and only value_N says something.
+    bool has_gradient = true;
+    /// The field of the simulator ends at seven spreads: there it misses the gradient's field by at most this.
+    double cut_off_N = 0;
+  };
+  Wake wake(const std::vector<Offset>& neighbours) const;
+
+  /// Everything else, which depends on the vehicle's own state.
+  struct Rest {
+    Interval force_N[3];
+    double rate_N_s[3] = {0, 0, 0};  ///< of what has a rate
+    double abrupt_N[3] = {0, 0, 0};  ///< size of what may change at any rate: the thrust's rate is not known
+  };
+  /// @param acceleration_m_s2, thrust_rate_N_s bounds of |v'| and of |(T b3)'|; they enter the rates only.
+  Rest rest(Interval height_m, const Interval velocity_m_s[3], double acceleration_m_s2,
+            double thrust_rate_N_s) const;
+
+ private:
+  struct Downwash {
+    double amplitude_N, decay, spread_m, spread_slope, norm;
+    Interval mass_factor;
+    bool for_some_only;
+  };
+  struct Lift {
+    double amplitude_N, decay, spread_m;
+    bool for_some_only;
+  };
+  void add(const Downwash& field, const std::vector<Offset>& neighbours, Wake& sum) const;
+  void add(const Lift& field, const std::vector<Offset>& neighbours, Wake& sum) const;
+
+  stability::Model model_;
+  double largest_thrust_N_;
+  std::vector<Downwash> downwash_;
+  std::vector<Lift> lift_;
+  std::vector<stability::EffectSpec> others_;
+  std::string refusal_;
+};
+
+}  // namespace swarmcert::analysis

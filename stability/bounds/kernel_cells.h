@@ -1,0 +1,31 @@
+/// @file Where in time a response acts: integrals of its absolute value cell by cell, enclosed from above.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "stability/bounds/impulse_response.h"
+
+namespace swarmcert::stability {
+
+/// Upper bounds, in real arithmetic, for y(t) = L^-1[Y] at t > 0.
+struct KernelCells {
+  std::vector<double> integral;  ///< at least int |y| over [k cell_s, (k + 1) cell_s]
+  double peak = 0;               ///< at least sup |y| over all of them
+  double total() const;          ///< at least int |y| over all of them
+};
+
+/// Steps of a millisecond or less in coordinates in which the system contracts (contracting_system.h), so that errors of
+/// the computed state never grow; within a step |y| <= max of both ends + step^2/8 sup|y''|.
+/// @param y without a delay, strictly proper.
+/// @returns nothing where stability could not be verified.
+std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count);
+
+/// sup |e| for e = y * w from rest, up to the end of each cell, where |w| <= sizes[k] in cell k, time in the same cells:
+///   |e(t)| <= sum_m integral[m] max(sizes[n - m], sizes[n - m - 1])   for t in cell n,
+/// because t - u lies in one of these two cells for u in cell m. Rounded up. It is at most |y|_1 sup|w|, and near
+/// |y|_oo int|w| for a short w: both bounds at once.
+/// @returns one bound per cell of `sizes`. Precondition: as many cells in the kernel.
+std::vector<double> convolved(const KernelCells& kernel, const std::vector<double>& sizes);
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,127 @@
+// bound --tube --task as a user runs it.
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "analysis/run.h"
+#include "nn/files/json.h"
+
+namespace swarmcert::tests {
+namespace {
+
+using files::Json;
+
+const std::string kSources = SWARMCERT_SOURCE_DIR;
+const std::string kNetwork = " --network " + kSources + "/nn/networks/demo/network.toml";
+const std::string kTruth = " --truth " + kSources + "/stability/models/crazyflie-small-effects.toml";
+
+std::string bound(const std::string& gains) {
+  return "swarmcert bound --gains " + kSources + "/controller/gains/" + gains + " --model " + kSources +
+         "/stability/models/crazyflie-small.toml";
+}
+
+TEST(TubeCommand, ProvesATubeAroundASwapAndReportsItBesideLipschitzBounds) {
+  const ScratchFolder folder;
+  const std::string command =
+      bound("composite.toml") + kNetwork + kTruth + " --tube --task swap --duration 4.5 --report r";
+  ASSERT_EQ(run_shell(command + " --json a.json", folder.path()).exit_code, 0);
+  const Json result = files::parse_json(read_text(folder / "a.json"), "a.json");
+  EXPECT_TRUE(result["tube"].is_array()) << "the bound over time stays where it was";
+  const Json& tube = result["local_tube"];
+  EXPECT_EQ(tube["verdict"], "proved");
+  EXPECT_EQ(tube["task"], "swap");
+  EXPECT_EQ(tube["vehicles"], 2);
+  EXPECT_EQ(tube["duration_s"], 4.5);
+  EXPECT_FALSE(tube["interrupted"].get<bool>());
+  const double radius_m = tube["radius_m"].get<double>();
+  EXPECT_GT(radius_m, 0);
+  for (const Json& r : tube["radius_xyz_m"]) EXPECT_LE(r.get<double>(), radius_m);
+  ASSERT_EQ(tube["radii"].size(), 2u);
+  ASSERT_EQ(tube["bounds"].size(), 2u);
+  for (const Json& b : tube["bounds"]) {
+    for (const char* const name : {"rate", "amplitude", "edges", "impulse", "slices"})
+      EXPECT_GE(b[name].get<double>(), b["minimum"].get<double>()) << name;
+    EXPECT_LE(b["minimum"].get<double>(), tube["radius_xyz_m"][2].get<double>());
+  }
+  double last = 0;
+  for (const char* const row : {"local", "global", "product"}) {
+    const Json& constants = tube[row]["lipschitz"];
+    const double constant =
+        (constants["position_N_m"].is_number() ? constants["position_N_m"] : constants["all_N"])
+            .get<double>();
+    EXPECT_GE(constant, last) << row;
+    last = constant;
+    EXPECT_EQ(tube[row]["radius_m"].is_number(), tube[row]["verdict"] == "proved");
+    if (tube[row]["radius_m"].is_null()) {
+      EXPECT_FALSE(tube[row]["why"].get<std::string>().empty());
+    }
+  }
+  for (const Json& at : tube["at"])
+    for (const Json& e : at["error_z_m"]) EXPECT_LE(e.get<double>(), tube["radius_xyz_m"][2].get<double>());
+  EXPECT_NE(read_text(folder / "r/report.html").find("Tube around the task"), std::string::npos);
+  std::istringstream data(read_text(folder / "r/local_tube.dat"));
+  std::string line;
+  int rows = 0;
+  while (std::getline(data, line)) ++rows;
+  EXPECT_GT(rows, 100);
+}
+
+TEST(TubeCommand, TheResultDoesNotDependOnTheThreads) {
+  const ScratchFolder folder;
+  const std::string command =
+      bound("composite.toml") + kNetwork + kTruth + " --tube --task swap --duration 2";
+  for (const char* const jobs : {"1", "3"})
+    ASSERT_EQ(run_shell(command + " --jobs " + jobs + " --json " + jobs, folder.path()).exit_code, 0);
+  EXPECT_GT(read_text(folder / "1").size(), 1000u);
+  EXPECT_EQ(read_text(folder / "1"), read_text(folder / "3"));
+}
+
+TEST(TubeCommand, WhatIsMissingOrMakesNoSenseIsSaid) {
+  const ScratchFolder folder;
+  const std::string all = bound("composite.toml") + " --tube --task swap";
+  for (const auto& [command, words] : {
+           std::pair(all + kNetwork, "--truth"),
+           std::pair(all + kTruth, "--network"),
+           std::pair(bound("composite.toml") + " --task swap" + kNetwork + kTruth, "add --tube"),
+           std::pair(bound("composite.toml") + " --tube --task swop" + kNetwork + kTruth, "swap"),
+           std::pair(bound("composite.toml") + " --tube --task circle" + kNetwork + kTruth, "enclosure"),
+           std::pair(all + kNetwork + kTruth + " --vehicles 1", "--vehicles"),
+       }) {
+    const Outcome outcome = run_shell(command, folder.path());
+    EXPECT_EQ(outcome.exit_code, 2) << command;
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
+  }
+  const Outcome no_file = run_shell(all + kNetwork + " --truth nowhere.toml", folder.path());
+  EXPECT_EQ(no_file.exit_code, 3);
+  EXPECT_NE(no_file.output.find("nowhere.toml"), std::string::npos) << no_file.output;
+}
+
+TEST(TubeCommand, WeightsThatAreNoNumberAreRefused) {
+  const ScratchFolder folder;
+  std::filesystem::copy(kSources + "/nn/networks/demo", folder.path() / "net");
+  // The data of a safetensors file end with the last tensor: its last number becomes NaN.
+  std::string bytes = read_text(folder / "net/phi.safetensors");
+  bytes.replace(bytes.size() - 4, 4, std::string("\x00\x00\xc0\x7f", 4));
+  write_text(folder / "net/phi.safetensors", bytes);
+  const Outcome outcome = run_shell(
+      bound("composite.toml") + " --tube --task swap --network net/network.toml" + kTruth, folder.path());
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("phi.safetensors"), std::string::npos) << outcome.output;
+}
+
+TEST(TubeCommand, WhereNothingIsProvedTheExitCodeAndTheReasonSaySo) {
+  const ScratchFolder folder;
+  write_text(folder / "weak.toml", "schema = \"swarmcert/gains/1\"\n[position]\nLambda = 0.6\nK = 0.04\n");
+  const Outcome outcome = run_shell("swarmcert bound --gains weak.toml --model " + kSources +
+                                        "/stability/models/crazyflie-small.toml" + kNetwork + kTruth +
+                                        " --tube --task swap --duration 4.5 --json out.json",
+                                    folder.path());
+  EXPECT_EQ(outcome.exit_code, 4) << outcome.output;
+  const Json tube = files::parse_json(read_text(folder / "out.json"), "out.json")["local_tube"];
+  EXPECT_EQ(tube["verdict"], "inconclusive");
+  EXPECT_TRUE(tube["radius_m"].is_null());
+  EXPECT_NE(tube["why"].get<std::string>().find("f_hat"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace swarmcert::tests

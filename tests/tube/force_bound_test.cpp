@@ -1,0 +1,162 @@
+// Bounds of |f_hat - f_a| over a tube against states inside it.
+#include "analysis/tube/force_bound.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "analysis/tube/force_constants.h"
+#include "stability/deep_set_force.h"
+#include "stability/effects/effect.h"
+#include "tube/scenes.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using stability::AppliedEffect;
+using stability::Instant;
+using stability::Neighbour;
+using tests::between;
+
+/// Both forces as the simulator has them.
+class Forces {
+ public:
+  Forces(const files::Network& network, const stability::Model& truth)
+      : learned_(network, "small", {"small"}) {
+    for (const stability::EffectSpec& spec : truth.effects) {
+      if (spec.name == "motor_lag") continue;
+      effects_.push_back(std::make_unique<AppliedEffect>(
+          spec, stability::EffectContext{truth.kind, {truth.kind}, truth.path}));
+    }
+  }
+  Instant at(const std::vector<double>& x, int neighbours) {
+    others_.clear();
+    for (int n = 0; n < neighbours; ++n) {
+      const double* const s = x.data() + n * kPerNeighbour;
+      others_.push_back({{s[0], s[1], s[2]}, {s[3], s[4], s[5]}, Eigen::Vector3d::Zero(), 0.034, 0});
+    }
+    const double* const own = x.data() + neighbours * kPerNeighbour;
+    Instant now;
+    now.mass_kg = 0.034;
+    now.p_W_m = {0, 0, own[0]};
+    now.v_W_m_s = {own[1], own[2], own[3]};
+    now.thrust_N = 0.034 * 9.81;
+    now.neighbours = others_.data();
+    now.num_neighbours = neighbours;
+    return now;
+  }
+  double learned(const Instant& now) { return learned_.force_z_N(now); }
+  double truth(const Instant& now) const {
+    double sum = 0;
+    for (const auto& effect : effects_) sum += effect->wrench(now).force_W_N.z();
+    return sum;
+  }
+
+ private:
+  stability::DeepSetForce learned_;
+  std::vector<std::unique_ptr<AppliedEffect>> effects_;
+  std::vector<Neighbour> others_;
+};
+
+Radii some_radii(int vehicles, double position_m, double velocity_m_s) {
+  Radii radii = Radii::none(vehicles);
+  for (auto& p : radii.position_m) p.fill(position_m);
+  for (auto& v : radii.velocity_m_s) v.fill(velocity_m_s);
+  return radii;
+}
+
+/// Random states of every stretch: what the network saw, and where the truth acts a little later.
+/// @returns the largest share of its bound that any state reached.
+double largest_share(const Scene& scene, const files::Network& network, const stability::Model& truth,
+                     const Radii& radii, const std::vector<double>& bounds, std::uint64_t seed) {
+  Forces forces(network, truth);
+  files::Random random(seed);
+  double share = 0;
+  for (std::size_t s = 0; s < bounds.size(); ++s) {
+    const std::vector<Interval> states = scene.states(scene.motion().stretches[s], radii);
+    for (int i = 0; i < 60; ++i) {
+      std::vector<double> seen, now;
+      for (const Interval& x : states)
+        seen.push_back(i % 2 == 0 ? (random.below(2) == 0 ? x.lo : x.hi) : between(random, x.lo, x.hi));
+      now = seen;
+      const double age_s = between(random, 0, scene.network_age_s());
+      for (int n = 0; n + 1 < scene.vehicles(); ++n) {
+        for (int k = 0; k < 3; ++k) {
+          const auto at = static_cast<std::size_t>(n * kPerNeighbour + k);
+          now[at] += age_s * between(random, states[at + 3].lo, states[at + 3].hi);
+        }
+      }
+      const double learned = forces.learned(forces.at(seen, scene.vehicles() - 1));
+      const double error = std::abs(learned - forces.truth(forces.at(now, scene.vehicles() - 1)));
+      share = std::max(share, error / bounds[s]);
+    }
+  }
+  return share;
+}
+
+struct Case {
+  int vehicles;
+  double position_m, velocity_m_s;
+};
+
+TEST(Enclosure, NoStateOfTheTubeExceedsItsBoundAndSomeComeNear) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  for (const Case& c : {Case{2, 0, 0}, Case{2, 0.04, 0.15}, Case{3, 0.01, 0.03}}) {
+    const auto task = stability::make_task("swap", {c.vehicles, 4.5, 0});
+    const Scene scene(loop, truth, network, *task, c.vehicles, 0.011);
+    ASSERT_EQ(scene.refusal(), "");
+    EnclosureOptions options;
+    options.boxes = c.vehicles == 2 ? 6 : 1;
+    Enclosure enclosure(scene, options);
+    const Radii radii = some_radii(c.vehicles, c.position_m, c.velocity_m_s);
+    ASSERT_TRUE(enclosure.prepare(radii, {}));
+    const std::vector<double> bounds = enclosure.sizes(radii);
+    const double share = largest_share(scene, network, truth, radii, bounds, 5);
+    EXPECT_LE(share, 1) << c.vehicles << " " << c.position_m;
+    EXPECT_GT(share, 0.4) << "bounds that no state comes near to would hide a fault";
+    // A smaller tube within the one that was prepared: its bounds are smaller, and hold.
+    const Radii half = radii.scaled(0.5, 0);
+    const std::vector<double> smaller = enclosure.sizes(half);
+    for (std::size_t s = 0; s < smaller.size(); ++s) ASSERT_LE(smaller[s], bounds[s]);
+    EXPECT_LE(largest_share(scene, network, truth, half, smaller, 6), 1);
+    // Half of the bound must fail the same look: the test can tell.
+    std::vector<double> broken = smaller;
+    for (double& x : broken) x *= 0.4;
+    EXPECT_GT(largest_share(scene, network, truth, half, broken, 6), 1);
+  }
+}
+
+TEST(SlopeBound, NoStateOfTheTubeExceedsItAndBetterConstantsBoundBetter) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  const Scene scene(loop, truth, network, *task, 2, 0.011);
+  Enclosure at_set_points(scene, {});
+  const Radii none = Radii::none(2);
+  ASSERT_TRUE(at_set_points.prepare(none, {}));
+  const Radii radii = some_radii(2, 0.03, 0.1);
+  const GlobalConstants global = global_constants(network, scene.learned(), nullptr);
+  const std::vector<ForceConstants> local =
+      local_constants(network, scene, radii, global, 15, 0, nullptr, nullptr);
+  const std::vector<ForceConstants> product(2, global.product);
+  const std::vector<ForceConstants> sdp(2, global.sdp);
+  std::vector<std::vector<double>> all;
+  for (const std::vector<ForceConstants>* constants : {&local, &sdp, &product}) {
+    SlopeBound bound(scene, at_set_points.sizes(none), *constants);
+    ASSERT_TRUE(bound.prepare(radii, scene.truth_sizes(radii)));
+    all.push_back(bound.sizes(radii));
+    EXPECT_LE(largest_share(scene, network, truth, radii, all.back(), 8), 1);
+  }
+  for (std::size_t s = 0; s < all[0].size(); ++s) {
+    ASSERT_LE(all[0][s], all[1][s]);
+    ASSERT_LE(all[1][s], all[2][s]);
+  }
+  EXPECT_LT(local[0].position, global.sdp.position)
+      << "a box this small must be steeper nowhere near the global bound";
+}
+
+}  // namespace
+}  // namespace swarmcert::analysis
