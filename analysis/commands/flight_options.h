@@ -14,7 +14,7 @@ struct FlightOptions {
   std::vector<std::string> words;   ///< model.toml files, then flights
   std::vector<std::string> models;  ///< --model
   std::string fleet, columns, network;
-  bool published_filter = false;
+  bool published_filter = false, published_signals = false;
 };
 
 /// Declares --flights, --columns and, where `positional_models`, MODEL... FLIGHTS..., else --model and FLIGHTS...

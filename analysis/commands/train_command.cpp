@@ -32,6 +32,7 @@ struct TrainOptions {
   learning::NetworkSizes sizes;
   learning::RunOptions run;
   std::string gamma_scope = "layer", gamma_mode = "clip";
+  std::string weights = "errors", symmetry = "vertical";
   bool no_ground = false;
 };
 
@@ -70,6 +71,8 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
   files::Json json = result_head("train", inputs);
   json["seed"] = options.run.trainer.seed;
   json["gamma"] = options.run.trainer.gamma.value;
+  json["max_lipschitz"] =
+      options.run.max_lipschitz > 0 ? files::Json(options.run.max_lipschitz) : files::Json();
   json["samples"] = {{"fit", data.indices(Use::kFit).size()},
                      {"select", data.indices(Use::kSelect).size()},
                      {"test", data.indices(Use::kTest).size()}};
@@ -115,6 +118,9 @@ void print(const TrainOptions& options, const LearningData& data, const Outcome&
     fmt::print("Lipschitz constant of {}: at most {:.8g} gf per unit of input, proved\n", function, upper);
   fmt::print("gamma {} in every {}: {}\n", options.run.trainer.gamma.value, options.gamma_scope,
              name(outcome.certified.gamma));
+  if (options.run.max_lipschitz > 0)
+    fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
+               outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
   for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
@@ -163,6 +169,11 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   trainer.gamma.mode =
       options.gamma_mode == "clip" ? files::GammaStatement::Mode::kClip : files::GammaStatement::Mode::kEqual;
   trainer.jobs = common.jobs;
+  trainer.turns = options.symmetry == "vertical";
+  options.run.weighing =
+      options.weights == "errors" ? learning::Weighing::kErrors : learning::Weighing::kCompositions;
+  if (options.run.max_lipschitz > 0 && options.gamma_mode == "equal")
+    throw UsageError("--max-lipschitz scales layers, which --gamma-mode equal forbids");
 
   const residuals::Inputs inputs = read_flights(options.flights);
   const std::optional<residuals::Inputs> select = others(options, options.select);
@@ -257,6 +268,23 @@ Command train_command() {
                        "clip: at most the limit; equal: always the limit")
             ->check(CLI::IsMember({"clip", "equal"}))
             ->capture_default_str();
+        app.add_option(
+               "--max-lipschitz", options->run.max_lipschitz,
+               "Limit of the joint Lipschitz bounds in gf per unit of input, proved; layers that reach it "
+               "are clipped below gamma")
+            ->check(CLI::PositiveNumber);
+        app.add_option(
+               "--weights", options->weights,
+               "Compositions of kinds count the same (compositions), or the same relative to their own "
+               "errors (errors)")
+            ->check(CLI::IsMember({"compositions", "errors"}))
+            ->capture_default_str();
+        app.add_option(
+               "--symmetry", options->symmetry,
+               "vertical: every epoch turns every sample about the vertical and mirrors it, which leaves a "
+               "vertical force as it is; none: samples as recorded")
+            ->check(CLI::IsMember({"vertical", "none"}))
+            ->capture_default_str();
         app.add_option("--phi", options->sizes.phi, "Hidden layers of phi")
             ->delimiter(',')
             ->capture_default_str();
@@ -284,6 +312,8 @@ Command train_command() {
         app.add_flag("--resume", options->run.resumes, "Go on with an interrupted run in the same folder");
         app.add_flag("--published-filter", options->flights.published_filter,
                      "Cut and filter as the networks' authors did, see compare");
+        app.add_flag("--published-signals", options->flights.published_signals,
+                     "Of that, only their thrust lag, their masses and the accelerometer as it is");
         app.add_option("--report", options->report, "Write an HTML report into this folder");
         return [options](const CommonOptions& common) { return run_train(*options, common); };
       }};

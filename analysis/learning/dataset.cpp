@@ -106,18 +106,22 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
     own.insert(track.kind);
     for (const int kind : track.neighbour_kind) neighbours.insert(kinds[kind]);
   }
+  using Plane = std::array<int, 2>;
   std::vector<training::Part> parts;
-  const auto add = [&parts](const std::string& part, int inputs, const std::vector<int>& hidden,
-                            int outputs) {
+  const auto add = [&parts](const std::string& part, int inputs, const std::vector<int>& hidden, int outputs,
+                            std::vector<Plane> horizontal) {
     std::vector<int> all = {inputs};
     all.insert(all.end(), hidden.begin(), hidden.end());
     all.push_back(outputs);
-    parts.push_back({part, std::move(all), 0});
+    parts.push_back({part, std::move(all), 0, std::move(horizontal)});
   };
-  if (sizes.ground)
-    add(std::string("phi:") + files::kGroundKind, files::kGroundInputs, sizes.phi, sizes.features);
-  for (const std::string& kind : neighbours) add("phi:" + kind, kNeighbourInputs, sizes.phi, sizes.features);
-  for (const std::string& kind : own) add("rho:" + kind, sizes.features, sizes.rho, 1);
+  if (sizes.ground) {
+    add(std::string("phi:") + files::kGroundKind, files::kGroundInputs, sizes.phi, sizes.features,
+        {Plane{1, 2}});
+  }
+  for (const std::string& kind : neighbours)
+    add("phi:" + kind, kNeighbourInputs, sizes.phi, sizes.features, {Plane{0, 1}, Plane{3, 4}});
+  for (const std::string& kind : own) add("rho:" + kind, sizes.features, sizes.rho, 1, {});
   return training::Layout(std::move(parts));
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/learning/lipschitz_limit.h"
 #include "analysis/learning/projection.h"
 #include "nn/files/file_io.h"
 #include "nn/files/input_error.h"
@@ -18,6 +19,7 @@ constexpr double kPi = 3.14159265358979323846;
 /// Everything a run needs to go on.
 struct State {
   Vector trainer, best;
+  std::vector<double> shares;  ///< of the layers' limits, per part
   std::vector<Epoch> epochs;
 };
 
@@ -31,8 +33,10 @@ std::string fingerprint(const LearningData& data, const RunOptions& options) {
   for (const TrackSamples& track : data.tracks) text += name(track.use) + std::to_string(track.end);
   for (const training::Part& part : data.layout.parts()) text += part.name + bytes(part.sizes);
   const training::TrainerOptions& t = options.trainer;
-  for (const double x : {t.gamma.value, t.learning_rate, static_cast<double>(t.gamma.scope),
-                         static_cast<double>(t.gamma.mode), static_cast<double>(t.batch)})
+  for (const double x :
+       {t.gamma.value, t.learning_rate, static_cast<double>(t.gamma.scope), static_cast<double>(t.gamma.mode),
+        static_cast<double>(t.batch), static_cast<double>(t.turns), static_cast<double>(options.weighing),
+        options.max_lipschitz})
     text += std::to_string(x) + ",";
   return files::sha256(text + std::to_string(t.seed) + "," + std::to_string(options.epochs));
 }
@@ -49,11 +53,9 @@ Vector as_vector(const files::Json& json) {
 void write_checkpoint(const State& state, const std::string& key, const std::string& path) {
   files::Json epochs = files::Json::array();
   for (const Epoch& epoch : state.epochs) epochs.push_back({epoch.fit_rmse_gf, epoch.select_rmse_gf});
-  const files::Json file = {{"schema", kSchema},
-                            {"run", key},
-                            {"epochs", std::move(epochs)},
-                            {"trainer", as_json(state.trainer)},
-                            {"best", as_json(state.best)}};
+  const files::Json file = {{"schema", kSchema},           {"run", key},
+                            {"epochs", std::move(epochs)}, {"trainer", as_json(state.trainer)},
+                            {"best", as_json(state.best)}, {"shares", state.shares}};
   files::write_file(path, files::to_text(file), true);
 }
 
@@ -67,6 +69,7 @@ State read_checkpoint(const std::string& key, const std::string& path) {
     if (file.at("run") != key) refuse("run", "this checkpoint is of other flights, options or seed");
     state.trainer = as_vector(file.at("trainer"));
     state.best = as_vector(file.at("best"));
+    state.shares = file.at("shares").get<std::vector<double>>();
     for (const files::Json& epoch : file.at("epochs"))
       state.epochs.push_back({epoch.at(0).get<double>(), epoch.at(1).get<double>()});
   } catch (const files::Json::exception& error) {
@@ -93,15 +96,16 @@ Run run_training(const LearningData& data, const RunOptions& options) {
                             training::initial_parameters(data.layout, chosen.seed), chosen);
   State state;
   state.best = trainer.theta();
+  state.shares.assign(data.layout.parts().size(), 1.0);
   if (options.resumes) {
     state = read_checkpoint(key, options.checkpoint);
-    if (state.best.size() != data.layout.size() || state.epochs.empty())
+    if (state.best.size() != data.layout.size() || state.shares.size() != data.layout.parts().size() ||
+        state.epochs.empty())
       throw files::InputError(
           {options.checkpoint, "", "best", "", "not a whole checkpoint", "begin anew with --force"});
     trainer.restore(state.trainer);
   }
   Run run;
-  const std::vector<Eigen::Index> select = data.indices(Use::kSelect);
   for (int epoch = static_cast<int>(state.epochs.size()); epoch < options.epochs; ++epoch) {
     if (!state.epochs.empty() && epoch - best_of(state.epochs) > options.patience) break;
     if (options.cancelled != nullptr && *options.cancelled) {
@@ -109,12 +113,18 @@ Run run_training(const LearningData& data, const RunOptions& options) {
       break;
     }
     const double rate = chosen.learning_rate * 0.5 * (1 + std::cos(kPi * epoch / options.epochs));
-    const double fit = trainer.run_epoch(epoch, rate);
-    const double selected =
-        select.empty() ? fit
-                       : training::mean_loss(data.layout, trainer.theta(), data.samples, select, chosen.jobs);
-    state.epochs.push_back({std::sqrt(fit), std::sqrt(selected)});
-    if (best_of(state.epochs) == epoch) state.best = trainer.theta();
+    trainer.weigh(weights_by(options.weighing, data, trainer.theta(), chosen.jobs));
+    trainer.tighten(state.shares);
+    const double fit_gf = std::sqrt(trainer.run_epoch(epoch, rate));
+    Vector candidate = trainer.theta();
+    if (options.max_lipschitz > 0) {
+      const Tightening asked = scale_to(options.max_lipschitz, data.layout, chosen.jobs, candidate);
+      for (std::size_t p = 0; p < state.shares.size(); ++p)
+        state.shares[p] = std::min(1.0, state.shares[p] * asked.shares[p]);
+    }
+    const double select_gf = mean_rmse_gf(data, candidate, Use::kSelect, chosen.jobs);
+    state.epochs.push_back({fit_gf, std::isnan(select_gf) ? fit_gf : select_gf});
+    if (best_of(state.epochs) == epoch) state.best = std::move(candidate);
     state.trainer = trainer.state();
     if (!options.checkpoint.empty()) write_checkpoint(state, key, options.checkpoint);
     if (options.progress) options.progress(epoch + 1, options.epochs, state.epochs.back().select_rmse_gf);
@@ -123,6 +133,8 @@ Run run_training(const LearningData& data, const RunOptions& options) {
   run.epochs = std::move(state.epochs);
   run.best_epoch = run.epochs.empty() ? 0 : best_of(run.epochs);
   project(data.layout, chosen.gamma, run.theta);
+  if (options.max_lipschitz > 0)
+    limit_joint_bounds(options.max_lipschitz, data.layout, chosen.jobs, run.theta);
   return run;
 }
 

@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "analysis/learning/dataset.h"
+#include "analysis/learning/weighing.h"
 #include "nn/training/trainer.h"
 
 namespace swarmcert::learning {
 
 struct RunOptions {
   training::TrainerOptions trainer;
+  Weighing weighing = Weighing::kErrors;
+  double max_lipschitz = 0;  ///< joint bounds are proved to keep it; 0: no limit but gamma
   int epochs = 40;
   int patience = 10;       ///< epochs without a better score on the selecting flights before the run ends
   std::string checkpoint;  ///< file that is written after every epoch; empty: none
@@ -21,8 +23,8 @@ struct RunOptions {
   std::function<void(int done, int total, double select_rmse_gf)> progress;
 };
 
-/// Root mean square errors in gram-force: of the flights that are fitted, met during the epoch and weighted by
-/// scenario; of those that select.
+/// Root mean square errors in gram-force: of the flights that are fitted, met during the epoch and weighted; of those
+/// that select, the mean over compositions of kinds.
 struct Epoch {
   double fit_rmse_gf = 0, select_rmse_gf = 0;
 };
@@ -37,6 +39,8 @@ struct Run {
 
 /// Trains. The learning rate falls from the stated one to zero along half a cosine over `epochs`. The same data,
 /// options and seed give the same bits, whatever the number of threads and however often the run was taken up again.
+/// With max_lipschitz, epochs compete with their networks scaled to the limit, and layers whose bounds exceed it are
+/// clipped at less than gamma in the next epoch.
 /// @throws files::InputError if the checkpoint cannot be read, or is of other networks, data or options.
 Run run_training(const LearningData& data, const RunOptions& options);
 

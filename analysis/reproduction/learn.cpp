@@ -18,10 +18,10 @@ using learning::Use;
 constexpr const char* kLearnSchema = "swarmcert/learned/1";
 
 std::string text_of(const LearnOptions& options) {
-  std::string text =
-      fmt::format("{} {} {} {} {} {} {} {} {} {}", options.gamma.value, static_cast<int>(options.gamma.scope),
-                  static_cast<int>(options.gamma.mode), options.rate, options.batch, options.steps,
-                  options.epochs, options.seed, options.sizes.features, options.sizes.ground);
+  std::string text = fmt::format(
+      "{} {} {} {} {} {} {} {} {} {} {} {}", options.gamma.value, static_cast<int>(options.gamma.scope),
+      static_cast<int>(options.gamma.mode), options.max_lipschitz, options.turns, options.rate, options.batch,
+      options.steps, options.epochs, options.seed, options.sizes.features, options.sizes.ground);
   for (const int size : options.sizes.phi) text += fmt::format(" phi {}", size);
   for (const int size : options.sizes.rho) text += fmt::format(" rho {}", size);
   return text;
@@ -59,6 +59,8 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   run.trainer.gamma = options.gamma;
   run.trainer.learning_rate = options.rate;
   run.trainer.batch = options.batch;
+  run.trainer.turns = options.turns;
+  run.max_lipschitz = options.max_lipschitz;
   run.trainer.seed = options.seed;
   run.trainer.jobs = setting.jobs;
   const auto samples = static_cast<int>(data.indices(Use::kFit).size());
@@ -74,8 +76,9 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   const files::Network network = learning::write_network(data.layout, trained.theta, options.gamma, folder);
   lipschitz::CertifyOptions certify;
   certify.jobs = setting.jobs;
-  certify.lower.rounds = 0;                                              // only upper bounds are shown
-  if (!setting.full) certify.method = lipschitz::UpperMethod::kProduct;  // looser, but at once
+  certify.lower.rounds = 0;  // only upper bounds are shown
+  if (!setting.full && options.max_lipschitz == 0)
+    certify.method = lipschitz::UpperMethod::kProduct;  // looser, but at once
   const learning::Certified certified = learning::write_certificate(network, folder, certify);
   files::Json bounds = files::Json::array(), epochs = files::Json::array();
   for (const auto& [function, upper] : certified.set_bounds) bounds.push_back({function, upper});

@@ -102,7 +102,7 @@ Inputs read_inputs(const InputArguments& arguments) {
   }
   const auto complete = [&](stability::Model& model) {
     if (!arguments.network.empty()) set_network(model, arguments.network);
-    if (arguments.rules.published) set_published_mass(model);
+    if (arguments.rules.has_published_signals()) set_published_mass(model);
   };
   for (stability::Model& model : inputs.models) complete(model);
   for (auto& [vehicle, model] : inputs.vehicle_models) complete(model);

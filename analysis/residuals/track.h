@@ -35,7 +35,7 @@ struct CutRules {
   /// kept, |f_a,z| >= 50 gf dropped although that looks at the label; thrust lag 0.16 per record, no accelerometer
   /// filter.
   bool published = false;
-  /// Of these, only their thrust lag and the missing accelerometer filter.
+  /// Of these, only their thrust lag, their masses and the missing accelerometer filter.
   bool published_signals = false;
 
   bool has_published_signals() const { return published || published_signals; }

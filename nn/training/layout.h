@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,8 @@ struct Part {
   std::string name;
   std::vector<int> sizes;  ///< inputs, hidden layers, outputs
   Eigen::Index begin = 0;  ///< first parameter: per layer W (column-major, [outputs x inputs]), then b
+  /// Which inputs are x and y of one vector in the world frame: see turn_about_vertical().
+  std::vector<std::array<int, 2>> horizontal = {};
 
   int layers() const { return static_cast<int>(sizes.size()) - 1; }
   int inputs() const { return sizes.front(); }

@@ -16,7 +16,7 @@ double layer_limit(const files::GammaStatement& gamma, int layers) {
 
 SpectralNormalization::SpectralNormalization(const Layout& layout, const files::GammaStatement& gamma,
                                              const Vector& theta)
-    : layout_(&layout), gamma_(gamma) {
+    : layout_(&layout), gamma_(gamma), shares_(layout.parts().size(), 1.0) {
   for (std::size_t p = 0; p < layout.parts().size(); ++p) {
     const int part = static_cast<int>(p);
     right_.emplace_back();
@@ -43,7 +43,7 @@ void SpectralNormalization::apply(Vector& theta) {
   for (std::size_t p = 0; p < right_.size(); ++p) {
     const int part = static_cast<int>(p);
     const int layers = layout_->parts()[p].layers();
-    const double limit = layer_limit(gamma_, layers);
+    const double limit = shares_[p] * layer_limit(gamma_, layers);
     for (int k = 0; k < layers; ++k) {
       iterate(theta, part, k);
       double& norm = norms_[p][k];

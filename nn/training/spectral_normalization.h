@@ -24,6 +24,9 @@ class SpectralNormalization {
   /// One power iteration per layer, then the rescaling.
   void apply(Vector& theta);
 
+  /// From now on the limit of every layer of a part is its share of gamma's, in (0, 1]. @param shares one per part.
+  void tighten(const std::vector<double>& shares) { shares_ = shares; }
+
   /// Estimated norms, per part and layer.
   const std::vector<std::vector<double>>& norms() const { return norms_; }
 
@@ -34,6 +37,7 @@ class SpectralNormalization {
   files::GammaStatement gamma_;
   std::vector<std::vector<Vector>> right_;  ///< estimates of the leading right singular vectors
   std::vector<std::vector<double>> norms_;
+  std::vector<double> shares_;
 };
 
 }  // namespace swarmcert::training

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "nn/files/parallel.h"
+#include "nn/training/symmetry.h"
 
 namespace swarmcert::training {
 namespace {
@@ -26,11 +27,13 @@ double sum_of_weights(const Dataset& data, const Index* samples, Index count) {
 Trainer::Trainer(const Layout& layout, const Dataset& data, std::vector<Index> samples, Vector theta,
                  const TrainerOptions& options)
     : layout_(layout),
+      source_(data),
       data_(data),
       samples_(std::move(samples)),
       options_(options),
       theta_(std::move(theta)),
       adam_(layout.size()),
+      shares_(layout.parts().size(), 1.0),
       normalization_(layout, options.gamma, theta_) {
   normalization_.apply(theta_);
   gradients_.resize(static_cast<std::size_t>((options_.batch + kPiece - 1) / kPiece));
@@ -61,8 +64,10 @@ double Trainer::run_epoch(int epoch, double learning_rate) {
   files::Random random(options_.seed * 0x9e3779b97f4a7c15u + static_cast<std::uint64_t>(epoch));
   std::vector<Index> order = samples_;
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
+  if (options_.turns) turn_about_vertical(layout_, source_, random, data_);
   // Where the power iteration stands is no part of the state: begin anew, as a resumed run must.
   normalization_ = SpectralNormalization(layout_, options_.gamma, theta_);
+  normalization_.tighten(shares_);
   double loss = 0;
   const Index count = static_cast<Index>(order.size());
   for (Index at = 0; at < count; at += options_.batch) {

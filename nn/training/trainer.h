@@ -13,7 +13,8 @@ namespace swarmcert::training {
 struct TrainerOptions {
   files::GammaStatement gamma;
   double learning_rate = 1e-3;
-  int batch = 1024;  ///< samples per step
+  int batch = 1024;    ///< samples per step
+  bool turns = false;  ///< every epoch sees every sample turned about the vertical: see turn_about_vertical()
   std::uint64_t seed = 1;
   int jobs = 0;  ///< threads; 0: all. The bits of the result do not depend on it.
 };
@@ -21,8 +22,8 @@ struct TrainerOptions {
 /// Minimises deep_set_loss() / (sum of weights) with Adam and spectral normalisation after every step.
 ///
 /// A batch is cut into pieces of kPiece samples, whose gradients are summed in their order: the same bits for any
-/// number of threads. Everything that a step depends on is in theta, adam, the norms' vectors and the epoch's number,
-/// so that a run can be taken up again at the end of any epoch.
+/// number of threads. Everything that a step depends on is in theta, adam, the norms' vectors, the epoch's number, and
+/// what weigh() and tighten() were told, so that a run can be taken up again at the end of any epoch.
 class Trainer {
  public:
   /// @param layout, data must outlive the trainer.
@@ -32,6 +33,11 @@ class Trainer {
   /// One pass over the samples in an order drawn from seed and `epoch`.
   /// @returns the mean weighted squared error met on the way, before each step's update.
   double run_epoch(int epoch, double learning_rate);
+
+  /// From now on sample s of the dataset counts weights[s].
+  void weigh(std::vector<float> weights) { data_.weight = std::move(weights); }
+  /// From now on the limit of every layer of part p is shares[p] of gamma's.
+  void tighten(std::vector<double> shares) { shares_ = std::move(shares); }
 
   const Vector& theta() const { return theta_; }
   const SpectralNormalization& normalization() const { return normalization_; }
@@ -45,11 +51,13 @@ class Trainer {
   double step(const Eigen::Index* samples, Eigen::Index count, double learning_rate);
 
   const Layout& layout_;
-  const Dataset& data_;
+  const Dataset& source_;
+  Dataset data_;  ///< as this epoch sees it
   std::vector<Eigen::Index> samples_;
   TrainerOptions options_;
   Vector theta_;
   Adam adam_;
+  std::vector<double> shares_;
   SpectralNormalization normalization_;
   std::vector<Vector> gradients_;  ///< per piece of a batch
 };

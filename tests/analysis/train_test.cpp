@@ -1,3 +1,4 @@
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -60,9 +61,34 @@ TEST_F(Train, LearnsTheDownwashOfFlightsThatItDidNotSeeAndCertifiesTheResult) {
   EXPECT_LT(rmse("out/model-small.toml"), 0.7 * rmse("nominal.toml"));
 }
 
+TEST_F(Train, KeepsTheLipschitzLimitThatItWasGiven) {
+  const auto learn = [&](const std::string& options) {
+    const Outcome outcome =
+        execute(train("--epochs 20 --batch 256 --rate 5e-3 --force --json result.json " + options));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return files::read_json(folder_ / "result.json", "swarmcert/train/1");
+  };
+  const double loose = learn("-o loose")["lipschitz"].get<double>();
+  const Json tight = learn(fmt::format("-o tight --max-lipschitz {}", loose / 2));
+  EXPECT_LE(tight["lipschitz"].get<double>(), loose / 2);
+  EXPECT_EQ(tight["gamma_verdict"], "proved");
+  EXPECT_LT(tight["test_rmse"].get<double>(), tight["test_rmse_of_nothing"].get<double>());
+  // As certify sees it, from the files alone.
+  EXPECT_EQ(execute(fmt::format("swarmcert certify tight/network.toml --max-lipschitz {} -o certificate.json",
+                                loose / 2))
+                .exit_code,
+            0);
+  EXPECT_NE(execute(fmt::format(
+                        "swarmcert certify loose/network.toml --max-lipschitz {} -o certificate.json --force",
+                        loose / 2))
+                .exit_code,
+            0);
+  EXPECT_EQ(execute(train("--epochs 1 --max-lipschitz 100 --gamma-mode equal -o out")).exit_code, 2);
+}
+
 TEST_F(Train, SameSeedGivesTheSameFilesWhateverTheJobs) {
-  ASSERT_EQ(execute(train("--epochs 3 -o one -j 1")).exit_code, 0);
-  ASSERT_EQ(execute(train("--epochs 3 -o two -j 2")).exit_code, 0);
+  ASSERT_EQ(execute(train("--epochs 3 --max-lipschitz 100 -o one -j 1")).exit_code, 0);
+  ASSERT_EQ(execute(train("--epochs 3 --max-lipschitz 100 -o two -j 2")).exit_code, 0);
   ASSERT_EQ(execute(train("--epochs 3 -o other --seed 2")).exit_code, 0);
   for (const std::string file :
        {"phi_small.safetensors", "rho_small.safetensors", "phi_ground.safetensors"}) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "nn/training/symmetry.h"
 #include "nn/training/trainer.h"
 
 namespace swarmcert::training {
@@ -13,9 +14,9 @@ using Eigen::Index;
 
 /// Two kinds of neighbours, a ground term with four inputs, two kinds of vehicles, two outputs.
 Layout mixed_layout() {
-  return Layout({{"phi:ground", {4, 9, 5}, 0},
-                 {"phi:large", {6, 8, 7, 5}, 0},
-                 {"phi:small", {6, 10, 5}, 0},
+  return Layout({{"phi:ground", {4, 9, 5}, 0, {{1, 2}}},
+                 {"phi:large", {6, 8, 7, 5}, 0, {{0, 1}, {3, 4}}},
+                 {"phi:small", {6, 10, 5}, 0, {{0, 1}, {3, 4}}},
                  {"rho:large", {5, 8, 2}, 0},
                  {"rho:small", {5, 6, 6, 2}, 0}});
 }
@@ -124,6 +125,55 @@ TEST(DeepSetLoss, GradientIsTheDerivativeInEveryParameter) {
   EXPECT_EQ(compared, layout.size());
 }
 
+/// x and y of all horizontal vectors of a sample's inputs.
+std::vector<Eigen::Vector2f> horizontal_vectors(const Layout& layout, const Dataset& data, Index sample) {
+  std::vector<Eigen::Vector2f> vectors;
+  for (Index i = data.first[sample]; i < data.first[sample + 1]; ++i) {
+    for (const auto& [x, y] : layout.parts()[data.phi[i]].horizontal)
+      vectors.emplace_back(data.x[i * data.width + x], data.x[i * data.width + y]);
+  }
+  return vectors;
+}
+
+TEST(Symmetry, TurnedSamplesKeepHeightsAndWhatTheirVectorsAreToOneAnother) {
+  const Layout layout = mixed_layout();
+  const Dataset data = mixed_dataset(500, 6);
+  Dataset turned = data;
+  files::Random random(1);
+  turn_about_vertical(layout, data, random, turned);
+  int moved = 0, mirrored = 0, pairs = 0;
+  for (Index s = 0; s < data.samples(); ++s) {
+    const std::vector<Eigen::Vector2f> before = horizontal_vectors(layout, data, s),
+                                       after = horizontal_vectors(layout, turned, s);
+    const auto cross = [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
+      return a.x() * b.y() - a.y() * b.x();
+    };
+    float orientation = 0;  // of the first two vectors, and so of all
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      moved += (after[i] - before[i]).norm() > 0.01f;
+      for (std::size_t j = i; j < before.size(); ++j) {
+        EXPECT_NEAR(after[i].dot(after[j]), before[i].dot(before[j]), 1e-5f) << s;
+        if (std::abs(cross(before[i], before[j])) < 1e-3f) continue;
+        const float sign = cross(after[i], after[j]) / cross(before[i], before[j]);
+        EXPECT_NEAR(std::abs(sign), 1, 1e-2f) << s;
+        if (orientation == 0) {
+          orientation = sign;
+          ++pairs;
+          mirrored += sign < 0;
+        }
+        EXPECT_GT(sign * orientation, 0) << s << ": one vector was mirrored without the others";
+      }
+    }
+    for (Index i = data.first[s]; i < data.first[s + 1]; ++i) {
+      const int z = layout.parts()[data.phi[i]].inputs() == 4 ? 0 : 2;
+      EXPECT_EQ(turned.x[i * data.width + z], data.x[i * data.width + z]);
+    }
+  }
+  EXPECT_GT(moved, 1000);
+  EXPECT_GT(mirrored, pairs / 3);
+  EXPECT_LT(mirrored, 2 * pairs / 3);
+}
+
 TEST(Layout, LoadsWhatItStored) {
   const Layout layout = mixed_layout();
   const Vector theta = initial_parameters(layout, 5);
@@ -139,6 +189,7 @@ TrainerOptions options_with(double gamma, files::GammaStatement::Scope scope,
   TrainerOptions options;
   options.gamma = {gamma, scope, mode};
   options.batch = 256;
+  options.turns = true;
   options.jobs = 1;
   return options;
 }
@@ -165,6 +216,21 @@ TEST(SpectralNormalization, ClipKeepsEveryLayerBelowGamma) {
     }
   }
   EXPECT_GT(at_limit, 0);
+}
+
+TEST(SpectralNormalization, TightenedLayersKeepTheirShareOfGamma) {
+  const Layout layout = mixed_layout();
+  const Dataset data = mixed_dataset(600, 3);
+  Trainer trainer(layout, data, all_samples(data), 3 * initial_parameters(layout, 1),
+                  options_with(0.8, Scope::kLayer, Mode::kClip));
+  trainer.tighten({1, 1, 0.5, 1, 0.25});
+  for (int epoch = 0; epoch < 20; ++epoch) trainer.run_epoch(epoch, 1e-3);
+  const double limits[] = {0.8, 0.8, 0.4, 0.8, 0.2};
+  for (int p = 0; p < 5; ++p) {
+    for (int k = 0; k < layout.parts()[p].layers(); ++k)
+      EXPECT_LE(norm_of(layout, trainer.theta(), p, k), limits[p] * 1.01) << layout.parts()[p].name;
+  }
+  EXPECT_GT(norm_of(layout, trainer.theta(), 0, 0), 0.41) << "a part that was not tightened";
 }
 
 TEST(SpectralNormalization, EqualMakesTheProductOfTheNormsGamma) {
@@ -212,6 +278,30 @@ TEST(Trainer, ARunThatWasTakenUpAgainEndsWithTheSameBits) {
   for (int epoch = 2; epoch < 4; ++epoch) second.run_epoch(epoch, 1e-2);
   EXPECT_EQ(second.theta(), whole.theta());
   EXPECT_THROW(second.restore(Vector::Zero(3)), std::invalid_argument);
+}
+
+TEST(Trainer, TurnsLetItPredictDirectionsThatItNeverSaw) {
+  // f = 1 where the neighbour is beside, 0 where it is far; recorded to the east only.
+  const Layout layout({{"phi:default", {6, 16, 8}, 0, {{0, 1}, {3, 4}}}, {"rho:default", {8, 16, 1}, 0}});
+  files::Random random(3);
+  Dataset east, west;
+  for (int s = 0; s < 2000; ++s) {
+    const float distance = static_cast<float>(random.uniform());
+    const float force = distance < 0.5f ? 1.0f - 2 * distance : 0.0f;
+    east.add_input(0, {distance, 0, 0.3f, 0, 0, 0});
+    east.add_sample(1, {force});
+    west.add_input(0, {-distance, 0, 0.3f, 0, 0, 0});
+    west.add_sample(1, {force});
+  }
+  const auto error_to_the_west = [&](bool turns) {
+    TrainerOptions options = options_with(10, Scope::kLayer, Mode::kClip);
+    options.turns = turns;
+    Trainer trainer(layout, east, all_samples(east), initial_parameters(layout, 2), options);
+    for (int epoch = 0; epoch < 60; ++epoch) trainer.run_epoch(epoch, 1e-2);
+    return std::sqrt(mean_loss(layout, trainer.theta(), west, all_samples(west), 1));
+  };
+  EXPECT_LT(error_to_the_west(true), 0.05);
+  EXPECT_GT(error_to_the_west(false), 0.2);
 }
 
 TEST(Trainer, LearnsTheForceOfAnotherDeepSet) {

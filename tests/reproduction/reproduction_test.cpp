@@ -85,6 +85,8 @@ TEST_F(Reproduction, RecordedFlightsAreLearnedBesideThePublishedNetworks) {
   EXPECT_TRUE(found["gamma_proved"].get<bool>());
   EXPECT_EQ(found["compositions"].size(), 2u);  // alone, and with another small vehicle
   EXPECT_TRUE(found["published_networks_saw_test_flights"].get<bool>());
+  ASSERT_EQ(found["bounds"].size(), 2u);  // a small neighbour, and the ground
+  for (const Json& bound : found["bounds"]) EXPECT_LE(bound["upper"].get<double>(), 373) << bound;
   const Json& ladder = found["physics_first"];
   EXPECT_LT(ladder.back()["rms_gf"].get<double>(), ladder.front()["rms_gf"].get<double>());
 }

@@ -1,0 +1,40 @@
+/// @file Keeps the joint Lipschitz bounds of a deep set below a limit while it is trained.
+///
+/// gamma limits the product of the layers' norms, and with it the joint bound, but by an order of magnitude more than
+/// need be: networks with the same gamma differ in their joint bounds by a factor of two. Here the joint bound itself is
+/// what is limited.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nn/training/layout.h"
+
+namespace swarmcert::learning {
+
+/// A proved bound of rho(phi(x) + h) over x, for any h, in output unit per unit of input.
+struct JointBound {
+  int phi, rho;  ///< parts of the layout
+  double upper;  ///< LipSDP-Neuron or the product of the layers' norms, whichever is smaller
+};
+
+/// All pairs of a phi, that of the ground among them, and a rho.
+std::vector<JointBound> joint_bounds(const training::Layout& layout, const training::Vector& theta, int jobs);
+
+/// What one look at the bounds asks for.
+struct Tightening {
+  double largest = 0;  ///< of the bounds
+  std::vector<double>
+      shares;  ///< per part: what its layers' limit is to be multiplied by to come to the limit
+};
+
+/// Scales the last weights of each rho, and with them what the network says of differences, so that its bounds keep
+/// the limit up to rounding. Bounds grow with the product of the norms over the layers of phi and rho: shares are
+/// (limit / bound)^(1 / layers) for the largest bound that the part has a hand in, above one where there is room.
+Tightening scale_to(double limit, const training::Layout& layout, int jobs, training::Vector& theta);
+
+/// Scales until every bound is proved to keep the limit.
+/// @throws std::runtime_error if that takes more than a few tries.
+void limit_joint_bounds(double limit, const training::Layout& layout, int jobs, training::Vector& theta);
+
+}  // namespace swarmcert::learning

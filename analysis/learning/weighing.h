@@ -1,0 +1,31 @@
+/// @file How much each composition of kinds counts in training, and what is left of its force.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "analysis/learning/dataset.h"
+
+namespace swarmcert::learning {
+
+/// What makes two compositions count the same.
+enum class Weighing {
+  kCompositions,  ///< the same total weight: large vehicles, whose forces are ten times as large, decide
+  kErrors,  ///< the same total weight over its mean squared error so far: what falls is the mean logarithm
+};
+
+/// Mean squared error in gf^2 per composition of kinds, over every `stride`-th sample of `use`.
+std::map<std::string, double> errors_by_composition(const LearningData& data, const training::Vector& theta,
+                                                    Use use, int stride, int jobs);
+
+/// Mean over compositions of the root mean square error in gram-force; NaN where `use` has no sample.
+double mean_rmse_gf(const LearningData& data, const training::Vector& theta, Use use, int jobs);
+
+/// Weights of all samples for the next epoch. kErrors: sum over compositions of log(mean squared error) has, at theta,
+/// the gradient of the loss with these weights (maximum likelihood of noise whose variance each composition has of its
+/// own). They sum to the number of samples.
+std::vector<float> weights_by(Weighing weighing, const LearningData& data, const training::Vector& theta,
+                              int jobs);
+
+}  // namespace swarmcert::learning

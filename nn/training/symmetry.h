@@ -1,0 +1,18 @@
+/// @file The air does not know north: samples turned about the vertical are samples as well.
+#pragma once
+
+#include "nn/files/random.h"
+#include "nn/training/deep_set_loss.h"
+
+namespace swarmcert::training {
+
+/// Replaces the inputs of `turned` by those of `source`, each sample turned about the vertical by an angle of its own,
+/// uniform in [0, 2 pi), and mirrored in a vertical plane in half of the cases: the same for all inputs of a sample,
+/// since what they are to one another stays. Vertical forces do not change under either, so that a network which is
+/// fitted to turned samples spends nothing on directions in which the recorded ones happened to lie.
+///
+/// @param layout names the horizontal vectors of each part's inputs; parts that name none are left as they are.
+/// @param turned a copy of `source` but for its x.
+void turn_about_vertical(const Layout& layout, const Dataset& source, files::Random& random, Dataset& turned);
+
+}  // namespace swarmcert::training

@@ -1,0 +1,100 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "analysis/learning/lipschitz_limit.h"
+#include "analysis/learning/weighing.h"
+#include "nn/files/random.h"
+
+namespace swarmcert::learning {
+namespace {
+
+using Eigen::Index;
+
+/// Two compositions: forces around 1 gf of small vehicles, around 10 gf of large ones, twice as many of these.
+LearningData two_compositions() {
+  LearningData data;
+  data.layout = training::Layout(
+      {{"phi:small", {6, 10, 5}, 0}, {"rho:large", {5, 8, 1}, 0}, {"rho:small", {5, 6, 1}, 0}});
+  files::Random random(1);
+  for (const bool large : {true, false}) {
+    TrackSamples track;
+    track.composition = large ? "small>large" : "small>small";
+    track.begin = data.samples.samples();
+    const float weight = large ? 0.75f : 1.5f;  // the same total weight, as loaded
+    for (int s = 0; s < (large ? 1600 : 800); ++s) {
+      std::vector<float> x;
+      for (int k = 0; k < 6; ++k) x.push_back(static_cast<float>(random.symmetric()));
+      data.samples.add_input(0, x);
+      data.samples.add_sample(large ? 1 : 2, {static_cast<float>((large ? 10 : 1) * random.symmetric())},
+                              weight);
+    }
+    track.end = data.samples.samples();
+    data.tracks.push_back(track);
+  }
+  return data;
+}
+
+TEST(Weighing, ByErrorsFollowsTheGradientOfTheMeanLogarithm) {
+  LearningData data = two_compositions();
+  const training::Vector theta = training::initial_parameters(data.layout, 3);
+  training::Dataset weighed = data.samples;
+  weighed.weight = weights_by(Weighing::kErrors, data, theta, 1);
+  EXPECT_NEAR(std::accumulate(weighed.weight.begin(), weighed.weight.end(), 0.0), 2400, 0.5);
+  const auto gradient_of = [&](const training::Dataset& samples, Index begin, Index end) {
+    std::vector<Index> some(static_cast<std::size_t>(end - begin));
+    std::iota(some.begin(), some.end(), begin);
+    training::Vector gradient = training::Vector::Zero(data.layout.size());
+    training::deep_set_loss(data.layout, theta, samples, some.data(), end - begin, &gradient);
+    return gradient;
+  };
+  // d/dtheta sum_c log MSE_c = sum_c (d MSE_c / d theta) / MSE_c.
+  training::Dataset plain = data.samples;
+  plain.weight.assign(plain.weight.size(), 1.0f);
+  training::Vector expected = training::Vector::Zero(data.layout.size());
+  for (const TrackSamples& track : data.tracks) {
+    const double error = errors_by_composition(data, theta, Use::kFit, 1, 1).at(track.composition);
+    expected += gradient_of(plain, track.begin, track.end) /
+                static_cast<float>(error * static_cast<double>(track.end - track.begin));
+  }
+  const training::Vector found = gradient_of(weighed, 0, 2400);
+  // Errors are taken from every eighth sample: the direction is right to a few percent.
+  EXPECT_GT(found.normalized().dot(expected.normalized()), 0.99f);
+}
+
+TEST(LipschitzLimit, ScaledNetworksAreProvedToKeepItAndNothingElseChanges) {
+  const LearningData data = two_compositions();
+  const training::Vector before = 4 * training::initial_parameters(data.layout, 3);
+  training::Vector theta = before;
+  const std::vector<JointBound> loose = joint_bounds(data.layout, theta, 1);
+  ASSERT_EQ(loose.size(), 2u);
+  const double limit = 0.5 * std::min(loose[0].upper, loose[1].upper);
+  limit_joint_bounds(limit, data.layout, 1, theta);
+  for (const JointBound& bound : joint_bounds(data.layout, theta, 1)) {
+    EXPECT_LE(bound.upper, limit);
+    EXPECT_GE(bound.upper, 0.999 * limit);
+  }
+  Index changed = 0;
+  for (Index i = 0; i < theta.size(); ++i) changed += theta[i] != before[i];
+  EXPECT_LE(changed, 8 + 6) << "the last weights of both rho";
+  training::Vector again = theta;
+  limit_joint_bounds(limit, data.layout, 1, again);
+  EXPECT_EQ(again, theta) << "what keeps the limit stays";
+}
+
+TEST(LipschitzLimit, AsksForTheLayersThatHaveAHandInTheLargestBound) {
+  const LearningData data = two_compositions();
+  training::Vector theta = 4 * training::initial_parameters(data.layout, 3);
+  const std::vector<JointBound> bounds = joint_bounds(data.layout, theta, 1);
+  const bool first = bounds[0].upper > bounds[1].upper;
+  const double limit = std::sqrt(bounds[0].upper * bounds[1].upper);  // one above, one below
+  const Tightening asked = scale_to(limit, data.layout, 1, theta);
+  EXPECT_LT(asked.shares[0], 1) << "phi has a hand in both";
+  EXPECT_LT(asked.shares[static_cast<std::size_t>(bounds[first ? 0 : 1].rho)], 1);
+  EXPECT_GT(asked.shares[static_cast<std::size_t>(bounds[first ? 1 : 0].rho)], 1);
+  EXPECT_NEAR(std::pow(asked.shares[0], 4) * asked.largest, limit, 1e-9 * limit) << "two layers of each";
+}
+
+}  // namespace
+}  // namespace swarmcert::learning
