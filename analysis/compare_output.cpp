@@ -282,6 +282,15 @@ void print_compositions(const Comparison& comparison, const Comparison* own) {
   }
 }
 
+void print_damage(const Comparison& comparison) {
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    if (track.is_sound) continue;
+    std::string text;
+    for (const std::string& finding : track.findings) text += (text.empty() ? "" : "; ") + finding;
+    fmt::print("damaged: {}: {}\n", track.path, text);
+  }
+}
+
 }  // namespace
 
 void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
@@ -322,7 +331,8 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
                worst.residual_N.norm() / stability::kGramForce_N);
   }
   print_trajectories(comparison.trajectories);
-  for (const std::string& problem : comparison.problems) fmt::print("left out: {}\n", problem);
+  print_damage(comparison);
+  for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);
   if (!inputs.found.skipped.empty())
     fmt::print("{} files are no logs and were skipped\n", inputs.found.skipped.size());
 }

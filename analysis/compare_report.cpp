@@ -270,7 +270,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
                     track.clock_onsets > 0 ? fmt::format("{:.0f} ms", 1000 * track.clock_offset_s) : "-"});
   }
   report.table({"", "records cut", "the log", "clock offset"}, rows);
-  for (const std::string& problem : comparison.problems) report.paragraph("Left out: " + problem);
+  for (const std::string& problem : comparison.problems) report.paragraph("Not judged: " + problem);
   return report.write(folder, overwrite);
 }
 

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "analysis/report.h"
-#include "analysis/report_text.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -38,9 +37,8 @@ std::string values_of(const Missing& missing) {
 /// @param name of the figure.
 void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& name) {
   std::vector<std::vector<std::string>> rows;
-  std::string data;
-  for (std::size_t i = 0; i < diagnosis.ranking.size(); ++i) {
-    const Missing& missing = diagnosis.ranking[i];
+  std::vector<Bar> bars;
+  for (const Missing& missing : diagnosis.ranking) {
     const identification::Finding& finding = missing.finding;
     const bool each = !missing.specs.empty() && !missing.specs[0].vehicle.empty();
     rows.push_back({missing.effect + (each ? " of each vehicle" : ""),
@@ -50,21 +48,16 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
                     values_of(missing),
                     missing.equivalence_class == missing.effect ? "" : missing.equivalence_class,
                     joined(finding.confounded_with()), missing.excitation});
-    data += fmt::format("{} {} {} {} {}\n", i, 100 * drop(missing), 100 * finding.drop_interval.first,
-                        100 * finding.drop_interval.second, plot_field(missing.effect));
+    bars.push_back({missing.effect, 100 * drop(missing), 100 * finding.drop_interval.first,
+                    100 * finding.drop_interval.second});
   }
   report.table({"effect", "RMSE [N]", "fall, 90 %", "values, 90 %", "flights cannot tell apart",
                 "these flights cannot tell it from", "what separates them"},
                rows);
   // Kinds come from users: figures are numbered.
-  report.figure(
-      name, data,
-      "unset key\nset xlabel 'fall of the error [%]'\n"
-      "set yrange [*:*] reverse\nset offsets 0, 0, 0.5, 0.5\nset xrange [0:*]\n"
-      "plot '" +
-          name + ".dat' using 2:1:3:4:ytic(5) with xerrorbars pt 7 lw 2\n",
-      "How far each effect lowers the cross-validated error when it is added to those above it, with "
-      "90 % intervals from resampled blocks.");
+  report.bars(name, bars, "fall of the error [%]",
+              "How far each effect lowers the cross-validated error when it is added to those above it, with "
+              "90 % intervals from resampled blocks.");
 }
 
 void add_left(Report& report, const Diagnosis& diagnosis) {

@@ -188,7 +188,9 @@ int climb(const AddOptions& options, const CommonOptions& common) {
                      {"test", names_of(inputs, ladder.split.test)}};
   result["effects"] = json_of(ladder.model.effects);
   result["written"] = ladder.any_accepted;
+  result["problems"] = ladder.problems;
   if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;
+  for (const std::string& problem : ladder.problems) fmt::print(stderr, "warning: {}\n", problem);
   write_result(common, result);
   if (!ladder.too_poor.empty()) {
     fmt::print(stderr, "inconclusive: {}; 'swarmcert compare' says what was cut\n", ladder.too_poor);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -79,11 +80,23 @@ identification::Budget budget_of(const CompareOptions& options, const residuals:
 files::Json inject(const residuals::Inputs& inputs, const std::string& folder, bool overwrite) {
   namespace fs = std::filesystem;
   files::Json injected = files::Json::array(), unchanged = files::Json::array();
+  const auto place_of = [](const std::string& log) {
+    const fs::path from = fs::absolute(log).lexically_normal();
+    return (from.parent_path().filename() / from.filename()).string();
+  };
+  std::map<std::string, std::string> places;
+  for (const residuals::FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, log] : flight.logs) {
+      const auto [other, is_new] = places.emplace(fs::path(place_of(log)).replace_extension().string(), log);
+      if (!is_new)
+        throw UsageError("--inject would write " + other->second + " and " + log +
+                         " to the same place: inject them one after the other, into folders of their own");
+    }
+  }
   for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
     std::vector<std::string> problems;
     for (const residuals::Track& track : inputs.load(i, problems)) {
-      const fs::path from = fs::absolute(track.path);
-      const std::string place = from.parent_path().filename() / from.filename();
+      const std::string place = place_of(track.path);
       fs::path to = fs::path(folder) / place;
       if (!track.position_only) to.replace_extension();
       fs::create_directories(to.parent_path());
@@ -141,8 +154,9 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (comparison.overall.statistics.samples > 0) return kDone;
-  fmt::print(stderr,
-             "no usable record: nothing was compared; 'swarmcert inspect LOG' says what is in a log\n");
+  fmt::print(stderr, "no usable record: nothing was compared{}\n",
+             comparison.problems.empty() ? "; 'swarmcert inspect LOG' says what is in a log"
+                                         : ": " + comparison.problems[0]);
   return kInconclusive;
 }
 

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -166,6 +167,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   bool flag = false, inconclusive = true;
   double ratio = 0;
   std::string reasons;
+  std::vector<std::string> problems;
   files::Json depends_on = files::Json::array();
   std::vector<Diagnosis> diagnoses;
   for (const stability::Model& model : inputs.models) {
@@ -173,6 +175,11 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     const Diagnosis diagnosis =
         identification::diagnose(inputs, model.kind, identification::every_flight(inputs), common.jobs,
                                  [&](int done, int total) { progress.show(done, total, "flights"); });
+    for (const std::string& problem : diagnosis.problems) {
+      if (std::find(problems.begin(), problems.end(), problem) != problems.end()) continue;
+      fmt::print(stderr, "warning: {}\n", problem);
+      problems.push_back(problem);
+    }
     if (common.prints_text()) print(diagnosis);
     if (diagnosis.too_poor.empty()) {
       inconclusive = false;
@@ -196,6 +203,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   result["detectable"] = std::move(detectable);
   result["detectable_meaning"] = kDetectableMeaning;
   result["kinds"] = std::move(kinds);
+  result["problems"] = problems;
   if (inconclusive) result["reason"] = reasons;
   write_result(common, result);
   if (!options.report.empty()) {

@@ -28,7 +28,13 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
   }
   app.add_option("--flights", options.fleet,
                  "flights.toml: vehicles with their models (default: the published ones)");
-  app.add_option("--columns", options.columns, "columns.toml: what the columns of CSV logs mean");
+  app.add_option(
+      "--columns", options.columns,
+      "columns.toml: what the columns of CSV logs mean, per signal column, unit and frame, as in position_x "
+      "= { "
+      "column = \"px\", unit = \"mm\" }: time, position_x .. z, velocity_x .. z, specific_force_x .. z, "
+      "attitude_x .. z and _w, duty_1 .. 4, battery; if there, rate_x .. z, target_position_x .. z, "
+      "target_velocity_x .. z");
 }
 
 residuals::Inputs read_flights(const FlightOptions& options, bool own_models) {

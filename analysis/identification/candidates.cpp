@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "analysis/identification/column_run.h"
+#include "analysis/logs/read_log.h"
 #include "nn/files/parallel.h"
 #include "stability/effects/registry.h"
 
@@ -88,9 +89,14 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
     Part& part = parts[static_cast<std::size_t>(i)];
     part.covered.range = {INFINITY, -INFINITY};
-    std::vector<std::string> problems;
     for (const Track& track :
-         inputs.load(static_cast<std::size_t>(which[static_cast<std::size_t>(i)]), problems)) {
+         inputs.load(static_cast<std::size_t>(which[static_cast<std::size_t>(i)]), part.covered.problems)) {
+      if (!logs::is_sound(track.health)) {
+        std::string text;
+        for (const std::string& finding : logs::findings(track.health))
+          text += (text.empty() ? "" : "; ") + finding;
+        part.covered.problems.push_back(track.path + ": " + text);
+      }
       if (track.position_only || track.kind != kind) continue;
       part.covered.blocks += cut_into_blocks(track).blocks.size();
       for (std::size_t s = 0; s < track.instants.size(); ++s) {
@@ -118,6 +124,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
     all.blocks += part.covered.blocks;
     squares += part.squares;
     vehicles.insert(part.vehicles.begin(), part.vehicles.end());
+    all.problems.insert(all.problems.end(), part.covered.problems.begin(), part.covered.problems.end());
   }
   all.vehicles.assign(vehicles.begin(), vehicles.end());
   all.speed_rms_m_s = all.records > 0 ? std::sqrt(squares / static_cast<double>(all.records)) : 0;

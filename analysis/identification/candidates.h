@@ -31,6 +31,8 @@ struct Coverage {
   std::size_t records = 0;
   std::size_t blocks = 0;             ///< of cut_into_blocks()
   std::vector<std::string> vehicles;  ///< of the kind that flew, without those used for their position only
+  std::vector<std::string>
+      problems;  ///< logs of any kind that could not be read, and what is damaged in others
 
   /// Why these flights are too few for an answer; empty if they are not.
   std::string too_poor() const;

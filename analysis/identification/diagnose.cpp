@@ -75,10 +75,10 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates) {
         moved = true;
       }
     }
-    widen_by_bias(result.checks, result.refined);
     if (!moved || now == named || passes.records > kManyRecords) break;
     named = now;
   }
+  widen_by_bias(result.checks, instrument_with_shapes(passes, result.refined), result.refined);
   return result;
 }
 
@@ -172,9 +172,11 @@ Settled settle(const Passes& passes, const Coverage& covered) {
     result.ranking = ranking_of(passes, result.selected);
     result.rest = remainder(passes, specs_of(result.ranking));
     if (result.rest.ratio <= kLoudRatio) break;
-    const std::set<std::string> names = suspects(result.selected);
+    std::set<std::string> names = suspects(result.selected);
     if (names.empty()) break;
     result.suspected.insert(result.suspected.end(), names.begin(), names.end());
+    // A scale that follows the battery would only take the place of the scale that is too doubtful.
+    if (names.count("thrust_ratio") == 1) names.insert("battery");
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
                                     [&](const Candidate& c) { return names.count(c.name) == 1; }),
                      candidates.end());
@@ -224,6 +226,7 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.flights = static_cast<int>(which.size());
   result.blocks = covered.blocks;
   result.too_poor = covered.too_poor();
+  result.problems = covered.problems;
   if (!result.too_poor.empty()) return result;
   const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
   Settled settled = settle(passes, covered);
@@ -270,7 +273,7 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
   }
   selected.refined = refine(passes, selected.grams, selected.members);
   selected.checks = instrument(passes, candidates_of(selected.refined));
-  widen_by_bias(selected.checks, selected.refined);
+  widen_by_bias(selected.checks, instrument_with_shapes(passes, selected.refined), selected.refined);
   return ranking_of(passes, selected);
 }
 

@@ -48,6 +48,7 @@ struct Diagnosis {
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated
   std::size_t records = 0, blocks = 0;
   int flights = 0;
+  std::vector<std::string> problems;  ///< Coverage::problems
 };
 
 /// Diagnoses the model of one kind of vehicle on the flights `which`.

@@ -49,8 +49,9 @@ struct Moments {
   Eigen::VectorXd zr, xr;
 };
 
+/// @param mix [columns x unknowns]: what is fitted, as sums of columns.
 bool add_track(const residuals::Inputs& inputs, const Track& track, const Grams& columns,
-               std::vector<Moments>& blocks) {
+               const Eigen::MatrixXd& mix, std::vector<Moments>& blocks) {
   if (track.targets.size() != track.instants.size()) return false;
   const stability::Model& model = inputs.model_for(track);
   const std::vector<Eigen::Vector3d> r = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
@@ -58,14 +59,15 @@ bool add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
   const TrackBlocks cut = cut_into_blocks(track);
   ColumnRun actual(columns, inputs, model, track.vehicle), commanded(columns, inputs, model, track.vehicle);
   const std::size_t first = blocks.size();
-  const int n = columns.columns;
+  const Eigen::Index n = mix.cols();
   blocks.resize(first + cut.blocks.size(), {Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n),
                                             Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)});
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     const bool restart = track.restarts[i] != 0;
-    const Eigen::Matrix3Xd& x = actual.advance(track.instants[i], restart);
-    const Eigen::Matrix3Xd& z = commanded.advance(wanted[i], restart);
+    const Eigen::Matrix3Xd& all = actual.advance(track.instants[i], restart);
+    const Eigen::Matrix3Xd& wanted_all = commanded.advance(wanted[i], restart);
     if (cut.of_record[i] < 0) continue;
+    const Eigen::Matrix3Xd x = all * mix, z = wanted_all * mix;
     Moments& to = blocks[first + static_cast<std::size_t>(cut.of_record[i])];
     to.zx.noalias() += z.transpose() * x;
     to.xx.noalias() += x.transpose() * x;
@@ -75,49 +77,10 @@ bool add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
   return true;
 }
 
-}  // namespace
-
-bool InstrumentedValue::is_strong() const {
-  return interval.second - interval.first < std::abs(least_squares);
-}
-
-bool InstrumentedValue::contradicts() const {
-  constexpr double kSurely_z = 3, kMost = 0.5;
-  return is_strong() && std::abs(difference_z) > kSurely_z &&
-         instrument * least_squares < kMost * least_squares * least_squares;
-}
-
-double InstrumentedValue::bias() const {
-  if (!is_strong() || std::abs(difference_z) <= 1) return 0;
-  return std::abs(instrument - least_squares) * std::sqrt(1 - 1 / (difference_z * difference_z));
-}
-
-void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks, std::vector<Refined>& refined) {
-  // By the bias to both sides, and to where the instrument's own interval ends.
-  const auto widen = [](Interval& interval, const InstrumentedValue& check, double scale,
-                        const stability::Parameter& parameter) {
-    if (!check.is_strong()) return;
-    const double by = scale * check.bias();
-    interval.first = std::max(std::min(interval.first - by, scale * check.interval.first), parameter.lower);
-    interval.second =
-        std::min(std::max(interval.second + by, scale * check.interval.second), parameter.upper);
-  };
-  for (std::size_t i = 0; i < checks.size(); ++i) {
-    Refined& effect = refined[i];
-    const stability::EffectInfo& info = effect.candidate.info;
-    if (info.remembers) {
-      widen(effect.shape_intervals[0], checks[i][0], effect.theta[0], info.shape[0]);
-      continue;
-    }
-    for (std::size_t c = 0; c < checks[i].size(); ++c)
-      widen(effect.linear_intervals[c], checks[i][c], 1, info.linear[c]);
-  }
-}
-
-std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
-                                                       const std::vector<Candidate>& effects) {
-  const Grams columns = columns_of(effects);
-  const auto n = static_cast<Eigen::Index>(columns.columns);
+/// Both estimates of every unknown. Empty where a log has no set points, or nothing moves.
+std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& columns,
+                                         const Eigen::MatrixXd& mix) {
+  const Eigen::Index n = mix.cols();
   std::vector<std::vector<Moments>> pieces(passes.flights.size());
   std::vector<char> complete(passes.flights.size(), 1);
   files::parallel_for(static_cast<int>(passes.flights.size()), passes.jobs, [&](int i) {
@@ -125,7 +88,7 @@ std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
     std::vector<std::string> problems;
     for (const Track& track : passes.inputs.load(static_cast<std::size_t>(passes.flights[k]), problems)) {
       if (track.position_only || track.kind != passes.kind) continue;
-      if (!add_track(passes.inputs, track, columns, pieces[k])) complete[k] = 0;
+      if (!add_track(passes.inputs, track, columns, mix, pieces[k])) complete[k] = 0;
     }
   });
   if (n == 0 || std::find(complete.begin(), complete.end(), 0) != complete.end()) return {};
@@ -151,22 +114,155 @@ std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
       difference += (a - b).cwiseAbs2();
     }
   }
+  std::vector<InstrumentedValue> values;
+  for (Eigen::Index at = 0; at < n; ++at) {
+    InstrumentedValue value;
+    value.least_squares = by_squares[at];
+    value.instrument = by_instrument[at];
+    const double half = kQuantile90 * std::sqrt(variance[at]);
+    value.interval = {value.instrument - half, value.instrument + half};
+    const double deviation = std::sqrt(difference[at]);
+    value.difference_z = deviation > 0 ? (value.instrument - value.least_squares) / deviation : 0;
+    values.push_back(value);
+  }
+  return values;
+}
+
+/// A shape that is estimated as well: its derivative is a difference of columns.
+struct FreeShape {
+  std::size_t effect, index;
+  std::size_t lower, upper;  ///< thetas of the effect's candidate
+  double width;
+};
+
+}  // namespace
+
+bool InstrumentedValue::is_strong() const {
+  return interval.second - interval.first < std::abs(least_squares);
+}
+
+bool InstrumentedValue::contradicts() const {
+  constexpr double kSurely_z = 3, kMost = 0.5;
+  return is_strong() && std::abs(difference_z) > kSurely_z &&
+         instrument * least_squares < kMost * least_squares * least_squares;
+}
+
+double InstrumentedValue::bias() const {
+  if (!is_strong() || std::abs(difference_z) <= 1) return 0;
+  return std::abs(instrument - least_squares) * std::sqrt(1 - 1 / (difference_z * difference_z));
+}
+
+std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
+                                                       const std::vector<Candidate>& effects) {
+  const Grams columns = columns_of(effects);
+  const std::vector<InstrumentedValue> values =
+      estimates(passes, columns, Eigen::MatrixXd::Identity(columns.columns, columns.columns));
+  if (values.empty()) return {};
   std::vector<std::vector<InstrumentedValue>> result;
-  Eigen::Index at = 0;
+  auto next = values.begin();
   for (const Candidate& effect : effects) {
-    result.emplace_back();
-    for (int c = 0; c < effect.columns(); ++c, ++at) {
-      InstrumentedValue value;
-      value.least_squares = by_squares[at];
-      value.instrument = by_instrument[at];
-      const double half = kQuantile90 * std::sqrt(variance[at]);
-      value.interval = {value.instrument - half, value.instrument + half};
-      const double deviation = std::sqrt(difference[at]);
-      value.difference_z = deviation > 0 ? (value.instrument - value.least_squares) / deviation : 0;
-      result.back().push_back(value);
-    }
+    result.emplace_back(next, next + effect.columns());
+    next += effect.columns();
   }
   return result;
+}
+
+std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
+                                                      const std::vector<Refined>& refined) {
+  constexpr double kToEachSide = 0.05;  // of the shape, to both sides
+  std::vector<Candidate> around;
+  std::vector<FreeShape> free;
+  for (std::size_t e = 0; e < refined.size(); ++e) {
+    const Refined& effect = refined[e];
+    around.push_back(effect.candidate);
+    std::vector<std::vector<double>>& thetas = around.back().thetas;
+    thetas = {effect.theta};
+    if (effect.candidate.info.remembers) continue;
+    for (std::size_t i = 0; i < effect.theta.size(); ++i) {
+      const bool varies = effect.shape_intervals[i].first < effect.shape_intervals[i].second;
+      if (!varies || effect.theta[i] == 0) continue;
+      free.push_back({e, i, thetas.size(), thetas.size() + 1, 2 * kToEachSide * std::abs(effect.theta[i])});
+      for (const double sign : {-1.0, 1.0}) {
+        thetas.push_back(effect.theta);
+        thetas.back()[i] += sign * kToEachSide * std::abs(effect.theta[i]);
+      }
+    }
+  }
+  if (free.empty()) return {};
+  const Grams columns = columns_of(around);
+  Eigen::Index unknowns = static_cast<Eigen::Index>(free.size());
+  for (const Candidate& effect : around) unknowns += effect.columns();
+  Eigen::MatrixXd mix = Eigen::MatrixXd::Zero(columns.columns, unknowns);
+  Eigen::Index at = 0;
+  for (std::size_t e = 0; e < around.size(); ++e) {
+    for (int c = 0; c < around[e].columns(); ++c) mix(columns.first_column[e][0] + c, at++) = 1;
+  }
+  for (const FreeShape& shape : free) {
+    for (int c = 0; c < around[shape.effect].columns(); ++c) {
+      const double slope = refined[shape.effect].coefficients[static_cast<std::size_t>(c)] / shape.width;
+      mix(columns.first_column[shape.effect][shape.upper] + c, at) += slope;
+      mix(columns.first_column[shape.effect][shape.lower] + c, at) -= slope;
+    }
+    ++at;
+  }
+  const std::vector<InstrumentedValue> values = estimates(passes, columns, mix);
+  if (values.empty()) return {};
+  std::vector<InstrumentedShape> result;
+  auto next = values.begin();
+  for (const Refined& effect : refined) {
+    const int count = effect.candidate.columns();
+    result.push_back({{next, next + count}, std::vector<InstrumentedValue>(effect.theta.size())});
+    next += count;
+  }
+  for (const FreeShape& shape : free) {
+    InstrumentedValue value = *next++;  // a change of the shape
+    const double from = refined[shape.effect].theta[shape.index];
+    value.least_squares += from;
+    value.instrument += from;
+    value.interval = {value.interval.first + from, value.interval.second + from};
+    result[shape.effect].shapes[shape.index] = value;
+  }
+  return result;
+}
+
+void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
+                   const std::vector<InstrumentedShape>& with_shapes, std::vector<Refined>& refined) {
+  // By the bias to both sides, and to where the instrument's own interval ends.
+  const auto widen = [](Interval& interval, const InstrumentedValue& check, double scale,
+                        const stability::Parameter& parameter) {
+    if (!check.is_strong()) return;
+    const double by = scale * check.bias();
+    interval.first = std::max(std::min(interval.first - by, scale * check.interval.first), parameter.lower);
+    interval.second =
+        std::min(std::max(interval.second + by, scale * check.interval.second), parameter.upper);
+  };
+  for (std::size_t i = 0; i < checks.size(); ++i) {
+    Refined& effect = refined[i];
+    const stability::EffectInfo& info = effect.candidate.info;
+    if (info.remembers) {
+      widen(effect.shape_intervals[0], checks[i][0], effect.theta[0], info.shape[0]);
+      continue;
+    }
+    for (std::size_t c = 0; c < checks[i].size(); ++c) {
+      const bool with_shape = !with_shapes.empty() && with_shapes[i].coefficients[c].is_strong();
+      widen(effect.linear_intervals[c], with_shape ? with_shapes[i].coefficients[c] : checks[i][c], 1,
+            info.linear[c]);
+    }
+    // An error of the shape multiplies the coefficient: what has a sign may be as many times too small as too large.
+    const bool has_free_shape =
+        std::any_of(effect.shape_intervals.begin(), effect.shape_intervals.end(),
+                    [](const Interval& interval) { return interval.first < interval.second; });
+    for (std::size_t c = 0; has_free_shape && c < effect.coefficients.size(); ++c) {
+      const double value = effect.coefficients[c];
+      Interval& interval = effect.linear_intervals[c];
+      if (info.linear[c].lower >= 0 && value > 0) {
+        const double times = std::exp((interval.second - value) / value);
+        interval.second = std::min(value * times, info.linear[c].upper);
+      }
+    }
+    for (std::size_t k = 0; !with_shapes.empty() && k < effect.theta.size(); ++k)
+      widen(effect.shape_intervals[k], with_shapes[i].shapes[k], 1, info.shape[k]);
+  }
 }
 
 }  // namespace swarmcert::identification

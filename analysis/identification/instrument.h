@@ -27,14 +27,29 @@ struct InstrumentedValue {
   double bias() const;
 };
 
-/// Widens the intervals of `refined` by the bias of each coefficient, and so that they hold the instrument's where that
-/// is strong; what concerns a lag's gain falls on its time, since c (L_tau T - T) is about (L_(c tau) T - T).
-/// @param checks of the same effects, see instrument(); may be empty.
-void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks, std::vector<Refined>& refined);
-
 /// Both estimates of all coefficients of `effects` together, without bounds, effect by effect. Empty where a log has
 /// no set points, or nothing moves.
 std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
                                                        const std::vector<Candidate>& effects);
+
+/// An effect whose shape is estimated as well.
+struct InstrumentedShape {
+  std::vector<InstrumentedValue> coefficients;
+  std::vector<InstrumentedValue> shapes;  ///< by parameter; those that were held are weak
+};
+
+/// As instrument(), of coefficients and free shapes together, one Gauss-Newton step from `refined`: a disturbance that
+/// moves the vehicle bends the shape as well, and a coefficient beside a wrong shape is wrong by both estimators. Lags
+/// and delays keep their times. Empty where no shape is free.
+std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
+                                                      const std::vector<Refined>& refined);
+
+/// Widens the intervals of `refined` by the bias of each number, and so that they hold the instrument's where that is
+/// strong; what concerns a lag's gain falls on its time, since c (L_tau T - T) is about (L_(c tau) T - T). A positive
+/// coefficient beside a free shape gets the upper end of an interval of its logarithm: f = a exp(-(z - z0) / b) is seen
+/// away from z0 only, so that an error of b multiplies a.
+/// @param checks, with_shapes of the same effects, see above; may be empty.
+void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
+                   const std::vector<InstrumentedShape>& with_shapes, std::vector<Refined>& refined);
 
 }  // namespace swarmcert::identification

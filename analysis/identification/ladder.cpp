@@ -74,15 +74,22 @@ std::map<std::string, double> values_of(const stability::Model& model) {
 }
 
 /// Why the flights are too few to fit, to select or to test; empty if they are not.
-std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, const Split& split, int jobs) {
-  const std::string poor = coverage(inputs, kind, split.fit, jobs).too_poor();
-  if (!poor.empty()) return "flights for the fit: " + poor;
-  if (!split.by_flight) return "";
+/// @param problems gets those of all flights.
+std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, const Split& split, int jobs,
+                     std::vector<std::string>& problems) {
+  const auto look = [&](const std::vector<int>& which) {
+    Coverage covered = coverage(inputs, kind, which, jobs);
+    problems.insert(problems.end(), covered.problems.begin(), covered.problems.end());
+    return covered;
+  };
+  const std::string poor = look(split.fit).too_poor();
+  if (!split.by_flight) return poor.empty() ? "" : "flights for the fit: " + poor;
+  std::string nothing;
   for (const auto& [name, which] : {std::pair("select", &split.select), std::pair("test", &split.test)}) {
-    if (coverage(inputs, kind, *which, jobs).records == 0)
-      return fmt::format("the flights to {} have no usable record of kind {}", name, kind);
+    if (look(*which).records == 0)
+      nothing = fmt::format("the flights to {} have no usable record of kind {}", name, kind);
   }
-  return "";
+  return poor.empty() ? nothing : "flights for the fit: " + poor;
 }
 
 /// One candidate on top of the model of the last accepted row.
@@ -116,7 +123,7 @@ Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int 
   ladder.split = split_flights(inputs);
   const stability::Model& nominal = inputs.models[0];
   const std::string& kind = nominal.kind;
-  ladder.too_poor = too_poor(inputs, kind, ladder.split, jobs);
+  ladder.too_poor = too_poor(inputs, kind, ladder.split, jobs, ladder.problems);
   if (!ladder.too_poor.empty()) return ladder;
   ladder.earlier = nominal.ladder;
   ladder.test_looks = looks_so_far(nominal) + 1;

@@ -27,6 +27,7 @@ struct Ladder {
   bool any_accepted = false;
   std::string too_poor;  ///< why nothing was fitted; empty if something was. The rest is then empty as well.
   int test_looks = 0;    ///< including this ladder
+  std::vector<std::string> problems;  ///< Coverage::problems
 };
 
 struct LadderOptions {

@@ -1,199 +1,33 @@
 #include "analysis/identification/selection.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <random>
 
-#include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/covariance.h"
 #include "nn/files/doubles.h"
 
 namespace swarmcert::identification {
-namespace {
 
-/// Whole flights are left out where there are this many.
-constexpr std::size_t kFewestFlights = 5;
-
-}  // namespace
-
-Members without(Members members, std::size_t index) {
-  members.erase(members.begin() + static_cast<std::ptrdiff_t>(index));
-  return members;
-}
-
-Members with(Members members, const Member& added) {
-  members.push_back(added);
-  return members;
-}
-
-Selection::Selection(const Grams& grams, Thresholds thresholds) : grams_(grams), thresholds_(thresholds) {
-  // Random folds, equally many blocks in each.
-  std::mt19937_64 generator(1);
-  std::vector<int>& fold = random_.of_block;
-  for (std::size_t i = 0; i < grams.blocks.size(); ++i) fold.push_back(static_cast<int>(i % kFolds));
-  for (std::size_t i = fold.size(); i > 1; --i) std::swap(fold[i - 1], fold[generator() % i]);
-  divide(random_);
-  std::map<int, int> fold_of_flight;
-  for (const Block& block : grams.blocks)
-    fold_of_flight.emplace(block.flight, static_cast<int>(fold_of_flight.size()) % kFolds);
-  has_flights_ = fold_of_flight.size() >= kFewestFlights;
-  if (has_flights_) {
-    for (const Block& block : grams.blocks) by_flight_.of_block.push_back(fold_of_flight[block.flight]);
-    divide(by_flight_);
+/// Where the voltage falls by little, its effect is a change of scale: that is what flights show unless they clearly say
+/// more.
+int Selection::plain_form(int which) const {
+  const std::string& name = grams().candidates[static_cast<std::size_t>(which)].name;
+  if (name != "battery") return -1;
+  for (int k = 0; k < static_cast<int>(grams().candidates.size()); ++k) {
+    if (grams().candidates[static_cast<std::size_t>(k)].name == "thrust_ratio") return k;
   }
-  const Eigen::Index packed = Eigen::Index(grams.columns) * (grams.columns + 1) / 2;
-  total_.gram.setZero(packed);
-  total_.b.setZero(grams.columns);
-  for (const Sum& sum : random_.inside) {
-    total_.gram += sum.gram;
-    total_.b += sum.b;
-    total_.y += sum.y;
-    total_.records += sum.records;
-  }
+  return -1;
 }
 
-void Selection::divide(Folds& folds) const {
-  const Eigen::Index packed = Eigen::Index(grams_.columns) * (grams_.columns + 1) / 2;
-  for (Sum& sum : folds.inside) {
-    sum.gram.setZero(packed);
-    sum.b.setZero(grams_.columns);
-  }
-  for (std::size_t i = 0; i < grams_.blocks.size(); ++i) {
-    const Block& block = grams_.blocks[i];
-    Sum& sum = folds.inside[static_cast<std::size_t>(folds.of_block[i])];
-    sum.gram += block.gram;
-    sum.b += block.b;
-    sum.y += block.y;
-    sum.records += block.records;
-  }
-  for (std::size_t f = 0; f < kFolds; ++f) {
-    Sum& rest = folds.outside[f];
-    rest.gram.setZero(packed);
-    rest.b.setZero(grams_.columns);
-    for (std::size_t other = 0; other < kFolds; ++other) {
-      if (other == f) continue;
-      rest.gram += folds.inside[other].gram;
-      rest.b += folds.inside[other].b;
-    }
-  }
-}
-
-/// Whole flights, unless an effect was active in one flight only: left out, it could not be learned.
-const Selection::Folds& Selection::folds_for(const Members& members) const {
-  const bool by_flight = has_flights_ && std::all_of(members.begin(), members.end(), [&](const Member& m) {
-                           return support(m).flights >= 2 && candidate(m).vehicles.empty();
-                         });
-  return by_flight ? by_flight_ : random_;
-}
-
-std::vector<int> Selection::columns(const Members& members) const {
-  std::vector<int> all;
-  for (const Member& m : members) {
-    const int first =
-        grams_.first_column[static_cast<std::size_t>(m.candidate)][static_cast<std::size_t>(m.theta)];
-    for (int c = 0; c < candidate(m).columns(); ++c) all.push_back(first + c);
-  }
-  return all;
-}
-
-bool Selection::is_present(const Members& members, int which) const {
-  const std::string& name = grams_.candidates[static_cast<std::size_t>(which)].name;
-  return std::any_of(members.begin(), members.end(),
-                     [&](const Member& m) { return candidate(m).name == name; });
-}
-
-Eigen::VectorXd Selection::solve(const Sum& sum, const Members& members) const {
-  const std::vector<int> all = columns(members);
-  Eigen::VectorXd lower(static_cast<Eigen::Index>(all.size())), upper = lower;
-  Eigen::Index i = 0;
-  for (const Member& m : members) {
-    for (const stability::Parameter& p : candidate(m).info.linear) {
-      lower[i] = p.lower;
-      upper[i++] = p.upper;
-    }
-  }
-  return box_least_squares(part_of_gram(sum.gram, all), part_of(sum.b, all), lower, upper);
-}
-
-std::vector<Eigen::VectorXd> Selection::fold_coefficients(const Members& members) const {
-  std::vector<Eigen::VectorXd> fits;
-  for (const Sum& rest : folds_for(members).outside) fits.push_back(solve(rest, members));
-  return fits;
-}
-
-double Selection::mean_square(const Members& members) const {
-  return mean_square(members, folds_for(members));
-}
-
-double Selection::mean_square(const Members& members, const Folds& folds) const {
-  const std::vector<int> all = columns(members);
-  double error = 0;
-  for (std::size_t f = 0; f < kFolds; ++f) {
-    error += folds.inside[f].y;
-    if (all.empty()) continue;
-    const Eigen::VectorXd c = solve(folds.outside[f], members);
-    error += c.dot(part_of_gram(folds.inside[f].gram, all) * c) - 2 * c.dot(part_of(folds.inside[f].b, all));
-  }
-  return total_.records > 0 ? error / total_.records : kInfinity;
-}
-
-std::vector<double> Selection::block_errors(const Members& members) const {
-  return block_errors(members, folds_for(members));
-}
-
-std::vector<double> Selection::block_errors(const Members& members, const Folds& folds) const {
-  const std::vector<int> all = columns(members);
-  std::array<Eigen::VectorXd, kFolds> fits;
-  for (std::size_t f = 0; f < kFolds && !all.empty(); ++f) fits[f] = solve(folds.outside[f], members);
-  std::vector<double> errors;
-  for (std::size_t i = 0; i < grams_.blocks.size(); ++i) {
-    const Block& block = grams_.blocks[i];
-    double error = block.y;
-    if (!all.empty()) {
-      const Eigen::VectorXd& c = fits[static_cast<std::size_t>(folds.of_block[i])];
-      error += c.dot(part_of_gram(block.gram, all) * c) - 2 * c.dot(part_of(block.b, all));
-    }
-    errors.push_back(std::max(error, 0.0));
-  }
-  return errors;
-}
-
-Fit Selection::fit(const Members& members) const {
-  Fit result;
-  result.coefficients = solve(total_, members);
-  const std::vector<int> all = columns(members);
-  std::vector<Block> blocks;
-  std::vector<int> free;
-  for (const Block& block : grams_.blocks) {
-    Block small;
-    small.follows = block.follows;
-    small.b = part_of(block.b, all);
-    const Eigen::MatrixXd gram = part_of_gram(block.gram, all);
-    small.gram.resize(gram.rows() * (gram.rows() + 1) / 2);
-    for (int j = 0; j < gram.rows(); ++j)
-      small.gram.segment(Eigen::Index(j) * (j + 1) / 2, j + 1) = gram.col(j).head(j + 1);
-    blocks.push_back(std::move(small));
-  }
-  for (int i = 0; i < static_cast<int>(all.size()); ++i) free.push_back(i);
-  result.covariance = sandwich(blocks, free, result.coefficients);
-  return result;
-}
-
-double Selection::wald(const Members& members) const {
-  const Fit f = fit(members);
-  const Eigen::Index p = candidate(members.back()).columns();
-  const Eigen::VectorXd c = f.coefficients.tail(p);
-  Eigen::MatrixXd v = f.covariance.bottomRightCorner(p, p);
-  for (Eigen::Index i = 0; i < p; ++i) v(i, i) += 1e-12 * v(i, i) + 1e-30;
-  const double statistic = c.dot(v.ldlt().solve(c));
-  return std::sqrt(std::max(0.0, statistic - 3 * static_cast<double>(p - 1)));
+bool Selection::is_clearly_better(const Members& after, const Members& before) const {
+  constexpr double kClearly_z = 2;
+  const Folds& folds = folds_for(after);
+  return paired_z(block_errors(before, folds), block_errors(after, folds)) >= kClearly_z;
 }
 
 bool Selection::is_held(const Members& members) const {
   if (!candidate(members.back()).info.remembers) return false;
-  const Eigen::VectorXd c = solve(total_, members);
+  const Eigen::VectorXd c = coefficients(members);
   return std::abs(c[c.size() - 1] - 1) > 0.999 * kMemoryTolerance;
 }
 
@@ -201,7 +35,7 @@ Member Selection::best_theta(const Members& members, int which) const {
   Member best{which, 0};
   double least = kInfinity;
   bool best_is_held = true;
-  const auto thetas = static_cast<int>(grams_.candidates[static_cast<std::size_t>(which)].thetas.size());
+  const auto thetas = static_cast<int>(grams().candidates[static_cast<std::size_t>(which)].thetas.size());
   for (int t = 0; t < thetas; ++t) {
     const Member member{which, t};
     const Members after = with(members, member);
@@ -246,7 +80,7 @@ bool Selection::add_one(Members& members) const {
     double share() const { return after / before; }
   };
   std::vector<Choice> choices;
-  for (int k = 0; k < static_cast<int>(grams_.candidates.size()); ++k) {
+  for (int k = 0; k < static_cast<int>(grams().candidates.size()); ++k) {
     if (is_present(members, k)) continue;
     const Member member = best_theta(members, k);
     const Members after = with(members, member);
@@ -267,6 +101,14 @@ bool Selection::add_one(Members& members) const {
       if (choices[j].share() - choices[i].share() > thresholds_.swap_gain) break;
       if (choices[j].parameters < best->parameters && accepts(choices[j])) best = &choices[j];
     }
+    const int plain = plain_form(best->member.candidate);
+    for (const Choice& choice : choices) {
+      if (choice.member.candidate == plain && accepts(choice) &&
+          !is_clearly_better(with(members, best->member), with(members, choice.member))) {
+        best = &choice;
+        break;
+      }
+    }
     members.push_back(best->member);
     return true;
   }
@@ -276,7 +118,7 @@ bool Selection::add_one(Members& members) const {
 bool Selection::swap_one(Members& members) const {
   for (std::size_t i = 0; i < members.size(); ++i) {
     const Members rest = without(members, i);
-    for (int k = 0; k < static_cast<int>(grams_.candidates.size()); ++k) {
+    for (int k = 0; k < static_cast<int>(grams().candidates.size()); ++k) {
       if (is_present(rest, k)) continue;
       const Member member = best_theta(rest, k);
       if (member == members[i]) continue;
@@ -284,6 +126,7 @@ bool Selection::swap_one(Members& members) const {
       const Folds& folds = folds_for(with(instead, members[i]));
       const double now = mean_square(members, folds), then = mean_square(instead, folds);
       const bool retunes = k == members[i].candidate;
+      if (plain_form(k) == members[i].candidate && !is_clearly_better(instead, members)) continue;
       if (then < (retunes ? 1 - 1e-6 : 1 - thresholds_.swap_gain) * now &&
           is_acceptable(rest, member, mean_square(rest, folds), then, folds)) {
         members[i] = member;

@@ -144,7 +144,7 @@ SignalMap parse_columns(const std::string& text, const std::string& path) {
         table.refuse("frame", "", "differs from the frame of another axis", "all three axes need one frame");
     }
     map.push_back({in_body ? signal.signal - kForceWorld + kForceBody : signal.signal, table.text("column"),
-                   unit.multiply, unit.divide});
+                   unit.multiply, unit.divide, true});
   }
   return map;
 }

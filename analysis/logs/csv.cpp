@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <charconv>
 #include <istream>
+#include <limits>
 #include <set>
 
 #include "analysis/logs/record_source.h"
@@ -35,34 +37,53 @@ std::string trimmed(std::string text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-std::vector<std::string> split(const std::string& line) {
+std::vector<std::string> split(const std::string& line, char separator) {
   std::vector<std::string> cells;
   std::size_t begin = 0;
   while (true) {
-    const std::size_t end = line.find(',', begin);
+    const std::size_t end = line.find(separator, begin);
     cells.push_back(trimmed(line.substr(begin, end == std::string::npos ? end : end - begin)));
     if (end == std::string::npos) return cells;
     begin = end + 1;
   }
 }
 
-/// True if `line` is exactly values.size() numbers.
-bool parse_numbers(const std::string& line, std::vector<double>& values) {
+/// The first of the usual separators that `header` has.
+char separator_of(const std::string& header) {
+  for (const char separator : {',', ';', '\t'}) {
+    if (header.find(separator) != std::string::npos) return separator;
+  }
+  return ',';
+}
+
+/// The number between `at` and `end` without the blanks around it; NaN for an empty cell. Returns false for anything else.
+bool parse_cell(const char* at, const char* end, double& value) {
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
+  while (at < end && is_blank(*at)) ++at;
+  while (end > at && is_blank(end[-1])) --end;
+  value = std::numeric_limits<double>::quiet_NaN();
+  if (at == end) return true;
+  if (*at == '+') ++at;
+  double number = 0;
+  const auto [next, error] = std::from_chars(at, end, number);
+  if (error != std::errc() || next != end) return false;
+  value = number;
+  return true;
+}
+
+/// True if `line` has exactly values.size() cells, each a number or empty where the sink needs it.
+bool parse_line(const std::string& line, char separator, const RecordSink& sink,
+                std::vector<double>& values) {
   const char* at = line.data();
   const char* const end = at + line.size();
-  const auto skip_blanks = [&] {
-    while (at < end && (*at == ' ' || *at == '\t')) ++at;
-  };
   for (std::size_t i = 0; i < values.size(); ++i) {
-    skip_blanks();
-    if (at < end && *at == '+') ++at;
-    const auto [next, error] = std::from_chars(at, end, values[i]);
-    if (error != std::errc()) return false;
-    at = next;
-    skip_blanks();
-    if (i + 1 < values.size() && (at == end || *at++ != ',')) return false;
+    const char* const cell_end = std::find(at, end, separator);
+    if (!parse_cell(at, cell_end, values[i]) && sink.needs(i)) return false;
+    const bool last = i + 1 == values.size();
+    if (last != (cell_end == end)) return false;
+    at = cell_end + 1;
   }
-  return at == end;
+  return true;
 }
 
 }  // namespace
@@ -74,11 +95,14 @@ void read_csv(std::istream& in, const std::string& path, RecordSink& sink, LogHe
     throw files::InputError(
         {path, "line 1", "", "", "the file is empty", "the recording failed; leave it out"});
   }
+  const std::string kByteOrderMark = "\xEF\xBB\xBF";
+  if (line.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0) line.erase(0, kByteOrderMark.size());
   if (!line.empty() && line[0] == '#') line.erase(0, 1);
-  const std::vector<std::string> names = split(line);
+  const char separator = separator_of(line);
+  const std::vector<std::string> names = split(line, separator);
   if (names.size() < 2 || line.size() > kLongestLine_bytes) {
     throw files::InputError({path, "line 1", "header", files::in_quotes(line), "does not name columns",
-                             "the first line names them, separated by commas"});
+                             "the first line names them, separated by commas, semicolons or tabs"});
   }
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size())
     throw files::InputError({path, "line 1", "header", "", "names a column twice", "rename one of them"});
@@ -86,7 +110,7 @@ void read_csv(std::istream& in, const std::string& path, RecordSink& sink, LogHe
   std::vector<double> values(names.size());
   while (next_line(in, line, complete)) {
     if (line.empty()) continue;
-    if (parse_numbers(line, values)) {
+    if (parse_line(line, separator, sink, values)) {
       sink.record(values);
     } else if (complete) {
       ++health.damaged_lines;

@@ -36,9 +36,10 @@ struct Sample {
 
 /// Which optional groups of signals a log has.
 struct Signals {
-  bool force = false;     ///< specific force, attitude, duty and battery: a force residual can be formed
-  bool targets = false;   ///< target position and velocity
-  bool commands = false;  ///< motor forces, thrust and torque commands
+  bool force = false;       ///< specific force, attitude, duty and battery: a force residual can be formed
+  std::string force_lacks;  ///< which of these no column carries, in words; empty where `force`
+  bool targets = false;     ///< target position and velocity
+  bool commands = false;    ///< motor forces, thrust and torque commands
   bool rates = false;
 };
 

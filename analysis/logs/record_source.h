@@ -16,8 +16,10 @@ class RecordSink {
   virtual ~RecordSink() = default;
   /// @param names  of the columns, unique. The first is the time.
   virtual void begin(const std::vector<std::string>& names) = 0;
-  /// @param values one per name; valid during the call only.
+  /// @param values one per name; NaN where the file says nothing; valid during the call only.
   virtual void record(const std::vector<double>& values) = 0;
+  /// After begin(): false where text in place of the number of `column` does no harm.
+  virtual bool needs(std::size_t column) const = 0;
 };
 
 /// Old micro-SD format: u8 number of variables, that many "name(type)," tokens, u32 checksum; then blocks of u8 n,
@@ -35,7 +37,8 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
 /// @return the version
 int read_usd_events(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
 
-/// Text: a header line, which may start with "#", and lines of as many numbers.
+/// Text: a header line, which may start with "#", and lines of as many cells, separated by the first of comma, semicolon
+/// and tab that the header has. Cells are numbers, or empty; in columns that the sink does not need, anything.
 /// @throws files::InputError if the header is empty or has a name twice.
 void read_csv(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "nn/files/input_error.h"
+#include "nn/files/suggest.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -183,6 +184,11 @@ void SampleBuilder::begin(const std::vector<std::string>& names) {
   for (const SignalSource& source : s.map) {
     const auto found = std::find(names.begin(), names.end(), source.column);
     const auto signal = static_cast<std::size_t>(source.signal);
+    if (found == names.end() && source.is_certain) {
+      throw files::InputError({s.log.path, "line 1", "column", files::in_quotes(source.column),
+                               "is no column of this log, but columns.toml names it",
+                               files::did_you_mean(source.column, names)});
+    }
     if (found == names.end() || s.has[signal]) continue;
     s.has[signal] = true;
     if (source.signal == kTime) s.wraps = source.column == "tick";
@@ -201,10 +207,22 @@ void SampleBuilder::begin(const std::vector<std::string>& names) {
   const bool attitude = s.has[kPackedAttitude] || s.has_group(kAttitude, 4);
   const bool force =
       s.has_group(kForceWorld, 3) || s.has_group(kForceBody, 3) || s.has_group(kAccelerationWorld, 3);
-  signals.force = attitude && force && s.has_group(kDuty, 4) && s.has[kBattery];
+  const std::pair<bool, const char*> needed[] = {{force, "specific force"},
+                                                 {attitude, "attitude"},
+                                                 {s.has_group(kDuty, 4), "duty of the motors"},
+                                                 {s.has[kBattery], "battery voltage"}};
+  for (const auto& [present, what] : needed) {
+    if (!present) signals.force_lacks += (signals.force_lacks.empty() ? "" : ", ") + std::string(what);
+  }
+  signals.force = signals.force_lacks.empty();
   signals.targets = s.has_group(kTargetPosition, 3) && s.has_group(kTargetVelocity, 3);
   signals.commands = s.has_group(kMotorForce, 4) && s.has[kThrust] && s.has_group(kTorque, 3);
   signals.rates = s.has_group(kRates, 3);
+}
+
+bool SampleBuilder::needs(std::size_t column) const {
+  return std::any_of(state_->used.begin(), state_->used.end(),
+                     [&](const State::Used& used) { return used.column == column; });
 }
 
 void SampleBuilder::record(const std::vector<double>& raw) {

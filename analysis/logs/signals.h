@@ -35,6 +35,7 @@ struct SignalSource {
   int signal;
   std::string column;
   double multiply = 1, divide = 1;
+  bool is_certain = false;  ///< a user says that it is there
 };
 
 /// A map of columns; where two sources give one signal, the first that the file has is taken.
@@ -57,9 +58,11 @@ class SampleBuilder : public RecordSink {
   SampleBuilder(Log& log, const SignalMap& map);
   ~SampleBuilder() override;
 
-  /// @throws files::InputError if a signal that every log needs (time, position, velocity) has no column.
+  /// @throws files::InputError if a signal that every log needs (time, position, velocity) has no column, or a column
+  /// that a columns.toml names is missing.
   void begin(const std::vector<std::string>& names) override;
   void record(const std::vector<double>& raw) override;
+  bool needs(std::size_t column) const override;
   /// Call once after the last record.
   void end();
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/residuals/inputs.h"
+#include "analysis/residuals/learning_error.h"
 #include "analysis/residuals/regions.h"
 #include "analysis/residuals/statistics.h"
 #include "analysis/residuals/torque_residual.h"
@@ -65,21 +66,6 @@ struct NeighbourMap {
   std::array<std::array<Cell, kLateral>, kHeights> cells{};
 };
 
-/// Quantiles over windows of kWindow_s of the residual behind a low-pass of kBandwidth_hz.
-struct LearningError {
-  static constexpr double kWindow_s = 4.5;  ///< one pass of the published swaps
-  static constexpr double kBandwidth_hz = 5;
-  struct Quantiles {
-    Axes p50, p95, p99, max;
-  };
-  std::size_t windows = 0;
-  Quantiles bias_N;       ///< |mean| over a vehicle's flight
-  Quantiles amplitude_N;  ///< largest value
-  Quantiles rate_N_s;     ///< largest rate of change
-  Quantiles variation_N;  ///< total variation
-  Quantiles impulse_N_s;  ///< integral of the absolute value
-};
-
 /// The second level over all tracks that have it.
 struct Trajectories {
   std::string refused;  ///< why no track has it; else empty
@@ -107,7 +93,7 @@ struct Comparison {
   LearningError learning_error;
   Trajectories trajectories;
   NeighbourMap neighbours;
-  std::vector<std::string> problems;  ///< logs that could not be read
+  std::vector<std::string> problems;  ///< logs that could not be read or have no force, and why
 };
 
 /// Shows progress: flights done of all.

@@ -209,6 +209,8 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     const auto known = fleet.find(vehicle);
     track.kind = known == fleet.end() ? fallback_kind : known->second.kind;
     track.position_only = !log.signals.force || (known != fleet.end() && known->second.position_only);
+    if (!log.signals.force && !(known != fleet.end() && known->second.position_only))
+      problems.push_back(path + ": only a neighbour: no column carries " + log.signals.force_lacks);
     track.has_rates = log.signals.rates;
     track.health = log.health;
     onsets.push_back(onsets_s(log));

@@ -58,6 +58,36 @@ TEST(FlightCommands, RefuseKindsThatNobodyHasAndSuggestNamesOfEffects) {
   EXPECT_NE(effect.output.find("did you mean \"torque_bias\""), std::string::npos) << effect.output;
 }
 
+TEST(FlightCommands, RefuseToInjectTwoLogsIntoOneFile) {
+  const ScratchFolder folder;
+  fly(folder, 4, "one/flights");
+  fly(folder, 4, "two/flights");
+  const Outcome outcome =
+      run_shell("swarmcert compare " + small_model() + " one two --inject injected --force", folder.path());
+  EXPECT_EQ(outcome.exit_code, 2) << outcome.output;
+  EXPECT_NE(outcome.output.find("to the same place"), std::string::npos) << outcome.output;
+  EXPECT_FALSE(std::filesystem::exists(folder / "injected"));
+}
+
+/// One good log, one of which a line is damaged, one empty.
+TEST(FlightCommands, WarnOfLogsThatAreDamagedOrCannotBeRead) {
+  const ScratchFolder folder;
+  fly(folder, 40, "flights");
+  std::string bytes = read_text(folder / "flights/cf1_00");
+  bytes[bytes.size() / 2] ^= 1;
+  write_text(folder / "flights/cf1_01", bytes);
+  write_text(folder / "flights/cf1_02", "");
+  for (const char* command : {"diagnose", "compare"}) {
+    SCOPED_TRACE(command);
+    const Outcome outcome =
+        run_shell(std::string("swarmcert ") + command + " " + small_model() + " flights -q", folder.path());
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("cf1_01: 1 damaged place"), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("cf1_02: offset 0: the file is empty"), std::string::npos)
+        << outcome.output;
+  }
+}
+
 TEST(FlightCommands, InjectAnEffectThatDiagnoseFindsAndAddTakesOutAgain) {
   const ScratchFolder folder;
   fly(folder, 40, "flights");

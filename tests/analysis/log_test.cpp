@@ -222,6 +222,38 @@ TEST(CsvLog, LinesThatAreNotNumbersAreCounted) {
   EXPECT_TRUE(log.health.truncated);
 }
 
+TEST(CsvLog, OtherSeparatorsEmptyCellsAndColumnsOfTextAreRead) {
+  const logs::SignalMap map = logs::parse_columns(small_columns(), "columns.toml");
+  const std::string plain = small_csv(3);
+  for (const char separator : {';', '\t'}) {
+    std::string text = "\xEF\xBB\xBF";
+    for (const char c : plain) {
+      if (c == '\n')
+        text += std::string(1, separator) + (text.find('\n') == std::string::npos ? "mode" : "flying");
+      text += c == ',' ? separator : c;
+    }
+    const logs::Log log = parse(text, map);
+    EXPECT_EQ(survivors(log), (std::vector<int>{0, 1, 2})) << separator;
+    EXPECT_TRUE(logs::is_sound(log.health));
+  }
+  const logs::Log log = parse(plain + "0.05,,1,1,1,1,1\n", map);
+  EXPECT_EQ(log.health.not_finite, 1u) << "an empty cell of a needed column";
+  EXPECT_EQ(log.health.damaged_lines, 0u);
+}
+
+TEST(CsvLog, AColumnThatIsNamedButMissingIsRefusedWithASuggestion) {
+  std::string columns = small_columns();
+  const std::string name = "\"vx\"";
+  columns.replace(columns.find(name), name.size(), "\"vxx\"");
+  try {
+    parse(small_csv(3), logs::parse_columns(columns, "columns.toml"));
+    FAIL() << "accepted";
+  } catch (const files::InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("vxx"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("did you mean"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Columns, RefuseWhatTheyDoNotKnow) {
   const auto refusal_of = [](std::string text, const std::string& from, const std::string& to) {
     text.replace(text.find(from), from.size(), to);

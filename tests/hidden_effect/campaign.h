@@ -1,37 +1,12 @@
-/// @file Campaigns of hidden effects: who flies with what, and how the answers of diagnose are judged.
+/// @file Campaigns of hidden effects: how the answers of diagnose are judged.
 #pragma once
 
-#include <set>
 #include <string>
 #include <vector>
 
-#include "hidden_effect/other_simulator.h"
+#include "hidden_effect/truths.h"
 
 namespace swarmcert::tests {
-
-/// One hidden effect, or none.
-struct Hidden {
-  std::string name;
-  Truth truth;
-  std::set<std::string> answers;  ///< names that are right, any of them
-  std::set<std::string> allowed =
-      {};  ///< may be named besides: what the library's form leaves of another form
-  int vehicles = 1;
-  bool is_foreign = false;  ///< gust, or a force outside the library: must be flagged as unexplained
-  /// Same-form truths: the parameter and its true value.
-  std::string parameter = {};
-  double value = 0;
-  double tolerance = 0.1;
-};
-
-/// At least ten single effects, of the library's form and of others.
-std::vector<Hidden> single_effects();
-/// Gusts and forces that no effect of the library has.
-std::vector<Hidden> foreign_forces();
-/// Single effects in a gust: both must be said.
-std::vector<std::vector<Hidden>> disturbed();
-/// Pairs of `single_effects()` at once.
-std::vector<std::vector<Hidden>> pairs();
 
 /// What diagnose said of one flight.
 struct Answer {

@@ -210,6 +210,34 @@ TEST(HiddenEffect, OffsetsThatDifferByVehicleAreFoundByVehicle) {
   EXPECT_TRUE(loop.run("diagnose new.toml flights", "diagnose")["ranking"].empty());
 }
 
+/// A gust moves the vehicle over the ground: the controller's answer bends amplitude and decay alike.
+TEST(HiddenEffect, IntervalsOfTheGroundHoldItsAmplitudeUnderAGust) {
+  constexpr int kFlights = 20;
+  constexpr double kAmplitude = 0.16;
+  const ScratchFolder folder;
+  Truth truth;
+  truth.motor_lag_s = kUsualLag_s;
+  truth.gust_N = 0.006;
+  truth.force_N = [](const Moment& now) {
+    return Eigen::Vector3d(-0.02 * now.v_m_s +
+                           kAmplitude * now.thrust_N * std::exp(-(now.p_m.z() - 0.06) / 0.05) * now.b3);
+  };
+  Loop loop(folder);
+  int held = 0;
+  for (int i = 0; i < kFlights; ++i) {
+    std::filesystem::remove_all(folder / "flights");
+    fly(truth, {Program::kRich, 1, kFlight_s, static_cast<std::uint64_t>(100 + i)}, folder / "flights");
+    const files::Json added =
+        loop.run("add drag_linear,ground --keep-anyway --model known.toml flights -o new.toml", "add");
+    for (const files::Json& effect : added["effects"]) {
+      if (effect["effect"] != "ground") continue;
+      const files::Json& interval = effect["parameters"]["amplitude"]["interval_90"];
+      held += interval[0].get<double>() <= kAmplitude && kAmplitude <= interval[1].get<double>();
+    }
+  }
+  EXPECT_GE(held, 0.8 * kFlights) << share(held, kFlights);
+}
+
 TEST(HiddenEffect, WhatDoesNotHelpIsRefusedUnlessKeptAnyway) {
   const ScratchFolder folder;
   Loop loop(folder);

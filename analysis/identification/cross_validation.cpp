@@ -1,0 +1,196 @@
+#include "analysis/identification/cross_validation.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "analysis/identification/box_least_squares.h"
+#include "analysis/identification/covariance.h"
+#include "nn/files/doubles.h"
+
+namespace swarmcert::identification {
+namespace {
+
+/// Whole flights are left out where there are this many.
+constexpr std::size_t kFewestFlights = 5;
+
+}  // namespace
+
+Members without(Members members, std::size_t index) {
+  members.erase(members.begin() + static_cast<std::ptrdiff_t>(index));
+  return members;
+}
+
+Members with(Members members, const Member& added) {
+  members.push_back(added);
+  return members;
+}
+
+CrossValidation::CrossValidation(const Grams& grams) : grams_(grams) {
+  // Random folds, equally many blocks in each.
+  std::mt19937_64 generator(1);
+  std::vector<int>& fold = random_.of_block;
+  for (std::size_t i = 0; i < grams.blocks.size(); ++i) fold.push_back(static_cast<int>(i % kFolds));
+  for (std::size_t i = fold.size(); i > 1; --i) std::swap(fold[i - 1], fold[generator() % i]);
+  divide(random_);
+  std::map<int, int> fold_of_flight;
+  for (const Block& block : grams.blocks)
+    fold_of_flight.emplace(block.flight, static_cast<int>(fold_of_flight.size()) % kFolds);
+  has_flights_ = fold_of_flight.size() >= kFewestFlights;
+  if (has_flights_) {
+    for (const Block& block : grams.blocks) by_flight_.of_block.push_back(fold_of_flight[block.flight]);
+    divide(by_flight_);
+  }
+  const Eigen::Index packed = Eigen::Index(grams.columns) * (grams.columns + 1) / 2;
+  total_.gram.setZero(packed);
+  total_.b.setZero(grams.columns);
+  for (const Sum& sum : random_.inside) {
+    total_.gram += sum.gram;
+    total_.b += sum.b;
+    total_.y += sum.y;
+    total_.records += sum.records;
+  }
+}
+
+void CrossValidation::divide(Folds& folds) const {
+  const Eigen::Index packed = Eigen::Index(grams_.columns) * (grams_.columns + 1) / 2;
+  for (Sum& sum : folds.inside) {
+    sum.gram.setZero(packed);
+    sum.b.setZero(grams_.columns);
+  }
+  for (std::size_t i = 0; i < grams_.blocks.size(); ++i) {
+    const Block& block = grams_.blocks[i];
+    Sum& sum = folds.inside[static_cast<std::size_t>(folds.of_block[i])];
+    sum.gram += block.gram;
+    sum.b += block.b;
+    sum.y += block.y;
+    sum.records += block.records;
+  }
+  for (std::size_t f = 0; f < kFolds; ++f) {
+    Sum& rest = folds.outside[f];
+    rest.gram.setZero(packed);
+    rest.b.setZero(grams_.columns);
+    for (std::size_t other = 0; other < kFolds; ++other) {
+      if (other == f) continue;
+      rest.gram += folds.inside[other].gram;
+      rest.b += folds.inside[other].b;
+    }
+  }
+}
+
+/// Whole flights, unless an effect was active in one flight only: left out, it could not be learned.
+const CrossValidation::Folds& CrossValidation::folds_for(const Members& members) const {
+  const bool by_flight = has_flights_ && std::all_of(members.begin(), members.end(), [&](const Member& m) {
+                           return support(m).flights >= 2 && candidate(m).vehicles.empty();
+                         });
+  return by_flight ? by_flight_ : random_;
+}
+
+std::vector<int> CrossValidation::columns(const Members& members) const {
+  std::vector<int> all;
+  for (const Member& m : members) {
+    const int first =
+        grams_.first_column[static_cast<std::size_t>(m.candidate)][static_cast<std::size_t>(m.theta)];
+    for (int c = 0; c < candidate(m).columns(); ++c) all.push_back(first + c);
+  }
+  return all;
+}
+
+bool CrossValidation::is_present(const Members& members, int which) const {
+  const std::string& name = grams_.candidates[static_cast<std::size_t>(which)].name;
+  return std::any_of(members.begin(), members.end(),
+                     [&](const Member& m) { return candidate(m).name == name; });
+}
+
+Eigen::VectorXd CrossValidation::solve(const Sum& sum, const Members& members) const {
+  const std::vector<int> all = columns(members);
+  Eigen::VectorXd lower(static_cast<Eigen::Index>(all.size())), upper = lower;
+  Eigen::Index i = 0;
+  for (const Member& m : members) {
+    for (const stability::Parameter& p : candidate(m).info.linear) {
+      lower[i] = p.lower;
+      upper[i++] = p.upper;
+    }
+  }
+  return box_least_squares(part_of_gram(sum.gram, all), part_of(sum.b, all), lower, upper);
+}
+
+Eigen::VectorXd CrossValidation::coefficients(const Members& members) const { return solve(total_, members); }
+
+std::vector<Eigen::VectorXd> CrossValidation::fold_coefficients(const Members& members) const {
+  std::vector<Eigen::VectorXd> fits;
+  for (const Sum& rest : folds_for(members).outside) fits.push_back(solve(rest, members));
+  return fits;
+}
+
+double CrossValidation::mean_square(const Members& members) const {
+  return mean_square(members, folds_for(members));
+}
+
+double CrossValidation::mean_square(const Members& members, const Folds& folds) const {
+  const std::vector<int> all = columns(members);
+  double error = 0;
+  for (std::size_t f = 0; f < kFolds; ++f) {
+    error += folds.inside[f].y;
+    if (all.empty()) continue;
+    const Eigen::VectorXd c = solve(folds.outside[f], members);
+    error += c.dot(part_of_gram(folds.inside[f].gram, all) * c) - 2 * c.dot(part_of(folds.inside[f].b, all));
+  }
+  return total_.records > 0 ? error / total_.records : kInfinity;
+}
+
+std::vector<double> CrossValidation::block_errors(const Members& members) const {
+  return block_errors(members, folds_for(members));
+}
+
+std::vector<double> CrossValidation::block_errors(const Members& members, const Folds& folds) const {
+  const std::vector<int> all = columns(members);
+  std::array<Eigen::VectorXd, kFolds> fits;
+  for (std::size_t f = 0; f < kFolds && !all.empty(); ++f) fits[f] = solve(folds.outside[f], members);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < grams_.blocks.size(); ++i) {
+    const Block& block = grams_.blocks[i];
+    double error = block.y;
+    if (!all.empty()) {
+      const Eigen::VectorXd& c = fits[static_cast<std::size_t>(folds.of_block[i])];
+      error += c.dot(part_of_gram(block.gram, all) * c) - 2 * c.dot(part_of(block.b, all));
+    }
+    errors.push_back(std::max(error, 0.0));
+  }
+  return errors;
+}
+
+Fit CrossValidation::fit(const Members& members) const {
+  Fit result;
+  result.coefficients = solve(total_, members);
+  const std::vector<int> all = columns(members);
+  std::vector<Block> blocks;
+  std::vector<int> free;
+  for (const Block& block : grams_.blocks) {
+    Block small;
+    small.follows = block.follows;
+    small.b = part_of(block.b, all);
+    const Eigen::MatrixXd gram = part_of_gram(block.gram, all);
+    small.gram.resize(gram.rows() * (gram.rows() + 1) / 2);
+    for (int j = 0; j < gram.rows(); ++j)
+      small.gram.segment(Eigen::Index(j) * (j + 1) / 2, j + 1) = gram.col(j).head(j + 1);
+    blocks.push_back(std::move(small));
+  }
+  for (int i = 0; i < static_cast<int>(all.size()); ++i) free.push_back(i);
+  result.covariance = sandwich(blocks, free, result.coefficients);
+  return result;
+}
+
+double CrossValidation::wald(const Members& members) const {
+  const Fit f = fit(members);
+  const Eigen::Index p = candidate(members.back()).columns();
+  const Eigen::VectorXd c = f.coefficients.tail(p);
+  Eigen::MatrixXd v = f.covariance.bottomRightCorner(p, p);
+  for (Eigen::Index i = 0; i < p; ++i) v(i, i) += 1e-12 * v(i, i) + 1e-30;
+  const double statistic = c.dot(v.ldlt().solve(c));
+  return std::sqrt(std::max(0.0, statistic - 3 * static_cast<double>(p - 1)));
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,83 @@
+/// @file Fits of any set of effects, and how well they predict blocks that they have not seen.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "analysis/identification/block_grams.h"
+
+namespace swarmcert::identification {
+
+/// An effect with a theta of its grid.
+struct Member {
+  int candidate = 0, theta = 0;
+  bool operator==(const Member& other) const { return candidate == other.candidate && theta == other.theta; }
+};
+using Members = std::vector<Member>;
+
+/// `members` without the one at `index`; with `added` at the end.
+Members without(Members members, std::size_t index);
+Members with(Members members, const Member& added);
+
+/// A fit on all blocks.
+struct Fit {
+  Eigen::VectorXd coefficients;
+  Eigen::MatrixXd covariance;  ///< see sandwich()
+};
+
+class CrossValidation {
+ public:
+  /// @param grams must outlive this.
+  explicit CrossValidation(const Grams& grams);
+
+  /// Cross-validated mean square of the vector residual, N^2. Infinite if it cannot be fitted.
+  double mean_square(const Members& members) const;
+  /// Cross-validated squared error of each block, N^2.
+  std::vector<double> block_errors(const Members& members) const;
+  /// Coefficients of the fits without one fold each.
+  std::vector<Eigen::VectorXd> fold_coefficients(const Members& members) const;
+  /// Coefficients of the fit on all blocks, within their bounds.
+  Eigen::VectorXd coefficients(const Members& members) const;
+  Fit fit(const Members& members) const;
+  /// Cluster-robust, of the last member, on the scale of one coefficient: comparable whatever its number of columns.
+  double wald(const Members& members) const;
+
+  const Grams& grams() const { return grams_; }
+  const Candidate& candidate(const Member& member) const {
+    return grams_.candidates[static_cast<std::size_t>(member.candidate)];
+  }
+  const Support& support(const Member& member) const {
+    return grams_.support[static_cast<std::size_t>(member.candidate)][static_cast<std::size_t>(member.theta)];
+  }
+  /// True if an effect of the candidate's name is among `members`.
+  bool is_present(const Members& members, int candidate) const;
+  double records() const { return total_.records; }
+
+ protected:
+  static constexpr int kFolds = 5;
+  struct Sum {
+    Eigen::VectorXd gram, b;
+    double y = 0;
+    double records = 0;
+  };
+  /// A way to divide the blocks: at random, or by whole flights.
+  struct Folds {
+    std::vector<int> of_block;
+    std::array<Sum, kFolds> inside, outside;
+  };
+  const Folds& folds_for(const Members& members) const;
+  double mean_square(const Members& members, const Folds& folds) const;
+  std::vector<double> block_errors(const Members& members, const Folds& folds) const;
+
+ private:
+  void divide(Folds& folds) const;
+  std::vector<int> columns(const Members& members) const;
+  Eigen::VectorXd solve(const Sum& sum, const Members& members) const;
+
+  const Grams& grams_;
+  Folds random_, by_flight_;
+  bool has_flights_ = false;
+  Sum total_;
+};
+
+}  // namespace swarmcert::identification

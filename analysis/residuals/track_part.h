@@ -1,0 +1,42 @@
+/// @file One track's part of a comparison: what groups of tracks are summed from.
+#pragma once
+
+#include <vector>
+
+#include "analysis/residuals/comparison.h"
+
+namespace swarmcert::residuals {
+
+/// One used record: residual of the model, of the model without effects, and where it lies.
+struct ResidualPoint {
+  Eigen::Vector3f r, r0;
+  RegionIndices regions;
+};
+
+/// Sums that groups of tracks share.
+struct Part {
+  std::vector<ResidualPoint> points;
+  std::vector<BlockSum> blocks;
+  Spectrum spectrum;
+  double weight_N = 0;
+};
+
+/// Everything of one track.
+struct TrackPart {
+  TrackErrors errors;
+  Part part;
+  std::vector<ErrorWindow> windows;
+  std::vector<Moment> moments;
+  NeighbourMap neighbours;
+};
+
+/// Applies the models and evaluates both levels. @param track its thrust is changed.
+TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& track);
+
+/// Errors over all records of `parts`.
+GroupErrors errors_of(const std::vector<const Part*>& parts);
+
+/// Keeps the worst few, worst first.
+void sort_and_shorten(std::vector<Moment>& moments);
+
+}  // namespace swarmcert::residuals
