@@ -32,7 +32,7 @@ Format format_of(std::istream& in) {
     const auto byte = static_cast<unsigned char>(c);
     if (byte < ' ' && c != '\n' && c != '\r' && c != '\t') return Format::kUnknown;
   }
-  return start.find(',') == std::string::npos ? Format::kUnknown : Format::kCsv;
+  return start.find_first_of(",;\t") == std::string::npos ? Format::kUnknown : Format::kCsv;
 }
 
 std::ifstream open(const std::string& path) {

@@ -228,7 +228,9 @@ TEST(HiddenEffect, IntervalsOfTheGroundHoldItsAmplitudeUnderAGust) {
     std::filesystem::remove_all(folder / "flights");
     fly(truth, {Program::kRich, 1, kFlight_s, static_cast<std::uint64_t>(100 + i)}, folder / "flights");
     const files::Json added =
-        loop.run("add drag_linear,ground --keep-anyway --model known.toml flights -o new.toml", "add");
+        loop.run("add drag_linear,motor_lag,ground --keep-anyway --model " +
+                     source_path("stability/models/crazyflie-small.toml") + " flights -o new.toml",
+                 "add");
     for (const files::Json& effect : added["effects"]) {
       if (effect["effect"] != "ground") continue;
       const files::Json& interval = effect["parameters"]["amplitude"]["interval_90"];
