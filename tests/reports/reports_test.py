@@ -63,6 +63,7 @@ network = {json.dumps(str(demo / "network.toml"))}
 gains = {json.dumps(str(named))}
 model = "{model}"
 flights = [{json.dumps(str(flights))}]
+logs = 4
 [spectral_norms]
 [tracking]
 over = "corners"
