@@ -340,7 +340,7 @@ class SampledEnclosure {
   Linear k0_, k1_, rest_, second_rest_;
 };
 
-constexpr std::array<Interval VerifiedNorms::*, 4> kGains = {&VerifiedNorms::rate, &VerifiedNorms::amplitude,
+constexpr std::array<Interval VerifiedNorms::*, 4> kSampledGains = {&VerifiedNorms::rate, &VerifiedNorms::amplitude,
                                                              &VerifiedNorms::edge, &VerifiedNorms::impulse};
 
 }  // namespace
@@ -363,7 +363,7 @@ std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& lo
     const double phase_s = loop.period_s * i / kPhases;
     const VerifiedNorms here = output(model.error_at(phase_s), phase_s, at_rest);
     if (i == 0) result.at_samples = result.all_times = here;
-    for (const auto gain : kGains) {
+    for (const auto gain : kSampledGains) {
       Interval& all = result.all_times.*gain;
       all = {std::max(all.lo, (here.*gain).lo), std::max(all.hi, (here.*gain).hi)};
     }
@@ -374,7 +374,7 @@ std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& lo
     IntervalVector after(model.size() + 1);
     after[i < model.lags() ? 2 + i : model.command_index()] = 1;
     const VerifiedNorms here = output(after, 0, Interval(0));
-    for (const auto gain : kGains) (bend.*gain).hi = std::max((bend.*gain).hi, (here.*gain).hi);
+    for (const auto gain : kSampledGains) (bend.*gain).hi = std::max((bend.*gain).hi, (here.*gain).hi);
   }
   if (is_force) {
     bend.amplitude = bend.amplitude + Interval(1);
@@ -383,13 +383,13 @@ std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& lo
   }
   bend.edge = bend.amplitude;  // a force of variation 1 from rest stays below 1
   const double step_s = up(loop.period_s / kPhases * (1 + 1e-15));
-  for (const auto gain : kGains) {
+  for (const auto gain : kSampledGains) {
     Interval& all = result.all_times.*gain;
     if (std::isfinite(all.hi))
       all.hi = (Interval(all.hi) + Interval(step_s) * step_s / Interval(8) * (bend.*gain).hi).hi;
   }
   for (VerifiedNorms* const norms : {&result.at_samples, &result.all_times}) {
-    for (const auto gain : kGains) {
+    for (const auto gain : kSampledGains) {
       if (std::isfinite((norms->*gain).hi)) norms->*gain = norms->*gain / Interval(loop.plant.mass_kg);
     }
   }
