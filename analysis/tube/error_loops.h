@@ -27,7 +27,7 @@ struct ErrorLoops {
   std::string refusal;  ///< why there are none; empty where there are
 };
 
-/// @param gains with the integral gain as the firmware's step makes it act.
+/// The loops of all axes, their kernels over `slices` slices, with the integral gain as the firmware's step makes it act.
 ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices);
 
 /// Bounds of |e| and |e'| at the times of each slice.
