@@ -340,8 +340,8 @@ class SampledEnclosure {
   Linear k0_, k1_, rest_, second_rest_;
 };
 
-constexpr std::array<Interval VerifiedNorms::*, 4> kSampledGains = {&VerifiedNorms::rate, &VerifiedNorms::amplitude,
-                                                             &VerifiedNorms::edge, &VerifiedNorms::impulse};
+constexpr std::array<Interval VerifiedNorms::*, 4> kSampledGains = {
+    &VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse};
 
 }  // namespace
 

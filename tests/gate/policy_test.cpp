@@ -110,8 +110,8 @@ TEST(GateChecks, TheGuardFactorOfTheFlightsWidensTheMeasuredBound) {
 
 TEST(GateChecks, CornersPassForTheWholeBoxOnlyWhereThePolicySaysSo) {
   const ReleaseFolder release;
-  std::filesystem::copy_file(source_path("controller/gains/crazyflie-small.toml"),
-                             release / "gains.toml", std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::copy_file(source_path("controller/gains/crazyflie-small.toml"), release / "gains.toml",
+                             std::filesystem::copy_options::overwrite_existing);
   const auto row_of = [&](const std::string& body) {
     return release.judge(release.policy_of({"tracking\namplitude_N = 0.01\nguard_factor = 1\n" + body}))
         .checks.at(0);
