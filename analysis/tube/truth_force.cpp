@@ -6,6 +6,7 @@
 #include "stability/bounds/interval_functions.h"
 #include "stability/bounds/truth_bounds.h"
 #include "stability/effects/registry.h"
+#include "stability/effects/wake_shape.h"
 
 namespace swarmcert::analysis {
 
@@ -17,10 +18,6 @@ using stability::exp;
 using stability::hull;
 using stability::pow;
 
-constexpr double kReference_m = 0.3;
-constexpr double kReferenceMass_kg = 0.034;
-constexpr double kNearest_m = 0.12;
-constexpr double kTouching_m = 0.05;
 /// exp(-7^2/2), where the simulator's wakes end, rounded up.
 constexpr double kCutOff = 2.3e-11;
 /// What is smaller counts as a number between zero and this: logarithms end somewhere.
@@ -57,16 +54,16 @@ struct Strength {
 Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double spread_slope) {
   Strength result;
   const Interval z = dp[2];
-  if (z.hi <= kTouching_m) return result;
-  const Interval h = {std::max(z.lo, kNearest_m), std::max(z.hi, kNearest_m)};
+  if (z.hi <= stability::kWakeTouching_m) return result;
+  const Interval h = {std::max(z.lo, stability::kWakeNearest_m), std::max(z.hi, stability::kWakeNearest_m)};
   const Interval s = Interval(spread_m) + Interval(spread_slope) * h;
   const Interval ss = square(s);
   const Interval rr = square(dp[0]) + square(dp[1]);
   const Interval profile = exp(-(rr / (Interval(2) * ss)));
-  const Interval full = pow(Interval(kReference_m) / h, decay) * profile;
+  const Interval full = pow(Interval(stability::kWakeReference_m) / h, decay) * profile;
   // u = x^2 (3 - 2 x) rises from 0 where vehicles touch to 1 at the nearest gap of the fits.
-  const Interval range = Interval(kNearest_m) - Interval(kTouching_m);
-  const Interval x = cut((z - Interval(kTouching_m)) / range, 0, 1);
+  const Interval range = Interval(stability::kWakeNearest_m) - Interval(stability::kWakeTouching_m);
+  const Interval x = cut((z - Interval(stability::kWakeTouching_m)) / range, 0, 1);
   const auto fade = [](double t) {
     return Interval(t) * Interval(t) * (Interval(3) - Interval(2) * Interval(t));
   };
@@ -78,7 +75,9 @@ Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double
   // Below 0.12 m only u changes, above only the rest; a set on both sides has either slope.
   const Interval rises = full * (Interval(6) * x * (Interval(1) - x) / range);
   const Interval falls = full * (Interval(spread_slope) * rr / (ss * s) - Interval(decay) / h);
-  result.slope[2] = z.lo >= kNearest_m ? falls : z.hi <= kNearest_m ? rises : hull(rises, falls);
+  result.slope[2] = z.lo >= stability::kWakeNearest_m   ? falls
+                    : z.hi <= stability::kWakeNearest_m ? rises
+                                                        : hull(rises, falls);
   return result;
 }
 
@@ -95,11 +94,12 @@ TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
       if (value_of(effect, "tail") != 0 || value_of(effect, "convection_s_m") != 0) {
         refuse("has a tail or is carried along by the air, of which there is no enclosure over a tube");
       }
-      downwash_.push_back(
-          {value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"), value_of(effect, "spread_m"),
-           value_of(effect, "spread_slope"), value_of(effect, "norm_exponent"),
-           pow(Interval(truth.mass_kg) / Interval(kReferenceMass_kg), value_of(effect, "mass_exponent")),
-           for_some_only});
+      downwash_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
+                           value_of(effect, "spread_m"), value_of(effect, "spread_slope"),
+                           value_of(effect, "norm_exponent"),
+                           pow(Interval(truth.mass_kg) / Interval(stability::kWakeReferenceMass_kg),
+                               value_of(effect, "mass_exponent")),
+                           for_some_only});
     } else if (!effect.is_expression() && effect.name == "upper_lift") {
       lift_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
                        value_of(effect, "spread_m"), for_some_only});
@@ -143,9 +143,10 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
   if (field.for_some_only) force = hull(force, Interval(0));
   sum.value_N += force;
   // A wake that ends changes the sum by at most its own strength there.
-  const double cut_off = up(field.amplitude_N * field.mass_factor.hi * kCutOff *
-                            pow(Interval(kReference_m) / Interval(kNearest_m), field.decay).hi *
-                            static_cast<double>(neighbours.size()) * 1.001);
+  const double cut_off =
+      up(field.amplitude_N * field.mass_factor.hi * kCutOff *
+         pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).hi *
+         static_cast<double>(neighbours.size()) * 1.001);
   sum.cut_off_N = up(sum.cut_off_N + cut_off);
   sum.value_N += Interval(-cut_off, cut_off);
   for (std::size_t j = 0; j < each.size(); ++j) {
@@ -169,25 +170,28 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
 void TruthForce::add(const Lift& field, const std::vector<Offset>& neighbours, Wake& sum) const {
   for (std::size_t j = 0; j < neighbours.size(); ++j) {
     const Interval z = -neighbours[j][2];
-    if (z.hi <= kTouching_m) continue;
-    const Interval h = {std::max(z.lo, kNearest_m), std::max(z.hi, kNearest_m)};
+    if (z.hi <= stability::kWakeTouching_m) continue;
+    const Interval h = {std::max(z.lo, stability::kWakeNearest_m), std::max(z.hi, stability::kWakeNearest_m)};
     const Interval ss = square(Interval(field.spread_m));
     const Interval rr = square(neighbours[j][0]) + square(neighbours[j][1]);
-    Interval force = Interval(field.amplitude_N) * pow(Interval(kReference_m) / h, field.decay) *
+    Interval force = Interval(field.amplitude_N) *
+                     pow(Interval(stability::kWakeReference_m) / h, field.decay) *
                      exp(-(rr / (Interval(2) * ss)));
-    const bool may_vanish = z.lo <= kTouching_m || field.for_some_only;
+    const bool may_vanish = z.lo <= stability::kWakeTouching_m || field.for_some_only;
     if (may_vanish) force = hull(force, Interval(0));
-    if (z.lo <= kTouching_m && field.amplitude_N > 0) sum.has_gradient = false;
+    if (z.lo <= stability::kWakeTouching_m && field.amplitude_N > 0) sum.has_gradient = false;
     sum.value_N += force;
-    const double cut_off = up(field.amplitude_N * kCutOff *
-                              pow(Interval(kReference_m) / Interval(kNearest_m), field.decay).hi * 1.001);
+    const double cut_off =
+        up(field.amplitude_N * kCutOff *
+           pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).hi *
+           1.001);
     sum.cut_off_N = up(sum.cut_off_N + cut_off);
     sum.value_N += Interval(-cut_off, cut_off);
     Offset& gradient = sum.gradient_N_m[j];
     for (std::size_t k = 0; k < 2; ++k) gradient[k] += -(force * neighbours[j][k] / ss);
     // h is z beyond 0.12 m, and z = -dp_z: the force rises with dp_z.
     const Interval rise = force * Interval(field.decay) / h;
-    gradient[2] += z.lo >= kNearest_m ? rise : hull(rise, Interval(0));
+    gradient[2] += z.lo >= stability::kWakeNearest_m ? rise : hull(rise, Interval(0));
   }
 }
 

@@ -5,12 +5,11 @@
 
 #include "nn/files/doubles.h"
 #include "stability/bounds/interval_functions.h"
+#include "stability/effects/wake_shape.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr double kTouching_m = 0.05;
-constexpr double kNearest_m = 0.12;
 constexpr double kFarSpreads = 7;
 constexpr double kGap = 1e-3;
 constexpr int kMostBoxes = 6000;
@@ -22,7 +21,7 @@ Interval inverse(Interval x) { return {std::isinf(x.hi) ? 0 : down(1 / x.hi), up
 
 Interval square(Interval x) { return abs(x) * abs(x); }
 
-/// q = r / spread(h), and z, on one side of kNearest_m.
+/// q = r / spread(h), and z, on one side of kWakeNearest_m.
 struct Box {
   Interval q, z;
   double bound = 0;
@@ -32,7 +31,7 @@ struct Box {
 class Slopes {
  public:
   Slopes(const WakeField& field, Slope which) : field_(field), which_(which) {
-    at_nearest_ = pow(Interval(0.3) / Interval(kNearest_m), field.decay);
+    at_nearest_ = pow(Interval(kWakeReference_m) / Interval(kWakeNearest_m), field.decay);
   }
 
   Interval operator()(Interval q, Interval z) const {
@@ -46,14 +45,15 @@ class Slopes {
     if (is_far) E.lo = qE.lo = qqE.lo = 0;
     Interval along;
     Interval across;
-    if (z.hi <= kNearest_m) {
+    if (z.hi <= kWakeNearest_m) {
       const Interval spread =
-          Interval(field_.spread_m) + Interval(field_.spread_slope) * Interval(kNearest_m);
-      const Interval x = (z - Interval(kTouching_m)) / (Interval(kNearest_m) - Interval(kTouching_m));
+          Interval(field_.spread_m) + Interval(field_.spread_slope) * Interval(kWakeNearest_m);
+      const Interval x =
+          (z - Interval(kWakeTouching_m)) / (Interval(kWakeNearest_m) - Interval(kWakeTouching_m));
       const Interval fade = field_.fades ? smooth_step(x) : Interval(1);
-      const Interval rise =
-          field_.fades ? Interval(6) * x * (Interval(1) - x) / (Interval(kNearest_m) - Interval(kTouching_m))
-                       : Interval(0);
+      const Interval rise = field_.fades ? Interval(6) * x * (Interval(1) - x) /
+                                               (Interval(kWakeNearest_m) - Interval(kWakeTouching_m))
+                                         : Interval(0);
       along = at_nearest_ * rise * E;
       across = at_nearest_ * fade * qE / spread;
     } else {
@@ -75,7 +75,7 @@ class Slopes {
   }
 
  private:
-  Interval power(double z) const { return pow(Interval(0.3) / Interval(z), field_.decay); }
+  Interval power(double z) const { return pow(Interval(kWakeReference_m) / Interval(z), field_.decay); }
   /// x^2 (3 - 2x), which rises on [0, 1].
   static Interval smooth_step(Interval x) {
     const auto at = [](double t) {
@@ -101,8 +101,8 @@ Interval supremum(const WakeField& field, Slope which, double from_m, double to_
       reached = std::max(reached, slope(Interval(middle_q), Interval(at)).lo);
   };
   for (const Interval q : {Interval(0, kFarSpreads), Interval(kFarSpreads, kInfinity)}) {
-    if (from_m < kNearest_m) add(q, {from_m, std::min(to_m, kNearest_m)});
-    if (to_m > kNearest_m) add(q, {std::max(from_m, kNearest_m), to_m});
+    if (from_m < kWakeNearest_m) add(q, {from_m, std::min(to_m, kWakeNearest_m)});
+    if (to_m > kWakeNearest_m) add(q, {std::max(from_m, kWakeNearest_m), to_m});
   }
   for (int i = 0; i < kMostBoxes && open.top().bound > reached * (1 + kGap); ++i) {
     const Box box = open.top();
@@ -130,17 +130,17 @@ Interval supremum(const WakeField& field, Slope which, double from_m, double to_
 
 FieldSlopes field_slopes(const WakeField& field, double least_gap_m, double largest_gap_m) {
   FieldSlopes result;
-  if (largest_gap_m <= kTouching_m) return result;
-  const double from_m = std::max(least_gap_m, kTouching_m);
-  // Straight below, the field rises up to kNearest_m and falls beyond.
-  const double strongest_m = std::max(from_m, kNearest_m);
-  result.value = pow(Interval(0.3) / Interval(strongest_m), field.decay);
-  if (largest_gap_m < kNearest_m && field.fades) {
-    const Interval x =
-        (Interval(largest_gap_m) - Interval(kTouching_m)) / (Interval(kNearest_m) - Interval(kTouching_m));
+  if (largest_gap_m <= kWakeTouching_m) return result;
+  const double from_m = std::max(least_gap_m, kWakeTouching_m);
+  // Straight below, the field rises up to kWakeNearest_m and falls beyond.
+  const double strongest_m = std::max(from_m, kWakeNearest_m);
+  result.value = pow(Interval(kWakeReference_m) / Interval(strongest_m), field.decay);
+  if (largest_gap_m < kWakeNearest_m && field.fades) {
+    const Interval x = (Interval(largest_gap_m) - Interval(kWakeTouching_m)) /
+                       (Interval(kWakeNearest_m) - Interval(kWakeTouching_m));
     result.value = result.value * x * x * (Interval(3) - Interval(2) * x);
   }
-  if (!field.fades && least_gap_m <= kTouching_m) {
+  if (!field.fades && least_gap_m <= kWakeTouching_m) {
     result.total = result.across = result.along = {0, kInfinity};
     return result;
   }

@@ -4,40 +4,35 @@
 #include <cmath>
 #include <limits>
 
+#include "stability/effects/wake_shape.h"
+
 namespace swarmcert::stability {
 namespace {
-
-constexpr double kReference_m = 0.3;
-constexpr double kReferenceMass_kg = 0.034;
-constexpr double kNearest_m = 0.12;  ///< no fit reaches nearer
-constexpr double kTouching_m = 0.05;
-/// Beyond this many spreads the Gaussian, 2e-11, is taken as zero.
-constexpr double kReachInSpreads = 7;
 
 /// ln g_j without the fade u. Returns false where the neighbour does nothing.
 bool log_strength(const Neighbour& neighbour, const double* shape, double* result) {
   const double dz = neighbour.dp_W_m.z();
-  if (dz <= kTouching_m) return false;
+  if (dz <= kWakeTouching_m) return false;
   const double delay_s = shape[Downwash::kConvection] * dz;
   const double rx = neighbour.dp_W_m.x() - delay_s * neighbour.v_W_m_s.x();
   const double ry = neighbour.dp_W_m.y() - delay_s * neighbour.v_W_m_s.y();
-  const double height_m = std::max(dz, kNearest_m);
+  const double height_m = std::max(dz, kWakeNearest_m);
   const double spread_m = shape[Downwash::kSpread0] + shape[Downwash::kSpreadSlope] * height_m;
   const double in_spreads2 = (rx * rx + ry * ry) / (spread_m * spread_m);
   const double tail = shape[Downwash::kTail];
-  if (tail == 0 && in_spreads2 > kReachInSpreads * kReachInSpreads) return false;
-  *result = shape[Downwash::kDecay] * std::log(kReference_m / height_m) -
+  if (tail == 0 && in_spreads2 > kWakeReachInSpreads * kWakeReachInSpreads) return false;
+  *result = shape[Downwash::kDecay] * std::log(kWakeReference_m / height_m) -
             (tail == 0 ? 0.5 * in_spreads2 : std::log1p(0.5 * tail * in_spreads2) / tail);
-  if (neighbour.mass_kg != kReferenceMass_kg) {
-    *result += shape[Downwash::kMassExponent] * std::log(neighbour.mass_kg / kReferenceMass_kg);
+  if (neighbour.mass_kg != kWakeReferenceMass_kg) {
+    *result += shape[Downwash::kMassExponent] * std::log(neighbour.mass_kg / kWakeReferenceMass_kg);
   }
   return true;
 }
 
-/// 0 where vehicles touch, 1 from kNearest_m on, smooth between.
+/// 0 where vehicles touch, 1 from kWakeNearest_m on, smooth between.
 double fade(double dz) {
-  if (dz >= kNearest_m) return 1;
-  const double x = (dz - kTouching_m) / (kNearest_m - kTouching_m);
+  if (dz >= kWakeNearest_m) return 1;
+  const double x = (dz - kWakeTouching_m) / (kWakeNearest_m - kWakeTouching_m);
   return x * x * (3 - 2 * x);
 }
 
@@ -93,7 +88,7 @@ bool Downwash::in_support(const Instant& now, const double* shape) const {
   for (int j = 0; j < now.num_neighbours; ++j) {
     const Eigen::Vector3d& dp = now.neighbours[j].dp_W_m;
     const double spread_m = shape[kSpread0] + shape[kSpreadSlope] * dp.z();
-    if (dp.z() > kTouching_m && dp.z() < 1 && dp.head<2>().norm() < 2 * spread_m) return true;
+    if (dp.z() > kWakeTouching_m && dp.z() < 1 && dp.head<2>().norm() < 2 * spread_m) return true;
   }
   return false;
 }
@@ -116,11 +111,12 @@ std::vector<std::vector<double>> Downwash::grid(const FlightRange&) const {
 }
 
 double Downwash::reach_m(double dz_m, const double* shape) const {
-  if (dz_m <= kTouching_m) return 0;
+  if (dz_m <= kWakeTouching_m) return 0;
   if (shape[kTail] > 0) return std::numeric_limits<double>::infinity();
   // The wake lags by k dz |v|; 20 m/s is faster than anything this project flies.
   const double lag_m = shape[kConvection] * dz_m * 20;
-  return kReachInSpreads * (shape[kSpread0] + shape[kSpreadSlope] * std::max(dz_m, kNearest_m)) + lag_m;
+  return kWakeReachInSpreads * (shape[kSpread0] + shape[kSpreadSlope] * std::max(dz_m, kWakeNearest_m)) +
+         lag_m;
 }
 
 }  // namespace swarmcert::stability

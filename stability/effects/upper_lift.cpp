@@ -3,24 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stability/effects/wake_shape.h"
+
 namespace swarmcert::stability {
 namespace {
 
 enum Shape { kSpread, kExponent };
-
-constexpr double kLiftReference_m = 0.3;
-constexpr double kLiftNearest_m = 0.12;
-constexpr double kLiftTouching_m = 0.05;
-/// Beyond this many spreads the Gaussian, 2e-11, is taken as zero.
-constexpr double kLiftReachInSpreads = 7;
 
 /// Lift per newton of amplitude from one neighbour; 0 for those that are not below.
 double lift(const Neighbour& neighbour, const double* shape) {
   const double below_m = -neighbour.dp_W_m.z();
   const double r2 = neighbour.dp_W_m.head<2>().squaredNorm();
   const double s2 = shape[kSpread] * shape[kSpread];
-  if (below_m <= kLiftTouching_m || r2 > kLiftReachInSpreads * kLiftReachInSpreads * s2) return 0;
-  return std::pow(kLiftReference_m / std::max(below_m, kLiftNearest_m), shape[kExponent]) *
+  if (below_m <= kWakeTouching_m || r2 > kWakeReachInSpreads * kWakeReachInSpreads * s2) return 0;
+  return std::pow(kWakeReference_m / std::max(below_m, kWakeNearest_m), shape[kExponent]) *
          std::exp(-r2 / (2 * s2));
 }
 
@@ -47,13 +43,13 @@ void UpperLift::columns(const Instant& now, const double* shape, Wrench* columns
 bool UpperLift::in_support(const Instant& now, const double* shape) const {
   for (int j = 0; j < now.num_neighbours; ++j) {
     const Eigen::Vector3d& dp = now.neighbours[j].dp_W_m;
-    if (dp.z() < -kLiftTouching_m && dp.z() > -0.8 && dp.head<2>().norm() < 2 * shape[kSpread]) return true;
+    if (dp.z() < -kWakeTouching_m && dp.z() > -0.8 && dp.head<2>().norm() < 2 * shape[kSpread]) return true;
   }
   return false;
 }
 
 double UpperLift::reach_m(double dz_m, const double* shape) const {
-  return dz_m < -kLiftTouching_m ? kLiftReachInSpreads * shape[kSpread] : 0;
+  return dz_m < -kWakeTouching_m ? kWakeReachInSpreads * shape[kSpread] : 0;
 }
 
 }  // namespace swarmcert::stability
