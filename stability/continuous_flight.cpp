@@ -120,14 +120,19 @@ void ContinuousFlight::start(double t, const double* y) {
 
 long ContinuousFlight::evaluations() const { return integrator_->evaluations(); }
 
-/// What the flight code does at (t, y).
-struct ContinuousFlight::Control {
-  controller::FlightCommand<double> command;
-  controller::Vector3<double> rate_error;
-  Eigen::Vector3d position_error_m;
+/// What the flight code reads at (t, y).
+struct ContinuousFlight::Inputs {
+  controller::Measured<double> measured;
+  controller::FlightReference<double> reference;
+  double prediction_N;
+
+  double position_error_m(int axis) const {
+    const controller::Vector3<double> error = measured.position_W_m - reference.position_W_m;
+    return axis == 0 ? error.x : axis == 1 ? error.y : error.z;
+  }
 };
 
-ContinuousFlight::Control ContinuousFlight::control(int i, double t, const double* y) {
+ContinuousFlight::Inputs ContinuousFlight::inputs_of(int i, double t, const double* y) {
   const double* const x = y + i * kVehicleStateSize;
   const double* const own = y + swarm_.state_size() + i * kControllerSize;
   Vehicle& vehicle = vehicles_[static_cast<std::size_t>(i)];
@@ -135,48 +140,46 @@ ContinuousFlight::Control ContinuousFlight::control(int i, double t, const doubl
   const Setpoint setpoint = task_.at(i, t);
   Eigen::Matrix3d R;
   rotation_of(x + kQuaternion, &R);
-  controller::Measured<double> measured;
-  measured.position_W_m = vector(x + kPosition);
-  measured.velocity_W_m_s = vector(x + kVelocity);
-  measured.attitude = {
+  Inputs result;
+  result.measured.position_W_m = vector(x + kPosition);
+  result.measured.velocity_W_m_s = vector(x + kVelocity);
+  result.measured.attitude = {
       {{R(0, 0), R(0, 1), R(0, 2)}, {R(1, 0), R(1, 1), R(1, 2)}, {R(2, 0), R(2, 1), R(2, 2)}},
       vector(x + kOmega)};
-  measured.position_stamp_ms = measured.attitude_stamp_ms = 0;
-  measured.battery_V = input.battery_V;
-  const controller::FlightReference<double> reference = {
+  result.measured.position_stamp_ms = result.measured.attitude_stamp_ms = 0;
+  result.measured.battery_V = input.battery_V;
+  result.reference = {
       vector(setpoint.p_W_m), vector(setpoint.v_W_m_s), vector(setpoint.a_W_m_s2), {}, {}, {}};
   vehicle.memory.integral_m_s = vector(own);
   vehicle.memory.rate_integral_rad = vector(own + 3);
-  double prediction_N = 0;
-  if (!networks_.empty()) {
-    prediction_N =
-        networks_[static_cast<std::size_t>(swarm_.kind_of(i))]->force_z_N(swarm_.instant(i, t, y, input));
-  }
-  Control result;
-  result.command = vehicle.pilot->step(vehicle.memory, measured, reference, prediction_N, 0, true);
-  result.rate_error = vehicle.pilot->rate_error(vehicle.memory, measured);
-  result.position_error_m = Eigen::Vector3d(x[0], x[1], x[2]) - setpoint.p_W_m;
+  result.prediction_N =
+      networks_.empty()
+          ? 0
+          : networks_[static_cast<std::size_t>(swarm_.kind_of(i))]->force_z_N(swarm_.instant(i, t, y, input));
   return result;
 }
 
 void ContinuousFlight::derivative(double t, const double* y, double* dy) {
   for (int i = 0; i < swarm_.size(); ++i) {
     double* const d_own = dy + swarm_.state_size() + i * kControllerSize;
-    const Vehicle& vehicle = vehicles_[static_cast<std::size_t>(i)];
+    Vehicle& vehicle = vehicles_[static_cast<std::size_t>(i)];
     VehicleInput& input = inputs_[static_cast<std::size_t>(i)];
     if (disturbance_) input.disturbance_W_N = disturbance_(i, t);
-    const Control now = control(i, t, y);
+    const Inputs now = inputs_of(i, t, y);
+    const Pilot<double>::Push push =
+        vehicle.pilot->push(vehicle.memory, now.measured, now.reference, now.prediction_N);
     for (int r = 0; r < kNumRotors; ++r) {
-      input.rotor_command_N[r] = now.command.motors_off ? 0 : now.command.mixed.forces.at_N[r];
+      input.rotor_command_N[r] = push.motors_off ? 0 : push.forces.at_N[r];
     }
     std::fill(d_own, d_own + kControllerSize, 0.0);
     if (input.resting) continue;
     for (int axis = 0; axis < 3; ++axis) {
-      if (vehicle.held[static_cast<std::size_t>(axis)] == 0) d_own[axis] = now.position_error_m[axis];
+      if (vehicle.held[static_cast<std::size_t>(axis)] == 0) d_own[axis] = now.position_error_m(axis);
     }
-    d_own[3] = now.rate_error.x;
-    d_own[4] = now.rate_error.y;
-    d_own[5] = now.rate_error.z;
+    const controller::Vector3<double> rate_error = vehicle.pilot->rate_error(vehicle.memory, now.measured);
+    d_own[3] = rate_error.x;
+    d_own[4] = rate_error.y;
+    d_own[5] = rate_error.z;
   }
   swarm_.derivative(t, y, inputs_.data(), dy, kPull_1_s);
 }
@@ -190,12 +193,13 @@ void ContinuousFlight::watch(double t, const double* y, double* g) {
     const Vehicle& vehicle = vehicles_[static_cast<std::size_t>(i)];
     const VehicleInput& input = inputs_[static_cast<std::size_t>(i)];
     double* const at = g + i * kEventsPerVehicle;
-    const Control now = control(i, t, y);
-    at[0] = now.command.wanted.thrust_N - kNumRotors * swarm_.model(i).thrust.largest_N(input.battery_V);
+    const Inputs now = inputs_of(i, t, y);
+    at[0] = vehicle.pilot->wanted_thrust_N(vehicle.memory, now.measured, now.reference, now.prediction_N) -
+            kNumRotors * swarm_.model(i).thrust.largest_N(input.battery_V);
     for (int axis = 0; axis < 3; ++axis) {
       const auto index = static_cast<std::size_t>(axis);
       const double limit = vehicle.limit_m_s[index];
-      at[1 + axis] = vehicle.held[index] != 0 ? vehicle.held[index] * now.position_error_m[axis]
+      at[1 + axis] = vehicle.held[index] != 0 ? vehicle.held[index] * now.position_error_m(axis)
                      : std::isfinite(limit)   ? limit - std::abs(own[axis])
                                               : 1;
     }

@@ -60,8 +60,8 @@ class ContinuousFlight {
 
  private:
   struct Vehicle;
-  struct Control;
-  Control control(int vehicle, double t, const double* y);
+  struct Inputs;
+  Inputs inputs_of(int vehicle, double t, const double* y);
   void derivative(double t, const double* y, double* dy);
   void watch(double t, const double* y, double* g);
   void meet(int event, double t, double* y);

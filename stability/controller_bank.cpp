@@ -18,6 +18,13 @@ controller::Vector3<Scalar> narrow(const Eigen::Vector3d& v) {
   return {static_cast<Scalar>(v.x()), static_cast<Scalar>(v.y()), static_cast<Scalar>(v.z())};
 }
 
+/// What logs want of the last period.
+template <typename Scalar>
+struct Answer {
+  controller::Wrench<Scalar> wanted{};
+  controller::RotorForces<Scalar> forces{};
+};
+
 /// What flight_step() reads and writes for one vehicle, or for the lanes of several.
 template <typename Scalar>
 struct Slot {
@@ -25,59 +32,73 @@ struct Slot {
   Measured<Scalar> measured{};
   FlightReference<Scalar> reference{};
   Scalar prediction_N{};
+  Answer<Scalar> answer;
 };
 
-// Copies between one lane and one vehicle: the same list of numbers, whichever way.
-struct ToLane {
-  int lane;
-  void operator()(Lanes& lanes, const float& x) const { lanes.set(lane, x); }
+// What happens to every number of a slot.
+struct Fill {
+  const Lanes::Part& part;
+  SWARMCERT_LANE void operator()(Lanes& to, const Lanes& from) const { to = from.filled(part); }
 };
-struct FromLane {
-  int lane;
-  void operator()(const Lanes& lanes, float& x) const { x = lanes[lane]; }
+struct Take {
+  const Lanes::Part& part;
+  SWARMCERT_LANE void operator()(Lanes& to, const Lanes& from) const { to.take(from, part); }
 };
 
-template <typename A, typename B, typename Copy>
-void each(controller::Vector3<A>& a, controller::Vector3<B>& b, const Copy& copy) {
-  copy(a.x, b.x);
-  copy(a.y, b.y);
-  copy(a.z, b.z);
+template <typename Copy>
+void each(controller::Vector3<Lanes>& to, const controller::Vector3<Lanes>& from, const Copy& copy) {
+  copy(to.x, from.x);
+  copy(to.y, from.y);
+  copy(to.z, from.z);
 }
 
-template <typename A, typename B, typename Copy>
-void each(controller::Matrix3<A>& a, controller::Matrix3<B>& b, const Copy& copy) {
-  each(a.x, b.x, copy);
-  each(a.y, b.y, copy);
-  each(a.z, b.z, copy);
+template <typename Copy>
+void each(controller::Matrix3<Lanes>& to, const controller::Matrix3<Lanes>& from, const Copy& copy) {
+  each(to.x, from.x, copy);
+  each(to.y, from.y, copy);
+  each(to.z, from.z, copy);
 }
 
-template <typename A, typename B, typename Copy>
-void each(FlightReference<A>& a, FlightReference<B>& b, const Copy& copy) {
-  each(a.position_W_m, b.position_W_m, copy);
-  each(a.velocity_W_m_s, b.velocity_W_m_s, copy);
-  each(a.acceleration_W_m_s2, b.acceleration_W_m_s2, copy);
-  copy(a.heading.cosine, b.heading.cosine);
-  copy(a.heading.sine, b.heading.sine);
-  each(a.omega_R_rad_s, b.omega_R_rad_s, copy);
-  each(a.omega_dot_R_rad_s2, b.omega_dot_R_rad_s2, copy);
+template <typename Copy>
+void each(FlightReference<Lanes>& to, const FlightReference<Lanes>& from, const Copy& copy) {
+  each(to.position_W_m, from.position_W_m, copy);
+  each(to.velocity_W_m_s, from.velocity_W_m_s, copy);
+  each(to.acceleration_W_m_s2, from.acceleration_W_m_s2, copy);
+  copy(to.heading.cosine, from.heading.cosine);
+  copy(to.heading.sine, from.heading.sine);
+  each(to.omega_R_rad_s, from.omega_R_rad_s, copy);
+  each(to.omega_dot_R_rad_s2, from.omega_dot_R_rad_s2, copy);
 }
 
-/// All but the stamps and the flags, which lanes share.
-template <typename A, typename B, typename Copy>
-void each(Slot<A>& a, Slot<B>& b, const Copy& copy) {
-  each(a.memory.integral_m_s, b.memory.integral_m_s, copy);
-  each(a.memory.rate_integral_rad, b.memory.rate_integral_rad, copy);
-  each(a.memory.force_W_N, b.memory.force_W_N, copy);
-  each(a.memory.R_WR, b.memory.R_WR, copy);
-  each(a.memory.last_reference, b.memory.last_reference, copy);
-  copy(a.memory.mean_p, b.memory.mean_p);
-  each(a.measured.position_W_m, b.measured.position_W_m, copy);
-  each(a.measured.velocity_W_m_s, b.measured.velocity_W_m_s, copy);
-  each(a.measured.attitude.R_WB, b.measured.attitude.R_WB, copy);
-  each(a.measured.attitude.omega_B_rad_s, b.measured.attitude.omega_B_rad_s, copy);
-  copy(a.measured.battery_V, b.measured.battery_V);
-  each(a.reference, b.reference, copy);
-  copy(a.prediction_N, b.prediction_N);
+/// All but the flags, which are one for all lanes.
+template <typename Copy>
+void each(FlightMemory<Lanes>& to, const FlightMemory<Lanes>& from, const Copy& copy) {
+  each(to.integral_m_s, from.integral_m_s, copy);
+  each(to.rate_integral_rad, from.rate_integral_rad, copy);
+  each(to.force_W_N, from.force_W_N, copy);
+  each(to.R_WR, from.R_WR, copy);
+  each(to.last_reference, from.last_reference, copy);
+  copy(to.mean_p, from.mean_p);
+}
+
+template <typename Copy>
+void each(Answer<Lanes>& to, const Answer<Lanes>& from, const Copy& copy) {
+  copy(to.wanted.thrust_N, from.wanted.thrust_N);
+  each(to.wanted.torque_N_m, from.wanted.torque_N_m, copy);
+  for (int r = 0; r < kNumRotors; ++r) copy(to.forces.at_N[r], from.forces.at_N[r]);
+}
+
+/// What flight_step() reads, but for the stamps and the flags.
+template <typename Copy>
+void each(Slot<Lanes>& to, const Slot<Lanes>& from, const Copy& copy) {
+  each(to.memory, from.memory, copy);
+  each(to.measured.position_W_m, from.measured.position_W_m, copy);
+  each(to.measured.velocity_W_m_s, from.measured.velocity_W_m_s, copy);
+  each(to.measured.attitude.R_WB, from.measured.attitude.R_WB, copy);
+  each(to.measured.attitude.omega_B_rad_s, from.measured.attitude.omega_B_rad_s, copy);
+  copy(to.measured.battery_V, from.measured.battery_V);
+  each(to.reference, from.reference, copy);
+  copy(to.prediction_N, from.prediction_N);
 }
 
 template <typename Scalar>
@@ -102,28 +123,42 @@ void set(controller::Vector3<Lanes>& to, int lane, std::size_t vehicles, const E
 double at(float x, int) { return static_cast<double>(x); }
 double at(double x, int) { return x; }
 double at(const Lanes& x, int lane) { return static_cast<double>(x[lane]); }
-std::uint16_t at(std::uint16_t x, int) { return x; }
-std::uint16_t at(const Lanes::Registers& x, int lane) { return x[lane]; }
 
 template <typename Scalar>
 Eigen::Vector3d at(const controller::Vector3<Scalar>& v, int lane) {
   return {at(v.x, lane), at(v.y, lane), at(v.z, lane)};
 }
 
-template <typename Scalar>
-void read(const FlightCommand<Scalar>& command, const FlightMemory<Scalar>& memory, int lane,
-          ControlRecord* record) {
-  record->force_W_N = at(memory.force_W_N, lane);
-  record->thrust_N = at(command.wanted.thrust_N, lane);
-  record->torque_B_Nm = at(command.wanted.torque_N_m, lane);
-  for (int r = 0; r < kNumRotors; ++r) {
-    record->rotor_N[r] = at(command.mixed.forces.at_N[r], lane);
-    record->pwm[r] = at(command.pwm[r], lane);
-  }
-  record->integral_m_s = at(memory.integral_m_s, lane);
-  record->motors_off = command.motors_off;
+/// @param push a Pilot's.
+template <typename Push, typename Scalar>
+void read(const Push& push, const FlightMemory<Scalar>& memory, int lane, ControlRecord* record) {
+  for (int r = 0; r < kNumRotors; ++r) record->rotor_N[r] = at(push.forces.at_N[r], lane);
+  record->motors_off = push.motors_off;
   record->saturated = memory.thrust_saturated;
-  record->faults = command.faults;
+  record->faults = push.faults;
+}
+
+/// What read() leaves for report(). PWM is not computed in flight_step(), whose result for it nobody reads, but here,
+/// by the same function of the same numbers.
+template <typename Scalar>
+void read_rest(const controller::ThrustMap<double>& map, const Slot<Scalar>& slot, int lane,
+               ControlRecord* record) {
+  using Number = std::conditional_t<std::is_same_v<Scalar, Lanes>, float, Scalar>;
+  record->force_W_N = at(slot.memory.force_W_N, lane);
+  record->thrust_N = at(slot.answer.wanted.thrust_N, lane);
+  record->torque_B_Nm = at(slot.answer.wanted.torque_N_m, lane);
+  record->integral_m_s = at(slot.memory.integral_m_s, lane);
+  const controller::ThrustMap<Number> own = {static_cast<Number>(map.c00), static_cast<Number>(map.c10),
+                                             static_cast<Number>(map.c01), static_cast<Number>(map.c20),
+                                             static_cast<Number>(map.c11)};
+  const Number volts = (record->faults & controller::kBatteryFault) != 0
+                           ? Number(controller::kAssumedVoltage_V)
+                           : static_cast<Number>(at(slot.measured.battery_V, lane));
+  for (int r = 0; r < kNumRotors; ++r) {
+    const auto force_N = static_cast<Number>(at(slot.answer.forces.at_N[r], lane));
+    record->pwm[r] =
+        record->motors_off ? 0 : controller::pwm_register(controller::pwm_of_force(own, force_N, volts));
+  }
 }
 
 template <typename Scalar>
@@ -145,45 +180,102 @@ void see_attitude(const double* x, int lane, std::size_t vehicles, Slot<Lanes>* 
   set(attitude.omega_B_rad_s, lane, vehicles, {x[kOmega], x[kOmega + 1], x[kOmega + 2]});
 }
 
-/// The lanes of up to eight vehicles of one kind.
+/// The lanes of up to eight vehicles of one kind. Lanes beyond the vehicles repeat the first one.
 struct Group {
   std::vector<int> vehicles;
   Slot<Lanes> slot;
-  bool joined = false;  ///< the numbers are in `slot`; else in the vehicles' own
-  int wait = 0;         ///< periods to go on alone: lanes that disagreed tend to do so again
+  /// What lanes do not hold side by side.
+  struct Flags {
+    std::uint32_t position_stamp_ms = 0;
+    bool has_reference = false, thrust_saturated = false;
+    bool operator==(const Flags& other) const {
+      return position_stamp_ms == other.position_stamp_ms && has_reference == other.has_reference &&
+             thrust_saturated == other.thrust_saturated;
+    }
+  };
+  Flags flags[Lanes::kCount];
+  std::vector<unsigned> parts = {Lanes::kAll};  ///< lanes, as bits, that take one path through the code
+  int wait = 0;  ///< periods until all try together: lanes that disagreed tend to do so again
+
+  std::size_t vehicle_of(int lane) const {
+    const auto k = static_cast<std::size_t>(lane);
+    return static_cast<std::size_t>(k < vehicles.size() ? vehicles[k] : vehicles.front());
+  }
+  const Flags& flags_of(int lane) const { return flags[lane < static_cast<int>(vehicles.size()) ? lane : 0]; }
 };
 
-/// Lanes beyond the vehicles repeat the first one.
-std::size_t vehicle_of(const Group& group, int lane) {
-  const auto k = static_cast<std::size_t>(lane);
-  return static_cast<std::size_t>(k < group.vehicles.size() ? group.vehicles[k] : group.vehicles.front());
+int first_of(unsigned lanes) {
+  int lane = 0;
+  while ((lanes >> lane & 1) == 0) ++lane;
+  return lane;
 }
 
-/// One control period of a group; false, and nothing changed, where its lanes disagree.
-template <typename Settings>
-SWARMCERT_FOR_LANES bool step_lanes(const Settings& settings, Group& group, const double* state,
-                                    double battery_V, std::uint32_t now_ms, bool position_is_due,
-                                    ControlRecord* records) {
+/// The lanes whose flags are those of the first.
+unsigned alike(const Group& group, unsigned lanes) {
+  const Group::Flags& first = group.flags_of(first_of(lanes));
+  unsigned result = 0;
+  for (int lane = 0; lane < Lanes::kCount; ++lane) {
+    if ((lanes >> lane & 1) != 0 && group.flags_of(lane) == first) result |= 1U << lane;
+  }
+  return result;
+}
+
+/// What all lanes see of this period.
+SWARMCERT_FOR_LANES void look(Group& group, const double* state, double battery_V, std::uint32_t now_ms,
+                              const ControlRecord* records) {
   Slot<Lanes>& slot = group.slot;
   slot.measured.attitude_stamp_ms = now_ms;
   slot.measured.battery_V = Lanes(battery_V);
   for (int lane = 0; lane < static_cast<int>(group.vehicles.size()); ++lane) {
-    see_attitude(state + vehicle_of(group, lane) * kVehicleStateSize, lane, group.vehicles.size(), &slot);
+    see_attitude(state + group.vehicle_of(lane) * kVehicleStateSize, lane, group.vehicles.size(), &slot);
   }
   for (int lane = 0; lane < Lanes::kCount; ++lane) {
-    slot.prediction_N.set(lane, static_cast<float>(records[vehicle_of(group, lane)].prediction_N));
+    slot.prediction_N.set(lane, static_cast<float>(records[group.vehicle_of(lane)].prediction_N));
   }
-  FlightMemory<Lanes> memory = slot.memory;
-  Lanes::disagreed = false;
+}
+
+/// One control period of a part of a group. Where its lanes disagree nothing is changed, and those of one side are
+/// returned; else 0.
+template <typename Settings>
+SWARMCERT_FOR_LANES unsigned step_lanes(const Settings& settings, Group& group, unsigned lanes,
+                                        std::uint32_t now_ms, bool position_is_due, ControlRecord* records) {
+  const Lanes::Part part(lanes);
+  const bool all = lanes == Lanes::kAll;
+  Slot<Lanes> own;
+  if (!all) {
+    each(own, group.slot, Fill{part});
+    own.measured.attitude_stamp_ms = now_ms;
+  }
+  Slot<Lanes>& slot = all ? group.slot : own;
+  const Group::Flags& flags = group.flags[first_of(lanes)];
+  slot.measured.position_stamp_ms = flags.position_stamp_ms;
+  FlightMemory<Lanes>& memory = slot.memory;
+  const FlightMemory<Lanes> before = memory;
+  memory.has_reference = flags.has_reference;
+  memory.thrust_saturated = flags.thrust_saturated;
+  Lanes::split = 0;
   const FlightCommand<Lanes> command =
       controller::flight_step(settings, memory, slot.measured, slot.reference,
                               {Lanes(), Lanes(), slot.prediction_N}, now_ms, position_is_due);
-  if (Lanes::disagreed) return false;
-  slot.memory = memory;
-  for (std::size_t k = 0; k < group.vehicles.size(); ++k) {
-    read(command, memory, static_cast<int>(k), &records[static_cast<std::size_t>(group.vehicles[k])]);
+  memory.mean_p = before.mean_p;  // as Pilot::push()
+  if (Lanes::split != 0) {
+    if (all) memory = before;
+    return Lanes::split & lanes;
   }
-  return true;
+  const Pilot<Lanes>::Push push = {command.faults, command.motors_off, command.wanted, command.mixed.forces};
+  slot.answer.wanted = push.wanted;
+  for (int r = 0; r < kNumRotors; ++r) slot.answer.forces.at_N[r] = push.forces.at_N[r];
+  if (!all) {
+    each(group.slot.memory, memory, Take{part});
+    each(group.slot.answer, slot.answer, Take{part});
+  }
+  for (std::size_t k = 0; k < group.vehicles.size(); ++k) {
+    if ((lanes >> k & 1) == 0) continue;
+    group.flags[k].has_reference = memory.has_reference;
+    group.flags[k].thrust_saturated = memory.thrust_saturated;
+    read(push, memory, static_cast<int>(k), &records[static_cast<std::size_t>(group.vehicles[k])]);
+  }
+  return 0;
 }
 
 template <typename Scalar>
@@ -228,20 +320,21 @@ class Bank : public ControllerBank {
   void see(int vehicle, const Eigen::Vector3d& p_W_m, const Eigen::Vector3d& v_W_m_s,
            std::uint32_t stamp_ms) override {
     const auto i = static_cast<std::size_t>(vehicle);
-    if (joined(i)) {
+    if (group_of_[i] != nullptr) {
       Measured<Lanes>& measured = group_of_[i]->slot.measured;
       set(measured.position_W_m, lane_of_[i], group_of_[i]->vehicles.size(), p_W_m);
       set(measured.velocity_W_m_s, lane_of_[i], group_of_[i]->vehicles.size(), v_W_m_s);
+      group_of_[i]->flags[lane_of_[i]].position_stamp_ms = stamp_ms;
     } else {
       set(slots_[i].measured.position_W_m, p_W_m);
       set(slots_[i].measured.velocity_W_m_s, v_W_m_s);
+      slots_[i].measured.position_stamp_ms = stamp_ms;
     }
-    slots_[i].measured.position_stamp_ms = stamp_ms;
   }
 
   void follow(int vehicle, const Setpoint& to) override {
     const auto i = static_cast<std::size_t>(vehicle);
-    if (joined(i)) {
+    if (group_of_[i] != nullptr) {
       FlightReference<Lanes>& reference = group_of_[i]->slot.reference;
       set(reference.position_W_m, lane_of_[i], group_of_[i]->vehicles.size(), to.p_W_m);
       set(reference.velocity_W_m_s, lane_of_[i], group_of_[i]->vehicles.size(), to.v_W_m_s);
@@ -256,7 +349,7 @@ class Bank : public ControllerBank {
 
   void reset_integrals(int vehicle) override {
     const auto i = static_cast<std::size_t>(vehicle);
-    if (joined(i)) {
+    if (group_of_[i] != nullptr) {
       FlightMemory<Lanes>& memory = group_of_[i]->slot.memory;
       set(memory.integral_m_s, lane_of_[i], group_of_[i]->vehicles.size(), Eigen::Vector3d::Zero());
       set(memory.rate_integral_rad, lane_of_[i], group_of_[i]->vehicles.size(), Eigen::Vector3d::Zero());
@@ -275,10 +368,19 @@ class Bank : public ControllerBank {
     }
   }
 
+  void report(int vehicle, ControlRecord* record) const override {
+    const auto i = static_cast<std::size_t>(vehicle);
+    const ThrustMap& map = swarm_.model(vehicle).thrust;
+    const controller::ThrustMap<double> thrust_map = {map.c00, map.c10, map.c01, map.c20, map.c11};
+    if (group_of_[i] != nullptr) {
+      read_rest(thrust_map, group_of_[i]->slot, lane_of_[i], record);
+    } else {
+      read_rest(thrust_map, slots_[i], 0, record);
+    }
+  }
+
  private:
   static constexpr bool kLanes = std::is_same_v<Scalar, float>;
-
-  bool joined(std::size_t i) const { return group_of_[i] != nullptr && group_of_[i]->joined; }
 
   void step_alone(std::size_t i, const double* state, double battery_V, std::uint32_t now_ms,
                   bool position_is_due, ControlRecord* record) {
@@ -287,67 +389,37 @@ class Bank : public ControllerBank {
     slot.measured.attitude_stamp_ms = now_ms;
     slot.measured.battery_V = static_cast<Scalar>(battery_V);
     slot.prediction_N = static_cast<Scalar>(record->prediction_N);
-    const FlightCommand<Scalar> command =
-        pilots_[static_cast<std::size_t>(swarm_.kind_of(static_cast<int>(i)))].step(
+    const typename Pilot<Scalar>::Push push =
+        pilots_[static_cast<std::size_t>(swarm_.kind_of(static_cast<int>(i)))].push(
             slot.memory, slot.measured, slot.reference, slot.prediction_N, now_ms, position_is_due);
-    read(command, slot.memory, 0, record);
+    slot.answer = {push.wanted, push.forces};
+    read(push, slot.memory, 0, record);
   }
 
+  /// As few runs through the code as there are paths that vehicles take.
   void step(Group& group, const double* state, double battery_V, std::uint32_t now_ms, bool position_is_due,
             std::vector<ControlRecord>& records) {
-    if (!group.joined && --group.wait < 0) join(group);
-    if (group.joined && !step_together(group, state, battery_V, now_ms, position_is_due, records)) {
-      part(group);
-      constexpr int kWait = 10;
+    constexpr int kWait = 10;
+    look(group, state, battery_V, now_ms, records.data());
+    if (group.parts.size() > 1 && --group.wait < 0) {
+      group.parts.assign(1, Lanes::kAll);
       group.wait = kWait;
     }
-    if (group.joined) return;
-    for (const int vehicle : group.vehicles) {
-      const auto i = static_cast<std::size_t>(vehicle);
-      step_alone(i, state, battery_V, now_ms, position_is_due, &records[i]);
-    }
-  }
-
-  bool step_together(Group& group, const double* state, double battery_V, std::uint32_t now_ms,
-                     bool position_is_due, std::vector<ControlRecord>& records) {
-    const auto first = static_cast<std::size_t>(group.vehicles.front());
-    const std::uint32_t stamp_ms = slots_[first].measured.position_stamp_ms;
-    for (const int vehicle : group.vehicles) {
-      if (slots_[static_cast<std::size_t>(vehicle)].measured.position_stamp_ms != stamp_ms) return false;
-    }
-    group.slot.measured.position_stamp_ms = stamp_ms;
     const Pilot<Lanes>& pilot =
         lane_pilots_[static_cast<std::size_t>(swarm_.kind_of(group.vehicles.front()))];
-    return pilot.with_settings([&](const auto& settings) {
-      return step_lanes(settings, group, state, battery_V, now_ms, position_is_due, records.data());
-    });
-  }
-
-  void join(Group& group) {
-    const FlightMemory<Scalar>& first = slots_[vehicle_of(group, 0)].memory;
-    for (const int vehicle : group.vehicles) {
-      const FlightMemory<Scalar>& memory = slots_[static_cast<std::size_t>(vehicle)].memory;
-      if (memory.has_reference != first.has_reference || memory.thrust_saturated != first.thrust_saturated)
-        return;
-    }
-    if constexpr (kLanes) {
-      for (int lane = 0; lane < Lanes::kCount; ++lane) {
-        each(group.slot, slots_[vehicle_of(group, lane)], ToLane{lane});
+    pilot.with_settings([&](const auto& settings) {
+      for (std::size_t k = 0; k < group.parts.size();) {
+        const unsigned lanes = group.parts[k];
+        unsigned some = alike(group, lanes);
+        if (some == lanes) some = step_lanes(settings, group, lanes, now_ms, position_is_due, records.data());
+        if (some == 0) {
+          ++k;
+        } else {
+          group.parts[k] = some;
+          group.parts.push_back(lanes & ~some);
+        }
       }
-    }
-    group.slot.memory.has_reference = first.has_reference;
-    group.slot.memory.thrust_saturated = first.thrust_saturated;
-    group.joined = true;
-  }
-
-  void part(Group& group) {
-    for (int lane = 0; lane < static_cast<int>(group.vehicles.size()); ++lane) {
-      Slot<Scalar>& own = slots_[vehicle_of(group, lane)];
-      if constexpr (kLanes) each(group.slot, own, FromLane{lane});
-      own.memory.has_reference = group.slot.memory.has_reference;
-      own.memory.thrust_saturated = group.slot.memory.thrust_saturated;
-    }
-    group.joined = false;
+    });
   }
 
   const Swarm& swarm_;

@@ -16,16 +16,17 @@ namespace swarmcert::stability {
 /// What one vehicle's controller was asked and what it answered in one control period.
 struct ControlRecord {
   Setpoint setpoint;
-  double prediction_N = 0;                              ///< f_a_hat along z, as applied
-  Eigen::Vector3d force_W_N = Eigen::Vector3d::Zero();  ///< f_d
-  double thrust_N = 0;
-  Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
+  double prediction_N = 0;                      ///< f_a_hat along z, as applied
   std::array<double, kNumRotors> rotor_N = {};  ///< commands before the delay
-  std::array<std::uint16_t, kNumRotors> pwm = {};
-  Eigen::Vector3d integral_m_s = Eigen::Vector3d::Zero();
   bool motors_off = false;
   bool saturated = false;   ///< thrust was held at its upper limit
   std::uint8_t faults = 0;  ///< sum of controller::Fault
+  // What only logs want; see ControllerBank::report().
+  Eigen::Vector3d force_W_N = Eigen::Vector3d::Zero();  ///< f_d
+  double thrust_N = 0;
+  Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
+  std::array<std::uint16_t, kNumRotors> pwm = {};
+  Eigen::Vector3d integral_m_s = Eigen::Vector3d::Zero();
 };
 
 class ControllerBank {
@@ -40,13 +41,15 @@ class ControllerBank {
   virtual void reset_integrals(int vehicle) = 0;
   /// One control period of every vehicle: controller::flight_step().
   /// @param state   of the swarm, see StateIndex; attitudes and rates are read from it.
-  /// @param records by vehicle: predictions are read, the answers written.
+  /// @param records by vehicle: predictions are read, the answers written but for those of report().
   virtual void step(const double* state, double battery_V, std::uint32_t now_ms, bool position_is_due,
                     std::vector<ControlRecord>& records) = 0;
+  /// Completes a vehicle's record of the last step() with what only logs want.
+  virtual void report(int vehicle, ControlRecord* record) const = 0;
 };
 
-/// Controllers in float, as they fly. Three vehicles of one kind or more run in the lanes of one Lanes; while those do
-/// not take the same path through the code (thrust at its limit in some, say), each runs alone.
+/// Controllers in float, as they fly. Three vehicles of one kind or more run in the lanes of one Lanes; those that do
+/// not take the same path through the code (thrust at its limit in some, say) run apart, a run for each path.
 /// @param period_s of the control loop.
 std::unique_ptr<ControllerBank> make_float_bank(const Swarm& swarm, const Gains& gains, double period_s);
 /// The same code in double.

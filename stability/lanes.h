@@ -2,8 +2,8 @@
 ///
 /// A Lanes is a Scalar of the control laws (controller/scalar.h) that stands for the same variable of eight vehicles.
 /// Each operation does in every lane what it does to a float alone, so the lanes hold the bits that fly. Only
-/// comparisons that steer the code join the lanes: where they disagree, the result is worthless, and `disagreed` says
-/// so; the caller then computes each vehicle alone.
+/// comparisons that steer the code join the lanes: where they disagree, the result is worthless, and `split` says who
+/// disagreed; the caller then computes those apart.
 #pragma once
 
 #include <cmath>
@@ -25,8 +25,10 @@ namespace swarmcert::stability {
 class Lanes {
  public:
   static constexpr int kCount = 8;
-  /// Set by a comparison whose outcome is not the same in all lanes; never reset here.
-  static inline thread_local bool disagreed = false;
+  static constexpr unsigned kAll = (1U << kCount) - 1;
+  /// The lanes, as bits, in which the first comparison with different outcomes was true; 0 while there was none. Never
+  /// reset here.
+  static inline thread_local unsigned split = 0;
 
   SWARMCERT_LANE Lanes() : v_{} {}
   SWARMCERT_LANE explicit Lanes(float x) : v_(Vector{} + x) {}
@@ -42,6 +44,38 @@ class Lanes {
 
   SWARMCERT_LANE float operator[](int lane) const { return v_[lane]; }
   SWARMCERT_LANE void set(int lane, float x) { v_[lane] = x; }
+
+  /// Which lanes a part of the vehicles takes, and what fills the others: copies of its first.
+  struct Part {
+    std::int32_t from[kCount] = {};
+    std::int32_t taken[kCount] = {};  ///< -1 where it takes the lane, else 0
+
+    explicit Part(unsigned lanes) {
+      int first = 0;
+      while (first < kCount - 1 && (lanes >> first & 1) == 0) ++first;
+      for (int lane = 0; lane < kCount; ++lane) {
+        const bool takes = (lanes >> lane & 1) != 0;
+        from[lane] = takes ? lane : first;
+        taken[lane] = takes ? -1 : 0;
+      }
+    }
+  };
+  SWARMCERT_LANE Lanes filled(const Part& part) const {
+#if defined(SWARMCERT_LANES_AVX2)
+    Mask from;
+    std::memcpy(&from, part.from, sizeof from);
+    return Lanes(Raw{__builtin_shuffle(v_, from)});
+#else
+    Lanes result;
+    for (int lane = 0; lane < kCount; ++lane) result.v_[lane] = v_[part.from[lane]];
+    return result;
+#endif
+  }
+  SWARMCERT_LANE void take(const Lanes& other, const Part& part) {
+    Mask taken;
+    std::memcpy(&taken, part.taken, sizeof taken);
+    v_ = taken != 0 ? other.v_ : v_;
+  }
 
   SWARMCERT_LANE friend Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(Raw{a.v_ + b.v_}); }
   SWARMCERT_LANE friend Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(Raw{a.v_ - b.v_}); }
@@ -118,15 +152,14 @@ class Lanes {
 
   SWARMCERT_LANE static bool together(const Choice& choice) {
 #if defined(SWARMCERT_LANES_AVX2)
-    constexpr int kAll = 0xff;
-    const int both = _mm256_movemask_ps(_mm256_castsi256_ps(reinterpret_cast<__m256i>(choice.m)));
+    const auto both =
+        static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(reinterpret_cast<__m256i>(choice.m))));
 #else
-    constexpr int kAll = kCount;
-    int both = 0;
-    for (int i = 0; i < kCount; ++i) both += choice.m[i] != 0 ? 1 : 0;
+    unsigned both = 0;
+    for (int i = 0; i < kCount; ++i) both |= choice.m[i] != 0 ? 1U << i : 0U;
 #endif
     if (both == 0) return false;
-    if (both != kAll) disagreed = true;
+    if (both != kAll && split == 0) split = both;
     return true;
   }
 

@@ -81,6 +81,37 @@ controller::FlightCommand<Scalar> Pilot<Scalar>::step(controller::FlightMemory<S
       settings_);
 }
 
+// Flattened, so that what is not returned is not computed.
+template <typename Scalar>
+[[gnu::flatten]] typename Pilot<Scalar>::Push Pilot<Scalar>::push(
+    controller::FlightMemory<Scalar>& memory, const controller::Measured<Scalar>& measured,
+    const controller::FlightReference<Scalar>& reference, Scalar prediction_N, std::uint32_t now_ms,
+    bool position_is_due) const {
+  const auto with = [&](const auto& settings) -> Push {
+    const Scalar mean_p = memory.mean_p;
+    const controller::FlightCommand<Scalar> command = controller::flight_step(
+        settings, memory, measured, reference, {Scalar(0), Scalar(0), prediction_N}, now_ms, position_is_due);
+    memory.mean_p = mean_p;  // on which no pilot's largest force depends
+    return {command.faults, command.motors_off, command.wanted, command.mixed.forces};
+  };
+  if (const auto* const pid = std::get_if<0>(&settings_)) return with(*pid);
+  return with(*std::get_if<1>(&settings_));
+}
+
+template <typename Scalar>
+[[gnu::flatten]] Scalar Pilot<Scalar>::wanted_thrust_N(controller::FlightMemory<Scalar> memory,
+                                                       const controller::Measured<Scalar>& measured,
+                                                       const controller::FlightReference<Scalar>& reference,
+                                                       Scalar prediction_N) const {
+  const auto with = [&](const auto& settings) {
+    return controller::flight_step(settings, memory, measured, reference,
+                                   {Scalar(0), Scalar(0), prediction_N}, 0, true)
+        .wanted.thrust_N;
+  };
+  if (const auto* const pid = std::get_if<0>(&settings_)) return with(*pid);
+  return with(*std::get_if<1>(&settings_));
+}
+
 template <typename Scalar>
 controller::Vector3<Scalar> Pilot<Scalar>::rate_error(const controller::FlightMemory<Scalar>& memory,
                                                       const controller::Measured<Scalar>& measured) const {

@@ -28,7 +28,23 @@ class Pilot {
                                          Scalar prediction_N, std::uint32_t now_ms,
                                          bool position_is_due) const;
 
-  /// omega - omega_r, which the robust law integrates, after a step() with the same `measured`; 0 for the other law.
+  /// What step() asks of the rotors.
+  struct Push {
+    std::uint8_t faults;
+    bool motors_off;
+    controller::Wrench<Scalar> wanted;
+    controller::RotorForces<Scalar> forces;
+  };
+  /// step() without PWM and without the memory of it: simulation calls this a million times.
+  Push push(controller::FlightMemory<Scalar>& memory, const controller::Measured<Scalar>& measured,
+            const controller::FlightReference<Scalar>& reference, Scalar prediction_N,
+            std::uint32_t now_ms = 0, bool position_is_due = true) const;
+  /// The collective thrust that push() asks for.
+  Scalar wanted_thrust_N(controller::FlightMemory<Scalar> memory,
+                         const controller::Measured<Scalar>& measured,
+                         const controller::FlightReference<Scalar>& reference, Scalar prediction_N) const;
+
+  /// omega - omega_r, which the robust law integrates, after a step() or push() with the same `measured`; 0 for the other law.
   controller::Vector3<Scalar> rate_error(const controller::FlightMemory<Scalar>& memory,
                                          const controller::Measured<Scalar>& measured) const;
 

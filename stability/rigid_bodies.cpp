@@ -46,8 +46,6 @@ Kernel choose([[maybe_unused]] int size) {
   return {narrow::derivatives, narrow::stage};
 }
 
-constexpr int kWidest = 8;
-
 }  // namespace
 
 struct RigidBodies::Choice {
@@ -56,18 +54,17 @@ struct RigidBodies::Choice {
 
 RigidBodies::RigidBodies(int size)
     : size_(size),
-      stride_((size + kWidest - 1) / kWidest * kWidest),
-      rows_(static_cast<std::size_t>(stride_) * kNumRows, 0.0),
+      rows_(lines_for(static_cast<std::size_t>(size)) * kNumRows),
       choice_(std::make_unique<Choice>(Choice{choose(size)})) {}
 
 RigidBodies::~RigidBodies() = default;
 
 void RigidBodies::derivative(const double* state, double stabilise, double* derivative) const {
-  choice_->kernel.derivatives(rows_.data(), state, size_, stride_, stabilise, derivative);
+  choice_->kernel.derivatives(rows_.data(), state, size_, stabilise, derivative);
 }
 
 void RigidBodies::stage(int which, double step_s, double* start, double* state, double* sum) const {
-  choice_->kernel.stage(which, rows_.data(), size_, stride_, step_s, start, state, sum);
+  choice_->kernel.stage(which, rows_.data(), size_, step_s, start, state, sum);
 }
 
 }  // namespace swarmcert::stability

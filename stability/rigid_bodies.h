@@ -1,15 +1,40 @@
 /// @file Equations of motion of many vehicles side by side: up to eight at a time where the processor can.
 ///
-/// All numbers lie in rows: row r of vehicle i at [r * stride + i], the stride being the number of vehicles rounded up
-/// to the widest block.
+/// All numbers lie in rows of eight vehicles, a cache line each: see row_index(). Places are then known when the code is
+/// compiled, and no register straddles two lines.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
 #include "stability/vehicle_state.h"
 
 namespace swarmcert::stability {
+
+inline constexpr int kRowLength = 8;
+
+/// Where row 0 of a vehicle lies among numbers of `rows` rows; row r lies r * kRowLength further on.
+inline std::size_t row_index(int vehicle, int rows) {
+  return static_cast<std::size_t>(vehicle / kRowLength * rows * kRowLength + vehicle % kRowLength);
+}
+
+/// How many lines of kRowLength hold `count` numbers.
+inline std::size_t lines_for(std::size_t count) { return (count + kRowLength - 1) / kRowLength; }
+
+/// Zeros, in lines of kRowLength.
+class Rows {
+ public:
+  explicit Rows(std::size_t lines = 1) : lines_(lines) {}
+  double* data() { return lines_.data()->at; }
+  const double* data() const { return lines_.data()->at; }
+
+ private:
+  struct alignas(kRowLength * sizeof(double)) Line {
+    double at[kRowLength] = {};
+  };
+  std::vector<Line> lines_;
+};
 
 class RigidBodies {
  public:
@@ -33,9 +58,7 @@ class RigidBodies {
   explicit RigidBodies(int size);
   ~RigidBodies();
 
-  int stride() const { return stride_; }
-  double& at(int row, int vehicle) { return rows_[static_cast<std::size_t>(row * stride_ + vehicle)]; }
-  double at(int row, int vehicle) const { return rows_[static_cast<std::size_t>(row * stride_ + vehicle)]; }
+  double& at(int row, int vehicle) { return rows_.data()[row_index(vehicle, kNumRows) + row * kRowLength]; }
 
   /// derivative = d state / dt.
   /// @param stabilise rate in 1/s at which |q| is drawn to 1; else 0.
@@ -49,8 +72,8 @@ class RigidBodies {
 
  private:
   struct Choice;
-  int size_, stride_;
-  std::vector<double> rows_;
+  int size_;
+  Rows rows_;
   std::unique_ptr<const Choice> choice_;  ///< of the code for this processor
 };
 

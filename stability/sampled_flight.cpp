@@ -37,6 +37,7 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
   state_.resize(size);
   inputs_.resize(static_cast<std::size_t>(swarm.size()));
   records_.resize(inputs_.size());
+  is_complete_.resize(inputs_.size(), 1);
   for (int i = 0; i < swarm.size(); ++i) {
     const Setpoint start = task.at(i, 0);
     set_hover(swarm.model(i), start.p_W_m, start.v_W_m_s,
@@ -77,6 +78,15 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
 }
 
 SampledFlight::~SampledFlight() = default;
+
+const ControlRecord& SampledFlight::record(int vehicle) const {
+  const auto i = static_cast<std::size_t>(vehicle);
+  if (is_complete_[i] == 0) {
+    controllers_->report(vehicle, &records_[i]);
+    is_complete_[i] = 1;
+  }
+  return records_[i];
+}
 
 double SampledFlight::battery_V() const {
   return std::max(options_.battery_start_V - options_.battery_drop_V_s * time_s(), 3.2);
@@ -141,6 +151,7 @@ void SampledFlight::control() {
   const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
   if (ran_position_) measure();
   controllers_->step(state_.data(), battery, now_ms, ran_position_, records_);
+  std::fill(is_complete_.begin(), is_complete_.end(), 0);
   for (std::size_t i = 0; i < records_.size(); ++i) {
     VehicleInput& input = inputs_[i];
     ControlRecord& record = records_[i];
@@ -148,9 +159,10 @@ void SampledFlight::control() {
     // On the ground the motors are off until the task leaves it, and no integral grows.
     if (input.resting) {
       controllers_->reset_integrals(static_cast<int>(i));
-      record.integral_m_s.setZero();
     }
     if (record.motors_off || (input.resting && record.setpoint.p_W_m.z() <= options_.ground_m + 1e-3)) {
+      controllers_->report(static_cast<int>(i), &record);
+      is_complete_[i] = 1;
       record.thrust_N = 0;
       record.rotor_N = {};
       record.pwm = {};

@@ -60,7 +60,9 @@ class SampledFlight {
   const VehicleInput& input(int vehicle) const { return inputs_[static_cast<std::size_t>(vehicle)]; }
   VehicleInput& input(int vehicle) { return inputs_[static_cast<std::size_t>(vehicle)]; }
   /// What a vehicle's controller did last.
-  const ControlRecord& record(int vehicle) const { return records_[static_cast<std::size_t>(vehicle)]; }
+  const ControlRecord& record(int vehicle) const;
+  /// record(vehicle).saturated, without the rest of it.
+  bool is_saturated(int vehicle) const { return records_[static_cast<std::size_t>(vehicle)].saturated; }
   Swarm& swarm() { return swarm_; }
   double battery_V() const;
 
@@ -83,7 +85,8 @@ class SampledFlight {
   bool ran_position_ = false;
   std::vector<double> state_;
   std::vector<VehicleInput> inputs_;
-  std::vector<ControlRecord> records_;
+  mutable std::vector<ControlRecord> records_;
+  mutable std::vector<char> is_complete_;  ///< by vehicle: its record has what only logs want
   std::unique_ptr<ControllerBank> controllers_;
   std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
   std::unique_ptr<Radio> radio_;

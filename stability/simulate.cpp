@@ -54,7 +54,7 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
     if (options.keep_logs) recorder.listen();
     for (std::size_t i = 0; i < vehicles; ++i) {
       const int vehicle = static_cast<int>(i);
-      if (loop.record(vehicle).saturated) ++saturated[i];
+      if (loop.is_saturated(vehicle)) ++saturated[i];
       if (!loop.ran_position() || loop.input(vehicle).resting) continue;
       const double* const x = loop.state() + i * kVehicleStateSize;
       const Eigen::Vector3d p(x[0], x[1], x[2]);

@@ -16,6 +16,22 @@ struct Swarm::Kind {
   std::vector<AppliedEffect> effects;      ///< without those that live in `path`
   std::vector<int> only;                   ///< by effect: the one vehicle that it acts on; kEvery: all
   std::vector<const AppliedEffect*> wide;  ///< that look at neighbours
+  bool only_pairs = false;                 ///< its one effect acts on all vehicles, and takes pairs
+};
+
+/// Vehicles of one kind on which a single effect acts that takes pairs: computed together.
+struct Swarm::PairBatch {
+  const AppliedEffect* applied = nullptr;
+  std::vector<int> vehicles, ends;      ///< pairs up to ends[i] are those of vehicles[i]
+  std::vector<std::size_t> own, other;  ///< of each pair: where the two lie in the rows of states
+  std::vector<double> masses_kg;        ///< of each pair's neighbour
+  Rows pairs, scratch, force_N;
+
+  void clear() {
+    for (std::vector<int>* list : {&vehicles, &ends}) list->clear();
+    for (std::vector<std::size_t>* list : {&own, &other}) list->clear();
+    masses_kg.clear();
+  }
 };
 
 inline const Swarm::Kind& Swarm::kind(int vehicle) const {
@@ -63,6 +79,7 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
     }
   }
   kinds_.resize(models_.size());
+  batches_.resize(models_.size());
   for (std::size_t i = 0; i < models_.size(); ++i) {
     const Model& model = models_[i];
     Kind& kind = kinds_[i];
@@ -83,13 +100,15 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
       if (applied.effect().info().needs_neighbours) kind.wide.push_back(&applied);
     }
     interacts_ = interacts_ || !kind.wide.empty();
+    kind.only_pairs =
+        kind.effects.size() == 1 && kind.only[0] == kEvery && kind.effects[0].effect().takes_pairs();
+    if (kind.only_pairs) batches_[i].applied = &kind.effects[0];
     set_lag(&kind);
   }
   near_.resize(kind_of_.size());
+  rested_.resize(kind_of_.size());
   neighbours_.resize(kind_of_.size());
-  for (std::vector<double>* rows : {&rows_, &start_, &sum_}) {
-    rows->resize(static_cast<std::size_t>(bodies_.stride()) * kVehicleStateSize);
-  }
+  rows_ = start_ = sum_ = Rows(lines_for(kind_of_.size()) * kVehicleStateSize);
   set_bodies();
 }
 
@@ -201,16 +220,18 @@ Wrench Swarm::sum_of_effects(int vehicle, const VehicleInput& input) const {
 }
 
 void Swarm::to_rows(const double* state, double* rows) const {
-  const int stride = bodies_.stride();
   for (int i = 0; i < size(); ++i) {
-    for (int c = 0; c < kVehicleStateSize; ++c) rows[c * stride + i] = state[i * kVehicleStateSize + c];
+    const double* const from = state + i * kVehicleStateSize;
+    double* const to = rows + row_index(i, kVehicleStateSize);
+    for (int c = 0; c < kVehicleStateSize; ++c) to[c * kRowLength] = from[c];
   }
 }
 
 void Swarm::from_rows(const double* rows, double* state) const {
-  const int stride = bodies_.stride();
   for (int i = 0; i < size(); ++i) {
-    for (int c = 0; c < kVehicleStateSize; ++c) state[i * kVehicleStateSize + c] = rows[c * stride + i];
+    const double* const from = rows + row_index(i, kVehicleStateSize);
+    double* const to = state + i * kVehicleStateSize;
+    for (int c = 0; c < kVehicleStateSize; ++c) to[c] = from[c * kRowLength];
   }
 }
 
@@ -224,19 +245,63 @@ void Swarm::hold(const VehicleInput* inputs) {
       bodies_.at(RigidBodies::kTorque + axis, i) = 0;
     }
   }
+  pair_up(inputs);
+}
+
+/// Who is acted on, and by whom, until find_neighbours() looks again or a vehicle comes to rest or leaves the ground.
+void Swarm::pair_up(const VehicleInput* inputs) {
+  for (int i = 0; i < size(); ++i) {
+    char& rested = rested_[static_cast<std::size_t>(i)];
+    pairs_hold_ = pairs_hold_ && (rested != 0) == inputs[i].resting;
+    rested = inputs[i].resting ? 1 : 0;
+  }
+  if (pairs_hold_) return;
+  pairs_hold_ = true;
   acted_on_.clear();
+  for (PairBatch& batch : batches_) batch.clear();
   for (int i = 0; i < size(); ++i) {
     const Kind& own = kind(i);
     // Where only neighbours matter and none is near, there is nothing to add.
     const bool alone = listed_ && near_[static_cast<std::size_t>(i)].empty();
     const bool nothing = own.effects.empty() || (alone && own.wide.size() == own.effects.size());
-    if (!inputs[i].resting && !nothing) acted_on_.push_back(i);
+    if (inputs[i].resting || nothing) continue;
+    if (!own.only_pairs) {
+      acted_on_.push_back(i);
+      continue;
+    }
+    PairBatch& batch = batches_[static_cast<std::size_t>(kind_of(i))];
+    const auto add = [&](int other) {
+      batch.own.push_back(row_index(i, kVehicleStateSize));
+      batch.other.push_back(row_index(other, kVehicleStateSize));
+      batch.masses_kg.push_back(kind(other).mass_kg);
+    };
+    if (listed_) {
+      for (const int other : near_[static_cast<std::size_t>(i)]) add(other);
+    } else {
+      for (int other = 0; other < size(); ++other) {
+        if (other != i) add(other);
+      }
+    }
+    batch.vehicles.push_back(i);
+    batch.ends.push_back(static_cast<int>(batch.own.size()));
+  }
+  for (PairBatch& batch : batches_) {
+    if (batch.applied == nullptr) continue;
+    const std::size_t lines = lines_for(batch.own.size()), vehicle_lines = lines_for(batch.vehicles.size());
+    batch.pairs = Rows(6 * lines);
+    batch.scratch = Rows(2 * (lines + vehicle_lines));
+    batch.force_N = Rows(vehicle_lines);
+    double* const constant = batch.pairs.data() + 5 * lines * kRowLength;
+    for (std::size_t k = 0; k < batch.own.size(); ++k) {
+      constant[k] = batch.applied->effect().pair_constant(batch.masses_kg[k], batch.applied->shape().data());
+    }
   }
 }
 
 /// Disturbances and effects, as outer forces of the bodies.
 void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
-  const States states = {rows, bodies_.stride(), 1};
+  act_on_pairs(rows, inputs);
+  const States states = {rows, true};
   instant_.time_s = time_s;
   for (const int i : acted_on_) {
     fill(i, states, inputs[i]);
@@ -246,6 +311,36 @@ void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
     for (int axis = 0; axis < 3; ++axis) {
       bodies_.at(RigidBodies::kForce + axis, i) = sum.force_W_N[axis];
       bodies_.at(RigidBodies::kTorque + axis, i) = sum.torque_B_Nm[axis];
+    }
+  }
+}
+
+void Swarm::act_on_pairs(const double* state, const VehicleInput* inputs) {
+  static_assert(kRowLength == PairRows::kMultiple);
+  for (PairBatch& batch : batches_) {
+    const std::size_t count = batch.own.size(), row = lines_for(count) * kRowLength;
+    if (count == 0) continue;
+    double* const rows = batch.pairs.data();
+    const Effect& effect = batch.applied->effect();
+    const double* const shape = batch.applied->shape().data();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double* const at = state + axis * kRowLength;
+      double* const to = rows + static_cast<std::size_t>(axis) * row;
+      for (std::size_t k = 0; k < count; ++k) to[k] = at[batch.other[k]] - at[batch.own[k]];
+    }
+    for (int axis = 0; axis < 2 && effect.pairs_need_velocity(shape); ++axis) {
+      const double* const at = state + (kVelocity + axis) * kRowLength;
+      double* const to = rows + static_cast<std::size_t>(3 + axis) * row;
+      for (std::size_t k = 0; k < count; ++k) to[k] = at[batch.other[k]];
+    }
+    effect.force_z({rows, rows + row, rows + 2 * row, rows + 3 * row, rows + 4 * row, rows + 5 * row},
+                   batch.ends.data(), static_cast<int>(batch.vehicles.size()), shape, batch.scratch.data(),
+                   batch.force_N.data());
+    const double per_unit = batch.applied->coefficients()[0];
+    for (std::size_t i = 0; i < batch.vehicles.size(); ++i) {
+      const int vehicle = batch.vehicles[i];
+      bodies_.at(RigidBodies::kForce + 2, vehicle) =
+          inputs[vehicle].disturbance_W_N.z() + per_unit * batch.force_N.data()[i];
     }
   }
 }
@@ -275,6 +370,7 @@ void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleIn
 
 void Swarm::find_neighbours(const double* state, double horizon_s) {
   listed_ = interacts_;
+  pairs_hold_ = false;
   if (!interacts_) return;
   constexpr double kFastestChange_m_s2 = 50;
   double fastest_m_s = 0;
@@ -301,7 +397,7 @@ void Swarm::find_neighbours(const double* state, double horizon_s) {
   }
 }
 
-void Swarm::forget_neighbours() { listed_ = false; }
+void Swarm::forget_neighbours() { listed_ = pairs_hold_ = false; }
 
 void set_hover(const Model& model, const Eigen::Vector3d& p_W_m, const Eigen::Vector3d& v_W_m_s,
                double* state) {

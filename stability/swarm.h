@@ -70,12 +70,16 @@ class Swarm {
 
  private:
   struct Kind;
-  /// States of all vehicles: component c of vehicle i at x[c * component + i * vehicle].
+  struct PairBatch;
+  /// States of all vehicles, one after the other, or in rows.
   struct States {
     const double* x;
-    std::ptrdiff_t component, vehicle;
+    bool in_rows;
 
-    double operator()(int i, int c) const { return x[c * component + i * vehicle]; }
+    double operator()(int i, int c) const {
+      return in_rows ? x[row_index(i, kVehicleStateSize) + static_cast<std::size_t>(c * kRowLength)]
+                     : x[i * kVehicleStateSize + c];
+    }
     Eigen::Vector3d three(int i, int c) const {
       return {(*this)(i, c), (*this)(i, c + 1), (*this)(i, c + 2)};
     }
@@ -83,7 +87,7 @@ class Swarm {
 
   static void set_lag(Kind* kind);
   const Kind& kind(int vehicle) const;
-  States by_vehicle(const double* state) const { return {state, 1, kVehicleStateSize}; }
+  States by_vehicle(const double* state) const { return {state, false}; }
   void fill(int vehicle, const States& states, const VehicleInput& input);
   void add_neighbour(int vehicle, int other, const States& states);
   void gather(int vehicle, const States& states, bool all);
@@ -91,7 +95,9 @@ class Swarm {
   void to_rows(const double* state, double* rows) const;
   void from_rows(const double* rows, double* state) const;
   void hold(const VehicleInput* inputs);
+  void pair_up(const VehicleInput* inputs);
   void act(double time_s, const double* rows, const VehicleInput* inputs);
+  void act_on_pairs(const double* rows, const VehicleInput* inputs);
   void set_bodies();
 
   std::vector<Model> models_;
@@ -100,11 +106,14 @@ class Swarm {
   bool interacts_ = false;  ///< some effect looks at neighbours
   bool listed_ = false;
   std::vector<std::vector<int>> near_;  ///< by vehicle, if listed_
-  std::vector<int> acted_on_;           ///< vehicles on which effects act, since hold()
+  std::vector<int> acted_on_;  ///< vehicles on which effects act, but for those in batches_; since hold()
+  std::vector<PairBatch> batches_;  ///< by kind
+  bool pairs_hold_ = false;   ///< acted_on_ and batches_ are those of near_ and of the vehicles that rest
+  std::vector<char> rested_;  ///< by vehicle, when they were made
   Instant instant_;
   std::vector<Neighbour> neighbours_;
   RigidBodies bodies_;
-  std::vector<double> rows_, start_, sum_;
+  Rows rows_, start_, sum_;
 };
 
 /// Initial state: at `p_W_m`, with velocity `v_W_m_s`, level, heading +x, rotors at hover force.

@@ -9,32 +9,52 @@
 namespace swarmcert::stability {
 namespace {
 
-/// ln g_j without the fade u. Returns false where the neighbour does nothing.
-bool log_strength(const Neighbour& neighbour, const double* shape, double* result) {
-  const double dz = neighbour.dp_W_m.z();
-  if (dz <= kWakeTouching_m) return false;
-  const double delay_s = shape[Downwash::kConvection] * dz;
-  const double rx = neighbour.dp_W_m.x() - delay_s * neighbour.v_W_m_s.x();
-  const double ry = neighbour.dp_W_m.y() - delay_s * neighbour.v_W_m_s.y();
-  const double height_m = std::max(dz, kWakeNearest_m);
-  const double spread_m = shape[Downwash::kSpread0] + shape[Downwash::kSpreadSlope] * height_m;
-  const double in_spreads2 = (rx * rx + ry * ry) / (spread_m * spread_m);
-  const double tail = shape[Downwash::kTail];
-  if (tail == 0 && in_spreads2 > kWakeReachInSpreads * kWakeReachInSpreads) return false;
-  *result = shape[Downwash::kDecay] * std::log(kWakeReference_m / height_m) -
-            (tail == 0 ? 0.5 * in_spreads2 : std::log1p(0.5 * tail * in_spreads2) / tail);
-  if (neighbour.mass_kg != kWakeReferenceMass_kg) {
-    *result += shape[Downwash::kMassExponent] * std::log(neighbour.mass_kg / kWakeReferenceMass_kg);
-  }
-  return true;
+#define KERNEL narrow
+#define KERNEL_BLOCK 2
+#include "stability/effects/downwash_kernel.inc"
+#undef KERNEL
+#undef KERNEL_BLOCK
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define SWARMCERT_WIDE_KERNELS
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#define KERNEL avx2
+#define KERNEL_BLOCK 4
+#include "stability/effects/downwash_kernel.inc"
+#undef KERNEL
+#undef KERNEL_BLOCK
+#pragma GCC pop_options
+
+#pragma GCC push_options
+#pragma GCC target("avx512f")
+#define KERNEL avx512
+#define KERNEL_BLOCK 8
+#include "stability/effects/downwash_kernel.inc"
+#undef KERNEL
+#undef KERNEL_BLOCK
+#pragma GCC pop_options
+#endif
+
+struct Kernel {
+  int block;
+  decltype(&narrow::strengths) strengths;
+  decltype(&narrow::composed) composed;
+};
+
+/// The narrowest that takes `count` at once, or the widest of this processor.
+const Kernel& kernel_for([[maybe_unused]] int count) {
+  static constexpr Kernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::composed};
+#if defined(SWARMCERT_WIDE_KERNELS)
+  static constexpr Kernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::composed};
+  static constexpr Kernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::composed};
+  if (count > avx2::kBlock && __builtin_cpu_supports("avx512f") != 0) return kAvx512;
+  if (count > narrow::kBlock && __builtin_cpu_supports("avx2") != 0) return kAvx2;
+#endif
+  return kNarrow;
 }
 
-/// 0 where vehicles touch, 1 from kWakeNearest_m on, smooth between.
-double fade(double dz) {
-  if (dz >= kWakeNearest_m) return 1;
-  const double x = (dz - kWakeTouching_m) / (kWakeNearest_m - kWakeTouching_m);
-  return x * x * (3 - 2 * x);
-}
+int round_up(int count, int block) { return (count + block - 1) / block * block; }
 
 }  // namespace
 
@@ -59,29 +79,69 @@ EffectInfo Downwash::describe() {
 }
 
 void Downwash::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  columns[0] = {};
-  const double norm = shape[kNorm];
-  double sum = 0;  // of g^p
-  double single = 0, single_fade = 0;
-  int count = 0;
-  const auto to_the_norm = [norm](double log_strength, double faded) {
-    const double power = std::exp(norm * log_strength);
-    return faded == 1 ? power : power * std::pow(faded, norm);
-  };
-  for (int j = 0; j < now.num_neighbours; ++j) {
-    double strength;
-    if (!log_strength(now.neighbours[j], shape, &strength)) continue;
-    const double faded = fade(now.neighbours[j].dp_W_m.z());
-    if (++count == 1) {  // the common case needs no power: (g^p)^(1/p) = g
-      single = strength;
-      single_fade = faded;
-      continue;
+  // The same arithmetic as for a whole swarm, a handful of neighbours at a time.
+  constexpr int kMost = 4 * PairRows::kMultiple;
+  double rows[6][kMost], log_strength[kMost], power[kMost];
+  double sum = 0, single = std::numeric_limits<double>::quiet_NaN();
+  int acting = 0;
+  for (int first = 0; first < now.num_neighbours; first += kMost) {
+    const int count = std::min(kMost, now.num_neighbours - first);
+    for (int k = 0; k < round_up(count, PairRows::kMultiple); ++k) {
+      const Neighbour& neighbour = now.neighbours[first + std::min(k, count - 1)];
+      rows[0][k] = neighbour.dp_W_m.x();
+      rows[1][k] = neighbour.dp_W_m.y();
+      rows[2][k] = neighbour.dp_W_m.z();
+      rows[3][k] = neighbour.v_W_m_s.x();
+      rows[4][k] = neighbour.v_W_m_s.y();
+      rows[5][k] = pair_constant(neighbour.mass_kg, shape);
     }
-    if (count == 2) sum = to_the_norm(single, single_fade);
-    sum += to_the_norm(strength, faded);
+    const Kernel& kernel = kernel_for(count);
+    kernel.strengths({rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]}, round_up(count, kernel.block),
+                     shape, log_strength, power);
+    for (int k = 0; k < count; ++k) {
+      if (power[k] == 0) continue;
+      single = ++acting == 1 ? log_strength[k] : std::numeric_limits<double>::quiet_NaN();
+      sum += power[k];
+    }
   }
-  if (count == 1) columns[0].force_W_N.z() = -single_fade * std::exp(single);
-  if (count > 1) columns[0].force_W_N.z() = sum > 0 ? -std::exp(std::log(sum) / norm) : 0;
+  columns[0] = {};
+  if (acting == 0) return;
+  double sums[narrow::kBlock] = {sum}, singles[narrow::kBlock] = {single}, strength[narrow::kBlock];
+  narrow::composed(sums, singles, 1 / shape[kNorm], narrow::kBlock, strength);
+  columns[0].force_W_N.z() = -strength[0];
+}
+
+double Downwash::pair_constant(double neighbour_mass_kg, const double* shape) const {
+  const bool differs = neighbour_mass_kg != kWakeReferenceMass_kg;
+  return differs ? shape[kMassExponent] * std::log(neighbour_mass_kg / kWakeReferenceMass_kg) : 0;
+}
+
+void Downwash::force_z(const PairRows& pairs, const int* ends, int vehicles, const double* shape,
+                       double* scratch, double* force) const {
+  const int count = vehicles > 0 ? ends[vehicles - 1] : 0;
+  const int room = round_up(count, PairRows::kMultiple), others = round_up(vehicles, PairRows::kMultiple);
+  double* const log_strength = scratch;
+  double* const power = scratch + room;
+  double* const sum = scratch + 2 * room;
+  double* const single = sum + others;
+  const Kernel& wide = kernel_for(count);
+  wide.strengths(pairs, round_up(count, wide.block), shape, log_strength, power);
+  for (int i = 0, k = 0; i < vehicles; ++i) {
+    double total = 0, log = std::numeric_limits<double>::quiet_NaN();
+    int acting = 0;
+    for (; k < ends[i]; ++k) {
+      if (power[k] == 0) continue;
+      log = ++acting == 1 ? log_strength[k] : std::numeric_limits<double>::quiet_NaN();
+      total += power[k];
+    }
+    sum[i] = total;
+    single[i] = log;
+  }
+  const Kernel& kernel = kernel_for(vehicles);
+  const int padded = round_up(vehicles, kernel.block);
+  for (int i = vehicles; i < padded; ++i) sum[i] = single[i] = 0;
+  kernel.composed(sum, single, 1 / shape[kNorm], padded, force);
+  for (int i = 0; i < vehicles; ++i) force[i] = -force[i];
 }
 
 bool Downwash::in_support(const Instant& now, const double* shape) const {

@@ -22,6 +22,12 @@ class Downwash : public Effect {
   Downwash() : Effect(describe()) {}
   static EffectInfo describe();
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
+  bool takes_pairs() const override { return true; }
+  bool pairs_need_velocity(const double* shape) const override { return shape[kConvection] != 0; }
+  /// The logarithm of what the neighbour's mass does.
+  double pair_constant(double neighbour_mass_kg, const double* shape) const override;
+  void force_z(const PairRows& pairs, const int* ends, int vehicles, const double* shape, double* scratch,
+               double* force) const override;
   bool in_support(const Instant& now, const double* shape) const override;
   std::vector<std::vector<double>> grid(const FlightRange& range) const override;
   double reach_m(double dz_m, const double* shape) const override;

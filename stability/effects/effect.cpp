@@ -44,6 +44,12 @@ std::vector<std::vector<double>> Effect::grid(const FlightRange&) const {
 
 void Effect::add_to(SignalPath&, const double*, const double*) const {}
 
+bool Effect::pairs_need_velocity(const double*) const { return true; }
+
+double Effect::pair_constant(double, const double*) const { return 0; }
+
+void Effect::force_z(const PairRows&, const int*, int, const double*, double*, double*) const {}
+
 double Effect::reach_m(double, const double*) const { return 0; }
 
 AppliedEffect::AppliedEffect(const EffectSpec& spec, const EffectContext& context)

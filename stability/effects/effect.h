@@ -54,6 +54,15 @@ struct Wrench {
   Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
 };
 
+/// Pairs of a vehicle and a neighbour, side by side, for effects that treat many at once. Rows reach to a multiple of
+/// kMultiple: what lies beyond the pairs are numbers, which do not count.
+struct PairRows {
+  static constexpr int kMultiple = 8;
+  const double *dx_m, *dy_m, *dz_m;  ///< the neighbour's position minus the vehicle's, in W
+  const double *vx_m_s, *vy_m_s;     ///< the neighbour's velocity; unset where pairs_need_velocity() is false
+  const double* constant;            ///< pair_constant() of the neighbour
+};
+
 /// A coefficient or a shape parameter.
 struct Parameter {
   std::string name;  ///< with its unit, as in model.toml: "drag_N_s_m"
@@ -123,6 +132,21 @@ class Effect {
   /// @param shape   theta, [info().shape.size()].
   /// @param columns [num_columns()], overwritten.
   virtual void columns(const Instant& now, const double* shape, Wrench* columns) const = 0;
+
+  /// Whether force_z() gives this effect's one column, which then is a vertical force that depends on nothing but pairs:
+  /// the fast way for simulated swarms.
+  virtual bool takes_pairs() const { return false; }
+
+  virtual bool pairs_need_velocity(const double* shape) const;
+  /// What never changes about a pair: force_z() is told it.
+  virtual double pair_constant(double neighbour_mass_kg, const double* shape) const;
+
+  /// The column's vertical force on each vehicle, the same as columns() gives.
+  /// @param ends    [vehicles]: pairs ends[i - 1] to ends[i] are those of vehicle i, in the order of columns().
+  /// @param scratch 2 (pairs + vehicles) numbers, both rounded up to PairRows::kMultiple.
+  /// @param force   [vehicles, rounded up to PairRows::kMultiple], overwritten.
+  virtual void force_z(const PairRows& pairs, const int* ends, int vehicles, const double* shape,
+                       double* scratch, double* force) const;
 
   /// The columns along a time series; the effect must outlive the stream.
   virtual std::unique_ptr<ColumnStream> stream(const double* shape) const;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "data.h"
@@ -138,6 +139,132 @@ TEST(Downwash, ComposesByThePNormAndActsDownwardsOnly) {
   EXPECT_EQ(downwash_gf(1, 0.3), 0) << "beyond its reach";
   for (double dz = 0.05; dz < 0.13; dz += 1e-3)
     EXPECT_LT(std::abs(downwash_gf(0, dz + 1e-6) - downwash_gf(0, dz)), 1e-3);
+}
+
+TEST(Downwash, IsItsFormulaToRoundingForAnyNumberOfNeighboursAndShape) {
+  std::mt19937_64 random(11);
+  const auto uniform = [&random](double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random);
+  };
+  int acting = 0, fading = 0;
+  double worst = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    EffectSpec spec = spec_of("downwash");
+    const long double n = uniform(0, 4), s0 = uniform(0.005, 0.3), s1 = uniform(0, 1), p = uniform(1, 10);
+    const long double k = trial % 3 == 0 ? uniform(0, 1) : 0, e = uniform(0, 2);
+    const long double q = trial % 2 == 0 ? 0 : trial % 7 == 1 ? 1e-9 : uniform(0, 1);
+    const auto set = [&](const char* name, long double x) { spec.parameters[name] = static_cast<double>(x); };
+    set("amplitude_N", 1);
+    set("decay_exponent", n);
+    set("spread_m", s0);
+    set("spread_slope", s1);
+    set("norm_exponent", p);
+    set("convection_s_m", k);
+    set("mass_exponent", e);
+    set("tail", q);
+    std::vector<Neighbour> all;
+    long double sum = 0;
+    const int count = 1 + trial % 40;
+    for (int j = 0; j < count; ++j) {
+      Neighbour other = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.034, 0};
+      other.dp_W_m = {uniform(-0.5, 0.5), uniform(-0.5, 0.5), uniform(-0.2, j % 4 == 0 ? 0.15 : 1.5)};
+      other.v_W_m_s = {uniform(-2, 2), uniform(-2, 2), 0};
+      other.mass_kg = trial % 5 == 0 ? 0.067 : 0.034;
+      all.push_back(other);
+      const long double dz = other.dp_W_m.z();
+      if (dz <= 0.05L) continue;
+      const long double x = other.dp_W_m.x() - k * dz * other.v_W_m_s.x();
+      const long double y = other.dp_W_m.y() - k * dz * other.v_W_m_s.y();
+      const long double h = std::max(dz, 0.12L), s = s0 + s1 * h, r2 = (x * x + y * y) / (s * s);
+      if (q == 0 && r2 > 49) continue;
+      const long double inside = std::min(1.0L, (dz - 0.05L) / 0.07L);
+      fading += inside < 1;
+      const long double profile = q == 0 ? std::exp(-r2 / 2) : std::exp(-std::log1p(q * r2 / 2) / q);
+      sum += std::pow(std::pow(other.mass_kg / 0.034L, e) * std::pow(0.3L / h, n) * profile * inside *
+                          inside * (3 - 2 * inside),
+                      p);
+    }
+    Instant now;
+    now.neighbours = all.data();
+    now.num_neighbours = count;
+    const double given = -AppliedEffect(spec, kContext).wrench(now).force_W_N.z();
+    const auto expected = static_cast<double>(std::pow(sum, 1 / p));
+    if (expected < 1e-30) {
+      ASSERT_LE(given, 1e-30);
+      continue;
+    }
+    worst = std::max(worst, std::abs(given / expected - 1));
+    ++acting;
+  }
+  EXPECT_GT(acting, 2000);
+  EXPECT_GT(fading, 2000);
+  EXPECT_LT(worst, 2e-14);
+}
+
+TEST(Downwash, HasTheSameBitsForOneVehicleAndForASwarm) {
+  std::mt19937_64 random(12);
+  const auto uniform = [&random](double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random);
+  };
+  const std::unique_ptr<Effect> effect = make_effect(spec_of("downwash"), kContext);
+  const std::vector<double> shape = effect_values(effect->info(), spec_of("downwash")).shape;
+  ASSERT_TRUE(effect->takes_pairs());
+  int acting = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const int vehicles = 1 + trial % 19;
+    std::vector<std::vector<Neighbour>> neighbours(static_cast<std::size_t>(vehicles));
+    std::vector<double> rows[6];
+    std::vector<int> ends;
+    for (std::vector<Neighbour>& own : neighbours) {
+      const int count = static_cast<int>(random() % 6);
+      for (int j = 0; j < count; ++j) {
+        Neighbour other = {{uniform(-0.2, 0.2), uniform(-0.2, 0.2), uniform(-0.2, 0.6)},
+                           Eigen::Vector3d::Zero(),
+                           {uniform(-1, 1), uniform(-1, 1), 0},
+                           j % 2 == 0 ? 0.034 : 0.067,
+                           0};
+        own.push_back(other);
+        const double numbers[] = {other.dp_W_m.x(),  other.dp_W_m.y(),
+                                  other.dp_W_m.z(),  other.v_W_m_s.x(),
+                                  other.v_W_m_s.y(), effect->pair_constant(other.mass_kg, shape.data())};
+        for (int row = 0; row < 6; ++row) rows[row].push_back(numbers[row]);
+      }
+      ends.push_back(static_cast<int>(rows[0].size()));
+    }
+    const std::size_t pairs = (rows[0].size() + 7) / 8 * 8, padded = (neighbours.size() + 7) / 8 * 8;
+    for (std::vector<double>& row : rows) row.resize(pairs);
+    std::vector<double> scratch(2 * (pairs + padded)), force(padded);
+    effect->force_z(
+        {rows[0].data(), rows[1].data(), rows[2].data(), rows[3].data(), rows[4].data(), rows[5].data()},
+        ends.data(), vehicles, shape.data(), scratch.data(), force.data());
+    for (std::size_t i = 0; i < neighbours.size(); ++i) {
+      Instant now;
+      now.neighbours = neighbours[i].data();
+      now.num_neighbours = static_cast<int>(neighbours[i].size());
+      Wrench column;
+      effect->columns(now, shape.data(), &column);
+      ASSERT_EQ(force[i], column.force_W_N.z()) << vehicles << " vehicles, number " << i;
+      acting += force[i] < 0;
+    }
+  }
+  EXPECT_GT(acting, 500);
+}
+
+TEST(Downwash, ANeighbourThatIsNowhereGivesNoNumber) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double tail : {0.0, 0.5}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      EffectSpec spec = spec_of("downwash");
+      spec.parameters["tail"] = tail;
+      Neighbour near = {{0.01, 0, 0.3}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.034, 0};
+      Neighbour all[] = {near, near};
+      all[1].dp_W_m[axis] = nan;
+      Instant now;
+      now.neighbours = all;
+      now.num_neighbours = 2;
+      EXPECT_TRUE(std::isnan(AppliedEffect(spec, kContext).wrench(now).force_W_N.z())) << axis << " " << tail;
+    }
+  }
 }
 
 TEST(Downwash, IsZeroBeyondItsReach) {
