@@ -71,7 +71,20 @@ Json witness_json(const lipschitz::FoundSlope& found) {
   return {{"x", found.witness->x}, {"y", found.witness->y}, {"others", std::move(others)}};
 }
 
+std::string label(const lipschitz::Neighbours& neighbours) {
+  std::string text;
+  for (const auto& [kind, count] : neighbours)
+    text += fmt::format("{}{} {}", text.empty() ? "" : " + ", count, kind);
+  return text;
+}
+
 }  // namespace
+
+std::string label(const CertifiedBound& bound) {
+  return bound.function + (bound.block == "all" ? "" : " " + bound.block) +
+         (bound.scale.empty() ? "" : " scaled") +
+         (bound.neighbours.empty() ? "" : ", at most " + label(bound.neighbours));
+}
 
 std::vector<std::string> explain(const lipschitz::Comparison& comparison, double product, double upper,
                                  double lower) {
@@ -241,12 +254,6 @@ void print_layers(const files::Network& network, const Certification& found) {
   }
 }
 
-/// "set:small:large", "set:small:large position", "set:small:large scaled".
-std::string label(const CertifiedBound& bound) {
-  return bound.function + (bound.block == "all" ? "" : " " + bound.block) +
-         (bound.scale.empty() ? "" : " scaled");
-}
-
 void print_bounds(const files::Network& network, const Certification& found) {
   std::size_t width = 8;
   for (const CertifiedBound& bound : found.bounds) width = std::max(width, label(bound).size());
@@ -268,18 +275,13 @@ void print_bounds(const files::Network& network, const Certification& found) {
     }
   }
   if (!network.rho.empty()) {
-    fmt::print("  set: per neighbour that moves, whatever the number and the places of the others\n");
+    fmt::print(
+        "  set: per neighbour that moves, whatever the number and the places of the others, or in the box\n"
+        "  with at most those listed\n");
   }
   const auto is_block = [](const CertifiedBound& bound) { return bound.block == "position"; };
   if (std::any_of(found.bounds.begin(), found.bounds.end(), is_block))
     fmt::print("  blocks add up: |df| <= L_position |dp| + L_velocity |dv|\n");
-}
-
-std::string label(const lipschitz::Neighbours& neighbours) {
-  std::string text;
-  for (const auto& [kind, count] : neighbours)
-    text += fmt::format("{}{} {}", text.empty() ? "" : " + ", count, kind);
-  return text;
 }
 
 void print_comparisons(const CertifyOutput& output) {

@@ -30,6 +30,9 @@ struct CertifyOutput {
   std::vector<lipschitz::SlopeMap> maps;
 };
 
+/// "set:small:large", "set:small:large position scaled", "set:small:large, at most 2 small".
+std::string label(const lipschitz::CertifiedBound& bound);
+
 /// What the numbers mean, in sentences.
 /// @param product product of spectral norms, `upper` the best proved bound, `lower` the steepest slope found (0: none).
 std::vector<std::string> explain(const lipschitz::Comparison& comparison, double product, double upper,

@@ -27,24 +27,17 @@ std::string number(double x, int digits) {
   return std::isfinite(x) ? fmt::format("{:.{}g}", x, digits) : "-";
 }
 
-std::string where(const CertifiedBound& bound) {
-  std::string text = bound.function;
-  if (bound.block != "all") text += " " + bound.block;
-  if (!bound.scale.empty()) text += " scaled";
-  return text;
-}
-
 void add_bounds(Report& report, const files::Network& network, const CertifyOutput& output) {
   report.heading("Lipschitz constants");
   std::vector<std::vector<std::string>> rows;
   std::string data = "# function product proved witnessed\n";
   for (const CertifiedBound& bound : output.found.bounds) {
     const double lower = slope_of(bound.lower);
-    rows.push_back({where(bound), bound.domain, number(bound.upper.value(), 10), name(bound.method),
+    rows.push_back({label(bound), bound.domain, number(bound.upper.value(), 10), name(bound.method),
                     number(bound.product.value(), 8), number(lower, 8),
                     files::unit(network, bound.function, bound.block)});
     // A logarithmic axis has no zero.
-    data += fmt::format("{} {:.17g} {:.17g} {}\n", plot_field(where(bound)), bound.product.value(),
+    data += fmt::format("{} {:.17g} {:.17g} {}\n", plot_field(label(bound)), bound.product.value(),
                         bound.upper.value(), lower > 0 ? fmt::format("{:.17g}", lower) : "NaN");
   }
   report.table(

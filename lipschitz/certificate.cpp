@@ -40,7 +40,34 @@ Json upper_json(const UpperProof& proof) {
   return {{"rho", hex_float(proof.rho)}, {"t", hex_floats(proof.t)}, {"factor", factor_json(proof.factor)}};
 }
 
+Json tree_json(const LocalProof& proof) {
+  Json multipliers = Json::array();
+  for (const std::vector<double>& t : proof.tree.multipliers) multipliers.push_back(joined(t));
+  Json json = {
+      {"rho", hex_float(proof.rho)}, {"tree", proof.tree.tree}, {"multipliers", std::move(multipliers)}};
+  if (proof.tree.conflicts.empty()) return json;
+  json["conflicts"] = Json::array();
+  for (const std::vector<check::Conflict>& conflicts : proof.tree.conflicts) {
+    std::string text;
+    for (const check::Conflict& c : conflicts)
+      text += (text.empty() ? "" : " ") + std::to_string(c.first) + (c.first_on ? "+ " : "- ") +
+              std::to_string(c.second) + (c.second_on ? "+ " : "- ") + hex_float(c.lambda) + " " +
+              hex_float(c.multiplier);
+    json["conflicts"].push_back(std::move(text));
+  }
+  return json;
+}
+
 Json local_json(const LocalProof& proof) {
+  Json json = tree_json(proof);
+  if (!proof.radius.empty()) json["radius"] = hex_floats(proof.radius);
+  if (proof.others) {
+    json["others"] = Json::object();
+    for (const auto& [part, range] : *proof.others)
+      json["others"][part] = {
+          {"tree", range.tree}, {"least", hex_floats(range.least)}, {"most", hex_floats(range.most)}};
+    return json;
+  }
   Json form;
   if (proof.form) {
     const Eigen::MatrixXd& q = proof.form->q;
@@ -54,12 +81,8 @@ Json local_json(const LocalProof& proof) {
             {"t", hex_floats(proof.form->t)},
             {"factor", factor_json(proof.form->factor)}};
   }
-  Json multipliers = Json::array();
-  for (const std::vector<double>& t : proof.tree.multipliers) multipliers.push_back(joined(t));
-  return {{"rho", hex_float(proof.rho)},
-          {"form", std::move(form)},
-          {"tree", proof.tree.tree},
-          {"multipliers", std::move(multipliers)}};
+  json["form"] = std::move(form);
+  return json;
 }
 
 Json layer_json(const CertifiedLayer& layer) {
@@ -117,6 +140,7 @@ Json summary(const files::Network& network, const CertifiedBound& bound) {
                {"upper", bound.upper.value()},
                {"upper_method", name(bound.method)},
                {"lower", nullptr}};
+  if (!bound.neighbours.empty()) json["neighbours"] = bound.neighbours;
   if (bound.lower.witness) json["lower"] = bound.lower.witness->slope.value();
   return json;
 }

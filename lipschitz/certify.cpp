@@ -31,14 +31,31 @@ UpperBound bound_of(const Network& network, const LawClaim& law, const std::vect
   if (network.phi.count(files::kGroundKind) == 1) neighbours[files::kGroundKind] = 1;
   std::vector<std::pair<UpperBound, int>> terms;
   for (const auto& [kind, count] : neighbours) {
+    const CertifiedBound* best = nullptr;
     for (const CertifiedBound& bound : bounds) {
-      if (bound.function == "set:" + kind + ":" + law.rho && bound.block == law.block && bound.scale.empty())
-        terms.emplace_back(bound.upper, count);
+      const bool holds = bound.function == "set:" + kind + ":" + law.rho && bound.block == law.block &&
+                         bound.scale.empty() &&
+                         (bound.neighbours.empty() || bound.neighbours == law.neighbours);
+      if (holds && (best == nullptr || bound.upper.value() < best->upper.value())) best = &bound;
     }
+    if (best != nullptr) terms.emplace_back(best->upper, count);
   }
   if (terms.size() != neighbours.size())
     throw std::logic_error("certify: a law lacks the bound of one of its terms");
   return law_bound(law.law, terms);
+}
+
+/// What is proved for any number of neighbours holds for so many.
+void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedBound& counted) {
+  const auto any = std::find_if(bounds.begin(), bounds.end(), [&](const CertifiedBound& bound) {
+    return bound.function == counted.function && bound.block == counted.block && bound.neighbours.empty() &&
+           bound.scale.empty();
+  });
+  counted.upper = any->upper;
+  counted.method = any->method;
+  counted.proof = any->proof;
+  counted.local = any->local;
+  counted.sdp = any->sdp;
 }
 
 /// Replaces the bound for all inputs by a smaller one for the box, where there is one.
@@ -51,14 +68,16 @@ void branch_further(const Network& network, const std::map<std::string, Box>& do
     branch.progress = [&options, &bound](double share, double upper) {
       constexpr int kSteps = 1000;
       options.progress(static_cast<int>(share * kSteps), kSteps,
-                       bound.function + " " + bound.block + " at most " + std::to_string(upper));
+                       bound.function + " " + bound.block +
+                           (bound.neighbours.empty() ? "" : " with so many") + " at most " +
+                           std::to_string(upper));
     };
   }
   const UpperProof* const global = bound.proof       ? &*bound.proof
                                    : bound.sdp.proof ? &*bound.sdp.proof
                                                      : nullptr;
-  LocalBound local = local_bound(network, bound, domain.at(files::networks_of(bound.function).front()),
-                                 global != nullptr ? global->t : std::vector<double>(), branch);
+  LocalBound local =
+      local_bound(network, bound, domain, global != nullptr ? global->t : std::vector<double>(), branch);
   bound.nodes = local.nodes;
   LowerBoundOptions lower = options.lower;
   lower.cancelled = options.cancelled;
@@ -76,6 +95,7 @@ void branch_further(const Network& network, const std::map<std::string, Box>& do
   bound.upper = local.upper;
   bound.method = UpperMethod::kBranch;
   bound.local = std::move(local.proof);
+  if (bound.proof) bound.sdp.proof = std::move(bound.proof);  // where others may start from
   bound.proof.reset();
 }
 
@@ -122,8 +142,6 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   if (result.gamma && !(result.gamma->value > 0)) {
     throw std::invalid_argument("certify: gamma must be positive");
   }
-  if (options.method == UpperMethod::kBranch && options.domain.empty())
-    throw std::invalid_argument("branch and bound needs a box: give --domain");
   const std::map<std::string, const Weights*> parts = files::parts(network);
   std::vector<const files::Layer*> layers;
   for (const auto& [name, weights] : parts) {
@@ -133,7 +151,9 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     }
   }
   result.domain = options.domain;
-  for (Claim& claim : claims(network, options)) {
+  ClaimOptions wanted = options;
+  wanted.counted = options.method == UpperMethod::kBranch;
+  for (Claim& claim : claims(network, wanted)) {
     result.bounds.emplace_back();
     static_cast<Claim&>(result.bounds.back()) = std::move(claim);
   }
@@ -185,7 +205,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   files::parallel_for(2 * count, options.jobs, [&](int i) {
     CertifiedBound& bound = result.bounds[static_cast<std::size_t>(i % count)];
     if (i < count) {
-      if (options.method != UpperMethod::kProduct) {
+      if (options.method != UpperMethod::kProduct && bound.neighbours.empty()) {
         bound.sdp =
             sdp_bound(check::stages(network, bound.function, bound.block, bound.scale), options.cancelled);
         const bool smaller = bound.sdp.proof && bound.sdp.proof->upper.value() < bound.product.value();
@@ -207,16 +227,20 @@ Certification certify(const Network& network, const CertifyOptions& options) {
 
   if (options.method == UpperMethod::kBranch) {
     const std::map<std::string, Box> domain = clamped(network, options.domain);
-    files::parallel_for(count, options.jobs, [&](int i) {
-      CertifiedBound& bound = result.bounds[static_cast<std::size_t>(i)];
-      if (bound.domain == "box") branch_further(network, domain, options, bound);
-    });
+    for (const bool are_counted : {false, true}) {
+      files::parallel_for(count, options.jobs, [&](int i) {
+        CertifiedBound& bound = result.bounds[static_cast<std::size_t>(i)];
+        if (bound.function.rfind("rho:", 0) == 0 || bound.neighbours.empty() == are_counted) return;
+        if (are_counted) start_from_any_number(result.bounds, bound);
+        branch_further(network, domain, options, bound);
+      });
+    }
   }
 
   for (CertifiedLaw& law : result.laws) {
     law.upper = bound_of(network, law, result.bounds);
     for (const CertifiedBound& bound : result.bounds)
-      if (bound.method == UpperMethod::kBranch) law.domain = "box";
+      if (bound.method == UpperMethod::kBranch && bound.domain == "box") law.domain = "box";
   }
   return result;
 }

@@ -24,7 +24,7 @@ enum class UpperMethod {
   kAuto,     ///< the smaller of both
   kProduct,  ///< product of the layers' spectral norms
   kSdp,      ///< LipSDP-Neuron
-  kBranch,   ///< branch and bound on the claim's box; kAuto for claims about all inputs
+  kBranch,  ///< branch and bound on the claim's box, or, for all inputs, on a projective cover; kAuto for rho
 };
 
 struct CertifyOptions : ClaimOptions {
@@ -81,8 +81,9 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 
 /// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
-/// a distance, leaves the upper bounds valid. Branch and bound runs on what the clamp lets through of the box.
-/// @throws std::invalid_argument if gamma is not positive, if kBranch has no domain, or as claims() and law_claims().
+/// a distance, leaves the upper bounds valid. Branch and bound runs on what the clamp lets through of the box, or on a
+/// projective cover of all inputs where there is no box.
+/// @throws std::invalid_argument if gamma is not positive, or as claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);
 
 /// What the law gives from verified bounds of its terms, rounded up.

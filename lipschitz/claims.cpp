@@ -22,6 +22,37 @@ int inputs_of(const files::Network& network, const std::string& function) {
   return files::parts(network).at(files::networks_of(function).front())->inputs();
 }
 
+/// The groups of neighbours that the options name.
+std::vector<Neighbours> groups(const files::Network& network, const ClaimOptions& options) {
+  std::vector<Neighbours> result;
+  for (const auto& [kind, phi] : network.phi) {
+    if (kind != files::kGroundKind && options.neighbours > 0) result.push_back({{kind, options.neighbours}});
+  }
+  for (const auto& [kind, count] : options.mixture) {
+    if (network.phi.count(kind) == 0 || kind == files::kGroundKind)
+      throw std::invalid_argument("there are no neighbours of kind \"" + kind + "\"");
+    if (count < 1) throw std::invalid_argument("a number of neighbours is below 1");
+  }
+  if (!options.mixture.empty()) result.push_back(options.mixture);
+  return result;
+}
+
+/// Claims that hold for a group of neighbours only: of the set functions whose moving term is in it, or the ground's.
+void add_counted(const files::Network& network, const ClaimOptions& options, std::vector<Claim>& claims) {
+  for (const Neighbours& group : groups(network, options)) {
+    for (const std::string& function : files::functions(network)) {
+      if (function.rfind("set:", 0) != 0) continue;
+      const std::string kind = files::networks_of(function).front().substr(4);
+      if (kind != files::kGroundKind && group.count(kind) == 0) continue;
+      Claim claim;
+      claim.function = function;
+      claim.domain = "box";
+      claim.neighbours = group;
+      claims.push_back(std::move(claim));
+    }
+  }
+}
+
 Box read_box(const files::TomlTable& table, std::size_t inputs) {
   Box box{table.numbers("lower"), table.numbers("upper")};
   for (const auto& [key, numbers] : {std::pair{"lower", &box.lower}, std::pair{"upper", &box.upper}}) {
@@ -75,23 +106,14 @@ std::vector<Claim> claims(const files::Network& network, const ClaimOptions& opt
   if (!scale_fits)
     throw std::invalid_argument("no function has " + std::to_string(options.scale.size()) +
                                 " inputs, as the scale has");
+  if (options.counted && !options.domain.empty()) add_counted(network, options, result);
   return result;
 }
 
 std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptions& options) {
-  std::vector<Neighbours> groups;
-  for (const auto& [kind, phi] : network.phi) {
-    if (kind != files::kGroundKind && options.neighbours > 0) groups.push_back({{kind, options.neighbours}});
-  }
-  for (const auto& [kind, count] : options.mixture) {
-    if (network.phi.count(kind) == 0 || kind == files::kGroundKind)
-      throw std::invalid_argument("there are no neighbours of kind \"" + kind + "\"");
-    if (count < 1) throw std::invalid_argument("a number of neighbours is below 1");
-  }
-  if (!options.mixture.empty()) groups.push_back(options.mixture);
   std::vector<LawClaim> result;
   for (const auto& [rho, weights] : network.rho) {
-    for (const Neighbours& group : groups) {
+    for (const Neighbours& group : groups(network, options)) {
       for (const std::string block : {"all", "position", "velocity"}) {
         const std::vector<std::string> has =
             files::blocks(network, "set:" + group.begin()->first + ":" + rho);

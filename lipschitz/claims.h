@@ -11,6 +11,9 @@
 
 namespace swarmcert::lipschitz {
 
+/// Neighbours by kind.
+using Neighbours = std::map<std::string, int>;
+
 /// |f(x) - f(y)|_2 <= L |x - y| for all x and y of the domain that differ in `block` only; in a set function for one
 /// neighbour that moves.
 struct Claim {
@@ -18,6 +21,9 @@ struct Claim {
   std::string block = "all";      ///< see files::block_coordinates()
   std::vector<double> scale;      ///< empty: |x - y|_2; else |x - y|^2 = sum_k ((x_k - y_k) / scale_k)^2
   std::string domain = "global";  ///< or "box"
+  /// Of a set function on a box: there are at most as many neighbours, the moving one included, all in the box. Empty:
+  /// any number, anywhere.
+  Neighbours neighbours = {};
 };
 
 /// How a bound for one neighbour becomes one for several terms of the sum, moved one after the other (triangle
@@ -29,9 +35,6 @@ enum class LawKind {
 };
 /// "all_stacked", "all_max" or "own_state".
 const char* name(LawKind law);
-
-/// Neighbours by kind.
-using Neighbours = std::map<std::string, int>;
 
 /// A law for one group of neighbours in front of one rho. Single coordinates have none: those of the ground are others
 /// than those of a neighbour.
@@ -49,6 +52,7 @@ struct ClaimOptions {
   std::vector<double> scale;  ///< not empty: claims in this norm as well, for functions with as many inputs
   int neighbours = 0;         ///< laws for as many neighbours of each kind; 0: none
   Neighbours mixture;         ///< laws for this group as well; empty: none
+  bool counted = false;       ///< claims for these numbers of neighbours as well, where there is a domain
   /// By part ("network", "phi:<kind>"): claims of functions of these inputs hold for them. Empty: all of R^n.
   std::map<std::string, Box> domain;
 };

@@ -17,13 +17,13 @@ using Eigen::VectorXd;
 /// Below this size LAPACK's unblocked inversion is as fast as anything.
 constexpr int kSmallTriangle = 32;
 
-void multiply(CBLAS_TRANSPOSE transpose_b, Eigen::Ref<MatrixXd> c, const Eigen::Ref<const MatrixXd>& a,
-              const Eigen::Ref<const MatrixXd>& b) {
-  if (c.size() == 0 || a.cols() == 0) return;
-  cblas_dgemm(CblasColMajor, CblasNoTrans, transpose_b, static_cast<int>(c.rows()),
-              static_cast<int>(c.cols()), static_cast<int>(a.cols()), 1.0, a.data(),
-              static_cast<int>(a.outerStride()), b.data(), static_cast<int>(b.outerStride()), 1.0, c.data(),
-              static_cast<int>(c.outerStride()));
+void multiply(CBLAS_TRANSPOSE transpose_a, CBLAS_TRANSPOSE transpose_b, Eigen::Ref<MatrixXd> c,
+              const Eigen::Ref<const MatrixXd>& a, const Eigen::Ref<const MatrixXd>& b) {
+  const Eigen::Index inner = transpose_a == CblasNoTrans ? a.cols() : a.rows();
+  if (c.size() == 0 || inner == 0) return;
+  cblas_dgemm(CblasColMajor, transpose_a, transpose_b, static_cast<int>(c.rows()), static_cast<int>(c.cols()),
+              static_cast<int>(inner), 1.0, a.data(), static_cast<int>(a.outerStride()), b.data(),
+              static_cast<int>(b.outerStride()), 1.0, c.data(), static_cast<int>(c.outerStride()));
 }
 
 /// Replaces a lower triangular L = [A 0; B C] by its inverse [A^-1 0; -C^-1 B A^-1 C^-1].
@@ -53,12 +53,17 @@ void use_one_blas_thread() { openblas_set_num_threads(1); }
 
 void add_product(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const MatrixXd>& a,
                  const Eigen::Ref<const MatrixXd>& b) {
-  multiply(CblasNoTrans, c, a, b);
+  multiply(CblasNoTrans, CblasNoTrans, c, a, b);
 }
 
 void add_product_transposed(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const MatrixXd>& a,
                             const Eigen::Ref<const MatrixXd>& b) {
-  multiply(CblasTrans, c, a, b);
+  multiply(CblasNoTrans, CblasTrans, c, a, b);
+}
+
+void add_transposed_product(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const MatrixXd>& a,
+                            const Eigen::Ref<const MatrixXd>& b) {
+  multiply(CblasTrans, CblasNoTrans, c, a, b);
 }
 
 MatrixXd cholesky(const MatrixXd& x) {
@@ -88,6 +93,18 @@ VectorXd congruence_times(const MatrixXd& l, const MatrixXd& d, const VectorXd& 
   add_symmetric_product(w, 1.0, d, u);
   cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, l.data(), n, w.data(), 1);
   return w;
+}
+
+void solve_lower(const MatrixXd& l, MatrixXd& b) {
+  const int n = static_cast<int>(l.rows());
+  cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, static_cast<int>(b.cols()),
+              1.0, l.data(), n, b.data(), n);
+}
+
+void solve_lower_transposed(const MatrixXd& l, MatrixXd& b) {
+  const int n = static_cast<int>(l.rows());
+  cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, n, static_cast<int>(b.cols()),
+              1.0, l.data(), n, b.data(), n);
 }
 
 void solve_cholesky(const MatrixXd& l, VectorXd& b) {

@@ -21,6 +21,10 @@ void add_product(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::Ma
 void add_product_transposed(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::MatrixXd>& a,
                             const Eigen::Ref<const Eigen::MatrixXd>& b);
 
+/// C += A' B.
+void add_transposed_product(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::MatrixXd>& a,
+                            const Eigen::Ref<const Eigen::MatrixXd>& b);
+
 /// L with X = L L' for a symmetric X (its lower triangle is read), zeros above the diagonal. Empty if the
 /// factorisation breaks down, so X is not safely positive definite.
 Eigen::MatrixXd cholesky(const Eigen::MatrixXd& x);
@@ -31,6 +35,10 @@ Eigen::MatrixXd inverse_from_cholesky(const Eigen::MatrixXd& l);
 /// L^-1 D L^-T v, symmetric D (its lower triangle is read).
 Eigen::VectorXd congruence_times(const Eigen::MatrixXd& l, const Eigen::MatrixXd& d,
                                  const Eigen::VectorXd& v);
+
+/// B <- L^-1 B, and B <- L^-T B.
+void solve_lower(const Eigen::MatrixXd& l, Eigen::MatrixXd& b);
+void solve_lower_transposed(const Eigen::MatrixXd& l, Eigen::MatrixXd& b);
 
 /// Solves L L' v = b in place.
 void solve_cholesky(const Eigen::MatrixXd& l, Eigen::VectorXd& b);

@@ -16,9 +16,9 @@ using files::Weights;
 constexpr int kMostNeighbours = 3;
 
 /// The fixed neighbours of a set function with `neighbours` neighbours in all: the moving one's own kind first, then
-/// the other kinds in turn; and the ground.
-std::vector<std::string> other_networks(const Network& network, const std::string& function, int neighbours) {
-  const std::vector<std::string> names = files::networks_of(function);
+/// the other kinds in turn, each as often as the claim allows; and the ground.
+std::vector<std::string> other_networks(const Network& network, const Claim& claim, int neighbours) {
+  const std::vector<std::string> names = files::networks_of(claim.function);
   std::vector<std::string> others;
   if (names.size() == 1) return others;
   const std::string ground = files::kGroundPhi;
@@ -30,8 +30,18 @@ std::vector<std::string> other_networks(const Network& network, const std::strin
     const std::string name = "phi:" + kind;
     if (name != ground && name != names[0]) kinds.push_back(name);
   }
-  for (int j = ground_moves ? 0 : 1; j < neighbours && !kinds.empty(); ++j)
-    others.push_back(kinds[static_cast<std::size_t>(j) % kinds.size()]);
+  Neighbours left = claim.neighbours;
+  if (!ground_moves && !left.empty()) --left[names[0].substr(4)];
+  std::size_t turn = 0;
+  for (int j = ground_moves ? 0 : 1; j < neighbours; ++j) {
+    for (std::size_t tries = 0; tries < kinds.size(); ++tries, ++turn) {
+      const std::string& name = kinds[turn % kinds.size()];
+      if (!claim.neighbours.empty() && left[name.substr(4)]-- <= 0) continue;
+      others.push_back(name);
+      ++turn;
+      break;
+    }
+  }
   return others;
 }
 
@@ -107,7 +117,7 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const std::ma
   const std::vector<std::string> names = files::networks_of(claim.function);
   const int cases = names.size() == 2 ? kMostNeighbours : 1;  // they share the rounds and the seconds
   for (int neighbours = 1; neighbours <= cases; ++neighbours) {
-    const std::vector<std::string> others = other_networks(network, claim.function, neighbours);
+    const std::vector<std::string> others = other_networks(network, claim, neighbours);
     const SlopeFunction f = slope_function(network, claim.function, others);
     SlopeSearchOptions search;
     search.seed = options.seed + static_cast<std::uint64_t>(neighbours) * 1000003;

@@ -40,7 +40,8 @@ ReachNetwork reach_network(const files::Weights& weights) {
   return network;
 }
 
-Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, std::vector<MatrixXd>* slopes)
+Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, std::vector<MatrixXd>* slopes,
+             std::vector<LinearForms>* forms)
     : network_(network), box_(box) {
   VectorXd magnitude = largest_input(box);
   for (std::size_t k = 0; k < network.size(); ++k) {
@@ -60,8 +61,17 @@ Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, s
     MatrixXd both = MatrixXd::Zero(2 * count, rows);
     for (Index i = 0; i < count; ++i)
       both(i, open[static_cast<std::size_t>(i)]) = 1, both(count + i, open[static_cast<std::size_t>(i)]) = -1;
-    const LinearForms forms = substituted(k, std::move(both));
-    const VectorXd ends = largest(forms);
+    const LinearForms found = substituted(k, std::move(both));
+    const VectorXd ends = largest(found);
+    if (forms != nullptr) {
+      forms->push_back({MatrixXd::Zero(2 * rows, network.front().weights.cols()),
+                        VectorXd::Constant(2 * rows, kInfinity)});
+      for (Index i = 0; i < 2 * count; ++i) {
+        const Index row = open[static_cast<std::size_t>(i % count)] + (i < count ? 0 : rows);
+        forms->back().rows.row(row) = found.rows.row(i);
+        forms->back().constants(row) = found.constants(i);
+      }
+    }
     if (slopes != nullptr) slopes->push_back(MatrixXd::Zero(rows, network.front().weights.cols()));
     for (Index i = 0; i < count; ++i) {
       double& lower = bounds.lower(open[static_cast<std::size_t>(i)]);
@@ -70,7 +80,7 @@ Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, s
       if (ends(i) < upper) upper = ends(i);
       if (slopes != nullptr)
         slopes->back().row(open[static_cast<std::size_t>(i)]) =
-            0.5 * (forms.rows.row(i).cwiseAbs() + forms.rows.row(count + i).cwiseAbs());
+            0.5 * (found.rows.row(i).cwiseAbs() + found.rows.row(count + i).cwiseAbs());
     }
     magnitude = layer.has_relu ? VectorXd(bounds.upper.cwiseMax(0.0)) : bounds.magnitude();
     bounds_.push_back(std::move(bounds));

@@ -50,8 +50,10 @@ class Reach {
   ///   decides keep its bounds.
   /// @param slopes if not null, one matrix per layer: |slope| of the forms that bound each neuron, [outputs x inputs],
   ///   the mean of the upper and the lower one; zero for neurons that `around` decides.
+  /// @param forms if not null, per layer the forms above y and then those above -y, [2 outputs x inputs]; with infinite
+  ///   constants for neurons that `around` decides.
   Reach(const ReachNetwork& network, const Box& box, const Reach* around = nullptr,
-        std::vector<Eigen::MatrixXd>* slopes = nullptr);
+        std::vector<Eigen::MatrixXd>* slopes = nullptr, std::vector<LinearForms>* forms = nullptr);
 
   /// Of y_k, before the ReLU of layer k.
   const Bounds& before_relu(std::size_t k) const { return bounds_[k]; }

@@ -16,7 +16,7 @@ namespace {
 constexpr double kTolerance = 0.01;
 
 bool has_map(const CertifiedBound& bound) {
-  if (bound.block != "all" || !bound.scale.empty()) return false;
+  if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) return false;
   return bound.function == "network" || (bound.function.rfind("set:", 0) == 0 &&
                                          files::networks_of(bound.function).front() != files::kGroundPhi);
 }
@@ -67,7 +67,7 @@ void look_at(const files::Network& network, const CertifiedBound& everywhere, co
   const UpperProof* const global = everywhere.proof       ? &*everywhere.proof
                                    : everywhere.sdp.proof ? &*everywhere.sdp.proof
                                                           : nullptr;
-  const LocalBound local = local_bound(network, claim, clamped(network, domain).at(moving),
+  const LocalBound local = local_bound(network, claim, clamped(network, domain),
                                        global != nullptr ? global->t : std::vector<double>(), branch);
   if (!local.proof || !(local.upper.value() < cell.upper.value())) return;
   cell.upper = local.upper;

@@ -24,4 +24,17 @@ std::vector<Matrix> stages(const files::Network& network, const std::string& fun
 LocalFunction local_function(const files::Network& network, const std::string& part, const std::string& block,
                              const std::vector<double>& scale, const Matrix& q);
 
+/// What `phi` adds to the values before the first ReLU of `rho`: V phi(x), with V the first layer of rho, its bias left
+/// out. The last layer of phi and V have no ReLU.
+/// @throws std::out_of_range if NET has no such part; std::invalid_argument if rho has no hidden layer.
+std::vector<HiddenLayer> term_layers(const files::Network& network, const std::string& phi,
+                                     const std::string& rho);
+
+/// x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>" as one chain, for any s with least <= V s <= most; V as in
+/// term_layers().
+/// @throws as local_function() and term_layers().
+LocalFunction coupled_function(const files::Network& network, const std::string& function,
+                               const std::string& block, const std::vector<double>& scale,
+                               const std::vector<double>& least, const std::vector<double>& most);
+
 }  // namespace swarmcert::check

@@ -12,7 +12,10 @@ inline constexpr const char* kStatement =
     "|f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x and y in the box. "
     "So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
     "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x "
-    "to y, whatever the number and the places of the others. Laws hold for the neighbours listed and "
+    "to y, whatever the number and the places of the others; where neighbours are listed, with at most so "
+    "many of "
+    "each kind, the moving one included, all in the box, and the ground's input where there is one. Laws "
+    "hold for the neighbours listed and "
     "the ground's input where there is one, in the box where their domain is box: all_stacked, |df| <= upper "
     "sqrt(sum |dx_j|^2); all_max, "
     "|df| <= upper max |dx_j|; own_state, |df| <= upper |dx| where the vehicle's own state moves by dx.";

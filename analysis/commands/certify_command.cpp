@@ -67,7 +67,7 @@ Verdict judge(const Certification& found, double max_lipschitz) {
   }
   for (const CertifiedBound& bound : found.bounds) {
     if (max_lipschitz <= 0 || !is_composed(bound)) continue;
-    if (bound.block != "all" || !bound.scale.empty()) continue;
+    if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
     const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
     verdicts.push_back(bound.upper.value() <= max_lipschitz ? Verdict::kProved
                        : lower > max_lipschitz              ? Verdict::kRefuted
@@ -121,7 +121,7 @@ void add_comparisons(const files::Network& network, const lipschitz::CertifyOpti
   output.comparisons.resize(bounds.size());
   files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
     const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
-    if (bound.block == "all" && bound.scale.empty())
+    if (bound.block == "all" && bound.scale.empty() && bound.neighbours.empty())
       output.comparisons[static_cast<std::size_t>(i)] =
           lipschitz::compare(network, bound.function, bound.block, bound.scale);
   });
@@ -134,7 +134,7 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Ce
   if (domain.empty()) throw UsageError("--range needs a box: give --domain, or a clamp in network.toml");
   std::map<std::string, double> bounds, rho_bounds;
   for (const CertifiedBound& bound : output.found.bounds) {
-    if (bound.block != "all" || !bound.scale.empty()) continue;
+    if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
     bounds[bound.function] = bound.upper.value();
     if (bound.function.rfind("rho:", 0) == 0) rho_bounds[bound.function.substr(4)] = bound.upper.value();
   }
@@ -272,10 +272,11 @@ Command certify_command() {
       [](CLI::App& app) {
         const auto options = std::make_shared<CertifyOptions>();
         declare_network(app, options->network);
-        app.add_option("--method", options->method,
-                       "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), auto, the smaller one, "
-                       "or branch: branch "
-                       "and bound over the box of --domain, for bounds that hold there only")
+        app.add_option(
+               "--method", options->method,
+               "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), auto, the smaller one, "
+               "or branch: branch "
+               "and bound over the box of --domain, for bounds that hold there only, or over all inputs")
             ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
             ->capture_default_str();
         app.add_option("--as", options->as,
@@ -289,7 +290,8 @@ Command certify_command() {
             ->delimiter(',');
         app.add_option(
             "--neighbours", options->neighbours,
-            "Laws for several neighbours: a number of each kind, or a group such as small=1,large=2");
+            "Laws for several neighbours: a number of each kind, or a group such as small=1,large=2. With "
+            "--method branch also the bound for one that moves among at most so many, all in the box");
         app.add_option("--domain", options->domain,
                        "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
         auto* map = app.add_option("--map", options->map,

@@ -66,8 +66,8 @@ files::Json inspect_certificate(const std::string& path, bool print) {
   }
   for (const files::Json& bound : certificate.value("bounds", files::Json::array())) {
     files::Json line = files::Json::object();
-    for (const char* key :
-         {"function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_method", "lower"}) {
+    for (const char* key : {"function", "domain", "block", "law", "norm", "scale", "unit", "upper",
+                            "upper_method", "lower", "neighbours"}) {
       if (bound.contains(key)) line[key] = bound[key];
     }
     if (print) print_bound_row(cell(bound, "function"), bound);

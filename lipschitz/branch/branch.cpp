@@ -8,8 +8,10 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <queue>
 
+#include "lipschitz/branch/descend.h"
 #include "lipschitz/branch/node_inequality.h"
 
 namespace swarmcert::lipschitz {
@@ -26,15 +28,21 @@ constexpr double kRhoMargin = 1e-8;
 /// A part gets multipliers of its own once its undecided neurons are fewer than this share of those for which the
 /// inherited ones were computed.
 constexpr double kLazy = 0.97;
-/// Programs are solved this well: the next one starts where this one stopped.
-constexpr double kGap = 0.1;
-/// A program starts at the inherited multipliers, drawn this far towards a point well inside.
-constexpr double kInwards = 0.01;
+/// How well a part's program is solved: it starts where an ancestor's stopped.
+constexpr double kGap = 0.03;
+constexpr int kSteps = 2;
+/// Pairs of neurons that a part's program may use, and what one has to take off the barrier.
+constexpr std::size_t kMostPairs = 40;
+constexpr double kLeastGain = 1e-2;
+/// How well the program of the whole box is solved.
+constexpr double kRootGap = 0.02;
+constexpr int kRootSteps = 12;
 
 struct Part {
   double rho = std::numeric_limits<double>::infinity();
   int index = 0;  ///< in Search::nodes_
   std::shared_ptr<const Reach> reach;
+  std::shared_ptr<const Reach> around;  ///< of the box that was halved, which `reach` rests on
   std::vector<NeuronState> states;
   int undecided = 0;
   int split = 0;           ///< the coordinate to halve
@@ -45,16 +53,18 @@ struct Part {
 
 class Search {
  public:
-  Search(const LocalChain& chain, const Box& box, const BranchOptions& options)
-      : chain_(chain), box_(box), options_(options) {}
+  Search(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options)
+      : chain_(chain), boxes_(boxes), options_(options) {}
 
   BranchResult run() {
     const auto start = std::chrono::steady_clock::now();
-    nodes_.push_back({});
     std::priority_queue<Part> queue;
-    Part root = part(box_, nullptr, 0);
-    solve(root);
-    queue.push(std::move(root));
+    for (const Box& box : boxes_) {
+      nodes_.push_back({});
+      Part root = part(box, nullptr, static_cast<int>(nodes_.size()) - 1);
+      solve(root);
+      queue.push(std::move(root));
+    }
     const auto enough = [&] {
       const double attained = std::max(options_.known, std::sqrt(chain_.unscaled_rho(steepest())));
       return attained * (1 + options_.tolerance);
@@ -75,7 +85,7 @@ class Search {
       }
       const Box& whole = top.reach->box();
       const auto k = static_cast<std::size_t>(top.split);
-      if (!(whole.upper[k] > whole.lower[k])) {
+      if (top.multipliers < 0 || !(whole.upper[k] > whole.lower[k])) {
         queue.push(std::move(top));
         break;
       }
@@ -96,7 +106,7 @@ class Search {
     result_.tree.rho = chain_.unscaled_rho(rho);
     for (; !queue.empty(); queue.pop())
       nodes_[static_cast<std::size_t>(queue.top().index)].multipliers = queue.top().multipliers;
-    write_preorder(0);
+    for (std::size_t root = 0; root < boxes_.size(); ++root) write_preorder(static_cast<int>(root));
     for (const auto& [slope, centre] : steep_) result_.steep_centres.push_back(centre);
     return std::move(result_);
   }
@@ -127,11 +137,16 @@ class Search {
     Part part;
     part.index = index;
     std::vector<MatrixXd> slopes;
-    part.reach =
-        std::make_shared<const Reach>(chain_.hidden, box, parent ? parent->reach.get() : nullptr, &slopes);
+    std::vector<LinearForms> forms;
+    if (parent != nullptr) part.around = parent->reach;
+    part.reach = std::make_shared<const Reach>(chain_.hidden, box, part.around.get(), &slopes, &forms);
     for (std::size_t k = 0; k < chain_.hidden.size(); ++k) {
       const Bounds& bounds = part.reach->before_relu(k);
       for (Index i = 0; i < bounds.lower.size(); ++i) {
+        if (i >= bounds.lower.size() - chain_.without_relu[k]) {
+          part.states.push_back(NeuronState::kOn);
+          continue;
+        }
         const double margin = kStateMargin * std::max(std::abs(bounds.lower(i)), std::abs(bounds.upper(i)));
         part.states.push_back(bounds.lower(i) > margin    ? NeuronState::kOn
                               : bounds.upper(i) < -margin ? NeuronState::kOff
@@ -143,9 +158,14 @@ class Search {
       part.rho = parent->rho;
       part.multipliers = parent->multipliers;
       part.undecided_then = parent->undecided_then;
-      if (part.states != parent->states) {
-        const NodeInequality inequality(chain_, part.states);
-        part.rho = std::min(part.rho, inequality.least_rho(at_undecided(inequality, part.multipliers)));
+      const std::vector<std::size_t> pairs = still_shown(part, NeuronForms(forms, box));
+      const bool all_pairs = pairs.size() == scaled_[static_cast<std::size_t>(part.multipliers)].pairs.size();
+      if (part.states != parent->states || !all_pairs) {
+        NodeInequality inequality(chain_, part.states);
+        const double rho = inequality.least_rho(inherited(part, pairs, inequality));
+        const bool is_worse = !all_pairs && !(rho <= part.rho);  // for want of a pair
+        part.rho = is_worse ? rho : std::min(part.rho, rho);
+        if (is_worse) solve(part);
       }
     }
     part.split = best_split(*part.reach, slopes, part.states);
@@ -175,48 +195,140 @@ class Search {
     return static_cast<int>(best);
   }
 
-  VectorXd at_undecided(const NodeInequality& inequality, int multipliers) const {
-    return scaled_[static_cast<std::size_t>(multipliers)](inequality.undecided());
+  /// Of the pairs that come with the part's multipliers, those that hold in it between undecided neurons.
+  std::vector<std::size_t> still_shown(const Part& part, const NeuronForms& forms) const {
+    std::vector<std::size_t> result;
+    const std::vector<NeuronPair>& pairs = scaled_[static_cast<std::size_t>(part.multipliers)].pairs;
+    const auto is_undecided = [&](Index neuron) {
+      return part.states[static_cast<std::size_t>(neuron)] == NeuronState::kUndecided;
+    };
+    for (std::size_t c = 0; c < pairs.size(); ++c)
+      if (is_undecided(pairs[c].first) && is_undecided(pairs[c].second) && forms.excludes(pairs[c]))
+        result.push_back(c);
+    return result;
+  }
+
+  /// The inherited multipliers; adds the pairs, given by their indices, to `inequality`.
+  VectorXd inherited(const Part& part, const std::vector<std::size_t>& pairs,
+                     NodeInequality& inequality) const {
+    const Multipliers& own = scaled_[static_cast<std::size_t>(part.multipliers)];
+    VectorXd t(inequality.neurons() + static_cast<Index>(pairs.size()));
+    t.head(inequality.neurons()) = own.t(inequality.undecided());
+    for (std::size_t c = 0; c < pairs.size(); ++c) {
+      inequality.add(own.pairs[pairs[c]]);
+      t(inequality.neurons() + static_cast<Index>(c)) = own.of_pairs[pairs[c]];
+    }
+    return t;
+  }
+
+  /// The pairs worth a multiplier: those that come with the part's multipliers, and the best of the box's.
+  std::vector<NeuronPair> chosen_pairs(const Part& part, VectorXd& t) const {
+    std::vector<LinearForms> found;
+    const Reach again(chain_.hidden, part.reach->box(), part.around.get(), nullptr, &found);
+    const NeuronForms forms(found, part.reach->box());
+    NodeInequality inequality(chain_, part.states);
+    const std::vector<std::size_t> old = still_shown(part, forms);
+    t = inherited(part, old, inequality);
+    std::vector<NeuronPair> result;
+    for (const std::size_t c : old)
+      result.push_back(scaled_[static_cast<std::size_t>(part.multipliers)].pairs[c]);
+    const auto same = [](const NeuronPair& a, const NeuronPair& b) {
+      return a.first == b.first && a.second == b.second && a.first_on == b.first_on &&
+             a.second_on == b.second_on;
+    };
+    std::vector<NeuronPair> all;
+    for (const NeuronPair& pair : forms.pairs(inequality.undecided())) {
+      if (std::any_of(result.begin(), result.end(),
+                      [&](const NeuronPair& other) { return same(pair, other); }))
+        continue;
+      all.push_back(pair);
+      inequality.add(pair);
+    }
+    if (all.empty()) return result;
+    const Index before = t.size();
+    t.conservativeResize(before + static_cast<Index>(all.size()));
+    t.tail(static_cast<Index>(all.size())).setZero();
+    const std::vector<double> gain = gains(inequality, t, kGap);
+    std::vector<std::size_t> order(all.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto of = [&](std::size_t c) { return gain[old.size() + c]; };
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return of(a) > of(b) || (of(a) == of(b) && a < b); });
+    order.resize(std::min(order.size(), kMostPairs - std::min(kMostPairs, old.size())));
+    for (const std::size_t c : order)
+      if (of(c) > kLeastGain) result.push_back(all[c]);
+    t.conservativeResize(inequality.neurons() + static_cast<Index>(result.size()));
+    return result;
   }
 
   /// Multipliers of the part's own.
   void solve(Part& part) {
-    const NodeInequality inequality(chain_, part.states);
+    NodeInequality inequality(chain_, part.states);
     const Index m = inequality.neurons();
-    VectorXd start(1 + m);
+    std::vector<NeuronPair> pairs;
+    VectorXd t;
     if (part.multipliers < 0) {
-      start = interior(inequality);
-      interior_ = VectorXd::Zero(1 + chain_.neurons());
-      interior_(0) = start(0);
-      for (Index i = 0; i < m; ++i)
-        interior_(1 + inequality.undecided()[static_cast<std::size_t>(i)]) = start(1 + i);
+      t = root_multipliers(inequality);
     } else {
-      start(0) = kInwards * interior_(0) + (1 - kInwards) * 1.02 * part.rho;
-      start.tail(m) = kInwards * VectorXd(interior_.tail(chain_.neurons()))(inequality.undecided()) +
-                      (1 - kInwards) * at_undecided(inequality, part.multipliers);
+      pairs = chosen_pairs(part, t);
+      for (const NeuronPair& pair : pairs) inequality.add(pair);
+      DescentOptions descent;
+      descent.relative_gap = kGap;
+      descent.steps = kSteps;
+      t = descend(inequality, t, descent);
+      if (!std::isfinite(inequality.least_rho(t)) && !pairs.empty()) {
+        pairs.clear();
+        inequality = NodeInequality(chain_, part.states);
+        t = root_multipliers(inequality);
+      }
     }
-    InteriorPointOptions options;
-    options.relative_gap = kGap;
-    options.infeasibility = std::numeric_limits<double>::infinity();  // every iterate is a bound
-    const InteriorPointResult found = minimise(inequality, start, options);
     part.undecided_then = part.undecided;
-
-    if (found.points.empty()) return;
     // In single precision: the certificate is half as long, and any multipliers will do that prove the part.
-    const VectorXd t = found.points.back().tail(m).cast<float>().cast<double>();
+    t = t.cast<float>().cast<double>();
     const double rho = inequality.least_rho(t);
     if (!(rho < part.rho)) return;
     part.rho = rho;
-    VectorXd all = VectorXd::Zero(chain_.neurons());
-    for (Index i = 0; i < m; ++i) all(inequality.undecided()[static_cast<std::size_t>(i)]) = t(i);
-    part.multipliers = static_cast<int>(scaled_.size());
-    scaled_.push_back(all);
+    Multipliers own;
+    own.t = VectorXd::Zero(chain_.neurons());
+    for (Index i = 0; i < m; ++i) own.t(inequality.undecided()[static_cast<std::size_t>(i)]) = t(i);
     std::vector<double> unscaled;
-    Index neuron = 0;
-    for (std::size_t k = 0; k < chain_.hidden.size(); ++k)
-      for (Index i = 0; i < chain_.hidden[k].weights.rows(); ++i, ++neuron)
-        unscaled.push_back(chain_.unscaled_multiplier(all(neuron), k));
+    for (Index i = 0; i < own.t.size(); ++i)
+      unscaled.push_back(chain_.unscaled_multiplier(own.t(i), chain_.layer_of(i)));
+    std::vector<check::Conflict> conflicts;
+    for (std::size_t c = 0; c < pairs.size(); ++c) {
+      own.of_pairs.push_back(t(m + static_cast<Index>(c)));
+      conflicts.push_back(chain_.unscaled(pairs[c], own.of_pairs.back()));
+    }
+    own.pairs = std::move(pairs);
+    part.multipliers = static_cast<int>(scaled_.size());
+    scaled_.push_back(std::move(own));
     result_.tree.multipliers.push_back(std::move(unscaled));
+    result_.tree.conflicts.push_back(std::move(conflicts));
+  }
+
+  /// Those that the options start from, improved, or where they prove nothing, those of the whole program.
+  VectorXd root_multipliers(const NodeInequality& inequality) const {
+    if (!options_.start.empty()) {
+      VectorXd all(chain_.neurons());
+      Index neuron = 0, given = 0;
+      for (std::size_t k = 0; k < chain_.hidden.size(); ++k) {
+        const Index rows = chain_.hidden[k].weights.rows();
+        for (Index i = 0; i < rows; ++i, ++neuron)
+          all(neuron) =
+              i < rows - chain_.without_relu[k]
+                  ? chain_.scaled_multiplier(options_.start.at(static_cast<std::size_t>(given++)), k)
+                  : 0;
+      }
+      const VectorXd t = all(inequality.undecided());
+      DescentOptions descent;
+      descent.steps = kRootSteps;
+      if (std::isfinite(inequality.least_rho(t))) return descend(inequality, t, descent);
+    }
+    InteriorPointOptions options;
+    options.relative_gap = kRootGap;
+    options.infeasibility = std::numeric_limits<double>::infinity();  // every iterate is a bound
+    const InteriorPointResult found = minimise(inequality, interior(inequality), options);
+    return found.points.back().tail(inequality.neurons());
   }
 
   /// A point well inside: in a balanced chain all-ones is nearly feasible, and earlier layers want more.
@@ -229,6 +341,7 @@ class Search {
         const Index rows = chain_.hidden[k].weights.rows();
         layers.segment(end - rows, rows).setConstant(level);
         end -= rows;
+        if (!chain_.hidden[k].has_relu) level *= shrink;
       }
       VectorXd y(1 + inequality.neurons());
       y(0) = level;
@@ -247,19 +360,24 @@ class Search {
   }
 
   const LocalChain& chain_;
-  const Box& box_;
+  const std::vector<Box>& boxes_;
   const BranchOptions& options_;
   std::vector<TreeNode> nodes_;
-  std::vector<VectorXd> scaled_;  ///< multipliers in the chain's units
-  VectorXd interior_;
+  /// In the chain's units.
+  struct Multipliers {
+    VectorXd t;
+    std::vector<NeuronPair> pairs;
+    std::vector<double> of_pairs;
+  };
+  std::vector<Multipliers> scaled_;
   std::multimap<double, VectorXd, std::greater<>> steep_;  ///< centres by their squared slope
   BranchResult result_;
 };
 
 }  // namespace
 
-BranchResult branch(const LocalChain& chain, const Box& box, const BranchOptions& options) {
-  return Search(chain, box, options).run();
+BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options) {
+  return Search(chain, boxes, options).run();
 }
 
 }  // namespace swarmcert::lipschitz

@@ -7,10 +7,12 @@
 #include <vector>
 
 #include "lipschitz/branch/local_chain.h"
+#include "lipschitz/checker/tree_proof.h"
 
 namespace swarmcert::lipschitz {
 
-/// A bisection of the box with a proof per part, in preorder: a split is followed by its lower, then its upper half.
+/// A bisection of the boxes with a proof per part, in preorder, box after box: a split is followed by its lower, then its
+/// upper half.
 struct BranchTree {
   static constexpr int kLeaf = -1;
   struct Node {
@@ -19,7 +21,8 @@ struct BranchTree {
   };
   std::vector<Node> nodes;
   std::vector<std::vector<double>> multipliers;  ///< one per hidden neuron of the network, in its own units
-  double rho = 0;                                ///< claimed bound on the squared Lipschitz constant
+  std::vector<std::vector<check::Conflict>> conflicts;  ///< that go with each of them
+  double rho = 0;                                       ///< claimed bound on the squared Lipschitz constant
 };
 
 struct BranchOptions {
@@ -27,6 +30,9 @@ struct BranchOptions {
   double seconds = 0;       ///< wall clock; the search stops at the next node; 0: no limit
   double known = 0;         ///< a Lipschitz constant that is attained: no need to go below
   double tolerance = 1e-3;  ///< stop when the bound is within this of `known`, relatively
+  /// Multipliers to start from, one per hidden neuron of the network, in its own units: those of a bound that holds
+  /// everywhere. Empty: none.
+  std::vector<double> start;
   const std::atomic<bool>* cancelled = nullptr;
   /// After every so many nodes: share of the nodes or of the time that is used up, bound so far.
   std::function<void(double share, double bound)> progress;
@@ -41,11 +47,12 @@ struct BranchResult {
 
 inline constexpr std::size_t kSteepCentres = 8;
 
-/// Best-first search. Each box bounds its neurons by linear relaxation (Reach), takes out those that it decides, and
+/// Best-first search over the union of the boxes. Each box bounds its neurons by linear relaxation (Reach), takes out those that it decides, and
 /// inherits the multipliers of an ancestor; the box that dominates gets multipliers of its own once enough of its
-/// neurons are decided, and is halved otherwise. The slope at each box's centre says how far the bound can fall at most.
+/// neurons are decided, and is halved otherwise. Pairs of neurons that a box keeps from being in some states at once get
+/// multipliers as well. The slope at each box's centre says how far the bound can fall at most.
 /// The result depends on the options only, not on the machine's load
 /// (seconds unset). It can be used whenever the search stops.
-BranchResult branch(const LocalChain& chain, const Box& box, const BranchOptions& options);
+BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options);
 
 }  // namespace swarmcert::lipschitz

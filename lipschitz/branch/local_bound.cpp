@@ -1,7 +1,9 @@
 #include "lipschitz/branch/local_bound.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/lmi_proof.h"
 #include "lipschitz/stages.h"
 #include "nn/files/functions.h"
@@ -29,15 +31,117 @@ std::string preorder(const BranchTree& tree) {
   return text;
 }
 
+/// Boxes per kind to enclose what a neighbour adds to the sum.
+constexpr int kRangeNodes = 400;
+
+/// How far from the origin the first layer has its kinks, in the median: a cover's inner box with this radius.
+double cover_radius(const files::Layer& layer) {
+  std::vector<double> distances;
+  for (int i = 0; i < layer.outputs; ++i) {
+    double square = 0;
+    for (int j = 0; j < layer.inputs; ++j)
+      square += std::pow(layer.weights[static_cast<std::size_t>(i) * layer.inputs + j], 2);
+    const double distance = std::abs(layer.biases[static_cast<std::size_t>(i)]) / std::sqrt(square);
+    if (distance > 1e-20 && distance < 1e20) distances.push_back(distance);
+  }
+  if (distances.empty()) return 1;
+  std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
+  return std::exp2(std::ceil(std::log2(distances[distances.size() / 2])));
+}
+
+/// The ranges of the other terms, and what they add up to before the first ReLU of rho.
+struct Others {
+  std::map<std::string, RangeProof> ranges;
+  std::vector<double> least, most;
+};
+
+Others others_of(const files::Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
+                 int nodes) {
+  const std::vector<std::string> names = files::networks_of(claim.function);
+  const std::string ground = std::string("phi:") + files::kGroundKind;
+  std::map<std::string, int> counts;
+  for (const auto& [kind, count] : claim.neighbours) counts["phi:" + kind] = count;
+  if (names[0] == ground) {
+    counts.erase(ground);
+  } else {
+    if (--counts.at(names[0]) == 0) counts.erase(names[0]);
+    if (network.phi.count(files::kGroundKind) == 1) counts[ground] = 1;
+  }
+  Others others;
+  const auto rows = static_cast<std::size_t>(files::parts(network).at(names[1])->layers.front().outputs);
+  others.least.assign(rows, 0.0);
+  others.most.assign(rows, 0.0);
+  for (const auto& [part, count] : counts) {
+    RangeProof range =
+        sum_range(check::term_layers(network, part, names[1]), domain.at(part), std::min(nodes, kRangeNodes));
+    for (std::size_t i = 0; i < rows; ++i) {  // all the ground, of the others any number up to `count`
+      others.least[i] += part == ground ? range.least[i] : count * std::min(range.least[i], 0.0);
+      others.most[i] += part == ground ? range.most[i] : count * std::max(range.most[i], 0.0);
+    }
+    others.ranges.emplace(part, std::move(range));
+  }
+  return others;
+}
+
+/// Hidden neurons with a ReLU.
+std::size_t multipliers_of(const check::LocalFunction& f) {
+  int count = 0;
+  for (const check::HiddenLayer& layer : f.hidden) count += layer.outputs - layer.without_relu;
+  return static_cast<std::size_t>(count);
+}
+
+/// Lets branch and bound work on `f`, and the checker judge what it found.
+void prove(const check::LocalFunction& f, const LocalChain& chain, const std::vector<check::Sides>& boxes,
+           BranchOptions options, LocalProof proof, LocalBound& result) {
+  std::vector<Box> roots;
+  for (const check::Sides& box : boxes) roots.push_back({box.lower, box.upper});
+  options.start.resize(std::min(options.start.size(), multipliers_of(f)));
+  if (options.start.size() != multipliers_of(f)) options.start.clear();
+  BranchResult found = branch(chain, roots, options);
+  result.nodes = found.nodes;
+  result.steep_centres = std::move(found.steep_centres);
+  proof.tree.tree = preorder(found.tree);
+  proof.tree.multipliers = std::move(found.tree.multipliers);
+  proof.tree.conflicts = std::move(found.tree.conflicts);
+  // The search rounds, the checker rounds otherwise: where a part is lost to that, a little more is claimed.
+  for (const double slack : {0.0, 1e-7, 1e-6, 1e-5, 1e-4}) {
+    proof.rho = std::max(found.tree.rho * (1 + slack), kLeastRho);
+    const check::TreeVerdict verdict = check::check_tree(f, boxes, proof.rho, proof.tree);
+    result.leaves = verdict.leaves;
+    if (!verdict.holds) continue;
+    result.upper = UpperBound(sqrt_up(proof.rho));
+    result.proof = std::move(proof);
+    break;
+  }
+}
+
 }  // namespace
 
-LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,
-                       const std::vector<double>& joint_t, const BranchOptions& options) {
+LocalBound local_bound(const files::Network& network, const Claim& claim,
+                       const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
+                       const BranchOptions& given) {
   LocalBound result;
+  BranchOptions options = given;
+  options.start = joint_t;  // of phi the first ones
   const std::vector<std::string> names = files::networks_of(claim.function);
-  const std::vector<files::Layer>& layers = files::parts(network).at(names.front())->layers;
-  if (layers.size() < 2 || names.front().rfind("rho:", 0) == 0) return result;
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  if (parts.at(names.front())->layers.size() < 2 || names.front().rfind("rho:", 0) == 0) return result;
+  const bool is_global = claim.domain == "global";
+  std::vector<check::Sides> boxes;
+  if (!is_global) boxes.push_back({domain.at(names.front()).lower, domain.at(names.front()).upper});
   LocalProof proof;
+  if (!claim.neighbours.empty()) {
+    const std::vector<files::Layer>& behind = parts.at(names.back())->layers;
+    if (behind.size() < 2) return result;
+    Others others = others_of(network, claim, domain, options.nodes);
+    const check::LocalFunction f =
+        check::coupled_function(network, claim.function, claim.block, claim.scale, others.least, others.most);
+    ReachNetwork layers = reach_layers(f.hidden);
+    layers.push_back(reach_network(*parts.at(names.back())).back());
+    proof.others = std::move(others.ranges);
+    prove(f, local_chain(layers, {}, f.coordinates, f.weight), boxes, options, std::move(proof), result);
+    return result;
+  }
   if (names.size() == 2) {
     const std::vector<check::Matrix> rho = check::stages(network, names.back());
     const std::size_t hidden = check::hidden_neurons(rho);
@@ -48,25 +152,25 @@ LocalBound local_bound(const files::Network& network, const Claim& claim, const 
   const Eigen::MatrixXd q = proof.form ? proof.form->q : Eigen::MatrixXd();
   const check::LocalFunction f =
       check::local_function(network, names.front(), claim.block, claim.scale, exact(q));
-
-  const LocalChain chain =
-      local_chain(reach_network(*files::parts(network).at(names.front())), q, f.coordinates, f.weight);
-  BranchResult found = branch(chain, box, options);
-  result.nodes = found.nodes;
-  result.steep_centres = std::move(found.steep_centres);
-  proof.tree.tree = preorder(found.tree);
-  proof.tree.multipliers = std::move(found.tree.multipliers);
-  // The search rounds, the checker rounds otherwise: where a part is lost to that, a little more is claimed.
-  for (const double slack : {0.0, 1e-7, 1e-6, 1e-5, 1e-4}) {
-    proof.rho = std::max(found.tree.rho * (1 + slack), kLeastRho);
-    const check::TreeVerdict verdict = check::check_tree(f, box.lower, box.upper, proof.rho, proof.tree);
-    result.leaves = verdict.leaves;
-    if (!verdict.holds) continue;
-    result.upper = UpperBound(sqrt_up(proof.rho));
-    result.proof = std::move(proof);
-    break;
+  const LocalChain chain = local_chain(reach_network(*parts.at(names.front())), q, f.coordinates, f.weight);
+  if (!is_global) {
+    prove(f, chain, boxes, options, std::move(proof), result);
+    return result;
+  }
+  proof.radius.assign(static_cast<std::size_t>(chain.inputs()),
+                      cover_radius(parts.at(names.front())->layers.front()));
+  prove(check::homogeneous(f), homogeneous(chain), check::projective_cover(proof.radius), options,
+        std::move(proof), result);
+  for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) is the point u / s
+    const double s = centre(centre.size() - 1);
+    centre = Eigen::VectorXd(centre.head(centre.size() - 1) / (s > 0 ? s : 1));
   }
   return result;
+}
+
+LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,
+                       const std::vector<double>& joint_t, const BranchOptions& options) {
+  return local_bound(network, claim, {{files::networks_of(claim.function).front(), box}}, joint_t, options);
 }
 
 }  // namespace swarmcert::lipschitz

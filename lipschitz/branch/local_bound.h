@@ -1,11 +1,13 @@
 /// @file A Lipschitz bound that holds on a box only, proved part by part.
 #pragma once
 
+#include <map>
 #include <optional>
 
 #include "lipschitz/bounds.h"
 #include "lipschitz/branch/branch.h"
 #include "lipschitz/branch/rho_form.h"
+#include "lipschitz/branch/sum_range.h"
 #include "lipschitz/checker/tree_proof.h"
 #include "lipschitz/claims.h"
 #include "nn/files/network.h"
@@ -15,7 +17,10 @@ namespace swarmcert::lipschitz {
 /// What shows |f(x) - f(y)| <= sqrt(rho) |x - y| on the box.
 struct LocalProof {
   double rho = 0;
-  std::optional<RhoForm> form;  ///< of a set function
+  std::optional<RhoForm> form;  ///< of a set function with any number of neighbours
+  /// Of a set function with so many neighbours: the ranges of the other terms, by "phi:<kind>".
+  std::optional<std::map<std::string, RangeProof>> others;
+  std::vector<double> radius;  ///< of the projective cover, where the bound holds everywhere; else empty
   check::TreeProof tree;
 };
 
@@ -27,12 +32,21 @@ struct LocalBound {
   std::vector<Eigen::VectorXd> steep_centres;  ///< as BranchResult has them
 };
 
-/// Bound of `claim` for inputs in `box`, both ends of the slope: of a plain network or of phi; of a set function with one
+/// Bound of `claim` for inputs in its box, both ends of the slope, or for all inputs by a projective cover: of a plain network or of phi; of a set function with one
 /// neighbour moving in the box, whatever the number and the places of the others, through a RhoForm.
 ///
 /// Branch and bound proposes, check::check_tree() verifies: what is returned has been accepted.
-/// @param joint_t multipliers of the claim's global bound (UpperProof::t); for a set function.
+/// @param joint_t multipliers of the claim's global bound (UpperProof::t); empty: none, and then no proof for a set
+///   function with any number of neighbours.
 /// @returns no proof for functions without hidden layers, and for rho alone.
+/// For claims with a number of neighbours as well: the chain through rho, with what the others add before its first ReLU
+/// as an interval, shown by the parts of each kind's box.
+/// @param domain by part; of all kinds where the claim has a number of neighbours.
+LocalBound local_bound(const files::Network& network, const Claim& claim,
+                       const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
+                       const BranchOptions& options);
+
+/// The same for a claim without a number of neighbours, whose box is that of the moving input.
 LocalBound local_bound(const files::Network& network, const Claim& claim, const Box& box,
                        const std::vector<double>& joint_t, const BranchOptions& options);
 

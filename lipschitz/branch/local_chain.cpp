@@ -23,6 +23,28 @@ double LocalChain::unscaled_multiplier(double t, std::size_t layer) const {
   return std::ldexp(t, 2 * (output_exponent - exponents[layer]));
 }
 
+double LocalChain::scaled_multiplier(double t, std::size_t layer) const {
+  return std::ldexp(t, 2 * (exponents[layer] - output_exponent));
+}
+
+std::size_t LocalChain::layer_of(Index neuron) const {
+  std::size_t layer = 0;
+  for (; neuron >= hidden[layer].weights.rows(); ++layer) neuron -= hidden[layer].weights.rows();
+  return layer;
+}
+
+check::Conflict LocalChain::unscaled(const NeuronPair& pair, double multiplier) const {
+  const int first = exponents[layer_of(pair.first)], second = exponents[layer_of(pair.second)];
+  // lambda y_1 2^-first + (1 - lambda) y_2 2^-second, up to a positive factor.
+  const double one = std::ldexp(pair.lambda, second - first);
+  return {static_cast<std::size_t>(pair.first),
+          static_cast<std::size_t>(pair.second),
+          pair.first_on,
+          pair.second_on,
+          one / (one + (1 - pair.lambda)),
+          std::ldexp(multiplier, 2 * output_exponent - first - second)};
+}
+
 double LocalChain::squared_slope(const Eigen::VectorXd& x) const {
   Eigen::VectorXd h = x;
   MatrixXd jacobian = MatrixXd::Zero(inputs(), static_cast<Index>(block.size()));
@@ -30,6 +52,7 @@ double LocalChain::squared_slope(const Eigen::VectorXd& x) const {
   for (const ReachLayer& layer : hidden) {
     h = (layer.weights * h + layer.bias).eval();
     jacobian = (layer.weights * jacobian).eval();
+    if (!layer.has_relu) continue;
     for (Index i = 0; i < h.size(); ++i)
       if (!(h(i) > 0)) jacobian.row(i).setZero();
     h = h.cwiseMax(0.0);
@@ -53,25 +76,52 @@ LocalChain local_chain(const ReachNetwork& layers, const MatrixXd& form, const s
   chain.gram =
       form.size() == 0 ? MatrixXd(last.transpose() * last) : MatrixXd(last.transpose() * form * last);
 
-  ReluChain stages;
-  for (const ReachLayer& layer : chain.hidden) stages.push_back(layer.weights);
-  stages.front() = MatrixXd(stages.front()(Eigen::all, chain.block));
+  // Stages lie between ReLUs: a layer without one is multiplied out, and is not scaled.
+  ReluChain stages = {MatrixXd::Zero(chain.inputs(), static_cast<Index>(chain.block.size()))};
   for (std::size_t k = 0; k < chain.weight.size(); ++k)
-    stages.front().col(static_cast<Index>(k)) *= chain.weight[k];
+    stages.front()(chain.block[k], static_cast<Index>(k)) = chain.weight[k];
+  bool joins = true;
+  for (const ReachLayer& layer : chain.hidden) {
+    if (joins) {
+      stages.back() = (layer.weights * stages.back()).eval();
+    } else {
+      stages.push_back(layer.weights);
+    }
+    joins = !layer.has_relu;
+  }
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(chain.gram);
   stages.emplace_back(eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
                       eigen.eigenvectors().transpose());
   const std::vector<int> exponents = balancing_exponents(stages);
   int total = 0;
-  for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
-    chain.hidden[k].weights *= std::ldexp(1.0, -exponents[k]);
-    total += exponents[k];
-    chain.hidden[k].bias *= std::ldexp(1.0, -total);
-    chain.hidden[k].bias_radius *= std::ldexp(1.0, -total);
+  std::size_t stage = 0;
+  for (ReachLayer& layer : chain.hidden) {
+    const int own = layer.has_relu ? exponents[stage++] : 0;
+    layer.weights *= std::ldexp(1.0, -own);
+    total += own;
+    layer.bias *= std::ldexp(1.0, -total);
+    layer.bias_radius *= std::ldexp(1.0, -total);
     chain.exponents.push_back(total);
+    chain.without_relu.push_back(layer.has_relu ? 0 : layer.weights.rows());
   }
   chain.gram *= std::ldexp(1.0, -2 * exponents.back());
   chain.output_exponent = total + exponents.back();
+  return chain;
+}
+
+LocalChain homogeneous(LocalChain chain) {
+  for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
+    ReachLayer& layer = chain.hidden[k];
+    const bool is_last = k + 1 == chain.hidden.size();
+    const Index rows = layer.weights.rows(), columns = layer.weights.cols();
+    MatrixXd wider = MatrixXd::Zero(rows + (is_last ? 0 : 1), columns + 1);
+    wider.topLeftCorner(rows, columns) = layer.weights;
+    wider.col(columns).head(rows) = layer.bias;
+    if (!is_last) wider(rows, columns) = 1;
+    if (!is_last) chain.without_relu[k] = 1;
+    layer.weights = std::move(wider);
+    layer.bias = layer.bias_radius = Eigen::VectorXd::Zero(layer.weights.rows());
+  }
   return chain;
 }
 

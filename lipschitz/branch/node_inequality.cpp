@@ -1,6 +1,7 @@
 #include "lipschitz/branch/node_inequality.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <limits>
 
 #include "lipschitz/dense_kernels.h"
@@ -59,6 +60,44 @@ MatrixXd NodeInequality::linear(const VectorXd& y) const {
 
 MatrixXd NodeInequality::slack(const VectorXd& y) const { return linear(y) - last_gram_; }
 
+void NodeInequality::add(const NeuronPair& pair) {
+  const auto column = [this](Index neuron, bool is_on) {
+    const auto at = std::lower_bound(undecided_.begin(), undecided_.end(), neuron) - undecided_.begin();
+    return static_cast<Index>(at) + (is_on ? neurons() : 0);
+  };
+  pairs_.push_back({column(pair.first, pair.first_on), column(pair.second, pair.second_on)});
+}
+
+MatrixXd NodeInequality::slack_without_rho(const VectorXd& t) const {
+  VectorXd y(1 + neurons());
+  y << 0, t.head(neurons());
+  MatrixXd s = slack(y);
+  const Index m = neurons();
+  Index used = 0;
+  MatrixXd left(size(), static_cast<Index>(pairs_.size())), right(size(), static_cast<Index>(pairs_.size()));
+  for (std::size_t c = 0; c < pairs_.size(); ++c) {
+    const double weight = t(m + static_cast<Index>(c));
+    if (weight == 0) continue;
+    auto [p, q] = pairs_[c];
+    if (p > q) std::swap(p, q);  // a unit vector last
+    const Index unit = inputs_ + q - m;
+    if (p >= m) {
+      s(inputs_ + p - m, unit) -= weight;
+      s(unit, inputs_ + p - m) -= weight;
+    } else if (q >= m) {
+      s.row(unit) -= weight * a_.col(p).transpose();
+      s.col(unit) -= weight * a_.col(p);
+    } else {
+      left.col(used) = -weight * a_.col(p);
+      right.col(used++) = a_.col(q);
+    }
+  }
+  if (used == 0) return s;
+  MatrixXd half = MatrixXd::Zero(size(), size());
+  add_product_transposed(half, left.leftCols(used), right.leftCols(used));
+  return s + half + half.transpose();
+}
+
 MatrixXd NodeInequality::times_a(const MatrixXd& x) const {
   MatrixXd result = MatrixXd::Zero(x.rows(), a_.cols());
   add_product(result, x, a_);
@@ -78,9 +117,7 @@ MatrixXd NodeInequality::times_patterned(const MatrixXd& x, const MatrixXd& d) c
 }
 
 double NodeInequality::least_rho(const VectorXd& t) const {
-  VectorXd y(1 + neurons());
-  y << 0, t;
-  const MatrixXd s = slack(y);
+  const MatrixXd s = slack_without_rho(t);
   MatrixXd inner = -s.topLeftCorner(inputs_, inputs_);  // rho I >= this + S_xz S_zz^-1 S_zx
   if (neurons() > 0) {
     const MatrixXd factor = cholesky(s.bottomRightCorner(neurons(), neurons()));

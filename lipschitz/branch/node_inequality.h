@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "lipschitz/branch/conflicts.h"
 #include "lipschitz/branch/local_chain.h"
 #include "lipschitz/interior_point.h"
 
@@ -27,16 +28,30 @@ class NodeInequality final : public RankTwoInequality {
   Eigen::MatrixXd a_transposed_times(const Eigen::MatrixXd& x) const override;
   Eigen::MatrixXd times_patterned(const Eigen::MatrixXd& x, const Eigen::MatrixXd& d) const override;
 
+  /// Adds a pair of undecided neurons: with u = dz (on) or dy - dz (off), 2 u_1 u_2 = 0 gets a multiplier of either sign.
+  void add(const NeuronPair& pair);
+  /// Columns of [A E], E the unit vectors of the neurons, that make up u_1 and u_2 of a pair.
+  struct Factors {
+    Eigen::Index first, second;
+  };
+  const std::vector<Factors>& pairs() const { return pairs_; }
+
+  /// S(0, t) for the multipliers of the neurons, and of the pairs behind them.
+  Eigen::MatrixXd slack_without_rho(const Eigen::VectorXd& t) const;
+  /// [size x neurons], column i is a_i.
+  const Eigen::MatrixXd& a() const { return a_; }
+
   /// Indices of the undecided neurons among all, ascending: t has one entry for each.
   const std::vector<Eigen::Index>& undecided() const { return undecided_; }
 
-  /// The least rho with S(rho, t) >= 0, up to rounding; infinity if there is none.
+  /// The least rho with S(rho, t) >= 0, up to rounding; infinity if there is none. `t` as in slack_without_rho().
   double least_rho(const Eigen::VectorXd& t) const;
 
  private:
   Eigen::Index inputs_;
   std::vector<Eigen::Index> undecided_;
-  Eigen::MatrixXd a_;          ///< [size x neurons] columns a_i
+  Eigen::MatrixXd a_;  ///< [size x neurons] columns a_i
+  std::vector<Factors> pairs_;
   Eigen::MatrixXd last_gram_;  ///< of df in the variables
 };
 

@@ -34,6 +34,11 @@ void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
     form.absolute += std::abs(bias);
     error += std::abs(c) * term[static_cast<std::size_t>(i)];
     ++form.terms;
+    if (layer.least.empty()) continue;
+    const double most = c * (c > 0 ? layer.most : layer.least)[static_cast<std::size_t>(i)];
+    form.constant += most;
+    form.absolute += std::abs(most);
+    ++form.terms;
   }
   form.error += 1.01 * (layer.outputs + 2) * kUnit * error;
   if (!std::all_of(next.begin(), next.end(), [](double c) { return std::isfinite(c); }))
@@ -42,11 +47,11 @@ void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
 }
 
 /// Substitutes h = relu(y), l <= y <= u.
-void through_relu(Form& form, const Row& lower, const Row& upper) {
+void through_relu(Form& form, const HiddenLayer& layer, const Row& lower, const Row& upper) {
   for (std::size_t i = 0; i < form.coefficients.size(); ++i) {
     double& c = form.coefficients[i];
     const double l = lower[i], u = upper[i];
-    if (c == 0 || l >= 0) continue;
+    if (c == 0 || l >= 0 || !layer.has_relu(i)) continue;
     if (u <= 0) {
       c = 0;
     } else if (c < 0) {
@@ -77,12 +82,61 @@ double largest(const Form& form, const Row& lower, const Row& upper) {
   return std::isnan(result) ? kInfinity : result;
 }
 
+/// The form as one in x, `top` the layer that it is in.
+Form down_to_inputs(Form form, std::size_t top, const std::vector<HiddenLayer>& layers,
+                    const NeuronBounds& bounds) {
+  for (std::size_t j = top + 1; j-- > 0;) {
+    through_layer(form, layers[j], bounds.terms[j]);
+    if (j > 0) through_relu(form, layers[j - 1], bounds.lower[j - 1], bounds.upper[j - 1]);
+  }
+  return form;
+}
+
+/// Above y (sign 1) or -y of one neuron.
+Form above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, std::size_t layer,
+           std::size_t output, double sign) {
+  Form form;
+  form.coefficients.assign(static_cast<std::size_t>(layers[layer].outputs), 0.0);
+  form.coefficients[output] = sign;
+  return down_to_inputs(std::move(form), layer, layers, bounds);
+}
+
+/// w times the form, w >= 0.
+void scale(Form& form, double w) {
+  for (double& c : form.coefficients) c *= w;
+  form.constant *= w;
+  form.absolute *= w;
+  form.error *= w;
+}
+
 }  // namespace
+
+double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, const Row& lower,
+                   const Row& upper, const WeightedNeuron& first, const WeightedNeuron& second) {
+  Form sum =
+      above(layers, bounds, first.layer, static_cast<std::size_t>(first.output), first.weight < 0 ? -1 : 1);
+  Form other = above(layers, bounds, second.layer, static_cast<std::size_t>(second.output),
+                     second.weight < 0 ? -1 : 1);
+  scale(sum, std::abs(first.weight));
+  scale(other, std::abs(second.weight));
+  double rounding = 0;  // of products and sums of coefficients, by what they multiply
+  for (std::size_t j = 0; j < lower.size(); ++j) {
+    rounding += (std::abs(sum.coefficients[j]) + std::abs(other.coefficients[j])) *
+                std::max(std::abs(lower[j]), std::abs(upper[j]));
+    sum.coefficients[j] += other.coefficients[j];
+  }
+  sum.constant += other.constant;
+  sum.absolute += other.absolute;
+  sum.error += other.error + 8 * kUnit * (rounding + sum.absolute) + kTiny;
+  sum.error *= 1 + 1e-6;  // roundings of the error terms themselves
+  sum.terms += other.terms;
+  return largest(sum, lower, upper);
+}
 
 NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lower, const Row& upper,
                            const NeuronBounds* around) {
   NeuronBounds bounds;
-  std::vector<Row> term;
+  std::vector<Row>& term = bounds.terms;
   Row magnitude;  // of the layer's input
   for (std::size_t j = 0; j < lower.size(); ++j)
     magnitude.push_back(std::max(std::abs(lower[j]), std::abs(upper[j])));
@@ -92,6 +146,7 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lo
     term.emplace_back(rows);
     for (std::size_t i = 0; i < rows; ++i) {
       double sum = std::abs(layer.biases[i]);
+      if (!layer.least.empty()) sum += std::max(std::abs(layer.least[i]), std::abs(layer.most[i]));
       for (std::size_t j = 0; j < magnitude.size(); ++j)
         sum += std::abs(layer.weights[i * magnitude.size() + j]) * magnitude[j];
       term.back()[i] = (1 + 2 * kUnit * static_cast<double>(magnitude.size() + 4)) * sum + kTiny;
@@ -103,21 +158,14 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lo
     for (std::size_t i = 0; i < rows; ++i) {
       double& l = bounds.lower[k][i];
       double& u = bounds.upper[k][i];
-      if (l < 0 && u > 0) {
+      if (!layer.has_relu(i) || (l < 0 && u > 0)) {
         for (const double sign : {1.0, -1.0}) {
-          Form form;
-          form.coefficients.assign(rows, 0.0);
-          form.coefficients[i] = sign;
-          for (std::size_t j = k + 1; j-- > 0;) {
-            through_layer(form, layers[j], term[j]);
-            if (j > 0) through_relu(form, bounds.lower[j - 1], bounds.upper[j - 1]);
-          }
-          const double end = largest(form, lower, upper);
+          const double end = largest(above(layers, bounds, k, i, sign), lower, upper);
           if (sign > 0) u = std::min(u, end);
           if (sign < 0) l = std::max(l, -end);
         }
       }
-      magnitude[i] = std::max(0.0, u);
+      magnitude[i] = layer.has_relu(i) ? std::max(0.0, u) : std::max(std::abs(l), std::abs(u));
     }
   }
   return bounds;

@@ -14,11 +14,30 @@ struct HiddenLayer {
   int outputs = 0, inputs = 0;
   std::vector<double> weights;  ///< [outputs x inputs], row-major
   std::vector<double> biases;
+  int without_relu = 0;  ///< of the outputs, the last so many pass as they are: h = y
+  /// Empty, or y = W h + b + e with any e, least <= e <= most: what else enters a sum.
+  std::vector<double> least = {}, most = {};
+  bool has_relu(std::size_t output) const {
+    return output + without_relu < static_cast<std::size_t>(outputs);
+  }
+};
+
+/// {lower <= x <= upper}, one interval per input.
+struct Sides {
+  std::vector<double> lower, upper;
 };
 
 /// l <= y <= u for every neuron of every hidden layer, over one box.
 struct NeuronBounds {
   std::vector<std::vector<double>> lower, upper;  ///< by layer
+  std::vector<std::vector<double>> terms;         ///< |W| |h| + |b|, at least: what roundings are measured by
+};
+
+/// weight y of one neuron.
+struct WeightedNeuron {
+  std::size_t layer = 0;
+  int output = 0;
+  double weight = 0;
 };
 
 /// Bounds on all neurons over the box {lower <= x <= upper}, which hold in exact arithmetic.
@@ -32,7 +51,13 @@ struct NeuronBounds {
 /// values and overflow make a bound infinite, a NaN is never used.
 /// @param lower, upper at most kLargestInput in absolute value.
 /// @param around bounds over a larger box, which hold here too; neurons that they decide keep them. May be null.
+/// Outputs without a ReLU are substituted as they are.
 NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const std::vector<double>& lower,
                            const std::vector<double>& upper, const NeuronBounds* around);
+
+/// The largest value of first + second over the box that `bounds` are for, rounded up: each by its own form in x.
+double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds,
+                   const std::vector<double>& lower, const std::vector<double>& upper,
+                   const WeightedNeuron& first, const WeightedNeuron& second);
 
 }  // namespace swarmcert::check

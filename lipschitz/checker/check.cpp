@@ -1,12 +1,16 @@
 #include "lipschitz/checker/check.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
 #include <stdexcept>
 
 #include "lipschitz/checker/lipschitz_lmi.h"
+#include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/checker/tree_proof.h"
 #include "lipschitz/stages.h"
 #include "lipschitz/witness.h"
@@ -19,6 +23,13 @@ namespace {
 using files::Json;
 using files::require_keys;
 using files::Weights;
+
+using Row = std::vector<double>;
+/// By kind.
+using Neighbours = std::map<std::string, long>;
+
+constexpr long kMostNeighbours = 1000000;
+const std::string kGround = std::string("phi:") + files::kGroundKind;
 
 void require(bool condition, const std::string& reason) {
   if (!condition) throw std::runtime_error(reason);
@@ -38,6 +49,31 @@ std::vector<double> hex_floats_in(const Json& json) {
   std::istringstream text(json.get<std::string>());
   for (std::string word; text >> word;) values.push_back(files::parse_hex_float(word));
   return values;
+}
+
+/// Conflicts in one text, each as "<neuron><+ or -> <neuron><+ or -> <lambda> <multiplier>"; + is on.
+std::vector<Conflict> conflicts_in(const Json& json) {
+  std::vector<Conflict> conflicts;
+  std::istringstream text(json.get<std::string>());
+  const auto neuron = [](const std::string& word, bool& is_on) {
+    std::size_t index = 0;
+    const char* const last = word.data() + word.size() - 1;
+    const auto [end, error] = std::from_chars(word.data(), last, index);
+    require(error == std::errc() && end == last && word.size() <= 10 && (*last == '+' || *last == '-'),
+            "a conflict's neuron is not a number with + or -");
+    is_on = *last == '+';
+    return index;
+  };
+  for (std::string first, second, lambda, multiplier; text >> first;) {
+    require(static_cast<bool>(text >> second >> lambda >> multiplier), "a conflict lacks words");
+    Conflict conflict;
+    conflict.first = neuron(first, conflict.first_on);
+    conflict.second = neuron(second, conflict.second_on);
+    conflict.lambda = files::parse_hex_float(lambda);
+    conflict.multiplier = files::parse_hex_float(multiplier);
+    conflicts.push_back(conflict);
+  }
+  return conflicts;
 }
 
 Dyadic squared_norm(const Matrix& m) {
@@ -107,8 +143,8 @@ class Checker {
     for (const Json& bound : certificate_["bounds"]) check_bound(bound);
     for (const Json& law : certificate_["laws"]) check_law(law);
     std::string reason = "every statement verified in exact arithmetic";
-    if (on_a_box_ > 0) reason += ", those on a box in double with every rounding accounted for";
-    return {true, reason, spectral_norms_, upper_bounds_, lower_bounds_, on_a_box_};
+    if (on_boxes_ > 0) reason += ", those by parts of boxes in double with every rounding accounted for";
+    return {true, reason, spectral_norms_, upper_bounds_, lower_bounds_, on_boxes_};
   }
 
  private:
@@ -146,10 +182,11 @@ class Checker {
   }
 
   void check_bound(const Json& bound) {
-    require_keys(bound,
-                 {"function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_hex",
-                  "upper_method", "lower", "lower_hex", "lower_witness", "proof"},
-                 "bound");
+    std::set<std::string> keys = {"function", "domain",    "block",         "law",       "norm",
+                                  "scale",    "unit",      "upper",         "upper_hex", "upper_method",
+                                  "lower",    "lower_hex", "lower_witness", "proof"};
+    if (bound.contains("neighbours")) keys.insert("neighbours");
+    require_keys(bound, keys, "bound");
     const std::string function = bound["function"].get<std::string>();
     const std::string block = bound["block"].get<std::string>();
     const std::string where = "bound " + function + " " + block;
@@ -164,6 +201,7 @@ class Checker {
         {"law", names.size() == 2 ? "one_neighbour" : "none"}};
     for (const auto& [key, text] : meaning)
       require(bound[key] == text, where + ": " + key + " is not " + text);
+    const Neighbours neighbours = neighbours_of(bound, where);
     const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
     if (bound["upper_method"] == "sdp") {
       check_upper(stages(network_, function, block, scale), bound["proof"], upper, where);
@@ -177,8 +215,9 @@ class Checker {
       require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
     }
     if (scale.empty()) {
-      proved_[function + " " + block] = upper;
-      if (bound["upper_method"] == "branch") local_.insert(function + " " + block);
+      proved_[key(function, block, neighbours)] = upper;
+      if (bound["upper_method"] == "branch" && bound["domain"] == "box")
+        local_.insert(key(function, block, neighbours));
     }
     ++upper_bounds_;
     if (bound["lower_witness"].is_null())
@@ -189,42 +228,128 @@ class Checker {
     ++lower_bounds_;
   }
 
+  /// Of a set function, at most how many of each kind there are; empty: any number.
+  Neighbours neighbours_of(const Json& bound, const std::string& where) const {
+    if (!bound.contains("neighbours")) return {};
+    const Neighbours neighbours = bound["neighbours"].get<Neighbours>();
+    const std::vector<std::string> names = files::networks_of(bound["function"].get<std::string>());
+    require(names.size() == 2 && bound["domain"] == "box",
+            where + ": neighbours only of a set function on a box");
+    for (const auto& [kind, count] : neighbours)
+      require(kind != files::kGroundKind && parts_.count("phi:" + kind) == 1 && 1 <= count &&
+                  count <= kMostNeighbours,
+              where + ": impossible neighbours");
+    require(!neighbours.empty() && (names[0] == kGround || neighbours.count(names[0].substr(4)) == 1),
+            where + ": the neighbour that moves is none of those listed");
+    return neighbours;
+  }
+
+  static std::string key(const std::string& function, const std::string& block,
+                         const Neighbours& neighbours) {
+    return function + " " + block + (neighbours.empty() ? "" : " " + Json(neighbours).dump());
+  }
+
+  /// The part's box, or what the input clamp makes of it.
+  void read_box(const std::string& part, std::vector<double>& lower, std::vector<double>& upper,
+                const std::string& where) const {
+    lower = files::parse_hex_floats(certificate_["box"].at(part).at("lower"));
+    upper = files::parse_hex_floats(certificate_["box"].at(part).at("upper"));
+    const auto inputs = static_cast<std::size_t>(parts_.at(part)->inputs());
+    require(lower.size() == inputs && upper.size() == inputs, where + ": the box has another size");
+    for (std::size_t k = 0; k < inputs; ++k) {
+      if (network_.clamp && files::is_clamped(part)) {  // never increases a distance
+        lower[k] = std::clamp(lower[k], network_.clamp->lower[k], network_.clamp->upper[k]);
+        upper[k] = std::clamp(upper[k], network_.clamp->lower[k], network_.clamp->upper[k]);
+      }
+      require(lower[k] <= upper[k], where + ": the box is empty");
+    }
+  }
+
+  /// What the other terms of the sum add to the values before the first ReLU of rho: each kind's range over its box,
+  /// shown by a tree, as often as there are such neighbours or less; the ground's once.
+  void check_others(const Json& others, const std::vector<std::string>& names, Neighbours counts, Row& least,
+                    Row& most, const std::string& where) const {
+    if (names[0] != kGround) {
+      if (--counts.at(names[0].substr(4)) == 0) counts.erase(names[0].substr(4));
+      if (parts_.count(kGround) == 1) counts[files::kGroundKind] = 1;
+    }
+    require(others.is_object() && others.size() == counts.size(), where + ": others lists other kinds");
+    const auto rows = static_cast<std::size_t>(parts_.at(names[1])->layers.front().outputs);
+    least.assign(rows, 0.0);
+    most.assign(rows, 0.0);
+    for (const auto& [kind, count] : counts) {
+      const std::string part = "phi:" + kind, here = where + "." + part;
+      const Json& range = others.at(part);
+      require_keys(range, {"tree", "least", "most"}, here);
+      const Row low = files::parse_hex_floats(range["least"]), high = files::parse_hex_floats(range["most"]);
+      Row lower_end, upper_end;
+      read_box(part, lower_end, upper_end, here);
+      const TreeVerdict verdict = check_range(term_layers(network_, part, names[1]), lower_end, upper_end,
+                                              range["tree"].get<std::string>(), low, high);
+      require(verdict.holds, here + ": " + verdict.reason);
+      const auto n = static_cast<double>(count);
+      const bool always = kind == files::kGroundKind;
+      constexpr double kInfinity = std::numeric_limits<double>::infinity();
+      for (std::size_t i = 0; i < rows; ++i) {
+        const double down = always ? low[i] : std::nextafter(n * std::min(low[i], 0.0), -kInfinity);
+        const double up = always ? high[i] : std::nextafter(n * std::max(high[i], 0.0), kInfinity);
+        least[i] = std::nextafter(least[i] + down, -kInfinity);
+        most[i] = std::nextafter(most[i] + up, kInfinity);
+      }
+    }
+  }
+
   /// sqrt(rho) <= `upper` bounds the slope on the box, or on what the input clamp makes of it; of a set function through
-  /// a quadratic form of rho.
+  /// a quadratic form of rho, or, for so many neighbours, of the chain through rho. Everywhere: by a projective cover.
   void check_local(const Json& bound, double upper, const std::vector<double>& scale,
                    const std::string& where) {
     const Json& proof = bound["proof"];
-    require(bound["domain"] == "box", where + ": a bound by parts of a box without a box");
-    require_keys(proof, {"rho", "form", "tree", "multipliers"}, where + ".proof");
+    const bool is_coupled = proof.contains("others"), is_global = bound["domain"] == "global";
+    std::set<std::string> keys = {"rho", is_coupled ? "others" : "form", "tree", "multipliers"};
+    if (is_global) keys.insert("radius");
+    if (proof.contains("conflicts")) keys.insert("conflicts");
+    require_keys(proof, keys, where + ".proof");
     const std::vector<std::string> names = files::networks_of(bound["function"].get<std::string>());
-    require(names.front().rfind("rho:", 0) != 0, where + ": rho has no box");
-    require(proof["form"].is_null() == (names.size() == 1),
-            where + ": a form for set functions, and only for those");
-    Matrix q(0, 0);
-    if (names.size() == 2) q = checked_form(proof["form"], names.back(), where + ".form");
+    const std::string& moved = names.front();
+    const std::string block = bound["block"].get<std::string>();
+    require(moved.rfind("rho:", 0) != 0, where + ": rho has no box");
     const double rho = files::parse_hex_float(proof["rho"].get<std::string>());
     require(rho > 0 && Dyadic(upper) * upper >= Dyadic(rho), where + ": claims less than sqrt(rho)");
-
-    const std::string& moved = names.front();
-    std::vector<double> lower_end = files::parse_hex_floats(certificate_["box"].at(moved).at("lower"));
-    std::vector<double> upper_end = files::parse_hex_floats(certificate_["box"].at(moved).at("upper"));
-    const auto inputs = static_cast<std::size_t>(parts_.at(moved)->inputs());
-    require(lower_end.size() == inputs && upper_end.size() == inputs, where + ": the box has another size");
-    for (std::size_t k = 0; k < inputs; ++k) {
-      if (network_.clamp && files::is_clamped(moved)) {  // never increases a distance
-        lower_end[k] = std::clamp(lower_end[k], network_.clamp->lower[k], network_.clamp->upper[k]);
-        upper_end[k] = std::clamp(upper_end[k], network_.clamp->lower[k], network_.clamp->upper[k]);
-      }
-      require(lower_end[k] <= upper_end[k], where + ": the box is empty");
+    LocalFunction f;
+    if (is_coupled) {
+      const Neighbours neighbours = neighbours_of(bound, where);
+      require(!neighbours.empty(), where + ": a bound for any number of neighbours needs a form");
+      Row least, most;
+      check_others(proof["others"], names, neighbours, least, most, where + ".others");
+      f = coupled_function(network_, bound["function"].get<std::string>(), block, scale, least, most);
+    } else {
+      require(proof["form"].is_null() == (names.size() == 1),
+              where + ": a form for set functions, and only for those");
+      Matrix q(0, 0);
+      if (names.size() == 2) q = checked_form(proof["form"], names.back(), where + ".form");
+      f = local_function(network_, moved, block, scale, q);
     }
-    TreeProof tree{proof["tree"].get<std::string>(), {}};
+    std::vector<Sides> boxes(1);
+    if (is_global) {
+      const Row radius = files::parse_hex_floats(proof["radius"]);
+      require(radius.size() == static_cast<std::size_t>(parts_.at(moved)->inputs()) &&
+                  std::all_of(radius.begin(), radius.end(), [](double r) { return r > 0; }),
+              where + ": needs a positive radius per input");
+      boxes = projective_cover(radius);
+      f = homogeneous(f);
+    } else {
+      read_box(moved, boxes[0].lower, boxes[0].upper, where);
+    }
+    TreeProof tree{proof["tree"].get<std::string>(), {}, {}};
     require(proof["multipliers"].is_array(), where + ": multipliers is not an array");
     for (const Json& words : proof["multipliers"]) tree.multipliers.push_back(hex_floats_in(words));
-    const TreeVerdict verdict =
-        check_tree(local_function(network_, moved, bound["block"].get<std::string>(), scale, q), lower_end,
-                   upper_end, rho, tree);
+    if (proof.contains("conflicts")) {
+      require(proof["conflicts"].is_array(), where + ": conflicts is not an array");
+      for (const Json& words : proof["conflicts"]) tree.conflicts.push_back(conflicts_in(words));
+    }
+    const TreeVerdict verdict = check_tree(f, boxes, rho, tree);
     require(verdict.holds, where + ": " + verdict.reason);
-    ++on_a_box_;
+    ++on_boxes_;
   }
 
   /// Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w), its lower triangle given row by row.
@@ -276,11 +401,18 @@ class Checker {
     lipschitz::SlopePoints points{point(witness["x"], moved), point(witness["y"], moved), {}};
     std::vector<std::string> others;
     require(witness["others"].is_array(), where + ": others is not an array");
+    Neighbours there = {{moved.substr(moved.find(':') + 1), 1}};
     for (const Json& other : witness["others"]) {
       require_keys(other, {"network", "x"}, where + ".others");
       others.push_back(other["network"].get<std::string>());
       points.others.push_back(point(other["x"], others.back()));
+      ++there[others.back().substr(others.back().find(':') + 1)];
     }
+    const Neighbours neighbours = neighbours_of(bound, where);
+    for (const auto& [kind, count] : there)
+      require(neighbours.empty() || kind == files::kGroundKind ||
+                  (neighbours.count(kind) == 1 && count <= neighbours.at(kind)),
+              where + ": has more neighbours than listed");
     const mpq_class square = lipschitz::slope_squared(
         lipschitz::slope_function(network_, function, others), points,
         files::block_coordinates(network_, function, bound["block"].get<std::string>()), scale);
@@ -295,17 +427,23 @@ class Checker {
     const std::string rho = law["rho"].get<std::string>(), block = law["block"].get<std::string>();
     const std::string where = "law of " + rho + " " + block;
     const double upper = number(law["upper"], law["upper_hex"], where + " upper");
-    std::map<std::string, long> terms = law["neighbours"].get<std::map<std::string, long>>();
+    const Neighbours neighbours = law["neighbours"].get<Neighbours>();
+    Neighbours terms = neighbours;
     require(terms.count(files::kGroundKind) == 0, where + ": the ground is no neighbour");
     if (parts_.count(files::kGroundPhi) == 1) terms[files::kGroundKind] = 1;
     require(law["domain"] == "box" || law["domain"] == "global", where + ": unknown domain");
     Dyadic sum, sum_of_squares;
     for (const auto& [kind, count] : terms) {
-      require(1 <= count && count <= 1000000, where + ": impossible number of neighbours");
+      require(1 <= count && count <= kMostNeighbours, where + ": impossible number of neighbours");
       const Dyadic n = static_cast<double>(count);
-      const Dyadic& k = proved_.at("set:" + kind + ":" + rho + " " + block);
-      require(law["domain"] == "box" || local_.count("set:" + kind + ":" + rho + " " + block) == 0,
-              where + ": rests on a bound that holds on a box only");
+      const std::string function = "set:" + kind + ":" + rho, any_number = key(function, block, {});
+      Dyadic k = proved_.at(any_number);
+      if (law["domain"] == "box") {
+        const auto fewer = proved_.find(key(function, block, neighbours));
+        if (fewer != proved_.end() && k >= fewer->second) k = fewer->second;
+      } else {
+        require(local_.count(any_number) == 0, where + ": rests on a bound that holds on a box only");
+      }
       sum += n * k;
       sum_of_squares += n * k * k;
     }
@@ -322,9 +460,9 @@ class Checker {
   const files::Network network_;
   std::map<std::string, const Weights*> parts_;
   std::map<std::string, Dyadic> norms_;   ///< product of the verified norms, by network
-  std::map<std::string, Dyadic> proved_;  ///< verified upper bounds, by "<function> <block>"
+  std::map<std::string, Dyadic> proved_;  ///< verified upper bounds, by key()
   std::set<std::string> local_;           ///< those of them that hold on the box only
-  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_a_box_ = 0;
+  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_boxes_ = 0;
 };
 
 }  // namespace

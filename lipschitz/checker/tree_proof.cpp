@@ -5,7 +5,9 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
+#include <utility>
 
 #include "nn/files/doubles.h"
 
@@ -40,9 +42,11 @@ struct Rounded {
 /// The matrix inequality of one part.
 class PartInequality {
  public:
+  /// @param conflicts that hold in the part, between undecided neurons.
   PartInequality(const LocalFunction& f, const Rounded& gram, const NeuronBounds& bounds, double rho,
-                 const Row& t)
+                 const Row& t, const std::vector<const Conflict*>& conflicts)
       : f_(f), bounds_(bounds), t_(t), moving_(static_cast<int>(f.coordinates.size())) {
+    for (const Conflict* conflict : conflicts) factors_[conflict->first] = factors_[conflict->second] = {};
     int free = 0;
     for (std::size_t k = 0; k < f.hidden.size(); ++k)
       for (int i = 0; i < f.hidden[k].outputs; ++i)
@@ -51,7 +55,9 @@ class PartInequality {
     s_.assign(static_cast<std::size_t>(n_) * n_, 0.0);
     excess_.assign(s_.size(), 0.0);
     for (int i = 0; i < moving_; ++i) s(i, i) = rho;
-    subtract_output(gram, subtract_neurons());
+    const Rounded z = subtract_neurons();
+    for (const Conflict* conflict : conflicts) subtract_conflict(*conflict);
+    subtract_output(gram, z);
   }
 
   bool is_positive_definite() {
@@ -73,8 +79,14 @@ class PartInequality {
  private:
   double& s(int i, int j) { return s_[static_cast<std::size_t>(i) * n_ + j]; }
   double& excess(int i, int j) { return excess_[static_cast<std::size_t>(i) * n_ + j]; }
-  bool on(std::size_t k, int i) const { return bounds_.lower[k][static_cast<std::size_t>(i)] >= 0; }
-  bool off(std::size_t k, int i) const { return bounds_.upper[k][static_cast<std::size_t>(i)] <= 0; }
+  bool on(std::size_t k, int i) const {
+    return !f_.hidden[k].has_relu(static_cast<std::size_t>(i)) ||
+           bounds_.lower[k][static_cast<std::size_t>(i)] >= 0;
+  }
+  bool off(std::size_t k, int i) const {
+    return f_.hidden[k].has_relu(static_cast<std::size_t>(i)) &&
+           bounds_.upper[k][static_cast<std::size_t>(i)] <= 0;
+  }
   bool undecided(std::size_t k, int i) const { return !on(k, i) && !off(k, i); }
 
   /// Adds to S and returns dz of the last hidden layer as forms in the variables.
@@ -100,6 +112,9 @@ class PartInequality {
           excess(j, variable) = excess(variable, j);
         }
         s(variable, variable) += 2 * t;  // exact: nothing else is there yet
+        const auto wanted = factors_.find(neuron);
+        if (wanted != factors_.end())
+          wanted->second = {variable, Row(row, row + n_), Row(radius, radius + n_)};
         std::fill(y.at(i), y.at(i) + n_, 0.0);
         std::fill(y.radius_at(i), y.radius_at(i) + n_, 0.0);
         y.at(i)[variable++] = 1;  // from here on the row is dz
@@ -112,6 +127,48 @@ class PartInequality {
       z = std::move(y);
     }
     return z;
+  }
+
+  /// dy of an undecided neuron as a form in the variables, and its own variable dz.
+  struct NeuronForms {
+    int variable = 0;
+    Row value, radius;
+  };
+
+  /// e_i, or a_i = dy_i - e_i: exact but for dy_i, which does not depend on the neuron's own variable.
+  static NeuronForms factor(NeuronForms forms, bool is_on) {
+    if (is_on) {
+      std::fill(forms.value.begin(), forms.value.end(), 0.0);
+      std::fill(forms.radius.begin(), forms.radius.end(), 0.0);
+    }
+    forms.value[static_cast<std::size_t>(forms.variable)] = is_on ? 1 : -1;
+    return forms;
+  }
+
+  /// S -= s (p q' + q p').
+  void subtract_conflict(const Conflict& conflict) {
+    const NeuronForms p = factor(factors_.at(conflict.first), conflict.first_on);
+    const NeuronForms q = factor(factors_.at(conflict.second), conflict.second_on);
+    const std::vector<int> rows = support(p), columns = support(q);
+    for (const int i : rows)
+      for (const int j : columns) {
+        const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
+        const double product = conflict.multiplier * (p.value[a] * q.value[b]);
+        const double spread = std::abs(p.value[a]) * q.radius[b] + p.radius[a] * std::abs(q.value[b]) +
+                              p.radius[a] * q.radius[b] + kLost;
+        for (const auto& [k, l] : {std::pair(i, j), std::pair(j, i)}) {
+          s(k, l) -= product;
+          excess(k, l) += 1.01 * (std::abs(conflict.multiplier) * spread + 4 * kUnit * std::abs(product)) +
+                          kUnit * std::abs(s(k, l)) + kLost;
+        }
+      }
+  }
+
+  static std::vector<int> support(const NeuronForms& forms) {
+    std::vector<int> result;
+    for (std::size_t j = 0; j < forms.value.size(); ++j)
+      if (forms.value[j] != 0 || forms.radius[j] != 0) result.push_back(static_cast<int>(j));
+    return result;
   }
 
   Rounded first_layer() const {
@@ -236,7 +293,8 @@ class PartInequality {
   const NeuronBounds& bounds_;
   const Row& t_;
   int moving_, n_ = 0;
-  Row s_, excess_;  ///< the true entries of S lie within s +- excess
+  std::map<std::size_t, NeuronForms> factors_;  ///< of the neurons in conflicts
+  Row s_, excess_;                              ///< the true entries of S lie within s +- excess
 };
 
 /// G in double, with what that rounding may have changed.
@@ -261,37 +319,56 @@ struct Part {
   NeuronBounds bounds;
 };
 
-}  // namespace
+/// Which layer and which of its outputs the n-th one is.
+WeightedNeuron neuron_at(const std::vector<HiddenLayer>& layers, std::size_t n, double weight) {
+  std::size_t layer = 0;
+  for (; n >= static_cast<std::size_t>(layers[layer].outputs); ++layer)
+    n -= static_cast<std::size_t>(layers[layer].outputs);
+  return {layer, static_cast<int>(n), weight};
+}
 
-TreeVerdict check_tree(const LocalFunction& f, const Row& lower, const Row& upper, double rho,
-                       const TreeProof& proof) {
-  TreeVerdict verdict;
-  std::size_t neurons = 0;
-  for (const HiddenLayer& layer : f.hidden) neurons += static_cast<std::size_t>(layer.outputs);
-  for (const Row& t : proof.multipliers)
-    if (t.size() != neurons ||
-        !std::all_of(t.begin(), t.end(), [](double x) { return x >= 0 && std::isfinite(x); }))
-      return {false, "multipliers are not one nonnegative number per hidden neuron", 0};
-  const auto in_range = [](double x) {
-    return std::ldexp(1.0, -kRange) <= x && x <= std::ldexp(1.0, kRange);
+/// The conflicts between neurons that the part leaves undecided which their lambda shows there.
+std::vector<const Conflict*> shown(const std::vector<HiddenLayer>& layers, const Part& part,
+                                   const std::vector<Conflict>& conflicts) {
+  std::vector<const Conflict*> result;
+  const auto is_undecided = [&](const WeightedNeuron& at) {
+    const auto i = static_cast<std::size_t>(at.output);
+    return layers[at.layer].has_relu(i) && part.bounds.lower[at.layer][i] < 0 &&
+           part.bounds.upper[at.layer][i] > 0;
   };
-  if (!in_range(rho)) return {false, "rho is not positive, or out of range", 0};
-  const auto usable_weight = [](double w) { return 0x1p-200 <= w && w <= 0x1p200; };
-  if (f.weight.size() != f.coordinates.size() ||
-      !std::all_of(f.weight.begin(), f.weight.end(), usable_weight))
-    return {false, "scale is out of range", 0};
-  if (f.hidden.empty() || lower.size() != upper.size() ||
-      lower.size() != static_cast<std::size_t>(f.hidden[0].inputs))
-    return {false, "the box has another size", 0};
+  for (const Conflict& conflict : conflicts) {
+    const WeightedNeuron first =
+        neuron_at(layers, conflict.first, conflict.first_on ? conflict.lambda : -conflict.lambda);
+    const double rest = 1 - conflict.lambda;  // rounded: any two nonnegative weights, not both zero, will do
+    const WeightedNeuron second = neuron_at(layers, conflict.second, conflict.second_on ? rest : -rest);
+    if (is_undecided(first) && is_undecided(second) &&
+        largest_sum(layers, part.bounds, part.lower, part.upper, first, second) <= 0)
+      result.push_back(&conflict);
+  }
+  return result;
+}
+
+bool is_usable(const Sides& box, const std::vector<HiddenLayer>& layers) {
+  const Row &lower = box.lower, &upper = box.upper;
+  if (layers.empty() || lower.size() != upper.size() ||
+      lower.size() != static_cast<std::size_t>(layers.front().inputs))
+    return false;
   for (std::size_t k = 0; k < lower.size(); ++k)
     if (!(std::abs(lower[k]) <= kLargestInput && std::abs(upper[k]) <= kLargestInput && lower[k] <= upper[k]))
-      return {false, "the box is empty or too large", 0};
-  const Rounded gram = rounded(f.gram);
+      return false;
+  return true;
+}
 
+/// Visits the leaves of a tree: `leaf(index, part)` says what is wrong with one, or nothing.
+template <class Leaf>
+TreeVerdict walk(const std::vector<HiddenLayer>& layers, const std::vector<Sides>& boxes,
+                 const std::string& tree, const Leaf& leaf) {
+  TreeVerdict verdict;
   std::vector<Part> open;  // what preorder has still to visit, the next one last
-  open.push_back({lower, upper, neuron_bounds(f.hidden, lower, upper, nullptr)});
-  const char* at = proof.tree.data();
-  const char* const end = at + proof.tree.size();
+  for (auto box = boxes.rbegin(); box != boxes.rend(); ++box)
+    open.push_back({box->lower, box->upper, neuron_bounds(layers, box->lower, box->upper, nullptr)});
+  const char* at = tree.data();
+  const char* const end = at + tree.size();
   for (long word = 1; at != end; ++word) {
     const std::string where = "word " + std::to_string(word) + " of the tree";
     const char kind = *at++;
@@ -305,28 +382,87 @@ TreeVerdict check_tree(const LocalFunction& f, const Row& lower, const Row& uppe
     const Part part = std::move(open.back());
     open.pop_back();
     if (kind == 's') {
-      if (index >= lower.size()) return {false, where + ": there is no such coordinate", verdict.leaves};
-      if (open.size() > kDeepest) return {false, where + ": the tree is too deep", verdict.leaves};
+      if (index >= part.lower.size()) return {false, where + ": there is no such coordinate", verdict.leaves};
+      if (open.size() > kDeepest + boxes.size())
+        return {false, where + ": the tree is too deep", verdict.leaves};
       const double middle = part.lower[index] + (part.upper[index] - part.lower[index]) / 2;
       if (!(part.lower[index] <= middle && middle <= part.upper[index]))
         return {false, where + ": the side cannot be halved", verdict.leaves};
       for (const bool is_upper : {true, false}) {
         Part half{part.lower, part.upper, {}};
         (is_upper ? half.lower : half.upper)[index] = middle;
-        half.bounds = neuron_bounds(f.hidden, half.lower, half.upper, &part.bounds);
+        half.bounds = neuron_bounds(layers, half.lower, half.upper, &part.bounds);
         open.push_back(std::move(half));
       }
       continue;
     }
-    if (index >= proof.multipliers.size())
-      return {false, where + ": there are no such multipliers", verdict.leaves};
     ++verdict.leaves;
-    if (!PartInequality(f, gram, part.bounds, rho, proof.multipliers[index]).is_positive_definite())
-      return {false, where + ": its multipliers do not show the bound there", verdict.leaves};
+    const std::string fault = leaf(index, part);
+    if (!fault.empty()) return {false, where + ": " + fault, verdict.leaves};
   }
   if (!open.empty()) return {false, "the tree ends before the box is covered", verdict.leaves};
   verdict.holds = true;
   return verdict;
+}
+
+}  // namespace
+
+TreeVerdict check_tree(const LocalFunction& f, const Row& lower, const Row& upper, double rho,
+                       const TreeProof& proof) {
+  return check_tree(f, {{lower, upper}}, rho, proof);
+}
+
+TreeVerdict check_tree(const LocalFunction& f, const std::vector<Sides>& boxes, double rho,
+                       const TreeProof& proof) {
+  std::size_t neurons = 0;
+  for (const HiddenLayer& layer : f.hidden) neurons += static_cast<std::size_t>(layer.outputs);
+  for (const Row& t : proof.multipliers)
+    if (t.size() != neurons ||
+        !std::all_of(t.begin(), t.end(), [](double x) { return x >= 0 && std::isfinite(x); }))
+      return {false, "multipliers are not one nonnegative number per hidden neuron", 0};
+  if (!proof.conflicts.empty() && proof.conflicts.size() != proof.multipliers.size())
+    return {false, "there are conflicts for other multipliers", 0};
+  for (const std::vector<Conflict>& conflicts : proof.conflicts)
+    for (const Conflict& c : conflicts)
+      if (!(c.first < c.second && c.second < neurons && 0 <= c.lambda && c.lambda <= 1 &&
+            std::isfinite(c.multiplier)))
+        return {false, "a conflict is not between two neurons, or its lambda not in [0, 1]", 0};
+  const auto in_range = [](double x) {
+    return std::ldexp(1.0, -kRange) <= x && x <= std::ldexp(1.0, kRange);
+  };
+  if (!in_range(rho)) return {false, "rho is not positive, or out of range", 0};
+  const auto usable_weight = [](double w) { return 0x1p-200 <= w && w <= 0x1p200; };
+  if (f.weight.size() != f.coordinates.size() ||
+      !std::all_of(f.weight.begin(), f.weight.end(), usable_weight))
+    return {false, "scale is out of range", 0};
+  for (const Sides& box : boxes)
+    if (!is_usable(box, f.hidden)) return {false, "the box is empty, too large or of another size", 0};
+  const Rounded gram = rounded(f.gram);
+  return walk(f.hidden, boxes, proof.tree, [&](std::size_t index, const Part& part) -> std::string {
+    if (index >= proof.multipliers.size()) return "there are no such multipliers";
+    std::vector<const Conflict*> conflicts;
+    if (!proof.conflicts.empty()) conflicts = shown(f.hidden, part, proof.conflicts[index]);
+    if (!PartInequality(f, gram, part.bounds, rho, proof.multipliers[index], conflicts)
+             .is_positive_definite())
+      return "its multipliers do not show the bound there";
+    return "";
+  });
+}
+
+TreeVerdict check_range(const std::vector<HiddenLayer>& layers, const Row& lower, const Row& upper,
+                        const std::string& tree, const Row& least, const Row& most) {
+  if (!is_usable({lower, upper}, layers)) return {false, "the box is empty, too large or of another size", 0};
+  const auto outputs = static_cast<std::size_t>(layers.back().outputs);
+  if (layers.back().without_relu != layers.back().outputs || least.size() != outputs ||
+      most.size() != outputs)
+    return {false, "the range is of something else", 0};
+  return walk(layers, {{lower, upper}}, tree, [&](std::size_t index, const Part& part) -> std::string {
+    if (index != 0) return "a leaf of a range has no multipliers";
+    for (std::size_t i = 0; i < outputs; ++i)
+      if (!(least[i] <= part.bounds.lower.back()[i] && part.bounds.upper.back()[i] <= most[i]))
+        return "the range is larger there";
+    return "";
+  });
 }
 
 }  // namespace swarmcert::check

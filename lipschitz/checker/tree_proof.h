@@ -13,18 +13,33 @@ namespace swarmcert::check {
 /// sum (dx_k / weight_k)^2.
 struct LocalFunction {
   std::vector<HiddenLayer> hidden;
-  Matrix gram;                   ///< G, exactly
+  Matrix gram;                   ///< G, exactly, of the last hidden layer
   std::vector<int> coordinates;  ///< that move, ascending
   std::vector<double> weight;    ///< one per moving coordinate, positive
 
   LocalFunction() : gram(0, 0) {}
 };
 
+/// Two neurons, counted over all outputs of hidden layers, that cannot be in these states at once: nowhere in the part
+/// are s_1 y_1 and s_2 y_2 both positive, s = 1 for a neuron that is on and -1 for one that is off, because
+/// lambda s_1 y_1 + (1 - lambda) s_2 y_2 <= 0 there. Then u_1 u_2 = 0 at almost every point, with u = dz of a neuron
+/// that is on and u = dy - dz of one that is off; `multiplier`, of either sign, multiplies 2 u_1 u_2.
+struct Conflict {
+  std::size_t first = 0, second = 0;
+  bool first_on = true, second_on = true;
+  double lambda = 0;  ///< in [0, 1]
+  double multiplier = 0;
+};
+
 /// The words of a tree in preorder: "s3" halves coordinate 3 of the box at hand, its lower half first; "t5" is a leaf
-/// that multipliers 5 prove.
+/// that multipliers 5 prove. Of several boxes, their trees one after the other.
 struct TreeProof {
   std::string tree;
-  std::vector<std::vector<double>> multipliers;  ///< each with one number per hidden neuron, not negative
+  /// Each with one number per output of a hidden layer, not negative; nobody reads those of outputs without ReLU.
+  std::vector<std::vector<double>> multipliers;
+  /// Conflicts that go with each multipliers, or nothing at all. In a part that decides one of the two neurons, or where
+  /// lambda does not show it, a conflict counts for nothing.
+  std::vector<std::vector<Conflict>> conflicts = {};
 };
 
 struct TreeVerdict {
@@ -38,13 +53,23 @@ struct TreeVerdict {
 /// the parts it crosses, so each part may be proved alone.
 ///
 /// A part. Its neurons have bounds (box_states.h). On a pair of points of the part, dz = dy for a neuron whose y stays
-/// positive, dz = 0 where it stays negative, and dz (dy - dz) >= 0 otherwise. With multipliers t >= 0 of the last kind
+/// positive, and for an output without ReLU, dz = 0 where it stays negative, and dz (dy - dz) >= 0 otherwise. With multipliers t >= 0 of the last kind
 /// and everything expressed in (dx, dz of the undecided), the claim follows from
-///   S = rho I_x - F' G F - sum_i t_i (a_i e_i' + e_i a_i') >= 0,  a_i = (dy_i in these variables) - e_i.
+///   S = rho I_x - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') >= 0,
+/// with a_i = (dy_i in these variables) - e_i, and p_c, q_c one of e_i (on) and a_i (off) for the conflict's two neurons.
 /// S is computed in double together with a bound on the norm of what rounding changed, scaled to a unit diagonal by
 /// powers of two, shifted down by that bound and by what a Cholesky factorisation in double may overlook,
 /// gamma_(n+1) tr(S) (Rump 2006, BIT 46), and factorised: if that runs to its end, S is positive definite.
 TreeVerdict check_tree(const LocalFunction& f, const std::vector<double>& lower,
                        const std::vector<double>& upper, double rho, const TreeProof& proof);
+/// The same for the union of several boxes, for the slope at almost every point of each.
+TreeVerdict check_tree(const LocalFunction& f, const std::vector<Sides>& boxes, double rho,
+                       const TreeProof& proof);
+
+/// Whether least <= y <= most for the outputs y of the last layer, which has no ReLU, all over the box: over each leaf of
+/// the tree by neuron_bounds(). Leaves are "t0": there are no multipliers.
+TreeVerdict check_range(const std::vector<HiddenLayer>& layers, const std::vector<double>& lower,
+                        const std::vector<double>& upper, const std::string& tree,
+                        const std::vector<double>& least, const std::vector<double>& most);
 
 }  // namespace swarmcert::check

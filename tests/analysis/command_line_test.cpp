@@ -198,10 +198,18 @@ TEST_F(CommandLine, OptionsThatAskForWhatTheNetworkHasNotAreUsageErrors) {
   expect("certify " + net + " --neighbours many", 2, {"--neighbours many", "small=1"});
   expect("certify " + net + " --neighbours a=1", 2, {"\"a\""});
   expect("certify " + net + " --range", 2, {"--domain"});
-  expect("certify " + net + " --method branch", 2, {"branch and bound needs a box", "--domain"});
   expect("certify " + net + " --as float16", 2, {"--as"});
   write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1]\nupper = [1, 2]\n");
   expect("certify " + net + " --domain box.toml", 3, {"box.toml", "line 2", "2 inputs"});
+}
+
+TEST_F(CommandLine, BranchAndBoundWithoutABoxHoldsForAllInputs) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  ASSERT_EQ(run("certify " + net + " --method branch --nodes 300 -o cert.json --json out.json").exit_code, 0);
+  const Json bound = Json::parse(read_text(folder_ / "out.json"))["bounds"][0];
+  EXPECT_EQ(bound["domain"], "global");
+  EXPECT_GE(bound["upper"].get<double>(), bound["lower"].get<double>());
+  expect("check cert.json " + net, 0, {"accepted"});
 }
 
 TEST_F(CommandLine, LawsOfTheShippedNetwork) {

@@ -31,7 +31,8 @@ STATEMENT = (
     "that differ in the block only, and |f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x "
     "and y in the box. So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
     "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x to y, whatever the "
-    "number and the places of the others. Laws hold for the neighbours listed and the ground's input where there is "
+    "number and the places of the others; where neighbours are listed, with at most so many of each kind, the moving one "
+    "included, all in the box, and the ground's input where there is one. Laws hold for the neighbours listed and the ground's input where there is "
     "one, in the box where their domain is box: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, |df| <= upper max |dx_j|; own_state, |df| <= upper "
     "|dx| where the vehicle's own state moves by dx.")
 
@@ -610,34 +611,85 @@ def rounded_up(x):
     return Fraction(-((-x.numerator << 80) // x.denominator), 1 << 80)
 
 
+def conflicts_in(text, where):
+    """(neuron, is on, neuron, is on, lambda, multiplier) of "3+ 17- <lambda> <multiplier>", ..."""
+    require(isinstance(text, str), f"{where}: conflicts are not text")
+    words = [w for w in re.split("[ \t\n\v\f\r]+", text) if w]
+    require(len(words) % 4 == 0, f"{where}: a conflict lacks words")
+    result = []
+    for first, second, weight, multiplier in zip(*[iter(words)] * 4):
+        require(re.fullmatch("[0-9]{1,9}[+-]", first) and re.fullmatch("[0-9]{1,9}[+-]", second),
+                f"{where}: a conflict's neuron is not a number with + or -")
+        result.append((int(first[:-1]), first[-1] == "+", int(second[:-1]), second[-1] == "+",
+                       Fraction(hex_float(weight)), Fraction(hex_float(multiplier))))
+    return result
+
+
+class Hidden:
+    """y = W h + b + e for any least <= e <= most; the next h is relu(y), of the last `without_relu` outputs y."""
+
+    def __init__(self, layer, has_relu=True, bias=True):
+        self.weights = [[Fraction(w) for w in layer.weights[i * layer.inputs:(i + 1) * layer.inputs]]
+                        for i in range(layer.outputs)]
+        self.biases = [Fraction(b) if bias else Fraction(0) for b in layer.biases]
+        self.without_relu, self.least, self.most = 0 if has_relu else layer.outputs, None, None
+
+    def homogeneous(self, is_last):
+        """y = W h + b s, s the last input and, but for the last layer, the last output."""
+        self.weights = [row + [b] for row, b in zip(self.weights, self.biases)]
+        if not is_last:
+            self.weights.append([Fraction(0)] * (len(self.weights[0]) - 1) + [Fraction(1)])
+            self.without_relu = 1
+        self.biases = [Fraction(0)] * len(self.weights)
+
+    def has_relu(self, i):
+        return i < len(self.biases) - self.without_relu
+
+    def constant(self, form):
+        """The largest of form (b + e)."""
+        total = sum(map(mul, form, self.biases))
+        if self.least:
+            total += sum(c * (m if c > 0 else l) for c, l, m in zip(form, self.least, self.most))
+        return total
+
+
+def above(layers, bounds, layer, neuron, sign):
+    """A linear form in x above sign * y by relaxation of ReLU: coefficients and constant."""
+    form, constant = [Fraction(0)] * len(layers[layer].biases), Fraction(0)
+    form[neuron] = Fraction(sign)
+    for j in range(layer, -1, -1):
+        constant += layers[j].constant(form)
+        form = [sum(c * row[x] for c, row in zip(form, layers[j].weights) if c) for x in range(len(layers[j].weights[0]))]
+        if j == 0:
+            break
+        for c, (l, u) in enumerate(bounds[j - 1]):
+            if l >= 0 or form[c] == 0 or not layers[j - 1].has_relu(c):
+                continue
+            if u <= 0 or (form[c] < 0 and u <= -l):
+                form[c] = Fraction(0)
+            elif form[c] > 0:
+                slope = min(Fraction(1), rounded_up(u / (u - l)))
+                constant += form[c] * max(u - slope * u, -slope * l)
+                form[c] *= slope
+    return form, constant
+
+
+def largest(form, constant, low, high):
+    return rounded_up(constant + sum(c * (h if c > 0 else l) for c, l, h in zip(form, low, high)))
+
+
 def neuron_bounds(layers, low, high, around):
     """Bounds on every neuron over a box by linear relaxation of ReLU, layer by layer; those that `around` decides keep
     its bounds. Exact but for bounds and slopes, which are rounded so that they still hold."""
     bounds = []
-    for k, (weights, biases) in enumerate(layers):
+    for k, layer in enumerate(layers):
         bounds.append([])
-        for i in range(len(biases)):
+        for i in range(len(layer.biases)):
             lower, upper = around[k][i] if around else (None, None)
-            if lower is not None and (lower >= 0 or upper <= 0):
+            if layer.has_relu(i) and lower is not None and (lower >= 0 or upper <= 0):
                 bounds[k].append((lower, upper))
                 continue
-            ends = []
-            for sign in 1, -1:
-                form, constant = [sign * w for w in weights[i]], sign * biases[i]
-                for j in range(k - 1, -1, -1):
-                    for c, (l, u) in enumerate(bounds[j]):
-                        if l >= 0 or form[c] == 0:
-                            continue
-                        if u <= 0 or (form[c] < 0 and u <= -l):
-                            form[c] = Fraction(0)
-                        elif form[c] > 0:
-                            slope = min(Fraction(1), rounded_up(u / (u - l)))
-                            constant += form[c] * max(u - slope * u, -slope * l)
-                            form[c] *= slope
-                    constant += sum(map(mul, form, layers[j][1]))
-                    form = [sum(c * row[x] for c, row in zip(form, layers[j][0]) if c)
-                            for x in range(len(layers[j][0][0]))]
-                ends.append(rounded_up(constant + sum(c * (h if c > 0 else l) for c, l, h in zip(form, low, high))))
+            ends = [largest(*above(layers, bounds, k, i, sign), low, high) for sign in (1, -1)]
             l, u = -ends[1], ends[0]
             bounds[k].append((l, u) if lower is None else (max(l, lower), min(u, upper)))
     return bounds
@@ -659,29 +711,57 @@ def is_positive_semidefinite(s):
     return True
 
 
-def part_holds(layers, gram, moving, weight, bounds, rho, t):
-    """S = rho I - F' G F - sum_i t_i (a_i e_i' + e_i a_i') over the moving inputs and the undecided neurons."""
-    n = len(moving) + sum(l < 0 < u for layer in bounds for l, u in layer)
+def shown(layers, low, high, bounds, conflicts):
+    """The conflicts between undecided neurons that their lambda shows in this box."""
+    places = [(k, i) for k, layer in enumerate(layers) for i in range(len(layer.biases))]
+    undecided = lambda at: bounds[at[0]][at[1]][0] < 0 < bounds[at[0]][at[1]][1] and layers[at[0]].has_relu(at[1])
+    result = []
+    for first, first_on, second, second_on, weight, multiplier in conflicts:
+        if not undecided(places[first]) or not undecided(places[second]):
+            continue
+        one, one_constant = above(layers, bounds, *places[first], 1 if first_on else -1)
+        other, other_constant = above(layers, bounds, *places[second], 1 if second_on else -1)
+        form = [weight * a + (1 - weight) * b for a, b in zip(one, other)]
+        if largest(form, weight * one_constant + (1 - weight) * other_constant, low, high) <= 0:
+            result.append((first, first_on, second, second_on, multiplier))
+    return result
+
+
+def part_holds(layers, gram, moving, weight, bounds, rho, t, conflicts):
+    """S = rho I - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') over the moving inputs and
+    the undecided neurons."""
+    forms = {}
+    n = len(moving) + sum(l < 0 < u and layer.has_relu(i) for layer, ends in zip(layers, bounds)
+                          for i, (l, u) in enumerate(ends))
     s = [[Fraction(0)] * n for _ in range(n)]
     for i in range(len(moving)):
         s[i][i] = Fraction(rho)
     z = [[weight[j] if j < len(moving) and moving[j] == i else Fraction(0) for j in range(n)]
-         for i in range(len(layers[0][0][0]))]
+         for i in range(len(layers[0].weights[0]))]
     variable, neuron = len(moving), 0
-    for (weights, _), layer in zip(layers, bounds):
-        y = [[sum(w * row[j] for w, row in zip(weights_of_one, z)) for j in range(n)] for weights_of_one in weights]
-        for i, (l, u) in enumerate(layer):
-            if l < 0 < u:
+    for layer, ends in zip(layers, bounds):
+        y = [[sum(w * row[j] for w, row in zip(weights, z)) for j in range(n)] for weights in layer.weights]
+        for i, (l, u) in enumerate(ends):
+            if not layer.has_relu(i):
+                pass
+            elif l < 0 < u:
                 for j in range(n):
                     s[variable][j] -= t[neuron] * y[i][j]
                     s[j][variable] -= t[neuron] * y[i][j]
                 s[variable][variable] += 2 * t[neuron]
+                forms[neuron] = (y[i], variable)
                 y[i] = [Fraction(int(j == variable)) for j in range(n)]
                 variable += 1
             elif l < 0:
                 y[i] = [Fraction(0)] * n
             neuron += 1
         z = y
+    for first, first_on, second, second_on, multiplier in conflicts:
+        p, q = ([(0 if is_on else x) + (1 if is_on else -1) * int(j == forms[at][1]) for j, x in enumerate(forms[at][0])]
+                for at, is_on in ((first, first_on), (second, second_on)))
+        for i in range(n):
+            for j in range(n):
+                s[i][j] -= multiplier * (p[i] * q[j] + q[i] * p[j])
     h = [[sum(g * row[j] for g, row in zip(gram_row, z)) for j in range(n)] for gram_row in gram]
     for i in range(n):
         for j in range(n):
@@ -689,19 +769,31 @@ def part_holds(layers, gram, moving, weight, bounds, rho, t):
     return is_positive_semidefinite(s)
 
 
-def tree_fails(layers, gram, moving, weight, low, high, rho, text, multipliers):
-    """"" if every part of the box is proved, else why not."""
-    open_parts = [(low, high, neuron_bounds(layers, low, high, None))]
+def projective_cover(radius):
+    """Boxes of (u, s), s >= 0, such that every x is u / s for a point of one."""
+    one = Fraction(1)
+    boxes = [([-r for r in radius] + [one], radius + [one])]
+    for k, r in enumerate(radius):
+        for side in -r, r:
+            low, high = [-r for r in radius] + [Fraction(0)], radius + [one]
+            low[k] = high[k] = side
+            boxes.append((low, high))
+    return boxes
+
+
+def tree_fails(layers, boxes, text, proves):
+    """"" if proves(low, high, bounds, index) for every leaf, else why not."""
+    open_parts = [(low, high, neuron_bounds(layers, low, high, None)) for low, high in reversed(boxes)]
     for word in text.split(" ") if text else []:
         if not re.fullmatch("[st][0-9]{1,15}", word) or not open_parts:
             return f"{word!r} is no split and no leaf, or one too many"
         low, high, bounds = open_parts.pop()
         index = int(word[1:])
         if word[0] == "t":
-            if index >= len(multipliers) or not part_holds(layers, gram, moving, weight, bounds, rho, multipliers[index]):
+            if not proves(low, high, bounds, index):
                 return f"{word} does not prove its part"
             continue
-        if index >= len(low) or len(open_parts) > 2000:
+        if index >= len(low) or len(open_parts) > 2000 + len(boxes):
             return f"{word}: no such coordinate, or too deep"
         middle = Fraction(float(low[index]) + (float(high[index]) - float(low[index])) / 2)
         if not low[index] <= middle <= high[index]:
@@ -794,7 +886,8 @@ class Checker:
 
     def check_bound(self, bound):
         require_keys(bound, ["function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_hex",
-                             "upper_method", "lower", "lower_hex", "lower_witness", "proof"], "bound")
+                             "upper_method", "lower", "lower_hex", "lower_witness", "proof"]
+                     + ["neighbours"] * ("neighbours" in bound), "bound")
         function, block = bound["function"], bound["block"]
         require(isinstance(function, str) and isinstance(block, str), "bound: a name is not text")
         where = f"bound {function} {block}"
@@ -805,6 +898,7 @@ class Checker:
         require(bound["norm"] == ("weighted_l2" if scale else "l2"), f"{where}: another norm")
         require(bound["unit"] == unit_of(self.network, function, block), f"{where}: another unit")
         require(bound["law"] == ("one_neighbour" if len(names) == 2 else "none"), f"{where}: another law")
+        neighbours = self.neighbours_of(bound, where)
         upper = number(bound["upper"], bound["upper_hex"], where)
         if bound["upper_method"] == "sdp":
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where)
@@ -818,29 +912,100 @@ class Checker:
                 total *= self.norms[name]
             require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
         if not scale:
-            self.proved[function, block] = Fraction(upper)
-            if bound["upper_method"] == "branch":
-                self.local.add((function, block))
+            key = (function, block, frozenset(neighbours.items()))
+            self.proved[key] = Fraction(upper)
+            if bound["upper_method"] == "branch" and boxed:
+                self.local.add(key)
         if bound["lower_witness"] is None:
             require(bound["lower"] is None and bound["lower_hex"] is None, f"{where}: lower without a witness")
             return
         lower = number(bound["lower"], bound["lower_hex"], where)
         self.check_lower(bound, Fraction(lower), scale, boxed, where)
 
+    def neighbours_of(self, bound, where):
+        """Of a set function, at most how many of each kind; empty: any number."""
+        if "neighbours" not in bound:
+            return {}
+        names = networks_of(bound["function"])
+        require(isinstance(bound["neighbours"], dict), f"{where}: neighbours is not an object")
+        neighbours = {kind: integer(count) for kind, count in bound["neighbours"].items()}
+        require(len(names) == 2 and bound["domain"] == "box", f"{where}: neighbours only of a set function on a box")
+        require(all(kind != "ground" and f"phi:{kind}" in self.network.parts and 1 <= count <= 1000000
+                    for kind, count in neighbours.items()), f"{where}: impossible neighbours")
+        require(neighbours and (names[0] == "phi:ground" or names[0][4:] in neighbours),
+                f"{where}: the neighbour that moves is none of those listed")
+        return neighbours
+
+    def box_of(self, part, where):
+        """The part's box, or what the input clamp makes of it."""
+        require(part in self.c["box"] and part in self.network.parts, f"{where}: no box for {part}")
+        low, high = (hex_floats(self.c["box"][part][side]) for side in ("lower", "upper"))
+        require(len(low) == len(high) == self.network.parts[part].layers[0].inputs, f"{where}: the box has another size")
+        if self.network.clamp and part != "phi:ground":
+            clamp = list(zip(*self.network.clamp))
+            low, high = ([min(max(x, a), b) for x, (a, b) in zip(side, clamp)] for side in (low, high))
+        require(all(-2.0 ** 100 <= a <= b <= 2.0 ** 100 for a, b in zip(low, high)), f"{where}: the box is empty or too large")
+        return [Fraction(x) for x in low], [Fraction(x) for x in high]
+
+    def term_layers(self, phi, rho):
+        """V phi(x), V the first layer of rho without its bias."""
+        layers = [Hidden(layer) for layer in self.network.parts[phi].layers]
+        layers[-1].without_relu = len(layers[-1].biases)
+        return layers + [Hidden(self.network.parts[rho].layers[0], False, False)]
+
+    def check_others(self, others, names, neighbours, where):
+        """What the other terms of the sum add before the first ReLU of rho: least and most."""
+        counts = dict(neighbours)
+        if names[0] != "phi:ground":
+            counts[names[0][4:]] -= 1
+            counts = {kind: count for kind, count in counts.items() if count > 0}
+            if "phi:ground" in self.network.parts:
+                counts["ground"] = 1
+        require(isinstance(others, dict) and len(others) == len(counts), f"{where}: others lists other kinds")
+        rows = self.network.parts[names[1]].layers[0].outputs
+        least, most = [Fraction(0)] * rows, [Fraction(0)] * rows
+        for kind, count in counts.items():
+            part, here = f"phi:{kind}", f"{where} {kind}"
+            require_keys(others[part], ["tree", "least", "most"], here)
+            low, high = ([Fraction(x) for x in hex_floats(others[part][end])] for end in ("least", "most"))
+            require(len(low) == len(high) == rows, f"{here}: the range is of something else")
+            require(isinstance(others[part]["tree"], str), f"{here}: the tree is not text")
+            layers = self.term_layers(part, names[1])
+            reason = tree_fails(layers, [self.box_of(part, here)], others[part]["tree"], lambda _, __, bounds, index: index == 0 and all(
+                a <= l and u <= b for a, (l, u), b in zip(low, bounds[-1], high)))
+            require(not reason, f"{here}: {reason}")
+            for i in range(rows):
+                least[i] += low[i] if kind == "ground" else count * min(low[i], 0)
+                most[i] += high[i] if kind == "ground" else count * max(high[i], 0)
+        return least, most
+
     def check_local(self, bound, upper, scale, where):
         proof = bound["proof"]
-        require(bound["domain"] == "box", f"{where}: a bound by parts of a box without a box")
-        require_keys(proof, ["rho", "form", "tree", "multipliers"], where)
+        coupled, everywhere = "others" in proof, bound["domain"] == "global"
+        require_keys(proof, ["rho", "others" if coupled else "form", "tree", "multipliers"] + ["radius"] * everywhere
+                     + ["conflicts"] * ("conflicts" in proof), where)
         names = networks_of(bound["function"])
         require(all(name in self.network.parts for name in names), f"{where}: no such function")
         require(not names[0].startswith("rho:"), f"{where}: rho has no box")
         layers = self.network.parts[names[0]].layers
-        require(len(layers) > 1, f"{where}: no hidden layer")
-        require((proof["form"] is None) == (len(names) == 1), f"{where}: a form for set functions only")
-        last = Matrix.of(layers[-1].weights, layers[-1].inputs)
-        gram = last.transposed() @ last
-        if len(names) == 2:
-            gram = last.transposed() @ self.checked_form(proof["form"], names[1], where) @ last
+        if coupled:
+            neighbours = self.neighbours_of(bound, where)
+            require(neighbours, f"{where}: a bound for any number of neighbours needs a form")
+            behind = self.network.parts[names[1]].layers
+            require(len(behind) > 1, f"{where}: rho has no hidden layer")
+            hidden = self.term_layers(*names)[:-1] + [Hidden(layer) for layer in behind[:-1]]
+            first = hidden[len(layers)]
+            first.least, first.most = self.check_others(proof["others"], names, neighbours, where)
+            last = Matrix.of(behind[-1].weights, behind[-1].inputs)
+            gram = last.transposed() @ last
+        else:
+            require(len(layers) > 1, f"{where}: no hidden layer")
+            require((proof["form"] is None) == (len(names) == 1), f"{where}: a form for set functions only")
+            hidden = [Hidden(layer) for layer in layers[:-1]]
+            last = Matrix.of(layers[-1].weights, layers[-1].inputs)
+            gram = last.transposed() @ last
+            if len(names) == 2:
+                gram = last.transposed() @ self.checked_form(proof["form"], names[1], where) @ last
         gram = [[gram.fraction(i, j) for j in range(len(gram.rows))] for i in range(len(gram.rows))]
         rho = hex_float(proof["rho"])
         require(rho > 0 and Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
@@ -848,25 +1013,31 @@ class Checker:
         moving = block_coordinates(self.network, names[0], bound["block"])
         require(not scale or len(scale) == layers[0].inputs, f"{where}: scale has another size")
         weight = [Fraction(scale[k]) if scale else Fraction(1) for k in moving]
-        require(names[0] in self.c["box"], f"{where}: no box for {names[0]}")
-        low, high = (hex_floats(self.c["box"][names[0]][side]) for side in ("lower", "upper"))
-        require(len(low) == len(high) == layers[0].inputs, f"{where}: the box has another size")
-        if self.network.clamp and names[0] != "phi:ground":
-            clamp = list(zip(*self.network.clamp))
-            low, high = ([min(max(x, a), b) for x, (a, b) in zip(side, clamp)] for side in (low, high))
-        require(all(-2.0 ** 100 <= a <= b <= 2.0 ** 100 for a, b in zip(low, high)), f"{where}: the box is empty or too large")
+        if everywhere:
+            radius = [Fraction(r) for r in hex_floats(proof["radius"])]
+            require(len(radius) == layers[0].inputs and min(radius) > 0, f"{where}: needs a positive radius per input")
+            require(max(radius) <= 2 ** 100, f"{where}: the box is empty or too large")
+            boxes = projective_cover(radius)
+            for layer in hidden:
+                layer.homogeneous(layer is hidden[-1])
+        else:
+            boxes = [self.box_of(names[0], where)]
         require(2.0 ** -400 <= rho <= 2.0 ** 400, f"{where}: rho is out of range")
         require(all(2.0 ** -200 <= w <= 2.0 ** 200 for w in weight), f"{where}: scale is out of range")
-        hidden = [([[Fraction(w) for w in layer.weights[i * layer.inputs:(i + 1) * layer.inputs]]
-                    for i in range(layer.outputs)], [Fraction(b) for b in layer.biases]) for layer in layers[:-1]]
         multipliers = []
         for text in listed(proof["multipliers"]):
             multipliers.append([Fraction(x) for x in hex_floats([w for w in re.split("[ \t\n\v\f\r]+", text) if w])])
-        require(all(len(t) == sum(len(b) for _, b in hidden) and min(t) >= 0 for t in multipliers),
+        require(all(len(t) == sum(len(layer.biases) for layer in hidden) and min(t) >= 0 for t in multipliers),
                 f"{where}: multipliers are not one nonnegative number per hidden neuron")
+        conflicts = [conflicts_in(text, where) for text in listed(proof.get("conflicts", [""] * len(multipliers)))]
+        require(len(conflicts) == len(multipliers), f"{where}: there are conflicts for other multipliers")
+        require(all(c[0] < c[2] < sum(len(layer.biases) for layer in hidden) and 0 <= c[4] <= 1
+                    for some in conflicts for c in some), f"{where}: a conflict is not between two neurons")
         require(isinstance(proof["tree"], str), f"{where}: the tree is not text")
-        reason = tree_fails(hidden, gram, moving, weight, [Fraction(x) for x in low], [Fraction(x) for x in high], rho,
-                            proof["tree"], multipliers)
+        reason = tree_fails(hidden, boxes, proof["tree"], 
+                            lambda low, high, bounds, index: index < len(multipliers) and part_holds(
+                                hidden, gram, moving, weight, bounds, rho, multipliers[index],
+                                shown(hidden, low, high, bounds, conflicts[index])))
         require(not reason, f"{where}: {reason}")
 
     def checked_form(self, form, name, where):
@@ -914,6 +1085,9 @@ class Checker:
         if len(names) == 2:
             grounds = [n for n in [names[0]] + [o for o, _ in others] if n == "phi:ground"]
             require(len(grounds) == ("phi:ground" in self.network.parts), f"{where}: the ground enters exactly once")
+        neighbours, there = self.neighbours_of(bound, where), [names[0]] + [o for o, _ in others]
+        require(not neighbours or all(there.count(o) <= neighbours.get(o[4:], 0) for o in there if o != "phi:ground"),
+                f"{where}: has more neighbours than listed")
         block = block_coordinates(self.network, function, bound["block"])
         require(all(a == b for k, (a, b) in enumerate(zip(x, y)) if k not in block), f"{where}: leaves its block")
         run = sum(((Fraction(a) - Fraction(b)) / (Fraction(s) if scale else 1)) ** 2
@@ -936,19 +1110,23 @@ class Checker:
         upper = Fraction(number(law["upper"], law["upper_hex"], where))
         require(isinstance(law["neighbours"], dict), f"{where}: neighbours is not an object")
         require("ground" not in law["neighbours"], f"{where}: the ground is no neighbour")
-        terms = dict(law["neighbours"])
+        terms = {kind: integer(count) for kind, count in law["neighbours"].items()}
+        listed_ = frozenset(terms.items())
         if "phi:ground" in self.network.parts:
             terms["ground"] = 1
         require(law["block"] in ("all", "position", "velocity"), f"{where}: no law for this block")
         require(law["domain"] in ("box", "global"), f"{where}: unknown domain")
         total = squares = Fraction(0)
         for kind, count in terms.items():
-            require(1 <= integer(count) <= 1000000, f"{where}: impossible number of neighbours")
-            key = (f"set:{kind}:{law['rho']}", law["block"])
+            require(1 <= count <= 1000000, f"{where}: impossible number of neighbours")
+            key = (f"set:{kind}:{law['rho']}", law["block"], frozenset())
             require(key in self.proved, f"{where}: no bound of {key[0]}")
             require(law["domain"] == "box" or key not in self.local, f"{where}: rests on a bound for a box only")
-            total += integer(count) * self.proved[key]
-            squares += integer(count) * self.proved[key] ** 2
+            bound = self.proved[key]
+            if law["domain"] == "box":
+                bound = min(bound, self.proved.get(key[:2] + (listed_,), bound))
+            total += count * bound
+            squares += count * bound ** 2
         require(law["law"] in ("all_stacked", "all_max", "own_state"), f"{where}: unknown law")
         require(upper ** 2 >= squares if law["law"] == "all_stacked" else upper >= total,
                 f"{where}: claims less than the law gives")

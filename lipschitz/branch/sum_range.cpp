@@ -1,0 +1,110 @@
+#include "lipschitz/branch/sum_range.h"
+
+#include <memory>
+#include <queue>
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// The claimed range is wider than the one found, relatively: the checker rounds otherwise.
+constexpr double kMargin = 1e-9;
+
+struct Part {
+  double width = 0;
+  std::size_t index = 0;  ///< in the tree
+  int split = 0;
+  std::shared_ptr<const Reach> reach;
+  bool operator<(const Part& other) const { return width < other.width; }
+};
+
+struct TreeNode {
+  int split = -1;
+  std::size_t first_child = 0;
+};
+
+Part part_of(const ReachNetwork& network, const Box& box, const Reach* around, std::size_t index) {
+  Part part;
+  std::vector<Eigen::MatrixXd> slopes;
+  part.reach = std::make_shared<const Reach>(network, box, around, &slopes);
+  part.index = index;
+  part.width = (part.reach->output().upper - part.reach->output().lower).sum();
+  VectorXd gain = slopes.back().colwise().sum().transpose();
+  for (Index k = 0; k < gain.size(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    gain(k) *= box.upper[i] - box.lower[i];
+  }
+  Index best = 0;
+  gain.maxCoeff(&best);
+  part.split = static_cast<int>(best);
+  return part;
+}
+
+void write_preorder(const std::vector<TreeNode>& nodes, std::size_t at, std::string& text) {
+  if (!text.empty()) text += ' ';
+  const TreeNode& node = nodes[at];
+  if (node.split < 0) {
+    text += "t0";
+    return;
+  }
+  text += "s" + std::to_string(node.split);
+  write_preorder(nodes, node.first_child, text);
+  write_preorder(nodes, node.first_child + 1, text);
+}
+
+}  // namespace
+
+ReachNetwork reach_layers(const std::vector<check::HiddenLayer>& layers) {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  ReachNetwork network;
+  for (const check::HiddenLayer& layer : layers) {
+    network.push_back({Eigen::Map<const RowMajor>(layer.weights.data(), layer.outputs, layer.inputs),
+                       Eigen::Map<const VectorXd>(layer.biases.data(), layer.outputs),
+                       VectorXd::Zero(layer.outputs), layer.without_relu != layer.outputs});
+    if (layer.least.empty()) continue;
+    const Eigen::Map<const VectorXd> least(layer.least.data(), layer.outputs);
+    const Eigen::Map<const VectorXd> most(layer.most.data(), layer.outputs);
+    const VectorXd size = network.back().bias.cwiseAbs() + least.cwiseAbs() + most.cwiseAbs();
+    network.back().bias += (least + most) / 2;
+    network.back().bias_radius = (most - least) / 2 + kMargin * size;
+  }
+  return network;
+}
+
+RangeProof sum_range(const std::vector<check::HiddenLayer>& layers, const Box& box, int nodes) {
+  const ReachNetwork network = reach_layers(layers);
+  std::vector<TreeNode> tree(1);
+  std::priority_queue<Part> queue;
+  queue.push(part_of(network, box, nullptr, 0));
+  for (int done = 1; done + 2 <= nodes; done += 2) {
+    const Part top = queue.top();
+    const Box& whole = top.reach->box();
+    const auto k = static_cast<std::size_t>(top.split);
+    if (!(whole.upper[k] > whole.lower[k])) break;
+    queue.pop();
+    tree[top.index] = {top.split, tree.size()};
+    const auto [first, second] = halves(whole, top.split);
+    for (const Box& half : {first, second}) {
+      queue.push(part_of(network, half, top.reach.get(), tree.size()));
+      tree.push_back({});
+    }
+  }
+  Bounds hull = queue.top().reach->output();
+  for (; !queue.empty(); queue.pop()) {
+    const Bounds& bounds = queue.top().reach->output();
+    hull.lower = hull.lower.cwiseMin(bounds.lower);
+    hull.upper = hull.upper.cwiseMax(bounds.upper);
+  }
+  RangeProof proof;
+  write_preorder(tree, 0, proof.tree);
+  for (Index i = 0; i < hull.lower.size(); ++i) {
+    const double margin = kMargin * std::max(std::abs(hull.lower(i)), std::abs(hull.upper(i))) + 1e-300;
+    proof.least.push_back(hull.lower(i) - margin);
+    proof.most.push_back(hull.upper(i) + margin);
+  }
+  return proof;
+}
+
+}  // namespace swarmcert::lipschitz
