@@ -30,7 +30,9 @@ constexpr double kRhoMargin = 1e-8;
 constexpr double kLazy = 0.97;
 /// How well a part's program is solved: it starts where an ancestor's stopped.
 constexpr double kGap = 0.03;
-constexpr int kSteps = 2;
+constexpr int kSteps = 6;
+/// A program that took rho below this share of what it was may have stopped early: it gets another turn.
+constexpr double kFar = 0.9;
 /// Pairs of neurons that a part's program may use, and what one has to take off the barrier.
 constexpr std::size_t kMostPairs = 40;
 constexpr double kLeastGain = 1e-2;
@@ -287,6 +289,7 @@ class Search {
     t = t.cast<float>().cast<double>();
     const double rho = inequality.least_rho(t);
     if (!(rho < part.rho)) return;
+    if (rho < kFar * part.rho) part.undecided_then = std::numeric_limits<int>::max();
     part.rho = rho;
     Multipliers own;
     own.t = VectorXd::Zero(chain_.neurons());

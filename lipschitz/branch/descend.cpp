@@ -1,6 +1,7 @@
 #include "lipschitz/branch/descend.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -15,9 +16,10 @@ using Eigen::VectorXd;
 
 /// Weight of log det S_zz beside log det R: keeps S_zz away from singular, where R alone does not see it.
 constexpr double kInterior = 0.01;
-/// A step is shortened by this until the barrier falls; a program that needs more is left as it is.
-constexpr double kShorten = 0.4;
-constexpr int kShortest = 6;
+/// A step is shortened by this until the barrier falls: far from the optimum, where rho is nearly linear along t, Newton's
+/// step is far too long.
+constexpr double kShorten = 0.3;
+constexpr int kShortest = 12;
 
 /// The barrier's root rho for the eigenvalues g of rho I - R: sum 1 / (rho - g_k) = 1 / mu.
 double centred_rho(const VectorXd& g, double mu) {
@@ -37,7 +39,7 @@ struct Point {
   MatrixXd vectors;
   double rho = 0, value = 0;
 
-  Point(const NodeInequality& inequality, VectorXd at, double mu) : t(std::move(at)) {
+  Point(const NodeInequality& inequality, VectorXd at) : t(std::move(at)) {
     const Index n0 = inequality.inputs(), m = inequality.neurons();
     const MatrixXd s = inequality.slack_without_rho(t);
     factor = cholesky(s.bottomRightCorner(m, m));
@@ -49,7 +51,8 @@ struct Point {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inner);
     g = eigen.eigenvalues();
     vectors = eigen.eigenvectors();
-    if (mu <= 0) return;
+  }
+  void centre(double mu) {
     rho = centred_rho(g, mu);
     value = rho / mu - (rho - g.array()).log().sum() - 2 * kInterior * factor.diagonal().array().log().sum();
   }
@@ -152,35 +155,38 @@ double barrier_weight(const NodeInequality& inequality, double g, double relativ
 
 VectorXd descend(const NodeInequality& inequality, const VectorXd& t, const DescentOptions& options) {
   if (inequality.neurons() == 0) return t;
-  const Point start(inequality, t, 0);
-  if (!start.good()) return t;
-  const double mu = barrier_weight(inequality, start.g.maxCoeff(), options.relative_gap);
-  if (!(mu > 0)) return t;
-  Point at(inequality, t, mu);
+  Point at(inequality, t);
+  if (!at.good()) return t;
+  const double before = at.g.maxCoeff();
   for (int i = 0; i < options.steps; ++i) {
+    const double mu = barrier_weight(inequality, at.g.maxCoeff(), options.relative_gap);
+    if (!(mu > 0)) break;
+    at.centre(mu);
     double decrease = 0;
     const VectorXd step = Model(inequality, at).step(decrease);
     if (step.size() == 0 || !(decrease * mu > 0.1 * options.relative_gap * at.rho)) break;
+    bool is_better = false;
     double length = 1;
-    int tries = 0;
-    for (; tries < kShortest; ++tries, length *= kShorten) {
-      Point next(inequality, at.t + length * step, mu);
-      if (!next.good() || !(next.value < at.value)) continue;
-      at = std::move(next);
-      break;
+    for (int tries = 0; !is_better && tries < kShortest; ++tries, length *= kShorten) {
+      Point next(inequality, at.t + length * step);
+      if (!next.good()) continue;
+      next.centre(mu);
+      is_better = next.value < at.value;
+      if (is_better) at = std::move(next);
     }
-    if (tries == kShortest) break;
+    if (!is_better) break;
   }
-  return at.g.maxCoeff() < start.g.maxCoeff() ? at.t : t;
+  return at.g.maxCoeff() < before ? at.t : t;
 }
 
 std::vector<double> gains(const NodeInequality& inequality, const VectorXd& t, double relative_gap) {
   std::vector<double> result(inequality.pairs().size(), 0.0);
-  const Point start(inequality, t, 0);
-  if (!start.good() || inequality.neurons() == 0) return result;
-  const double mu = barrier_weight(inequality, start.g.maxCoeff(), relative_gap);
+  if (inequality.neurons() == 0) return result;
+  Point at(inequality, t);
+  if (!at.good()) return result;
+  const double mu = barrier_weight(inequality, at.g.maxCoeff(), relative_gap);
   if (!(mu > 0)) return result;
-  const Point at(inequality, t, mu);
+  at.centre(mu);
   const Kernel kernel(inequality, at);
   for (std::size_t c = 0; c < result.size(); ++c) {
     const auto [p, q] = inequality.pairs()[c];

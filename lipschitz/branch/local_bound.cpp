@@ -159,8 +159,8 @@ LocalBound local_bound(const files::Network& network, const Claim& claim,
   }
   proof.radius.assign(static_cast<std::size_t>(chain.inputs()),
                       cover_radius(parts.at(names.front())->layers.front()));
-  prove(check::homogeneous(f), homogeneous(chain), check::projective_cover(proof.radius), options,
-        std::move(proof), result);
+  const std::vector<check::Sides> cover = check::projective_cover(proof.radius);
+  prove(check::homogeneous(f), homogeneous(chain), cover, options, std::move(proof), result);
   for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) is the point u / s
     const double s = centre(centre.size() - 1);
     centre = Eigen::VectorXd(centre.head(centre.size() - 1) / (s > 0 ? s : 1));

@@ -10,23 +10,23 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 /// The claimed range is wider than the one found, relatively: the checker rounds otherwise.
-constexpr double kMargin = 1e-9;
+constexpr double kRangeMargin = 1e-9;
 
-struct Part {
+struct RangePart {
   double width = 0;
   std::size_t index = 0;  ///< in the tree
   int split = 0;
   std::shared_ptr<const Reach> reach;
-  bool operator<(const Part& other) const { return width < other.width; }
+  bool operator<(const RangePart& other) const { return width < other.width; }
 };
 
-struct TreeNode {
+struct RangeNode {
   int split = -1;
   std::size_t first_child = 0;
 };
 
-Part part_of(const ReachNetwork& network, const Box& box, const Reach* around, std::size_t index) {
-  Part part;
+RangePart range_part(const ReachNetwork& network, const Box& box, const Reach* around, std::size_t index) {
+  RangePart part;
   std::vector<Eigen::MatrixXd> slopes;
   part.reach = std::make_shared<const Reach>(network, box, around, &slopes);
   part.index = index;
@@ -42,16 +42,16 @@ Part part_of(const ReachNetwork& network, const Box& box, const Reach* around, s
   return part;
 }
 
-void write_preorder(const std::vector<TreeNode>& nodes, std::size_t at, std::string& text) {
+void write_range_tree(const std::vector<RangeNode>& nodes, std::size_t at, std::string& text) {
   if (!text.empty()) text += ' ';
-  const TreeNode& node = nodes[at];
+  const RangeNode& node = nodes[at];
   if (node.split < 0) {
     text += "t0";
     return;
   }
   text += "s" + std::to_string(node.split);
-  write_preorder(nodes, node.first_child, text);
-  write_preorder(nodes, node.first_child + 1, text);
+  write_range_tree(nodes, node.first_child, text);
+  write_range_tree(nodes, node.first_child + 1, text);
 }
 
 }  // namespace
@@ -68,18 +68,18 @@ ReachNetwork reach_layers(const std::vector<check::HiddenLayer>& layers) {
     const Eigen::Map<const VectorXd> most(layer.most.data(), layer.outputs);
     const VectorXd size = network.back().bias.cwiseAbs() + least.cwiseAbs() + most.cwiseAbs();
     network.back().bias += (least + most) / 2;
-    network.back().bias_radius = (most - least) / 2 + kMargin * size;
+    network.back().bias_radius = (most - least) / 2 + kRangeMargin * size;
   }
   return network;
 }
 
 RangeProof sum_range(const std::vector<check::HiddenLayer>& layers, const Box& box, int nodes) {
   const ReachNetwork network = reach_layers(layers);
-  std::vector<TreeNode> tree(1);
-  std::priority_queue<Part> queue;
-  queue.push(part_of(network, box, nullptr, 0));
+  std::vector<RangeNode> tree(1);
+  std::priority_queue<RangePart> queue;
+  queue.push(range_part(network, box, nullptr, 0));
   for (int done = 1; done + 2 <= nodes; done += 2) {
-    const Part top = queue.top();
+    const RangePart top = queue.top();
     const Box& whole = top.reach->box();
     const auto k = static_cast<std::size_t>(top.split);
     if (!(whole.upper[k] > whole.lower[k])) break;
@@ -87,7 +87,7 @@ RangeProof sum_range(const std::vector<check::HiddenLayer>& layers, const Box& b
     tree[top.index] = {top.split, tree.size()};
     const auto [first, second] = halves(whole, top.split);
     for (const Box& half : {first, second}) {
-      queue.push(part_of(network, half, top.reach.get(), tree.size()));
+      queue.push(range_part(network, half, top.reach.get(), tree.size()));
       tree.push_back({});
     }
   }
@@ -98,9 +98,9 @@ RangeProof sum_range(const std::vector<check::HiddenLayer>& layers, const Box& b
     hull.upper = hull.upper.cwiseMax(bounds.upper);
   }
   RangeProof proof;
-  write_preorder(tree, 0, proof.tree);
+  write_range_tree(tree, 0, proof.tree);
   for (Index i = 0; i < hull.lower.size(); ++i) {
-    const double margin = kMargin * std::max(std::abs(hull.lower(i)), std::abs(hull.upper(i))) + 1e-300;
+    const double margin = kRangeMargin * std::max(std::abs(hull.lower(i)), std::abs(hull.upper(i))) + 1e-300;
     proof.least.push_back(hull.lower(i) - margin);
     proof.most.push_back(hull.upper(i) + margin);
   }
