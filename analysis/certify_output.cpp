@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "analysis/branch_outlook.h"
 #include "analysis/commands/command.h"
 #include "nn/files/functions.h"
 
@@ -60,6 +61,19 @@ Json comparison_json(const CertifiedBound& bound, const lipschitz::Comparison& c
   if (comparison.combettes_pesquet) json["combettes_pesquet_upper"] = comparison.combettes_pesquet->value();
   if (comparison.eclipse_fast) json["eclipse_fast_upper"] = comparison.eclipse_fast->upper.value();
   return json;
+}
+
+Json outlook_json(const CertifiedBound& bound) {
+  const std::optional<BranchOutlook> outlook = branch_outlook(bound);
+  if (!outlook) return nullptr;
+  return {{"ratio", BranchOutlook::kRatio},
+          {"boxes_estimate", outlook->boxes ? Json(*outlook->boxes) : Json()},
+          {"gap_halfway", outlook->gap_halfway},
+          {"undecided", bound.outlook.undecided},
+          {"neurons", bound.outlook.neurons},
+          {"slope_in_part_estimate", bound.outlook.slope_in_part},
+          {"relaxation_share_estimate", outlook->relaxation_share},
+          {"words", branch_outlook_words(bound)}};
 }
 
 Json witness_json(const lipschitz::FoundSlope& found) {
@@ -182,6 +196,7 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
       json["nodes"] = bound.nodes;
       const bool has_lower = bound.lower.witness && bound.lower.witness->slope.value() > 0;
       json["gap"] = has_lower ? Json(bound.upper.value() / bound.lower.witness->slope.value() - 1) : Json();
+      json["outlook"] = outlook_json(bound);
     }
     if (bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) json["sdp_stop"] = name(bound.sdp.stop);
     if (i < output.comparisons.size() && output.comparisons[i])
@@ -273,6 +288,8 @@ void print_bounds(const files::Network& network, const Certification& found) {
       fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
                  name(bound.sdp.stop));
     }
+    const std::string outlook = branch_outlook_words(bound);
+    if (!outlook.empty()) fmt::print("    {}\n", outlook);
   }
   if (!network.rho.empty()) {
     fmt::print(

@@ -79,6 +79,7 @@ void branch_further(const Network& network, const std::map<std::string, Box>& do
   LocalBound local =
       local_bound(network, bound, domain, global != nullptr ? global->t : std::vector<double>(), branch);
   bound.nodes = local.nodes;
+  bound.outlook = local.outlook;
   LowerBoundOptions lower = options.lower;
   lower.cancelled = options.cancelled;
   lower.starts = std::move(local.steep_centres);

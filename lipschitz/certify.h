@@ -51,6 +51,7 @@ struct CertifiedBound : Claim {
   std::optional<UpperProof> proof;  ///< where method is kSdp
   std::optional<LocalProof> local;  ///< where method is kBranch
   int nodes = 0;                    ///< boxes that branch and bound looked at
+  Outlook outlook;                  ///< where nodes > 0
   UpperBound product{0};            ///< product of spectral norms, for comparison
   SdpBound sdp;                     ///< how the semidefinite program went; its proof is moved to `proof`
   FoundSlope lower;                 ///< proves the lower bound

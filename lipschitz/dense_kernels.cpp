@@ -1,6 +1,9 @@
 #include "lipschitz/dense_kernels.h"
 
 #include <cblas.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
@@ -50,6 +53,13 @@ void invert_lower(Eigen::Ref<MatrixXd> l) {
 }  // namespace
 
 void use_one_blas_thread() { openblas_set_num_threads(1); }
+
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  mallopt(M_TRIM_THRESHOLD, 1 << 28);
+  mallopt(M_MMAP_THRESHOLD, 1 << 25);
+#endif
+}
 
 void add_product(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const MatrixXd>& a,
                  const Eigen::Ref<const MatrixXd>& b) {

@@ -294,6 +294,11 @@ Command certify_command() {
             "--method branch also the bound for one that moves among at most so many, all in the box");
         app.add_option("--domain", options->domain,
                        "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
+        app.add_option("--cuts", options->certify.branch.pairs,
+                       "With --method branch: pairs of neurons that exclude each other, at most so many per "
+                       "box. Fewer boxes and a shorter certificate for the same bound, but more time")
+            ->check(CLI::Range(0, 1000))
+            ->capture_default_str();
         auto* map = app.add_option("--map", options->map,
                                    "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
                                    "by cell; the slope in a "

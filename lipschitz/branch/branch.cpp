@@ -10,9 +10,11 @@
 #include <memory>
 #include <numeric>
 #include <queue>
+#include <random>
 
 #include "lipschitz/branch/descend.h"
 #include "lipschitz/branch/node_inequality.h"
+#include "lipschitz/dense_kernels.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -27,15 +29,24 @@ constexpr double kStateMargin = 1e-9;
 constexpr double kRhoMargin = 1e-8;
 /// A part gets multipliers of its own once its undecided neurons are fewer than this share of those for which the
 /// inherited ones were computed.
-constexpr double kLazy = 0.97;
-/// How well a part's program is solved: it starts where an ancestor's stopped.
-constexpr double kGap = 0.03;
-constexpr int kSteps = 6;
+constexpr double kLazy = 0.9;
+/// How well a part's program is solved, relatively, at most; it starts where an ancestor's stopped. Near the end this
+/// share of the distance that is left.
+constexpr double kGap = 0.03, kShareOfDistance = 0.1;
+/// Newton steps per program: solved more often and less far, a search is faster.
+constexpr int kSteps = 2;
+/// A search that ends with so few parts solves those that dominate, at most kPolished, this well and with kMostPairs.
+constexpr std::size_t kFewParts = 64;
+constexpr int kPolished = 8;
+constexpr double kFineGap = 1e-4;
+constexpr int kFineSteps = 20;
+constexpr std::size_t kMostPairs = 40;
+/// What a pair has to take off the barrier to be used.
+constexpr double kLeastGain = 1e-2;
+/// Points of the part that dominates where its slope is looked at.
+constexpr int kSamples = 500;
 /// A program that took rho below this share of what it was may have stopped early: it gets another turn.
 constexpr double kFar = 0.9;
-/// Pairs of neurons that a part's program may use, and what one has to take off the barrier.
-constexpr std::size_t kMostPairs = 40;
-constexpr double kLeastGain = 1e-2;
 /// How well the program of the whole box is solved.
 constexpr double kRootGap = 0.02;
 constexpr int kRootSteps = 12;
@@ -99,13 +110,16 @@ class Search {
         queue.push(part(half, &top, index));
       }
       nodes_[static_cast<std::size_t>(top.index)].first_child = static_cast<int>(nodes_.size()) - 2;
+      course_.push_back(bound(queue.top()));
       if (options_.progress && result_.nodes % 256 < 2) {
         const double share = std::max(share_of_time(), 1.0 * result_.nodes / options_.nodes);
         options_.progress(std::min(share, 1.0), bound(queue.top()));
       }
     }
+    polish(queue);
     const double rho = queue.top().rho * (1 + kRhoMargin);
     result_.tree.rho = chain_.unscaled_rho(rho);
+    look_ahead(queue.top());
     for (; !queue.empty(); queue.pop())
       nodes_[static_cast<std::size_t>(queue.top().index)].multipliers = queue.top().multipliers;
     for (std::size_t root = 0; root < boxes_.size(); ++root) write_preorder(static_cast<int>(root));
@@ -117,6 +131,56 @@ class Search {
   struct TreeNode {
     int split = BranchTree::kLeaf, first_child = 0, multipliers = -1;
   };
+  /// In the chain's units.
+  struct Multipliers {
+    VectorXd t;
+    std::vector<NeuronPair> pairs;
+    std::vector<double> of_pairs;
+  };
+
+  const Multipliers& multipliers_of(const Part& part) const {
+    return scaled_[static_cast<std::size_t>(part.multipliers)];
+  }
+
+  /// What is known of the way that is left.
+  void look_ahead(const Part& top) {
+    Outlook& outlook = result_.outlook;
+    outlook.undecided = top.undecided;
+    for (std::size_t k = 0; k < chain_.hidden.size(); ++k)
+      outlook.neurons += static_cast<int>(chain_.hidden[k].weights.rows() - chain_.without_relu[k]);
+    if (!course_.empty()) {
+      outlook.bound_halfway = course_[course_.size() / 2];
+      outlook.bound = course_.back();
+    }
+    std::mt19937 generator(1);
+    std::uniform_real_distribution<double> unit(0, 1);
+    const Box& box = top.reach->box();
+    for (int i = 0; i < kSamples; ++i) {
+      VectorXd x(chain_.inputs());
+      for (std::size_t k = 0; k < box.lower.size(); ++k)
+        x(static_cast<Index>(k)) = box.lower[k] + (box.upper[k] - box.lower[k]) * unit(generator);
+      const double slope = std::sqrt(chain_.unscaled_rho(chain_.squared_slope(x)));
+      outlook.slope_in_part = std::max(outlook.slope_in_part, slope);
+    }
+  }
+
+  /// The parts that dominate in the end get better multipliers, where there are few.
+  void polish(std::priority_queue<Part>& queue) {
+    if (queue.size() > kFewParts) return;
+    DescentOptions descent;
+    descent.relative_gap = kFineGap;
+    descent.steps = kFineSteps;
+    for (int i = 0; i < kPolished; ++i) {
+      Part top = queue.top();
+      if (top.multipliers < 0) return;
+      const double before = top.rho;
+      queue.pop();
+      solve(top, descent, kMostPairs);
+      const bool is_better = top.rho < before;
+      queue.push(std::move(top));
+      if (!is_better) return;
+    }
+  }
 
   double bound(const Part& part) const { return std::sqrt(chain_.unscaled_rho(part.rho)); }
 
@@ -141,7 +205,9 @@ class Search {
     std::vector<MatrixXd> slopes;
     std::vector<LinearForms> forms;
     if (parent != nullptr) part.around = parent->reach;
-    part.reach = std::make_shared<const Reach>(chain_.hidden, box, part.around.get(), &slopes, &forms);
+    const bool has_pairs = parent != nullptr && !multipliers_of(*parent).pairs.empty();
+    part.reach = std::make_shared<const Reach>(chain_.hidden, box, part.around.get(), &slopes,
+                                               has_pairs ? &forms : nullptr);
     for (std::size_t k = 0; k < chain_.hidden.size(); ++k) {
       const Bounds& bounds = part.reach->before_relu(k);
       for (Index i = 0; i < bounds.lower.size(); ++i) {
@@ -160,8 +226,9 @@ class Search {
       part.rho = parent->rho;
       part.multipliers = parent->multipliers;
       part.undecided_then = parent->undecided_then;
-      const std::vector<std::size_t> pairs = still_shown(part, NeuronForms(forms, box));
-      const bool all_pairs = pairs.size() == scaled_[static_cast<std::size_t>(part.multipliers)].pairs.size();
+      std::vector<std::size_t> pairs;
+      if (has_pairs) pairs = still_shown(part, NeuronForms(forms, box));
+      const bool all_pairs = pairs.size() == multipliers_of(part).pairs.size();
       if (part.states != parent->states || !all_pairs) {
         NodeInequality inequality(chain_, part.states);
         const double rho = inequality.least_rho(inherited(part, pairs, inequality));
@@ -200,7 +267,7 @@ class Search {
   /// Of the pairs that come with the part's multipliers, those that hold in it between undecided neurons.
   std::vector<std::size_t> still_shown(const Part& part, const NeuronForms& forms) const {
     std::vector<std::size_t> result;
-    const std::vector<NeuronPair>& pairs = scaled_[static_cast<std::size_t>(part.multipliers)].pairs;
+    const std::vector<NeuronPair>& pairs = multipliers_of(part).pairs;
     const auto is_undecided = [&](Index neuron) {
       return part.states[static_cast<std::size_t>(neuron)] == NeuronState::kUndecided;
     };
@@ -213,7 +280,7 @@ class Search {
   /// The inherited multipliers; adds the pairs, given by their indices, to `inequality`.
   VectorXd inherited(const Part& part, const std::vector<std::size_t>& pairs,
                      NodeInequality& inequality) const {
-    const Multipliers& own = scaled_[static_cast<std::size_t>(part.multipliers)];
+    const Multipliers& own = multipliers_of(part);
     VectorXd t(inequality.neurons() + static_cast<Index>(pairs.size()));
     t.head(inequality.neurons()) = own.t(inequality.undecided());
     for (std::size_t c = 0; c < pairs.size(); ++c) {
@@ -223,8 +290,14 @@ class Search {
     return t;
   }
 
-  /// The pairs worth a multiplier: those that come with the part's multipliers, and the best of the box's.
-  std::vector<NeuronPair> chosen_pairs(const Part& part, VectorXd& t) const {
+  /// The pairs worth a multiplier: those that come with the part's multipliers, and the best of the box's, up to `most`
+  /// in all. `t` becomes the multipliers to start from.
+  std::vector<NeuronPair> chosen_pairs(const Part& part, std::size_t most, VectorXd& t) const {
+    if (most == 0 && multipliers_of(part).pairs.empty()) {
+      NodeInequality inequality(chain_, part.states);
+      t = inherited(part, {}, inequality);
+      return {};
+    }
     std::vector<LinearForms> found;
     const Reach again(chain_.hidden, part.reach->box(), part.around.get(), nullptr, &found);
     const NeuronForms forms(found, part.reach->box());
@@ -232,13 +305,13 @@ class Search {
     const std::vector<std::size_t> old = still_shown(part, forms);
     t = inherited(part, old, inequality);
     std::vector<NeuronPair> result;
-    for (const std::size_t c : old)
-      result.push_back(scaled_[static_cast<std::size_t>(part.multipliers)].pairs[c]);
+    for (const std::size_t c : old) result.push_back(multipliers_of(part).pairs[c]);
     const auto same = [](const NeuronPair& a, const NeuronPair& b) {
       return a.first == b.first && a.second == b.second && a.first_on == b.first_on &&
              a.second_on == b.second_on;
     };
     std::vector<NeuronPair> all;
+    if (result.size() >= most) return result;
     for (const NeuronPair& pair : forms.pairs(inequality.undecided())) {
       if (std::any_of(result.begin(), result.end(),
                       [&](const NeuronPair& other) { return same(pair, other); }))
@@ -256,7 +329,7 @@ class Search {
     const auto of = [&](std::size_t c) { return gain[old.size() + c]; };
     std::sort(order.begin(), order.end(),
               [&](std::size_t a, std::size_t b) { return of(a) > of(b) || (of(a) == of(b) && a < b); });
-    order.resize(std::min(order.size(), kMostPairs - std::min(kMostPairs, old.size())));
+    order.resize(std::min(order.size(), most - old.size()));
     for (const std::size_t c : order)
       if (of(c) > kLeastGain) result.push_back(all[c]);
     t.conservativeResize(inequality.neurons() + static_cast<Index>(result.size()));
@@ -265,6 +338,15 @@ class Search {
 
   /// Multipliers of the part's own.
   void solve(Part& part) {
+    const double attained = std::max(steepest(), options_.known * options_.known / chain_.unscaled_rho(1));
+    const double wanted = attained > 0 ? kShareOfDistance * (part.rho / attained - 1) : kGap;
+    DescentOptions descent;
+    descent.relative_gap = std::clamp(wanted, kFineGap, kGap);
+    descent.steps = kSteps;
+    solve(part, descent, static_cast<std::size_t>(std::max(options_.pairs, 0)));
+  }
+
+  void solve(Part& part, const DescentOptions& descent, std::size_t most_pairs) {
     NodeInequality inequality(chain_, part.states);
     const Index m = inequality.neurons();
     std::vector<NeuronPair> pairs;
@@ -272,11 +354,8 @@ class Search {
     if (part.multipliers < 0) {
       t = root_multipliers(inequality);
     } else {
-      pairs = chosen_pairs(part, t);
+      pairs = chosen_pairs(part, most_pairs, t);
       for (const NeuronPair& pair : pairs) inequality.add(pair);
-      DescentOptions descent;
-      descent.relative_gap = kGap;
-      descent.steps = kSteps;
       t = descend(inequality, t, descent);
       if (!std::isfinite(inequality.least_rho(t)) && !pairs.empty()) {
         pairs.clear();
@@ -366,20 +445,16 @@ class Search {
   const std::vector<Box>& boxes_;
   const BranchOptions& options_;
   std::vector<TreeNode> nodes_;
-  /// In the chain's units.
-  struct Multipliers {
-    VectorXd t;
-    std::vector<NeuronPair> pairs;
-    std::vector<double> of_pairs;
-  };
   std::vector<Multipliers> scaled_;
   std::multimap<double, VectorXd, std::greater<>> steep_;  ///< centres by their squared slope
+  std::vector<double> course_;                             ///< the bound after each split
   BranchResult result_;
 };
 
 }  // namespace
 
 BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options) {
+  keep_freed_memory();
   return Search(chain, boxes, options).run();
 }
 

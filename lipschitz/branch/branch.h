@@ -30,6 +30,9 @@ struct BranchOptions {
   double seconds = 0;       ///< wall clock; the search stops at the next node; 0: no limit
   double known = 0;         ///< a Lipschitz constant that is attained: no need to go below
   double tolerance = 1e-3;  ///< stop when the bound is within this of `known`, relatively
+  /// Conflict cuts: pairs of neurons that a box keeps from being in some states at once, at most so many per box. Fewer
+  /// boxes and a shorter proof for the same bound, but more time.
+  int pairs = 0;
   /// Multipliers to start from, one per hidden neuron of the network, in its own units: those of a bound that holds
   /// everywhere. Empty: none.
   std::vector<double> start;
@@ -38,9 +41,18 @@ struct BranchOptions {
   std::function<void(double share, double bound)> progress;
 };
 
+/// What a search that has stopped knows of the way that is left: estimates, no bounds.
+struct Outlook {
+  double bound_halfway = 0, bound = 0;  ///< Lipschitz constants proved after half of the boxes, and after all
+  int undecided = 0,
+      neurons = 0;  ///< in the part that dominates, whose neurons could still do as they like; of all
+  double slope_in_part = 0;  ///< the steepest slope at points of that part
+};
+
 struct BranchResult {
   BranchTree tree;
   int nodes = 0;  ///< boxes looked at
+  Outlook outlook;
   /// Centres of boxes, by falling slope at the centre, at most kSteepCentres: where a search for lower bounds may start.
   std::vector<Eigen::VectorXd> steep_centres;
 };
@@ -49,8 +61,7 @@ inline constexpr std::size_t kSteepCentres = 8;
 
 /// Best-first search over the union of the boxes. Each box bounds its neurons by linear relaxation (Reach), takes out those that it decides, and
 /// inherits the multipliers of an ancestor; the box that dominates gets multipliers of its own once enough of its
-/// neurons are decided, and is halved otherwise. Pairs of neurons that a box keeps from being in some states at once get
-/// multipliers as well. The slope at each box's centre says how far the bound can fall at most.
+/// neurons are decided, and is halved otherwise. The slope at each box's centre says how far the bound can fall at most.
 /// The result depends on the options only, not on the machine's load
 /// (seconds unset). It can be used whenever the search stops.
 BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options);

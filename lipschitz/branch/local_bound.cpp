@@ -99,6 +99,7 @@ void prove(const check::LocalFunction& f, const LocalChain& chain, const std::ve
   if (options.start.size() != multipliers_of(f)) options.start.clear();
   BranchResult found = branch(chain, roots, options);
   result.nodes = found.nodes;
+  result.outlook = found.outlook;
   result.steep_centres = std::move(found.steep_centres);
   proof.tree.tree = preorder(found.tree);
   proof.tree.multipliers = std::move(found.tree.multipliers);

@@ -29,6 +29,7 @@ struct LocalBound {
   UpperBound upper{0};              ///< sqrt(rho), rounded up
   int nodes = 0;                    ///< boxes looked at
   long leaves = 0;
+  Outlook outlook;
   std::vector<Eigen::VectorXd> steep_centres;  ///< as BranchResult has them
 };
 

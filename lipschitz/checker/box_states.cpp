@@ -47,7 +47,8 @@ void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
 }
 
 /// Substitutes h = relu(y), l <= y <= u.
-void through_relu(Form& form, const HiddenLayer& layer, const Row& lower, const Row& upper) {
+void through_relu(Form& form, const HiddenLayer& layer, const NeuronBounds& bounds, std::size_t k) {
+  const Row &lower = bounds.lower[k], &upper = bounds.upper[k];
   for (std::size_t i = 0; i < form.coefficients.size(); ++i) {
     double& c = form.coefficients[i];
     const double l = lower[i], u = upper[i];
@@ -57,8 +58,7 @@ void through_relu(Form& form, const HiddenLayer& layer, const Row& lower, const 
     } else if (c < 0) {
       if (!(u > -l)) c = 0;
     } else {
-      const double slope = std::min(1.0, u / (u - l));
-      const double offset = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
+      const double slope = bounds.slope[k][i], offset = bounds.offset[k][i];
       form.constant += c * offset;
       form.absolute += c * offset;
       ++form.terms;
@@ -87,7 +87,7 @@ Form down_to_inputs(Form form, std::size_t top, const std::vector<HiddenLayer>& 
                     const NeuronBounds& bounds) {
   for (std::size_t j = top + 1; j-- > 0;) {
     through_layer(form, layers[j], bounds.terms[j]);
-    if (j > 0) through_relu(form, layers[j - 1], bounds.lower[j - 1], bounds.upper[j - 1]);
+    if (j > 0) through_relu(form, layers[j - 1], bounds, j - 1);
   }
   return form;
 }
@@ -155,6 +155,8 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lo
     bounds.lower.push_back(around != nullptr ? around->lower[k] : Row(rows, -kInfinity));
     bounds.upper.push_back(around != nullptr ? around->upper[k] : Row(rows, kInfinity));
     magnitude.assign(rows, 0);
+    bounds.slope.emplace_back(rows, 0.0);
+    bounds.offset.emplace_back(rows, 0.0);
     for (std::size_t i = 0; i < rows; ++i) {
       double& l = bounds.lower[k][i];
       double& u = bounds.upper[k][i];
@@ -164,6 +166,11 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lo
           if (sign > 0) u = std::min(u, end);
           if (sign < 0) l = std::max(l, -end);
         }
+      }
+      if (layer.has_relu(i) && l < 0 && u > 0) {
+        const double slope = std::min(1.0, u / (u - l));
+        bounds.slope[k][i] = slope;
+        bounds.offset[k][i] = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
       }
       magnitude[i] = layer.has_relu(i) ? std::max(0.0, u) : std::max(std::abs(l), std::abs(u));
     }

@@ -31,6 +31,7 @@ struct Sides {
 struct NeuronBounds {
   std::vector<std::vector<double>> lower, upper;  ///< by layer
   std::vector<std::vector<double>> terms;         ///< |W| |h| + |b|, at least: what roundings are measured by
+  std::vector<std::vector<double>> slope, offset;  ///< max(0, y) <= slope y + offset, where l < 0 < u
 };
 
 /// weight y of one neuron.

@@ -29,7 +29,6 @@ using Row = std::vector<double>;
 using Neighbours = std::map<std::string, long>;
 
 constexpr long kMostNeighbours = 1000000;
-const std::string kGround = std::string("phi:") + files::kGroundKind;
 
 void require(bool condition, const std::string& reason) {
   if (!condition) throw std::runtime_error(reason);
@@ -239,8 +238,9 @@ class Checker {
       require(kind != files::kGroundKind && parts_.count("phi:" + kind) == 1 && 1 <= count &&
                   count <= kMostNeighbours,
               where + ": impossible neighbours");
-    require(!neighbours.empty() && (names[0] == kGround || neighbours.count(names[0].substr(4)) == 1),
-            where + ": the neighbour that moves is none of those listed");
+    require(
+        !neighbours.empty() && (names[0] == files::kGroundPhi || neighbours.count(names[0].substr(4)) == 1),
+        where + ": the neighbour that moves is none of those listed");
     return neighbours;
   }
 
@@ -269,9 +269,9 @@ class Checker {
   /// shown by a tree, as often as there are such neighbours or less; the ground's once.
   void check_others(const Json& others, const std::vector<std::string>& names, Neighbours counts, Row& least,
                     Row& most, const std::string& where) const {
-    if (names[0] != kGround) {
+    if (names[0] != files::kGroundPhi) {
       if (--counts.at(names[0].substr(4)) == 0) counts.erase(names[0].substr(4));
-      if (parts_.count(kGround) == 1) counts[files::kGroundKind] = 1;
+      if (parts_.count(files::kGroundPhi) == 1) counts[files::kGroundKind] = 1;
     }
     require(others.is_object() && others.size() == counts.size(), where + ": others lists other kinds");
     const auto rows = static_cast<std::size_t>(parts_.at(names[1])->layers.front().outputs);

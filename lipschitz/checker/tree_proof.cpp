@@ -261,29 +261,31 @@ class PartInequality {
 
   /// D S D with powers of two d_i^2 near 1 / s_ii: exact, short of underflow.
   void scale_to_unit_diagonal() {
-    std::vector<int> exponent(static_cast<std::size_t>(n_));
+    Row power(static_cast<std::size_t>(n_), 1.0);
     for (int i = 0; i < n_; ++i)
-      exponent[static_cast<std::size_t>(i)] = s(i, i) > 0 ? -std::ilogb(s(i, i)) / 2 : 0;
+      if (s(i, i) > 0) power[static_cast<std::size_t>(i)] = std::ldexp(1.0, -std::ilogb(s(i, i)) / 2);
     for (int i = 0; i < n_; ++i)
-      for (int j = 0; j < n_; ++j) {
-        const int e = exponent[static_cast<std::size_t>(i)] + exponent[static_cast<std::size_t>(j)];
-        s(i, j) = std::ldexp(s(i, j), e);
-        excess(i, j) = std::ldexp(excess(i, j), e) + 0x1p-1000;
+      for (int j = 0; j < n_; ++j) {  // of the product only overflow is inexact: it ends in a refusal
+        const double both = power[static_cast<std::size_t>(i)] * power[static_cast<std::size_t>(j)];
+        s(i, j) *= both;
+        excess(i, j) = excess(i, j) * both + 0x1p-1000;
       }
   }
 
+  /// S = U' U on the upper triangle, row by row.
   bool cholesky_runs_through() {
-    for (int j = 0; j < n_; ++j) {
-      double pivot = s(j, j);
-      for (int k = 0; k < j; ++k) pivot -= s(j, k) * s(j, k);
+    for (int k = 0; k < n_; ++k) {
+      const double pivot = s(k, k);
       if (!(pivot > 0) || !std::isfinite(pivot)) return false;
       const double root = std::sqrt(pivot);
-      s(j, j) = root;
-      for (int i = j + 1; i < n_; ++i) {
-        double entry = s(i, j);
-        for (int k = 0; k < j; ++k) entry -= s(i, k) * s(j, k);
-        s(i, j) = entry / root;
-        if (!std::isfinite(s(i, j))) return false;
+      double* const row = &s(k, 0);
+      for (int j = k + 1; j < n_; ++j) row[j] /= root;
+      for (int i = k + 1; i < n_; ++i) {
+        const double factor = row[i];
+        if (!std::isfinite(factor)) return false;
+        if (factor == 0) continue;
+        double* const other = &s(i, 0);
+        for (int j = i; j < n_; ++j) other[j] -= factor * row[j];
       }
     }
     return true;

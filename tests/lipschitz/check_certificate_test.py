@@ -140,8 +140,8 @@ def run():
         tiny.write_bytes(safetensors([2, 5, 4, 1], generator))
         nets = [([hetero], ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2", "--domain",
                             str(folder / "box.toml")]),
-                ([hetero], ["--neighbours", "2", "--domain", str(folder / "part.toml"), "--method", "branch"]),
-                ([str(tiny)], ["--method", "branch"]),
+                ([hetero], ["--neighbours", "2", "--domain", str(folder / "part.toml"), "--method", "branch", "--cuts", "20"]),
+                ([str(tiny)], ["--method", "branch", "--cuts", "20"]),
                 ([hetero], ["--as", "float32", "--neighbours", "2", "--method", "product"]),
                 ([str(demo / "network.toml")], ["--blocks=position"]),
                 (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
