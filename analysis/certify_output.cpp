@@ -85,7 +85,7 @@ Json witness_json(const lipschitz::FoundSlope& found) {
   return {{"x", found.witness->x}, {"y", found.witness->y}, {"others", std::move(others)}};
 }
 
-std::string label(const lipschitz::Neighbours& neighbours) {
+std::string group_label(const lipschitz::Neighbours& neighbours) {
   std::string text;
   for (const auto& [kind, count] : neighbours)
     text += fmt::format("{}{} {}", text.empty() ? "" : " + ", count, kind);
@@ -97,7 +97,7 @@ std::string label(const lipschitz::Neighbours& neighbours) {
 std::string label(const CertifiedBound& bound) {
   return bound.function + (bound.block == "all" ? "" : " " + bound.block) +
          (bound.scale.empty() ? "" : " scaled") +
-         (bound.neighbours.empty() ? "" : ", at most " + label(bound.neighbours));
+         (bound.neighbours.empty() ? "" : ", at most " + group_label(bound.neighbours));
 }
 
 std::vector<std::string> explain(const lipschitz::Comparison& comparison, double product, double upper,
@@ -355,8 +355,8 @@ void print_laws(const files::Network& network, const Certification& found) {
     const char* meaning = law.law == lipschitz::LawKind::kAllStacked ? "|df| <= L sqrt(sum_j |dx_j|^2)"
                           : law.law == lipschitz::LawKind::kAllMax   ? "|df| <= L max_j |dx_j|"
                                                                      : "|df| <= L |d own state|";
-    fmt::print("  {:<24} rho:{:<8} {:<9} {:<11} {:>14.10g}  {}\n", label(law.neighbours), law.rho, law.block,
-               name(law.law), law.upper.value(), meaning);
+    fmt::print("  {:<24} rho:{:<8} {:<9} {:<11} {:>14.10g}  {}\n", group_label(law.neighbours), law.rho,
+               law.block, name(law.law), law.upper.value(), meaning);
   }
 }
 
