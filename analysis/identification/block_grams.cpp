@@ -73,6 +73,19 @@ void add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
 
 }  // namespace
 
+double telling_blocks(const Grams& grams, std::size_t candidate, std::size_t theta) {
+  const int first = grams.first_column[candidate][theta];
+  double sum = 0, squares = 0;
+  for (const Block& block : grams.blocks) {
+    double energy = 0;
+    for (int c = 0; c < grams.candidates[candidate].columns(); ++c)
+      energy += block.gram[Grams::packed(first + c, first + c)];
+    sum += energy;
+    squares += energy * energy;
+  }
+  return squares > 0 ? sum * sum / squares : 0;
+}
+
 Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns) {
   Eigen::VectorXd part(static_cast<Eigen::Index>(columns.size()));
   for (std::size_t i = 0; i < columns.size(); ++i) part[static_cast<Eigen::Index>(i)] = all[columns[i]];

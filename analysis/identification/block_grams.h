@@ -44,6 +44,10 @@ struct Grams {
   }
 };
 
+/// How many blocks tell of a candidate's coefficients, if all told as much: (sum h)^2 / sum h^2 with h the energy of its
+/// columns in each block.
+double telling_blocks(const Grams& grams, std::size_t candidate, std::size_t theta);
+
 /// Rows and columns `columns` of a packed Gram matrix; elements `columns` of a vector.
 Eigen::MatrixXd part_of_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns);
 Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns);

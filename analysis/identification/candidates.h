@@ -16,6 +16,7 @@ struct Candidate {
   stability::EffectInfo info;  ///< coefficients per vehicle where `vehicles` names some: "cf50.force_x_N"
   std::vector<std::vector<double>> thetas;
   std::vector<std::string> vehicles = {};  ///< each has coefficients of its own; empty: all have the same
+  std::size_t refined_thetas = 0;          ///< so many at the end of `thetas` come from a refinement
 
   int columns() const { return static_cast<int>(info.linear.size()); }
 };
@@ -59,6 +60,11 @@ std::vector<std::string> candidate_names(const stability::Model& model);
 
 /// True for lags and delays that `model` has: a second one cannot be written as a change of the first.
 bool is_taken(const std::string& name, const stability::Model& model);
+
+/// True for a coefficient that is left out.
+inline bool is_held_at_zero(const stability::Parameter& coefficient) {
+  return coefficient.lower == 0 && coefficient.upper == 0;
+}
 
 /// A lag or delay whose gain would be further from 1 than this is something else.
 inline constexpr double kMemoryTolerance = 0.3;

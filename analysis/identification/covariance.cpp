@@ -53,6 +53,22 @@ Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int
   return covariance;
 }
 
+double long_run_variance(const std::vector<double>& influences, const std::vector<char>& follows) {
+  constexpr double kMostCorrelation = 0.7;  // beyond it, blocks of this length tell nothing of the rest
+  constexpr double kFewestPairs = 4;
+  double squares = 0, products = 0, pairs = 0;
+  for (std::size_t i = 0; i < influences.size(); ++i) {
+    squares += influences[i] * influences[i];
+    if (i == 0 || follows[i] == 0) continue;
+    products += influences[i] * influences[i - 1];
+    pairs += 1;
+  }
+  if (pairs < kFewestPairs || squares <= 0) return squares;
+  const double seen = products / pairs / (squares / static_cast<double>(influences.size()));
+  const double rho = std::clamp((pairs * seen + 1) / (pairs - 3), 0.0, kMostCorrelation);
+  return squares * (1 + rho) / (1 - rho);
+}
+
 Jackknife jackknife(const std::vector<Block>& blocks, const std::vector<int>& free, const Eigen::VectorXd& c,
                     const Eigen::VectorXd& ridge) {
   const auto n = static_cast<Eigen::Index>(free.size());
@@ -61,15 +77,15 @@ Jackknife jackknife(const std::vector<Block>& blocks, const std::vector<int>& fr
   const Eigen::MatrixXd inverse = sum.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
   // What one block alone determines stays determined by this much of it: without it, it would be infinitely uncertain.
   constexpr double kOthers = 0.98;
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(n), last = variance, weights = variance,
-                  squared_weights = variance;
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(n), squared_weights = weights;
+  std::vector<std::vector<double>> influences(free.size());
+  std::vector<char> follows;
   for (const Block& block : blocks) {
     const Eigen::VectorXd score = part_of(block.b - part_of_gram(block.gram, all) * c, free);
     const Eigen::MatrixXd own = part_of_gram(block.gram, free);
     const Eigen::VectorXd influence = (sum - kOthers * own).ldlt().solve(score);
-    variance += influence.cwiseAbs2();
-    if (block.follows) variance += influence.cwiseProduct(last);
-    last = influence;
+    for (Eigen::Index i = 0; i < n; ++i) influences[static_cast<std::size_t>(i)].push_back(influence[i]);
+    follows.push_back(block.follows ? 1 : 0);
     const Eigen::VectorXd weight = (inverse * own * inverse).diagonal().cwiseMax(0);
     weights += weight;
     squared_weights += weight.cwiseAbs2();
@@ -77,7 +93,7 @@ Jackknife jackknife(const std::vector<Block>& blocks, const std::vector<int>& fr
   Jackknife result{Eigen::VectorXd::Zero(c.size()), Eigen::VectorXd::Ones(c.size())};
   for (Eigen::Index i = 0; i < n; ++i) {
     const int column = free[static_cast<std::size_t>(i)];
-    result.variance[column] = std::max(variance[i], 0.0);
+    result.variance[column] = long_run_variance(influences[static_cast<std::size_t>(i)], follows);
     if (squared_weights[i] > 0)
       result.freedom[column] = std::max(1.0, weights[i] * weights[i] / squared_weights[i] - 1);
   }

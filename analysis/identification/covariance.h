@@ -14,6 +14,13 @@ namespace swarmcert::identification {
 Eigen::MatrixXd sandwich(const std::vector<Block>& blocks, const std::vector<int>& free,
                          const Eigen::VectorXd& c, const Eigen::VectorXd& ridge = {});
 
+/// Variance of the sum of `influences`, one per block, whose correlation dies away like that of a process of first
+/// order: sum of squares times (1 + rho) / (1 - rho) (Andrews 1991), rho the correlation of blocks of which one follows
+/// the other, less its bias -(1 + 3 rho) / n (Kendall 1954), and no less than 0: no credit for blocks that seem to
+/// alternate. An estimate: independent blocks give about a tenth more than they should where there are 20.
+/// @param follows true where a block follows the one before it, [influences].
+double long_run_variance(const std::vector<double>& influences, const std::vector<char>& follows);
+
 /// For intervals: what a block weighs is measured by leaving it out.
 struct Jackknife {
   Eigen::VectorXd variance;  ///< 0 of columns that are not free
@@ -22,8 +29,8 @@ struct Jackknife {
   Eigen::VectorXd freedom;
 };
 
-/// As sandwich(), with the influence (G - G_b)^-1 (b_b - G_b c) of each block b instead of G^-1 (b_b - G_b c), which is
-/// too small where a block carries much of a coefficient (MacKinnon and White 1985, HC3). Freedom: n_eff - 1 with
+/// long_run_variance() of the influence (G - G_b)^-1 (b_b - G_b c) of each block b; G^-1 (b_b - G_b c) would be too
+/// small where a block carries much of a coefficient (MacKinnon and White 1985, HC3). Freedom: n_eff - 1 with
 /// n_eff = (sum h_b)^2 / sum h_b^2 and h_b the diagonal of G^-1 G_b G^-1.
 Jackknife jackknife(const std::vector<Block>& blocks, const std::vector<int>& free, const Eigen::VectorXd& c,
                     const Eigen::VectorXd& ridge = {});

@@ -4,83 +4,11 @@
 #include <cmath>
 #include <set>
 
+#include "analysis/identification/closed_loop.h"
+#include "stability/effects/registry.h"
+
 namespace swarmcert::identification {
 namespace {
-
-/// Where there are more records, thetas off the grid do not take part in a second selection.
-constexpr std::size_t kManyRecords = 400'000;
-
-/// What selection leaves: which effects, with which thetas.
-struct Selected {
-  Grams grams;
-  Members members;
-  std::vector<Refined> refined;  ///< of `members`, in their order
-  std::vector<std::vector<InstrumentedValue>> checks;
-  std::vector<std::string> contradicted;
-};
-
-std::vector<Candidate> candidates_of(const std::vector<Refined>& refined) {
-  std::vector<Candidate> candidates;
-  for (const Refined& r : refined) {
-    candidates.push_back(r.candidate);
-    // The gain of a lag is what the check is about.
-    if (r.candidate.info.remembers) candidates.back().info.linear[0].lower = 0;
-  }
-  return candidates;
-}
-
-/// Index of the first effect that is only the controller's answer to something else; -1 if none.
-int contradicted(const std::vector<Refined>& refined,
-                 const std::vector<std::vector<InstrumentedValue>>& checks) {
-  for (std::size_t i = 0; i < checks.size(); ++i) {
-    if (refined[i].candidate.columns() == 1 && checks[i][0].contradicts()) return static_cast<int>(i);
-  }
-  return -1;
-}
-
-/// Selects on the grid, refines, and selects again with the refined thetas among the others, so that what a coarse
-/// theta left does not count as another effect. Effects that the instrument contradicts are taken out.
-Selected select(const Passes& passes, std::vector<Candidate> candidates) {
-  constexpr int kMostRounds = 6;
-  Selected result;
-  std::set<std::string> named;
-  bool reuse = false;
-  for (int round = 0; round < kMostRounds; ++round) {
-    if (!reuse) {
-      result.grams =
-          block_grams(passes.inputs, passes.kind, candidates, passes.flights, passes.jobs, passes.progress);
-    }
-    const Selection selection(result.grams);
-    if (!selection.is_sound()) return result;
-    result.members = selection.select();
-    result.refined = refine(passes, result.grams, result.members);
-    result.checks = instrument(passes, candidates_of(result.refined));
-    if (const int bad = contradicted(result.refined, result.checks); bad >= 0) {
-      const std::string& name = result.refined[static_cast<std::size_t>(bad)].candidate.name;
-      result.contradicted.push_back(name);
-      candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
-                                      [&](const Candidate& c) { return c.name == name; }),
-                       candidates.end());
-      continue;
-    }
-    std::set<std::string> now;
-    bool moved = false;
-    for (std::size_t i = 0; i < result.members.size(); ++i) {
-      const Refined& refined = result.refined[i];
-      now.insert(refined.candidate.name);
-      Candidate& candidate = candidates[static_cast<std::size_t>(result.members[i].candidate)];
-      if (std::find(candidate.thetas.begin(), candidate.thetas.end(), refined.theta) ==
-          candidate.thetas.end()) {
-        candidate.thetas.push_back(refined.theta);
-        moved = true;
-      }
-    }
-    if (!moved || now == named || passes.records > kManyRecords) break;
-    named = now;
-  }
-  widen_by_bias(result.checks, instrument_with_shapes(passes, result.refined), result.refined);
-  return result;
-}
 
 Missing missing_of(const Passes& passes, const Refined& refined, Finding finding, const Grams& grams) {
   const Candidate& candidate = refined.candidate;
@@ -118,41 +46,16 @@ std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) 
   std::vector<Finding> known = findings(Selection(selected.grams), selected.members);
   std::vector<Missing> ranking;
   for (std::size_t i = 0; i < known.size(); ++i) {
+    const std::string& name = selected.refined[i].candidate.name;
+    const std::vector<std::string> rivals = known[i].confounded_with();
+    const bool has_substitute = !selected.instead.empty() && (is_scale(name) || name == "constant_force");
+    if (has_substitute && name != selected.instead &&
+        std::find(rivals.begin(), rivals.end(), selected.instead) == rivals.end())
+      known[i].rivals.push_back({selected.instead, stability::effect_info(selected.instead).excitation});
     ranking.push_back(missing_of(passes, selected.refined[i], std::move(known[i]), selected.grams));
     if (!selected.checks.empty()) ranking.back().instrument = selected.checks[i];
   }
   return ranking;
-}
-
-/// Thrust answers whatever disturbs the vehicle: what its history seems to do needs another witness.
-bool is_of_thrust(const Candidate& candidate) {
-  const std::string& name = candidate.name;
-  return candidate.info.remembers || name == "thrust_ratio" || name == "battery" || name == "inflow";
-}
-
-/// The instrument says the same of the effect's coefficient.
-bool is_confirmed(const std::vector<InstrumentedValue>& check) {
-  constexpr double kAlike = 0.25;
-  return std::all_of(check.begin(), check.end(), [](const InstrumentedValue& value) {
-    return value.is_strong() &&
-           std::abs(value.instrument - value.least_squares) <= kAlike * std::abs(value.least_squares);
-  });
-}
-
-/// Names of selected effects that are no match for a loud remainder, see Diagnosis::suspected.
-std::set<std::string> suspects(const Selected& selected) {
-  constexpr double kShare = 0.1;
-  const Selection selection(selected.grams);
-  const double square = selection.mean_square(selected.members);
-  std::set<std::string> names;
-  for (std::size_t i = 0; i < selected.members.size(); ++i) {
-    const Candidate& candidate = selected.refined[i].candidate;
-    const bool small = square > (1 - kShare) * selection.mean_square(without(selected.members, i));
-    const bool unconfirmed =
-        is_of_thrust(candidate) && (selected.checks.empty() || !is_confirmed(selected.checks[i]));
-    if (small || unconfirmed) names.insert(candidate.name);
-  }
-  return names;
 }
 
 /// What is selected once nothing of it is suspect.
@@ -167,19 +70,22 @@ Settled settle(const Passes& passes, const Coverage& covered) {
   constexpr int kMostRounds = 8;
   std::vector<Candidate> candidates = all_candidates(*passes.inputs.model_of(passes.kind), covered);
   Settled result;
+  bool doubts_slope = false;
   for (int round = 0; round < kMostRounds; ++round) {
-    result.selected = select(passes, candidates);
+    result.selected = doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates);
     result.ranking = ranking_of(passes, result.selected);
     result.rest = remainder(passes, specs_of(result.ranking));
     if (result.rest.ratio <= kLoudRatio) break;
     std::set<std::string> names = suspects(result.selected);
     if (names.empty()) break;
+    const bool has_scale = std::any_of(names.begin(), names.end(), is_scale);
+    if (has_scale && !doubts_slope && has_vertical_push(result.selected.refined)) {
+      doubts_slope = true;
+      continue;
+    }
+    if (has_scale) doubts_slope = false;
     result.suspected.insert(result.suspected.end(), names.begin(), names.end());
-    // A scale that follows the battery would only take the place of the scale that is too doubtful.
-    if (names.count("thrust_ratio") == 1) names.insert("battery");
-    candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
-                                    [&](const Candidate& c) { return names.count(c.name) == 1; }),
-                     candidates.end());
+    erase(candidates, with_substitutes(names, result.selected.refined));
   }
   return result;
 }

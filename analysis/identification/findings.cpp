@@ -6,6 +6,7 @@
 
 #include "analysis/identification/covariance.h"
 #include "analysis/residuals/statistics.h"
+#include "nn/files/doubles.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -38,12 +39,29 @@ void widen(std::vector<Interval>& spread, const Eigen::VectorXd& values) {
   }
 }
 
+/// `members` with the last on the theta of its grid that suits best: rivals are not refined either.
+Members on_grid(const Selection& selection, const Members& members) {
+  const Candidate& candidate = selection.candidate(members.back());
+  const auto count = static_cast<int>(candidate.thetas.size() - candidate.refined_thetas);
+  const Members rest = without(members, members.size() - 1);
+  Members best = members;
+  double least = kInfinity;
+  for (int theta = 0; theta < count; ++theta) {
+    Members tried = with(rest, {members.back().candidate, theta});
+    const double square = selection.mean_square(tried);
+    if (square >= least) continue;
+    least = square;
+    best = std::move(tried);
+  }
+  return best;
+}
+
 /// Rivals of the last of `members`: they keep half of its gain, and the data do not prefer it clearly.
 void find_rivals(const Selection& selection, const Members& members, Finding& finding) {
   constexpr double kClearlyBetter_z = 2, kShare = 0.5;
   const Members rest = without(members, members.size() - 1);
   const double rest_square = selection.mean_square(rest), full_square = selection.mean_square(members);
-  const std::vector<double> full_errors = selection.block_errors(members);
+  const std::vector<double> full_errors = selection.block_errors(on_grid(selection, members));
   const Eigen::Index p = selection.candidate(members.back()).columns();
   for (int q = 0; q < static_cast<int>(selection.grams().candidates.size()); ++q) {
     if (selection.is_present(members, q)) continue;

@@ -101,9 +101,8 @@ class Injector {
     const Thresholds thresholds;
     std::vector<int> thetas;
     const Candidate& candidate = base_.candidates.back();
-    const std::vector<Support>& support = base_.support.back();
-    for (std::size_t t = 0; t < support.size(); ++t) {
-      if (support[t].records >= thresholds.support_records && support[t].blocks >= thresholds.support_blocks)
+    for (std::size_t t = 0; t < candidate.thetas.size(); ++t) {
+      if (is_supported(base_, base_.candidates.size() - 1, t, thresholds.support_blocks, thresholds))
         thetas.push_back(static_cast<int>(t));
     }
     const auto distance = [&](int t) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/identification/column_run.h"
+#include "analysis/identification/covariance.h"
 #include "nn/files/parallel.h"
 
 namespace swarmcert::identification {
@@ -47,6 +48,7 @@ std::vector<stability::Instant> as_commanded(const Track& track, double mass_kg)
 struct Moments {
   Eigen::MatrixXd zx, xx;
   Eigen::VectorXd zr, xr;
+  bool follows = false;  ///< the block before it, of the same track
 };
 
 /// @param mix [columns x unknowns]: what is fitted, as sums of columns.
@@ -60,8 +62,9 @@ bool add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
   ColumnRun actual(columns, inputs, model, track.vehicle), commanded(columns, inputs, model, track.vehicle);
   const std::size_t first = blocks.size();
   const Eigen::Index n = mix.cols();
-  blocks.resize(first + cut.blocks.size(), {Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n),
-                                            Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)});
+  for (const TrackBlock& block : cut.blocks)
+    blocks.push_back({Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n),
+                      Eigen::VectorXd::Zero(n), block.follows});
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     const bool restart = track.restarts[i] != 0;
     const Eigen::Matrix3Xd& all = actual.advance(track.instants[i], restart);
@@ -105,12 +108,15 @@ std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& colu
   const Eigen::FullPivLU<Eigen::MatrixXd> zx(sum.zx), xx(sum.xx);
   if (!zx.isInvertible() || !xx.isInvertible()) return {};
   const Eigen::VectorXd by_instrument = zx.solve(sum.zr), by_squares = xx.solve(sum.xr);
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(n), difference = variance;
+  Eigen::VectorXd difference = Eigen::VectorXd::Zero(n);
+  std::vector<std::vector<double>> influences(static_cast<std::size_t>(n));
+  std::vector<char> follows;
   for (const auto& piece : pieces) {
     for (const Moments& block : piece) {
       const Eigen::VectorXd a = zx.solve(block.zr - block.zx * by_instrument);
       const Eigen::VectorXd b = xx.solve(block.xr - block.xx * by_squares);
-      variance += a.cwiseAbs2();
+      for (Eigen::Index at = 0; at < n; ++at) influences[static_cast<std::size_t>(at)].push_back(a[at]);
+      follows.push_back(block.follows ? 1 : 0);
       difference += (a - b).cwiseAbs2();
     }
   }
@@ -119,7 +125,8 @@ std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& colu
     InstrumentedValue value;
     value.least_squares = by_squares[at];
     value.instrument = by_instrument[at];
-    const double half = kQuantile90 * std::sqrt(variance[at]);
+    const double half =
+        kQuantile90 * std::sqrt(long_run_variance(influences[static_cast<std::size_t>(at)], follows));
     value.interval = {value.instrument - half, value.instrument + half};
     const double deviation = std::sqrt(difference[at]);
     value.difference_z = deviation > 0 ? (value.instrument - value.least_squares) / deviation : 0;
@@ -155,14 +162,26 @@ double InstrumentedValue::bias() const {
 std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
                                                        const std::vector<Candidate>& effects) {
   const Grams columns = columns_of(effects);
-  const std::vector<InstrumentedValue> values =
-      estimates(passes, columns, Eigen::MatrixXd::Identity(columns.columns, columns.columns));
+  std::vector<char> varies;
+  for (const Candidate& effect : effects) {
+    for (const stability::Parameter& coefficient : effect.info.linear)
+      varies.push_back(is_held_at_zero(coefficient) ? 0 : 1);
+  }
+  Eigen::MatrixXd mix =
+      Eigen::MatrixXd::Zero(columns.columns, std::count(varies.begin(), varies.end(), char{1}));
+  for (Eigen::Index i = 0, to = 0; i < columns.columns; ++i) {
+    if (varies[static_cast<std::size_t>(i)] != 0) mix(i, to++) = 1;
+  }
+  const std::vector<InstrumentedValue> values = estimates(passes, columns, mix);
   if (values.empty()) return {};
   std::vector<std::vector<InstrumentedValue>> result;
   auto next = values.begin();
+  auto is_free = varies.begin();
   for (const Candidate& effect : effects) {
-    result.emplace_back(next, next + effect.columns());
-    next += effect.columns();
+    result.emplace_back(effect.info.linear.size());
+    for (InstrumentedValue& value : result.back()) {
+      if (*is_free++ != 0) value = *next++;
+    }
   }
   return result;
 }

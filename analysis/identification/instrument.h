@@ -27,8 +27,8 @@ struct InstrumentedValue {
   double bias() const;
 };
 
-/// Both estimates of all coefficients of `effects` together, without bounds, effect by effect. Empty where a log has
-/// no set points, or nothing moves.
+/// Both estimates of all coefficients of `effects` together, without bounds, effect by effect; those that are held at
+/// zero are weak. Empty where a log has no set points, or nothing moves.
 std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
                                                        const std::vector<Candidate>& effects);
 

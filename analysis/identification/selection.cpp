@@ -8,6 +8,13 @@
 
 namespace swarmcert::identification {
 
+bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, std::size_t blocks,
+                  const Thresholds& thresholds) {
+  const Support& where = grams.support[candidate][theta];
+  if (where.records >= thresholds.support_records && where.blocks >= blocks) return true;
+  return telling_blocks(grams, candidate, theta) >= static_cast<double>(blocks);
+}
+
 /// Where the voltage falls by little, its effect is a change of scale: that is what flights show unless they clearly say
 /// more.
 int Selection::plain_form(int which) const {
@@ -61,10 +68,10 @@ bool Selection::is_acceptable(const Members& before, const Member& added) const 
 bool Selection::is_acceptable(const Members& before, const Member& added, double before_square,
                               double after_square, const Folds& folds) const {
   if (!(after_square <= (1 - thresholds_.gain) * before_square)) return false;
-  const Support& where = support(added);
   const bool is_plain = after_square <= (1 - thresholds_.plain_gain) * before_square;
   const std::size_t blocks = is_plain ? thresholds_.plain_support_blocks : thresholds_.support_blocks;
-  if (where.records < thresholds_.support_records || where.blocks < blocks) return false;
+  const auto k = static_cast<std::size_t>(added.candidate), t = static_cast<std::size_t>(added.theta);
+  if (!is_supported(grams(), k, t, blocks, thresholds_)) return false;
   const Members after = with(before, added);
   if (is_held(after)) return false;
   const double z = paired_z(block_errors(before, folds), block_errors(after, folds));
@@ -174,27 +181,30 @@ Members Selection::select() const {
 }
 
 Members Selection::ordered(Members members) const {
+  constexpr double kLocalShare = 0.25;
   // A shape without a memory: ground, jets, ...
   const auto is_local = [&](const Member& m) {
     return !candidate(m).info.shape.empty() && !candidate(m).info.remembers;
   };
   Members result;
-  for (const bool local : {true, false}) {
-    while (
-        std::any_of(members.begin(), members.end(), [&](const Member& m) { return is_local(m) == local; })) {
-      std::size_t best = 0;
-      double least = kInfinity;
-      for (std::size_t i = 0; i < members.size(); ++i) {
-        if (is_local(members[i]) != local) continue;
-        const double square = mean_square(with(result, members[i]));
-        if (square < least) {
-          least = square;
-          best = i;
-        }
+  while (!members.empty()) {
+    const double before = mean_square(result);
+    std::size_t best = 0, best_local = members.size();
+    double least = kInfinity, least_local = kInfinity;
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const double square = mean_square(with(result, members[i]));
+      if (square < least) {
+        least = square;
+        best = i;
       }
-      result.push_back(members[best]);
-      members = without(members, best);
+      if (is_local(members[i]) && square < least_local) {
+        least_local = square;
+        best_local = i;
+      }
     }
+    if (before - least_local > kLocalShare * (before - least) && before > least_local) best = best_local;
+    result.push_back(members[best]);
+    members = without(members, best);
   }
   return result;
 }

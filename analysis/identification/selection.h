@@ -19,6 +19,12 @@ struct Thresholds {
   std::size_t plain_support_blocks = 2;
 };
 
+/// True where the flights show `candidate` with `theta` in at least `blocks` blocks: where the effect counts as acting
+/// (Effect::in_support), or where they carry its coefficient (telling_blocks): over the ground, flights that never come
+/// near the floor see a strong effect from above.
+bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, std::size_t blocks,
+                  const Thresholds& thresholds);
+
 /// The passes over candidates, on top of the fits that judge them.
 class Selection : public CrossValidation {
  public:
@@ -32,8 +38,8 @@ class Selection : public CrossValidation {
   bool add_one(Members& members) const;
   /// Drops effects that have become needless.
   void prune(Members& members) const;
-  /// First the effects that act in some places only, then those that act everywhere, which a wrong calibration looks
-  /// like; of each, in the order in which they lower the error most.
+  /// In the order in which they lower the error most; but one that acts in some places only comes before those that act
+  /// everywhere, which a wrong calibration looks like, where it lowers the error by a quarter as much.
   Members ordered(Members members) const;
   /// The theta of `candidate` that suits best beside `members`.
   Member best_theta(const Members& members, int candidate) const;

@@ -106,6 +106,82 @@ TEST(Detectable, SizesAreWhereInjectionsBeginToShow) {
   }
 }
 
+/// A process of first order, whose mean has the variance (1 + rho) / (1 - rho) / n in long series. Blocks are its values
+/// less their mean, as residuals of a fit are.
+TEST(LongRunVariance, IsThatOfTheMeanOfACorrelatedProcess) {
+  constexpr int kValues = 40, kSeries = 2000;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> bell;
+  for (const double rho : {0.0, 0.3, 0.6}) {
+    double estimated = 0, squared_means = 0;
+    for (int series = 0; series < kSeries; ++series) {
+      std::vector<double> values;
+      double x = bell(random);
+      for (int i = 0; i < kValues; ++i) {
+        values.push_back(x);
+        x = rho * x + std::sqrt(1 - rho * rho) * bell(random);
+      }
+      double mean = 0;
+      for (const double value : values) mean += value / kValues;
+      squared_means += mean * mean;
+      for (double& value : values) value = (value - mean) / (kValues - 1);
+      estimated += long_run_variance(values, std::vector<char>(kValues, 1));
+    }
+    // Too large by a tenth and more, because correlations below 0 do not count; never too small.
+    EXPECT_GT(estimated, 0.95 * squared_means) << rho;
+    EXPECT_LT(estimated, 1.6 * squared_means) << rho;
+  }
+  const std::vector<double> alike(kValues, 1);
+  EXPECT_EQ(long_run_variance(alike, std::vector<char>(kValues, 0)), kValues)
+      << "blocks that do not follow each other are independent";
+}
+
+TEST(TellingBlocks, AreAsManyAsCarryTheColumn) {
+  const WhiteNoise noise;
+  Grams grams = noise.grams(0);
+  EXPECT_NEAR(telling_blocks(grams, 0, 0), 40, 1);
+  grams.support = {{{0, 0, 0}}};
+  EXPECT_TRUE(is_supported(grams, 0, 0, 5, {})) << "nowhere near the floor, but seen in every block";
+  for (std::size_t k = 4; k < grams.blocks.size(); ++k) grams.blocks[k].gram[0] = 0;
+  EXPECT_NEAR(telling_blocks(grams, 0, 0), 4, 0.1);
+  EXPECT_FALSE(is_supported(grams, 0, 0, 5, {}));
+}
+
+TEST(Selection, RanksByDropAndLetsLocalEffectsGoFirstOnlyWhereTheyExplainMuch) {
+  const WhiteNoise noise;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> bell;
+  std::vector<Eigen::VectorXd> other;
+  for (const Eigen::VectorXd& column : noise.column)
+    other.push_back(Eigen::VectorXd::NullaryExpr(column.size(), [&]() { return bell(random); }));
+  const auto first = [&](double local_size) {
+    Grams grams = noise.grams(0.02);
+    Candidate ground = noise.candidate;
+    ground.name = ground.spec.name = "ground";
+    ground.info = stability::effect_info("ground");
+    ground.thetas = {{0.03, 0.06}};
+    grams.candidates.push_back(ground);
+    grams.first_column.push_back({1});
+    grams.support.push_back({{10'000, 40, 1}});
+    grams.columns = 2;
+    for (std::size_t k = 0; k < grams.blocks.size(); ++k) {
+      const Eigen::VectorXd& x = noise.column[k];
+      const Eigen::VectorXd r = noise.residual[k] + 0.02 * x + local_size * other[k];
+      Block& block = grams.blocks[k];
+      block.gram = Eigen::Vector3d(x.squaredNorm(), x.dot(other[k]), other[k].squaredNorm());
+      block.b = Eigen::Vector2d(x.dot(r), other[k].dot(r));
+      block.y = r.squaredNorm();
+    }
+    const Selection selection(grams);
+    const Members members = selection.ordered({{0, 0}, {1, 0}});
+    return selection.candidate(members[0]).name;
+  };
+  // Energies: 0.02^2 of the drag, local_size^2 of the ground.
+  EXPECT_EQ(first(0.001), "drag_linear");
+  EXPECT_EQ(first(0.008), "drag_linear");
+  EXPECT_EQ(first(0.013), "ground") << "less than drag, but more than a quarter of it";
+}
+
 TEST(Jackknife, IsTheVarianceOfWhiteNoiseAndKnowsWhenFewBlocksTell) {
   const WhiteNoise noise;
   Grams grams = noise.grams(0);

@@ -4,7 +4,7 @@
 ///   benchmark_identification coverage [count] [gust_N] [gust_time_s] [parameter]
 /// speed: one flight of 40 s, then `count` flights of two vehicles (default 240: 1.9 million records). Goals: 1 s of
 /// the processor; 60 s on two cores and 2 GiB.
-/// coverage: for each effect, `count` flights (default 40) under a gust (default 0.006 N rms and 0.5 s) that no column
+/// coverage: for each effect, `count` flights (default 100) under a gust (default 0.006 N rms and 0.5 s) that no column
 /// explains; with the name of a parameter, only the cases that have it.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
@@ -161,7 +161,7 @@ void coverage(const std::string& folder, int count, double gust_N, double gust_t
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "speed";
-  const int count = argc > 2 ? std::atoi(argv[2]) : what == "coverage" ? 40 : 240;
+  const int count = argc > 2 ? std::atoi(argv[2]) : what == "coverage" ? 100 : 240;
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / fmt::format("swarmcert-identification-{}", getpid());
   std::filesystem::create_directories(folder);

@@ -6,13 +6,57 @@
 #include <algorithm>
 #include <boost/math/distributions/beta.hpp>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <stdexcept>
 
 #include "analysis/run.h"
 #include "data.h"
+#include "nn/files/file_io.h"
 #include "nn/files/json.h"
 
 namespace swarmcert::tests {
+namespace {
+
+constexpr const char* kSchema = "swarmcert/campaign-answer/1";
+
+files::Json json_of(const Answer& answer) {
+  return {{"schema", kSchema},
+          {"label", answer.label},
+          {"named", answer.named},
+          {"drops", answer.drops},
+          {"first_right", answer.first_right},
+          {"exact", answer.exact},
+          {"all_found", answer.all_found},
+          {"claims_falsely", answer.claims_falsely},
+          {"flagged", answer.flagged},
+          {"ratio", answer.ratio},
+          {"has_value", answer.has_value},
+          {"value_right", answer.value_right},
+          {"covered", answer.covered},
+          {"value_error", answer.value_error}};
+}
+
+Answer answer_of(const files::Json& json) {
+  Answer answer;
+  answer.label = json["label"];
+  answer.named = json["named"].get<std::vector<std::string>>();
+  answer.drops = json["drops"].get<std::vector<double>>();
+  answer.first_right = json["first_right"];
+  answer.exact = json["exact"];
+  answer.all_found = json["all_found"];
+  answer.claims_falsely = json["claims_falsely"];
+  answer.flagged = json["flagged"];
+  answer.ratio = json["ratio"];
+  answer.has_value = json["has_value"];
+  answer.value_right = json["value_right"];
+  answer.covered = json["covered"];
+  answer.value_error = json["value_error"];
+  return answer;
+}
+
+}  // namespace
 
 Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s, std::uint64_t seed,
            const std::string& folder, bool knows_lag) {
@@ -69,6 +113,31 @@ Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s
                        hidden[0].value <= fitted["interval_90"][1].get<double>();
     }
   }
+  return answer;
+}
+
+std::optional<Answer> ask_once(const std::vector<Hidden>& hidden, Program program, double duration_s,
+                               std::uint64_t seed, const std::string& folder, bool knows_lag) {
+  const char* const kept = std::getenv("SWARMCERT_CAMPAIGN");
+  if (kept == nullptr) return ask(hidden, program, duration_s, seed, folder, knows_lag);
+  const char* const programs[] = {"rich", "slow", "hover"};
+  std::string name = programs[static_cast<int>(program)];
+  for (const Hidden& h : hidden) name += "-" + h.name;
+  name += fmt::format("-{}-{:g}s{}", seed, duration_s, knows_lag ? "-lag" : "");
+  std::replace(name.begin(), name.end(), ' ', '_');
+  const std::string path = std::string(kept) + "/" + name + ".json";
+  if (std::filesystem::exists(path)) return answer_of(files::read_json(path, kSchema));
+  if (const char* const text = std::getenv("SWARMCERT_CAMPAIGN_SHARD"); text != nullptr) {
+    unsigned shard = 0, shards = 0;
+    const bool is_sound = std::sscanf(text, "%u/%u", &shard, &shards) == 2 && shard >= 1 && shard <= shards;
+    if (!is_sound) throw std::invalid_argument("SWARMCERT_CAMPAIGN_SHARD is not i/N: " + std::string(text));
+    std::uint32_t number = 0;  // of the run, the same in every process
+    for (const char letter : name) number = 31 * number + static_cast<unsigned char>(letter);
+    if (number % shards + 1 != shard) return std::nullopt;
+  }
+  Answer answer = ask(hidden, program, duration_s, seed, folder, knows_lag);
+  std::filesystem::create_directories(kept);
+  files::write_file(path, json_of(answer).dump(1) + "\n", true);
   return answer;
 }
 

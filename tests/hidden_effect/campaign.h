@@ -1,6 +1,7 @@
 /// @file Campaigns of hidden effects: how the answers of diagnose are judged.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,13 @@ struct Answer {
 /// @param folder scratch; the flights are removed.
 Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s, std::uint64_t seed,
            const std::string& folder, bool knows_lag);
+
+/// As ask(), for campaigns that take longer than one sitting. Where the environment variable SWARMCERT_CAMPAIGN names a
+/// folder, answers are kept there, one file each, and what has one is not flown again; with SWARMCERT_CAMPAIGN_SHARD =
+/// i/N (i from 1) only every N-th run is flown. Empty for a run that belongs to another shard and has no answer yet.
+/// Answers are of the tool that gave them: a folder for each commit.
+std::optional<Answer> ask_once(const std::vector<Hidden>& hidden, Program program, double duration_s,
+                               std::uint64_t seed, const std::string& folder, bool knows_lag);
 
 /// Clopper-Pearson interval at 90 % of `hits` in `runs`.
 std::pair<double, double> clopper_pearson(int hits, int runs);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,7 @@ double total_rmse(const files::Json& comparison) {
 struct Tally {
   int runs = 0, first = 0, exact = 0, found = 0, flagged = 0, named_nothing = 0, claimed_falsely = 0,
       valued = 0, right = 0, covered = 0;
+  int missing = 0;  ///< runs that other shards have still to fly
 
   void add(const Answer& answer) {
     ++runs;
@@ -91,7 +93,12 @@ Tally campaign(const std::vector<std::vector<Hidden>>& cases, Program program, s
   for (const auto& hidden : cases) {
     for (int i = 0; i < seeds; ++i) {
       const std::uint64_t seed = first + static_cast<std::uint64_t>(i);
-      tally.add(ask(hidden, program, kFlight_s, seed, folder.path().string(), seed % 2 == 1));
+      const std::optional<Answer> answer =
+          ask_once(hidden, program, kFlight_s, seed, folder.path().string(), seed % 2 == 1);
+      if (answer)
+        tally.add(*answer);
+      else
+        ++tally.missing;
     }
   }
   return tally;
@@ -240,6 +247,48 @@ TEST(HiddenEffect, IntervalsOfTheGroundHoldItsAmplitudeUnderAGust) {
   EXPECT_GE(held, 0.8 * kFlights) << share(held, kFlights);
 }
 
+/// Thrust that answers a gust gives the force a slope over thrust; beside a constant force that fits, and set points say
+/// that it is not there. What is left is one push upwards or downwards, by which of three causes nobody can tell.
+TEST(HiddenEffect, AMassInAStrongGustIsNamedAsAClass) {
+  const ScratchFolder folder;
+  Loop loop(folder);
+  Truth truth;
+  truth.mass_factor = 1.05;
+  truth.gust_N = 0.012;
+  int named = 0;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    std::filesystem::remove_all(folder / "flights");
+    fly(truth, {Program::kRich, 1, kFlight_s, seed}, folder / "flights");
+    const files::Json result =
+        loop.run("diagnose " + source_path("stability/models/crazyflie-small.toml") + " flights", "diagnose");
+    EXPECT_TRUE(result["unexplained"]["flag"].get<bool>());
+    for (const files::Json& entry : result["ranking"]) {
+      ASSERT_EQ(entry["effect"], "thrust_ratio") << entry.dump(1);
+      EXPECT_FALSE(entry["confounded_with"].empty());
+      EXPECT_NEAR(entry["parameters"]["ratio"]["value"].get<double>(), 1 / 1.05 - 1, 0.02);
+      ++named;
+    }
+  }
+  EXPECT_GE(named, 2);
+}
+
+/// Never near the floor, where the effect counts as acting: its amplitude is defined at 0.06 m.
+TEST(HiddenEffect, GroundIsFoundByFlightsThatStayAboveIt) {
+  const ScratchFolder folder;
+  Loop loop(folder);
+  Truth truth;
+  truth.force_N = [](const Moment& now) {
+    return Eigen::Vector3d(0.2 * now.thrust_N * std::exp(-(now.p_m.z() - 0.06) / 0.04) * now.b3);
+  };
+  FlightPlan plan{Program::kRich, 1, kFlight_s, 7};
+  plan.lowest_m = 0.13;
+  fly(truth, plan, folder / "flights");
+  const files::Json ranking = loop.run(
+      "diagnose " + source_path("stability/models/crazyflie-small.toml") + " flights", "diagnose")["ranking"];
+  ASSERT_EQ(ranking.size(), 1u) << ranking.dump(1);
+  EXPECT_EQ(ranking[0]["effect"], "ground");
+}
+
 TEST(HiddenEffect, WhatDoesNotHelpIsRefusedUnlessKeptAnyway) {
   const ScratchFolder folder;
   Loop loop(folder);
@@ -301,9 +350,10 @@ TEST(HiddenEffect, CampaignOfForeignForces_slow) {
 
 TEST(HiddenEffect, CampaignOfFalseClaims_slow) {
   const std::uint64_t seed = seed_of_commit();
-  int runs = 0, claims = 0, flagged = 0;
+  int runs = 0, claims = 0, flagged = 0, missing = 0;
   const auto count = [&](const Tally& tally, int false_claims) {
     runs += tally.runs;
+    missing += tally.missing;
     claims += false_claims;
     flagged += tally.flagged;
   };
@@ -317,6 +367,7 @@ TEST(HiddenEffect, CampaignOfFalseClaims_slow) {
     count(tally, tally.claimed_falsely);
   }
   fmt::print("false claims: {}\nflagged: {}\n", share(claims, runs), share(flagged, runs));
+  if (missing > 0) GTEST_SKIP() << missing << " runs belong to other shards and have no answer yet";
   EXPECT_GE(runs, 300);
   EXPECT_LE(claims, 0.05 * runs);
   EXPECT_LE(flagged, 0.05 * runs);

@@ -143,10 +143,10 @@ std::vector<Path> paths_of(const FlightPlan& plan, Noise& noise) {
 /// On input z is a wave that goes on rising; on output a height.
 void fold_height(const FlightPlan& plan, Target& target) {
   if (plan.program != Program::kRich) return;
-  constexpr double kLowest_m = 0.085, kHighest_m = 1;
-  const double half = 0.5 * (kHighest_m - kLowest_m);
+  constexpr double kHighest_m = 1;
+  const double half = 0.5 * (kHighest_m - plan.lowest_m);
   const double angle = target.p.z(), rate = target.v.z(), change = target.a.z();
-  target.p.z() = kLowest_m + half * (1 - std::cos(angle));
+  target.p.z() = plan.lowest_m + half * (1 - std::cos(angle));
   target.v.z() = half * std::sin(angle) * rate;
   target.a.z() = half * (std::cos(angle) * rate * rate + std::sin(angle) * change);
 }

@@ -43,7 +43,7 @@ struct Truth {
 };
 
 enum class Program {
-  kRich,   ///< heights 0.08 .. 1 m, about 0.6 m/s rms
+  kRich,   ///< heights from FlightPlan::lowest_m to 1 m, about 0.6 m/s rms
   kSlow,   ///< heights 0.3 .. 0.6 m, about 0.1 m/s rms
   kHover,  ///< stays within a few millimetres of 0.5 m
 };
@@ -53,6 +53,7 @@ struct FlightPlan {
   int vehicles = 1;
   double duration_s = 40;
   std::uint64_t seed = 0;
+  double lowest_m = 0.085;  ///< of the rich program
 };
 
 /// Flies and writes `folder`/cf<1 ...>_<run>.

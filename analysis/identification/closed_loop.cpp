@@ -1,0 +1,180 @@
+#include "analysis/identification/closed_loop.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+namespace swarmcert::identification {
+namespace {
+
+/// Where there are more records, thetas off the grid do not take part in a second selection.
+constexpr std::size_t kManyRecords = 400'000;
+
+/// Index of the first effect that is only the controller's answer to something else; -1 if none.
+int contradicted(const std::vector<Refined>& refined,
+                 const std::vector<std::vector<InstrumentedValue>>& checks) {
+  for (std::size_t i = 0; i < checks.size(); ++i) {
+    if (refined[i].candidate.columns() == 1 && checks[i][0].contradicts()) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+bool is_vertical_push(const stability::Parameter& parameter) {
+  constexpr std::string_view kEnd = "force_z_N";
+  const std::string& name = parameter.name;
+  return name.size() >= kEnd.size() && name.compare(name.size() - kEnd.size(), kEnd.size(), kEnd) == 0;
+}
+
+/// Leaves the constant forces of `candidates` no vertical part.
+void hold_vertical_push(std::vector<Candidate>& candidates) {
+  for (Candidate& candidate : candidates) {
+    if (candidate.name != "constant_force") continue;
+    for (stability::Parameter& parameter : candidate.info.linear) {
+      if (is_vertical_push(parameter)) parameter.lower = parameter.upper = 0;
+    }
+  }
+}
+
+/// Thrust answers whatever disturbs the vehicle: what its history seems to do needs another witness.
+bool is_of_thrust(const Candidate& candidate) {
+  const std::string& name = candidate.name;
+  return candidate.info.remembers || name == "thrust_ratio" || name == "battery" || name == "inflow";
+}
+
+/// The instrument says the same of the effect's coefficient.
+bool is_confirmed(const std::vector<InstrumentedValue>& check) {
+  constexpr double kAlike = 0.25;
+  return std::all_of(check.begin(), check.end(), [](const InstrumentedValue& value) {
+    return value.is_strong() &&
+           std::abs(value.instrument - value.least_squares) <= kAlike * std::abs(value.least_squares);
+  });
+}
+
+}  // namespace
+
+void erase(std::vector<Candidate>& candidates, const std::set<std::string>& names) {
+  candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
+                                  [&](const Candidate& c) { return names.count(c.name) == 1; }),
+                   candidates.end());
+}
+
+bool is_scale(const std::string& effect) { return effect == "thrust_ratio" || effect == "battery"; }
+
+bool has_vertical_push(const std::vector<Refined>& effects) {
+  return std::any_of(effects.begin(), effects.end(), [](const Refined& effect) {
+    const std::vector<stability::Parameter>& linear = effect.candidate.info.linear;
+    return effect.candidate.name == "constant_force" &&
+           std::any_of(linear.begin(), linear.end(), [](const stability::Parameter& parameter) {
+             return is_vertical_push(parameter) && !is_held_at_zero(parameter);
+           });
+  });
+}
+
+std::vector<Candidate> candidates_of(const std::vector<Refined>& effects) {
+  std::vector<Candidate> candidates;
+  for (const Refined& r : effects) {
+    candidates.push_back(r.candidate);
+    if (r.candidate.info.remembers) candidates.back().info.linear[0].lower = 0;
+  }
+  return candidates;
+}
+
+Selected select(const Passes& passes, std::vector<Candidate> candidates) {
+  constexpr int kMostRounds = 6;
+  Selected result;
+  std::set<std::string> named;
+  for (int round = 0; round < kMostRounds; ++round) {
+    result.grams =
+        block_grams(passes.inputs, passes.kind, candidates, passes.flights, passes.jobs, passes.progress);
+    const Selection selection(result.grams);
+    if (!selection.is_sound()) return result;
+    result.members = selection.select();
+    result.refined = refine(passes, result.grams, result.members);
+    result.checks = instrument(passes, candidates_of(result.refined));
+    if (const int bad = contradicted(result.refined, result.checks); bad >= 0) {
+      const std::string& name = result.refined[static_cast<std::size_t>(bad)].candidate.name;
+      const bool is_slope = is_scale(name) && has_vertical_push(result.refined);
+      if (is_slope) return without_slope(passes, std::move(candidates), result.contradicted);
+      result.contradicted.push_back(name);
+      erase(candidates, {name});
+      continue;
+    }
+    std::set<std::string> now;
+    bool moved = false;
+    for (std::size_t i = 0; i < result.members.size(); ++i) {
+      const Refined& refined = result.refined[i];
+      now.insert(refined.candidate.name);
+      Candidate& candidate = candidates[static_cast<std::size_t>(result.members[i].candidate)];
+      if (std::find(candidate.thetas.begin(), candidate.thetas.end(), refined.theta) ==
+          candidate.thetas.end()) {
+        candidate.thetas.push_back(refined.theta);
+        ++candidate.refined_thetas;
+        moved = true;
+      }
+    }
+    if (!moved || now == named || passes.records > kManyRecords) break;
+    named = now;
+  }
+  widen_by_bias(result.checks, instrument_with_shapes(passes, result.refined), result.refined);
+  return result;
+}
+
+Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
+                       std::vector<std::string> contradicted) {
+  constexpr double kShare = 0.5;
+  const double alike = 1 + Thresholds().gain;
+  std::vector<Candidate> one = candidates;
+  hold_vertical_push(one);
+  Selected scale = select(passes, std::move(one));
+  erase(candidates, {"thrust_ratio", "battery"});
+  Selected push = select(passes, std::move(candidates));
+  const auto left = [](const Selected& s) { return Selection(s.grams).mean_square(s.members); };
+  const auto has = [](const Selected& s, const auto& is_one) {
+    return std::any_of(s.refined.begin(), s.refined.end(),
+                       [&](const Refined& effect) { return is_one(effect.candidate.name); });
+  };
+  const auto is_constant = [](const std::string& name) { return name == "constant_force"; };
+  const bool has_scale = has(scale, is_scale), has_push = has(push, is_constant);
+  const bool takes_scale = has_scale && left(scale) <= alike * left(push);
+  if (takes_scale) {
+    scale.instead = "constant_force";
+  } else {
+    const double none = Selection(push.grams).mean_square({});
+    if (has_scale && has_push && none - left(scale) > kShare * (none - left(push)))
+      push.instead = "thrust_ratio";
+    else
+      contradicted.emplace_back("thrust_ratio");
+  }
+  Selected result = takes_scale ? std::move(scale) : std::move(push);
+  contradicted.insert(contradicted.end(), result.contradicted.begin(), result.contradicted.end());
+  result.contradicted = std::move(contradicted);
+  return result;
+}
+
+std::set<std::string> suspects(const Selected& selected) {
+  constexpr double kShare = 0.1;
+  const Selection selection(selected.grams);
+  const double square = selection.mean_square(selected.members);
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < selected.members.size(); ++i) {
+    const Candidate& candidate = selected.refined[i].candidate;
+    const bool small = square > (1 - kShare) * selection.mean_square(without(selected.members, i));
+    const bool unconfirmed =
+        is_of_thrust(candidate) && (selected.checks.empty() || !is_confirmed(selected.checks[i]));
+    if (small || unconfirmed) names.insert(candidate.name);
+  }
+  return names;
+}
+
+std::set<std::string> with_substitutes(std::set<std::string> names, const std::vector<Refined>& selected) {
+  std::set<std::string> substitutes;
+  if (names.count("thrust_ratio") == 1) substitutes = {"battery"};
+  for (const char* late : {"motor_lag", "delay", "sensor_delay"}) {
+    if (names.count(late) == 1) substitutes.insert({"motor_lag", "delay", "sensor_delay"});
+  }
+  for (const Refined& effect : selected) substitutes.erase(effect.candidate.name);
+  names.merge(substitutes);
+  return names;
+}
+
+}  // namespace swarmcert::identification
