@@ -90,6 +90,15 @@ Settled settle(const Passes& passes, const Coverage& covered) {
   return result;
 }
 
+double own_ratio(const stability::Model& model) {
+  double sum = 0;
+  for (const stability::EffectSpec& spec : model.effects) {
+    const auto ratio = spec.parameters.find("ratio");
+    if (spec.name == "thrust_ratio" && ratio != spec.parameters.end()) sum += ratio->second;
+  }
+  return sum;
+}
+
 ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   const auto checks = instrument(
@@ -99,14 +108,29 @@ ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   scale.is_known = true;
   scale.value = checks[0][0];
   // The model's own ratio counts as well.
-  for (const stability::EffectSpec& spec : model.effects) {
-    const auto ratio = spec.parameters.find("ratio");
-    const double offset = spec.name == "thrust_ratio" && ratio != spec.parameters.end() ? ratio->second : 0;
-    scale.value.least_squares += offset;
-    scale.value.instrument += offset;
-    scale.value.interval = {scale.value.interval.first + offset, scale.value.interval.second + offset};
-  }
+  const double own = own_ratio(model);
+  scale.value.least_squares += own;
+  scale.value.instrument += own;
+  scale.value.interval = {scale.value.interval.first + own, scale.value.interval.second + own};
   return scale;
+}
+
+/// Where set points show a scale of the thrust that least squares have put down to a constant force, that force says
+/// so: thrust that hardly varies looks like one, and thrust that answers disturbances hides the rest.
+void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
+                       std::vector<Missing>& ranking) {
+  constexpr double kSurely = 2;  // half widths of the 90 % interval
+  const Interval& interval = scale.value.interval;
+  const double excess = std::abs(scale.value.instrument - own_ratio(model));
+  if (!scale.is_known || excess <= kSurely * (interval.second - interval.first) / 2) return;
+  const auto names_scale = [](const Missing& missing) { return missing.effect == "thrust_ratio"; };
+  if (std::any_of(ranking.begin(), ranking.end(), names_scale)) return;
+  for (Missing& missing : ranking) {
+    if (missing.effect != "constant_force") continue;
+    const std::vector<std::string> rivals = missing.finding.confounded_with();
+    if (std::find(rivals.begin(), rivals.end(), "thrust_ratio") != rivals.end()) continue;
+    missing.finding.rivals.push_back({"thrust_ratio", stability::effect_info("thrust_ratio").excitation});
+  }
 }
 
 }  // namespace
@@ -145,6 +169,7 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.rmse_after_N = std::sqrt(selection.mean_square(selected.members));
   result.detectable = detectable(selected.grams, selected.members);
   result.thrust_scale = thrust_scale(passes, covered);
+  name_hidden_scale(*inputs.model_of(kind), result.thrust_scale, result.ranking);
   result.remainder = std::move(settled.rest);
   return result;
 }

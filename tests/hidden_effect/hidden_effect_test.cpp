@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <optional>
@@ -270,6 +271,30 @@ TEST(HiddenEffect, AMassInAStrongGustIsNamedAsAClass) {
     }
   }
   EXPECT_GE(named, 2);
+}
+
+/// Injected into recorded flights, most of a payload looks like the vehicles' own constant offsets.
+TEST(HiddenEffect, APayloadInRecordedFlightsIsNamedAtLeastAsARival) {
+  SWARMCERT_NEEDS_DATA();
+  const ScratchFolder folder;
+  Loop loop(folder);
+  for (const double ratio : {-0.1, 0.06}) {
+    SCOPED_TRACE(ratio);
+    write_text(folder / "payload.toml", read_text(source_path("stability/models/crazyflie-small.toml")) +
+                                            effect("thrust_ratio", "ratio = " + std::to_string(ratio)));
+    const std::string fleet = " --flights " + source_path("analysis/flights/flights.toml");
+    loop.demand("swarmcert compare payload.toml -q --force" + fleet + " " +
+                data_path("flights/visible_test/21_swap_ss") + " --inject injected");
+    const files::Json result = loop.run("diagnose injected" + fleet, "diagnose");
+    bool named = false;
+    for (const files::Json& entry : result["ranking"]) {
+      const auto rivals = entry["confounded_with"].get<std::vector<std::string>>();
+      named = named || entry["effect"] == "thrust_ratio" ||
+              std::find(rivals.begin(), rivals.end(), "thrust_ratio") != rivals.end();
+    }
+    EXPECT_TRUE(named) << result["ranking"].dump(1);
+    std::filesystem::remove_all(folder / "injected");
+  }
 }
 
 /// Never near the floor, where the effect counts as acting: its amplitude is defined at 0.06 m.
