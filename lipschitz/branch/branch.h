@@ -59,11 +59,10 @@ struct BranchResult {
 
 inline constexpr std::size_t kSteepCentres = 8;
 
-/// Best-first search over the union of the boxes. Each box bounds its neurons by linear relaxation (Reach), takes out those that it decides, and
-/// inherits the multipliers of an ancestor; the box that dominates gets multipliers of its own once enough of its
+/// Best-first search over the union of the boxes. Each box bounds its neurons by linear relaxation (Reach), takes out those
+/// that it decides, and inherits the multipliers of an ancestor; the box that dominates gets multipliers of its own once enough of its
 /// neurons are decided, and is halved otherwise. The slope at each box's centre says how far the bound can fall at most.
-/// The result depends on the options only, not on the machine's load
-/// (seconds unset). It can be used whenever the search stops.
+/// The result depends on the options only, not on the machine's load (seconds unset). It can be used whenever the search stops.
 BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options);
 
 }  // namespace swarmcert::lipschitz

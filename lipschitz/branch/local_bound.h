@@ -33,16 +33,16 @@ struct LocalBound {
   std::vector<Eigen::VectorXd> steep_centres;  ///< as BranchResult has them
 };
 
-/// Bound of `claim` for inputs in its box, both ends of the slope, or for all inputs by a projective cover: of a plain network or of phi; of a set function with one
-/// neighbour moving in the box, whatever the number and the places of the others, through a RhoForm.
+/// Bound of `claim` for inputs in its box, both ends of the slope, or for all inputs by a projective cover: of a plain
+/// network or of phi; of a set function with one neighbour moving in the box, whatever the number and the places of the
+/// others, through a RhoForm. For claims with a number of neighbours: the chain through rho, with what the others add before
+/// its first ReLU as an interval, shown by the parts of each kind's box.
 ///
 /// Branch and bound proposes, check::check_tree() verifies: what is returned has been accepted.
+/// @param domain by part; of all kinds where the claim has a number of neighbours.
 /// @param joint_t multipliers of the claim's global bound (UpperProof::t); empty: none, and then no proof for a set
 ///   function with any number of neighbours.
 /// @returns no proof for functions without hidden layers, and for rho alone.
-/// For claims with a number of neighbours as well: the chain through rho, with what the others add before its first ReLU
-/// as an interval, shown by the parts of each kind's box.
-/// @param domain by part; of all kinds where the claim has a number of neighbours.
 LocalBound local_bound(const files::Network& network, const Claim& claim,
                        const std::map<std::string, Box>& domain, const std::vector<double>& joint_t,
                        const BranchOptions& options);

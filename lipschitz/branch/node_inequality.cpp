@@ -69,10 +69,13 @@ void NodeInequality::add(const NeuronPair& pair) {
 }
 
 MatrixXd NodeInequality::slack_without_rho(const VectorXd& t) const {
-  VectorXd y(1 + neurons());
-  y << 0, t.head(neurons());
-  MatrixXd s = slack(y);
   const Index m = neurons();
+  MatrixXd s = -last_gram_;
+  for (Index i = 0; i < m; ++i) {  // a_i ends at its own neuron
+    const Index rows = inputs_ + i + 1;
+    s.col(inputs_ + i).head(rows) -= t(i) * a_.col(i).head(rows);
+    s.row(inputs_ + i).head(rows) -= t(i) * a_.col(i).head(rows).transpose();
+  }
   Index used = 0;
   MatrixXd left(size(), static_cast<Index>(pairs_.size())), right(size(), static_cast<Index>(pairs_.size()));
   for (std::size_t c = 0; c < pairs_.size(); ++c) {

@@ -20,15 +20,41 @@ struct Form {
   long terms = 0;                     ///< of `constant`
 };
 
+/// out += a p, then b q, d r and e s.
+void add_four(double* out, int size, const double* p, const double* q, const double* r, const double* s,
+              double a, double b, double d, double e) {
+  for (int j = 0; j < size; ++j) out[j] = (((out[j] + a * p[j]) + b * q[j]) + d * r[j]) + e * s[j];
+}
+
+/// Sum of c_i times row i of W over `rows`, four rows at a time: added one after the other as in a plain loop, but with
+/// fewer trips to memory.
+Row combined(const Row& c, const HiddenLayer& layer, const std::vector<int>& rows) {
+  Row sum(static_cast<std::size_t>(layer.inputs), 0.0);
+  double* const out = sum.data();
+  const auto row = [&](std::size_t n) {
+    return &layer.weights[static_cast<std::size_t>(rows[n]) * static_cast<std::size_t>(layer.inputs)];
+  };
+  const auto weight = [&](std::size_t n) { return c[static_cast<std::size_t>(rows[n])]; };
+  std::size_t n = 0;
+  for (; n + 4 <= rows.size(); n += 4) {
+    add_four(out, layer.inputs, row(n), row(n + 1), row(n + 2), row(n + 3), weight(n), weight(n + 1),
+             weight(n + 2), weight(n + 3));
+  }
+  for (; n < rows.size(); ++n) {
+    const double* const p = row(n);
+    for (int j = 0; j < layer.inputs; ++j) out[j] += weight(n) * p[j];
+  }
+  return sum;
+}
+
 /// Substitutes y = W h + b: the form becomes one in h.
 void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
-  Row next(static_cast<std::size_t>(layer.inputs), 0.0);
   double error = 0;
+  std::vector<int> used;
   for (int i = 0; i < layer.outputs; ++i) {
     const double c = form.coefficients[static_cast<std::size_t>(i)];
     if (c == 0) continue;
-    const double* const row = &layer.weights[static_cast<std::size_t>(i) * layer.inputs];
-    for (int j = 0; j < layer.inputs; ++j) next[static_cast<std::size_t>(j)] += c * row[j];
+    used.push_back(i);
     const double bias = c * layer.biases[static_cast<std::size_t>(i)];
     form.constant += bias;
     form.absolute += std::abs(bias);
@@ -41,6 +67,7 @@ void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
     ++form.terms;
   }
   form.error += 1.01 * (layer.outputs + 2) * kUnit * error;
+  Row next = combined(form.coefficients, layer, used);
   if (!std::all_of(next.begin(), next.end(), [](double c) { return std::isfinite(c); }))
     form.error = kInfinity;
   form.coefficients = std::move(next);

@@ -24,8 +24,8 @@ struct CheckResult {
 
 /// Verifies every statement of `certificate` against the weights of `network`: content hash; no unknown field; the
 /// named weights; each spectral norm from both sides; each upper bound by its linear matrix inequality
-/// (lipschitz_lmi.h), part by part on a box (tree_proof.h), as product of norms, or by a law from bounds verified before; each lower bound by the exact
-/// slope between its two witness points. A malformed certificate is answered with a reason, not with an exception.
+/// (lipschitz_lmi.h), part by part on a box (tree_proof.h), as product of norms, or by a law from bounds verified before;
+/// each lower bound by the exact slope between its two witness points. A malformed certificate is answered with a reason, not with an exception.
 CheckResult check(const files::Json& certificate, const files::Network& network);
 
 }  // namespace swarmcert::check

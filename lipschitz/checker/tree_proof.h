@@ -52,9 +52,11 @@ struct TreeVerdict {
 /// is followed by both halves, which share the plane of the cut. The slope of f along a segment is bounded by that of
 /// the parts it crosses, so each part may be proved alone.
 ///
-/// A part. Its neurons have bounds (box_states.h). On a pair of points of the part, dz = dy for a neuron whose y stays
-/// positive, and for an output without ReLU, dz = 0 where it stays negative, and dz (dy - dz) >= 0 otherwise. With multipliers t >= 0 of the last kind
-/// and everything expressed in (dx, dz of the undecided), the claim follows from
+/// A part. Its neurons have bounds (box_states.h). For the derivatives at almost every point of the part, dz = dy for a
+/// neuron whose y stays positive, and for an output without ReLU, dz = 0 where it stays negative, and dz (dy - dz) >= 0
+/// otherwise. Of two neurons in conflict one has u = 0, with u = dz (on) or dy - dz (off): u_1 u_2 = 0. With multipliers
+/// t >= 0 of the undecided, s of either sign of the conflicts, and everything expressed in (dx, dz of the undecided), the
+/// claim follows from
 ///   S = rho I_x - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') >= 0,
 /// with a_i = (dy_i in these variables) - e_i, and p_c, q_c one of e_i (on) and a_i (off) for the conflict's two neurons.
 /// S is computed in double together with a bound on the norm of what rounding changed, scaled to a unit diagonal by

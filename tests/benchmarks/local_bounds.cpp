@@ -1,10 +1,13 @@
 // Bounds on a box side by side: branch and bound with its checked proof, the bound for all inputs, and the norm of the
 // interval Jacobian over the whole box. Usage: benchmark_local_bounds [SECONDS], per function (default 60); the recorded
-// networks where they are present, else the bundled one. One thread. "witness": a slope attained in the box.
+// networks where they are present, else the bundled one. One thread. "witness": a slope attained in the box. "1.01 at":
+// boxes for that ratio, if the gap goes on falling as over the second half of the search: an estimate.
 #include <fmt/core.h>
 
 #include <Eigen/SVD>
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 
 #include "data.h"
@@ -50,8 +53,16 @@ double interval_jacobian(const files::Weights& weights, const lipschitz::Box& bo
   return middle.jacobiSvd().singularValues()(0) + radius.jacobiSvd().singularValues()(0);
 }
 
-void run(const std::string& name, const files::Network& network, const std::string& function,
-         double seconds) {
+/// Boxes for a ratio of 1.01, if the gap falls by the same power of them as from the first half to the end.
+std::string boxes_for_one_percent(const lipschitz::LocalBound& bound, double witness) {
+  const double gap = bound.upper.value() / witness - 1, before = bound.outlook.bound_halfway / witness - 1;
+  if (gap <= 0.01) return "reached";
+  if (!(before > gap)) return "never";
+  return fmt::format("{:.1e}", bound.nodes * std::pow(gap / 0.01, 1 / std::log2(before / gap)));
+}
+
+void run(const std::string& name, const files::Network& network, const std::string& function, double seconds,
+         const lipschitz::Neighbours& neighbours = {}) {
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::string part = function == "network" ? "network" : "phi:default";
   const files::Weights& weights = *parts.at(part);
@@ -64,8 +75,15 @@ void run(const std::string& name, const files::Network& network, const std::stri
   lipschitz::Claim claim;
   claim.function = function;
   claim.domain = "box";
-  const lipschitz::FoundSlope slope = lipschitz::lower_bound(network, claim, {{part, box}}, {});
-  const double witness = slope.witness ? slope.witness->slope.value() : 0;
+  claim.neighbours = neighbours;
+  const std::map<std::string, lipschitz::Box> domain = {{part, box}};
+  lipschitz::LowerBoundOptions lower;
+  double witness = 0;
+  const auto look_for_slopes = [&] {
+    const lipschitz::FoundSlope found = lipschitz::lower_bound(network, claim, domain, lower);
+    if (found.witness) witness = std::max(witness, found.witness->slope.value());
+  };
+  look_for_slopes();
   const lipschitz::SdpBound global = lipschitz::sdp_bound(check::stages(network, function));
 
   lipschitz::BranchOptions options;
@@ -73,21 +91,24 @@ void run(const std::string& name, const files::Network& network, const std::stri
   options.seconds = seconds;
   options.known = witness;
   const auto start = std::chrono::steady_clock::now();
-  const lipschitz::LocalBound bound = lipschitz::local_bound(network, claim, box, global.proof->t, options);
+  const lipschitz::LocalBound bound =
+      lipschitz::local_bound(network, claim, domain, global.proof->t, options);
   const double total = since(start);
+  lower.starts = bound.steep_centres;
+  look_for_slopes();
   const double jacobian = function == "network" ? interval_jacobian(weights, box) : 0;
-  fmt::print("{:<12} {:>9.4f} {:>9.4f} {:>8.4f} {:>9.4f} {:>7.3f} {:>9.1f} {:>8.1f} {:>8}\n", name,
+  fmt::print("{:<12} {:>9.4f} {:>9.4f} {:>8.4f} {:>9.4f} {:>7.3f} {:>9.1f} {:>8.1f} {:>8} {:>8}\n", name,
              bound.upper.value(), witness, witness > 0 ? bound.upper.value() / witness : 0,
              global.proof->upper.value(), global.proof->upper.value() / bound.upper.value(), jacobian, total,
-             bound.nodes);
+             bound.nodes, boxes_for_one_percent(bound, witness));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 60;
-  fmt::print("{:<12} {:>9} {:>9} {:>8} {:>9} {:>7} {:>9} {:>8} {:>8}\n", "function", "branch", "witness",
-             "ratio", "all x", "gain", "interval", "s+check", "boxes");
+  fmt::print("{:<12} {:>9} {:>9} {:>8} {:>9} {:>7} {:>9} {:>8} {:>8} {:>8}\n", "function", "branch",
+             "witness", "ratio", "all x", "gain", "interval", "s+check", "boxes", "1.01 at");
   const auto weights = [](const std::string& name) {
     return files::load_weights(tests::data_path("weights/zip_f32/" + name));
   };
@@ -108,5 +129,6 @@ int main(int argc, char** argv) {
     network.phi["default"] = weights(std::string("phi_") + kind + ".pth");
     network.rho["default"] = weights(std::string("rho_") + kind + ".pth");
     run(std::string("set ") + kind, network, "set:default:default", seconds);
+    run(std::string("set ") + kind + ", 1", network, "set:default:default", seconds, {{"default", 1}});
   }
 }
