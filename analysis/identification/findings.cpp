@@ -69,8 +69,12 @@ void find_rivals(const Selection& selection, const Members& members, Finding& fi
     const Members instead = with(rest, rival);
     const bool explains = rest_square - selection.mean_square(instead) > kShare * (rest_square - full_square);
     if (!explains) continue;
-    if (paired_z(selection.block_errors(instead), full_errors) < kClearlyBetter_z)
-      finding.rivals.push_back({selection.candidate(rival).name, selection.candidate(rival).info.excitation});
+    const Candidate& other = selection.candidate(rival);
+    // A constant force for all and one for each vehicle have one name.
+    const bool is_known = std::any_of(finding.rivals.begin(), finding.rivals.end(),
+                                      [&](const Rival& r) { return r.effect == other.name; });
+    if (!is_known && paired_z(selection.block_errors(instead), full_errors) < kClearlyBetter_z)
+      finding.rivals.push_back({other.name, other.info.excitation});
     widen(finding.model_form, selection.fit(with(instead, members.back())).coefficients.tail(p));
   }
 }
