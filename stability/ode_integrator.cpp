@@ -4,12 +4,13 @@
 #include <cvode/cvode.h>
 #include <nvector/nvector_serial.h>
 #include <sundials/sundials_context.h>
-#include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "stability/ode_algebra.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -90,7 +91,8 @@ struct OdeIntegrator::Solver {
     if (method == OdeMethod::kBdf) {
       const sunindextype size = N_VGetLength(y);
       matrix = made(SUNDenseMatrix(size, size, context), "SUNDenseMatrix");
-      linear = made(SUNLinSol_Dense(y, matrix, context), "SUNLinSol_Dense");
+      compute_with_eigen(matrix);
+      linear = made(eigen_solver(context), "SUNLinSolNewEmpty");
       check(CVodeSetLinearSolver(memory, linear, matrix), "CVodeSetLinearSolver");
     } else {
       nonlinear = made(SUNNonlinSol_FixedPoint(y, 0, context), "SUNNonlinSol_FixedPoint");
@@ -109,6 +111,7 @@ OdeIntegrator::OdeIntegrator(OdeMethod method, Derivative derivative, double rel
   check(SUNContext_Create(nullptr, &solver_->context), "SUNContext_Create");
   const auto size = static_cast<sunindextype>(absolute.size());
   solver_->y = made(N_VNew_Serial(size, solver_->context), "N_VNew_Serial");
+  compute_with_eigen(solver_->y);
   solver_->absolute = made(N_VNew_Serial(size, solver_->context), "N_VNew_Serial");
   std::copy(absolute.begin(), absolute.end(), N_VGetArrayPointer(solver_->absolute));
 }
