@@ -10,11 +10,19 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 std::optional<ContractingSystem> contracting(const TransferFunction& h) {
-  const std::size_t n = h.denominator.size() - 1;
+  return contracting(IntervalVector(h.numerator.begin(), h.numerator.end()),
+                     IntervalVector(h.denominator.begin(), h.denominator.end()));
+}
+
+std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
+                                             const IntervalVector& denominator) {
+  const std::size_t n = denominator.size() - 1;
   const auto size = static_cast<Index>(n);
   double slowest = 1e300;
   double fastest = 0;
-  for (const std::complex<double>& pole : poles(h.denominator)) {
+  Polynomial middle;
+  for (const Interval& x : denominator) middle.push_back(x.lo + (x.hi - x.lo) / 2);
+  for (const std::complex<double>& pole : poles(middle)) {
     slowest = std::min(slowest, -pole.real());
     fastest = std::max(fastest, std::abs(pole));
   }
@@ -26,8 +34,7 @@ std::optional<ContractingSystem> contracting(const TransferFunction& h) {
   MatrixXd approximate = MatrixXd::Zero(size, size);
   std::vector<Interval> a(n + 1);  // monic, scaled
   for (std::size_t k = 0; k <= n; ++k) {
-    a[k] = Interval(h.denominator[k]) / Interval(h.denominator[n]) /
-           Interval(std::ldexp(1.0, exponent * static_cast<int>(n - k)));
+    a[k] = denominator[k] / denominator[n] / Interval(std::ldexp(1.0, exponent * static_cast<int>(n - k)));
   }
   for (std::size_t k = 0; k + 1 < n; ++k) {
     companion(k, k + 1) = 1;
@@ -82,9 +89,9 @@ std::optional<ContractingSystem> contracting(const TransferFunction& h) {
   IntervalVector initial(n);
   for (std::size_t k = 0; k < n; ++k) {
     const std::size_t power = n - 1 - k;
-    Interval c = power < h.numerator.size() ? Interval(h.numerator[power]) / Interval(h.denominator[n]) /
-                                                  Interval(std::ldexp(1.0, exponent * static_cast<int>(k)))
-                                            : Interval(0);
+    Interval c = power < numerator.size() ? numerator[power] / denominator[n] /
+                                                Interval(std::ldexp(1.0, exponent * static_cast<int>(k)))
+                                          : Interval(0);
     for (std::size_t j = 0; j < k; ++j) c = c - a[n - k + j] * initial[j];
     initial[k] = c;
   }

@@ -231,17 +231,70 @@ class Enclosure {
   double step_remainder_ = 0;
 };
 
-}  // namespace
+IntervalVector intervals(const Polynomial& p) { return IntervalVector(p.begin(), p.end()); }
 
-std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel) {
-  if (loop.delay_s > 0) return std::nullopt;
-  const bool integrates = loop.Ki > 0;
-  const TransferFunction y = integrates ? step_transfer(loop, channel) : impulse_transfer(loop, channel);
-  const std::optional<ContractingSystem> system =
-      contracting({y.numerator, sum(y.denominator, y.feedback), {}, 0});
+/// denominator + feedback times the first `order` + 1 terms of e^(-Ts).
+IntervalVector with_expanded_delay(const TransferFunction& y, std::size_t order) {
+  IntervalVector result = intervals(y.denominator);
+  Interval term = 1;
+  for (std::size_t j = 0; j <= order; ++j) {
+    if (j > 0) term = -(term * Interval(y.delay_s) / Interval(static_cast<double>(j)));
+    for (std::size_t i = 0; i < y.feedback.size(); ++i) result[i + j] += term * Interval(y.feedback[i]);
+  }
+  return result;
+}
+
+/// Upper bound of |feedback/denominator (e^(-Ts) - its expansion)|_1; see verified_norms().
+double rest_of_delay(const TransferFunction& y, std::size_t order, const IntervalVector& denominator) {
+  IntervalVector numerator = intervals(y.feedback);
+  numerator.insert(numerator.begin(), order, Interval(0));
+  const std::optional<ContractingSystem> system = contracting(numerator, denominator);
+  if (!system) return kInfinity;
+  Interval weight = 1;  // T^(order + 1)/(order + 1)!
+  for (std::size_t j = 1; j <= order + 1; ++j) {
+    weight = weight * Interval(y.delay_s) / Interval(static_cast<double>(j));
+  }
+  const Interval jump =
+      numerator.size() + 1 == denominator.size() ? abs(numerator.back() / denominator.back()) : Interval(0);
+  return (weight * (jump + Enclosure(*system).run(2, Interval(0)).amplitude)).hi;
+}
+
+/// The norms of the loop whose characteristic polynomial is `denominator`.
+std::optional<VerifiedNorms> norms_over(const TransferFunction& y, const IntervalVector& denominator,
+                                        bool integrates) {
+  const std::optional<ContractingSystem> system = contracting(intervals(y.numerator), denominator);
   if (!system) return std::nullopt;
   if (integrates) return Enclosure(*system).run(2, Interval(0));
   return Enclosure(*system).run(1, Interval(y.numerator[0]) / Interval(y.feedback[0]));
+}
+
+}  // namespace
+
+std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel) {
+  const bool integrates = loop.Ki > 0;
+  const TransferFunction y = integrates ? step_transfer(loop, channel) : impulse_transfer(loop, channel);
+  if (loop.delay_s == 0) return norms_over(y, intervals(sum(y.denominator, y.feedback)), integrates);
+  constexpr double kSharp = 0.01;
+  std::size_t order = y.denominator.size() - y.feedback.size();
+  IntervalVector denominator;
+  double rest = kInfinity;
+  while (order-- > 0 && !(rest < kSharp)) {
+    IntervalVector expanded = with_expanded_delay(y, order);
+    const double missed = rest_of_delay(y, order, expanded);
+    if (missed < rest) rest = missed, denominator = std::move(expanded);
+  }
+  if (!(rest < 1)) return std::nullopt;
+  std::optional<VerifiedNorms> norms = norms_over(y, denominator, integrates);
+  if (!norms) return std::nullopt;
+  const Interval more = Interval(1) / (Interval(1) - Interval(rest));
+  const Interval less = Interval(1) / (Interval(1) + Interval(rest));
+  for (const auto gain :
+       {&VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse}) {
+    Interval& x = *norms.*gain;
+    if (std::isfinite(x.hi)) x = {(x * less).lo, (x * more).hi};
+  }
+  norms->delay_gain = rest;
+  return norms;
 }
 
 }  // namespace swarmcert::stability
