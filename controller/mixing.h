@@ -227,13 +227,72 @@ inline Scalar largest_share(int count, const Scalar* base, const Scalar* added,
   return share;
 }
 
+template <typename Scalar>
+struct TorqueShares {
+  Scalar roll_pitch, yaw;
+};
+
+/// Shares (a, b) in [0, 1]^2 with base + a tilt + b yaw within the limits for every rotor: the largest a for which there
+/// is such a b, and the largest b for it. A linear program in two unknowns, one half-plane after the other (Seidel 1991):
+/// where one cuts off the best point so far, the best lies on its edge.
+/// @param known shares that are within the limits, returned where rounding leaves no better ones.
+template <typename Scalar>
+inline TorqueShares<Scalar> best_shares(int count, const Scalar* base, const Scalar* tilt, const Scalar* yaw,
+                                        const ForceLimits<Scalar>& limits,
+                                        const TorqueShares<Scalar>& known) {
+  const Scalar zero(0), one(1);
+  Scalar room[2 * kMostRotors];  // rotor i at its upper limit: 2i; at its lower, with signs changed: 2i + 1
+  for (int i = 0; i < count; ++i) {
+    room[2 * i] = limits.upper_N - base[i];
+    room[2 * i + 1] = base[i] - limits.lower_N;
+  }
+  TorqueShares<Scalar> best{one, one};
+  for (int k = 0; k < 2 * count; ++k) {
+    const Scalar a = k % 2 == 0 ? tilt[k / 2] : -tilt[k / 2], b = k % 2 == 0 ? yaw[k / 2] : -yaw[k / 2];
+    if (product(a, best.roll_pitch) + product(b, best.yaw) <= room[k]) continue;
+    // The edge: point + t direction, along which a, or where it stands still b, grows.
+    const Scalar length2 = product(a, a) + product(b, b);
+    if (!(length2 > zero)) return known;
+    const Scalar along = room[k] / length2;
+    const TorqueShares<Scalar> point{product(a, along), product(b, along)};
+    const bool turns = b < zero || (!(b > zero) && a > zero);
+    const TorqueShares<Scalar> direction{turns ? -b : b, turns ? a : -a};
+    Scalar from = zero, to = zero;
+    bool is_first_from = true, is_first_to = true;
+    const auto keep = [&](const Scalar& slope, const Scalar& left) {  // t slope <= left
+      if (slope > zero) {
+        const Scalar t = left / slope;
+        if (is_first_to || t < to) to = t, is_first_to = false;
+      } else if (slope < zero) {
+        const Scalar t = left / slope;
+        if (is_first_from || t > from) from = t, is_first_from = false;
+      }
+    };
+    keep(direction.roll_pitch, one - point.roll_pitch);
+    keep(-direction.roll_pitch, point.roll_pitch);
+    keep(direction.yaw, one - point.yaw);
+    keep(-direction.yaw, point.yaw);
+    for (int j = 0; j < k; ++j) {
+      const Scalar a_j = j % 2 == 0 ? tilt[j / 2] : -tilt[j / 2], b_j = j % 2 == 0 ? yaw[j / 2] : -yaw[j / 2];
+      keep(product(a_j, direction.roll_pitch) + product(b_j, direction.yaw),
+           room[j] - product(a_j, point.roll_pitch) - product(b_j, point.yaw));
+    }
+    if (is_first_to || (!is_first_from && from > to)) return known;
+    best = {clamp(point.roll_pitch + product(to, direction.roll_pitch), zero, one),
+            clamp(point.yaw + product(to, direction.yaw), zero, one)};
+  }
+  return best.roll_pitch > known.roll_pitch ? best : known;
+}
+
 }  // namespace detail
 
 /// Thrust mixing by priority: yaw torque is given up first, then roll and pitch torque (both by the same share), and
 /// thrust last, only where the rotors together cannot push that much or that little.
 ///
 /// f = B^+ (T, 0) + a B^+ (0, tau_x, tau_y, 0) + b B^+ (0, 0, 0, tau_z) with T the nearest feasible thrust, then the
-/// largest a in [0, 1], then the largest b in [0, 1] with all forces within the limits. Mixing by priority with the
+/// largest a in [0, 1] that some b in [0, 1] allows, then the largest such b, with all forces within the limits. So a
+/// wrench whose forces are within the limits is given as it is, also where roll and pitch alone would not be; and
+/// forces follow the wrench without jumps. Mixing by priority with the
 /// motors' limits at the present battery voltage follows Faessler, Falanga and Scaramuzza, "Thrust mixing,
 /// saturation, and body-rate control for accurate aggressive quadrotor flight", RA-L 2017; the order is that of this
 /// project: the tracking bounds rest on the thrust. Keep the thrust that you ask for below all rotors' limit, or
@@ -282,6 +341,20 @@ inline Mixed<Scalar> mix(const Allocation<Scalar>& allocation, const ForceLimits
   result.valid = true;
 
   result.roll_pitch_share = detail::largest_share(allocation.count, force, added, limits);
+  if (result.roll_pitch_share < Scalar(1) && allocation.rank == 4 && !(wanted.torque_N_m.z == zero)) {
+    const detail::TorqueShares<Scalar> shares =
+        detail::best_shares(allocation.count, force, added, yaw, limits, {result.roll_pitch_share, zero});
+    if (shares.roll_pitch > result.roll_pitch_share) {
+      for (int i = 0; i < allocation.count; ++i) {
+        result.forces.at_N[i] =
+            clamp(force[i] + product(shares.roll_pitch, added[i]) + product(shares.yaw, yaw[i]),
+                  limits.lower_N, limits.upper_N);
+      }
+      result.roll_pitch_share = shares.roll_pitch;
+      result.yaw_share = shares.yaw;
+      return result;
+    }
+  }
   for (int i = 0; i < allocation.count; ++i) {
     force[i] = clamp(force[i] + product(result.roll_pitch_share, added[i]), limits.lower_N, limits.upper_N);
   }

@@ -109,17 +109,36 @@ class Mixing : public testing::Test {
 };
 
 TEST_F(Mixing, FeasibleWrenchesAreGivenExactly) {
-  int kept = 0;
+  // Feasible: the least forces that give the wrench lie within the limits. Where roll or pitch alone would not, with
+  // the yaw torque that is wanted too it may.
+  int kept = 0, needs_yaw = 0;
   for (const Rotors<double>& vehicle : all_vehicles()) {
     const Rotors<float> rotors = cast<float>(vehicle);
     const Allocation<float> a = allocation(rotors);
-    for (int i = 0; i < 2000; ++i) {
-      Wrench<float> wanted = random_wrench(rotors, 0.5);
+    for (int i = 0; i < 4000; ++i) {
+      RotorForces<float> some;
+      for (int k = 0; k < rotors.count; ++k) {
+        some.at_N[k] = static_cast<float>(tests::uniform(generator_, 0, 1)) * kLargest_N;
+      }
+      Wrench<float> wanted = wrench(rotors, some);
       if (a.rank == 3) wanted.torque_N_m.z = 0;
+      const float eta[] = {wanted.thrust_N, wanted.torque_N_m.x, wanted.torque_N_m.y, wanted.torque_N_m.z};
+      bool is_feasible = true;
+      for (int k = 0; k < rotors.count; ++k) {
+        float least = 0;
+        for (int row = 0; row < 4; ++row) least += a.inverse[k][row] * eta[row];
+        is_feasible = is_feasible && least > 1e-5f && least < kLargest_N - 1e-5f;
+      }
+      if (!is_feasible) continue;
+      ++kept;
+      Wrench<float> without_yaw = wanted;
+      without_yaw.torque_N_m.z = 0;
+      needs_yaw += mix(a, kLimits, without_yaw).roll_pitch_share < 1;
       const Mixed<float> mixed = mix(a, kLimits, wanted);
       ASSERT_TRUE(mixed.valid);
-      if (mixed.thrust_limited || mixed.roll_pitch_share < 1 || mixed.yaw_share < 1) continue;
-      ++kept;
+      ASSERT_FALSE(mixed.thrust_limited);
+      ASSERT_EQ(mixed.roll_pitch_share, 1) << rotors.count << " rotors";
+      ASSERT_EQ(mixed.yaw_share, 1) << rotors.count << " rotors";
       const Wrench<float> given = wrench(rotors, mixed.forces);
       EXPECT_NEAR(given.thrust_N, wanted.thrust_N, 1e-6);
       EXPECT_NEAR(given.torque_N_m.x, wanted.torque_N_m.x, 1e-7);
@@ -130,6 +149,33 @@ TEST_F(Mixing, FeasibleWrenchesAreGivenExactly) {
     }
   }
   EXPECT_GT(kept, 3000);
+  EXPECT_GT(needs_yaw, 300);
+}
+
+TEST_F(Mixing, ForcesFollowTheWrenchWithoutJumps) {
+  // Out from feasible wrenches through every limit: a step of 1e-4 of the torques moves no force by more than 1e-2.
+  for (const Rotors<double>& rotors : all_vehicles()) {
+    const Allocation<double> a = allocation(rotors);
+    const ForceLimits<double> limits{0, 0.15};
+    int limited = 0;
+    for (int i = 0; i < 20; ++i) {
+      const auto at = [&, x = tests::uniform(generator_, -1, 1), y = tests::uniform(generator_, -1, 1),
+                       z = tests::uniform(generator_, -1, 1)](double size) {
+        return mix(a, limits,
+                   {0.3 * rotors.count * 0.15, {size * 0.02 * x, size * 0.02 * y, size * 0.003 * z}});
+      };
+      Mixed<double> last = at(0);
+      for (double size = 0; size < 2; size += 1e-4) {
+        const Mixed<double> mixed = at(size);
+        limited += mixed.roll_pitch_share < 1;
+        for (int k = 0; k < rotors.count; ++k) {
+          ASSERT_LT(std::abs(mixed.forces.at_N[k] - last.forces.at_N[k]), 0.01 * 0.15) << size;
+        }
+        last = mixed;
+      }
+    }
+    EXPECT_GT(limited, 1000);
+  }
 }
 
 TEST_F(Mixing, ForcesStayWithinTheLimitsWhateverIsAsked) {
@@ -168,11 +214,14 @@ TEST_F(Mixing, GivesUpYawBeforeRollAndPitchBeforeThrust) {
       EXPECT_NEAR(given.torque_N_m.x, mixed.roll_pitch_share * wanted.torque_N_m.x, 2e-7);
       EXPECT_NEAR(given.torque_N_m.y, mixed.roll_pitch_share * wanted.torque_N_m.y, 2e-7);
       lost_roll += mixed.roll_pitch_share < 1.0f;
-      if (mixed.roll_pitch_share > 0.01f && mixed.roll_pitch_share < 1.0f) {
-        // As much as the limits allow: a rotor is at its limit, by roll and pitch alone.
-        Wrench<float> more = {wanted.thrust_N, scaled(1.01f * mixed.roll_pitch_share, wanted.torque_N_m)};
-        more.torque_N_m.z = 0;
-        EXPECT_LT(mix(a, kLimits, more).roll_pitch_share, 1.0f);
+      if (mixed.roll_pitch_share > 0.01f && mixed.roll_pitch_share < 0.98f) {
+        // As much as the limits allow, whatever the share of yaw.
+        for (int share = 0; share <= 10; ++share) {
+          Wrench<float> more = wanted;
+          more.torque_N_m = scaled(1.01f * mixed.roll_pitch_share, wanted.torque_N_m);
+          more.torque_N_m.z = 0.1f * static_cast<float>(share) * wanted.torque_N_m.z;
+          EXPECT_LT(mix(a, kLimits, more).roll_pitch_share, 1.0f) << share;
+        }
       }
       if (mixed.yaw_share < 1.0f) ++lost_yaw;
       if (a.rank == 4) {
@@ -181,7 +230,7 @@ TEST_F(Mixing, GivesUpYawBeforeRollAndPitchBeforeThrust) {
       // The yaw torque does not take from the others.
       Wrench<float> without_yaw = wanted;
       without_yaw.torque_N_m.z = 0;
-      EXPECT_EQ(mix(a, kLimits, without_yaw).roll_pitch_share, mixed.roll_pitch_share);
+      EXPECT_LE(mix(a, kLimits, without_yaw).roll_pitch_share, mixed.roll_pitch_share);
     }
   }
   EXPECT_GT(lost_yaw, 1000);
