@@ -102,11 +102,21 @@ std::string pair_text(const Json& pair) { return number_text(pair[0]) + " .. " +
 
 namespace {
 
+/// An upper bound that is missing where a gain is finite at every point tried proves nothing.
+const char* status_of(const UncertainNorms& norms) {
+  if (std::isinf(norms.amplitude.lower)) return "unstable";
+  for (const UncertainGain* const gain : {&norms.rate, &norms.amplitude, &norms.edge, &norms.impulse}) {
+    if (std::isfinite(gain->lower) && !std::isfinite(gain->upper)) return "inconclusive";
+  }
+  return "enclosed";
+}
+
 Json uncertain_row(int axis, Channel channel, Loop loop, const UncertainNorms& norms) {
   return {{"axis", axis_name(axis)},
           {"channel", name(channel)},
           {"loop", name(loop)},
-          {"status", "enclosed"},
+          {"status", status_of(norms)},
+          {"evaluations", norms.evaluations},
           {"rate", gain_json(norms.rate)},
           {"amplitude", gain_json(norms.amplitude)},
           {"edge", gain_json(norms.edge)},
@@ -160,8 +170,8 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
       norms = uncertain_norms(SampledLoop{fixed, 1 / input.gains.rate_hz, input.gains.integrator_step_s},
                               plant, task.channel);
     } else {
-      // With a delay an evaluation takes longer by far: wider enclosures.
-      norms = plant.delay_s.to > 0 ? uncertain_norms(fixed, plant, task.channel, 0.05, 100)
+      // With a delay an evaluation takes up to a tenth of a second: wider enclosures, of fewer of them.
+      norms = plant.delay_s.to > 0 ? uncertain_norms(fixed, plant, task.channel, 0.05, 400)
                                    : uncertain_norms(fixed, plant, task.channel);
     }
     progress(++done, total);
@@ -198,6 +208,12 @@ void print_uncertain(const Json& uncertain) {
                g["axis"].get<std::string>(), g["channel"].get<std::string>(), g["loop"].get<std::string>(),
                pair_text(g["amplitude"]), pair_text(g["impulse"]), "", pair_text(g["edge"]),
                pair_text(g["rate"]));
+    if (g["status"] == "inconclusive") {
+      fmt::print("{:25}inconclusive: {} loops tried, not all of the intervals proved stable; narrow them\n",
+                 "", g["evaluations"].get<int>());
+    } else if (g["status"] == "unstable") {
+      fmt::print("{:25}unstable for some values of the intervals\n", "");
+    }
   }
 }
 
@@ -232,9 +248,12 @@ Json verified_json(const Tracking& input) {
       row["status"] = norms ? "proved" : "inconclusive";
       if (norms) {
         row.update(verified_gains_json(*norms));
+        if (loop->delay_s > 0) row["delay_gain"] = norms->delay_gain;
       } else {
-        row["why"] = loop->delay_s > 0 ? "a delay has no interval method for the continuous loop"
-                                       : "stability could not be verified in intervals";
+        row["why"] = loop->delay_s > 0
+                         ? "the loop gain of what the delay changes is not below 1: a shorter delay "
+                           "or lower gains would be needed"
+                         : "stability could not be verified in intervals";
       }
       rows.push_back(std::move(row));
       if (!sampled) continue;
@@ -268,6 +287,10 @@ void print_verified(const Json& verified) {
     };
     fmt::print("{}  {}\n                        {}  {}\n", text("rate"), text("amplitude"), text("edge"),
                text("impulse"));
+    if (row.contains("delay_gain")) {
+      fmt::print("{:24}the delay alone makes them {:.2g} % wide\n", "",
+                 200 * row["delay_gain"].get<double>());
+    }
   }
 }
 

@@ -26,6 +26,16 @@ struct Swarm::PairBatch {
   std::vector<std::size_t> own, other;  ///< of each pair: where the two lie in the rows of states
   std::vector<double> masses_kg;        ///< of each pair's neighbour
   Rows pairs, scratch, force_N;
+  std::size_t lines = 0, vehicle_lines = 0;  ///< that these have room for
+
+  void make_room(std::size_t for_lines, std::size_t for_vehicle_lines) {
+    if (for_lines <= lines && for_vehicle_lines <= vehicle_lines) return;
+    lines = std::max(lines, for_lines);
+    vehicle_lines = std::max(vehicle_lines, for_vehicle_lines);
+    pairs = Rows(6 * lines);
+    scratch = Rows(2 * (lines + vehicle_lines));
+    force_N = Rows(vehicle_lines);
+  }
 
   void clear() {
     for (std::vector<int>* list : {&vehicles, &ends}) list->clear();
@@ -287,10 +297,8 @@ void Swarm::pair_up(const VehicleInput* inputs) {
   }
   for (PairBatch& batch : batches_) {
     if (batch.applied == nullptr) continue;
-    const std::size_t lines = lines_for(batch.own.size()), vehicle_lines = lines_for(batch.vehicles.size());
-    batch.pairs = Rows(6 * lines);
-    batch.scratch = Rows(2 * (lines + vehicle_lines));
-    batch.force_N = Rows(vehicle_lines);
+    const std::size_t lines = lines_for(batch.own.size());
+    batch.make_room(lines, lines_for(batch.vehicles.size()));
     double* const constant = batch.pairs.data() + 5 * lines * kRowLength;
     for (std::size_t k = 0; k < batch.own.size(); ++k) {
       constant[k] = batch.applied->effect().pair_constant(batch.masses_kg[k], batch.applied->shape().data());

@@ -258,6 +258,55 @@ TEST(BoundCommand, EnclosuresAndIntervalsContainTheEstimate) {
   EXPECT_EQ(run_shell("swarmcert bound" + gains + " --uncertain weight=1:2", folder.path()).exit_code, 2);
 }
 
+TEST(BoundCommand, ADelayIsVerifiedAndADelayIntervalOnTheFlownGainsEnds) {
+  const ScratchFolder folder;
+  const Json verified =
+      json_of(folder, "bound" +
+                          gains_file(folder,
+                                     "[position]\nKp = 10\nKd = 5\nKi = 10\n[lag]\nmotor_s = 0.0575\n"
+                                     "delay_s = 0.004\n") +
+                          " --verified");
+  for (std::size_t i = 0; i < 6; ++i) {
+    const Json& row = verified["verified"][i];
+    ASSERT_EQ(row["status"], "proved");
+    EXPECT_LT(row["delay_gain"].get<double>(), 0.003);
+    for (const char* gain : {"rate", "amplitude", "edge", "impulse"}) {
+      const double value = verified["exact"][i][gain].get<double>();
+      EXPECT_LE(row[gain][0].get<double>(), value) << gain;
+      EXPECT_GE(row[gain][1].get<double>(), value) << gain;
+      EXPECT_LT(row[gain][1].get<double>(), 1.004 * value) << gain;
+    }
+  }
+  const Json uncertain = json_of(
+      folder, "bound" + kFlown + " --uncertain mass=0.034:0.034 thrust=1:1 lag=0.0575:0.0575 delay=0:0.01");
+  ASSERT_EQ(uncertain["uncertain"]["gains"].size(), 12u);
+  for (const Json& row : uncertain["uncertain"]["gains"]) {
+    EXPECT_EQ(row["status"], "enclosed") << row;
+    for (const char* gain : {"rate", "amplitude", "edge", "impulse"}) {
+      EXPECT_LE(row[gain][0].get<double>(), row[gain][1].get<double>()) << row;
+    }
+  }
+  // Too long for the vehicle: said, not enclosed.
+  const Json unstable = json_of(
+      folder, "bound" + kFlown + " --uncertain mass=0.034:0.034 thrust=1:1 lag=0.0575:0.0575 delay=0:0.3");
+  EXPECT_EQ(unstable["uncertain"]["gains"][0]["status"], "unstable");
+}
+
+TEST(IssCheckCommand, WithoutAViolationAndWithoutTheTheoremItIsInconclusive) {
+  // A delay takes away the theorem, and the integrated loop has none: nothing is violated, and nothing is shown.
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n[lag]\ndelay_s = 0.01\n");
+  const Outcome outcome =
+      run_shell("swarmcert iss-check" + gains + " --runs 10 --json out.json", folder.path());
+  EXPECT_EQ(outcome.exit_code, 4) << outcome.output;
+  const Json result = files::parse_json(read_text(folder / "out.json"), "out.json");
+  EXPECT_EQ(result["verdict"], "inconclusive");
+  EXPECT_FALSE(result["theorem"]["applies"].get<bool>());
+  EXPECT_FALSE(result["theorem"]["why_not"].empty());
+  EXPECT_EQ(result["violations"], 0);
+  EXPECT_EQ(result["delay_left_out_s"], 0.01);
+}
+
 TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");
