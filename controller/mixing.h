@@ -206,9 +206,10 @@ struct Mixed {
 namespace detail {
 
 /// Largest share in [0, 1] of `added` that keeps base + share * added within the limits, for every rotor.
+/// @param limiting set to the rotor that allows no more, where the share is below 1.
 template <typename Scalar>
 inline Scalar largest_share(int count, const Scalar* base, const Scalar* added,
-                            const ForceLimits<Scalar>& limits) {
+                            const ForceLimits<Scalar>& limits, int& limiting) {
   const Scalar zero(0);
   Scalar share(1);
   for (int i = 0; i < count; ++i) {
@@ -222,7 +223,10 @@ inline Scalar largest_share(int count, const Scalar* base, const Scalar* added,
       continue;
     }
     const Scalar own = clamp(room / added[i], zero, Scalar(1));
-    if (own < share) share = own;
+    if (own < share) {
+      share = own;
+      limiting = i;
+    }
   }
   return share;
 }
@@ -232,56 +236,56 @@ struct TorqueShares {
   Scalar roll_pitch, yaw;
 };
 
-/// Shares (a, b) in [0, 1]^2 with base + a tilt + b yaw within the limits for every rotor: the largest a for which there
-/// is such a b, and the largest b for it. A linear program in two unknowns, one half-plane after the other (Seidel 1991):
-/// where one cuts off the best point so far, the best lies on its edge.
-/// @param known shares that are within the limits, returned where rounding leaves no better ones.
+/// The largest share a of roll and pitch for which some share b of yaw keeps base + a tilt + b yaw within the limits.
+///
+/// The largest a of each b is the least of what the rotors allow, a concave function of b. This walks on it upwards from
+/// b = 0, along the limit of one rotor after the other, while more yaw relieves the rotor that allows least.
+/// @param shares   the largest a for b = 0, below 1.
+/// @param limiting the rotor that allows no more.
 template <typename Scalar>
-inline TorqueShares<Scalar> best_shares(int count, const Scalar* base, const Scalar* tilt, const Scalar* yaw,
-                                        const ForceLimits<Scalar>& limits,
-                                        const TorqueShares<Scalar>& known) {
+inline TorqueShares<Scalar> relieved_by_yaw(int count, const Scalar* base, const Scalar* tilt,
+                                            const Scalar* yaw, const ForceLimits<Scalar>& limits,
+                                            TorqueShares<Scalar> shares, int limiting) {
   const Scalar zero(0), one(1);
-  Scalar room[2 * kMostRotors];  // rotor i at its upper limit: 2i; at its lower, with signs changed: 2i + 1
-  for (int i = 0; i < count; ++i) {
-    room[2 * i] = limits.upper_N - base[i];
-    room[2 * i + 1] = base[i] - limits.lower_N;
-  }
-  TorqueShares<Scalar> best{one, one};
-  for (int k = 0; k < 2 * count; ++k) {
-    const Scalar a = k % 2 == 0 ? tilt[k / 2] : -tilt[k / 2], b = k % 2 == 0 ? yaw[k / 2] : -yaw[k / 2];
-    if (product(a, best.roll_pitch) + product(b, best.yaw) <= room[k]) continue;
-    // The edge: point + t direction, along which a, or where it stands still b, grows.
-    const Scalar length2 = product(a, a) + product(b, b);
-    if (!(length2 > zero)) return known;
-    const Scalar along = room[k] / length2;
-    const TorqueShares<Scalar> point{product(a, along), product(b, along)};
-    const bool turns = b < zero || (!(b > zero) && a > zero);
-    const TorqueShares<Scalar> direction{turns ? -b : b, turns ? a : -a};
-    Scalar from = zero, to = zero;
-    bool is_first_from = true, is_first_to = true;
-    const auto keep = [&](const Scalar& slope, const Scalar& left) {  // t slope <= left
-      if (slope > zero) {
-        const Scalar t = left / slope;
-        if (is_first_to || t < to) to = t, is_first_to = false;
-      } else if (slope < zero) {
-        const Scalar t = left / slope;
-        if (is_first_from || t > from) from = t, is_first_from = false;
+  for (int step = 0; step < count; ++step) {
+    const Scalar slope = -yaw[limiting] / tilt[limiting];  // of a over b along its limit
+    if (!(slope > zero)) break;
+    Scalar more = one - shares.yaw;
+    const Scalar missing = one - shares.roll_pitch;
+    const bool completes = product(slope, more) > missing;
+    if (completes) more = missing / slope;
+    int next = -1;
+    bool ends = true;
+    for (int i = 0; i < count; ++i) {
+      if (i == limiting) continue;
+      const Scalar now = base[i] + product(shares.roll_pitch, tilt[i]) + product(shares.yaw, yaw[i]);
+      const Scalar change = product(slope, tilt[i]) + yaw[i];
+      const Scalar end = now + product(more, change);
+      Scalar room = zero;
+      if (end > limits.upper_N) {
+        room = limits.upper_N - now;
+      } else if (end < limits.lower_N) {
+        room = limits.lower_N - now;
+      } else {
+        continue;
       }
-    };
-    keep(direction.roll_pitch, one - point.roll_pitch);
-    keep(-direction.roll_pitch, point.roll_pitch);
-    keep(direction.yaw, one - point.yaw);
-    keep(-direction.yaw, point.yaw);
-    for (int j = 0; j < k; ++j) {
-      const Scalar a_j = j % 2 == 0 ? tilt[j / 2] : -tilt[j / 2], b_j = j % 2 == 0 ? yaw[j / 2] : -yaw[j / 2];
-      keep(product(a_j, direction.roll_pitch) + product(b_j, direction.yaw),
-           room[j] - product(a_j, point.roll_pitch) - product(b_j, point.yaw));
+      const Scalar own = positive_part(room / change);
+      if (!(own < more)) continue;
+      more = own;
+      next = i;
+      // A rotor that more roll and pitch would relieve bounds b, not a.
+      ends = end > limits.upper_N ? !(tilt[i] > zero) : !(tilt[i] < zero);
     }
-    if (is_first_to || (!is_first_from && from > to)) return known;
-    best = {clamp(point.roll_pitch + product(to, direction.roll_pitch), zero, one),
-            clamp(point.yaw + product(to, direction.yaw), zero, one)};
+    shares.yaw = shares.yaw + more;
+    if (next < 0) {
+      shares.roll_pitch = completes ? one : shares.roll_pitch + product(slope, more);
+      break;
+    }
+    shares.roll_pitch = clamp(shares.roll_pitch + product(slope, more), zero, one);
+    if (ends) break;
+    limiting = next;
   }
-  return best.roll_pitch > known.roll_pitch ? best : known;
+  return shares;
 }
 
 }  // namespace detail
@@ -340,31 +344,26 @@ inline Mixed<Scalar> mix(const Allocation<Scalar>& allocation, const ForceLimits
   }
   result.valid = true;
 
-  result.roll_pitch_share = detail::largest_share(allocation.count, force, added, limits);
-  if (result.roll_pitch_share < Scalar(1) && allocation.rank == 4 && !(wanted.torque_N_m.z == zero)) {
-    const detail::TorqueShares<Scalar> shares =
-        detail::best_shares(allocation.count, force, added, yaw, limits, {result.roll_pitch_share, zero});
-    if (shares.roll_pitch > result.roll_pitch_share) {
-      for (int i = 0; i < allocation.count; ++i) {
-        result.forces.at_N[i] =
-            clamp(force[i] + product(shares.roll_pitch, added[i]) + product(shares.yaw, yaw[i]),
-                  limits.lower_N, limits.upper_N);
-      }
-      result.roll_pitch_share = shares.roll_pitch;
-      result.yaw_share = shares.yaw;
-      return result;
-    }
+  int limiting = -1;
+  detail::TorqueShares<Scalar> shares = {
+      detail::largest_share(allocation.count, force, added, limits, limiting), zero};
+  if (shares.roll_pitch < Scalar(1) && allocation.rank == 4) {
+    shares = detail::relieved_by_yaw(allocation.count, force, added, yaw, limits, shares, limiting);
   }
+  result.roll_pitch_share = shares.roll_pitch;
+  const Scalar left = Scalar(1) - shares.yaw;
   for (int i = 0; i < allocation.count; ++i) {
-    force[i] = clamp(force[i] + product(result.roll_pitch_share, added[i]), limits.lower_N, limits.upper_N);
+    force[i] = clamp(force[i] + product(shares.roll_pitch, added[i]) + product(shares.yaw, yaw[i]),
+                     limits.lower_N, limits.upper_N);
+    yaw[i] = product(left, yaw[i]);
   }
 
-  result.yaw_share = allocation.rank == 4 || wanted.torque_N_m.z == zero
-                         ? detail::largest_share(allocation.count, force, yaw, limits)
-                         : zero;
+  const Scalar more = allocation.rank == 4 || wanted.torque_N_m.z == zero
+                          ? detail::largest_share(allocation.count, force, yaw, limits, limiting)
+                          : zero;
+  result.yaw_share = shares.yaw + product(left, more);
   for (int i = 0; i < allocation.count; ++i) {
-    result.forces.at_N[i] =
-        clamp(force[i] + product(result.yaw_share, yaw[i]), limits.lower_N, limits.upper_N);
+    result.forces.at_N[i] = clamp(force[i] + product(more, yaw[i]), limits.lower_N, limits.upper_N);
   }
   return result;
 }
