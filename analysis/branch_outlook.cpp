@@ -44,9 +44,9 @@ std::string branch_outlook_words(const lipschitz::CertifiedBound& bound) {
         "about {:.2g} boxes (estimate: the second half of {} took the gap from {:.2g} % to {:.2g} %)",
         *outlook->boxes, bound.nodes, 100 * outlook->gap_halfway, 100 * outlook->gap);
   } else {
-    words +=
-        fmt::format("boxes alone will not do (the second half of {} took the gap from {:.2g} % to {:.2g} %)",
-                    bound.nodes, 100 * outlook->gap_halfway, 100 * outlook->gap);
+    words += fmt::format(
+        "too early to say, or too far (the second half of {} boxes took the gap from {:.3g} % to {:.3g} %)",
+        bound.nodes, 100 * outlook->gap_halfway, 100 * outlook->gap);
   }
   return words +
          fmt::format(
