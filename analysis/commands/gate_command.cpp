@@ -113,13 +113,7 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
     fmt::print("{}", to_github(result, allow));
     append_summary(to_markdown(result));
   }
-  if (options.update_baseline) {
-    const bool may = may_become_baseline(result);
-    if (may) gate::write_baseline(options.baseline, result.checks);
-    if (common.prints_text())
-      fmt::print("baseline {}: {}\n", may ? "replaced" : "kept, for the release does not pass",
-                 options.baseline);
-  }
+  // Before the baseline is replaced: a bundle holds the one that the release was held against.
   if (!options.bundle.empty()) {
     const bool may = result.verdict() == gate::Verdict::kPass;
     const std::string sha256 = may ? write_bundle(options.bundle, policy, result, json, common.force) : "";
@@ -127,6 +121,13 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
       if (may) fmt::print("bundle: {}\nSHA-256 of its manifest: {}\n", options.bundle, sha256);
       if (!may) fmt::print("no bundle: the release does not pass\n");
     }
+  }
+  if (options.update_baseline) {
+    const bool may = may_become_baseline(result);
+    if (may) gate::write_baseline(options.baseline, result.checks);
+    if (common.prints_text())
+      fmt::print("baseline {}: {}\n", may ? "replaced" : "kept, for the release does not pass",
+                 options.baseline);
   }
   return exit_code(result, allow);
 }

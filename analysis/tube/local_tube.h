@@ -51,6 +51,16 @@ struct LocalTube {
   std::vector<stability::Assumption> assumptions;
 };
 
+/// The least radii r >= 0 that the errors reproduce: while every vehicle is within r of its set point, the force error
+/// f_hat - f_a along z, the lag of the feed-forward and the truth along x and y push none of them further than r. From rest
+/// the errors then stay within r for the whole task.
+///
+/// Beside it the same from constants of the network alone: product of spectral norms, global and local Lipschitz bounds.
+/// @param tracking gains and model of every vehicle; @param truth what the force really is; @param vehicles 2 to 10.
+/// @param task one whose trajectories have enclosures (Task::over()).
+/// @return an upper bound in real arithmetic of the continuous loop under `assumptions`; where `proved` is false nothing is
+///   known (inconclusive), for the reason in `why`.
+/// @throws files::InputError if the network lacks functions of these vehicles' kind or has no unit of force.
 LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,
                      const files::Network& network, const stability::Task& task, int vehicles,
                      const LocalTubeOptions& options);

@@ -206,5 +206,19 @@ TEST(GateCommand, ABaselineIsReplacedOnlyByAReleaseThatPasses) {
   EXPECT_EQ(release.run(command).exit_code, 0) << "accepted as the new baseline";
 }
 
+TEST(GateCommand, ABundleHoldsTheBaselineThatTheReleaseWasHeldAgainst) {
+  const ReleaseFolder release;
+  release.policy({{"regression", "max_increase_percent = 5"}});
+  const std::string command = "swarmcert gate policy.toml -q --baseline old.json --update-baseline";
+  ASSERT_EQ(release.run(command).exit_code, 0);
+  const std::string before = read_text(release / "old.json");
+  release.write_facts(21500);  // 2 % more than before
+  const Outcome bundled = release.run(command + " --bundle bundle");
+  ASSERT_EQ(bundled.exit_code, 0) << bundled.output;
+  EXPECT_NE(read_text(release / "old.json"), before) << "replaced";
+  EXPECT_EQ(read_text(release / "bundle/files/old.json"), before);
+  EXPECT_EQ(release.run("swarmcert verify-bundle bundle --rerun -q").exit_code, 0);
+}
+
 }  // namespace
 }  // namespace swarmcert::tests
