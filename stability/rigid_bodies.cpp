@@ -5,32 +5,8 @@
 namespace swarmcert::stability {
 namespace {
 
-#define KERNEL narrow
-#define KERNEL_BLOCK 2
-#include "stability/rigid_bodies_kernel.inc"
-#undef KERNEL
-#undef KERNEL_BLOCK
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define SWARMCERT_WIDE_KERNELS
-#pragma GCC push_options
-#pragma GCC target("avx2")
-#define KERNEL avx2
-#define KERNEL_BLOCK 4
-#include "stability/rigid_bodies_kernel.inc"
-#undef KERNEL
-#undef KERNEL_BLOCK
-#pragma GCC pop_options
-
-#pragma GCC push_options
-#pragma GCC target("avx512f")
-#define KERNEL avx512
-#define KERNEL_BLOCK 8
-#include "stability/rigid_bodies_kernel.inc"
-#undef KERNEL
-#undef KERNEL_BLOCK
-#pragma GCC pop_options
-#endif
+#define SWARMCERT_KERNEL_FILE "stability/rigid_bodies_kernel.inc"
+#include "stability/kernel_widths.inc"
 
 struct Kernel {
   decltype(&narrow::derivatives) derivatives;
