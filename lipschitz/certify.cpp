@@ -66,8 +66,8 @@ void branch_further(const Network& network, const std::map<std::string, Box>& do
   branch.cancelled = options.cancelled;
   if (options.progress) {
     branch.progress = [&options, &bound](double share, double upper) {
-      constexpr int kSteps = 1000;
-      options.progress(static_cast<int>(share * kSteps), kSteps,
+      constexpr int kPermille = 1000;
+      options.progress(static_cast<int>(share * kPermille), kPermille,
                        bound.function + " " + bound.block +
                            (bound.neighbours.empty() ? "" : " with so many") + " at most " +
                            std::to_string(upper));

@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <map>
 
 #include "lipschitz/checker/lipschitz_lmi.h"
+#include "lipschitz/dense_kernels.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/stages.h"
 #include "nn/files/functions.h"
@@ -32,10 +32,6 @@ std::vector<MatrixXd> rounded(const std::vector<check::Matrix>& stages) {
     chain.push_back(std::move(m));
   }
   return chain;
-}
-
-double largest_eigenvalue(const MatrixXd& symmetric) {
-  return Eigen::SelfAdjointEigenSolver<MatrixXd>(symmetric, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
 }
 
 double norm_of(const MatrixXd& m) { return Eigen::JacobiSVD<MatrixXd>(m).singularValues()(0); }

@@ -1,6 +1,9 @@
 #include "lipschitz/dense_kernels.h"
 
 #include <cblas.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -126,6 +129,11 @@ void solve_cholesky(const MatrixXd& l, VectorXd& b) {
 void add_symmetric_product(VectorXd& y, double factor, const MatrixXd& x, const VectorXd& v) {
   const int n = static_cast<int>(x.rows());
   cblas_dsymv(CblasColMajor, CblasLower, n, factor, x.data(), n, v.data(), 1, 1.0, y.data(), 1);
+}
+
+double largest_eigenvalue(const MatrixXd& m) {
+  return std::max(
+      0.0, Eigen::SelfAdjointEigenSolver<MatrixXd>(m, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
 }
 
 }  // namespace swarmcert::lipschitz

@@ -1,6 +1,5 @@
 #include "lipschitz/lipsdp_solver.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
@@ -25,12 +24,6 @@ struct ScaledProblem {
   Index neurons() const { return size() - inputs(); }
   std::size_t layers() const { return stages.size() - 1; }  ///< hidden layers
 };
-
-/// Largest eigenvalue of a symmetric positive semidefinite matrix.
-double largest_eigenvalue(const MatrixXd& m) {
-  return std::max(
-      0.0, Eigen::SelfAdjointEigenSolver<MatrixXd>(m, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
-}
 
 /// The power of two next to x > 0; 1 for x = 0.
 int nearest_exponent(double x) {
