@@ -21,7 +21,7 @@ using tests::proved;
 using tests::random_number;
 using tests::weights;
 
-BranchOptions boxes(int nodes) {
+BranchOptions so_many_boxes(int nodes) {
   BranchOptions options;
   options.nodes = nodes;
   return options;
@@ -30,8 +30,8 @@ BranchOptions boxes(int nodes) {
 double bound_of(const files::Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
                 int nodes) {
   const SdpBound global = tests::sdp_bound_of(network, claim.function);
-  const LocalBound bound = local_bound(network, claim, domain,
-                                       global.proof ? global.proof->t : std::vector<double>(), boxes(nodes));
+  const LocalBound bound = local_bound(
+      network, claim, domain, global.proof ? global.proof->t : std::vector<double>(), so_many_boxes(nodes));
   EXPECT_TRUE(bound.proof.has_value());
   return bound.proof ? bound.upper.value() : std::nan("");
 }

@@ -12,6 +12,7 @@
 #include "lipschitz/networks.h"
 #include "nn/files/functions.h"
 #include "nn/files/random.h"
+#include "soundness/distance.h"
 
 namespace swarmcert {
 namespace {
@@ -21,11 +22,10 @@ using files::Network;
 using files::Random;
 using lipschitz::Box;
 using lipschitz::CertifiedBound;
+using tests::distance;
+using tests::kLeastDistance;
+using tests::kRounding;
 using Point = std::vector<double>;
-
-/// Rounding of two evaluations in double, relative to the slope, for points at least kLeast apart.
-constexpr double kRounding = 1e-7;
-constexpr double kLeast = 1e-4;
 
 Point inside(const Box& box, Random& random) {
   Point x;
@@ -36,12 +36,6 @@ Point inside(const Box& box, Random& random) {
 
 void add(Point& sum, const Point& term) {
   for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += term[i];
-}
-
-double apart(const Point& a, const Point& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return std::sqrt(sum);
 }
 
 /// Evaluates one bound's function at pairs of points.
@@ -59,7 +53,7 @@ class PairsInTheBox {
     for (long pair = 0; pair < pairs; ++pair) {
       const bool adversarial = pair % 2 == 0 && bound_.lower.witness;
       const auto [x, y] = points(adversarial, random);
-      if (apart(x, y) < kLeast) continue;
+      if (distance(x, y) < kLeastDistance) continue;
       Point a = parts_.at(names_[0])(x), b = parts_.at(names_[0])(y);
       if (names_.size() == 2) {
         const Point others = sum_of_others(adversarial, a.size(), random);
@@ -68,7 +62,7 @@ class PairsInTheBox {
         a = parts_.at(names_[1])(a);
         b = parts_.at(names_[1])(b);
       }
-      largest = std::max(largest, apart(a, b) / apart(x, y) / bound_.upper.value());
+      largest = std::max(largest, distance(a, b) / distance(x, y) / bound_.upper.value());
       ++tried;
     }
     return largest;

@@ -12,6 +12,7 @@
 #include "lipschitz/networks.h"
 #include "nn/files/functions.h"
 #include "nn/files/random.h"
+#include "soundness/distance.h"
 
 namespace swarmcert {
 namespace {
@@ -20,10 +21,9 @@ using files::Evaluator;
 using files::Network;
 using files::Random;
 using lipschitz::CertifiedBound;
-
-/// Rounding of two evaluations in double, relative to the slope, for points at least kLeast apart.
-constexpr double kRounding = 1e-7;
-constexpr double kLeast = 1e-4;
+using tests::distance;
+using tests::kLeastDistance;
+using tests::kRounding;
 
 /// One set function, or a network alone, ready to be evaluated at many points.
 class Function {
@@ -44,12 +44,6 @@ class Function {
   std::optional<Evaluator<double>> moved_, rho_;
   int inputs_ = 0;
 };
-
-double distance(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return std::sqrt(sum);
-}
 
 struct Tally {
   long tried = 0;
@@ -91,7 +85,7 @@ void try_pairs(const Network& network, const CertifiedBound& bound, const std::v
     for (std::size_t k = 0; k < x.size(); ++k)
       if (std::find(block.begin(), block.end(), static_cast<int>(k)) == block.end()) y[k] = x[k];
     const double moved = distance(x, y);
-    if (moved < kLeast) continue;
+    if (moved < kLeastDistance) continue;
     std::vector<double> a = f.hidden(x), b = f.hidden(y);
     if (f.is_set()) {
       if (!adversarial) {
