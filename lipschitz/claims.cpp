@@ -111,9 +111,10 @@ std::vector<Claim> claims(const files::Network& network, const ClaimOptions& opt
 }
 
 std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptions& options) {
+  const std::vector<Neighbours> named = groups(network, options);  // which refuses, rho or not
   std::vector<LawClaim> result;
   for (const auto& [rho, weights] : network.rho) {
-    for (const Neighbours& group : groups(network, options)) {
+    for (const Neighbours& group : named) {
       for (const std::string block : {"all", "position", "velocity"}) {
         const std::vector<std::string> has =
             files::blocks(network, "set:" + group.begin()->first + ":" + rho);
