@@ -98,10 +98,6 @@ std::string number_text(const Json& x) {
 
 std::string pair_text(const Json& pair) { return number_text(pair[0]) + " .. " + number_text(pair[1]); }
 
-}  // namespace
-
-namespace {
-
 /// An upper bound that is missing where a gain is finite at every point tried proves nothing.
 const char* status_of(const UncertainNorms& norms) {
   if (std::isinf(norms.amplitude.lower)) return "unstable";
