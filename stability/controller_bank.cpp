@@ -22,16 +22,7 @@ using flight_slots::set;
 using flight_slots::Slot;
 using flight_slots::Take;
 
-/// @param push a Pilot's.
-template <typename Push, typename Scalar>
-void read(const Push& push, const FlightMemory<Scalar>& memory, int lane, ControlRecord* record) {
-  for (int r = 0; r < kNumRotors; ++r) record->rotor_N[r] = at(push.forces.at_N[r], lane);
-  record->motors_off = push.motors_off;
-  record->saturated = memory.thrust_saturated;
-  record->faults = push.faults;
-}
-
-/// What read() leaves for report(). PWM is not computed in flight_step(), whose result for it nobody reads, but here,
+/// What step() leaves for report(). PWM is not computed in flight_step(), whose result for it nobody reads, but here,
 /// by the same function of the same numbers.
 template <typename Scalar>
 void read_rest(const controller::ThrustMap<double>& map, const Slot<Scalar>& slot, int lane,
@@ -54,29 +45,45 @@ void read_rest(const controller::ThrustMap<double>& map, const Slot<Scalar>& slo
   }
 }
 
+/// @param x the vehicle's numbers in the rows of the swarm's state.
 template <typename Scalar>
 void see_attitude(const double* x, Slot<Scalar>* slot) {
-  Eigen::Matrix3d R_WB;
-  rotation_of(x + kQuaternion, &R_WB);
-  slot->measured.attitude = {
-      {narrow<Scalar>(R_WB.row(0)), narrow<Scalar>(R_WB.row(1)), narrow<Scalar>(R_WB.row(2))},
-      narrow<Scalar>({x[kOmega], x[kOmega + 1], x[kOmega + 2]})};
-}
-
-void see_attitude(const double* x, int lane, std::size_t vehicles, Slot<Lanes>* slot) {
-  Eigen::Matrix3d R_WB;
-  rotation_of(x + kQuaternion, &R_WB);
-  controller::AttitudeState<Lanes>& attitude = slot->measured.attitude;
-  set(attitude.R_WB.x, lane, vehicles, R_WB.row(0));
-  set(attitude.R_WB.y, lane, vehicles, R_WB.row(1));
-  set(attitude.R_WB.z, lane, vehicles, R_WB.row(2));
-  set(attitude.omega_B_rad_s, lane, vehicles, {x[kOmega], x[kOmega + 1], x[kOmega + 2]});
+  const auto at = [x](int component) { return x[component * kRowLength]; };
+  double R[9];
+  rotation_of(at(kQuaternion), at(kQuaternion + 1), at(kQuaternion + 2), at(kQuaternion + 3), R);
+  slot->measured.attitude = {{narrow<Scalar>({R[0], R[1], R[2]}), narrow<Scalar>({R[3], R[4], R[5]}),
+                              narrow<Scalar>({R[6], R[7], R[8]})},
+                             narrow<Scalar>({at(kOmega), at(kOmega + 1), at(kOmega + 2)})};
 }
 
 /// The lanes of up to eight vehicles of one kind. Lanes beyond the vehicles repeat the first one.
 struct Group {
+  explicit Group(std::vector<int> of)
+      : vehicles(std::move(of)), filled((1U << vehicles.size()) - 1), is_line(vehicles[0] % kRowLength == 0) {
+    for (std::size_t k = 0; k < vehicles.size(); ++k) {
+      is_line = is_line && vehicles[k] == vehicles[0] + static_cast<int>(k);
+    }
+  }
+
   std::vector<int> vehicles;
+  Lanes::Part filled;  ///< the lanes of vehicles
+  bool is_line;        ///< lanes are those of a line in the rows of the swarm's state
   Slot<Lanes> slot;
+  /// Rows of `news`.
+  enum News : int {
+    kSeenPosition = 0,
+    kSeenVelocity = 3,
+    kWantedPosition = 6,
+    kWantedVelocity = 9,
+    kWantedAcceleration = 12,
+    kNumNews = 15
+  };
+  Rows news{kNumNews};  ///< what see() and follow() were told
+  bool has_news = false;
+  void put(int row, int lane, const Eigen::Vector3d& v) {
+    for (int axis = 0; axis < 3; ++axis) news.data()[(row + axis) * kRowLength + lane] = v[axis];
+    has_news = true;
+  }
   /// What lanes do not hold side by side.
   struct Flags {
     std::uint32_t position_stamp_ms = 0;
@@ -114,17 +121,81 @@ unsigned alike(const Group& group, unsigned lanes) {
 }
 
 /// What all lanes see of this period.
-SWARMCERT_FOR_LANES void look(Group& group, const double* state, double battery_V, std::uint32_t now_ms,
-                              const ControlRecord* records) {
+SWARMCERT_FOR_LANES void look(Group& group, const double* rows, double battery_V, std::uint32_t now_ms) {
   Slot<Lanes>& slot = group.slot;
   slot.measured.attitude_stamp_ms = now_ms;
   slot.measured.battery_V = Lanes(battery_V);
-  for (int lane = 0; lane < static_cast<int>(group.vehicles.size()); ++lane) {
-    see_attitude(state + group.vehicle_of(lane) * kVehicleStateSize, lane, group.vehicles.size(), &slot);
+  alignas(kRowLength * sizeof(double)) double gathered[7 * kRowLength];
+  static_assert(kOmega == kQuaternion + 4 && kRowLength == Lanes::kCount);
+  const double* seen = rows + row_index(group.vehicles[0], kVehicleStateSize) + kQuaternion * kRowLength;
+  if (!group.is_line) {
+    for (int lane = 0; lane < Lanes::kCount; ++lane) {
+      const double* const x = rows + row_index(static_cast<int>(group.vehicle_of(lane)), kVehicleStateSize) +
+                              kQuaternion * kRowLength;
+      for (int c = 0; c < 7; ++c) gathered[c * kRowLength + lane] = x[c * kRowLength];
+    }
+    seen = gathered;
   }
-  for (int lane = 0; lane < Lanes::kCount; ++lane) {
-    slot.prediction_N.set(lane, static_cast<float>(records[group.vehicle_of(lane)].prediction_N));
+  const auto row = [seen](int c) { return DoubleLanes(seen + c * kRowLength); };
+  DoubleLanes R[9];
+  rotation_of(row(0), row(1), row(2), row(3), R);
+  const auto vector = [&group](const DoubleLanes& x, const DoubleLanes& y, const DoubleLanes& z) {
+    const auto lanes = [&group](const DoubleLanes& wide) { return wide.rounded().filled(group.filled); };
+    return controller::Vector3<Lanes>{lanes(x), lanes(y), lanes(z)};
+  };
+  slot.measured.attitude.R_WB.x = vector(R[0], R[1], R[2]);
+  slot.measured.attitude.R_WB.y = vector(R[3], R[4], R[5]);
+  slot.measured.attitude.R_WB.z = vector(R[6], R[7], R[8]);
+  slot.measured.attitude.omega_B_rad_s = vector(row(4), row(5), row(6));
+  if (!group.has_news) return;
+  group.has_news = false;
+  const auto told = [&](int first) {
+    const auto news = [&group](int c) { return DoubleLanes(group.news.data() + c * kRowLength); };
+    return vector(news(first), news(first + 1), news(first + 2));
+  };
+  slot.measured.position_W_m = told(Group::kSeenPosition);
+  slot.measured.velocity_W_m_s = told(Group::kSeenVelocity);
+  slot.reference.position_W_m = told(Group::kWantedPosition);
+  slot.reference.velocity_W_m_s = told(Group::kWantedVelocity);
+  slot.reference.acceleration_W_m_s2 = told(Group::kWantedAcceleration);
+}
+
+/// What the lanes of one path have in common.
+struct Outcome {
+  bool motors_off = false;
+  std::uint8_t faults = 0;
+};
+
+/// One control period of lanes that agree on `flags`.
+/// @returns the lanes of one side where they disagree, and then changes nothing; else 0.
+template <typename Settings>
+SWARMCERT_FOR_LANES [[gnu::noinline]] unsigned fly(const Settings& settings, Slot<Lanes>& slot,
+                                                   Group::Flags& flags, std::uint32_t now_ms,
+                                                   bool position_is_due, Outcome* outcome) {
+  if (settings.allocation.count != kNumRotors) __builtin_unreachable();  // so that loops over rotors unroll
+  FlightMemory<Lanes> memory = slot.memory;
+  memory.has_reference = flags.has_reference;
+  memory.thrust_saturated = flags.thrust_saturated;
+  slot.measured.position_stamp_ms = flags.position_stamp_ms;
+  Lanes::split = 0;
+  const FlightCommand<Lanes> command =
+      controller::flight_step(settings, memory, slot.measured, slot.reference,
+                              {Lanes(), Lanes(), slot.prediction_N}, now_ms, position_is_due);
+  if (Lanes::split != 0) return static_cast<unsigned>(Lanes::split);
+  // mean_p stays, as in Pilot::push(). Between position loops only the attitude law's integral changes: the same wanted
+  // reference was taken over before.
+  if (position_is_due) {
+    memory.mean_p = slot.memory.mean_p;
+    slot.memory = memory;
+  } else {
+    slot.memory.rate_integral_rad = memory.rate_integral_rad;
   }
+  slot.answer.wanted = command.wanted;
+  for (int r = 0; r < kNumRotors; ++r) slot.answer.forces.at_N[r] = command.mixed.forces.at_N[r];
+  flags.has_reference = memory.has_reference;
+  flags.thrust_saturated = memory.thrust_saturated;
+  *outcome = {command.motors_off, command.faults};
+  return 0;
 }
 
 /// One control period of a part of a group. Where its lanes disagree nothing is changed, and those of one side are
@@ -132,41 +203,32 @@ SWARMCERT_FOR_LANES void look(Group& group, const double* state, double battery_
 template <typename Settings>
 SWARMCERT_FOR_LANES unsigned step_lanes(const Settings& settings, Group& group, unsigned lanes,
                                         std::uint32_t now_ms, bool position_is_due, ControlRecord* records) {
-  const Lanes::Part part(lanes);
-  const bool all = lanes == Lanes::kAll;
-  Slot<Lanes> own;
-  if (!all) {
+  Group::Flags flags = group.flags[first_of(lanes)];
+  Outcome common;
+  if (lanes == Lanes::kAll) {
+    const unsigned split = fly(settings, group.slot, flags, now_ms, position_is_due, &common);
+    if (split != 0) return split;
+  } else {
+    const Lanes::Part part(lanes);
+    Slot<Lanes> own;
     each(own, group.slot, Fill{part});
     own.measured.attitude_stamp_ms = now_ms;
+    const unsigned split = fly(settings, own, flags, now_ms, position_is_due, &common);
+    if (split != 0) return split & lanes;
+    each(group.slot.memory, own.memory, Take{part});
+    each(group.slot.answer, own.answer, Take{part});
   }
-  Slot<Lanes>& slot = all ? group.slot : own;
-  const Group::Flags& flags = group.flags[first_of(lanes)];
-  slot.measured.position_stamp_ms = flags.position_stamp_ms;
-  FlightMemory<Lanes>& memory = slot.memory;
-  const FlightMemory<Lanes> before = memory;
-  memory.has_reference = flags.has_reference;
-  memory.thrust_saturated = flags.thrust_saturated;
-  Lanes::split = 0;
-  const FlightCommand<Lanes> command =
-      controller::flight_step(settings, memory, slot.measured, slot.reference,
-                              {Lanes(), Lanes(), slot.prediction_N}, now_ms, position_is_due);
-  memory.mean_p = before.mean_p;  // as Pilot::push()
-  if (Lanes::split != 0) {
-    if (all) memory = before;
-    return Lanes::split & lanes;
-  }
-  const Pilot<Lanes>::Push push = {command.faults, command.motors_off, command.wanted, command.mixed.forces};
-  slot.answer.wanted = push.wanted;
-  for (int r = 0; r < kNumRotors; ++r) slot.answer.forces.at_N[r] = push.forces.at_N[r];
-  if (!all) {
-    each(group.slot.memory, memory, Take{part});
-    each(group.slot.answer, slot.answer, Take{part});
-  }
+  alignas(32) double rotor_N[kNumRotors][Lanes::kCount];
+  for (int r = 0; r < kNumRotors; ++r) DoubleLanes::widen(group.slot.answer.forces.at_N[r], rotor_N[r]);
   for (std::size_t k = 0; k < group.vehicles.size(); ++k) {
     if ((lanes >> k & 1) == 0) continue;
-    group.flags[k].has_reference = memory.has_reference;
-    group.flags[k].thrust_saturated = memory.thrust_saturated;
-    read(push, memory, static_cast<int>(k), &records[static_cast<std::size_t>(group.vehicles[k])]);
+    group.flags[k].has_reference = flags.has_reference;
+    group.flags[k].thrust_saturated = flags.thrust_saturated;
+    ControlRecord& record = records[static_cast<std::size_t>(group.vehicles[k])];
+    for (int r = 0; r < kNumRotors; ++r) record.rotor_N[r] = rotor_N[r][k];
+    record.motors_off = common.motors_off;
+    record.saturated = flags.thrust_saturated;
+    record.faults = common.faults;
   }
   return 0;
 }
@@ -191,8 +253,7 @@ class Bank : public ControllerBank {
         }
         for (auto first = same.begin(); same.end() - first >= static_cast<std::ptrdiff_t>(kFewest);) {
           const auto last = first + std::min<std::ptrdiff_t>(Lanes::kCount, same.end() - first);
-          groups_.push_back(std::make_unique<Group>());
-          groups_.back()->vehicles.assign(first, last);
+          groups_.push_back(std::make_unique<Group>(std::vector<int>(first, last)));
           first = last;
         }
       }
@@ -213,11 +274,11 @@ class Bank : public ControllerBank {
   void see(int vehicle, const Eigen::Vector3d& p_W_m, const Eigen::Vector3d& v_W_m_s,
            std::uint32_t stamp_ms) override {
     const auto i = static_cast<std::size_t>(vehicle);
-    if (group_of_[i] != nullptr) {
-      Measured<Lanes>& measured = group_of_[i]->slot.measured;
-      set(measured.position_W_m, lane_of_[i], group_of_[i]->vehicles.size(), p_W_m);
-      set(measured.velocity_W_m_s, lane_of_[i], group_of_[i]->vehicles.size(), v_W_m_s);
-      group_of_[i]->flags[lane_of_[i]].position_stamp_ms = stamp_ms;
+    if (Group* const group = group_of_[i]) {
+      const int lane = lane_of_[i];
+      group->put(Group::kSeenPosition, lane, p_W_m);
+      group->put(Group::kSeenVelocity, lane, v_W_m_s);
+      group->flags[lane].position_stamp_ms = stamp_ms;
     } else {
       set(slots_[i].measured.position_W_m, p_W_m);
       set(slots_[i].measured.velocity_W_m_s, v_W_m_s);
@@ -227,16 +288,29 @@ class Bank : public ControllerBank {
 
   void follow(int vehicle, const Setpoint& to) override {
     const auto i = static_cast<std::size_t>(vehicle);
-    if (group_of_[i] != nullptr) {
-      FlightReference<Lanes>& reference = group_of_[i]->slot.reference;
-      set(reference.position_W_m, lane_of_[i], group_of_[i]->vehicles.size(), to.p_W_m);
-      set(reference.velocity_W_m_s, lane_of_[i], group_of_[i]->vehicles.size(), to.v_W_m_s);
-      set(reference.acceleration_W_m_s2, lane_of_[i], group_of_[i]->vehicles.size(), to.a_W_m_s2);
+    if (Group* const group = group_of_[i]) {
+      const int lane = lane_of_[i];
+      group->put(Group::kWantedPosition, lane, to.p_W_m);
+      group->put(Group::kWantedVelocity, lane, to.v_W_m_s);
+      group->put(Group::kWantedAcceleration, lane, to.a_W_m_s2);
     } else {
       FlightReference<Scalar>& reference = slots_[i].reference;
       set(reference.position_W_m, to.p_W_m);
       set(reference.velocity_W_m_s, to.v_W_m_s);
       set(reference.acceleration_W_m_s2, to.a_W_m_s2);
+    }
+  }
+
+  void predict(int vehicle, double prediction_N) override {
+    const auto i = static_cast<std::size_t>(vehicle);
+    if (group_of_[i] == nullptr) {
+      slots_[i].prediction_N = static_cast<Scalar>(prediction_N);
+      return;
+    }
+    for (int lane = 0; lane < Lanes::kCount; ++lane) {
+      if (group_of_[i]->vehicle_of(lane) == i) {
+        group_of_[i]->slot.prediction_N.set(lane, static_cast<float>(prediction_N));
+      }
     }
   }
 
@@ -251,13 +325,13 @@ class Bank : public ControllerBank {
     }
   }
 
-  void step(const double* state, double battery_V, std::uint32_t now_ms, bool position_is_due,
+  void step(const double* rows, double battery_V, std::uint32_t now_ms, bool position_is_due,
             std::vector<ControlRecord>& records) override {
     if constexpr (kLanes) {
-      for (const auto& group : groups_) step(*group, state, battery_V, now_ms, position_is_due, records);
+      for (const auto& group : groups_) step(*group, rows, battery_V, now_ms, position_is_due, records);
     }
     for (std::size_t i = 0; i < slots_.size(); ++i) {
-      if (group_of_[i] == nullptr) step_alone(i, state, battery_V, now_ms, position_is_due, &records[i]);
+      if (group_of_[i] == nullptr) step_alone(i, rows, battery_V, now_ms, position_is_due, &records[i]);
     }
   }
 
@@ -275,35 +349,40 @@ class Bank : public ControllerBank {
  private:
   static constexpr bool kLanes = std::is_same_v<Scalar, float>;
 
-  void step_alone(std::size_t i, const double* state, double battery_V, std::uint32_t now_ms,
+  void step_alone(std::size_t i, const double* rows, double battery_V, std::uint32_t now_ms,
                   bool position_is_due, ControlRecord* record) {
     Slot<Scalar>& slot = slots_[i];
-    see_attitude(state + i * kVehicleStateSize, &slot);
+    see_attitude(rows + row_index(static_cast<int>(i), kVehicleStateSize), &slot);
     slot.measured.attitude_stamp_ms = now_ms;
     slot.measured.battery_V = static_cast<Scalar>(battery_V);
-    slot.prediction_N = static_cast<Scalar>(record->prediction_N);
     const typename Pilot<Scalar>::Push push =
         pilots_[static_cast<std::size_t>(swarm_.kind_of(static_cast<int>(i)))].push(
             slot.memory, slot.measured, slot.reference, slot.prediction_N, now_ms, position_is_due);
     slot.answer = {push.wanted, push.forces};
-    read(push, slot.memory, 0, record);
+    for (int r = 0; r < kNumRotors; ++r) record->rotor_N[r] = static_cast<double>(push.forces.at_N[r]);
+    record->motors_off = push.motors_off;
+    record->saturated = slot.memory.thrust_saturated;
+    record->faults = push.faults;
   }
 
   /// As few runs through the code as there are paths that vehicles take.
-  void step(Group& group, const double* state, double battery_V, std::uint32_t now_ms, bool position_is_due,
+  void step(Group& group, const double* rows, double battery_V, std::uint32_t now_ms, bool position_is_due,
             std::vector<ControlRecord>& records) {
     constexpr int kWait = 10;
-    look(group, state, battery_V, now_ms, records.data());
-    if (group.parts.size() > 1 && --group.wait < 0) {
+    look(group, rows, battery_V, now_ms);
+    const bool tries_together = group.parts.size() > 1 && --group.wait < 0;
+    if (tries_together) {
       group.parts.assign(1, Lanes::kAll);
       group.wait = kWait;
     }
     const Pilot<Lanes>& pilot =
         lane_pilots_[static_cast<std::size_t>(swarm_.kind_of(group.vehicles.front()))];
     pilot.with_settings([&](const auto& settings) {
+      // Flags part where paths do, and at new measurements.
+      const bool may_differ = position_is_due || group.parts.size() > 1 || tries_together;
       for (std::size_t k = 0; k < group.parts.size();) {
         const unsigned lanes = group.parts[k];
-        unsigned some = alike(group, lanes);
+        unsigned some = may_differ ? alike(group, lanes) : lanes;
         if (some == lanes) some = step_lanes(settings, group, lanes, now_ms, position_is_due, records.data());
         if (some == 0) {
           ++k;

@@ -38,11 +38,13 @@ class ControllerBank {
                    std::uint32_t stamp_ms) = 0;
   /// What a vehicle shall follow, until the next call.
   virtual void follow(int vehicle, const Setpoint& setpoint) = 0;
+  /// f_a_hat along z, until the next call; 0 before the first.
+  virtual void predict(int vehicle, double prediction_N) = 0;
   virtual void reset_integrals(int vehicle) = 0;
   /// One control period of every vehicle: controller::flight_step().
-  /// @param state   of the swarm, see StateIndex; attitudes and rates are read from it.
-  /// @param records by vehicle: predictions are read, the answers written but for those of report().
-  virtual void step(const double* state, double battery_V, std::uint32_t now_ms, bool position_is_due,
+  /// @param rows    the swarm's state in rows (rigid_bodies.h); attitudes and rates are read from it.
+  /// @param records by vehicle: the answers, but for those of report().
+  virtual void step(const double* rows, double battery_V, std::uint32_t now_ms, bool position_is_due,
                     std::vector<ControlRecord>& records) = 0;
   /// Completes a vehicle's record of the last step() with what only logs want.
   virtual void report(int vehicle, ControlRecord* record) const = 0;

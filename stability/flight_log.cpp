@@ -21,45 +21,49 @@ constexpr char kHeader[] =
 constexpr unsigned kVariables = 35;
 constexpr std::size_t kRecordsPerBlock = 2;
 
-/// Appends the bytes of an integer, lowest first.
+/// Writes an integer's bytes, lowest first; returns what comes behind.
 template <typename Integer>
-void append(std::string* bytes, Integer value) {
+char* put(char* to, Integer value) {
   for (std::size_t i = 0; i < sizeof value; ++i) {
-    *bytes += static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i) & 0xffu);
+    to[i] = static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i) & 0xffu);
   }
+  return to + sizeof value;
 }
 
-void append(std::string* bytes, float value) {
+char* put(char* to, float value) {
   std::uint32_t bits;
   static_assert(sizeof bits == sizeof value);
   std::memcpy(&bits, &value, sizeof bits);
-  append(bytes, bits);
+  return put(to, bits);
 }
 
 template <typename T, std::size_t kSize>
-void append(std::string* bytes, const std::array<T, kSize>& values) {
-  for (const T value : values) append(bytes, value);
+char* put(char* to, const std::array<T, kSize>& values) {
+  for (const T value : values) to = put(to, value);
+  return to;
 }
 
-/// Appends NOT crc32 of everything from `begin` on.
-void append_check(std::string* bytes, std::size_t begin) {
-  const auto* const data = reinterpret_cast<const Bytef*>(bytes->data() + begin);
-  append(bytes, static_cast<std::uint32_t>(~crc32(0, data, static_cast<uInt>(bytes->size() - begin))));
+/// NOT crc32 of everything from `begin` on.
+char* put_check(char* to, const char* begin) {
+  return put(to, static_cast<std::uint32_t>(
+                     ~crc32(0, reinterpret_cast<const Bytef*>(begin), static_cast<uInt>(to - begin))));
 }
 
-void append(std::string* bytes, const LogRecord& record) {
-  append(bytes, record.tick_us);
-  append(bytes, record.position_mm_velocity_mm_s_acceleration_mm_s2);
-  append(bytes, record.quaternion);
-  append(bytes, record.rates_mrad_s);
-  append(bytes, record.target_mm_mm_s);
-  append(bytes, record.thrust_N);
-  append(bytes, record.torque_Nm);
-  append(bytes, record.motor_N);
-  append(bytes, record.pwm);
-  append(bytes, record.largest_thrust_gf);
-  append(bytes, record.battery_mV);
-  append(bytes, record.prediction_gf);
+constexpr std::size_t kRecordBytes = 102, kCheckBytes = 4;
+
+char* put(char* to, const LogRecord& record) {
+  to = put(to, record.tick_us);
+  to = put(to, record.position_mm_velocity_mm_s_acceleration_mm_s2);
+  to = put(to, record.quaternion);
+  to = put(to, record.rates_mrad_s);
+  to = put(to, record.target_mm_mm_s);
+  to = put(to, record.thrust_N);
+  to = put(to, record.torque_Nm);
+  to = put(to, record.motor_N);
+  to = put(to, record.pwm);
+  to = put(to, record.largest_thrust_gf);
+  to = put(to, record.battery_mV);
+  return put(to, record.prediction_gf);
 }
 
 /// `q` turned by a small random rotation vector.
@@ -77,13 +81,15 @@ void disturb(files::Random& random, double angle_rad, double* q) {
 std::string to_usd_log(const std::vector<LogRecord>& records) {
   std::string bytes(1, static_cast<char>(kVariables));
   bytes += kHeader;
-  append_check(&bytes, 0);
+  const std::size_t head = bytes.size(), blocks = (records.size() + kRecordsPerBlock - 1) / kRecordsPerBlock;
+  bytes.resize(head + kCheckBytes + blocks * (1 + kCheckBytes) + records.size() * kRecordBytes);
+  char* to = put_check(bytes.data() + head, bytes.data());
   for (std::size_t i = 0; i < records.size(); i += kRecordsPerBlock) {
-    const std::size_t begin = bytes.size();
+    const char* const begin = to;
     const std::size_t count = std::min(kRecordsPerBlock, records.size() - i);
-    bytes += static_cast<char>(count);
-    for (std::size_t k = 0; k < count; ++k) append(&bytes, records[i + k]);
-    append_check(&bytes, begin);
+    to = put(to, static_cast<std::uint8_t>(count));
+    for (std::size_t k = 0; k < count; ++k) to = put(to, records[i + k]);
+    to = put_check(to, begin);
   }
   return bytes;
 }

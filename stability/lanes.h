@@ -20,18 +20,51 @@
 #define SWARMCERT_LANE
 #endif
 
+namespace swarmcert::controller {
+template <typename Scalar>
+struct ThrustMap;
+}
+
 namespace swarmcert::stability {
 
 class Lanes {
+  // Code without 256-bit registers need not align its stack for them.
+  using Vector = float __attribute__((vector_size(32), aligned(16)));
+  using Mask = std::int32_t __attribute__((vector_size(32), aligned(16)));
+
  public:
   static constexpr int kCount = 8;
   static constexpr unsigned kAll = (1U << kCount) - 1;
   /// The lanes, as bits, in which the first comparison with different outcomes was true; 0 while there was none. Never
-  /// reset here.
-  static inline thread_local unsigned split = 0;
+  /// reset here. (A type of which the flight code has no variables: a compiler then knows that comparing changes none.)
+  static inline thread_local std::uint64_t split = 0;
 
-  SWARMCERT_LANE Lanes() : v_{} {}
-  SWARMCERT_LANE explicit Lanes(float x) : v_(Vector{} + x) {}
+  /// The outcome of a comparison in each lane. The code takes one path when it turns into a bool; conditions that && and
+  /// || join do so together, which changes no outcome, since comparing has no effect of its own.
+  struct Choice {
+    Mask m;
+
+    SWARMCERT_LANE explicit Choice(const Mask& mask) : m(mask) {}
+    SWARMCERT_LANE Choice(const Choice& other) : m(other.m) {}  // not trivial, as that of Lanes
+    SWARMCERT_LANE operator bool() const {                      // NOLINT: flight code writes `if (a < b)`
+#if defined(SWARMCERT_LANES_AVX2)
+      const auto both =
+          static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(reinterpret_cast<__m256i>(m))));
+#else
+      unsigned both = 0;
+      for (int i = 0; i < kCount; ++i) both |= m[i] != 0 ? 1U << i : 0U;
+#endif
+      if (both == 0) return false;
+      if (both != kAll && split == 0) split = both;
+      return true;
+    }
+    SWARMCERT_LANE friend Choice operator&&(const Choice& a, const Choice& b) { return Choice(a.m & b.m); }
+    SWARMCERT_LANE friend Choice operator||(const Choice& a, const Choice& b) { return Choice(a.m | b.m); }
+    SWARMCERT_LANE friend Choice operator!(const Choice& a) { return Choice(~a.m); }
+  };
+
+  Lanes() = default;
+  SWARMCERT_LANE explicit Lanes(float x) : v_{x, x, x, x, x, x, x, x} {}
   SWARMCERT_LANE explicit Lanes(double x) : Lanes(static_cast<float>(x)) {}
   SWARMCERT_LANE explicit Lanes(int x) : Lanes(static_cast<float>(x)) {}
   // Not trivial, so that every compiler passes it in memory: functions for processors with and without 256-bit
@@ -83,87 +116,128 @@ class Lanes {
   SWARMCERT_LANE friend Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(Raw{a.v_ / b.v_}); }
   SWARMCERT_LANE friend Lanes product(const Lanes& a, const Lanes& b) { return Lanes(Raw{a.v_ * b.v_}); }
 
-  SWARMCERT_LANE friend bool operator<(const Lanes& a, const Lanes& b) {
-    return together(Choice{a.v_ < b.v_});
-  }
-  SWARMCERT_LANE friend bool operator>(const Lanes& a, const Lanes& b) {
-    return together(Choice{a.v_ > b.v_});
-  }
-  SWARMCERT_LANE friend bool operator<=(const Lanes& a, const Lanes& b) {
-    return together(Choice{a.v_ <= b.v_});
-  }
-  SWARMCERT_LANE friend bool operator>=(const Lanes& a, const Lanes& b) {
-    return together(Choice{a.v_ >= b.v_});
-  }
-  SWARMCERT_LANE friend bool operator==(const Lanes& a, const Lanes& b) {
-    return together(Choice{a.v_ == b.v_});
-  }
+  SWARMCERT_LANE friend Choice operator<(const Lanes& a, const Lanes& b) { return Choice(a.v_ < b.v_); }
+  SWARMCERT_LANE friend Choice operator>(const Lanes& a, const Lanes& b) { return Choice(a.v_ > b.v_); }
+  SWARMCERT_LANE friend Choice operator<=(const Lanes& a, const Lanes& b) { return Choice(a.v_ <= b.v_); }
+  SWARMCERT_LANE friend Choice operator>=(const Lanes& a, const Lanes& b) { return Choice(a.v_ >= b.v_); }
+  SWARMCERT_LANE friend Choice operator==(const Lanes& a, const Lanes& b) { return Choice(a.v_ == b.v_); }
 
   // As in controller/scalar.h and battery.h, lane by lane.
   SWARMCERT_LANE friend Lanes square_root(const Lanes& x) {
-    const Vector held = x.v_ < Vector{} ? Vector{} : x.v_;
 #if defined(SWARMCERT_LANES_AVX2)
-    return Lanes(Raw{_mm256_sqrt_ps(held)});
+    return Lanes(Raw{_mm256_sqrt_ps(_mm256_max_ps(Vector{}, x.v_))});
 #else
+    const Vector held = x.v_ < Vector{} ? Vector{} : x.v_;
     Vector root;
     for (int i = 0; i < kCount; ++i) root[i] = std::sqrt(held[i]);
     return Lanes(Raw{root});
 #endif
   }
-  SWARMCERT_LANE friend Lanes absolute(const Lanes& x) { return Lanes(Raw{x.v_ < Vector{} ? -x.v_ : x.v_}); }
+  // The larger of two; the second where they are equal or not numbers.
+  SWARMCERT_LANE friend Lanes absolute(const Lanes& x) {
+#if defined(SWARMCERT_LANES_AVX2)
+    return Lanes(Raw{_mm256_max_ps(-x.v_, x.v_)});
+#else
+    return Lanes(Raw{x.v_ < Vector{} ? -x.v_ : x.v_});
+#endif
+  }
   SWARMCERT_LANE friend Lanes positive_part(const Lanes& x) {
+#if defined(SWARMCERT_LANES_AVX2)
+    return Lanes(Raw{_mm256_max_ps(Vector{}, x.v_)});
+#else
     return Lanes(Raw{x.v_ < Vector{} ? Vector{} : x.v_});
+#endif
   }
   SWARMCERT_LANE friend Lanes clamp(const Lanes& x, const Lanes& lower, const Lanes& upper) {
     const Raw from_below{x.v_ > upper.v_ ? upper.v_ : x.v_};
     return Lanes(Raw{x.v_ < lower.v_ ? lower.v_ : from_below.v});
   }
-  SWARMCERT_LANE friend bool is_finite(const Lanes& x) {
-    return together(Choice{x.v_ - x.v_ == Vector{}});  // infinite and NaN give NaN
+  SWARMCERT_LANE friend Choice is_finite(const Lanes& x) {
+    return Choice(x.v_ - x.v_ == Vector{});  // infinite and NaN give NaN
   }
-  /// PWM registers of eight vehicles.
-  struct Registers {
-    std::int32_t at[kCount] = {};
-    std::uint16_t operator[](int lane) const { return static_cast<std::uint16_t>(at[lane]); }
-  };
-  SWARMCERT_LANE friend Registers pwm_register(const Lanes& p) {
-    const Vector value = p.v_ * 65536.0F + 0.5F;
-    const Vector most = Vector{} + 65535.0F;
-    const Vector held = value > Vector{} ? (value >= most ? most : value) : Vector{};
-    const Mask whole = __builtin_convertvector(held, Mask);
-    Registers registers;
-    std::memcpy(registers.at, &whole, sizeof whole);
-    return registers;
+  // Nobody reads what the flight code makes of forces for the motors, which would part lanes by the way; logs compute it
+  // from the forces (ControllerBank::report()).
+  struct Nothing {};
+  SWARMCERT_LANE friend Nothing pwm_register(const Lanes&) { return {}; }
+  SWARMCERT_LANE friend Lanes pwm_of_force(const controller::ThrustMap<Lanes>&, const Lanes&, const Lanes&) {
+    return Lanes(0);
   }
 
  private:
-  // Code without 256-bit registers need not align its stack for them.
-  using Vector = float __attribute__((vector_size(32), aligned(16)));
-  using Mask = std::int32_t __attribute__((vector_size(32), aligned(16)));
   // Vectors as such are passed differently for different processors: inside a struct, by reference, they are not.
   struct Raw {
     Vector v;
   };
-  struct Choice {
-    Mask m;
-  };
-
   SWARMCERT_LANE explicit Lanes(const Raw& raw) : v_(raw.v) {}
 
-  SWARMCERT_LANE static bool together(const Choice& choice) {
-#if defined(SWARMCERT_LANES_AVX2)
-    const auto both =
-        static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(reinterpret_cast<__m256i>(choice.m))));
-#else
-    unsigned both = 0;
-    for (int i = 0; i < kCount; ++i) both |= choice.m[i] != 0 ? 1U << i : 0U;
-#endif
-    if (both == 0) return false;
-    if (both != kAll && split == 0) split = both;
-    return true;
-  }
+  friend class DoubleLanes;
 
   Vector v_;
+};
+
+/// The same variable of eight vehicles in double: what is measured is computed in it, and then rounded.
+class DoubleLanes {
+  using Half = double __attribute__((vector_size(32), aligned(16)));
+
+ public:
+  SWARMCERT_LANE DoubleLanes() : low_{}, high_{} {}
+  SWARMCERT_LANE explicit DoubleLanes(int x) : low_(Half{} + x), high_(Half{} + x) {}
+  SWARMCERT_LANE explicit DoubleLanes(const double* at) {
+    std::memcpy(&low_, at, sizeof low_);
+    std::memcpy(&high_, at + 4, sizeof high_);
+  }
+  SWARMCERT_LANE DoubleLanes(const DoubleLanes& other) : low_(other.low_), high_(other.high_) {}
+  SWARMCERT_LANE DoubleLanes& operator=(const DoubleLanes& other) {
+    low_ = other.low_;
+    high_ = other.high_;
+    return *this;
+  }
+
+  SWARMCERT_LANE friend DoubleLanes operator+(const DoubleLanes& a, const DoubleLanes& b) {
+    return DoubleLanes(a.low_ + b.low_, a.high_ + b.high_);
+  }
+  SWARMCERT_LANE friend DoubleLanes operator-(const DoubleLanes& a, const DoubleLanes& b) {
+    return DoubleLanes(a.low_ - b.low_, a.high_ - b.high_);
+  }
+  SWARMCERT_LANE friend DoubleLanes operator*(const DoubleLanes& a, const DoubleLanes& b) {
+    return DoubleLanes(a.low_ * b.low_, a.high_ * b.high_);
+  }
+  SWARMCERT_LANE friend DoubleLanes operator/(const DoubleLanes& a, const DoubleLanes& b) {
+    return DoubleLanes(a.low_ / b.low_, a.high_ / b.high_);
+  }
+
+  SWARMCERT_LANE Lanes rounded() const {
+    Lanes result;
+#if defined(SWARMCERT_LANES_AVX2)
+    const __m256 low = _mm256_castps128_ps256(_mm256_cvtpd_ps(low_));
+    result.v_ = _mm256_insertf128_ps(low, _mm256_cvtpd_ps(high_), 1);
+#else
+    for (int i = 0; i < 4; ++i) {
+      result.v_[i] = static_cast<float>(low_[i]);
+      result.v_[4 + i] = static_cast<float>(high_[i]);
+    }
+#endif
+    return result;
+  }
+
+  /// The reverse, which is exact.
+  SWARMCERT_LANE static void widen(const Lanes& x, double* to) {
+#if defined(SWARMCERT_LANES_AVX2)
+    const Half low = _mm256_cvtps_pd(_mm256_castps256_ps128(x.v_));
+    const Half high = _mm256_cvtps_pd(_mm256_extractf128_ps(x.v_, 1));
+#else
+    Half low, high;
+    for (int i = 0; i < 4; ++i)
+      low[i] = static_cast<double>(x.v_[i]), high[i] = static_cast<double>(x.v_[4 + i]);
+#endif
+    std::memcpy(to, &low, sizeof low);
+    std::memcpy(to + 4, &high, sizeof high);
+  }
+
+ private:
+  SWARMCERT_LANE DoubleLanes(const Half& low, const Half& high) : low_(low), high_(high) {}
+
+  Half low_, high_;
 };
 
 /// False where this processor cannot execute them.

@@ -1,5 +1,11 @@
 #include "stability/rigid_bodies.h"
 
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#include <immintrin.h>
+#endif
+
+#include <cmath>
+
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -10,16 +16,21 @@ namespace {
 
 struct Kernel {
   decltype(&narrow::derivatives) derivatives;
-  decltype(&narrow::stage) stage;
+  decltype(&narrow::stage<true>) stage[2];  ///< by whether rotors lag
+  decltype(&narrow::drift) drift;
+  decltype(&narrow::normalise) normalise;
 };
 
 /// The widest that this processor has and `size` vehicles fill.
 Kernel choose([[maybe_unused]] int size) {
 #if defined(SWARMCERT_WIDE_KERNELS)
-  if (size > 4 && __builtin_cpu_supports("avx512f") != 0) return {avx512::derivatives, avx512::stage};
-  if (size > 2 && __builtin_cpu_supports("avx2") != 0) return {avx2::derivatives, avx2::stage};
+  if (size > 4 && __builtin_cpu_supports("avx512f") != 0)
+    return {
+        avx512::derivatives, {avx512::stage<false>, avx512::stage<true>}, avx512::drift, avx512::normalise};
+  if (size > 2 && __builtin_cpu_supports("avx2") != 0)
+    return {avx2::derivatives, {avx2::stage<false>, avx2::stage<true>}, avx2::drift, avx2::normalise};
 #endif
-  return {narrow::derivatives, narrow::stage};
+  return {narrow::derivatives, {narrow::stage<false>, narrow::stage<true>}, narrow::drift, narrow::normalise};
 }
 
 }  // namespace
@@ -39,8 +50,15 @@ void RigidBodies::derivative(const double* state, double stabilise, double* deri
   choice_->kernel.derivatives(rows_.data(), state, size_, stabilise, derivative);
 }
 
-void RigidBodies::stage(int which, double step_s, double* start, double* state, double* sum) const {
-  choice_->kernel.stage(which, rows_.data(), size_, step_s, start, state, sum);
+void RigidBodies::stage(int which, double step_s, double* start, double* state, double* sum,
+                        int force_z) const {
+  choice_->kernel.stage[lags_ ? 1 : 0](which, rows_.data(), size_, step_s, start, state, sum, force_z);
 }
+
+void RigidBodies::drift(double step_s, const double* start, const double* state, double* ahead) const {
+  choice_->kernel.drift(rows_.data(), size_, step_s, start, state, ahead);
+}
+
+void RigidBodies::normalise(double* state) const { choice_->kernel.normalise(size_, state); }
 
 }  // namespace swarmcert::stability

@@ -16,25 +16,33 @@ inline constexpr int kRowLength = 8;
 
 /// Where row 0 of a vehicle lies among numbers of `rows` rows; row r lies r * kRowLength further on.
 inline std::size_t row_index(int vehicle, int rows) {
-  return static_cast<std::size_t>(vehicle / kRowLength * rows * kRowLength + vehicle % kRowLength);
+  const auto number = static_cast<std::size_t>(vehicle);
+  constexpr std::size_t kLength = kRowLength;
+  return number / kLength * (static_cast<std::size_t>(rows) * kLength) + number % kLength;
 }
 
 /// How many lines of kRowLength hold `count` numbers.
 inline std::size_t lines_for(std::size_t count) { return (count + kRowLength - 1) / kRowLength; }
 
 /// Zeros, in lines of kRowLength.
-class Rows {
+template <typename Number>
+class AlignedLines {
  public:
-  explicit Rows(std::size_t lines = 1) : lines_(lines) {}
-  double* data() { return lines_.data()->at; }
-  const double* data() const { return lines_.data()->at; }
+  explicit AlignedLines(std::size_t lines = 1) : lines_(lines) {}
+  /// For at least so many.
+  void make_room(std::size_t lines) {
+    if (lines > lines_.size()) lines_.resize(lines);
+  }
+  Number* data() { return lines_.data()->at; }
+  const Number* data() const { return lines_.data()->at; }
 
  private:
-  struct alignas(kRowLength * sizeof(double)) Line {
-    double at[kRowLength] = {};
+  struct alignas(kRowLength * sizeof(Number)) Line {
+    Number at[kRowLength] = {};
   };
   std::vector<Line> lines_;
 };
+using Rows = AlignedLines<double>;
 
 class RigidBodies {
  public:
@@ -51,7 +59,9 @@ class RigidBodies {
     kLagShare = 15,     ///< gain of the motor lag
     kInertia = 16,
     kInverseInertia = 19,
-    kNumRows = 22
+    kLaterForceZ = 22,  ///< in place of the third kForce in the second and the last stage of look-ahead steps
+    kDisturbanceZ = 23,  ///< that part of kForce's third, and of kLaterForceZ, which effects are added to
+    kNumRows = 24
   };
 
   /// Vehicles beyond `size` up to a whole block stand still.
@@ -59,6 +69,11 @@ class RigidBodies {
   ~RigidBodies();
 
   double& at(int row, int vehicle) { return rows_.data()[row_index(vehicle, kNumRows) + row * kRowLength]; }
+  /// A row's first line; those of further vehicles lie kNumRows * kRowLength apart.
+  double* row(int which) { return rows_.data() + which * kRowLength; }
+
+  /// Whether some kLagRate is not 0: where rotors do not lag, their states stay as they are.
+  void set_lagging(bool lags) { lags_ = lags; }
 
   /// derivative = d state / dt.
   /// @param stabilise rate in 1/s at which |q| is drawn to 1; else 0.
@@ -68,11 +83,21 @@ class RigidBodies {
   /// @param start state before the step; the last stage makes it the state after.
   /// @param state where the next stage evaluates; read by all but the first.
   /// @param sum   scratch.
-  void stage(int which, double step_s, double* start, double* state, double* sum) const;
+  /// @param force_z the row of the outer force along z: kForce + 2 or kLaterForceZ.
+  void stage(int which, double step_s, double* start, double* state, double* sum,
+             int force_z = kForce + 2) const;
+
+  /// Positions of `ahead` = positions of `start` + step_s * d position / dt at `state`: where the state after the one
+  /// that is being computed will be evaluated, since positions follow velocities one stage late.
+  void drift(double step_s, const double* start, const double* state, double* ahead) const;
+
+  /// Quaternions of length 1.
+  void normalise(double* state) const;
 
  private:
   struct Choice;
   int size_;
+  bool lags_ = true;
   Rows rows_;
   std::unique_ptr<const Choice> choice_;  ///< of the code for this processor
 };

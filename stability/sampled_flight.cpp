@@ -23,7 +23,7 @@ int periods(double control_hz, double slow_hz, const char* what) {
 
 SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
                              const SampledFlightOptions& options, const files::Network* network)
-    : swarm_(swarm), task_(task), options_(options), random_(options.seed) {
+    : swarm_(swarm), task_(task), options_(options), rows_(swarm.make_rows()), random_(options.seed) {
   Gains gains = given;
   const double control_hz = std::max(options.attitude_rate_hz, gains.rate_hz);
   if (gains.rate_hz == 0) gains.rate_hz = control_hz;
@@ -79,6 +79,18 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
 
 SampledFlight::~SampledFlight() = default;
 
+const double* SampledFlight::state() const {
+  if (!is_unpacked_ && !is_changed_) swarm_.from_rows(rows_.data(), state_.data());
+  is_unpacked_ = true;
+  return state_.data();
+}
+
+double* SampledFlight::change_state() {
+  state();
+  is_changed_ = true;
+  return state_.data();
+}
+
 const ControlRecord& SampledFlight::record(int vehicle) const {
   const auto i = static_cast<std::size_t>(vehicle);
   if (is_complete_[i] == 0) {
@@ -93,7 +105,7 @@ double SampledFlight::battery_V() const {
 }
 
 Eigen::Vector3d SampledFlight::measured_position(int vehicle) {
-  const double* const x = &state_[static_cast<std::size_t>(vehicle) * kVehicleStateSize];
+  const double* const x = state() + vehicle * kVehicleStateSize;
   Eigen::Vector3d p(x[0], x[1], x[2]);
   for (int axis = 0; options_.noise && axis < 3; ++axis) {
     p[axis] += swarm_.model(vehicle).sensor.position_noise_m * random_.bell();
@@ -114,7 +126,7 @@ void SampledFlight::predict() {
     std::vector<double>& ring = predictions_[static_cast<std::size_t>(i)];
     double& now = ring[static_cast<std::size_t>(period_ % slots)];
     if (period_ % network_every_ == 0) {
-      Instant known = swarm_.instant(i, time_s(), state_.data(), input(i));
+      Instant known = swarm_.instant(i, time_s(), state(), input(i));
       radio_->look(i, now_ms, &known, known_, weights_);
       now = networks_[static_cast<std::size_t>(swarm_.kind_of(i))]->force_z_N(known, weights_.data());
     } else {
@@ -123,6 +135,7 @@ void SampledFlight::predict() {
     const std::int64_t applied = period_ - network_late_;
     records_[static_cast<std::size_t>(i)].prediction_N =
         applied < 0 ? 0 : ring[static_cast<std::size_t>(applied % slots)];
+    controllers_->predict(i, records_[static_cast<std::size_t>(i)].prediction_N);
   }
 }
 
@@ -130,10 +143,13 @@ void SampledFlight::predict() {
 void SampledFlight::measure() {
   const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
   for (int i = 0; i < swarm_.size(); ++i) {
-    const double* const x = &state_[static_cast<std::size_t>(i) * kVehicleStateSize];
+    const double* const x = rows_.data() + row_index(i, kVehicleStateSize);
+    const auto three = [x](int from) {
+      return Eigen::Vector3d(x[from * kRowLength], x[(from + 1) * kRowLength], x[(from + 2) * kRowLength]);
+    };
     Setpoint& setpoint = records_[static_cast<std::size_t>(i)].setpoint;
     setpoint = task_.at(i, time_s());
-    Eigen::Vector3d p(x[0], x[1], x[2]), v(x[3], x[4], x[5]);
+    Eigen::Vector3d p = three(kPosition), v = three(kVelocity);
     if (options_.noise) {
       const SensorModel& sensor = swarm_.model(i).sensor;
       for (int axis = 0; axis < 3; ++axis) {
@@ -150,7 +166,7 @@ void SampledFlight::control() {
   const double battery = battery_V();
   const auto now_ms = static_cast<std::uint32_t>(std::llround(1e3 * time_s()));
   if (ran_position_) measure();
-  controllers_->step(state_.data(), battery, now_ms, ran_position_, records_);
+  controllers_->step(rows_.data(), battery, now_ms, ran_position_, records_);
   std::fill(is_complete_.begin(), is_complete_.end(), 0);
   for (std::size_t i = 0; i < records_.size(); ++i) {
     VehicleInput& input = inputs_[i];
@@ -167,11 +183,13 @@ void SampledFlight::control() {
       record.rotor_N = {};
       record.pwm = {};
     }
+    if (!has_delay_) std::copy(record.rotor_N.begin(), record.rotor_N.end(), input.rotor_command_N);
   }
 }
 
 void SampledFlight::advance(double from_s, double h_s) {
-  swarm_.runge_kutta(from_s, h_s / options_.substeps, options_.substeps, inputs_.data(), state_.data());
+  swarm_.runge_kutta(from_s, h_s / options_.substeps, options_.substeps, inputs_.data(), rows_.data());
+  is_unpacked_ = false;
 }
 
 /// Puts the commands that delays let through into the inputs: those of `late` part of the period, or of the early one.
@@ -196,9 +214,6 @@ void SampledFlight::apply_delayed(bool late) {
 /// first r of it, that of k periods ago for the rest. Where kinds have different r, all switch at the largest.
 void SampledFlight::move() {
   if (!has_delay_) {
-    for (std::size_t i = 0; i < inputs_.size(); ++i) {
-      std::copy(records_[i].rotor_N.begin(), records_[i].rotor_N.end(), inputs_[i].rotor_command_N);
-    }
     advance(time_s(), period_s_);
     return;
   }
@@ -218,37 +233,34 @@ void SampledFlight::move() {
 /// Inelastic ground: a vehicle that sinks to it stands level until thrust lifts it.
 void SampledFlight::touch_ground() {
   for (int i = 0; i < swarm_.size(); ++i) {
-    double* const x = &state_[static_cast<std::size_t>(i) * kVehicleStateSize];
-    const Model& model = swarm_.model(i);
     if (input(i).resting) {
-      const double thrust_N = swarm_.instant(i, time_s(), state_.data(), input(i)).thrust_N;
-      const double lift_N = thrust_N + swarm_.effects_on(i, time_s(), state_.data(), input(i)).force_W_N.z();
-      input(i).resting = lift_N <= model.weight_N();
+      const double thrust_N = swarm_.instant(i, time_s(), state(), input(i)).thrust_N;
+      const double lift_N = thrust_N + swarm_.effects_on(i, time_s(), state(), input(i)).force_W_N.z();
+      input(i).resting = lift_N <= swarm_.model(i).weight_N();
       continue;
     }
-    if (x[kPosition + 2] > options_.ground_m || x[kVelocity + 2] >= 0) continue;
+    double* const x = rows_.data() + row_index(i, kVehicleStateSize);
+    const auto at = [x](int component) -> double& { return x[component * kRowLength]; };
+    if (at(kPosition + 2) > options_.ground_m || at(kVelocity + 2) >= 0) continue;
+    is_unpacked_ = false;
     input(i).resting = true;
-    x[kPosition + 2] = options_.ground_m;
-    std::fill(x + kVelocity, x + kVelocity + 3, 0.0);
-    std::fill(x + kOmega, x + kOmega + 3, 0.0);
-    std::fill(x + kQuaternion, x + kQuaternion + 4, 0.0);
-    x[kQuaternion] = 1;
+    at(kPosition + 2) = options_.ground_m;
+    for (int axis = 0; axis < 3; ++axis) at(kVelocity + axis) = at(kOmega + axis) = 0;
+    for (int c = 0; c < 4; ++c) at(kQuaternion + c) = c == 0 ? 1 : 0;
   }
 }
 
 void SampledFlight::step() {
   constexpr int kListEvery = 5;
-  if (period_ % kListEvery == 0) swarm_.find_neighbours(state_.data(), kListEvery * period_s_);
+  if (is_changed_) swarm_.to_rows(state_.data(), rows_.data());
+  is_changed_ = false;
+  if (period_ % kListEvery == 0) swarm_.find_neighbours(rows_.data(), kListEvery * period_s_);
   ran_position_ = period_ % position_every_ == 0;
   if (!networks_.empty()) predict();
   control();
   move();
   ++period_;
-  for (int i = 0; i < swarm_.size(); ++i) {
-    double* const q = &state_[static_cast<std::size_t>(i) * kVehicleStateSize + kQuaternion];
-    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    for (int k = 0; k < 4; ++k) q[k] /= length;
-  }
+  swarm_.normalise(rows_.data());
   touch_ground();
 }
 

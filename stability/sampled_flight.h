@@ -55,8 +55,10 @@ class SampledFlight {
   std::int64_t period() const { return period_; }
   /// True if the position loop ran in the last step().
   bool ran_position() const { return ran_position_; }
-  const double* state() const { return state_.data(); }
-  double* state() { return state_.data(); }
+  /// [swarm().state_size()], see StateIndex; valid until the next step().
+  const double* state() const;
+  /// state(), to be written before the next step().
+  double* change_state();
   const VehicleInput& input(int vehicle) const { return inputs_[static_cast<std::size_t>(vehicle)]; }
   VehicleInput& input(int vehicle) { return inputs_[static_cast<std::size_t>(vehicle)]; }
   /// What a vehicle's controller did last.
@@ -83,7 +85,10 @@ class SampledFlight {
   int position_every_, network_every_, network_late_;
   std::int64_t period_ = 0;
   bool ran_position_ = false;
-  std::vector<double> state_;
+  Rows rows_;                          ///< the state, unless is_changed_
+  mutable std::vector<double> state_;  ///< the state vehicle after vehicle, if is_unpacked_
+  mutable bool is_unpacked_ = false;
+  bool is_changed_ = true;
   std::vector<VehicleInput> inputs_;
   mutable std::vector<ControlRecord> records_;
   mutable std::vector<char> is_complete_;  ///< by vehicle: its record has what only logs want

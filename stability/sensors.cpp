@@ -42,6 +42,7 @@ DelayedSignal::DelayedSignal(double delay_s, double gain, double period_s) : gai
 }
 
 Eigen::Vector3d DelayedSignal::filter(const Eigen::Vector3d& input) {
+  if (gain_ == 0) return input;
   if (!is_filled_) {
     std::fill(past_.begin(), past_.end(), input);
     is_filled_ = true;

@@ -41,6 +41,7 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
   const auto vehicles = static_cast<std::size_t>(swarm.size());
   std::vector<Sums> sums(vehicles);
   std::vector<std::int64_t> saturated(vehicles);
+  std::vector<double> most_tilted(vehicles, 1.0);  ///< least cosine of the tilt
   Simulation simulation;
   simulation.vehicles.resize(vehicles);
   simulation.errors.resize(vehicles);
@@ -65,11 +66,11 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
         break;
       }
       sums[i].add(error);
-      Eigen::Matrix3d R_WB;
-      rotation_of(x + kQuaternion, &R_WB);
+      // The third entry of the thrust axis, whose angle to the vertical is the tilt.
+      const double* const q = x + kQuaternion;
+      const double length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+      most_tilted[i] = std::min(most_tilted[i], 1 - 2 * (q[1] * q[1] + q[2] * q[2]) / length2);
       SimulatedVehicle& result = simulation.vehicles[i];
-      result.largest_tilt_rad =
-          std::max(result.largest_tilt_rad, std::acos(std::clamp(R_WB(2, 2), -1.0, 1.0)));
       result.smallest_height_m = std::min(result.smallest_height_m, p.z());
       if (options.keep_errors && k % 5 == 0) {
         simulation.errors[i].push_back(
@@ -87,6 +88,7 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
     result.error = sums[i].result();
     result.saturated_share =
         static_cast<double>(saturated[i]) / static_cast<double>(std::max<std::int64_t>(loop.period(), 1));
+    result.largest_tilt_rad = std::acos(std::clamp(most_tilted[i], -1.0, 1.0));
     if (sums[i].count == 0) result.smallest_height_m = options.loop.ground_m;
     if (options.keep_logs) simulation.logs.push_back(recorder.records(static_cast<int>(i)));
   }

@@ -6,7 +6,50 @@
 #include <stdexcept>
 #include <string>
 
+#include "stability/swarm_pairs.h"
+
 namespace swarmcert::stability {
+
+namespace {
+
+/// Largest horizontal distance at which a neighbour that is `dz_m` higher does something.
+double reach_m(const std::vector<const AppliedEffect*>& effects, double dz_m) {
+  double reach = 0;
+  for (const AppliedEffect* applied : effects) {
+    reach = std::max(reach, applied->effect().reach_m(dz_m, applied->shape().data()));
+  }
+  return reach;
+}
+
+/// An upper bound on reach_m(), which is monotone in height, from its values at some heights.
+class ReachTable {
+ public:
+  ReachTable() = default;
+  explicit ReachTable(const std::vector<const AppliedEffect*>& effects) {
+    double last = reach_m(effects, -kHighest_m);
+    for (int k = 0; k < kCells; ++k) {
+      const double next = reach_m(effects, (k + 1) / kCellsPerMetre - kHighest_m);
+      at_.push_back(std::max(last, next));
+      last = next;
+    }
+  }
+  /// For heights from `lowest_m` to `highest_m`.
+  double over(double lowest_m, double highest_m) const { return std::max(at(lowest_m), at(highest_m)); }
+
+ private:
+  static constexpr double kHighest_m = 10, kCellsPerMetre = 100;
+  static constexpr int kCells = static_cast<int>(2 * kHighest_m * kCellsPerMetre);
+
+  double at(double dz_m) const {
+    const double cell = (dz_m + kHighest_m) * kCellsPerMetre;
+    return cell >= 0 && cell < kCells ? at_[static_cast<std::size_t>(cell)]
+                                      : std::numeric_limits<double>::infinity();
+  }
+
+  std::vector<double> at_;
+};
+
+}  // namespace
 
 struct Swarm::Kind {
   double mass_kg = 0, offset_m = 0, yaw_m = 0;
@@ -16,32 +59,15 @@ struct Swarm::Kind {
   std::vector<AppliedEffect> effects;      ///< without those that live in `path`
   std::vector<int> only;                   ///< by effect: the one vehicle that it acts on; kEvery: all
   std::vector<const AppliedEffect*> wide;  ///< that look at neighbours
+  ReachTable reach_m;                      ///< of those
   bool only_pairs = false;                 ///< its one effect acts on all vehicles, and takes pairs
 };
 
 /// Vehicles of one kind on which a single effect acts that takes pairs: computed together.
 struct Swarm::PairBatch {
   const AppliedEffect* applied = nullptr;
-  std::vector<int> vehicles, ends;      ///< pairs up to ends[i] are those of vehicles[i]
-  std::vector<std::size_t> own, other;  ///< of each pair: where the two lie in the rows of states
-  std::vector<double> masses_kg;        ///< of each pair's neighbour
-  Rows pairs, scratch, force_N;
-  std::size_t lines = 0, vehicle_lines = 0;  ///< that these have room for
-
-  void make_room(std::size_t for_lines, std::size_t for_vehicle_lines) {
-    if (for_lines <= lines && for_vehicle_lines <= vehicle_lines) return;
-    lines = std::max(lines, for_lines);
-    vehicle_lines = std::max(vehicle_lines, for_vehicle_lines);
-    pairs = Rows(6 * lines);
-    scratch = Rows(2 * (lines + vehicle_lines));
-    force_N = Rows(vehicle_lines);
-  }
-
-  void clear() {
-    for (std::vector<int>* list : {&vehicles, &ends}) list->clear();
-    for (std::vector<std::size_t>* list : {&own, &other}) list->clear();
-    masses_kg.clear();
-  }
+  SwarmPairs pairs;
+  Rows scratch;
 };
 
 inline const Swarm::Kind& Swarm::kind(int vehicle) const {
@@ -66,15 +92,6 @@ int only_vehicle(const EffectSpec& spec) {
                          spec.vehicle.compare(0, 2, "cf") == 0 &&
                          spec.vehicle.find_first_not_of("0123456789", 2) == std::string::npos;
   return is_number ? std::stoi(spec.vehicle.substr(2)) - 1 : std::numeric_limits<int>::max();
-}
-
-/// Largest horizontal distance at which a neighbour that is `dz_m` higher does something.
-double reach_m(const std::vector<const AppliedEffect*>& effects, double dz_m) {
-  double reach = 0;
-  for (const AppliedEffect* applied : effects) {
-    reach = std::max(reach, applied->effect().reach_m(dz_m, applied->shape().data()));
-  }
-  return reach;
 }
 
 }  // namespace
@@ -110,15 +127,17 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
       if (applied.effect().info().needs_neighbours) kind.wide.push_back(&applied);
     }
     interacts_ = interacts_ || !kind.wide.empty();
+    kind.reach_m = ReachTable(kind.wide);
     kind.only_pairs =
         kind.effects.size() == 1 && kind.only[0] == kEvery && kind.effects[0].effect().takes_pairs();
     if (kind.only_pairs) batches_[i].applied = &kind.effects[0];
+    batches_[i].pairs = SwarmPairs(size());
     set_lag(&kind);
   }
   near_.resize(kind_of_.size());
   rested_.resize(kind_of_.size());
   neighbours_.resize(kind_of_.size());
-  rows_ = start_ = sum_ = Rows(lines_for(kind_of_.size()) * kVehicleStateSize);
+  rows_ = sum_ = ahead_ = make_rows();
   set_bodies();
 }
 
@@ -130,6 +149,8 @@ Swarm::~Swarm() = default;
 const SignalPath& Swarm::path(int vehicle) const { return kind(vehicle).path; }
 
 void Swarm::set_bodies() {
+  bodies_.set_lagging(
+      std::any_of(kinds_.begin(), kinds_.end(), [](const Kind& own) { return own.lag_rate_1_s != 0; }));
   for (int i = 0; i < size(); ++i) {
     const Kind& own = kind(i);
     bodies_.at(RigidBodies::kInverseMass, i) = 1 / own.mass_kg;
@@ -229,6 +250,16 @@ Wrench Swarm::sum_of_effects(int vehicle, const VehicleInput& input) const {
   return sum;
 }
 
+Rows Swarm::make_rows() const {
+  const std::size_t lines = lines_for(kind_of_.size());
+  Rows rows(lines * kVehicleStateSize);
+  for (std::size_t line = 0; line < lines; ++line) {
+    const std::size_t at = row_index(static_cast<int>(line) * kRowLength, kVehicleStateSize);
+    std::fill_n(rows.data() + at + kQuaternion * kRowLength, kRowLength, 1.0);
+  }
+  return rows;
+}
+
 void Swarm::to_rows(const double* state, double* rows) const {
   for (int i = 0; i < size(); ++i) {
     const double* const from = state + i * kVehicleStateSize;
@@ -252,7 +283,9 @@ void Swarm::hold(const VehicleInput* inputs) {
     for (int r = 0; r < kNumRotors; ++r) bodies_.at(RigidBodies::kCommand + r, i) = input.rotor_command_N[r];
     for (int axis = 0; axis < 3; ++axis) {
       bodies_.at(RigidBodies::kForce + axis, i) = input.disturbance_W_N[axis];
-      bodies_.at(RigidBodies::kTorque + axis, i) = 0;
+    }
+    for (const auto row : {RigidBodies::kLaterForceZ, RigidBodies::kDisturbanceZ}) {
+      bodies_.at(row, i) = input.disturbance_W_N.z();
     }
   }
   pair_up(inputs);
@@ -267,8 +300,11 @@ void Swarm::pair_up(const VehicleInput* inputs) {
   }
   if (pairs_hold_) return;
   pairs_hold_ = true;
+  for (const int i : acted_on_) {
+    for (int axis = 0; axis < 3; ++axis) bodies_.at(RigidBodies::kTorque + axis, i) = 0;
+  }
   acted_on_.clear();
-  for (PairBatch& batch : batches_) batch.clear();
+  for (PairBatch& batch : batches_) batch.pairs.clear();
   for (int i = 0; i < size(); ++i) {
     const Kind& own = kind(i);
     // Where only neighbours matter and none is near, there is nothing to add.
@@ -281,9 +317,9 @@ void Swarm::pair_up(const VehicleInput* inputs) {
     }
     PairBatch& batch = batches_[static_cast<std::size_t>(kind_of(i))];
     const auto add = [&](int other) {
-      batch.own.push_back(row_index(i, kVehicleStateSize));
-      batch.other.push_back(row_index(other, kVehicleStateSize));
-      batch.masses_kg.push_back(kind(other).mass_kg);
+      batch.pairs.add(
+          i, other,
+          batch.applied->effect().pair_constant(kind(other).mass_kg, batch.applied->shape().data()));
     };
     if (listed_) {
       for (const int other : near_[static_cast<std::size_t>(i)]) add(other);
@@ -292,23 +328,19 @@ void Swarm::pair_up(const VehicleInput* inputs) {
         if (other != i) add(other);
       }
     }
-    batch.vehicles.push_back(i);
-    batch.ends.push_back(static_cast<int>(batch.own.size()));
   }
+  sees_ahead_ = acted_on_.empty();
   for (PairBatch& batch : batches_) {
-    if (batch.applied == nullptr) continue;
-    const std::size_t lines = lines_for(batch.own.size());
-    batch.make_room(lines, lines_for(batch.vehicles.size()));
-    double* const constant = batch.pairs.data() + 5 * lines * kRowLength;
-    for (std::size_t k = 0; k < batch.own.size(); ++k) {
-      constant[k] = batch.applied->effect().pair_constant(batch.masses_kg[k], batch.applied->shape().data());
-    }
+    if (batch.pairs.empty()) continue;
+    sees_ahead_ = sees_ahead_ && !batch.applied->effect().pairs_need_velocity(batch.applied->shape().data());
+    batch.pairs.close();
+    batch.scratch.make_room(2 * lines_for(static_cast<std::size_t>(batch.pairs.count())));
   }
 }
 
 /// Disturbances and effects, as outer forces of the bodies.
 void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
-  act_on_pairs(rows, inputs);
+  act_on_pairs(&rows, 1);
   const States states = {rows, true};
   instant_.time_s = time_s;
   for (const int i : acted_on_) {
@@ -323,33 +355,17 @@ void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
   }
 }
 
-void Swarm::act_on_pairs(const double* state, const VehicleInput* inputs) {
-  static_assert(kRowLength == PairRows::kMultiple);
+/// What pairs do in one or two states of the swarm, as outer forces of the bodies.
+void Swarm::act_on_pairs(const double* const* rows, int num_rows) {
+  double* const forces[] = {bodies_.row(RigidBodies::kForce + 2), bodies_.row(RigidBodies::kLaterForceZ)};
+  const double* const disturbance = bodies_.row(RigidBodies::kDisturbanceZ);
+  const double* from[] = {disturbance, disturbance};
   for (PairBatch& batch : batches_) {
-    const std::size_t count = batch.own.size(), row = lines_for(count) * kRowLength;
-    if (count == 0) continue;
-    double* const rows = batch.pairs.data();
-    const Effect& effect = batch.applied->effect();
-    const double* const shape = batch.applied->shape().data();
-    for (int axis = 0; axis < 3; ++axis) {
-      const double* const at = state + axis * kRowLength;
-      double* const to = rows + static_cast<std::size_t>(axis) * row;
-      for (std::size_t k = 0; k < count; ++k) to[k] = at[batch.other[k]] - at[batch.own[k]];
-    }
-    for (int axis = 0; axis < 2 && effect.pairs_need_velocity(shape); ++axis) {
-      const double* const at = state + (kVelocity + axis) * kRowLength;
-      double* const to = rows + static_cast<std::size_t>(3 + axis) * row;
-      for (std::size_t k = 0; k < count; ++k) to[k] = at[batch.other[k]];
-    }
-    effect.force_z({rows, rows + row, rows + 2 * row, rows + 3 * row, rows + 4 * row, rows + 5 * row},
-                   batch.ends.data(), static_cast<int>(batch.vehicles.size()), shape, batch.scratch.data(),
-                   batch.force_N.data());
-    const double per_unit = batch.applied->coefficients()[0];
-    for (std::size_t i = 0; i < batch.vehicles.size(); ++i) {
-      const int vehicle = batch.vehicles[i];
-      bodies_.at(RigidBodies::kForce + 2, vehicle) =
-          inputs[vehicle].disturbance_W_N.z() + per_unit * batch.force_N.data()[i];
-    }
+    if (batch.pairs.empty()) continue;
+    batch.applied->effect().add_force_z(batch.pairs, rows, num_rows, batch.applied->shape().data(),
+                                        batch.applied->coefficients()[0], batch.scratch.data(),
+                                        {from, forces, RigidBodies::kNumRows * kRowLength});
+    std::copy(forces, forces + 2, from);
   }
 }
 
@@ -362,47 +378,63 @@ void Swarm::derivative(double time_s, const double* state, const VehicleInput* i
   from_rows(sum_.data(), derivative);
 }
 
-void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* state) {
-  to_rows(state, start_.data());
+void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* start) {
   hold(inputs);
+  double* const rows = rows_.data();
   for (int step = 0; step < steps; ++step) {
+    if (sees_ahead_) {
+      for (const int first : {0, 2}) {
+        const double* const at = first == 0 ? start : rows;
+        bodies_.drift(first == 0 ? step_s / 2 : step_s, start, at, ahead_.data());
+        const double* const both[] = {at, ahead_.data()};
+        act_on_pairs(both, 2);
+        bodies_.stage(first, step_s, start, rows, sum_.data());
+        bodies_.stage(first + 1, step_s, start, rows, sum_.data(), RigidBodies::kLaterForceZ);
+      }
+      continue;
+    }
     const double t = time_s + step * step_s;
     const double at_s[] = {t, t + step_s / 2, t + step_s / 2, t + step_s};
     for (int stage = 0; stage < 4; ++stage) {
-      act(at_s[stage], (stage == 0 ? start_ : rows_).data(), inputs);
-      bodies_.stage(stage, step_s, start_.data(), rows_.data(), sum_.data());
+      act(at_s[stage], stage == 0 ? start : rows, inputs);
+      bodies_.stage(stage, step_s, start, rows, sum_.data());
     }
   }
-  from_rows(start_.data(), state);
 }
 
-void Swarm::find_neighbours(const double* state, double horizon_s) {
+void Swarm::find_neighbours(const double* rows, double horizon_s) {
+  const bool were_listed = listed_;
   listed_ = interacts_;
-  pairs_hold_ = false;
   if (!interacts_) return;
   constexpr double kFastestChange_m_s2 = 50;
-  double fastest_m_s = 0;
+  const auto at = [rows](int i) { return rows + row_index(i, kVehicleStateSize); };
+  double fastest2 = 0;
   for (int i = 0; i < size(); ++i) {
-    fastest_m_s = std::max(fastest_m_s, Vector3Map(state + i * kVehicleStateSize + kVelocity).norm());
+    const double* const v = at(i) + kVelocity * kRowLength;
+    const double x = v[0], y = v[kRowLength], z = v[2 * kRowLength];
+    fastest2 = std::max(fastest2, x * x + y * y + z * z);
   }
-  const double margin_m = 2 * horizon_s * (fastest_m_s + horizon_s * kFastestChange_m_s2);
+  const double margin_m = 2 * horizon_s * (std::sqrt(fastest2) + horizon_s * kFastestChange_m_s2);
+  bool same = were_listed;
   for (int i = 0; i < size(); ++i) {
-    const double* const x = state + i * kVehicleStateSize;
-    const Kind& kind = kinds_[static_cast<std::size_t>(kind_of(i))];
+    const double* const x = at(i);
+    const Kind& own = kind(i);
     std::vector<int>& near = near_[static_cast<std::size_t>(i)];
-    near.clear();
+    found_.clear();
     for (int j = 0; j < size(); ++j) {
       if (j == i) continue;
-      const double* const y = state + j * kVehicleStateSize;
-      const double dx = y[0] - x[0], dy = y[1] - x[1], dz = y[2] - x[2];
+      const double* const y = at(j);
+      const double dx = y[0] - x[0], dy = y[kRowLength] - x[kRowLength];
+      const double dz = y[2 * kRowLength] - x[2 * kRowLength];
       const double distance2 = dx * dx + dy * dy;
-      const auto reaches = [&](double height_m) {
-        const double reach = reach_m(kind.wide, height_m);
-        return reach > 0 && distance2 < (reach + margin_m) * (reach + margin_m);
-      };
-      if (reaches(dz + margin_m) || reaches(dz - margin_m)) near.push_back(j);
+      const double reach = own.reach_m.over(dz - margin_m, dz + margin_m);
+      if (reach > 0 && distance2 < (reach + margin_m) * (reach + margin_m)) found_.push_back(j);
     }
+    if (found_ == near) continue;
+    same = false;
+    near.swap(found_);
   }
+  pairs_hold_ = pairs_hold_ && same;
 }
 
 void Swarm::forget_neighbours() { listed_ = pairs_hold_ = false; }

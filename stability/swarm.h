@@ -53,9 +53,17 @@ class Swarm {
   void derivative(double time_s, const double* state, const VehicleInput* inputs, double* derivative,
                   double stabilise = 0);
 
+  /// A state in rows (rigid_bodies.h), and back.
+  void to_rows(const double* state, double* rows) const;
+  void from_rows(const double* rows, double* state) const;
+  /// Rows for a state, in which lanes without a vehicle are at rest.
+  Rows make_rows() const;
+
   /// Classical Runge-Kutta steps of `step_s` each, under inputs that are held.
-  /// @param state [state_size()], from `time_s` on; overwritten. Quaternions are not normalised.
-  void runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* state);
+  /// @param rows the state in rows, from `time_s` on; overwritten. Quaternions are not normalised.
+  void runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* rows);
+  /// Quaternions of length 1.
+  void normalise(double* rows) const { bodies_.normalise(rows); }
 
   /// f_a and tau_a of one vehicle at `state`.
   Wrench effects_on(int vehicle, double time_s, const double* state, const VehicleInput& input);
@@ -65,7 +73,8 @@ class Swarm {
 
   /// Remembers who can reach whom within `horizon_s`, so that derivative() looks at few pairs. Without a call, and
   /// after forget_neighbours(), it looks at all of them. Assumes accelerations below 50 m/s^2.
-  void find_neighbours(const double* state, double horizon_s);
+  /// @param rows the state in rows.
+  void find_neighbours(const double* rows, double horizon_s);
   void forget_neighbours();
 
  private:
@@ -92,12 +101,10 @@ class Swarm {
   void add_neighbour(int vehicle, int other, const States& states);
   void gather(int vehicle, const States& states, bool all);
   Wrench sum_of_effects(int vehicle, const VehicleInput& input) const;
-  void to_rows(const double* state, double* rows) const;
-  void from_rows(const double* rows, double* state) const;
   void hold(const VehicleInput* inputs);
   void pair_up(const VehicleInput* inputs);
   void act(double time_s, const double* rows, const VehicleInput* inputs);
-  void act_on_pairs(const double* rows, const VehicleInput* inputs);
+  void act_on_pairs(const double* const* rows, int num_rows);
   void set_bodies();
 
   std::vector<Model> models_;
@@ -106,14 +113,18 @@ class Swarm {
   bool interacts_ = false;  ///< some effect looks at neighbours
   bool listed_ = false;
   std::vector<std::vector<int>> near_;  ///< by vehicle, if listed_
+  std::vector<int> found_;              ///< scratch
   std::vector<int> acted_on_;  ///< vehicles on which effects act, but for those in batches_; since hold()
   std::vector<PairBatch> batches_;  ///< by kind
+  /// Nothing acts but what pairs' positions tell. Two stages of a Runge-Kutta step, the first and the second or the other
+  /// two, then have forces that do not depend on each other.
+  bool sees_ahead_ = false;
   bool pairs_hold_ = false;   ///< acted_on_ and batches_ are those of near_ and of the vehicles that rest
   std::vector<char> rested_;  ///< by vehicle, when they were made
   Instant instant_;
   std::vector<Neighbour> neighbours_;
   RigidBodies bodies_;
-  Rows rows_, start_, sum_;
+  Rows rows_, sum_, ahead_;
 };
 
 /// Initial state: at `p_W_m`, with velocity `v_W_m_s`, level, heading +x, rotors at hover force.

@@ -12,16 +12,22 @@ enum StateIndex : int { kPosition = 0, kVelocity = 3, kQuaternion = 6, kOmega = 
 inline constexpr int kVehicleStateSize = 17;
 inline constexpr int kNumRotors = 4;
 
-/// The rotation of a quaternion (w, x, y, z) of any length but 0: R(q) / |q|^2.
+/// The rotation of a quaternion (w, x, y, z) of any length but 0: R(q) / |q|^2, row after row.
+template <typename Number>
+inline void rotation_of(const Number& w, const Number& x, const Number& y, const Number& z, Number (&R)[9]) {
+  const Number one(1), s = Number(2) / (w * w + x * x + y * y + z * z);
+  const Number xx = s * x * x, yy = s * y * y, zz = s * z * z;
+  const Number xy = s * x * y, xz = s * x * z, yz = s * y * z;
+  const Number wx = s * w * x, wy = s * w * y, wz = s * w * z;
+  R[0] = one - yy - zz, R[1] = xy - wz, R[2] = xz + wy;
+  R[3] = xy + wz, R[4] = one - xx - zz, R[5] = yz - wx;
+  R[6] = xz - wy, R[7] = yz + wx, R[8] = one - xx - yy;
+}
+
 inline void rotation_of(const double* q, Eigen::Matrix3d* R_WB) {
-  const double w = q[0], x = q[1], y = q[2], z = q[3];
-  const double s = 2 / (w * w + x * x + y * y + z * z);
-  const double xx = s * x * x, yy = s * y * y, zz = s * z * z;
-  const double xy = s * x * y, xz = s * x * z, yz = s * y * z;
-  const double wx = s * w * x, wy = s * w * y, wz = s * w * z;
-  *R_WB << 1 - yy - zz, xy - wz, xz + wy,  //
-      xy + wz, 1 - xx - zz, yz - wx,       //
-      xz - wy, yz + wx, 1 - xx - yy;
+  double R[9];
+  rotation_of(q[0], q[1], q[2], q[3], R);
+  *R_WB = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R);
 }
 
 }  // namespace swarmcert::stability

@@ -117,7 +117,7 @@ void place_neighbours(const Track& track, std::size_t record, double time_s, sta
   const stability::Instant& now = track.instants[record];
   for (int j = 0; j < now.num_neighbours; ++j) {
     const stability::Neighbour& other = now.neighbours[j];
-    double* const x = loop.state() + (j + 1) * stability::kVehicleStateSize;
+    double* const x = loop.change_state() + (j + 1) * stability::kVehicleStateSize;
     const Eigen::Vector3d p = now.p_W_m + other.dp_W_m + (time_s - now.time_s) * other.v_W_m_s;
     for (int axis = 0; axis < 3; ++axis) {
       x[stability::kPosition + axis] = p[axis];
@@ -160,7 +160,7 @@ void fly_piece(const stability::Model& model, const stability::Gains& gains, con
   options.battery_start_V = start_V;
   options.battery_drop_V_s = std::max(0.0, (start_V - end_V) / task.duration_s());
   stability::SampledFlight loop(swarm, gains, task, options);
-  set_state(model, track, piece.first, loop.state());
+  set_state(model, track, piece.first, loop.change_state());
   std::size_t judged = piece.first;
   while (loop.time_s() < task.duration_s()) {
     const double time_s = task.start_s() + loop.time_s();

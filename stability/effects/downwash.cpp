@@ -1,13 +1,25 @@
 #include "stability/effects/downwash.h"
 
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#include <immintrin.h>
+#endif
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "stability/effects/wake_shape.h"
+#include "stability/swarm_pairs.h"
 
 namespace swarmcert::stability {
 namespace {
+
+/// Pairs side by side, as columns() meets them, in blocks of kRowLength.
+struct PairRows {
+  const double *dx_m, *dy_m, *dz_m;  ///< the neighbour's position minus the vehicle's, in W
+  const double *vx_m_s, *vy_m_s;     ///< the neighbour's velocity
+  const double* constant;            ///< pair_constant() of the neighbour
+};
 
 #define SWARMCERT_KERNEL_FILE "stability/effects/downwash_kernel.inc"
 #include "stability/kernel_widths.inc"
@@ -15,15 +27,18 @@ namespace {
 struct Kernel {
   int block;
   decltype(&narrow::strengths) strengths;
-  decltype(&narrow::composed) composed;
+  decltype(&narrow::swarm_forces_of<1>) swarm_forces[2];  ///< of one state, and of two
 };
 
 /// The narrowest that takes `count` at once, or the widest of this processor.
 const Kernel& kernel_for([[maybe_unused]] int count) {
-  static constexpr Kernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::composed};
+  static constexpr Kernel kNarrow = {
+      narrow::kBlock, narrow::strengths, {narrow::swarm_forces_of<1>, narrow::swarm_forces_of<2>}};
 #if defined(SWARMCERT_WIDE_KERNELS)
-  static constexpr Kernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::composed};
-  static constexpr Kernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::composed};
+  static constexpr Kernel kAvx2 = {
+      avx2::kBlock, avx2::strengths, {avx2::swarm_forces_of<1>, avx2::swarm_forces_of<2>}};
+  static constexpr Kernel kAvx512 = {
+      avx512::kBlock, avx512::strengths, {avx512::swarm_forces_of<1>, avx512::swarm_forces_of<2>}};
   if (count > avx2::kBlock && __builtin_cpu_supports("avx512f") != 0) return kAvx512;
   if (count > narrow::kBlock && __builtin_cpu_supports("avx2") != 0) return kAvx2;
 #endif
@@ -56,13 +71,12 @@ EffectInfo Downwash::describe() {
 
 void Downwash::columns(const Instant& now, const double* shape, Wrench* columns) const {
   // The same arithmetic as for a whole swarm, a handful of neighbours at a time.
-  constexpr int kMost = 4 * PairRows::kMultiple;
-  double rows[6][kMost], log_strength[kMost], power[kMost];
-  double sum = 0, single = std::numeric_limits<double>::quiet_NaN();
-  int acting = 0;
+  constexpr int kMost = 4 * kRowLength;
+  alignas(kRowLength * sizeof(double)) double rows[6][kMost], power[kMost];
+  double sum = 0;
   for (int first = 0; first < now.num_neighbours; first += kMost) {
     const int count = std::min(kMost, now.num_neighbours - first);
-    for (int k = 0; k < round_up(count, PairRows::kMultiple); ++k) {
+    for (int k = 0; k < round_up(count, kRowLength); ++k) {
       const Neighbour& neighbour = now.neighbours[first + std::min(k, count - 1)];
       rows[0][k] = neighbour.dp_W_m.x();
       rows[1][k] = neighbour.dp_W_m.y();
@@ -73,18 +87,11 @@ void Downwash::columns(const Instant& now, const double* shape, Wrench* columns)
     }
     const Kernel& kernel = kernel_for(count);
     kernel.strengths({rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]}, round_up(count, kernel.block),
-                     shape, log_strength, power);
-    for (int k = 0; k < count; ++k) {
-      if (power[k] == 0) continue;
-      single = ++acting == 1 ? log_strength[k] : std::numeric_limits<double>::quiet_NaN();
-      sum += power[k];
-    }
+                     shape, power);
+    for (int k = 0; k < count; ++k) sum += power[k];
   }
   columns[0] = {};
-  if (acting == 0) return;
-  double sums[narrow::kBlock] = {sum}, singles[narrow::kBlock] = {single}, strength[narrow::kBlock];
-  narrow::composed(sums, singles, 1 / shape[kNorm], narrow::kBlock, strength);
-  columns[0].force_W_N.z() = -strength[0];
+  columns[0].force_W_N.z() = -narrow::composed_of_one(sum, 1 / shape[kNorm]);
 }
 
 double Downwash::pair_constant(double neighbour_mass_kg, const double* shape) const {
@@ -92,32 +99,11 @@ double Downwash::pair_constant(double neighbour_mass_kg, const double* shape) co
   return differs ? shape[kMassExponent] * std::log(neighbour_mass_kg / kWakeReferenceMass_kg) : 0;
 }
 
-void Downwash::force_z(const PairRows& pairs, const int* ends, int vehicles, const double* shape,
-                       double* scratch, double* force) const {
-  const int count = vehicles > 0 ? ends[vehicles - 1] : 0;
-  const int room = round_up(count, PairRows::kMultiple), others = round_up(vehicles, PairRows::kMultiple);
-  double* const log_strength = scratch;
-  double* const power = scratch + room;
-  double* const sum = scratch + 2 * room;
-  double* const single = sum + others;
-  const Kernel& wide = kernel_for(count);
-  wide.strengths(pairs, round_up(count, wide.block), shape, log_strength, power);
-  for (int i = 0, k = 0; i < vehicles; ++i) {
-    double total = 0, log = std::numeric_limits<double>::quiet_NaN();
-    int acting = 0;
-    for (; k < ends[i]; ++k) {
-      if (power[k] == 0) continue;
-      log = ++acting == 1 ? log_strength[k] : std::numeric_limits<double>::quiet_NaN();
-      total += power[k];
-    }
-    sum[i] = total;
-    single[i] = log;
-  }
-  const Kernel& kernel = kernel_for(vehicles);
-  const int padded = round_up(vehicles, kernel.block);
-  for (int i = vehicles; i < padded; ++i) sum[i] = single[i] = 0;
-  kernel.composed(sum, single, 1 / shape[kNorm], padded, force);
-  for (int i = 0; i < vehicles; ++i) force[i] = -force[i];
+void Downwash::add_force_z(const SwarmPairs& pairs, const double* const* states, int num_states,
+                           const double* shape, double coefficient, double* scratch,
+                           const ForceRows& forces) const {
+  if (pairs.empty()) return;
+  kernel_for(pairs.count()).swarm_forces[num_states - 1](pairs, states, shape, coefficient, scratch, forces);
 }
 
 bool Downwash::in_support(const Instant& now, const double* shape) const {

@@ -26,8 +26,8 @@ class Downwash : public Effect {
   bool pairs_need_velocity(const double* shape) const override { return shape[kConvection] != 0; }
   /// The logarithm of what the neighbour's mass does.
   double pair_constant(double neighbour_mass_kg, const double* shape) const override;
-  void force_z(const PairRows& pairs, const int* ends, int vehicles, const double* shape, double* scratch,
-               double* force) const override;
+  void add_force_z(const SwarmPairs& pairs, const double* const* states, int num_states, const double* shape,
+                   double coefficient, double* scratch, const ForceRows& forces) const override;
   bool in_support(const Instant& now, const double* shape) const override;
   std::vector<std::vector<double>> grid(const FlightRange& range) const override;
   double reach_m(double dz_m, const double* shape) const override;

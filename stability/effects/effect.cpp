@@ -48,7 +48,8 @@ bool Effect::pairs_need_velocity(const double*) const { return true; }
 
 double Effect::pair_constant(double, const double*) const { return 0; }
 
-void Effect::force_z(const PairRows&, const int*, int, const double*, double*, double*) const {}
+void Effect::add_force_z(const SwarmPairs&, const double* const*, int, const double*, double, double*,
+                         const ForceRows&) const {}
 
 double Effect::reach_m(double, const double*) const { return 0; }
 

@@ -54,13 +54,12 @@ struct Wrench {
   Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
 };
 
-/// Pairs of a vehicle and a neighbour, side by side, for effects that treat many at once. Rows reach to a multiple of
-/// kMultiple: what lies beyond the pairs are numbers, which do not count.
-struct PairRows {
-  static constexpr int kMultiple = 8;
-  const double *dx_m, *dy_m, *dz_m;  ///< the neighbour's position minus the vehicle's, in W
-  const double *vx_m_s, *vy_m_s;     ///< the neighbour's velocity; unset where pairs_need_velocity() is false
-  const double* constant;            ///< pair_constant() of the neighbour
+/// Where Effect::add_force_z() puts what it finds for each of several states of a swarm. Numbers of vehicles in lines
+/// of kRowLength, `stride` numbers apart; `to` may be `from`.
+struct ForceRows {
+  const double* const* from;  ///< forces that are already there
+  double* const* to;
+  int stride;
 };
 
 /// A coefficient or a shape parameter.
@@ -116,6 +115,7 @@ class ColumnStream {
 };
 
 struct SignalPath;
+class SwarmPairs;
 
 /// One effect. Instances may keep scratch memory: use one per thread.
 class Effect {
@@ -133,20 +133,21 @@ class Effect {
   /// @param columns [num_columns()], overwritten.
   virtual void columns(const Instant& now, const double* shape, Wrench* columns) const = 0;
 
-  /// Whether force_z() gives this effect's one column, which then is a vertical force that depends on nothing but pairs:
-  /// the fast way for simulated swarms.
+  /// Whether add_force_z() gives this effect's one column, which then is a vertical force that depends on nothing but
+  /// pairs: the fast way for simulated swarms.
   virtual bool takes_pairs() const { return false; }
 
   virtual bool pairs_need_velocity(const double* shape) const;
-  /// What never changes about a pair: force_z() is told it.
+  /// What never changes about a pair: add_force_z() is told it.
   virtual double pair_constant(double neighbour_mass_kg, const double* shape) const;
 
-  /// The column's vertical force on each vehicle, the same as columns() gives.
-  /// @param ends    [vehicles]: pairs ends[i - 1] to ends[i] are those of vehicle i, in the order of columns().
-  /// @param scratch 2 (pairs + vehicles) numbers, both rounded up to PairRows::kMultiple.
-  /// @param force   [vehicles, rounded up to PairRows::kMultiple], overwritten.
-  virtual void force_z(const PairRows& pairs, const int* ends, int vehicles, const double* shape,
-                       double* scratch, double* force) const;
+  /// Adds a coefficient times the column's vertical force to the forces on a swarm's vehicles, the same bits as
+  /// columns() gives.
+  /// @param states  [num_states], 1 or 2: the swarm in rows (rigid_bodies.h).
+  /// @param scratch num_states pairs.count() numbers, in lines.
+  virtual void add_force_z(const SwarmPairs& pairs, const double* const* states, int num_states,
+                           const double* shape, double coefficient, double* scratch,
+                           const ForceRows& forces) const;
 
   /// The columns along a time series; the effect must outlive the stream.
   virtual std::unique_ptr<ColumnStream> stream(const double* shape) const;

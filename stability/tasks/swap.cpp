@@ -28,21 +28,27 @@ Geometry geometry(int vehicles) {
 
 }  // namespace
 
-Swap::Swap(const TaskOptions& options) : TimedTask(options, 6 * kPeriod_s) {}
+Swap::Swap(const TaskOptions& options) : TimedTask(options, 6 * kPeriod_s) {
+  const Geometry place = geometry(vehicles_);
+  for (int vehicle = 0; vehicle < vehicles_; ++vehicle) {
+    const double angle_rad = kPi * vehicle / vehicles_;
+    sides_m_.push_back(place.radius_m * Eigen::Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0));
+    sides_m_.back().z() = place.lowest_m + vehicle * place.step_m;
+  }
+}
 
 Setpoint Swap::at(int vehicle, double time_s) const {
-  const Geometry place = geometry(vehicles_);
-  const double angle_rad = kPi * vehicle / vehicles_;
   const double start_s = kPeriod_s - kSwap_s;
   const int swaps = static_cast<int>(std::floor(time_s / kPeriod_s));
   const RestToRest path((time_s - swaps * kPeriod_s - start_s) / kSwap_s);
   // From side +1 to side -1 in even swaps, back in odd ones.
   const double side = swaps % 2 == 0 ? 1 : -1;
-  const Eigen::Vector3d radius_m =
-      place.radius_m * Eigen::Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0);
+  Eigen::Vector3d radius_m = sides_m_[static_cast<std::size_t>(vehicle)];
+  const double height_m = radius_m.z();
+  radius_m.z() = 0;
   Setpoint setpoint;
   setpoint.p_W_m = side * (1 - 2 * path.s) * radius_m;
-  setpoint.p_W_m.z() = place.lowest_m + vehicle * place.step_m;
+  setpoint.p_W_m.z() = height_m;
   setpoint.v_W_m_s = -2 * side * path.ds / kSwap_s * radius_m;
   setpoint.a_W_m_s2 = -2 * side * path.dds / (kSwap_s * kSwap_s) * radius_m;
   return setpoint;

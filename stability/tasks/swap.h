@@ -13,6 +13,9 @@ class Swap : public TimedTask {
   Setpoint at(int vehicle, double time_s) const override;
   std::optional<SetpointRange> over(int vehicle, double from_s, double to_s) const override;
   std::vector<double> knots_s() const override;
+
+ private:
+  std::vector<Eigen::Vector3d> sides_m_;  ///< by vehicle: where it starts, its height included
 };
 
 }  // namespace swarmcert::stability

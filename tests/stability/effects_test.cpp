@@ -9,6 +9,8 @@
 #include "random_instant.h"
 #include "stability/effects/downwash.h"
 #include "stability/effects/registry.h"
+#include "stability/swarm_pairs.h"
+#include "stability/vehicle_state.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -206,48 +208,75 @@ TEST(Downwash, HasTheSameBitsForOneVehicleAndForASwarm) {
   const auto uniform = [&random](double from, double to) {
     return std::uniform_real_distribution<double>(from, to)(random);
   };
-  const std::unique_ptr<Effect> effect = make_effect(spec_of("downwash"), kContext);
-  const std::vector<double> shape = effect_values(effect->info(), spec_of("downwash")).shape;
-  ASSERT_TRUE(effect->takes_pairs());
-  int acting = 0;
-  for (int trial = 0; trial < 200; ++trial) {
-    const int vehicles = 1 + trial % 19;
-    std::vector<std::vector<Neighbour>> neighbours(static_cast<std::size_t>(vehicles));
-    std::vector<double> rows[6];
-    std::vector<int> ends;
-    for (std::vector<Neighbour>& own : neighbours) {
-      const int count = static_cast<int>(random() % 6);
-      for (int j = 0; j < count; ++j) {
-        Neighbour other = {{uniform(-0.2, 0.2), uniform(-0.2, 0.2), uniform(-0.2, 0.6)},
-                           Eigen::Vector3d::Zero(),
-                           {uniform(-1, 1), uniform(-1, 1), 0},
-                           j % 2 == 0 ? 0.034 : 0.067,
-                           0};
-        own.push_back(other);
-        const double numbers[] = {other.dp_W_m.x(),  other.dp_W_m.y(),
-                                  other.dp_W_m.z(),  other.v_W_m_s.x(),
-                                  other.v_W_m_s.y(), effect->pair_constant(other.mass_kg, shape.data())};
-        for (int row = 0; row < 6; ++row) rows[row].push_back(numbers[row]);
+  int acting = 0, composed = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    EffectSpec spec = spec_of("downwash");
+    spec.parameters["convection_s_m"] = trial % 3 == 0 ? 0.15 : 0;
+    spec.parameters["tail"] = trial % 4 == 1 ? 0.5 : 0;
+    const std::unique_ptr<Effect> effect = make_effect(spec, kContext);
+    const std::vector<double> shape = effect_values(effect->info(), spec).shape;
+    ASSERT_TRUE(effect->takes_pairs());
+    const int vehicles = 1 + trial % 26, most = trial % 2 == 0 ? 3 : 12;
+    const double coefficient = uniform(0.05, 0.2);
+    const auto lines = lines_for(static_cast<std::size_t>(vehicles));
+    Rows states[] = {Rows(lines * kVehicleStateSize), Rows(lines * kVehicleStateSize)};
+    Rows before(lines), after[] = {Rows(lines), Rows(lines)};
+    for (int i = 0; i < vehicles; ++i) {
+      before.data()[i] = uniform(-0.1, 0.1);
+      for (Rows& state : states) {
+        for (int c = 0; c < 6; ++c) {
+          state.data()[row_index(i, kVehicleStateSize) + static_cast<std::size_t>(c * kRowLength)] =
+              c < 2    ? uniform(-0.15, 0.15)
+              : c == 2 ? uniform(0, 1.2)
+                       : uniform(-1, 1);
+        }
       }
-      ends.push_back(static_cast<int>(rows[0].size()));
     }
-    const std::size_t pairs = (rows[0].size() + 7) / 8 * 8, padded = (neighbours.size() + 7) / 8 * 8;
-    for (std::vector<double>& row : rows) row.resize(pairs);
-    std::vector<double> scratch(2 * (pairs + padded)), force(padded);
-    effect->force_z(
-        {rows[0].data(), rows[1].data(), rows[2].data(), rows[3].data(), rows[4].data(), rows[5].data()},
-        ends.data(), vehicles, shape.data(), scratch.data(), force.data());
-    for (std::size_t i = 0; i < neighbours.size(); ++i) {
-      Instant now;
-      now.neighbours = neighbours[i].data();
-      now.num_neighbours = static_cast<int>(neighbours[i].size());
-      Wrench column;
-      effect->columns(now, shape.data(), &column);
-      ASSERT_EQ(force[i], column.force_W_N.z()) << vehicles << " vehicles, number " << i;
-      acting += force[i] < 0;
+    SwarmPairs pairs(vehicles);
+    std::vector<std::vector<int>> others(static_cast<std::size_t>(vehicles));
+    for (int i = 0; i < vehicles; ++i) {
+      int left = static_cast<int>(random() % static_cast<unsigned>(most));
+      for (int j = 0; j < vehicles; ++j) {
+        if (j == i || left == 0 || random() % 3 == 0) continue;
+        --left;
+        others[static_cast<std::size_t>(i)].push_back(j);
+        pairs.add(i, j, effect->pair_constant(j % 2 == 0 ? 0.034 : 0.067, shape.data()));
+      }
+    }
+    if (pairs.empty()) continue;
+    pairs.close();
+    Rows scratch(2 * static_cast<std::size_t>(pairs.count() / kRowLength));
+    const double* const at[] = {states[0].data(), states[1].data()};
+    const double* const from[] = {before.data(), before.data()};
+    double* const to[] = {after[0].data(), after[1].data()};
+    const int num_states = 1 + trial / 26 % 2;
+    effect->add_force_z(pairs, at, num_states, shape.data(), coefficient, scratch.data(),
+                        {from, to, kRowLength});
+    for (int s = 0; s < num_states; ++s) {
+      for (int i = 0; i < vehicles; ++i) {
+        const auto three = [&](int vehicle, int first) {
+          const double* const x = at[s] + row_index(vehicle, kVehicleStateSize) + first * kRowLength;
+          return Eigen::Vector3d(x[0], x[kRowLength], x[2 * kRowLength]);
+        };
+        std::vector<Neighbour> neighbours;
+        for (const int j : others[static_cast<std::size_t>(i)]) {
+          neighbours.push_back({three(j, kPosition) - three(i, kPosition), Eigen::Vector3d::Zero(),
+                                three(j, kVelocity), j % 2 == 0 ? 0.034 : 0.067, 0});
+        }
+        Instant now;
+        now.neighbours = neighbours.data();
+        now.num_neighbours = static_cast<int>(neighbours.size());
+        Wrench column;
+        effect->columns(now, shape.data(), &column);
+        ASSERT_EQ(to[s][i], before.data()[i] + coefficient * column.force_W_N.z())
+            << vehicles << " vehicles, number " << i << " of state " << s;
+        acting += column.force_W_N.z() < 0;
+        composed += column.force_W_N.z() < 0 && neighbours.size() > 2;
+      }
     }
   }
-  EXPECT_GT(acting, 500);
+  EXPECT_GT(acting, 1000);
+  EXPECT_GT(composed, 300);
 }
 
 TEST(Downwash, ANeighbourThatIsNowhereGivesNoNumber) {
