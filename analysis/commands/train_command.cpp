@@ -171,7 +171,7 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   trainer.jobs = common.jobs;
   trainer.turns = options.symmetry == "vertical";
   options.run.weighing =
-      options.weights == "errors" ? learning::Weighing::kErrors : learning::Weighing::kCompositions;
+      options.weights == "errors" ? learning::Weighing::kErrors : learning::Weighing::kGroups;
   if (options.run.max_lipschitz > 0 && options.gamma_mode == "equal")
     throw UsageError("--max-lipschitz scales layers, which --gamma-mode equal forbids");
 
@@ -273,11 +273,11 @@ Command train_command() {
                "Limit of the joint Lipschitz bounds in gf per unit of input, proved; layers that reach it "
                "are clipped below gamma")
             ->check(CLI::PositiveNumber);
-        app.add_option(
-               "--weights", options->weights,
-               "Compositions of kinds count the same (compositions), or the same relative to their own "
-               "errors (errors)")
-            ->check(CLI::IsMember({"compositions", "errors"}))
+        app.add_option("--weights", options->weights,
+                       "Scenarios and the compositions of kinds in them count the same (scenarios), or the "
+                       "same relative "
+                       "to their own errors (errors)")
+            ->check(CLI::IsMember({"scenarios", "errors"}))
             ->capture_default_str();
         app.add_option(
                "--symmetry", options->symmetry,

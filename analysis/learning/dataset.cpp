@@ -125,16 +125,16 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
   return training::Layout(std::move(parts));
 }
 
-/// Every composition that is fitted weighs the same in total, and all together as many as there are samples.
+/// Every group that is fitted weighs the same in total, and all together as many as there are samples.
 void balance(LearningData& data) {
   std::map<std::string, double> counts;
   for (const TrackSamples& track : data.tracks) {
-    if (track.use == Use::kFit) counts[track.composition] += static_cast<double>(track.end - track.begin);
+    if (track.use == Use::kFit) counts[track.group()] += static_cast<double>(track.end - track.begin);
   }
   double total = 0;
-  for (const auto& [composition, count] : counts) total += count;
+  for (const auto& [group, count] : counts) total += count;
   for (const TrackSamples& track : data.tracks) {
-    const auto found = counts.find(track.composition);
+    const auto found = counts.find(track.group());
     if (track.use != Use::kFit || found == counts.end()) continue;
     const double weight = total / (static_cast<double>(counts.size()) * found->second);
     for (Index s = track.begin; s < track.end; ++s) data.samples.weight[s] = static_cast<float>(weight);

@@ -28,6 +28,9 @@ struct TrackSamples {
   std::string composition;  ///< kinds of the neighbours, then of the vehicle: "small+small>small"
   Use use = Use::kFit;
   Eigen::Index begin = 0, end = 0;
+
+  /// Tracks of one group count the same together as those of any other: "21_swap_ss small>small".
+  std::string group() const { return scenario + " " + composition; }
 };
 
 struct LearningData {
@@ -60,7 +63,8 @@ struct LearningFlights {
 /// Loads flights. The target of a sample is what the vehicle's model leaves of the vertical force, in gram-force;
 /// inputs are relative positions and velocities of the neighbours in the world frame (paper, section V-B), and own
 /// (-z, -v) for the ground. Among the samples to
-/// fit, every composition of kinds gets the same total weight; the others have weight 1.
+/// fit, every group, which is a scenario and a composition of kinds, gets the same total weight: ten flights of one task
+/// say no more of another than one does. The others have weight 1.
 ///
 /// What `select` and `test` do not name is held back from `fit`: of every five flights, in order of names and runs, the
 /// third selects and the fifth tests; of three or four flights the last two do. By blocks: of every five blocks of a

@@ -24,7 +24,7 @@ struct RunOptions {
 };
 
 /// Root mean square errors in gram-force: of the flights that are fitted, met during the epoch and weighted; of those
-/// that select, the mean over compositions of kinds.
+/// that select, the mean over groups.
 struct Epoch {
   double fit_rmse_gf = 0, select_rmse_gf = 0;
 };

@@ -1,4 +1,4 @@
-/// @file How much each composition of kinds counts in training, and what is left of its force.
+/// @file How much each group of tracks (TrackSamples::group()) counts in training, and what is left of its force.
 #pragma once
 
 #include <map>
@@ -9,21 +9,21 @@
 
 namespace swarmcert::learning {
 
-/// What makes two compositions count the same.
+/// What makes two groups count the same.
 enum class Weighing {
-  kCompositions,  ///< the same total weight: large vehicles, whose forces are ten times as large, decide
+  kGroups,  ///< the same total weight: large vehicles, whose forces are ten times as large, decide
   kErrors,  ///< the same total weight over its mean squared error so far: what falls is the mean logarithm
 };
 
-/// Mean squared error in gf^2 per composition of kinds, over every `stride`-th sample of `use`.
-std::map<std::string, double> errors_by_composition(const LearningData& data, const training::Vector& theta,
-                                                    Use use, int stride, int jobs);
+/// Mean squared error in gf^2 per group, over every `stride`-th sample of `use`.
+std::map<std::string, double> errors_by_group(const LearningData& data, const training::Vector& theta,
+                                              Use use, int stride, int jobs);
 
-/// Mean over compositions of the root mean square error in gram-force; NaN where `use` has no sample.
+/// Mean over groups of the root mean square error in gram-force; NaN where `use` has no sample.
 double mean_rmse_gf(const LearningData& data, const training::Vector& theta, Use use, int jobs);
 
-/// Weights of all samples for the next epoch. kErrors: sum over compositions of log(mean squared error) has, at theta,
-/// the gradient of the loss with these weights (maximum likelihood of noise whose variance each composition has of its
+/// Weights of all samples for the next epoch. kErrors: sum over groups of log(mean squared error) has, at theta,
+/// the gradient of the loss with these weights (maximum likelihood of noise whose variance each group has of its
 /// own). They sum to the number of samples.
 std::vector<float> weights_by(Weighing weighing, const LearningData& data, const training::Vector& theta,
                               int jobs);

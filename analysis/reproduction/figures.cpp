@@ -31,6 +31,19 @@ std::string series(const Flown& flown, const Row& row) {
   return text;
 }
 
+/// Rows "time place height height_d": vehicles cross each other's ways, so that the place is the one along the own.
+std::string paths(const Flown& flown) {
+  std::string text;
+  for (const auto& moments : flown.vehicles) {
+    const Eigen::Vector2f way = moments.front().p_d_m.head<2>().normalized();
+    for (const Moment& now : moments)
+      text += fmt::format("{:.3f} {:.4f} {:.4f} {:.4f}\n", now.time_s, way.dot(now.p_m.head<2>()),
+                          now.p_m.z(), now.p_d_m.z());
+    text += "\n\n";
+  }
+  return text;
+}
+
 float height_error_m(const Moment& now) { return now.p_m.z() - now.p_d_m.z(); }
 
 }  // namespace
@@ -51,13 +64,9 @@ Finding figure_intro(const Setting& setting) {
     finding.json["controllers"].push_back({{"trained_with", trained_with}, {"max_z_m", largest_m}});
     const std::string name = trained_with == 0 ? "intro_baseline" : "intro_network";
     finding.figures.push_back(
-        {name,
-         series(flown,
-                [](const Moment& now) {
-                  return fmt::format("{:.3f} {:.4f} {:.4f} {:.4f}\n", now.time_s, now.p_m.x(), now.p_m.z(),
-                                     now.p_d_m.z());
-                }),
-         "set grid\nset xlabel 'x [m]'\nset ylabel 'z [m]'\nset yrange [0.4:1]\nset key outside\nplot for "
+        {name, paths(flown),
+         "set grid\nset xlabel 'along the own path [m]'\nset ylabel 'z [m]'\nset yrange [0.4:1]\nset key "
+         "outside\nplot for "
          "[i=0:1] '" +
              name +
              ".dat' index i using 2:3 with lines lw 2 title sprintf('vehicle %d', i + 1), for [i=0:1] '" +
@@ -258,10 +267,13 @@ Finding figure_validation(const Setting& setting) {
                 return fmt::format("{:.3f} {:.4f} {:.4f}\n", now.time_s, now.interaction_gf,
                                    now.prediction_gf);
               }),
-       "set multiplot layout 4,1\nset grid\nset yrange [-20:5]\nset ylabel 'f_{a,z} [gf]'\ndo for "
-       "[i=0:3] { set title sprintf('vehicle %d', i + 1); plot 'validation.dat' index i using 1:2 "
-       "with lines lw 2 lc 'black' title 'truth', '' index i using 1:3 with lines lw 2 lc 'red' "
-       "title 'prediction' }\nunset multiplot\n",
+       "set multiplot layout 2,2\nset grid\nset yrange [-20:5]\nset ytics 5\nset ylabel 'f_{a,z} [gf]'\nset "
+       "key inside bottom right\ndo for [i=0:3] { if (i == 1) { unset key }; if (i == 2) { set xlabel 'time "
+       "[s]' }; set title sprintf('vehicle %d', i + 1); plot 'validation.dat' index i using 1:2 with lines "
+       "lw "
+       "2 lc 'black' title 'truth', '' index i using 1:3 with lines lw 2 lc 'red' title 'prediction' "
+       "}\nunset "
+       "multiplot\n",
        "Force and prediction as flown in a swap of four; the network saw three at most."});
   return finding;
 }

@@ -13,14 +13,21 @@ namespace {
 
 constexpr double kLost_m = 100;
 
-/// A task, flown higher above the floor.
-class Raised final : public stability::Task {
+/// Height of the middle of the box of random walks, m.
+constexpr double kMiddle_m = 0.6;
+
+/// A task, flown elsewhere as the plan says.
+class Placed final : public stability::Task {
  public:
-  Raised(std::unique_ptr<stability::Task> task, double higher_m)
-      : task_(std::move(task)), higher_m_(higher_m) {}
+  Placed(std::unique_ptr<stability::Task> task, const Plan& plan)
+      : task_(std::move(task)), higher_m_(plan.higher_m), drawn_in_(plan.drawn_in) {}
   stability::Setpoint at(int vehicle, double time_s) const override {
     stability::Setpoint setpoint = task_->at(vehicle, time_s);
+    const Eigen::Vector3d middle_m(0, 0, kMiddle_m);
+    setpoint.p_W_m = middle_m + drawn_in_ * (setpoint.p_W_m - middle_m);
     setpoint.p_W_m.z() += higher_m_;
+    setpoint.v_W_m_s *= drawn_in_;
+    setpoint.a_W_m_s2 *= drawn_in_;
     return setpoint;
   }
   double duration_s() const override { return task_->duration_s(); }
@@ -29,7 +36,7 @@ class Raised final : public stability::Task {
 
  private:
   std::unique_ptr<stability::Task> task_;
-  double higher_m_;
+  double higher_m_, drawn_in_;
 };
 
 Eigen::Vector3f three(const double* x) {
@@ -40,8 +47,8 @@ Eigen::Vector3f three(const double* x) {
 
 Flown fly(const Setting& setting, const Truth& truth, const Plan& plan, const files::Network* network,
           bool keep_logs) {
-  const std::unique_ptr<stability::Task> task = std::make_unique<Raised>(
-      stability::make_task(plan.task, {plan.vehicles, plan.duration_s, plan.seed}), plan.higher_m);
+  const std::unique_ptr<stability::Task> task = std::make_unique<Placed>(
+      stability::make_task(plan.task, {plan.vehicles, plan.duration_s, plan.seed}), plan);
   const stability::Gains gains = stability::load_gains(setting.gains);
   stability::Swarm swarm(truth.model, plan.vehicles);
   swarm.assume_lag(gains.motor_lag_s, gains.delay_s);

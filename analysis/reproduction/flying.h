@@ -20,6 +20,7 @@ struct Plan {
   double duration_s = 0;  ///< 0: the task's own
   std::uint64_t seed = 0;
   double higher_m = 0;  ///< set points are that much above the task's
+  double drawn_in = 1;  ///< set points are drawn towards the middle of a random walk's box by this factor
 };
 
 /// One vehicle at one position period, in the world.

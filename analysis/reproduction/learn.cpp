@@ -18,10 +18,11 @@ using learning::Use;
 constexpr const char* kLearnSchema = "swarmcert/learned/1";
 
 std::string text_of(const LearnOptions& options) {
-  std::string text = fmt::format(
-      "{} {} {} {} {} {} {} {} {} {} {} {}", options.gamma.value, static_cast<int>(options.gamma.scope),
-      static_cast<int>(options.gamma.mode), options.max_lipschitz, options.turns, options.rate, options.batch,
-      options.steps, options.epochs, options.seed, options.sizes.features, options.sizes.ground);
+  std::string text =
+      fmt::format("groups {} {} {} {} {} {} {} {} {} {} {} {}", options.gamma.value,
+                  static_cast<int>(options.gamma.scope), static_cast<int>(options.gamma.mode),
+                  options.max_lipschitz, options.turns, options.rate, options.batch, options.steps,
+                  options.epochs, options.seed, options.sizes.features, options.sizes.ground);
   for (const int size : options.sizes.phi) text += fmt::format(" phi {}", size);
   for (const int size : options.sizes.rho) text += fmt::format(" rho {}", size);
   return text;

@@ -4,11 +4,10 @@
 #include <cmath>
 #include <filesystem>
 
-#include "analysis/identification/budget.h"
 #include "analysis/learning/trained_network.h"
 #include "analysis/reproduction/experiments.h"
-#include "analysis/reproduction/learn.h"
-#include "analysis/reproduction/residual_blocks.h"
+#include "analysis/reproduction/nearest_labels.h"
+#include "analysis/reproduction/recorded.h"
 #include "nn/files/file_io.h"
 #include "nn/files/input_error.h"
 
@@ -16,61 +15,7 @@ namespace swarmcert::reproduction {
 namespace {
 
 namespace fs = std::filesystem;
-using Blocks = std::vector<ResidualBlock>;
-
-/// gf per unit of input. Joint bounds of the published networks: 417.6 for the large pair, 373.7 for the small one, with
-/// gamma 3 in every layer, which ours keep as well.
-constexpr double kMaxLipschitz = 373;
-
-/// The published flights by use. No fit sees a flight of `test`.
-struct Recorded {
-  residuals::Inputs fit, select, test;
-  learning::LearningFlights flights() const { return {&fit, &select, &test}; }
-};
-
-bool is_fitted(const residuals::FlightFiles& flight) {
-  return flight.scenario.rfind("23_", 0) == 0 || flight.run % 3 == 0;
-}
-
-template <typename Keep>
-residuals::Inputs some_flights(const residuals::Inputs& all, const Keep& keep) {
-  residuals::Inputs some = all;
-  auto& flights = some.found.flights;
-  flights.erase(std::remove_if(flights.begin(), flights.end(), [&](const auto& f) { return !keep(f); }),
-                flights.end());
-  return some;
-}
-
-/// The small size takes the flights of one or two small vehicles.
-bool is_small(const residuals::FlightFiles& flight) {
-  return flight.scenario == "21_randomwalk_s" || flight.scenario == "21_randomwalk_ss" ||
-         flight.scenario == "21_swap_ss";
-}
-
-Recorded recorded_flights(const Setting& setting, bool published_signals) {
-  const auto read = [&](const std::string& folder) {
-    residuals::InputArguments arguments;
-    arguments.flights = {(fs::path(setting.recorded) / "flights" / folder).string()};
-    arguments.fleet = setting.fleet;
-    arguments.rules.published_signals = published_signals;
-    const residuals::Inputs inputs = residuals::read_inputs(arguments);
-    return some_flights(inputs, [&](const auto& flight) { return setting.full || is_small(flight); });
-  };
-  const residuals::Inputs development = read("development");
-  return {some_flights(development, is_fitted),
-          some_flights(development, [](const auto& flight) { return !is_fitted(flight); }),
-          read("visible_test")};
-}
-
-/// `inputs` whose models all have the deep set as one more effect.
-residuals::Inputs with_network(residuals::Inputs inputs, const std::string& network) {
-  stability::EffectSpec spec;
-  spec.name = "deep_set";
-  spec.network = fs::absolute(network).string();
-  for (stability::Model& model : inputs.models) model.effects.push_back(spec);
-  for (auto& [vehicle, model] : inputs.vehicle_models) model.effects.push_back(spec);
-  return inputs;
-}
+using TestBlocks = std::vector<ResidualBlock>;
 
 /// network.toml of the published weights, which stay where they are.
 std::string published_network(const Setting& setting) {
@@ -89,46 +34,6 @@ std::string published_network(const Setting& setting) {
   fs::create_directories(fs::path(path).parent_path());
   files::write_file(path, text, true);
   return path;
-}
-
-std::string key_of(const Setting& setting, const Recorded& recorded, const std::string& what) {
-  std::string key = what + (setting.full ? " full" : " small");
-  for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test}) {
-    for (const residuals::FlightFiles& flight : inputs->found.flights) {
-      for (const auto& [vehicle, path] : flight.logs) key += files::sha256(files::read_file(path));
-    }
-    key += ";";
-  }
-  return key;
-}
-
-LearnOptions learn_options(const Setting& setting, int full_epochs) {
-  LearnOptions options;
-  options.sizes.features = 20;
-  options.gamma.value = 3;
-  options.max_lipschitz = kMaxLipschitz;
-  options.turns = true;
-  options.rate = 2e-3;
-  options.batch = 1024;
-  options.epochs = setting.full ? full_epochs : 3;
-  options.seed = setting.seed;
-  return options;
-}
-
-Learned train(const Setting& setting, const Recorded& recorded, const LearnOptions& options,
-              const std::string& name, const std::string& key) {
-  const std::string folder = (fs::path(setting.work) / name).string();
-  const Learned learned = learn(setting, options, folder, key, [&] {
-    return learning::load_learning_data(
-        recorded.flights(), options.sizes, learning::SplitBy::kFlights, setting.jobs,
-        [&](int done, int total) { setting.progress(done, total, "flights"); });
-  });
-  return learned;
-}
-
-std::string gf(double value) { return fmt::format("{:.2f}", value); }
-std::string gf(const residuals::Interval& interval) {
-  return fmt::format("{:.2f} .. {:.2f}", interval.lower, interval.upper);
 }
 
 /// Mean over groups, and the largest ratio of one group.
@@ -158,6 +63,49 @@ Beside beside(const std::map<std::string, double>& ours, const std::map<std::str
   return result;
 }
 
+/// Where ours lose most to the published networks, and how much of it is the mean of one flight.
+void add_flights(const learning::LearningData& data, const std::vector<TrackError>& ours,
+                 const std::vector<TrackError>& theirs, Finding& finding) {
+  constexpr std::size_t kShown = 8;
+  const auto nearest = nearest_labels(data);
+  const auto lost = [&](std::size_t k) { return ours[k].squares_gf2() - theirs[k].squares_gf2(); };
+  finding.json["flights"] = files::Json::array();
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < ours.size(); ++k) {
+    order.push_back(k);
+    files::Json row = {{"flight", ours[k].flight},
+                       {"vehicle", ours[k].vehicle},
+                       {"mean_gf", ours[k].mean_gf},
+                       {"spread_gf", ours[k].spread_gf},
+                       {"published_mean_gf", theirs[k].mean_gf},
+                       {"published_spread_gf", theirs[k].spread_gf}};
+    const auto found = nearest.find({ours[k].flight, ours[k].vehicle});
+    row["nearest_mean_gf"] = found == nearest.end() ? files::Json() : files::Json(found->second.mean_gf);
+    row["nearest_rms_gf"] = found == nearest.end() ? files::Json() : files::Json(found->second.rms_gf);
+    finding.json["flights"].push_back(std::move(row));
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return lost(a) > lost(b); });
+  Table table = {"Where most is lost to the published networks: mean and spread of the residual [gf]",
+                 {"flight", "vehicle", "ours", "published", "nearest records"},
+                 {}};
+  for (std::size_t i = 0; i < std::min(kShown, order.size()) && lost(order[i]) > 0; ++i) {
+    const TrackError &own = ours[order[i]], &other = theirs[order[i]];
+    const auto found = nearest.find({own.flight, own.vehicle});
+    table.rows.push_back({own.flight, own.vehicle,
+                          fmt::format("{:+.2f} and {:.2f}", own.mean_gf, own.spread_gf),
+                          fmt::format("{:+.2f} and {:.2f}", other.mean_gf, other.spread_gf),
+                          found == nearest.end() ? "-" : fmt::format("{:+.2f}", found->second.mean_gf)});
+  }
+  finding.tables.push_back(std::move(table));
+  finding.notes.push_back(
+      "Nearest records: mean of this flight's labels less those that the flights to fit and to select have "
+      "at "
+      "the nearest relative states, for vehicles alone or with one neighbour. What is found there no "
+      "function "
+      "of relative states can learn from them.");
+}
+
 void add_bounds(const Learned& ours, const learning::Certified& theirs, Finding& finding) {
   Table table = {"Joint Lipschitz bounds, proved [gf per m or m/s]", {"function", "ours", "published"}, {}};
   finding.json["bounds"] = files::Json::array();
@@ -172,16 +120,42 @@ void add_bounds(const Learned& ours, const learning::Certified& theirs, Finding&
   finding.tables.push_back(std::move(table));
 }
 
+/// What seeing the test flights is worth: the same networks, fitted to every flight as the published ones were.
+void add_having_seen(const Setting& setting, const Recorded& recorded, const TestBlocks& theirs_blocks,
+                     Finding& finding) {
+  Recorded all = recorded;
+  for (const residuals::Inputs* some : {&recorded.select, &recorded.test}) {
+    const auto& flights = some->found.flights;
+    all.fit.found.flights.insert(all.fit.found.flights.end(), flights.begin(), flights.end());
+  }
+  all.select = recorded.test;
+  const Learned learned = train_recorded(setting, all, "deep-set-seen", "deep set that saw the test flights");
+  const TestBlocks blocks =
+      residual_blocks(with_network(recorded.test, learned.folder + "/network.toml"), setting.jobs);
+  files::Json scenarios = files::Json::array();
+  const Beside compared =
+      beside(by_scenario(blocks), by_scenario(theirs_blocks),
+             "The same by scenario, ours fitted to the test flights as well", finding, scenarios);
+  finding.json["having_seen_test_flights"] = {{"mean_rms_gf", compared.mean_ours_gf},
+                                              {"published_mean_rms_gf", compared.mean_theirs_gf},
+                                              {"largest_ratio", compared.largest_ratio},
+                                              {"scenarios", std::move(scenarios)},
+                                              {"bound", learned.bound}};
+  finding.notes.push_back(fmt::format(
+      "On an equal footing, ours fitted to the test flights as the published networks were: {:.3f} gf in "
+      "the mean over scenarios against {:.3f} gf, largest ratio {:.3f} ({}), largest joint bound {:.1f}.",
+      compared.mean_ours_gf, compared.mean_theirs_gf, compared.largest_ratio, compared.where, learned.bound));
+}
+
 /// The deep set alone, with the authors' own labels: thrust behind their lag, acceleration as logged, their masses.
 void deep_set_alone(const Setting& setting, Finding& finding) {
   const Recorded recorded = recorded_flights(setting, true);
-  const Learned learned = train(setting, recorded, learn_options(setting, 8), "deep-set",
-                                key_of(setting, recorded, "deep set alone"));
-  finding.json["recorded_sha256"] = files::sha256(key_of(setting, recorded, ""));
+  const Learned learned = train_recorded(setting, recorded, "deep-set", "deep set alone");
+  finding.json["recorded_sha256"] = files::sha256(recorded_key(setting, recorded));
   const std::string network = published_network(setting);
-  const Blocks ours_blocks =
+  const TestBlocks ours_blocks =
       residual_blocks(with_network(recorded.test, learned.folder + "/network.toml"), setting.jobs);
-  const Blocks theirs_blocks = residual_blocks(with_network(recorded.test, network), setting.jobs);
+  const TestBlocks theirs_blocks = residual_blocks(with_network(recorded.test, network), setting.jobs);
   finding.json["compositions"] = finding.json["scenarios"] = files::Json::array();
   const Beside compositions = beside(by_composition(ours_blocks), by_composition(theirs_blocks),
                                      "Vertical residual on test flights, RMS, by neighbours 2 vehicle",
@@ -190,8 +164,17 @@ void deep_set_alone(const Setting& setting, Finding& finding) {
                                   "The same by scenario", finding, finding.json["scenarios"]);
   finding.json["mean_rms_gf"] = {{"ours", compositions.mean_ours_gf},
                                  {"published", compositions.mean_theirs_gf}};
+  finding.json["mean_rms_over_scenarios_gf"] = {{"ours", scenarios.mean_ours_gf},
+                                                {"published", scenarios.mean_theirs_gf}};
   finding.json["largest_ratio"] = {{"compositions", compositions.largest_ratio},
                                    {"scenarios", scenarios.largest_ratio}};
+  const std::vector<TrackError> ours = by_track(ours_blocks), published = by_track(theirs_blocks);
+  finding.json["scenario_spreads"] = files::Json::array();
+  const Beside spreads = beside(spread_by_scenario(ours), spread_by_scenario(published),
+                                "The same by scenario, without the mean of each vehicle's flight", finding,
+                                finding.json["scenario_spreads"]);
+  add_flights(load_recorded(setting, recorded, recorded_options(setting)), ours, published, finding);
+  add_having_seen(setting, recorded, theirs_blocks, finding);
   finding.json["published_networks_saw_test_flights"] = true;
   lipschitz::CertifyOptions certify;
   certify.jobs = setting.jobs;
@@ -204,73 +187,13 @@ void deep_set_alone(const Setting& setting, Finding& finding) {
   finding.json["epochs"] = learned.epochs;
   finding.notes.push_back(
       "The published networks had seen these test flights when they were trained; ours had not.");
-  finding.notes.push_back(
-      fmt::format("Mean over compositions: ours {:.3f} gf, published {:.3f} gf. Largest ratio {:.3f} ({}); "
-                  "by scenario {:.3f} "
-                  "({}).",
-                  compositions.mean_ours_gf, compositions.mean_theirs_gf, compositions.largest_ratio,
-                  compositions.where, scenarios.largest_ratio, scenarios.where));
-}
-
-/// Physics first: lag, offsets, ground, jet and the rest are fitted, and a deep set learns the remainder.
-void physics_first(const Setting& setting, Finding& finding) {
-  Recorded recorded = recorded_flights(setting, false);
-  const identification::Budget budget =
-      identification::error_budget(recorded.fit, recorded.select, "", setting.jobs,
-                                   [&](int done, int total) { setting.progress(done, total, "passes"); });
-  std::vector<std::pair<std::string, Blocks>> rows;
-  const auto judge = [&](const std::string& name, const residuals::Inputs& inputs) {
-    rows.emplace_back(name, residual_blocks(inputs, setting.jobs));
-  };
-  for (residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test}) {
-    for (stability::Model& model : inputs->models) {
-      model.effects.clear();
-      const auto mass = budget.masses_kg.find(model.kind);
-      if (mass != budget.masses_kg.end()) model.mass_kg = mass->second;
-    }
-  }
-  judge("nominal", recorded.test);
-  for (const identification::BudgetRow& row : budget.rows) {
-    if (row.models.empty()) continue;
-    recorded.test.vehicle_models = row.models;
-    judge("+ " + row.name, recorded.test);
-  }
-  for (residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test})
-    inputs->vehicle_models = budget.fitted;
-  const Learned learned = train(setting, recorded, learn_options(setting, 8), "remainder",
-                                key_of(setting, recorded, "remainder"));
-  judge("+ deep set on the remainder", with_network(recorded.test, learned.folder + "/network.toml"));
-
-  Table table = {"Physics first: vertical residual on test flights",
-                 {"model", "RMS [gf]", "90 %", "falls by [gf]", "90 %"},
-                 {}};
-  finding.json["physics_first"] = files::Json::array();
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const residuals::Interval of_row = interval_of(rows[k].second);
-    const double rms = rms_gf(rows[k].second);
-    files::Json row = {
-        {"model", rows[k].first}, {"rms_gf", rms}, {"interval_gf", {of_row.lower, of_row.upper}}};
-    std::vector<std::string> cells = {rows[k].first, gf(rms), gf(of_row), "", ""};
-    if (k > 0) {
-      const Estimate fall = change(rows[k - 1].second, rows[k].second);
-      row["falls_by_gf"] = fall.value_gf;
-      row["falls_by_interval_gf"] = {fall.interval.lower, fall.interval.upper};
-      cells[3] = gf(fall.value_gf);
-      cells[4] = gf(fall.interval);
-    }
-    row["compositions"] = files::Json::object();
-    for (const auto& [name, value] : by_composition(rows[k].second)) row["compositions"][name] = value;
-    finding.json["physics_first"].push_back(std::move(row));
-    table.rows.push_back(std::move(cells));
-  }
-  finding.json["remainder_bound"] = learned.bound;
-  finding.tables.push_back(std::move(table));
-  finding.notes.push_back(
-      fmt::format("Physics first is judged with its own labels (accelerometer filter in the model), the deep "
-                  "set alone with the "
-                  "authors': compare rows within a table. Largest joint bound of the deep set on the "
-                  "remainder: {:.1f} gf per unit.",
-                  learned.bound));
+  finding.notes.push_back(fmt::format(
+      "Mean over compositions: ours {:.3f} gf, published {:.3f} gf; over scenarios {:.3f} and {:.3f} gf. "
+      "Largest "
+      "ratio {:.3f} ({}); by scenario {:.3f} ({}), without the means of single flights {:.3f} ({}).",
+      compositions.mean_ours_gf, compositions.mean_theirs_gf, scenarios.mean_ours_gf,
+      scenarios.mean_theirs_gf, compositions.largest_ratio, compositions.where, scenarios.largest_ratio,
+      scenarios.where, spreads.largest_ratio, spreads.where));
 }
 
 }  // namespace

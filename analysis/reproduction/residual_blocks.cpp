@@ -74,9 +74,11 @@ std::vector<ResidualBlock> residual_blocks(const residuals::Inputs& inputs, int 
       for (std::size_t k = 0; k < residual.size(); ++k) {
         if (track.cut[k] != residuals::Cut::kNone) continue;
         const double at = std::floor(track.instants[k].time_s / kBlock_s);
-        if (at != block_at) of_flight[f].push_back({track.scenario, composition_of(tracks, i), 0, 0});
+        if (at != block_at)
+          of_flight[f].push_back({track.flight, track.vehicle, track.scenario, composition_of(tracks, i)});
         block_at = at;
         const double r_gf = residual[k].z() / stability::kGramForce_N;
+        of_flight[f].back().sum_gf += r_gf;
         of_flight[f].back().squares_gf2 += r_gf * r_gf;
         of_flight[f].back().count += 1;
       }
@@ -123,6 +125,34 @@ Estimate mean_of(const std::vector<BlockMean>& blocks) {
     return total.sum / total.count;
   };
   return {mean(all), bootstrap(blocks.size(), mean)};
+}
+
+std::vector<TrackError> by_track(const std::vector<ResidualBlock>& blocks) {
+  std::vector<TrackError> tracks;
+  for (std::size_t k = 0; k < blocks.size();) {
+    TrackError track = {blocks[k].scenario, blocks[k].flight, blocks[k].vehicle};
+    double sum = 0, squares = 0;
+    for (; k < blocks.size() && blocks[k].flight == track.flight && blocks[k].vehicle == track.vehicle; ++k) {
+      sum += blocks[k].sum_gf;
+      squares += blocks[k].squares_gf2;
+      track.count += blocks[k].count;
+    }
+    track.mean_gf = sum / track.count;
+    track.spread_gf = std::sqrt(std::max(0.0, squares / track.count - track.mean_gf * track.mean_gf));
+    tracks.push_back(std::move(track));
+  }
+  return tracks;
+}
+
+std::map<std::string, double> spread_by_scenario(const std::vector<TrackError>& tracks) {
+  std::map<std::string, std::pair<double, double>> sums;
+  for (const TrackError& track : tracks) {
+    sums[track.scenario].first += track.count * track.spread_gf * track.spread_gf;
+    sums[track.scenario].second += track.count;
+  }
+  std::map<std::string, double> result;
+  for (const auto& [scenario, sum] : sums) result[scenario] = std::sqrt(sum.first / sum.second);
+  return result;
 }
 
 std::map<std::string, double> by_composition(const std::vector<ResidualBlock>& blocks) {

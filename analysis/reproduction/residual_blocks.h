@@ -12,10 +12,11 @@ namespace swarmcert::reproduction {
 
 /// Sum of squared vertical residuals of one vehicle over 2 s of a flight, gf^2.
 struct ResidualBlock {
-  std::string scenario;  ///< "21_swap_ss"
+  std::string flight, vehicle;  ///< "21_swap_ss/02", "cf50"
+  std::string scenario;         ///< "21_swap_ss"
   std::string
       composition;  ///< initials of the neighbours' kinds, then of the vehicle's: "SL2S"; "Ge2S" flies alone
-  double squares_gf2 = 0, count = 0;
+  double sum_gf = 0, squares_gf2 = 0, count = 0;
 };
 
 /// In order of flights, vehicles and time: blocks of two models with the same cut rules correspond.
@@ -39,6 +40,18 @@ struct BlockMean {
 };
 /// Mean of all values; 90 % interval by resampling blocks, equal ends where there are fewer than two.
 Estimate mean_of(const std::vector<BlockMean>& blocks);
+
+/// What is left of one vehicle in one flight.
+struct TrackError {
+  std::string scenario, flight, vehicle;
+  double mean_gf = 0, spread_gf = 0;  ///< RMS^2 = mean^2 + spread^2
+  double count = 0;
+  double squares_gf2() const { return count * (mean_gf * mean_gf + spread_gf * spread_gf); }
+};
+/// In order of flights and vehicles.
+std::vector<TrackError> by_track(const std::vector<ResidualBlock>& blocks);
+/// RMS in gf of each scenario, once the mean of every vehicle in every flight is taken off.
+std::map<std::string, double> spread_by_scenario(const std::vector<TrackError>& tracks);
 
 /// RMS in gf of the blocks of each composition ("" is all), or of each scenario.
 std::map<std::string, double> by_composition(const std::vector<ResidualBlock>& blocks);

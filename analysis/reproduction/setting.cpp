@@ -32,7 +32,7 @@ stability::EffectSpec updraft() {
 }  // namespace
 
 Scale scale_of(const Setting& setting) {
-  return setting.full ? Scale{60, 12000, 3, 5} : Scale{30, 800, 1, 2};
+  return setting.full ? Scale{60, 12000, 3, 5, 12} : Scale{30, 800, 1, 2, 6};
 }
 
 std::vector<Truth> truths(const Setting& setting) {

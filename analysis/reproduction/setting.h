@@ -34,6 +34,7 @@ struct Scale {
   int steps;           ///< of the optimiser, in batches of 256
   int training_seeds;  ///< networks trained anew, on flights of their own
   int flight_seeds;    ///< flights of each network and number of vehicles
+  int walks;           ///< random walks over which the least distance of a stage is averaged
 };
 Scale scale_of(const Setting& setting);
 

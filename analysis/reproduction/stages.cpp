@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <numeric>
 
 #include "nn/files/file_io.h"
 #include "nn/files/json.h"
+#include "nn/files/parallel.h"
 
 namespace swarmcert::reproduction {
 namespace {
@@ -72,10 +74,10 @@ std::optional<files::Network> Stages::flown_network(int stage) {
 
 std::string Stages::key(int stage) {
   const std::optional<files::Network> network = flown_network(stage);
-  return files::sha256(
-      stability::to_toml(truth_.model) + files::read_file(setting_.gains) +
-      fmt::format("{} {} {} {} ", truth_.battery_V, stage, scale_of(setting_).task_s, seed("flights")) +
-      (network ? weights_of(*network) : ""));
+  return files::sha256(stability::to_toml(truth_.model) + files::read_file(setting_.gains) +
+                       fmt::format("{} {} {} {} {} {} ", truth_.battery_V, stage, scale_of(setting_).task_s,
+                                   kStages[stage].drawn_in, scale_of(setting_).walks, seed("flights")) +
+                       (network ? weights_of(*network) : ""));
 }
 
 StageFlights Stages::flights(int stage) {
@@ -93,28 +95,37 @@ StageFlights Stages::flights(int stage) {
   const std::optional<files::Network> network = flown_network(stage);
   const double task_s = scale_of(setting_).task_s;
   const int vehicles = kStages[stage].vehicles;
-  // Stages 0 and 1 fly the same set points: what differs is the compensation.
+  const double drawn_in = kStages[stage].drawn_in;
   const std::uint64_t number = static_cast<std::uint64_t>(vehicles);
   const std::vector<std::pair<std::string, Plan>> plans = {
-      {"fit/random-walk", {"random-walk", vehicles, task_s, seed("fit", number)}},
+      {"fit/random-walk", {"random-walk", vehicles, task_s, seed("fit", number), 0, drawn_in}},
       {"fit/swap", {"swap", vehicles, task_s, seed("fit swap", number)}},
-      {"select/random-walk", {"random-walk", vehicles, task_s / 3, seed("select", number)}},
-      {"test/random-walk", {"random-walk", vehicles, task_s / 2, seed("test", number)}},
+      {"select/random-walk", {"random-walk", vehicles, task_s / 3, seed("select", number), 0, drawn_in}},
+      {"test/random-walk", {"random-walk", vehicles, task_s / 2, seed("test", number), 0, drawn_in}},
       {"test/swap", {"swap", vehicles, 13.5, seed("test swap", number)}}};
-  std::vector<float> distances;
   for (std::size_t k = 0; k < plans.size(); ++k) {
     setting_.progress(static_cast<int>(k), static_cast<int>(plans.size()),
                       fmt::format("flights of {} vehicles", vehicles));
-    const Flown flown = fly_logged(setting_, truth_, plans[k].second, network ? &*network : nullptr,
-                                   (fs::path(folder) / plans[k].first).string());
-    if (plans[k].first != "fit/random-walk") continue;
-    distances = nearest_distances_m(flown);
+    fly_logged(setting_, truth_, plans[k].second, network ? &*network : nullptr,
+               (fs::path(folder) / plans[k].first).string());
   }
-  const files::Json file = {
-      {"schema", kStagesSchema},
-      {"key", own_key},
-      {"least_distance_m", static_cast<double>(distances.front())},
-      {"percentile_distance_m", static_cast<double>(distances[distances.size() / 100])}};
+  // The least distance of one walk says as much of its seed as of the stage.
+  const int walks = scale_of(setting_).walks;
+  std::vector<double> least_m(static_cast<std::size_t>(walks)), percentile_m(least_m.size());
+  files::parallel_for(walks, setting_.jobs, [&](int w) {
+    const Plan plan = {"random-walk", vehicles, task_s, seed(fmt::format("walk {}", w), number), 0, drawn_in};
+    const std::vector<float> distances =
+        nearest_distances_m(fly(setting_, truth_, plan, network ? &*network : nullptr, false));
+    least_m[static_cast<std::size_t>(w)] = static_cast<double>(distances.front());
+    percentile_m[static_cast<std::size_t>(w)] = static_cast<double>(distances[distances.size() / 100]);
+  });
+  const auto mean = [](const std::vector<double>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  };
+  const files::Json file = {{"schema", kStagesSchema},
+                            {"key", own_key},
+                            {"least_distance_m", mean(least_m)},
+                            {"percentile_distance_m", mean(percentile_m)}};
   files::write_file(done, files::to_text(file), true);
   return read_back(file);
 }
@@ -125,22 +136,26 @@ residuals::Inputs Stages::inputs(const std::vector<int>& stages, const std::stri
   return read_simulated(truth_, folders);
 }
 
+std::string Stages::data_key(int stage) {
+  std::string all;
+  for (int k = 0; k <= stage; ++k) all += key(k);
+  return all;
+}
+
+learning::LearningData Stages::data(int stage, const learning::NetworkSizes& sizes) {
+  std::vector<int> from(static_cast<std::size_t>(stage) + 1);
+  std::iota(from.begin(), from.end(), 0);
+  const residuals::Inputs fit = inputs(from, "fit"), select = inputs(from, "select"),
+                          test = inputs({stage}, "test");
+  return learning::load_learning_data({&fit, &select, &test}, sizes, learning::SplitBy::kFlights,
+                                      setting_.jobs, [](int, int) {});
+}
+
 Learned Stages::learned(int stage) {
-  std::vector<int> from = {stage};
-  if (stage == 1) from = {0, 1};
-  std::string origin;
-  for (const int some : from) {
-    flights(some);
-    origin += key(some);
-  }
+  flights(stage);
   const LearnOptions options = learn_options();
   const std::string folder = (fs::path(folder_) / fmt::format("stage{}", stage) / "network").string();
-  return learn(setting_, options, folder, origin, [&] {
-    const residuals::Inputs fit = inputs(from, "fit"), select = inputs(from, "select"),
-                            test = inputs({stage}, "test");
-    return learning::load_learning_data({&fit, &select, &test}, options.sizes, learning::SplitBy::kFlights,
-                                        setting_.jobs, [](int, int) {});
-  });
+  return learn(setting_, options, folder, data_key(stage), [&] { return data(stage, options.sizes); });
 }
 
 }  // namespace swarmcert::reproduction

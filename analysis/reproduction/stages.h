@@ -11,23 +11,31 @@
 namespace swarmcert::reproduction {
 
 /// Stage 0: two vehicles without a network. 1: two with the network of stage 0. 2: three with that of stage 1. 3: four
-/// with that of stage 2. Every stage flies one random walk and repeated swaps, and learns from its own flights alone;
-/// but stage 1 learns from those of stage 0 as well, so that "trained with 2" is all that two vehicles flew.
+/// with that of stage 2. Every stage flies one random walk and repeated swaps. Its network learns from these flights and
+/// from those of all stages before it: the paper calls its curriculum cumulative. What was flown with fewer vehicles
+/// keeps swarms with fewer neighbours from being forgotten.
+///
+/// A network allows closer flight (section III-C): the random walks of every stage that has one are drawn in further.
+/// Left as it is, the task's repulsion keeps more vehicles as far apart as fewer. How far is our choice.
 struct Stage {
   int vehicles;
+  double drawn_in;         ///< of the random walks' set points, see Plan
   const char* flown_with;  ///< in words
 };
-inline constexpr Stage kStages[] = {
-    {2, "no network"}, {2, "network of 2, uncompensated"}, {3, "network of 2"}, {4, "network of 3"}};
+inline constexpr Stage kStages[] = {{2, 1.0, "no network"},
+                                    {2, 0.95, "network of 2, uncompensated"},
+                                    {3, 0.9, "network of 2"},
+                                    {4, 0.7, "network of 3"}};
 inline constexpr int kNumStages = 4;
 /// The stage whose network is "trained with" so many vehicles, 2 to 4.
 inline int stage_of(int trained_with) { return trained_with - 1; }
 
 /// What was seen of a stage's flights.
 struct StageFlights {
-  std::string folder;                ///< with fit/, select/ and test/
-  double least_distance_m = 0;       ///< between any two vehicles, in the flights to fit
-  double percentile_distance_m = 0;  ///< 1 % of the distances to the nearest other vehicle are below
+  std::string folder;           ///< with fit/, select/ and test/
+  double least_distance_m = 0;  ///< between any two vehicles in a random walk; mean of several walks
+  double percentile_distance_m =
+      0;  ///< 1 % of the distances to the nearest other vehicle are below; likewise
 };
 
 /// One truth and one training seed. Nothing is made twice: folders that are there and of the same origin are read.
@@ -40,6 +48,10 @@ class Stages {
   Learned learned(int stage);
   /// The network that flies stage `stage`; nothing for stage 0.
   std::optional<files::Network> flown_network(int stage);
+  /// What the network of a stage learns from, selects and tests by: it is tested on the stage's own flights.
+  learning::LearningData data(int stage, const learning::NetworkSizes& sizes);
+  /// Text that changes with everything data() depends on.
+  std::string data_key(int stage);
   /// Flights of a stage with the nominal model. @param use "fit", "select" or "test".
   residuals::Inputs inputs(const std::vector<int>& stages, const std::string& use);
   /// Text that changes with everything the flights of `stage` depend on.

@@ -74,12 +74,8 @@ Finding lipschitz_tradeoff(const Setting& setting) {
     options.steps = setting.full ? 6000 : 600;
     const std::string folder =
         (std::filesystem::path(stages.flights(stage).folder) / fmt::format("gamma-{:g}", gamma)).string();
-    const Learned learned = learn(setting, options, folder, stages.key(stage), [&] {
-      const residuals::Inputs fit = stages.inputs({stage}, "fit"), select = stages.inputs({stage}, "select"),
-                              test = stages.inputs({stage}, "test");
-      return learning::load_learning_data({&fit, &select, &test}, options.sizes, learning::SplitBy::kFlights,
-                                          setting.jobs, [](int, int) {});
-    });
+    const Learned learned = learn(setting, options, folder, stages.data_key(stage),
+                                  [&] { return stages.data(stage, options.sizes); });
     double predicted_m = 0, flown_m = 0;
     std::string by;
     for (int k = 0; k < scale_of(setting).flight_seeds; ++k) {

@@ -5,6 +5,7 @@
 
 #include "analysis/learning/lipschitz_limit.h"
 #include "analysis/learning/weighing.h"
+#include "analysis/reproduction/nearest_labels.h"
 #include "nn/files/random.h"
 
 namespace swarmcert::learning {
@@ -54,13 +55,61 @@ TEST(Weighing, ByErrorsFollowsTheGradientOfTheMeanLogarithm) {
   plain.weight.assign(plain.weight.size(), 1.0f);
   training::Vector expected = training::Vector::Zero(data.layout.size());
   for (const TrackSamples& track : data.tracks) {
-    const double error = errors_by_composition(data, theta, Use::kFit, 1, 1).at(track.composition);
+    const double error = errors_by_group(data, theta, Use::kFit, 1, 1).at(track.group());
     expected += gradient_of(plain, track.begin, track.end) /
                 static_cast<float>(error * static_cast<double>(track.end - track.begin));
   }
   const training::Vector found = gradient_of(weighed, 0, 2400);
   // Errors are taken from every eighth sample: the direction is right to a few percent.
   EXPECT_GT(found.normalized().dot(expected.normalized()), 0.99f);
+}
+
+TEST(Weighing, ScenariosOfOneCompositionHaveErrorsOfTheirOwn) {
+  LearningData data = two_compositions();
+  for (TrackSamples& track : data.tracks) track.composition = "small>small";
+  data.tracks[0].scenario = "swap";
+  data.tracks[1].scenario = "randomwalk";
+  const training::Vector nothing = training::Vector::Zero(data.layout.size());
+  const auto errors = errors_by_group(data, nothing, Use::kFit, 1, 1);
+  ASSERT_EQ(errors.size(), 2u);
+  EXPECT_NEAR(errors.at("swap small>small") / errors.at("randomwalk small>small"), 100, 15)
+      << "of 10 gf and of 1";
+}
+
+/// One neighbour at random places; the label is a function of height and lateral distance alone, plus `offset_gf`.
+void add_flight(LearningData& data, Use use, double offset_gf, double outwards_m, files::Random& random) {
+  TrackSamples track;
+  track.flight = std::string("swap/") + name(use);
+  track.vehicle = "cf1";
+  track.composition = "small>small";
+  track.use = use;
+  track.begin = data.samples.samples();
+  for (int s = 0; s < (use == Use::kTest ? 2000 : 40000); ++s) {
+    const double r = outwards_m + 0.2 * random.uniform(), dz = 0.3 + 0.1 * random.uniform();
+    const double angle = 3.14159 * random.symmetric();
+    data.samples.add_input(0, {static_cast<float>(r * std::cos(angle)),
+                               static_cast<float>(r * std::sin(angle)), static_cast<float>(dz), 0, 0, 0});
+    data.samples.add_sample(2, {static_cast<float>(-8 * std::exp(-100 * r * r) + 5 * dz + offset_gf)});
+  }
+  track.end = data.samples.samples();
+  data.tracks.push_back(track);
+}
+
+TEST(NearestLabels, SeeTheMeanOfAFlightThroughAnyTurnAndNothingWhereNobodyFlew) {
+  LearningData data = two_compositions();
+  data.tracks.clear();
+  files::Random random(5);
+  add_flight(data, Use::kFit, 0, 0, random);
+  add_flight(data, Use::kTest, -2, 0, random);
+  const auto found = reproduction::nearest_labels(data);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found.at({"swap/test", "cf1"}).mean_gf, -2, 0.1);
+  EXPECT_NEAR(found.at({"swap/test", "cf1"}).rms_gf, 2, 0.2);
+  LearningData elsewhere = two_compositions();
+  elsewhere.tracks.clear();
+  add_flight(elsewhere, Use::kFit, 0, 0, random);
+  add_flight(elsewhere, Use::kTest, -2, 1, random);
+  EXPECT_TRUE(reproduction::nearest_labels(elsewhere).empty());
 }
 
 TEST(LipschitzLimit, ScaledNetworksAreProvedToKeepItAndNothingElseChanges) {

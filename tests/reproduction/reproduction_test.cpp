@@ -44,6 +44,9 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
   for (const Json& column : table["columns"]) {
     EXPECT_EQ(column["max_z"].size(), 16u);
     EXPECT_EQ(column["flights"].size(), 16u * 2);
+    EXPECT_GT(column["least_improvement_trained_with_3_or_4"].get<double>(), 2) << column["truth"];
+    EXPECT_EQ(column["least_improvement_by_training_seed"].size(), 1u);
+    EXPECT_GT(column["improvement_trained_with_3_at_5"].get<double>(), 2) << column["truth"];
   }
 
   reproduce("curriculum -o out");
@@ -53,6 +56,7 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
     EXPECT_TRUE(stage["gamma_proved"].get<bool>());
     EXPECT_LT(stage["test_rmse_gf"].get<double>(), 0.7 * stage["test_rmse_of_nothing_gf"].get<double>());
   }
+  EXPECT_TRUE(curriculum["least_distance_falls"].get<bool>());
   ASSERT_GT(curriculum["labels"].size(), 3u);
   EXPECT_LT(curriculum["labels_rms_difference_gf"].get<double>(), 0.5);
 
@@ -85,6 +89,11 @@ TEST_F(Reproduction, RecordedFlightsAreLearnedBesideThePublishedNetworks) {
   EXPECT_TRUE(found["gamma_proved"].get<bool>());
   EXPECT_EQ(found["compositions"].size(), 2u);  // alone, and with another small vehicle
   EXPECT_TRUE(found["published_networks_saw_test_flights"].get<bool>());
+  EXPECT_LT(found["having_seen_test_flights"]["mean_rms_gf"].get<double>(),
+            found["having_seen_test_flights"]["published_mean_rms_gf"].get<double>());
+  ASSERT_FALSE(found["flights"].empty());
+  for (const Json& flight : found["flights"])
+    EXPECT_TRUE(flight["nearest_mean_gf"].is_number()) << "one neighbour at most: " << flight;
   ASSERT_EQ(found["bounds"].size(), 2u);  // a small neighbour, and the ground
   for (const Json& bound : found["bounds"]) EXPECT_LE(bound["upper"].get<double>(), 373) << bound;
   const Json& ladder = found["physics_first"];

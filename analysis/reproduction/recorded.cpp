@@ -1,0 +1,108 @@
+#include "analysis/reproduction/recorded.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "nn/files/file_io.h"
+
+namespace swarmcert::reproduction {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// gf per unit of input. Joint bounds of the published networks: 417.6 for the large pair, 373.7 for the small one, with
+/// gamma 3 in every layer, which ours keep as well.
+constexpr double kMaxLipschitz = 373;
+
+bool is_fitted(const residuals::FlightFiles& flight) {
+  return flight.scenario.rfind("23_", 0) == 0 || flight.run % 3 == 0;
+}
+
+template <typename Keep>
+residuals::Inputs some_flights(const residuals::Inputs& all, const Keep& keep) {
+  residuals::Inputs some = all;
+  auto& flights = some.found.flights;
+  flights.erase(std::remove_if(flights.begin(), flights.end(), [&](const auto& f) { return !keep(f); }),
+                flights.end());
+  return some;
+}
+
+/// The small size takes the flights of one or two small vehicles.
+bool is_small(const residuals::FlightFiles& flight) {
+  return flight.scenario == "21_randomwalk_s" || flight.scenario == "21_randomwalk_ss" ||
+         flight.scenario == "21_swap_ss";
+}
+
+}  // namespace
+
+Recorded recorded_flights(const Setting& setting, bool published_signals) {
+  const auto read = [&](const std::string& folder) {
+    residuals::InputArguments arguments;
+    arguments.flights = {(fs::path(setting.recorded) / "flights" / folder).string()};
+    arguments.fleet = setting.fleet;
+    arguments.rules.published_signals = published_signals;
+    const residuals::Inputs inputs = residuals::read_inputs(arguments);
+    return some_flights(inputs, [&](const auto& flight) { return setting.full || is_small(flight); });
+  };
+  const residuals::Inputs development = read("development");
+  return {some_flights(development, is_fitted),
+          some_flights(development, [](const auto& flight) { return !is_fitted(flight); }),
+          read("visible_test")};
+}
+
+residuals::Inputs with_network(residuals::Inputs inputs, const std::string& network) {
+  stability::EffectSpec spec;
+  spec.name = "deep_set";
+  spec.network = fs::absolute(network).string();
+  for (stability::Model& model : inputs.models) model.effects.push_back(spec);
+  for (auto& [vehicle, model] : inputs.vehicle_models) model.effects.push_back(spec);
+  return inputs;
+}
+
+std::string recorded_key(const Setting& setting, const Recorded& recorded) {
+  std::string key = setting.full ? "full" : "small";
+  for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test}) {
+    for (const residuals::FlightFiles& flight : inputs->found.flights) {
+      for (const auto& [vehicle, path] : flight.logs) key += files::sha256(files::read_file(path));
+    }
+    key += ";";
+  }
+  return key;
+}
+
+LearnOptions recorded_options(const Setting& setting) {
+  LearnOptions options;
+  options.sizes.features = 20;
+  options.gamma.value = 3;
+  options.max_lipschitz = kMaxLipschitz;
+  options.turns = true;
+  options.rate = 2e-3;
+  options.batch = 1024;
+  options.epochs = setting.full ? 16 : 6;
+  options.seed = setting.seed;
+  return options;
+}
+
+learning::LearningData load_recorded(const Setting& setting, const Recorded& recorded,
+                                     const LearnOptions& options) {
+  return learning::load_learning_data(recorded.flights(), options.sizes, learning::SplitBy::kFlights,
+                                      setting.jobs,
+                                      [&](int done, int total) { setting.progress(done, total, "flights"); });
+}
+
+Learned train_recorded(const Setting& setting, const Recorded& recorded, const std::string& name,
+                       const std::string& what) {
+  const LearnOptions options = recorded_options(setting);
+  return learn(setting, options, (fs::path(setting.work) / name).string(),
+               what + " " + recorded_key(setting, recorded),
+               [&] { return load_recorded(setting, recorded, options); });
+}
+
+std::string gf(double value) { return fmt::format("{:.2f}", value); }
+std::string gf(const residuals::Interval& interval) {
+  return fmt::format("{:.2f} .. {:.2f}", interval.lower, interval.upper);
+}
+
+}  // namespace swarmcert::reproduction
