@@ -98,7 +98,7 @@ FlightRecorder::FlightRecorder(SampledFlight& loop, std::uint64_t seed) : loop_(
   Swarm& swarm = loop.swarm();
   const double rate_hz = 1 / loop.period_s();
   every_ = std::max(1, static_cast<int>(std::lround(rate_hz / swarm.model(0).sensor.log_rate_hz)));
-  derivative_.resize(static_cast<std::size_t>(swarm.state_size()));
+  derivative_ = swarm.make_rows();
   for (int i = 0; i < swarm.size(); ++i) {
     files::Random random(files::Random(seed + 1000 + static_cast<std::uint64_t>(i)).bits());
     const double start_s = 0.03 * random.uniform();
@@ -109,22 +109,22 @@ FlightRecorder::FlightRecorder(SampledFlight& loop, std::uint64_t seed) : loop_(
                          random,
                          start_s,
                          {}});
-    inputs_.push_back(loop.input(i));
   }
 }
 
 void FlightRecorder::listen() {
   Swarm& swarm = loop_.swarm();
-  for (int i = 0; i < swarm.size(); ++i) inputs_[static_cast<std::size_t>(i)] = loop_.input(i);
-  swarm.derivative(loop_.time_s(), loop_.state(), inputs_.data(), derivative_.data());
+  swarm.derivative_in_rows(loop_.time_s(), loop_.rows(), loop_.inputs(), derivative_.data());
   const bool is_due = loop_.period() % every_ == 0;
   for (int i = 0; i < swarm.size(); ++i) {
     Vehicle& vehicle = vehicles_[static_cast<std::size_t>(i)];
-    const double* const x = loop_.state() + i * kVehicleStateSize;
-    const double* const dx = derivative_.data() + i * kVehicleStateSize;
+    const std::size_t at = row_index(i, kVehicleStateSize);
+    const double* const x = loop_.rows() + at + kQuaternion * kRowLength;
+    const double* const v_dot = derivative_.data() + at + kVelocity * kRowLength;
+    const double q[4] = {x[0], x[kRowLength], x[2 * kRowLength], x[3 * kRowLength]};
     Eigen::Matrix3d R_WB;
-    rotation_of(x + kQuaternion, &R_WB);
-    const Eigen::Vector3d force_W(dx[kVelocity], dx[kVelocity + 1], dx[kVelocity + 2] + kGravity_m_s2);
+    rotation_of(q, &R_WB);
+    const Eigen::Vector3d force_W(v_dot[0], v_dot[kRowLength], v_dot[2 * kRowLength] + kGravity_m_s2);
     const Eigen::Vector3d specific_force_B =
         vehicle.accelerometer.filter(R_WB.transpose() * vehicle.delay.filter(force_W));
     if (is_due && loop_.time_s() >= vehicle.start_s)

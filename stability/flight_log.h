@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "nn/files/random.h"
@@ -47,6 +48,10 @@ class FlightRecorder {
   const std::vector<LogRecord>& records(int vehicle) const {
     return vehicles_[static_cast<std::size_t>(vehicle)].records;
   }
+  /// records(), which then are none.
+  std::vector<LogRecord> take(int vehicle) {
+    return std::move(vehicles_[static_cast<std::size_t>(vehicle)].records);
+  }
 
  private:
   struct Vehicle {
@@ -60,8 +65,7 @@ class FlightRecorder {
 
   SampledFlight& loop_;
   int every_;
-  std::vector<double> derivative_;
-  std::vector<VehicleInput> inputs_;
+  Rows derivative_;  ///< of the state
   std::vector<Vehicle> vehicles_;
 };
 

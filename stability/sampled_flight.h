@@ -57,6 +57,8 @@ class SampledFlight {
   bool ran_position() const { return ran_position_; }
   /// [swarm().state_size()], see StateIndex; valid until the next step().
   const double* state() const;
+  /// The state in rows (rigid_bodies.h); after a step(), until change_state().
+  const double* rows() const { return rows_.data(); }
   /// state(), to be written before the next step().
   double* change_state();
   const VehicleInput& input(int vehicle) const { return inputs_[static_cast<std::size_t>(vehicle)]; }
@@ -65,6 +67,8 @@ class SampledFlight {
   const ControlRecord& record(int vehicle) const;
   /// record(vehicle).saturated, without the rest of it.
   bool is_saturated(int vehicle) const { return records_[static_cast<std::size_t>(vehicle)].saturated; }
+  /// Of all vehicles.
+  const VehicleInput* inputs() const { return inputs_.data(); }
   Swarm& swarm() { return swarm_; }
   double battery_V() const;
 

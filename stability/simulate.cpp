@@ -90,7 +90,7 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
         static_cast<double>(saturated[i]) / static_cast<double>(std::max<std::int64_t>(loop.period(), 1));
     result.largest_tilt_rad = std::acos(std::clamp(most_tilted[i], -1.0, 1.0));
     if (sums[i].count == 0) result.smallest_height_m = options.loop.ground_m;
-    if (options.keep_logs) simulation.logs.push_back(recorder.records(static_cast<int>(i)));
+    if (options.keep_logs) simulation.logs.push_back(recorder.take(static_cast<int>(i)));
   }
   return simulation;
 }

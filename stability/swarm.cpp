@@ -372,10 +372,15 @@ void Swarm::act_on_pairs(const double* const* rows, int num_rows) {
 void Swarm::derivative(double time_s, const double* state, const VehicleInput* inputs, double* derivative,
                        double stabilise) {
   to_rows(state, rows_.data());
-  hold(inputs);
-  act(time_s, rows_.data(), inputs);
-  bodies_.derivative(rows_.data(), stabilise, sum_.data());
+  derivative_in_rows(time_s, rows_.data(), inputs, sum_.data(), stabilise);
   from_rows(sum_.data(), derivative);
+}
+
+void Swarm::derivative_in_rows(double time_s, const double* rows, const VehicleInput* inputs,
+                               double* derivative_rows, double stabilise) {
+  hold(inputs);
+  act(time_s, rows, inputs);
+  bodies_.derivative(rows, stabilise, derivative_rows);
 }
 
 void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* start) {

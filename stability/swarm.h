@@ -53,6 +53,10 @@ class Swarm {
   void derivative(double time_s, const double* state, const VehicleInput* inputs, double* derivative,
                   double stabilise = 0);
 
+  /// derivative() of a state in rows (rigid_bodies.h), in rows.
+  void derivative_in_rows(double time_s, const double* rows, const VehicleInput* inputs,
+                          double* derivative_rows, double stabilise = 0);
+
   /// A state in rows (rigid_bodies.h), and back.
   void to_rows(const double* state, double* rows) const;
   void from_rows(const double* rows, double* state) const;
