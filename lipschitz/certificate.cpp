@@ -66,6 +66,9 @@ Json local_json(const LocalProof& proof) {
     for (const auto& [part, range] : *proof.others)
       json["others"][part] = {
           {"tree", range.tree}, {"least", hex_floats(range.least)}, {"most", hex_floats(range.most)}};
+    json["forms"] = Json::array();
+    for (const check::Form& form : proof.tree.forms)
+      json["forms"].push_back({{"q", joined(form.q)}, {"t", joined(form.t)}});
     return json;
   }
   Json form;

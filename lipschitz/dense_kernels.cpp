@@ -79,22 +79,30 @@ void add_transposed_product(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const Matri
   multiply(CblasTrans, CblasNoTrans, c, a, b);
 }
 
-MatrixXd cholesky(const MatrixXd& x) {
-  const int n = static_cast<int>(x.rows());
+bool cholesky_in_place(Eigen::Ref<MatrixXd> x) {
+  const int n = static_cast<int>(x.rows()), stride = static_cast<int>(x.outerStride());
   int info = 0;
+  dpotrf_("L", &n, x.data(), &stride, &info);
+  return info == 0 && x.diagonal().allFinite();
+}
+
+MatrixXd cholesky(const MatrixXd& x) {
   MatrixXd l = x.triangularView<Eigen::Lower>();
-  dpotrf_("L", &n, l.data(), &n, &info);
-  if (info != 0 || !l.allFinite()) return {};
+  if (!cholesky_in_place(l) || !l.allFinite()) return {};
   return l;
+}
+
+void invert_from_cholesky(Eigen::Ref<MatrixXd> l) {
+  invert_lower(l);
+  const int n = static_cast<int>(l.rows()), stride = static_cast<int>(l.outerStride());
+  int info = 0;
+  dlauum_("L", &n, l.data(), &stride, &info);
+  l.triangularView<Eigen::StrictlyUpper>() = l.transpose();
 }
 
 MatrixXd inverse_from_cholesky(const MatrixXd& l) {
   MatrixXd product = l;
-  invert_lower(product);
-  const int n = static_cast<int>(l.rows());
-  int info = 0;
-  dlauum_("L", &n, product.data(), &n, &info);
-  product.triangularView<Eigen::StrictlyUpper>() = product.transpose();
+  invert_from_cholesky(product);
   return product;
 }
 
@@ -108,16 +116,16 @@ VectorXd congruence_times(const MatrixXd& l, const MatrixXd& d, const VectorXd& 
   return w;
 }
 
-void solve_lower(const MatrixXd& l, MatrixXd& b) {
-  const int n = static_cast<int>(l.rows());
+void solve_lower(const Eigen::Ref<const MatrixXd>& l, Eigen::Ref<MatrixXd> b) {
+  const int n = static_cast<int>(l.rows()), stride = static_cast<int>(l.outerStride());
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, static_cast<int>(b.cols()),
-              1.0, l.data(), n, b.data(), n);
+              1.0, l.data(), stride, b.data(), static_cast<int>(b.outerStride()));
 }
 
-void solve_lower_transposed(const MatrixXd& l, MatrixXd& b) {
-  const int n = static_cast<int>(l.rows());
+void solve_lower_transposed(const Eigen::Ref<const MatrixXd>& l, Eigen::Ref<MatrixXd> b) {
+  const int n = static_cast<int>(l.rows()), stride = static_cast<int>(l.outerStride());
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, n, static_cast<int>(b.cols()),
-              1.0, l.data(), n, b.data(), n);
+              1.0, l.data(), stride, b.data(), static_cast<int>(b.outerStride()));
 }
 
 void solve_cholesky(const MatrixXd& l, VectorXd& b) {

@@ -33,16 +33,21 @@ void add_transposed_product(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<cons
 /// factorisation breaks down, so X is not safely positive definite.
 Eigen::MatrixXd cholesky(const Eigen::MatrixXd& x);
 
+/// The same in place; what is above the diagonal stays. False if the factorisation breaks down.
+bool cholesky_in_place(Eigen::Ref<Eigen::MatrixXd> x);
+
 /// X^-1 for X = L L'. Halves recursively, so that nearly all work is products of matrices.
 Eigen::MatrixXd inverse_from_cholesky(const Eigen::MatrixXd& l);
+/// The same in place.
+void invert_from_cholesky(Eigen::Ref<Eigen::MatrixXd> l);
 
 /// L^-1 D L^-T v, symmetric D (its lower triangle is read).
 Eigen::VectorXd congruence_times(const Eigen::MatrixXd& l, const Eigen::MatrixXd& d,
                                  const Eigen::VectorXd& v);
 
 /// B <- L^-1 B, and B <- L^-T B.
-void solve_lower(const Eigen::MatrixXd& l, Eigen::MatrixXd& b);
-void solve_lower_transposed(const Eigen::MatrixXd& l, Eigen::MatrixXd& b);
+void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& l, Eigen::Ref<Eigen::MatrixXd> b);
+void solve_lower_transposed(const Eigen::Ref<const Eigen::MatrixXd>& l, Eigen::Ref<Eigen::MatrixXd> b);
 
 /// Solves L L' v = b in place.
 void solve_cholesky(const Eigen::MatrixXd& l, Eigen::VectorXd& b);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <queue>
 
+#include "lipschitz/dense_kernels.h"
 #include "nn/files/doubles.h"
 
 namespace swarmcert::lipschitz {
@@ -43,9 +44,25 @@ ReachNetwork reach_network(const files::Weights& weights) {
 Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, std::vector<MatrixXd>* slopes,
              std::vector<LinearForms>* forms)
     : network_(network), box_(box) {
-  VectorXd magnitude = largest_input(box);
-  for (std::size_t k = 0; k < network.size(); ++k) {
-    const ReachLayer& layer = network[k];
+  add_layers(around, slopes, forms);
+}
+
+Reach::Reach(const ReachNetwork& network, const Reach& first, const Reach* around)
+    : network_(network),
+      box_(first.box_),
+      bounds_(first.bounds_),
+      input_magnitude_(first.input_magnitude_),
+      term_magnitude_(first.term_magnitude_) {
+  add_layers(around, nullptr, nullptr);
+}
+
+void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::vector<LinearForms>* forms) {
+  const auto after_relu = [](const ReachLayer& layer, const Bounds& bounds) {
+    return layer.has_relu ? VectorXd(bounds.upper.cwiseMax(0.0)) : bounds.magnitude();
+  };
+  for (std::size_t k = bounds_.size(); k < network_.size(); ++k) {
+    const ReachLayer& layer = network_[k];
+    const VectorXd magnitude = k == 0 ? largest_input(box_) : after_relu(network_[k - 1], bounds_.back());
     const Index rows = layer.weights.rows();
     input_magnitude_.push_back(magnitude);
     term_magnitude_.emplace_back(layer.weights.cwiseAbs() * magnitude + layer.bias.cwiseAbs() +
@@ -64,7 +81,7 @@ Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, s
     const LinearForms found = substituted(k, std::move(both));
     const VectorXd ends = largest(found);
     if (forms != nullptr) {
-      forms->push_back({MatrixXd::Zero(2 * rows, network.front().weights.cols()),
+      forms->push_back({MatrixXd::Zero(2 * rows, network_.front().weights.cols()),
                         VectorXd::Constant(2 * rows, kInfinity)});
       for (Index i = 0; i < 2 * count; ++i) {
         const Index row = open[static_cast<std::size_t>(i % count)] + (i < count ? 0 : rows);
@@ -72,7 +89,7 @@ Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, s
         forms->back().constants(row) = found.constants(i);
       }
     }
-    if (slopes != nullptr) slopes->push_back(MatrixXd::Zero(rows, network.front().weights.cols()));
+    if (slopes != nullptr) slopes->push_back(MatrixXd::Zero(rows, network_.front().weights.cols()));
     for (Index i = 0; i < count; ++i) {
       double& lower = bounds.lower(open[static_cast<std::size_t>(i)]);
       double& upper = bounds.upper(open[static_cast<std::size_t>(i)]);
@@ -82,7 +99,6 @@ Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, s
         slopes->back().row(open[static_cast<std::size_t>(i)]) =
             0.5 * (found.rows.row(i).cwiseAbs() + found.rows.row(count + i).cwiseAbs());
     }
-    magnitude = layer.has_relu ? VectorXd(bounds.upper.cwiseMax(0.0)) : bounds.magnitude();
     bounds_.push_back(std::move(bounds));
   }
 }
@@ -99,7 +115,9 @@ LinearForms Reach::substituted(std::size_t top, MatrixXd lambda) const {
     constants += lambda * layer.bias + size * layer.bias_radius;
     absolute += size * (layer.bias.cwiseAbs() + layer.bias_radius);
     error += gamma(layer.weights.rows()) * (size * term_magnitude_[j]);
-    lambda = lambda * layer.weights;
+    MatrixXd next = MatrixXd::Zero(rows, layer.weights.cols());
+    add_product(next, lambda, layer.weights);
+    lambda = std::move(next);
     terms += 2 * layer.weights.rows() + 2 * layer.weights.cols();
     if (j == 0 || !network_[j - 1].has_relu) continue;
     for (Index i = 0; i < lambda.cols(); ++i) {

@@ -55,6 +55,9 @@ class Reach {
   Reach(const ReachNetwork& network, const Box& box, const Reach* around = nullptr,
         std::vector<Eigen::MatrixXd>* slopes = nullptr, std::vector<LinearForms>* forms = nullptr);
 
+  /// Of a longer network over the same box: `first` are the bounds of its first layers, which are taken as they are.
+  Reach(const ReachNetwork& network, const Reach& first, const Reach* around);
+
   /// Of y_k, before the ReLU of layer k.
   const Bounds& before_relu(std::size_t k) const { return bounds_[k]; }
   /// Largest |h_{k-1}|, what layer k takes in.
@@ -69,6 +72,7 @@ class Reach {
   Eigen::VectorXd largest(const LinearForms& forms) const;
 
  private:
+  void add_layers(const Reach* around, std::vector<Eigen::MatrixXd>* slopes, std::vector<LinearForms>* forms);
   LinearForms substituted(std::size_t top, Eigen::MatrixXd lambda) const;
 
   const ReachNetwork& network_;

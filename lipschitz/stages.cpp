@@ -94,14 +94,17 @@ LocalFunction coupled_function(const files::Network& network, const std::string&
                                const std::string& block, const std::vector<double>& scale,
                                const std::vector<double>& least, const std::vector<double>& most) {
   const std::vector<std::string> names = files::networks_of(function);
-  const std::vector<files::Layer>& behind = files::parts(network).at(names.at(1))->layers;
   LocalFunction f;
   f.hidden = term_layers(network, names[0], names[1]);
-  f.hidden.back() = hidden_layer(behind.front(), true);
-  f.hidden.back().least = least;
-  f.hidden.back().most = most;
-  for (std::size_t k = 1; k + 1 < behind.size(); ++k) f.hidden.push_back(hidden_layer(behind[k], true));
-  f.gram = gram(behind.back(), Matrix(0, 0));
+  if (f.hidden.size() < 3) throw std::invalid_argument(names[0] + " has no hidden layer");
+  f.hidden.resize(f.hidden.size() - 2);
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<files::Layer>& behind = parts.at(names[1])->layers;
+  f.behind = {hidden_layer(parts.at(names[0])->layers.back(), false)};
+  for (std::size_t k = 0; k + 1 < behind.size(); ++k) f.behind.push_back(hidden_layer(behind[k], true));
+  f.behind_gram = gram(behind.back(), Matrix(0, 0));
+  f.behind[1].least = least;
+  f.behind[1].most = most;
   set_coordinates(f, network, names[0], block, scale);
   return f;
 }

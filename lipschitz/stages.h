@@ -30,8 +30,8 @@ LocalFunction local_function(const files::Network& network, const std::string& p
 std::vector<HiddenLayer> term_layers(const files::Network& network, const std::string& phi,
                                      const std::string& rho);
 
-/// x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>" as one chain, for any s with least <= V s <= most; V as in
-/// term_layers().
+/// x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>", for any s with least <= V s <= most; V as in term_layers(). What
+/// takes the place of rho, a tree's forms say.
 /// @throws as local_function() and term_layers().
 LocalFunction coupled_function(const files::Network& network, const std::string& function,
                                const std::string& block, const std::vector<double>& scale,

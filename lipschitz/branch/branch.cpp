@@ -47,6 +47,13 @@ constexpr double kLeastGain = 1e-2;
 constexpr int kSamples = 500;
 /// A program that took rho below this share of what it was may have stopped early: it gets another turn.
 constexpr double kFar = 0.9;
+/// A part of a set function gets a form of rho of its own once its undecided neurons are fewer than this share of those
+/// with which the inherited one was computed.
+constexpr double kFormLazy = 0.85;
+/// Where no more of rho's neurons are decided, it looks again with so much less.
+constexpr double kFormAgain = 0.8;
+/// What a form is above the least one, relatively to its largest entry: more than rounding it to single precision takes.
+constexpr double kFormMargin = 4e-6;
 /// How well the program of the whole box is solved.
 constexpr double kRootGap = 0.02;
 constexpr int kRootSteps = 12;
@@ -61,13 +68,16 @@ struct Part {
   int split = 0;           ///< the coordinate to halve
   int multipliers = -1;    ///< inherited or own
   int undecided_then = 0;  ///< where these multipliers were computed
+  int form = -1;           ///< index in Search::forms_
+  int undecided_form = 0;  ///< where that form was computed
   bool operator<(const Part& other) const { return rho < other.rho; }
 };
 
 class Search {
  public:
-  Search(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options)
-      : chain_(chain), boxes_(boxes), options_(options) {}
+  Search(const LocalChain& chain, const SetChain* set, const std::vector<Box>& boxes,
+         const BranchOptions& options)
+      : chain_(chain), set_(set), boxes_(boxes), options_(options) {}
 
   BranchResult run() {
     const auto start = std::chrono::steady_clock::now();
@@ -75,7 +85,11 @@ class Search {
     for (const Box& box : boxes_) {
       nodes_.push_back({});
       Part root = part(box, nullptr, static_cast<int>(nodes_.size()) - 1);
-      solve(root);
+      if (set_ == nullptr) {
+        solve(root);
+      } else {
+        renew_form(root);
+      }
       queue.push(std::move(root));
     }
     const auto enough = [&] {
@@ -91,6 +105,14 @@ class Search {
       if (bound(queue.top()) <= enough()) break;
       Part top = queue.top();
       queue.pop();
+      if (set_ != nullptr && top.undecided < kFormLazy * top.undecided_form) {
+        const double before = top.rho;
+        renew_form(top);
+        if (top.rho < before) {
+          queue.push(std::move(top));
+          continue;
+        }
+      }
       if (top.undecided < kLazy * top.undecided_then) {
         solve(top);
         queue.push(std::move(top));
@@ -129,7 +151,14 @@ class Search {
 
  private:
   struct TreeNode {
-    int split = BranchTree::kLeaf, first_child = 0, multipliers = -1;
+    int split = BranchTree::kLeaf, first_child = 0, multipliers = -1, form = -1;
+  };
+  /// In the chain's units.
+  struct OfRho {
+    MatrixXd gram;  ///< of phi
+    VectorXd t;     ///< of all of rho's neurons
+    std::shared_ptr<const Reach> reach;
+    int undecided;  ///< neurons of rho
   };
   /// In the chain's units.
   struct Multipliers {
@@ -140,6 +169,14 @@ class Search {
 
   const Multipliers& multipliers_of(const Part& part) const {
     return scaled_[static_cast<std::size_t>(part.multipliers)];
+  }
+
+  const MatrixXd& gram_of(const Part& part) const {
+    return set_ == nullptr ? chain_.gram : forms_[static_cast<std::size_t>(part.form)].gram;
+  }
+
+  double squared_slope(const VectorXd& x) const {
+    return set_ == nullptr ? chain_.squared_slope(x) : set_->whole.squared_slope(x);
   }
 
   /// What is known of the way that is left.
@@ -159,7 +196,7 @@ class Search {
       VectorXd x(chain_.inputs());
       for (std::size_t k = 0; k < box.lower.size(); ++k)
         x(static_cast<Index>(k)) = box.lower[k] + (box.upper[k] - box.lower[k]) * unit(generator);
-      const double slope = std::sqrt(chain_.unscaled_rho(chain_.squared_slope(x)));
+      const double slope = std::sqrt(chain_.unscaled_rho(squared_slope(x)));
       outlook.slope_in_part = std::max(outlook.slope_in_part, slope);
     }
   }
@@ -193,7 +230,7 @@ class Search {
       const auto k = static_cast<std::size_t>(j);
       centre(j) = box.lower[k] + (box.upper[k] - box.lower[k]) / 2;
     }
-    steep_.emplace(chain_.squared_slope(centre), centre);
+    steep_.emplace(squared_slope(centre), centre);
     if (steep_.size() > kSteepCentres) steep_.erase(std::prev(steep_.end()));
   }
 
@@ -208,29 +245,19 @@ class Search {
     const bool has_pairs = parent != nullptr && !multipliers_of(*parent).pairs.empty();
     part.reach = std::make_shared<const Reach>(chain_.hidden, box, part.around.get(), &slopes,
                                                has_pairs ? &forms : nullptr);
-    for (std::size_t k = 0; k < chain_.hidden.size(); ++k) {
-      const Bounds& bounds = part.reach->before_relu(k);
-      for (Index i = 0; i < bounds.lower.size(); ++i) {
-        if (i >= bounds.lower.size() - chain_.without_relu[k]) {
-          part.states.push_back(NeuronState::kOn);
-          continue;
-        }
-        const double margin = kStateMargin * std::max(std::abs(bounds.lower(i)), std::abs(bounds.upper(i)));
-        part.states.push_back(bounds.lower(i) > margin    ? NeuronState::kOn
-                              : bounds.upper(i) < -margin ? NeuronState::kOff
-                                                          : NeuronState::kUndecided);
-        if (part.states.back() == NeuronState::kUndecided) ++part.undecided;
-      }
-    }
+    part.states = states_of(*part.reach, chain_, 0);
+    part.undecided = undecided_in(part.states);
     if (parent != nullptr) {
       part.rho = parent->rho;
       part.multipliers = parent->multipliers;
       part.undecided_then = parent->undecided_then;
+      part.form = parent->form;
+      part.undecided_form = parent->undecided_form;
       std::vector<std::size_t> pairs;
       if (has_pairs) pairs = still_shown(part, NeuronForms(forms, box));
       const bool all_pairs = pairs.size() == multipliers_of(part).pairs.size();
       if (part.states != parent->states || !all_pairs) {
-        NodeInequality inequality(chain_, part.states);
+        NodeInequality inequality(chain_, part.states, gram_of(part));
         const double rho = inequality.least_rho(inherited(part, pairs, inequality));
         const bool is_worse = !all_pairs && !(rho <= part.rho);  // for want of a pair
         part.rho = is_worse ? rho : std::min(part.rho, rho);
@@ -239,6 +266,26 @@ class Search {
     }
     part.split = best_split(*part.reach, slopes, part.states);
     return part;
+  }
+
+  /// Of the neurons of `chain`, whose layers are those of `reach` from `first` on.
+  static std::vector<NeuronState> states_of(const Reach& reach, const LocalChain& chain, std::size_t first) {
+    std::vector<NeuronState> states;
+    for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
+      const Bounds& bounds = reach.before_relu(first + k);
+      for (Index i = 0; i < bounds.lower.size(); ++i) {
+        const double margin = kStateMargin * std::max(std::abs(bounds.lower(i)), std::abs(bounds.upper(i)));
+        const bool has_relu = i < bounds.lower.size() - chain.without_relu[k];
+        states.push_back(!has_relu || bounds.lower(i) > margin ? NeuronState::kOn
+                         : bounds.upper(i) < -margin           ? NeuronState::kOff
+                                                               : NeuronState::kUndecided);
+      }
+    }
+    return states;
+  }
+
+  static int undecided_in(const std::vector<NeuronState>& states) {
+    return static_cast<int>(std::count(states.begin(), states.end(), NeuronState::kUndecided));
   }
 
   /// The coordinate that makes up most of the undecided neurons' ranges.
@@ -294,14 +341,14 @@ class Search {
   /// in all. `t` becomes the multipliers to start from.
   std::vector<NeuronPair> chosen_pairs(const Part& part, std::size_t most, VectorXd& t) const {
     if (most == 0 && multipliers_of(part).pairs.empty()) {
-      NodeInequality inequality(chain_, part.states);
+      NodeInequality inequality(chain_, part.states, gram_of(part));
       t = inherited(part, {}, inequality);
       return {};
     }
     std::vector<LinearForms> found;
     const Reach again(chain_.hidden, part.reach->box(), part.around.get(), nullptr, &found);
     const NeuronForms forms(found, part.reach->box());
-    NodeInequality inequality(chain_, part.states);
+    NodeInequality inequality(chain_, part.states, gram_of(part));
     const std::vector<std::size_t> old = still_shown(part, forms);
     t = inherited(part, old, inequality);
     std::vector<NeuronPair> result;
@@ -347,20 +394,20 @@ class Search {
   }
 
   void solve(Part& part, const DescentOptions& descent, std::size_t most_pairs) {
-    NodeInequality inequality(chain_, part.states);
+    NodeInequality inequality(chain_, part.states, gram_of(part));
     const Index m = inequality.neurons();
     std::vector<NeuronPair> pairs;
     VectorXd t;
     if (part.multipliers < 0) {
-      t = root_multipliers(inequality);
+      t = root_multipliers(chain_, inequality);
     } else {
       pairs = chosen_pairs(part, most_pairs, t);
       for (const NeuronPair& pair : pairs) inequality.add(pair);
       t = descend(inequality, t, descent);
       if (!std::isfinite(inequality.least_rho(t)) && !pairs.empty()) {
         pairs.clear();
-        inequality = NodeInequality(chain_, part.states);
-        t = root_multipliers(inequality);
+        inequality = NodeInequality(chain_, part.states, gram_of(part));
+        t = root_multipliers(chain_, inequality);
       }
     }
     part.undecided_then = part.undecided;
@@ -370,15 +417,22 @@ class Search {
     if (!(rho < part.rho)) return;
     if (rho < kFar * part.rho) part.undecided_then = std::numeric_limits<int>::max();
     part.rho = rho;
+    keep(part, t.head(m), std::move(pairs), t.tail(t.size() - m));
+  }
+
+  /// Makes these the part's multipliers: of the undecided neurons, and of pairs.
+  void keep(Part& part, const VectorXd& t, std::vector<NeuronPair> pairs, const VectorXd& of_pairs) {
     Multipliers own;
     own.t = VectorXd::Zero(chain_.neurons());
-    for (Index i = 0; i < m; ++i) own.t(inequality.undecided()[static_cast<std::size_t>(i)]) = t(i);
+    Index next = 0;
+    for (std::size_t i = 0; i < part.states.size(); ++i)
+      if (part.states[i] == NeuronState::kUndecided) own.t(static_cast<Index>(i)) = t(next++);
     std::vector<double> unscaled;
     for (Index i = 0; i < own.t.size(); ++i)
       unscaled.push_back(chain_.unscaled_multiplier(own.t(i), chain_.layer_of(i)));
     std::vector<check::Conflict> conflicts;
     for (std::size_t c = 0; c < pairs.size(); ++c) {
-      own.of_pairs.push_back(t(m + static_cast<Index>(c)));
+      own.of_pairs.push_back(of_pairs(static_cast<Index>(c)));
       conflicts.push_back(chain_.unscaled(pairs[c], own.of_pairs.back()));
     }
     own.pairs = std::move(pairs);
@@ -388,20 +442,79 @@ class Search {
     result_.tree.conflicts.push_back(std::move(conflicts));
   }
 
+  /// Multipliers of the part's own for phi and rho together, and from rho's the form that takes its place.
+  void renew_form(Part& part) {
+    part.undecided_form = part.undecided;
+    const OfRho* const old = part.form >= 0 ? &forms_[static_cast<std::size_t>(part.form)] : nullptr;
+    OfRho own;
+    const std::size_t first = chain_.hidden.size() + 1;  // layer of rho
+    own.reach = std::make_shared<const Reach>(set_->whole.hidden, *part.reach,
+                                              old != nullptr ? old->reach.get() : nullptr);
+    const std::vector<NeuronState> behind = states_of(*own.reach, set_->rho, first);
+    own.undecided = undecided_in(behind);
+    if (old != nullptr && own.undecided >= old->undecided) {  // for phi alone solve() is cheaper
+      part.undecided_form = static_cast<int>(kFormAgain * part.undecided);
+      return;
+    }
+    std::vector<NeuronState> states = part.states;
+    states.insert(states.end(), static_cast<std::size_t>(set_->last.rows()), NeuronState::kOn);
+    states.insert(states.end(), behind.begin(), behind.end());
+    const NodeInequality joint(set_->whole, states);
+    const Index m = undecided_in(part.states);
+    VectorXd t;
+    if (old == nullptr) {
+      t = root_multipliers(set_->whole, joint);
+    } else {
+      VectorXd all(set_->whole.neurons());
+      all << multipliers_of(part).t, VectorXd::Zero(set_->last.rows()), old->t;
+      DescentOptions descent;
+      descent.relative_gap = kGap;
+      descent.steps = kSteps;
+      t = descend(joint, all(joint.undecided()), descent);
+    }
+    t = t.cast<float>().cast<double>();
+    const NodeInequality rho(set_->rho, behind);
+    MatrixXd q = rho.least_form(t.tail(t.size() - m));
+    if (q.size() == 0) return;
+    q.diagonal().array() += kFormMargin * q.diagonal().maxCoeff();
+    q = MatrixXd(q.cast<float>().cast<double>().selfadjointView<Eigen::Lower>());
+    own.gram = set_->gram(q);
+    const double least = NodeInequality(chain_, part.states, own.gram).least_rho(t.head(m));
+    if (!(least < part.rho)) return;
+    part.undecided_then = least < kFar * part.rho ? std::numeric_limits<int>::max() : part.undecided;
+    part.rho = least;
+    own.t = VectorXd::Zero(set_->rho.neurons());
+    for (Index i = 0; i < t.size() - m; ++i) own.t(rho.undecided()[static_cast<std::size_t>(i)]) = t(m + i);
+    check::Form form;
+    for (Index i = 0; i < q.rows(); ++i)
+      for (Index j = 0; j <= i; ++j) form.q.push_back(std::ldexp(q(i, j), set_->form_exponent()));
+    for (Index i = 0; i < own.t.size(); ++i)
+      form.t.push_back(set_->whole.unscaled_multiplier(own.t(i), first + set_->rho.layer_of(i)));
+    result_.tree.forms.push_back(std::move(form));
+    part.form = static_cast<int>(forms_.size());
+    nodes_[static_cast<std::size_t>(part.index)].form = static_cast<int>(result_.tree.forms.size()) - 1;
+    forms_.push_back(std::move(own));
+    keep(part, t.head(m), {}, {});
+  }
+
+  /// Those that the options start from, one per output of a hidden layer of `chain`.
+  VectorXd given_multipliers(const LocalChain& chain) const {
+    VectorXd all(chain.neurons());
+    Index neuron = 0, given = 0;
+    for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
+      const Index rows = chain.hidden[k].weights.rows();
+      for (Index i = 0; i < rows; ++i, ++neuron)
+        all(neuron) = i < rows - chain.without_relu[k]
+                          ? chain.scaled_multiplier(options_.start.at(static_cast<std::size_t>(given++)), k)
+                          : 0;
+    }
+    return all;
+  }
+
   /// Those that the options start from, improved, or where they prove nothing, those of the whole program.
-  VectorXd root_multipliers(const NodeInequality& inequality) const {
+  VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequality) const {
     if (!options_.start.empty()) {
-      VectorXd all(chain_.neurons());
-      Index neuron = 0, given = 0;
-      for (std::size_t k = 0; k < chain_.hidden.size(); ++k) {
-        const Index rows = chain_.hidden[k].weights.rows();
-        for (Index i = 0; i < rows; ++i, ++neuron)
-          all(neuron) =
-              i < rows - chain_.without_relu[k]
-                  ? chain_.scaled_multiplier(options_.start.at(static_cast<std::size_t>(given++)), k)
-                  : 0;
-      }
-      const VectorXd t = all(inequality.undecided());
+      const VectorXd t = given_multipliers(chain)(inequality.undecided());
       DescentOptions descent;
       descent.steps = kRootSteps;
       if (std::isfinite(inequality.least_rho(t))) return descend(inequality, t, descent);
@@ -409,21 +522,21 @@ class Search {
     InteriorPointOptions options;
     options.relative_gap = kRootGap;
     options.infeasibility = std::numeric_limits<double>::infinity();  // every iterate is a bound
-    const InteriorPointResult found = minimise(inequality, interior(inequality), options);
+    const InteriorPointResult found = minimise(inequality, interior(chain, inequality), options);
     return found.points.back().tail(inequality.neurons());
   }
 
   /// A point well inside: in a balanced chain all-ones is nearly feasible, and earlier layers want more.
-  VectorXd interior(const NodeInequality& inequality) const {
+  static VectorXd interior(const LocalChain& chain, const NodeInequality& inequality) {
     for (double shrink = 0.5;; shrink *= 0.5) {
-      VectorXd layers(chain_.neurons());
+      VectorXd layers(chain.neurons());
       double level = 4;
       Index end = layers.size();
-      for (std::size_t k = chain_.hidden.size(); k-- > 0; level /= shrink) {
-        const Index rows = chain_.hidden[k].weights.rows();
+      for (std::size_t k = chain.hidden.size(); k-- > 0; level /= shrink) {
+        const Index rows = chain.hidden[k].weights.rows();
         layers.segment(end - rows, rows).setConstant(level);
         end -= rows;
-        if (!chain_.hidden[k].has_relu) level *= shrink;
+        if (!chain.hidden[k].has_relu) level *= shrink;
       }
       VectorXd y(1 + inequality.neurons());
       y(0) = level;
@@ -435,13 +548,15 @@ class Search {
 
   void write_preorder(int index) {
     const TreeNode& node = nodes_[static_cast<std::size_t>(index)];
-    result_.tree.nodes.push_back({node.split, std::max(node.multipliers, 0)});
+    result_.tree.nodes.push_back({node.split, std::max(node.multipliers, 0), node.form});
     if (node.split == BranchTree::kLeaf) return;
     write_preorder(node.first_child);
     write_preorder(node.first_child + 1);
   }
 
   const LocalChain& chain_;
+  const SetChain* const set_;  ///< null: no set function
+  std::vector<OfRho> forms_;
   const std::vector<Box>& boxes_;
   const BranchOptions& options_;
   std::vector<TreeNode> nodes_;
@@ -455,7 +570,12 @@ class Search {
 
 BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options) {
   keep_freed_memory();
-  return Search(chain, boxes, options).run();
+  return Search(chain, nullptr, boxes, options).run();
+}
+
+BranchResult branch(const SetChain& set, const std::vector<Box>& boxes, const BranchOptions& options) {
+  keep_freed_memory();
+  return Search(set.phi, &set, boxes, options).run();
 }
 
 }  // namespace swarmcert::lipschitz

@@ -18,10 +18,13 @@ struct BranchTree {
   struct Node {
     int split = kLeaf;    ///< coordinate that is halved, or kLeaf
     int multipliers = 0;  ///< of a leaf: index into `multipliers`
+    int form = kNone;  ///< of set functions: index into `forms`, the form that holds from here down; or kNone
   };
+  static constexpr int kNone = -1;
   std::vector<Node> nodes;
   std::vector<std::vector<double>> multipliers;  ///< one per hidden neuron of the network, in its own units
   std::vector<std::vector<check::Conflict>> conflicts;  ///< that go with each of them
+  std::vector<check::Form> forms;                       ///< of rho
   double rho = 0;                                       ///< claimed bound on the squared Lipschitz constant
 };
 
@@ -64,5 +67,9 @@ inline constexpr std::size_t kSteepCentres = 8;
 /// neurons are decided, and is halved otherwise. The slope at each box's centre says how far the bound can fall at most.
 /// The result depends on the options only, not on the machine's load (seconds unset). It can be used whenever the search stops.
 BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options);
+
+/// The same for a set function whose sum is bounded. Its boxes are bounded with phi alone, in front of a form of rho; a box
+/// that decides more of phi's and of rho's neurons gets a form of its own, and hands it down.
+BranchResult branch(const SetChain& set, const std::vector<Box>& boxes, const BranchOptions& options);
 
 }  // namespace swarmcert::lipschitz

@@ -33,7 +33,7 @@ double centred_rho(const VectorXd& g, double mu) {
 
 struct Point {
   VectorXd t;
-  MatrixXd factor;  ///< of S_zz; empty: not positive definite
+  MatrixXd factor;  ///< of S_zz, in the lower triangle; empty: not positive definite
   MatrixXd half;    ///< factor^-1 S_zx
   VectorXd g;       ///< eigenvalues of rho I - R, and their vectors
   MatrixXd vectors;
@@ -42,8 +42,11 @@ struct Point {
   Point(const NodeInequality& inequality, VectorXd at) : t(std::move(at)) {
     const Index n0 = inequality.inputs(), m = inequality.neurons();
     const MatrixXd s = inequality.slack_without_rho(t);
-    factor = cholesky(s.bottomRightCorner(m, m));
-    if (factor.size() == 0) return;
+    factor = s.bottomRightCorner(m, m);
+    if (!cholesky_in_place(factor)) {
+      factor.resize(0, 0);
+      return;
+    }
     half = s.bottomLeftCorner(m, n0);
     solve_lower(factor, half);
     MatrixXd inner = -s.topLeftCorner(n0, n0);
@@ -59,74 +62,108 @@ struct Point {
   bool good() const { return factor.size() > 0 && g.allFinite(); }
 };
 
-/// x' M y for the vectors x and y of all pairs of constraints, where constraint c subtracts t_c (p_c q_c' + q_c p_c').
+/// x' M y for the vectors x and y of all constraints, where constraint c subtracts t_c (p_c q_c' + q_c p_c').
 struct Products {
-  MatrixXd pp, pq, qq;  ///< p_c' M p_d, p_c' M q_d, q_c' M q_d
-};
+  MatrixXd pp;  ///< p_c' M p_d, in the lower triangle
+  MatrixXd qp;  ///< q_c' M p_d
+  MatrixXd pq;  ///< its transpose
+  MatrixXd qq;  ///< q_c' M q_d
 
-/// p_c and q_c as columns of [A E]: a_i and e_i of the neurons, then those of the pairs.
-struct Columns {
-  std::vector<Index> p, q;
-  explicit Columns(const NodeInequality& inequality) {
-    const Index m = inequality.neurons();
-    for (Index i = 0; i < m; ++i) p.push_back(i), q.push_back(m + i);
-    for (const NodeInequality::Factors& pair : inequality.pairs())
-      p.push_back(pair.first), q.push_back(pair.second);
+  /// M += U U', for p_c' U and q_c' U.
+  void add(const MatrixXd& u_p, const MatrixXd& u_q) {
+    add_product_transposed(pp, u_p, u_p);
+    add_product_transposed(qp, u_q, u_p);
+    add_product_transposed(pq, u_p, u_q);
+    add_product_transposed(qq, u_q, u_q);
   }
-  /// @param all [A E]' M [A E].
-  Products of(const MatrixXd& all) const { return {all(p, p), all(p, q), all(q, q)}; }
+  /// H += factor (pp o qq + pq o qp) in the lower triangle.
+  void add_to(MatrixXd& hessian, double factor) const {
+    for (Index c = 0; c < hessian.cols(); ++c) {
+      const Index rows = hessian.rows() - c;
+      hessian.col(c).tail(rows) += factor * (pp.col(c).tail(rows).cwiseProduct(qq.col(c).tail(rows)) +
+                                             pq.col(c).tail(rows).cwiseProduct(qp.col(c).tail(rows)));
+    }
+  }
 };
 
 /// What gradient and Hessian are made of: S^-1 = S_zz^-1 (padded) + P, P = U U' with U = W R^-1/2 and
-/// W = [I; -S_zz^-1 S_zx].
+/// W = [I; -S_zz^-1 S_zx]. Of a neuron p = a_i and q = e_i; of a pair they are such of its two neurons.
 struct Kernel {
-  MatrixXd inverse;  ///< [A E]' S_zz^-1 [A E]
-  MatrixXd u;        ///< [A E]' U
-  VectorXd weights;  ///< eigenvalues of R^-1
+  Products inverse;   ///< M = S_zz^-1
+  MatrixXd u_p, u_q;  ///< p_c' U, q_c' U
+  VectorXd weights;   ///< eigenvalues of R^-1
 
   Kernel(const NodeInequality& inequality, const Point& at) {
     const Index n0 = inequality.inputs(), m = inequality.neurons();
-    const auto a_x = inequality.a().topRows(n0);
-    const auto a_z = inequality.a().bottomRows(m);
-    inverse.resize(2 * m, 2 * m);
-    inverse.bottomRightCorner(m, m) = inverse_from_cholesky(at.factor);
-    inverse.bottomLeftCorner(m, m).setZero();
-    add_product(inverse.bottomLeftCorner(m, m), inverse.bottomRightCorner(m, m), a_z);
-    inverse.topRightCorner(m, m) = inverse.bottomLeftCorner(m, m).transpose();
-    inverse.topLeftCorner(m, m).setZero();
-    add_transposed_product(inverse.topLeftCorner(m, m), a_z, inverse.bottomLeftCorner(m, m));
+    inverse.qq = at.factor;
+    invert_from_cholesky(inverse.qq);
+    inverse.qp.resize(m, m);
+    for (const NodeInequality::LayerBlock& block : inequality.blocks()) {
+      auto columns = inverse.qp.middleCols(block.first_neuron, block.neurons);
+      columns = -inverse.qq.middleCols(block.first_neuron, block.neurons);
+      const Index first = std::max(block.first_used - n0, Index{0}), used = block.past_used - n0 - first;
+      add_product_transposed(
+          columns, inverse.qq.middleCols(first, used),
+          inequality.rows_of_a().block(block.first_neuron, n0 + first, block.neurons, used));
+    }
+    inverse.pq = inverse.qp.transpose();
+    inverse.pp.resize(m, m);
+    for (const NodeInequality::LayerBlock& block : inequality.blocks()) {
+      const Index past = block.first_neuron + block.neurons;  // columns that the lower triangle needs
+      auto rows = inverse.pp.block(block.first_neuron, 0, block.neurons, past);
+      rows = -inverse.qp.block(block.first_neuron, 0, block.neurons, past);
+      const Index first = std::max(block.first_used - n0, Index{0}), used = block.past_used - n0 - first;
+      add_product(rows, inequality.rows_of_a().block(block.first_neuron, n0 + first, block.neurons, used),
+                  inverse.qp.block(first, 0, used, past));
+    }
     weights = (at.rho - at.g.array()).inverse().matrix();
-    const MatrixXd u_x = at.vectors * weights.cwiseSqrt().asDiagonal();
-    MatrixXd u_z = -(at.half * u_x);
-    solve_lower_transposed(at.factor, u_z);
-    u.resize(2 * m, n0);
-    u.bottomRows(m) = u_z;
-    u.topRows(m).noalias() = a_x.transpose() * u_x;
-    add_transposed_product(u.topRows(m), a_z, u_z);
+    MatrixXd u(n0 + m, n0);
+    u.topRows(n0) = at.vectors * weights.cwiseSqrt().asDiagonal();
+    u_q = -(at.half * u.topRows(n0));
+    solve_lower_transposed(at.factor, u_q);
+    u.bottomRows(m) = u_q;
+    u_p = MatrixXd::Zero(m, n0);
+    add_product(u_p, inequality.rows_of_a(), u);
+    if (!inequality.pairs().empty()) add_pairs(inequality.pairs());
+  }
+
+ private:
+  void add_pairs(const std::vector<NodeInequality::Factors>& pairs) {
+    const Index m = u_p.rows();
+    std::vector<Index> p, q;  // columns of [A E]
+    for (Index i = 0; i < m; ++i) p.push_back(i), q.push_back(m + i);
+    for (const NodeInequality::Factors& pair : pairs) p.push_back(pair.first), q.push_back(pair.second);
+    MatrixXd all(2 * m, 2 * m), u(2 * m, u_p.cols());
+    all.topLeftCorner(m, m) = inverse.pp.selfadjointView<Eigen::Lower>();
+    all.topRightCorner(m, m) = inverse.pq;
+    all.bottomLeftCorner(m, m) = inverse.qp;
+    all.bottomRightCorner(m, m) = inverse.qq;
+    u << u_p, u_q;
+    inverse = {all(p, p), all(q, p), all(p, q), all(q, q)};
+    u_p = u(p, Eigen::all);
+    u_q = u(q, Eigen::all);
   }
 };
 
 /// Gradient and Hessian of the barrier in t, rho eliminated.
 struct Model {
   VectorXd gradient;
-  MatrixXd hessian;
+  MatrixXd hessian;  ///< in the lower triangle
 
   Model(const NodeInequality& inequality, const Point& at) {
-    const Kernel kernel(inequality, at);
-    const Columns columns(inequality);
-    const MatrixXd u_p = kernel.u(columns.p, Eigen::all), u_q = kernel.u(columns.q, Eigen::all);
-    const Products x{u_p * u_p.transpose(), u_p * u_q.transpose(), u_q * u_q.transpose()};  // of P
-    const Products y = columns.of(kernel.inverse);
-    gradient = 2 * (x.pq.diagonal() + kInterior * y.pq.diagonal());
-    // tr(X A_i Y A_j) = X_pp o Y_qq + X_qq o Y_pp + X_pq o Y_pq' + X_pq' o Y_pq, for X = P and Y = 2 S_zz^-1 + P, and
-    // kInterior times that for X = Y = S_zz^-1.
-    hessian = x.pp.cwiseProduct(2 * y.qq + x.qq) + x.qq.cwiseProduct(2 * y.pp + x.pp) +
-              2 * kInterior * y.pp.cwiseProduct(y.qq);
-    const MatrixXd cross =
-        x.pq.cwiseProduct((2 * y.pq + x.pq).transpose()) + kInterior * y.pq.cwiseProduct(y.pq.transpose());
-    hessian += cross + cross.transpose();
-    const VectorXd edge = -2 * (u_q * kernel.weights.asDiagonal()).cwiseProduct(u_p).rowwise().sum();
-    hessian.noalias() -= edge * edge.transpose() / kernel.weights.squaredNorm();
+    Kernel kernel(inequality, at);
+    Products& products = kernel.inverse;
+    gradient = 2 * (kernel.u_p.cwiseProduct(kernel.u_q).rowwise().sum() + kInterior * products.pq.diagonal());
+    // tr(X A_i Y A_j) = X_pp o Y_qq + X_qq o Y_pp + X_pq o Y_pq' + X_pq' o Y_pq. Log det R has X = P and
+    // Y = 2 S_zz^-1 + P, so twice what Z = S_zz^-1 + P has in place of both less what S_zz^-1 has; log det S_zz has
+    // kInterior times the latter.
+    hessian = MatrixXd::Zero(gradient.size(), gradient.size());
+    products.add_to(hessian, -2 * (1 - kInterior));
+    products.add(kernel.u_p, kernel.u_q);
+    products.add_to(hessian, 2);
+    const VectorXd edge =
+        -2 * (kernel.u_q * kernel.weights.asDiagonal()).cwiseProduct(kernel.u_p).rowwise().sum();
+    hessian.selfadjointView<Eigen::Lower>().rankUpdate(edge, -1 / kernel.weights.squaredNorm());
   }
 
   /// -H^-1 gradient; empty if H is not positive definite. `decrease`: of the quadratic model, twice.
@@ -135,10 +172,9 @@ struct Model {
     if (!scale.allFinite()) return {};
     hessian = scale.asDiagonal() * hessian * scale.asDiagonal();
     hessian.diagonal().array() += 1e-12;
-    const MatrixXd factor = cholesky(hessian);
-    if (factor.size() == 0) return {};
+    if (!cholesky_in_place(hessian)) return {};
     VectorXd result = scale.cwiseProduct(-gradient);
-    solve_cholesky(factor, result);
+    solve_cholesky(hessian, result);
     result = scale.cwiseProduct(result);
     decrease = -gradient.dot(result);
     return result;
@@ -189,10 +225,11 @@ std::vector<double> gains(const NodeInequality& inequality, const VectorXd& t, d
   at.centre(mu);
   const Kernel kernel(inequality, at);
   for (std::size_t c = 0; c < result.size(); ++c) {
-    const auto [p, q] = inequality.pairs()[c];
-    const auto u_p = kernel.u.row(p), u_q = kernel.u.row(q);
+    const Index at_pair = inequality.neurons() + static_cast<Index>(c);
+    const auto u_p = kernel.u_p.row(at_pair), u_q = kernel.u_q.row(at_pair);
     const double pp = u_p.squaredNorm(), pq = u_p.dot(u_q), qq = u_q.squaredNorm();
-    const double i_pp = kernel.inverse(p, p), i_pq = kernel.inverse(p, q), i_qq = kernel.inverse(q, q);
+    const double i_pp = kernel.inverse.pp(at_pair, at_pair), i_pq = kernel.inverse.pq(at_pair, at_pair),
+                 i_qq = kernel.inverse.qq(at_pair, at_pair);
     const double gradient = 2 * (pq + kInterior * i_pq);
     const double curvature = 2 * (pp * i_qq + qq * i_pp + pp * qq + 2 * pq * i_pq + pq * pq) +
                              2 * kInterior * (i_pp * i_qq + i_pq * i_pq);

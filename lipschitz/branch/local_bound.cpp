@@ -11,6 +11,8 @@
 namespace swarmcert::lipschitz {
 namespace {
 
+using Eigen::Index;
+
 /// A constant function has no slope, a proof needs rho > 0.
 constexpr double kLeastRho = 1e-100;
 
@@ -25,6 +27,7 @@ std::string preorder(const BranchTree& tree) {
   std::string text;
   for (const BranchTree::Node& node : tree.nodes) {
     if (!text.empty()) text += ' ';
+    if (node.form != BranchTree::kNone) text += "q" + std::to_string(node.form) + ' ';
     text += node.split == BranchTree::kLeaf ? "t" + std::to_string(node.multipliers)
                                             : "s" + std::to_string(node.split);
   }
@@ -84,26 +87,27 @@ Others others_of(const files::Network& network, const Claim& claim, const std::m
 }
 
 /// Hidden neurons with a ReLU.
-std::size_t multipliers_of(const check::LocalFunction& f) {
-  int count = 0;
-  for (const check::HiddenLayer& layer : f.hidden) count += layer.outputs - layer.without_relu;
+std::size_t multipliers_of(const LocalChain& chain) {
+  Index count = chain.neurons();
+  for (const Index without : chain.without_relu) count -= without;
   return static_cast<std::size_t>(count);
 }
 
 /// Lets branch and bound work on `f`, and the checker judge what it found.
-void prove(const check::LocalFunction& f, const LocalChain& chain, const std::vector<check::Sides>& boxes,
-           BranchOptions options, LocalProof proof, LocalBound& result) {
+/// @param search of the boxes, with the options.
+template <class Search>
+void prove(const check::LocalFunction& f, const std::vector<check::Sides>& boxes, const Search& search,
+           LocalProof proof, LocalBound& result) {
   std::vector<Box> roots;
   for (const check::Sides& box : boxes) roots.push_back({box.lower, box.upper});
-  options.start.resize(std::min(options.start.size(), multipliers_of(f)));
-  if (options.start.size() != multipliers_of(f)) options.start.clear();
-  BranchResult found = branch(chain, roots, options);
+  BranchResult found = search(roots);
   result.nodes = found.nodes;
   result.outlook = found.outlook;
   result.steep_centres = std::move(found.steep_centres);
   proof.tree.tree = preorder(found.tree);
   proof.tree.multipliers = std::move(found.tree.multipliers);
   proof.tree.conflicts = std::move(found.tree.conflicts);
+  proof.tree.forms = std::move(found.tree.forms);
   // The search rounds, the checker rounds otherwise: where a part is lost to that, a little more is claimed.
   for (const double slack : {0.0, 1e-7, 1e-6, 1e-5, 1e-4}) {
     proof.rho = std::max(found.tree.rho * (1 + slack), kLeastRho);
@@ -116,6 +120,13 @@ void prove(const check::LocalFunction& f, const LocalChain& chain, const std::ve
   }
 }
 
+/// Multipliers to start from, for the neurons of `chain`, which come first; none where there are too few.
+std::vector<double> beginning(const std::vector<double>& t, const LocalChain& chain) {
+  const std::size_t size = multipliers_of(chain);
+  if (t.size() < size) return {};
+  return {t.begin(), t.begin() + static_cast<std::ptrdiff_t>(size)};
+}
+
 }  // namespace
 
 LocalBound local_bound(const files::Network& network, const Claim& claim,
@@ -123,7 +134,6 @@ LocalBound local_bound(const files::Network& network, const Claim& claim,
                        const BranchOptions& given) {
   LocalBound result;
   BranchOptions options = given;
-  options.start = joint_t;  // of phi the first ones
   const std::vector<std::string> names = files::networks_of(claim.function);
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   if (parts.at(names.front())->layers.size() < 2 || names.front().rfind("rho:", 0) == 0) return result;
@@ -132,15 +142,20 @@ LocalBound local_bound(const files::Network& network, const Claim& claim,
   if (!is_global) boxes.push_back({domain.at(names.front()).lower, domain.at(names.front()).upper});
   LocalProof proof;
   if (!claim.neighbours.empty()) {
-    const std::vector<files::Layer>& behind = parts.at(names.back())->layers;
-    if (behind.size() < 2) return result;
+    if (parts.at(names.back())->layers.size() < 2) return result;
     Others others = others_of(network, claim, domain, options.nodes);
+    proof.others = std::move(others.ranges);
     const check::LocalFunction f =
         check::coupled_function(network, claim.function, claim.block, claim.scale, others.least, others.most);
-    ReachNetwork layers = reach_layers(f.hidden);
-    layers.push_back(reach_network(*parts.at(names.back())).back());
-    proof.others = std::move(others.ranges);
-    prove(f, local_chain(layers, {}, f.coordinates, f.weight), boxes, options, std::move(proof), result);
+    std::vector<check::HiddenLayer> layers = f.hidden;
+    layers.insert(layers.end(), f.behind.begin(), f.behind.end());
+    ReachNetwork whole = reach_layers(layers);
+    whole.push_back(reach_network(*parts.at(names.back())).back());
+    const SetChain set = set_chain(local_chain(whole, {}, f.coordinates, f.weight), f.hidden.size());
+    options.start = beginning(joint_t, set.whole);
+    prove(
+        f, boxes, [&](const std::vector<Box>& roots) { return branch(set, roots, options); },
+        std::move(proof), result);
     return result;
   }
   if (names.size() == 2) {
@@ -154,14 +169,20 @@ LocalBound local_bound(const files::Network& network, const Claim& claim,
   const check::LocalFunction f =
       check::local_function(network, names.front(), claim.block, claim.scale, exact(q));
   const LocalChain chain = local_chain(reach_network(*parts.at(names.front())), q, f.coordinates, f.weight);
+  options.start = beginning(joint_t, chain);
   if (!is_global) {
-    prove(f, chain, boxes, options, std::move(proof), result);
+    prove(
+        f, boxes, [&](const std::vector<Box>& roots) { return branch(chain, roots, options); },
+        std::move(proof), result);
     return result;
   }
   proof.radius.assign(static_cast<std::size_t>(chain.inputs()),
                       cover_radius(parts.at(names.front())->layers.front()));
-  const std::vector<check::Sides> cover = check::projective_cover(proof.radius);
-  prove(check::homogeneous(f), homogeneous(chain), cover, options, std::move(proof), result);
+  const LocalChain wider = homogeneous(chain);
+  boxes = check::projective_cover(proof.radius);
+  prove(
+      check::homogeneous(f), boxes,
+      [&](const std::vector<Box>& roots) { return branch(wider, roots, options); }, std::move(proof), result);
   for (Eigen::VectorXd& centre : result.steep_centres) {  // (u, s) is the point u / s
     const double s = centre(centre.size() - 1);
     centre = Eigen::VectorXd(centre.head(centre.size() - 1) / (s > 0 ? s : 1));

@@ -109,6 +109,28 @@ LocalChain local_chain(const ReachNetwork& layers, const MatrixXd& form, const s
   return chain;
 }
 
+SetChain set_chain(const LocalChain& whole, std::size_t last) {
+  SetChain set{whole, whole, whole, whole.hidden.at(last).weights};
+  const auto cut = static_cast<std::ptrdiff_t>(last);
+  const auto part = [&](LocalChain& chain, std::ptrdiff_t from, std::ptrdiff_t to) {
+    chain.hidden = ReachNetwork(whole.hidden.begin() + from, whole.hidden.begin() + to);
+    chain.exponents = std::vector<int>(whole.exponents.begin() + from, whole.exponents.begin() + to);
+    chain.without_relu =
+        std::vector<Index>(whole.without_relu.begin() + from, whole.without_relu.begin() + to);
+  };
+  part(set.phi, 0, cut);
+  part(set.rho, cut + 1, static_cast<std::ptrdiff_t>(whole.hidden.size()));
+  set.phi.gram.resize(0, 0);
+  set.rho.block.resize(static_cast<std::size_t>(set.last.rows()));
+  std::iota(set.rho.block.begin(), set.rho.block.end(), 0);
+  set.rho.weight.assign(set.rho.block.size(), 1.0);
+  return set;
+}
+
+int SetChain::form_exponent() const {
+  return 2 * (whole.output_exponent - whole.exponents.at(phi.hidden.size()));
+}
+
 LocalChain homogeneous(LocalChain chain) {
   for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
     ReachLayer& layer = chain.hidden[k];

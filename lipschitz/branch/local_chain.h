@@ -45,6 +45,21 @@ struct LocalChain {
 LocalChain local_chain(const ReachNetwork& layers, const Eigen::MatrixXd& form, const std::vector<int>& block,
                        const std::vector<double>& weight);
 
+/// A set function's chain, taken apart at phi's last layer v = W h + b, which has no ReLU: phi's hidden layers, whose
+/// `gram` waits for a form Q with |drho|^2 <= dv' Q dv, and rho as a function of v. All in the units of the whole.
+struct SetChain {
+  LocalChain whole, phi, rho;
+  Eigen::MatrixXd last;  ///< W
+
+  /// G of phi for a form.
+  Eigen::MatrixXd gram(const Eigen::MatrixXd& q) const { return last.transpose() * q * last; }
+  /// Exponent of the power of two that turns a form of the chain into the network's.
+  int form_exponent() const;
+};
+
+/// @param last index of phi's last layer among the hidden layers of `whole`.
+SetChain set_chain(const LocalChain& whole, std::size_t last);
+
 /// The chain as a function of (u, s): see check::homogeneous().
 LocalChain homogeneous(LocalChain chain);
 

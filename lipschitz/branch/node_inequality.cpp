@@ -12,49 +12,57 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-NodeInequality::NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states)
+NodeInequality::NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states,
+                               const MatrixXd& gram)
     : inputs_(static_cast<Index>(chain.block.size())) {
   for (std::size_t i = 0; i < states.size(); ++i)
     if (states[i] == NeuronState::kUndecided) undecided_.push_back(static_cast<Index>(i));
   const auto free = static_cast<Index>(undecided_.size());
   const Index n = inputs_ + free;
-  a_ = MatrixXd::Zero(n, free);
+  a_ = MatrixXd::Zero(free, n);
 
-  // y and z as linear forms in the variables, layer by layer.
+  // y and z as linear forms in the variables, layer by layer; y is zero outside of columns [first_used, past_used).
   MatrixXd y = MatrixXd::Zero(chain.hidden.front().weights.rows(), n);
   y.leftCols(inputs_) = chain.hidden.front().weights(Eigen::all, chain.block);
   for (Index k = 0; k < inputs_; ++k) y.col(k) *= chain.weight[static_cast<std::size_t>(k)];
-  Index neuron = 0, variable = 0;
+  Index neuron = 0, variable = 0, first_used = 0;
   MatrixXd z;
   for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
-    const Index rows = chain.hidden[k].weights.rows();
+    const Index rows = chain.hidden[k].weights.rows(), before = variable, past_used = inputs_ + before;
     z = MatrixXd::Zero(rows, n);
+    bool has_on = false;
     for (Index i = 0; i < rows; ++i, ++neuron) {
       const NeuronState state = states[static_cast<std::size_t>(neuron)];
-      if (state == NeuronState::kOn) z.row(i) = y.row(i);
+      const auto used = y.row(i).segment(first_used, past_used - first_used);
+      if (state == NeuronState::kOn) {
+        z.row(i).segment(first_used, past_used - first_used) = used;
+        has_on = true;
+      }
       if (state != NeuronState::kUndecided) continue;
       z(i, inputs_ + variable) = 1;
-      a_.col(variable) = y.row(i).transpose();
-      a_(inputs_ + variable, variable) -= 1;
+      a_.row(variable).segment(first_used, past_used - first_used) = used;
+      a_(variable, inputs_ + variable) = -1;
       ++variable;
     }
+    if (variable > before) blocks_.push_back({before, variable - before, first_used, past_used});
+    if (!has_on) first_used = past_used;
     if (k + 1 == chain.hidden.size()) break;
     y = MatrixXd::Zero(chain.hidden[k + 1].weights.rows(), n);
-    // Only inputs and the neurons so far occur in z.
-    add_product(y.leftCols(inputs_ + variable), chain.hidden[k + 1].weights, z.leftCols(inputs_ + variable));
+    const Index used = inputs_ + variable - first_used;
+    add_product(y.middleCols(first_used, used), chain.hidden[k + 1].weights, z.middleCols(first_used, used));
   }
   MatrixXd gram_z = MatrixXd::Zero(z.rows(), n);
-  add_product(gram_z, chain.gram, z);
+  add_product(gram_z, gram, z);
   last_gram_ = MatrixXd::Zero(n, n);
-  add_product(last_gram_, MatrixXd(z.transpose()), gram_z);
+  add_transposed_product(last_gram_, z, gram_z);
 }
 
 MatrixXd NodeInequality::linear(const VectorXd& y) const {
   MatrixXd s = MatrixXd::Zero(size(), size());
   s.diagonal().head(inputs_).setConstant(y(0));
-  const MatrixXd a_t = a_ * y.tail(neurons()).asDiagonal();
-  s.rightCols(neurons()) -= a_t;
-  s.bottomRows(neurons()) -= a_t.transpose();
+  const MatrixXd t_a = y.tail(neurons()).asDiagonal() * a_;
+  s.rightCols(neurons()) -= t_a.transpose();
+  s.bottomRows(neurons()) -= t_a;
   return s;
 }
 
@@ -71,11 +79,13 @@ void NodeInequality::add(const NeuronPair& pair) {
 MatrixXd NodeInequality::slack_without_rho(const VectorXd& t) const {
   const Index m = neurons();
   MatrixXd s = -last_gram_;
-  for (Index i = 0; i < m; ++i) {  // a_i ends at its own neuron
-    const Index rows = inputs_ + i + 1;
-    s.col(inputs_ + i).head(rows) -= t(i) * a_.col(i).head(rows);
-    s.row(inputs_ + i).head(rows) -= t(i) * a_.col(i).head(rows).transpose();
+  for (const LayerBlock& block : blocks_) {
+    const Index used = block.past_used - block.first_used;
+    s.block(inputs_ + block.first_neuron, block.first_used, block.neurons, used) -=
+        t.segment(block.first_neuron, block.neurons).asDiagonal() *
+        a_.block(block.first_neuron, block.first_used, block.neurons, used);
   }
+  s.diagonal().tail(m) += 2 * t.head(m);
   Index used = 0;
   MatrixXd left(size(), static_cast<Index>(pairs_.size())), right(size(), static_cast<Index>(pairs_.size()));
   for (std::size_t c = 0; c < pairs_.size(); ++c) {
@@ -88,11 +98,11 @@ MatrixXd NodeInequality::slack_without_rho(const VectorXd& t) const {
       s(inputs_ + p - m, unit) -= weight;
       s(unit, inputs_ + p - m) -= weight;
     } else if (q >= m) {
-      s.row(unit) -= weight * a_.col(p).transpose();
-      s.col(unit) -= weight * a_.col(p);
+      s.row(unit) -= weight * a_.row(p);
+      s.col(unit) -= weight * a_.row(p).transpose();
     } else {
-      left.col(used) = -weight * a_.col(p);
-      right.col(used++) = a_.col(q);
+      left.col(used) = -weight * a_.row(p).transpose();
+      right.col(used++) = a_.row(q).transpose();
     }
   }
   if (used == 0) return s;
@@ -102,14 +112,14 @@ MatrixXd NodeInequality::slack_without_rho(const VectorXd& t) const {
 }
 
 MatrixXd NodeInequality::times_a(const MatrixXd& x) const {
-  MatrixXd result = MatrixXd::Zero(x.rows(), a_.cols());
-  add_product(result, x, a_);
+  MatrixXd result = MatrixXd::Zero(x.rows(), a_.rows());
+  add_product_transposed(result, x, a_);
   return result;
 }
 
 MatrixXd NodeInequality::a_transposed_times(const MatrixXd& x) const {
-  MatrixXd result = MatrixXd::Zero(a_.cols(), x.cols());
-  add_product(result, MatrixXd(a_.transpose()), x);
+  MatrixXd result = MatrixXd::Zero(a_.rows(), x.cols());
+  add_product(result, a_, x);
   return result;
 }
 
@@ -119,16 +129,23 @@ MatrixXd NodeInequality::times_patterned(const MatrixXd& x, const MatrixXd& d) c
   return result;
 }
 
-double NodeInequality::least_rho(const VectorXd& t) const {
-  const MatrixXd s = slack_without_rho(t);
-  MatrixXd inner = -s.topLeftCorner(inputs_, inputs_);  // rho I >= this + S_xz S_zz^-1 S_zx
+MatrixXd NodeInequality::least_form(const VectorXd& t) const {
+  MatrixXd s = slack_without_rho(t);
+  MatrixXd inner = -s.topLeftCorner(inputs_, inputs_);  // Q >= this + S_xz S_zz^-1 S_zx
   if (neurons() > 0) {
-    const MatrixXd factor = cholesky(s.bottomRightCorner(neurons(), neurons()));
-    if (factor.size() == 0) return std::numeric_limits<double>::infinity();
-    const MatrixXd half = factor.triangularView<Eigen::Lower>().solve(s.bottomLeftCorner(neurons(), inputs_));
-    inner += half.transpose() * half;
+    Eigen::Ref<MatrixXd> factor = s.bottomRightCorner(neurons(), neurons());
+    if (!cholesky_in_place(factor)) return {};
+    Eigen::Ref<MatrixXd> half = s.bottomLeftCorner(neurons(), inputs_);
+    solve_lower(factor, half);
+    add_transposed_product(inner, half, half);
   }
-  return Eigen::SelfAdjointEigenSolver<MatrixXd>(inner, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
+  return inner;
+}
+
+double NodeInequality::least_rho(const VectorXd& t) const {
+  const MatrixXd form = least_form(t);
+  if (form.size() == 0) return std::numeric_limits<double>::infinity();
+  return Eigen::SelfAdjointEigenSolver<MatrixXd>(form, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
 }
 
 }  // namespace swarmcert::lipschitz

@@ -18,9 +18,14 @@ enum class NeuronState : char { kOff, kOn, kUndecided };
 /// pairs of points of the box, since the segment between them stays inside.
 class NodeInequality final : public RankTwoInequality {
  public:
-  NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states);
+  /// @param gram G of what follows the hidden layers.
+  NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states,
+                 const Eigen::MatrixXd& gram);
+  /// With the chain's own.
+  NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states)
+      : NodeInequality(chain, states, chain.gram) {}
 
-  Eigen::Index size() const override { return a_.rows(); }
+  Eigen::Index size() const override { return a_.cols(); }
   Eigen::Index inputs() const override { return inputs_; }
   Eigen::MatrixXd linear(const Eigen::VectorXd& y) const override;
   Eigen::MatrixXd slack(const Eigen::VectorXd& y) const override;
@@ -36,21 +41,30 @@ class NodeInequality final : public RankTwoInequality {
   };
   const std::vector<Factors>& pairs() const { return pairs_; }
 
-  /// S(0, t) for the multipliers of the neurons, and of the pairs behind them.
+  /// The lower triangle of S(0, t) for the multipliers of the neurons, and of the pairs behind them.
   Eigen::MatrixXd slack_without_rho(const Eigen::VectorXd& t) const;
-  /// [size x neurons], column i is a_i.
-  const Eigen::MatrixXd& a() const { return a_; }
+  /// [neurons x size], row i is a_i'.
+  const Eigen::MatrixXd& rows_of_a() const { return a_; }
+  /// The neurons of one layer: beside -1 at their own variables, their a_i are zero outside of variables
+  /// [first_used, past_used).
+  struct LayerBlock {
+    Eigen::Index first_neuron, neurons, first_used, past_used;
+  };
+  const std::vector<LayerBlock>& blocks() const { return blocks_; }
 
   /// Indices of the undecided neurons among all, ascending: t has one entry for each.
   const std::vector<Eigen::Index>& undecided() const { return undecided_; }
 
   /// The least rho with S(rho, t) >= 0, up to rounding; infinity if there is none. `t` as in slack_without_rho().
   double least_rho(const Eigen::VectorXd& t) const;
+  /// The least Q with |df|^2 <= dx' Q dx for these multipliers; empty if there is none.
+  Eigen::MatrixXd least_form(const Eigen::VectorXd& t) const;
 
  private:
   Eigen::Index inputs_;
   std::vector<Eigen::Index> undecided_;
-  Eigen::MatrixXd a_;  ///< [size x neurons] columns a_i
+  Eigen::MatrixXd a_;  ///< [neurons x size] rows a_i'
+  std::vector<LayerBlock> blocks_;
   std::vector<Factors> pairs_;
   Eigen::MatrixXd last_gram_;  ///< of df in the variables
 };

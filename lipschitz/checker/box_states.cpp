@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lipschitz/checker/products.h"
 #include "nn/files/doubles.h"
 
 namespace swarmcert::check {
@@ -12,138 +13,156 @@ using Row = std::vector<double>;
 
 constexpr double kTiny = 0x1p-900;  ///< covers what underflow may cost in sums of at most 10^6 terms
 
-/// An upper bound on one neuron's (signed) value, as a linear form in some layer's y or in x.
-struct Form {
-  Row coefficients;
-  double constant = 0, absolute = 0;  ///< sum of the constants' terms, and of their absolute values
-  double error = 0;                   ///< what rounding the coefficients may have cost
-  long terms = 0;                     ///< of `constant`
+/// Upper bounds on (signed) values of neurons, one per row, as linear forms in some layer's y or h, or in x.
+struct Forms {
+  int count = 0, width = 0;
+  Row coefficients;        ///< [count x width]
+  Row constant, absolute;  ///< sums of the constants' terms, and of their absolute values
+  Row error;               ///< what rounding the coefficients may have cost
+  double terms = 0;        ///< of each `constant`, at most
+  double* at(int r) { return &coefficients[static_cast<std::size_t>(r) * static_cast<std::size_t>(width)]; }
+  const double* at(int r) const {
+    return &coefficients[static_cast<std::size_t>(r) * static_cast<std::size_t>(width)];
+  }
 };
 
-/// out += a p, then b q, d r and e s.
-void add_four(double* out, int size, const double* p, const double* q, const double* r, const double* s,
-              double a, double b, double d, double e) {
-  for (int j = 0; j < size; ++j) out[j] = (((out[j] + a * p[j]) + b * q[j]) + d * r[j]) + e * s[j];
+/// Adds what else enters the layer's sums, at most.
+void add_entering(Forms& forms, int r, const HiddenLayer& layer) {
+  if (layer.least.empty()) return;
+  const auto row = static_cast<std::size_t>(r);
+  const double* const c = forms.at(r);
+  for (std::size_t i = 0; i < layer.least.size(); ++i) {
+    const double most = c[i] * (c[i] > 0 ? layer.most : layer.least)[i];
+    forms.constant[row] += most;
+    forms.absolute[row] += std::abs(most);
+  }
 }
 
-/// Sum of c_i times row i of W over `rows`, four rows at a time: added one after the other as in a plain loop, but with
-/// fewer trips to memory.
-Row combined(const Row& c, const HiddenLayer& layer, const std::vector<int>& rows) {
-  Row sum(static_cast<std::size_t>(layer.inputs), 0.0);
-  double* const out = sum.data();
-  const auto row = [&](std::size_t n) {
-    return &layer.weights[static_cast<std::size_t>(rows[n]) * static_cast<std::size_t>(layer.inputs)];
-  };
-  const auto weight = [&](std::size_t n) { return c[static_cast<std::size_t>(rows[n])]; };
-  std::size_t n = 0;
-  for (; n + 4 <= rows.size(); n += 4) {
-    add_four(out, layer.inputs, row(n), row(n + 1), row(n + 2), row(n + 3), weight(n), weight(n + 1),
-             weight(n + 2), weight(n + 3));
+/// Substitutes y = W h + b: the forms become such in h. `used`: outputs with a coefficient in any form.
+void through_layer(Forms& forms, const HiddenLayer& layer, const Row& term, const std::vector<int>& used) {
+  Row next(static_cast<std::size_t>(forms.count) * static_cast<std::size_t>(layer.inputs), 0.0);
+  add_product(next.data(), layer.inputs, forms.count, layer.inputs, {forms.coefficients.data(), forms.width},
+              {layer.weights.data(), layer.inputs}, used);
+  for (int r = 0; r < forms.count; ++r) {
+    const auto row = static_cast<std::size_t>(r);
+    const FormSums sums = form_sums(forms.at(r), layer.biases.data(), term.data(), layer.outputs);
+    forms.constant[row] += sums.constant;
+    forms.absolute[row] += sums.absolute;
+    forms.error[row] += 1.01 * (layer.outputs + 2) * kUnit * sums.weighted;
+    add_entering(forms, r, layer);
   }
-  for (; n < rows.size(); ++n) {
-    const double* const p = row(n);
-    for (int j = 0; j < layer.inputs; ++j) out[j] += weight(n) * p[j];
-  }
-  return sum;
+  forms.terms += 2.0 * layer.outputs;
+  forms.width = layer.inputs;
+  forms.coefficients = std::move(next);
 }
 
-/// Substitutes y = W h + b: the form becomes one in h.
-void through_layer(Form& form, const HiddenLayer& layer, const Row& term) {
-  double error = 0;
-  std::vector<int> used;
-  for (int i = 0; i < layer.outputs; ++i) {
-    const double c = form.coefficients[static_cast<std::size_t>(i)];
-    if (c == 0) continue;
-    used.push_back(i);
-    const double bias = c * layer.biases[static_cast<std::size_t>(i)];
-    form.constant += bias;
-    form.absolute += std::abs(bias);
-    error += std::abs(c) * term[static_cast<std::size_t>(i)];
-    ++form.terms;
-    if (layer.least.empty()) continue;
-    const double most = c * (c > 0 ? layer.most : layer.least)[static_cast<std::size_t>(i)];
-    form.constant += most;
-    form.absolute += std::abs(most);
-    ++form.terms;
-  }
-  form.error += 1.01 * (layer.outputs + 2) * kUnit * error;
-  Row next = combined(form.coefficients, layer, used);
-  if (!std::all_of(next.begin(), next.end(), [](double c) { return std::isfinite(c); }))
-    form.error = kInfinity;
-  form.coefficients = std::move(next);
-}
+/// What relu(y) is replaced by: `above` y + `offset` where a form's coefficient is positive, `below` y where it is
+/// negative.
+struct Relaxation {
+  Row above, below, offset, error;  ///< `error`: of rounding above times a coefficient, relatively to that
+  std::vector<int> used;            ///< neurons that are not off
 
-/// Substitutes h = relu(y), l <= y <= u.
-void through_relu(Form& form, const HiddenLayer& layer, const NeuronBounds& bounds, std::size_t k) {
-  const Row &lower = bounds.lower[k], &upper = bounds.upper[k];
-  for (std::size_t i = 0; i < form.coefficients.size(); ++i) {
-    double& c = form.coefficients[i];
-    const double l = lower[i], u = upper[i];
-    if (c == 0 || l >= 0 || !layer.has_relu(i)) continue;
-    if (u <= 0) {
-      c = 0;
-    } else if (c < 0) {
-      if (!(u > -l)) c = 0;
-    } else {
-      const double slope = bounds.slope[k][i], offset = bounds.offset[k][i];
-      form.constant += c * offset;
-      form.absolute += c * offset;
-      ++form.terms;
-      c *= slope;
-      form.error += 4 * kUnit * c * std::max(u, -l);
+  Relaxation(const HiddenLayer& layer, const NeuronBounds& bounds, std::size_t k) {
+    const std::size_t size = bounds.lower[k].size();
+    above.assign(size, 1);
+    below.assign(size, 1);
+    offset.assign(size, 0);
+    error.assign(size, 0);
+    for (std::size_t i = 0; i < size; ++i) {
+      const double l = bounds.lower[k][i], u = bounds.upper[k][i];
+      const bool is_off = layer.has_relu(i) && !(l >= 0) && u <= 0;
+      if (is_off) above[i] = below[i] = 0;
+      if (!is_off) used.push_back(static_cast<int>(i));
+      if (is_off || l >= 0 || !layer.has_relu(i)) continue;
+      above[i] = bounds.slope[k][i];
+      below[i] = u > -l ? 1 : 0;
+      offset[i] = bounds.offset[k][i];
+      error[i] = 4 * kUnit * above[i] * std::max(u, -l);
     }
   }
+};
+
+/// Substitutes h = relu(y).
+void through_relu(Forms& forms, const Relaxation& relu) {
+  for (int r = 0; r < forms.count; ++r) {
+    const auto row = static_cast<std::size_t>(r);
+    const RelaxedSums sums = relax(forms.at(r), forms.width, relu.above.data(), relu.below.data(),
+                                   relu.offset.data(), relu.error.data());
+    forms.constant[row] += sums.offsets;
+    forms.absolute[row] += sums.offsets;
+    forms.error[row] += 1.001 * sums.errors;
+  }
+  forms.terms += forms.width;
 }
 
-/// The form's largest value over the box, rounded up.
-double largest(const Form& form, const Row& lower, const Row& upper) {
-  double value = form.constant, absolute = form.absolute;
-  for (std::size_t j = 0; j < form.coefficients.size(); ++j) {
-    const double c = form.coefficients[j];
+/// A form's largest value over the box, rounded up.
+double largest(const Forms& forms, int r, const Row& lower, const Row& upper) {
+  const auto row = static_cast<std::size_t>(r);
+  double value = forms.constant[row], absolute = forms.absolute[row];
+  for (std::size_t j = 0; j < lower.size(); ++j) {
+    const double c = forms.at(r)[j];
+    if (!std::isfinite(c)) return kInfinity;  // of layers before, `error` is infinite then, or a NaN
     value += c * (c > 0 ? upper[j] : lower[j]);
     absolute += std::abs(c) * std::max(std::abs(lower[j]), std::abs(upper[j]));
   }
-  const double terms =
-      static_cast<double>(form.terms) + 2.0 * static_cast<double>(form.coefficients.size()) + 16;
-  const double result = next_up(value + (2 * terms * kUnit * absolute + 1.01 * form.error + kTiny));
+  const double terms = forms.terms + 2.0 * static_cast<double>(lower.size()) + 16;
+  const double result = next_up(value + (2 * terms * kUnit * absolute + 1.01 * forms.error[row] + kTiny));
   return std::isnan(result) ? kInfinity : result;
 }
 
-/// The form as one in x, `top` the layer that it is in.
-Form down_to_inputs(Form form, std::size_t top, const std::vector<HiddenLayer>& layers,
-                    const NeuronBounds& bounds) {
-  for (std::size_t j = top + 1; j-- > 0;) {
-    through_layer(form, layers[j], bounds.terms[j]);
-    if (j > 0) through_relu(form, layers[j - 1], bounds, j - 1);
+/// An output of a layer, with sign 1 or -1.
+struct SignedOutput {
+  int output;
+  double sign;
+};
+
+/// Forms in x above the signed outputs of layer `top`.
+Forms above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, std::size_t top,
+            const std::vector<SignedOutput>& outputs) {
+  const HiddenLayer& layer = layers[top];
+  Forms forms;
+  forms.count = static_cast<int>(outputs.size());
+  forms.width = layer.inputs;
+  forms.terms = 2;
+  forms.error.assign(outputs.size(), 0.0);
+  forms.absolute.assign(outputs.size(), 0.0);
+  forms.constant.assign(outputs.size(), 0.0);
+  forms.coefficients.resize(outputs.size() * static_cast<std::size_t>(layer.inputs));
+  for (std::size_t r = 0; r < outputs.size(); ++r) {  // the layer's own row: exact
+    const double sign = outputs[r].sign;
+    const auto i = static_cast<std::size_t>(outputs[r].output);
+    const double* const row = &layer.weights[i * static_cast<std::size_t>(layer.inputs)];
+    double* const own = forms.at(static_cast<int>(r));
+    for (int j = 0; j < layer.inputs; ++j) own[j] = sign * row[j];
+    forms.constant[r] = sign * layer.biases[i];
+    forms.absolute[r] = std::abs(layer.biases[i]);
+    if (layer.least.empty()) continue;
+    const double most = sign * (sign > 0 ? layer.most : layer.least)[i];
+    forms.constant[r] += most;
+    forms.absolute[r] += std::abs(most);
   }
-  return form;
+  for (std::size_t j = top; j-- > 0;) {
+    const Relaxation relu(layers[j], bounds, j);
+    through_relu(forms, relu);
+    through_layer(forms, layers[j], bounds.terms[j], relu.used);
+  }
+  return forms;
 }
 
-/// Above y (sign 1) or -y of one neuron.
-Form above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, std::size_t layer,
-           std::size_t output, double sign) {
-  Form form;
-  form.coefficients.assign(static_cast<std::size_t>(layers[layer].outputs), 0.0);
-  form.coefficients[output] = sign;
-  return down_to_inputs(std::move(form), layer, layers, bounds);
-}
-
-/// w times the form, w >= 0.
-void scale(Form& form, double w) {
-  for (double& c : form.coefficients) c *= w;
-  form.constant *= w;
-  form.absolute *= w;
-  form.error *= w;
+/// w times a form, w >= 0.
+void scale(Forms& forms, double w) {
+  for (double& c : forms.coefficients) c *= w;
+  forms.constant[0] *= w;
+  forms.absolute[0] *= w;
+  forms.error[0] *= w;
 }
 
 }  // namespace
 
 double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, const Row& lower,
                    const Row& upper, const WeightedNeuron& first, const WeightedNeuron& second) {
-  Form sum =
-      above(layers, bounds, first.layer, static_cast<std::size_t>(first.output), first.weight < 0 ? -1 : 1);
-  Form other = above(layers, bounds, second.layer, static_cast<std::size_t>(second.output),
-                     second.weight < 0 ? -1 : 1);
+  Forms sum = above(layers, bounds, first.layer, {{first.output, first.weight < 0 ? -1.0 : 1.0}});
+  Forms other = above(layers, bounds, second.layer, {{second.output, second.weight < 0 ? -1.0 : 1.0}});
   scale(sum, std::abs(first.weight));
   scale(other, std::abs(second.weight));
   double rounding = 0;  // of products and sums of coefficients, by what they multiply
@@ -152,23 +171,33 @@ double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& b
                 std::max(std::abs(lower[j]), std::abs(upper[j]));
     sum.coefficients[j] += other.coefficients[j];
   }
-  sum.constant += other.constant;
-  sum.absolute += other.absolute;
-  sum.error += other.error + 8 * kUnit * (rounding + sum.absolute) + kTiny;
-  sum.error *= 1 + 1e-6;  // roundings of the error terms themselves
+  sum.constant[0] += other.constant[0];
+  sum.absolute[0] += other.absolute[0];
+  sum.error[0] += other.error[0] + 8 * kUnit * (rounding + sum.absolute[0]) + kTiny;
+  sum.error[0] *= 1 + 1e-6;  // roundings of the error terms themselves
   sum.terms += other.terms;
-  return largest(sum, lower, upper);
+  return largest(sum, 0, lower, upper);
 }
 
 NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lower, const Row& upper,
                            const NeuronBounds* around) {
   NeuronBounds bounds;
+  add_layers(bounds, layers, lower, upper, around);
+  return bounds;
+}
+
+void add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, const Row& lower,
+                const Row& upper, const NeuronBounds* around) {
   std::vector<Row>& term = bounds.terms;
-  Row magnitude;  // of the layer's input
-  for (std::size_t j = 0; j < lower.size(); ++j)
-    magnitude.push_back(std::max(std::abs(lower[j]), std::abs(upper[j])));
-  for (std::size_t k = 0; k < layers.size(); ++k) {
+  for (std::size_t k = bounds.lower.size(); k < layers.size(); ++k) {
     const HiddenLayer& layer = layers[k];
+    Row magnitude;  // of the layer's input
+    for (std::size_t j = 0; j < static_cast<std::size_t>(layer.inputs); ++j) {
+      const double l = k == 0 ? lower[j] : bounds.lower[k - 1][j],
+                   u = k == 0 ? upper[j] : bounds.upper[k - 1][j];
+      magnitude.push_back(k > 0 && layers[k - 1].has_relu(j) ? std::max(0.0, u)
+                                                             : std::max(std::abs(l), std::abs(u)));
+    }
     const auto rows = static_cast<std::size_t>(layer.outputs);
     term.emplace_back(rows);
     for (std::size_t i = 0; i < rows; ++i) {
@@ -181,28 +210,28 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lo
     }
     bounds.lower.push_back(around != nullptr ? around->lower[k] : Row(rows, -kInfinity));
     bounds.upper.push_back(around != nullptr ? around->upper[k] : Row(rows, kInfinity));
-    magnitude.assign(rows, 0);
     bounds.slope.emplace_back(rows, 0.0);
     bounds.offset.emplace_back(rows, 0.0);
+    std::vector<SignedOutput> open;
     for (std::size_t i = 0; i < rows; ++i) {
-      double& l = bounds.lower[k][i];
-      double& u = bounds.upper[k][i];
-      if (!layer.has_relu(i) || (l < 0 && u > 0)) {
-        for (const double sign : {1.0, -1.0}) {
-          const double end = largest(above(layers, bounds, k, i, sign), lower, upper);
-          if (sign > 0) u = std::min(u, end);
-          if (sign < 0) l = std::max(l, -end);
-        }
-      }
-      if (layer.has_relu(i) && l < 0 && u > 0) {
-        const double slope = std::min(1.0, u / (u - l));
-        bounds.slope[k][i] = slope;
-        bounds.offset[k][i] = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
-      }
-      magnitude[i] = layer.has_relu(i) ? std::max(0.0, u) : std::max(std::abs(l), std::abs(u));
+      if (layer.has_relu(i) && !(bounds.lower[k][i] < 0 && bounds.upper[k][i] > 0)) continue;
+      for (const double sign : {1.0, -1.0}) open.push_back({static_cast<int>(i), sign});
+    }
+    const Forms forms = above(layers, bounds, k, open);
+    for (std::size_t n = 0; n < open.size(); ++n) {
+      const auto i = static_cast<std::size_t>(open[n].output);
+      const double end = largest(forms, static_cast<int>(n), lower, upper);
+      if (open[n].sign > 0) bounds.upper[k][i] = std::min(bounds.upper[k][i], end);
+      if (open[n].sign < 0) bounds.lower[k][i] = std::max(bounds.lower[k][i], -end);
+    }
+    for (std::size_t i = 0; i < rows; ++i) {
+      const double l = bounds.lower[k][i], u = bounds.upper[k][i];
+      if (!layer.has_relu(i) || !(l < 0 && u > 0)) continue;
+      const double slope = std::min(1.0, u / (u - l));
+      bounds.slope[k][i] = slope;
+      bounds.offset[k][i] = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
     }
   }
-  return bounds;
 }
 
 }  // namespace swarmcert::check

@@ -56,6 +56,12 @@ struct WeightedNeuron {
 NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const std::vector<double>& lower,
                            const std::vector<double>& upper, const NeuronBounds* around);
 
+/// Adds the bounds of the layers that `bounds`, of the first ones over the same box, does not have yet.
+/// @param around of all layers over a larger box; may be null.
+void add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers,
+                const std::vector<double>& lower, const std::vector<double>& upper,
+                const NeuronBounds* around);
+
 /// The largest value of first + second over the box that `bounds` are for, rounded up: each by its own form in x.
 double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds,
                    const std::vector<double>& lower, const std::vector<double>& upper,

@@ -300,7 +300,7 @@ class Checker {
   }
 
   /// sqrt(rho) <= `upper` bounds the slope on the box, or on what the input clamp makes of it; of a set function through
-  /// a quadratic form of rho, or, for so many neighbours, of the chain through rho. Everywhere: by a projective cover.
+  /// a quadratic form of rho, for so many neighbours one that holds for the sums that they reach. Everywhere: by a projective cover.
   void check_local(const Json& bound, double upper, const std::vector<double>& scale,
                    const std::string& where) {
     const Json& proof = bound["proof"];
@@ -308,6 +308,7 @@ class Checker {
     std::set<std::string> keys = {"rho", is_coupled ? "others" : "form", "tree", "multipliers"};
     if (is_global) keys.insert("radius");
     if (proof.contains("conflicts")) keys.insert("conflicts");
+    if (is_coupled) keys.insert("forms");
     require_keys(proof, keys, where + ".proof");
     const std::vector<std::string> names = files::networks_of(bound["function"].get<std::string>());
     const std::string& moved = names.front();
@@ -340,12 +341,19 @@ class Checker {
     } else {
       read_box(moved, boxes[0].lower, boxes[0].upper, where);
     }
-    TreeProof tree{proof["tree"].get<std::string>(), {}, {}};
+    TreeProof tree{proof["tree"].get<std::string>(), {}, {}, {}};
     require(proof["multipliers"].is_array(), where + ": multipliers is not an array");
     for (const Json& words : proof["multipliers"]) tree.multipliers.push_back(hex_floats_in(words));
     if (proof.contains("conflicts")) {
       require(proof["conflicts"].is_array(), where + ": conflicts is not an array");
       for (const Json& words : proof["conflicts"]) tree.conflicts.push_back(conflicts_in(words));
+    }
+    if (is_coupled) {
+      require(proof["forms"].is_array(), where + ": forms is not an array");
+      for (const Json& form : proof["forms"]) {
+        require_keys(form, {"q", "t"}, where + ".forms");
+        tree.forms.push_back({hex_floats_in(form["q"]), hex_floats_in(form["t"])});
+      }
     }
     const TreeVerdict verdict = check_tree(f, boxes, rho, tree);
     require(verdict.holds, where + ": " + verdict.reason);

@@ -4,6 +4,7 @@ namespace swarmcert::check {
 
 LocalFunction homogeneous(const LocalFunction& f) {
   LocalFunction result = f;
+  result.behind.clear();
   for (std::size_t k = 0; k < f.hidden.size(); ++k) {
     const HiddenLayer& layer = f.hidden[k];
     const bool is_last = k + 1 == f.hidden.size();

@@ -13,11 +13,15 @@ namespace swarmcert::check {
 /// sum (dx_k / weight_k)^2.
 struct LocalFunction {
   std::vector<HiddenLayer> hidden;
-  Matrix gram;                   ///< G, exactly, of the last hidden layer
+  Matrix gram;                   ///< G, exactly, of the last hidden layer; no rows: as a tree's forms say
   std::vector<int> coordinates;  ///< that move, ascending
   std::vector<double> weight;    ///< one per moving coordinate, positive
+  /// Of a set function, what follows phi's hidden layers: phi's last layer v = W h + b, which has no ReLU, and rho's
+  /// hidden layers. None: no forms.
+  std::vector<HiddenLayer> behind = {};
+  Matrix behind_gram;  ///< exactly, of rho's last hidden layer
 
-  LocalFunction() : gram(0, 0) {}
+  LocalFunction() : gram(0, 0), behind_gram(0, 0) {}
 };
 
 /// Two neurons, counted over all outputs of hidden layers, that cannot be in these states at once: nowhere in the part
@@ -31,8 +35,14 @@ struct Conflict {
   double multiplier = 0;
 };
 
+/// |drho|^2 <= dv' Q dv in front of rho, where rho's neurons are as a part decides them.
+struct Form {
+  std::vector<double> q;  ///< the lower triangle, row by row
+  std::vector<double> t;  ///< one number per output of a hidden layer of rho, not negative
+};
+
 /// The words of a tree in preorder: "s3" halves coordinate 3 of the box at hand, its lower half first; "t5" is a leaf
-/// that multipliers 5 prove. Of several boxes, their trees one after the other.
+/// that multipliers 5 prove; "q2" says, before what becomes of the box at hand, that form 2 holds in it. Of several boxes, their trees one after the other.
 struct TreeProof {
   std::string tree;
   /// Each with one number per output of a hidden layer, not negative; nobody reads those of outputs without ReLU.
@@ -40,6 +50,7 @@ struct TreeProof {
   /// Conflicts that go with each multipliers, or nothing at all. In a part that decides one of the two neurons, or where
   /// lambda does not show it, a conflict counts for nothing.
   std::vector<std::vector<Conflict>> conflicts = {};
+  std::vector<Form> forms = {};
 };
 
 struct TreeVerdict {
@@ -48,6 +59,10 @@ struct TreeVerdict {
   long leaves = 0;
 };
 
+/// A form holds in a part if |drho|^2 <= dv' Q dv for the derivatives there, by the same inequality with Q in place of
+/// rho I, over dv and the neurons of rho that the part leaves undecided. G = W' Q W then, in it and in what it is halved
+/// into, until another form takes its place.
+///
 /// Whether |f(x) - f(y)|^2 <= rho |x - y|^2 for all x, y of the box, shown by the tree. The parts cover the box: a split
 /// is followed by both halves, which share the plane of the cut. The slope of f along a segment is bounded by that of
 /// the parts it crosses, so each part may be proved alone.

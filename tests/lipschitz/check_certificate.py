@@ -678,11 +678,13 @@ def largest(form, constant, low, high):
     return rounded_up(constant + sum(c * (h if c > 0 else l) for c, l, h in zip(form, low, high)))
 
 
-def neuron_bounds(layers, low, high, around):
+def neuron_bounds(layers, low, high, around, first=()):
     """Bounds on every neuron over a box by linear relaxation of ReLU, layer by layer; those that `around` decides keep
-    its bounds. Exact but for bounds and slopes, which are rounded so that they still hold."""
-    bounds = []
-    for k, layer in enumerate(layers):
+    its bounds. Exact but for bounds and slopes, which are rounded so that they still hold. `first`: those of the first
+    layers, which are taken as they are."""
+    bounds = list(first)
+    for k in range(len(bounds), len(layers)):
+        layer = layers[k]
         bounds.append([])
         for i in range(len(layer.biases)):
             lower, upper = around[k][i] if around else (None, None)
@@ -727,15 +729,15 @@ def shown(layers, low, high, bounds, conflicts):
     return result
 
 
-def part_holds(layers, gram, moving, weight, bounds, rho, t, conflicts):
-    """S = rho I - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') over the moving inputs and
+def part_holds(layers, gram, moving, weight, bounds, form, t, conflicts):
+    """S = form - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') over the moving inputs and
     the undecided neurons."""
     forms = {}
     n = len(moving) + sum(l < 0 < u and layer.has_relu(i) for layer, ends in zip(layers, bounds)
                           for i, (l, u) in enumerate(ends))
     s = [[Fraction(0)] * n for _ in range(n)]
     for i in range(len(moving)):
-        s[i][i] = Fraction(rho)
+        s[i][:len(moving)] = form[i]
     z = [[weight[j] if j < len(moving) and moving[j] == i else Fraction(0) for j in range(n)]
          for i in range(len(layers[0].weights[0]))]
     variable, neuron = len(moving), 0
@@ -781,16 +783,54 @@ def projective_cover(radius):
     return boxes
 
 
-def tree_fails(layers, boxes, text, proves):
-    """"" if proves(low, high, bounds, index) for every leaf, else why not."""
-    open_parts = [(low, high, neuron_bounds(layers, low, high, None)) for low, high in reversed(boxes)]
+def scaled_identity(rho, size):
+    return [[Fraction(rho) if i == j else Fraction(0) for j in range(size)] for i in range(size)]
+
+
+class Part:
+    """A box, bounds on its neurons and, once a form holds in it, those of the whole set function and the form's Gram matrix."""
+
+    def __init__(self, low, high, bounds, through_rho=None, gram=None):
+        self.low, self.high, self.bounds, self.through_rho, self.gram = low, high, bounds, through_rho, gram
+
+
+class Forms:
+    """|drho|^2 <= dv' Q dv where rho's neurons are as a part decides them: (Q, t) each. `behind`: phi's last layer, then
+    rho's hidden layers."""
+
+    def __init__(self, forms, hidden, behind, gram):
+        self.forms, self.layers, self.first, self.gram = forms, hidden + behind, len(hidden) + 1, gram
+
+    def use(self, index, part):
+        """Makes the form the part's, if it holds there."""
+        if index >= len(self.forms):
+            return False
+        q, t = self.forms[index]
+        part.through_rho = neuron_bounds(self.layers, part.low, part.high, part.through_rho, part.bounds)
+        one = [Fraction(1)] * len(q)
+        if not part_holds(self.layers[self.first:], self.gram, list(range(len(q))), one, part.through_rho[self.first:], q, t, []):
+            return False
+        last = self.layers[self.first - 1].weights
+        half = [[sum(a * row[j] for a, row in zip(q_row, last)) for j in range(len(last[0]))] for q_row in q]
+        part.gram = [[sum(row[i] * h[j] for row, h in zip(last, half)) for j in range(len(last[0]))] for i in range(len(last[0]))]
+        return True
+
+
+def tree_fails(layers, boxes, text, proves, forms=None):
+    """"" if proves(part, index) for every leaf, else why not."""
+    open_parts = [Part(low, high, neuron_bounds(layers, low, high, None)) for low, high in reversed(boxes)]
     for word in text.split(" ") if text else []:
-        if not re.fullmatch("[st][0-9]{1,15}", word) or not open_parts:
-            return f"{word!r} is no split and no leaf, or one too many"
-        low, high, bounds = open_parts.pop()
+        if not re.fullmatch("[stq][0-9]{1,15}", word) or not open_parts:
+            return f"{word!r} is no split, no leaf and no form, or one too many"
         index = int(word[1:])
+        if word[0] == "q":
+            if forms is None or not forms.use(index, open_parts[-1]):
+                return f"{word} does not hold in its part"
+            continue
+        part = open_parts.pop()
+        low, high = part.low, part.high
         if word[0] == "t":
-            if not proves(low, high, bounds, index):
+            if not proves(part, index):
                 return f"{word} does not prove its part"
             continue
         if index >= len(low) or len(open_parts) > 2000 + len(boxes):
@@ -801,7 +841,7 @@ def tree_fails(layers, boxes, text, proves):
         for is_upper in True, False:
             l, h = list(low), list(high)
             (l if is_upper else h)[index] = middle
-            open_parts.append((l, h, neuron_bounds(layers, l, h, bounds)))
+            open_parts.append(Part(l, h, neuron_bounds(layers, l, h, part.bounds), part.through_rho, part.gram))
     return "the tree ends early" if open_parts else ""
 
 
@@ -971,8 +1011,8 @@ class Checker:
             require(len(low) == len(high) == rows, f"{here}: the range is of something else")
             require(isinstance(others[part]["tree"], str), f"{here}: the tree is not text")
             layers = self.term_layers(part, names[1])
-            reason = tree_fails(layers, [self.box_of(part, here)], others[part]["tree"], lambda _, __, bounds, index: index == 0 and all(
-                a <= l and u <= b for a, (l, u), b in zip(low, bounds[-1], high)))
+            reason = tree_fails(layers, [self.box_of(part, here)], others[part]["tree"], lambda at, index: index == 0 and all(
+                a <= l and u <= b for a, (l, u), b in zip(low, at.bounds[-1], high)))
             require(not reason, f"{here}: {reason}")
             for i in range(rows):
                 least[i] += low[i] if kind == "ground" else count * min(low[i], 0)
@@ -982,22 +1022,28 @@ class Checker:
     def check_local(self, bound, upper, scale, where):
         proof = bound["proof"]
         coupled, everywhere = "others" in proof, bound["domain"] == "global"
-        require_keys(proof, ["rho", "others" if coupled else "form", "tree", "multipliers"] + ["radius"] * everywhere
+        require_keys(proof, ["rho", "tree", "multipliers"] + (["others", "forms"] if coupled else ["form"]) + ["radius"] * everywhere
                      + ["conflicts"] * ("conflicts" in proof), where)
         names = networks_of(bound["function"])
         require(all(name in self.network.parts for name in names), f"{where}: no such function")
         require(not names[0].startswith("rho:"), f"{where}: rho has no box")
+        forms = None
         layers = self.network.parts[names[0]].layers
         if coupled:
             neighbours = self.neighbours_of(bound, where)
             require(neighbours, f"{where}: a bound for any number of neighbours needs a form")
-            behind = self.network.parts[names[1]].layers
-            require(len(behind) > 1, f"{where}: rho has no hidden layer")
-            hidden = self.term_layers(*names)[:-1] + [Hidden(layer) for layer in behind[:-1]]
-            first = hidden[len(layers)]
-            first.least, first.most = self.check_others(proof["others"], names, neighbours, where)
-            last = Matrix.of(behind[-1].weights, behind[-1].inputs)
+            behind_rho = self.network.parts[names[1]].layers
+            require(len(behind_rho) > 1, f"{where}: rho has no hidden layer")
+            require(len(layers) > 1, f"{where}: no hidden layer")
+            hidden = self.term_layers(*names)[:-2]
+            behind = self.term_layers(*names)[-2:-1] + [Hidden(layer) for layer in behind_rho[:-1]]
+            behind[1].least, behind[1].most = self.check_others(proof["others"], names, neighbours, where)
+            last = Matrix.of(behind_rho[-1].weights, behind_rho[-1].inputs)
             gram = last.transposed() @ last
+            inputs = len(behind[0].biases)
+            forms = Forms([self.form_of_part(form, inputs, behind[1:], where) for form in listed(proof["forms"])], hidden,
+                          behind, [[gram.fraction(i, j) for j in range(len(gram.rows))] for i in range(len(gram.rows))])
+            gram = None
         else:
             require(len(layers) > 1, f"{where}: no hidden layer")
             require((proof["form"] is None) == (len(names) == 1), f"{where}: a form for set functions only")
@@ -1006,7 +1052,7 @@ class Checker:
             gram = last.transposed() @ last
             if len(names) == 2:
                 gram = last.transposed() @ self.checked_form(proof["form"], names[1], where) @ last
-        gram = [[gram.fraction(i, j) for j in range(len(gram.rows))] for i in range(len(gram.rows))]
+            gram = [[gram.fraction(i, j) for j in range(len(gram.rows))] for i in range(len(gram.rows))]
         rho = hex_float(proof["rho"])
         require(rho > 0 and Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
 
@@ -1034,11 +1080,25 @@ class Checker:
         require(all(c[0] < c[2] < sum(len(layer.biases) for layer in hidden) and 0 <= c[4] <= 1
                     for some in conflicts for c in some), f"{where}: a conflict is not between two neurons")
         require(isinstance(proof["tree"], str), f"{where}: the tree is not text")
-        reason = tree_fails(hidden, boxes, proof["tree"], 
-                            lambda low, high, bounds, index: index < len(multipliers) and part_holds(
-                                hidden, gram, moving, weight, bounds, rho, multipliers[index],
-                                shown(hidden, low, high, bounds, conflicts[index])))
+        square = scaled_identity(rho, len(moving))
+        reason = tree_fails(hidden, boxes, proof["tree"],
+                            lambda part, index: index < len(multipliers) and (part.gram or gram) is not None and part_holds(
+                                hidden, part.gram or gram, moving, weight, part.bounds, square, multipliers[index],
+                                shown(hidden, part.low, part.high, part.bounds, conflicts[index])), forms)
         require(not reason, f"{where}: {reason}")
+
+    def form_of_part(self, form, size, rho_layers, where):
+        """(Q, t); whether it holds in a part, Forms tells."""
+        require_keys(form, ["q", "t"], where)
+        values = []
+        for key in "q", "t":
+            require(isinstance(form[key], str), f"{where}: a form is not text")
+            values.append([Fraction(x) for x in hex_floats([w for w in re.split("[ \t\n\v\f\r]+", form[key]) if w])])
+        q, t = values
+        require(len(q) == size * (size + 1) // 2 and len(t) == sum(len(layer.biases) for layer in rho_layers),
+                f"{where}: a form is of another size")
+        require(min(t) >= 0 and max(map(abs, q + t)) <= 2 ** 400, f"{where}: a form is out of range, or a t of it negative")
+        return [[q[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(size)] for i in range(size)], t
 
     def checked_form(self, form, name, where):
         """Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w)."""

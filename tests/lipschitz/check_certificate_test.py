@@ -71,8 +71,9 @@ def mutated(value, generator):
     if isinstance(value, str) and value.startswith(("0x", "-0x")) and " " not in value:
         number = second.hex_float(value)
         return generator.choice([(number * (1 - 2 ** -20)).hex(), (-number).hex(), (0.0).hex(), "0x1p5000", "1.5", ""])
-    if isinstance(value, str) and value[:2] in ("s0", "s1", "s2", "s3", "s4", "s5"):  # a tree
-        return generator.choice([value + " t0", value[:-3], value.replace("s", "t"), value.replace("t", "s"), "s9 t0 t0",
+    if isinstance(value, str) and value[:2] in ("s0", "s1", "s2", "s3", "s4", "s5", "q0"):  # a tree
+        return generator.choice([value.replace("q", "q9"), " ".join(w for w in value.split() if w[0] != "q") + " q0",
+                                 value + " t0", value[:-3], value.replace("s", "t"), value.replace("t", "s"), "s9 t0 t0",
                                  " ".join(value.split()[1:]), ""])
     if isinstance(value, str) and " 0x" in value:  # multipliers, or a row of a form
         words = value.split()
