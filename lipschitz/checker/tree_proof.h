@@ -59,10 +59,6 @@ struct TreeVerdict {
   long leaves = 0;
 };
 
-/// A form holds in a part if |drho|^2 <= dv' Q dv for the derivatives there, by the same inequality with Q in place of
-/// rho I, over dv and the neurons of rho that the part leaves undecided. G = W' Q W then, in it and in what it is halved
-/// into, until another form takes its place.
-///
 /// Whether |f(x) - f(y)|^2 <= rho |x - y|^2 for all x, y of the box, shown by the tree. The parts cover the box: a split
 /// is followed by both halves, which share the plane of the cut. The slope of f along a segment is bounded by that of
 /// the parts it crosses, so each part may be proved alone.
@@ -74,6 +70,11 @@ struct TreeVerdict {
 /// claim follows from
 ///   S = rho I_x - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') >= 0,
 /// with a_i = (dy_i in these variables) - e_i, and p_c, q_c one of e_i (on) and a_i (off) for the conflict's two neurons.
+///
+/// A form holds in a part if |drho|^2 <= dv' Q dv for the derivatives there, by the same inequality with Q in place of
+/// rho I, over dv and the neurons of rho that the part leaves undecided. G = W' Q W then, in it and in what it is halved
+/// into, until another form takes its place.
+///
 /// S is computed in double together with a bound on the norm of what rounding changed, scaled to a unit diagonal by
 /// powers of two, shifted down by that bound and by what a Cholesky factorisation in double may overlook,
 /// gamma_(n+1) tr(S) (Rump 2006, BIT 46), and factorised: if that runs to its end, S is positive definite.
