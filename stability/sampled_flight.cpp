@@ -251,7 +251,7 @@ void SampledFlight::touch_ground() {
 }
 
 void SampledFlight::step() {
-  constexpr int kListEvery = 5;
+  constexpr int kListEvery = 10;
   if (is_changed_) swarm_.to_rows(state_.data(), rows_.data());
   is_changed_ = false;
   if (period_ % kListEvery == 0) swarm_.find_neighbours(rows_.data(), kListEvery * period_s_);
