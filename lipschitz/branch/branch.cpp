@@ -50,8 +50,9 @@ constexpr double kFar = 0.9;
 /// A part of a set function gets a form of rho of its own once its undecided neurons are fewer than this share of those
 /// with which the inherited one was computed.
 constexpr double kFormLazy = 0.85;
-/// Where no more of rho's neurons are decided, it looks again with so much less.
-constexpr double kFormAgain = 0.8;
+/// Only if of rho's, too, fewer are undecided than this share of those then: for phi alone a program without rho is
+/// cheaper. Otherwise it looks again as if this share of its own had been undecided.
+constexpr double kLazyRho = 0.985, kFormAgain = 0.95;
 /// What a form is above the least one, relatively to its largest entry: more than rounding it to single precision takes.
 constexpr double kFormMargin = 4e-6;
 /// How well the program of the whole box is solved.
@@ -452,7 +453,7 @@ class Search {
                                               old != nullptr ? old->reach.get() : nullptr);
     const std::vector<NeuronState> behind = states_of(*own.reach, set_->rho, first);
     own.undecided = undecided_in(behind);
-    if (old != nullptr && own.undecided >= old->undecided) {  // for phi alone solve() is cheaper
+    if (old != nullptr && own.undecided > kLazyRho * old->undecided) {
       part.undecided_form = static_cast<int>(kFormAgain * part.undecided);
       return;
     }
