@@ -77,9 +77,9 @@ void read_measured(const DisturbanceArguments& arguments, DisturbanceSource& sou
 
 double newtons(const std::string& unit, double value, const std::string& path) {
   if (unit.rfind("gf", 0) == 0) return value * stability::kGramForce_N;
-  if (unit.rfind("N", 0) == 0) return value;
+  if (unit.rfind("N", 0) == 0 && unit.rfind("N_m", 0) != 0) return value;
   throw InputError({path, "", "unit", files::in_quotes(unit), "is not a unit of force",
-                    "state output.unit in network.toml"});
+                    "state a force and its unit as output in network.toml"});
 }
 
 /// Lipschitz constants of f_hat in newton per unit of input: of one neighbour's input, and of the vehicle's own state.
@@ -123,6 +123,7 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
           "--certificate C proves nothing without the network that it is about: add --network NET");
     }
     const files::Network network = load_net(arguments.network);
+    files::require_force_z(network);
     for (const std::string& path : input_files(network)) inputs.push_back(path);
     const check::CheckResult verdict = check::check(certificate, network);
     if (!verdict.accepted) {
@@ -142,6 +143,7 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
         arguments.certificate);
   } else {
     const files::Network network = load_net(arguments.network);
+    files::require_force_z(network);
     for (const std::string& path : input_files(network)) inputs.push_back(path);
     lipschitz::CertifyOptions options;
     options.method = lipschitz::UpperMethod::kProduct;

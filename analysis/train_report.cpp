@@ -15,52 +15,66 @@ using Eigen::Index;
 using learning::LearningData;
 using learning::Use;
 
-void add_curve(Report& report, const learning::Run& run) {
-  std::string data;
-  for (std::size_t e = 0; e < run.epochs.size(); ++e)
-    data += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse_gf, run.epochs[e].select_rmse_gf);
-  report.figure("epochs", data,
-                "set xlabel 'epoch'\nset ylabel 'RMSE [gf]'\nset yrange [0:*]\n"
-                "plot 'epochs.dat' using 1:2 with linespoints lw 2 title 'flights to fit', '' using 1:3 with "
-                "linespoints lw 2 "
-                "title 'flights to select'\n",
-                fmt::format("Error over epochs. Kept: epoch {}.", run.best_epoch + 1));
+/// "vertical force [gf]", "force along x [gf]"
+std::string label_of(const LearningData& data, int component) {
+  const learning::TargetInfo& target = learning::info(data.target);
+  if (target.components == 1) return fmt::format("{} [{}]", target.words, target.unit);
+  return fmt::format("{} {} {} [{}]", target.words,
+                     data.target == learning::Target::kTorque ? "about" : "along", "xyz"[component],
+                     target.unit);
 }
 
-/// Share of the test samples per 0.5 gf, before and after.
-void add_histogram(Report& report, const LearningData& data, const learning::Run& run) {
+void add_curve(Report& report, const LearningData& data, const learning::Run& run) {
+  std::string text;
+  for (std::size_t e = 0; e < run.epochs.size(); ++e)
+    text += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse_gf, run.epochs[e].select_rmse_gf);
+  report.figure(
+      "epochs", text,
+      fmt::format("set xlabel 'epoch'\nset ylabel 'RMSE [{}]'\nset yrange [0:*]\n",
+                  learning::info(data.target).unit) +
+          "plot 'epochs.dat' using 1:2 with linespoints lw 2 title 'flights to fit', '' using 1:3 with "
+          "linespoints lw 2 "
+          "title 'flights to select'\n",
+      fmt::format("Error over epochs. Kept: epoch {}.", run.best_epoch + 1));
+}
+
+/// Share of the test samples per bin of one component of the target, before and after.
+void add_histogram(Report& report, const LearningData& data, const learning::Run& run, int component) {
   const std::vector<Index> samples = data.indices(Use::kTest);
   if (samples.empty()) return;
   constexpr int kBins = 81, kMiddle = kBins / 2;
-  constexpr double kWidth_gf = 0.5;
+  const double width = data.target == learning::Target::kTorque ? 0.02 : 0.5;
   std::array<std::array<double, kBins>, 2> share{};
-  const auto count = [&](int which, double force_gf) {
-    const double bin = std::round(force_gf / kWidth_gf) + kMiddle;
+  const auto count = [&](int which, double value) {
+    const double bin = std::round(value / width) + kMiddle;
     if (bin >= 0 && bin < kBins)
       share[which][static_cast<std::size_t>(bin)] += 100.0 / static_cast<double>(samples.size());
   };
   const training::Matrix predicted = training::predict(data.layout, run.theta, data.samples, samples.data(),
                                                        static_cast<Index>(samples.size()));
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const double target = static_cast<double>(data.samples.target[samples[i]]);
+    const auto target = static_cast<double>(data.samples.target_of(samples[i])[component]);
     count(0, target);
-    count(1, target - static_cast<double>(predicted(0, static_cast<Index>(i))));
+    count(1, target - static_cast<double>(predicted(component, static_cast<Index>(i))));
   }
   std::string text;
   for (int b = 0; b < kBins; ++b)
-    text += fmt::format("{} {} {}\n", (b - kMiddle) * kWidth_gf, share[0][b], share[1][b]);
+    text += fmt::format("{} {} {}\n", (b - kMiddle) * width, share[0][b], share[1][b]);
+  const std::string name = fmt::format("residuals_{}", component), label = label_of(data, component);
   report.figure(
-      "residuals", text,
-      "set xlabel 'vertical force [gf]'\nset ylabel 'samples [%]'\n"
-      "plot 'residuals.dat' using 1:2 with steps lw 2 lc 'gray' title 'without the network', '' using 1:3 "
-      "with "
-      "steps lw 2 title 'left by the network'\n",
-      "Vertical force on the test flights that the model does not explain, per 0.5 gf.");
+      name, text,
+      fmt::format("set xlabel '{}'\nset ylabel 'samples [%]'\nplot '{}.dat' using 1:2 with steps lw 2 "
+                  "lc 'gray' title 'without the network', '' using 1:3 with steps lw 2 title 'left by "
+                  "the network'\n",
+                  label, name),
+      fmt::format("What the model leaves on the test flights: {}, in bins of {}.", label, width));
 }
 
-/// Force on a vehicle at the origin from one neighbour at rest, over the neighbour's place in the plane y = 0.
-void add_map(Report& report, const LearningData& data, const learning::Run& run, int phi, int rho) {
+/// What one neighbour at rest does to a vehicle at the origin, over the neighbour's place in the plane y = 0.
+void add_map(Report& report, const LearningData& data, const learning::Run& run, int phi, int rho,
+             int component) {
   training::Dataset grid;
+  grid.outputs = data.samples.outputs;
   constexpr int kSteps = 61;
   for (int i = 0; i < kSteps; ++i) {
     for (int j = 0; j < kSteps; ++j) {
@@ -69,7 +83,7 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
       const int ground = data.layout.find("phi:ground");
       if (ground >= 0) grid.add_input(ground, {-0.6f, 0, 0, 0});
       grid.add_input(phi, {x, 0, z, 0, 0, 0});
-      grid.add_sample(rho, {0.0f});
+      grid.add_sample(rho, std::vector<float>(static_cast<std::size_t>(grid.outputs), 0.0f));
     }
   }
   std::vector<Index> all(static_cast<std::size_t>(grid.samples()));
@@ -79,15 +93,17 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
   for (int i = 0; i < kSteps; ++i) {
     for (int j = 0; j < kSteps; ++j) {
       text += fmt::format("{} {} {}\n", -0.5 + i / (kSteps - 1.0), -0.3 + 1.2 * j / (kSteps - 1.0),
-                          force(0, static_cast<Index>(i) * kSteps + j));
+                          force(component, static_cast<Index>(i) * kSteps + j));
     }
     text += "\n";
   }
-  const std::string name = fmt::format("map_{}_{}", phi, rho);
+  const std::string name = fmt::format("map_{}_{}_{}", phi, rho, component);
   report.figure(name, text,
                 "set view map\nset xlabel 'neighbour to the side [m]'\nset ylabel 'neighbour above [m]'\n"
-                "set cblabel 'vertical force [gf]'\nset palette @signed_colours\n"
-                "stats '" +
+                "set cblabel '" +
+                    label_of(data, component) +
+                    "'\nset palette @signed_colours\n"
+                    "stats '" +
                     name +
                     ".dat' using 3 nooutput\nm = (abs(STATS_min) > abs(STATS_max)) ? abs(STATS_min) : "
                     "abs(STATS_max)\nset cbrange [-m:m]\nset size ratio 1.2\nplot '" +
@@ -103,16 +119,22 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
   Report report("Training of a deep set");
   report.result(result);
   report.heading("Learning curve");
-  add_curve(report, run);
+  add_curve(report, data, run);
   report.heading("What is left");
-  add_histogram(report, data, run);
-  report.heading("The learned force");
+  const int components = data.samples.outputs;
+  for (int c = 0; c < components; ++c) add_histogram(report, data, run, c);
+  report.heading(std::string("The learned ") + learning::info(data.target).words);
+  // By symmetry nothing else can be in the plane y = 0.
+  std::vector<int> in_plane = {0};
+  if (data.target == learning::Target::kForce) in_plane = {0, 2};
+  if (data.target == learning::Target::kTorque) in_plane = {1};
   const std::vector<training::Part>& parts = data.layout.parts();
   for (std::size_t phi = 0; phi < parts.size(); ++phi) {
     if (parts[phi].name.rfind("phi:", 0) != 0 || parts[phi].name == "phi:ground") continue;
     for (std::size_t rho = 0; rho < parts.size(); ++rho) {
-      if (parts[rho].name.rfind("rho:", 0) == 0)
-        add_map(report, data, run, static_cast<int>(phi), static_cast<int>(rho));
+      if (parts[rho].name.rfind("rho:", 0) != 0) continue;
+      for (const int c : in_plane)
+        add_map(report, data, run, static_cast<int>(phi), static_cast<int>(rho), c);
     }
   }
   report.heading("Flights");

@@ -37,7 +37,7 @@ std::vector<int> read_order(const files::Network& network, int inputs) {
 }  // namespace
 
 DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
-                           const std::vector<std::string>& kinds)
+                           const std::vector<std::string>& kinds, DeepSetOutput output)
     : network_(std::move(network)) {
   if (network_.plain) {
     refuse(network_, "", "", "is one plain network, and a force among vehicles needs a deep set",
@@ -70,7 +70,9 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
     refuse(network_, "rho", "", "has no kind " + files::in_quotes(kind), "add [rho." + kind + "]");
   }
   evaluators_.emplace_back(rho->second);
-  if (rho->second.outputs() != 1) {
+  const std::string quantity = network_.output_quantity.empty() ? "force_z" : network_.output_quantity;
+  if (output == DeepSetOutput::kForceZ) files::require_force_z(network_);
+  if (rho->second.outputs() != files::components(quantity)) {
     refuse(network_, "rho." + rho->first, std::to_string(rho->second.outputs()) + " outputs",
            "must be 1: the force along z", "");
   }
@@ -86,7 +88,9 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
            "must be at most 6: relative position and velocity", "");
   }
   input_ = read_order(network_, set_.inputs());
-  newton_per_unit_ = network_.output_unit == "N" ? 1 : kGramForce_N;
+  is_torque_ = quantity == "torque";
+  const std::string& unit = network_.output_unit;
+  SI_per_unit_ = unit == "N" || unit == "N_m" ? 1 : unit == "mN_m" ? 1e-3 : kGramForce_N;
   own_.resize(files::kGroundInputs);
   hidden_sum_.resize(static_cast<std::size_t>(set_.hidden()));
   scratch_.resize(static_cast<std::size_t>(nn::scratch_size(set_)));
@@ -101,7 +105,7 @@ void DeepSetForce::reserve(int neighbours) {
   neighbours_.resize(count);
 }
 
-double DeepSetForce::force_z_N(const Instant& now) {
+Eigen::Vector3d DeepSetForce::evaluate(const Instant& now) {
   if (now.num_neighbours > static_cast<int>(order_.size())) reserve(2 * now.num_neighbours);
   own_ = {-now.p_W_m.z(), -now.v_W_m_s.x(), -now.v_W_m_s.y(), -now.v_W_m_s.z()};
   for (int j = 0; j < now.num_neighbours; ++j) {
@@ -112,11 +116,20 @@ double DeepSetForce::force_z_N(const Instant& now) {
     }
     neighbours_[static_cast<std::size_t>(j)] = {x, phi_of_kind_[static_cast<std::size_t>(neighbour.kind)]};
   }
-  double force = 0;
+  Eigen::Vector3d output = Eigen::Vector3d::Zero();
   nn::evaluate(
-      set_, own_.data(), neighbours_.data(), now.num_neighbours, &force,
+      set_, own_.data(), neighbours_.data(), now.num_neighbours, output.data(),
       {clamped_.data(), order_.data(), static_cast<int>(order_.size()), hidden_sum_.data(), scratch_.data()});
-  return newton_per_unit_ * force;
+  return SI_per_unit_ * output;
+}
+
+double DeepSetForce::force_z_N(const Instant& now) { return evaluate(now)[0]; }
+
+Wrench DeepSetForce::wrench(const Instant& now) {
+  const Eigen::Vector3d output = evaluate(now);
+  if (is_torque_) return {Eigen::Vector3d::Zero(), now.R_WB.transpose() * output};
+  if (set_.outputs() == 1) return {Eigen::Vector3d(0, 0, output[0]), Eigen::Vector3d::Zero()};
+  return {output, Eigen::Vector3d::Zero()};
 }
 
 double DeepSetForce::force_z_N(const Instant& now, const double* weights) {

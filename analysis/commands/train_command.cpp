@@ -21,6 +21,9 @@ namespace fs = std::filesystem;
 using learning::LearningData;
 using learning::Use;
 
+const std::map<std::string, learning::Target> kTargets = {{"force_z", learning::Target::kForceZ},
+                                                          {"force", learning::Target::kForce},
+                                                          {"torque", learning::Target::kTorque}};
 const std::map<std::string, learning::SplitBy> kSplits = {{"auto", learning::SplitBy::kAuto},
                                                           {"flights", learning::SplitBy::kFlights},
                                                           {"blocks", learning::SplitBy::kBlocks}};
@@ -28,7 +31,7 @@ const std::map<std::string, learning::SplitBy> kSplits = {{"auto", learning::Spl
 struct TrainOptions {
   FlightOptions flights;
   std::vector<std::string> select, test;
-  std::string output, report, split = "auto";
+  std::string output, report, quantity = "force_z", split = "auto";
   learning::NetworkSizes sizes;
   learning::RunOptions run;
   std::string gamma_scope = "layer", gamma_mode = "clip";
@@ -36,8 +39,9 @@ struct TrainOptions {
   bool no_ground = false;
 };
 
+/// Root mean square errors in the unit of the targets.
 struct Scores {
-  double nothing_gf = 0, network_gf = 0;
+  double nothing = 0, network = 0;
 };
 
 std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Vector& theta,
@@ -50,9 +54,28 @@ std::map<std::string, Scores> scores_by_composition(const LearningData& data, co
   std::map<std::string, Scores> result;
   for (const auto& [composition, samples] : members) {
     double squares = 0;
-    for (const Eigen::Index s : samples) squares += std::pow(static_cast<double>(data.samples.target[s]), 2);
+    for (const Eigen::Index s : samples) squares += data.samples.target_of(s).cast<double>().squaredNorm();
     result[composition] = {std::sqrt(squares / static_cast<double>(samples.size())),
                            std::sqrt(training::mean_loss(data.layout, theta, data.samples, samples, jobs))};
+  }
+  return result;
+}
+
+/// Of each component of the target, over all samples that test.
+std::vector<Scores> scores_by_component(const LearningData& data, const training::Vector& theta) {
+  const std::vector<Eigen::Index> samples = data.indices(Use::kTest);
+  const training::Matrix predicted = training::predict(data.layout, theta, data.samples, samples.data(),
+                                                       static_cast<Eigen::Index>(samples.size()));
+  Eigen::VectorXd nothing = Eigen::VectorXd::Zero(data.samples.outputs), network = nothing;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const training::Vector target = data.samples.target_of(samples[i]);
+    nothing += target.cast<double>().cwiseAbs2();
+    network += (target - predicted.col(static_cast<Eigen::Index>(i))).cast<double>().cwiseAbs2();
+  }
+  std::vector<Scores> result;
+  for (Eigen::Index c = 0; c < nothing.size(); ++c) {
+    result.push_back({std::sqrt(nothing[c] / static_cast<double>(samples.size())),
+                      std::sqrt(network[c] / static_cast<double>(samples.size()))});
   }
   return result;
 }
@@ -61,7 +84,8 @@ files::Json number_or_null(double x) { return std::isfinite(x) ? files::Json(x) 
 
 struct Outcome {
   learning::Run run;
-  double test_gf = 0, nothing_gf = 0;
+  Scores all;
+  std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
   std::map<std::string, Scores> compositions;
   learning::Certified certified;
 };
@@ -76,25 +100,35 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
   json["samples"] = {{"fit", data.indices(Use::kFit).size()},
                      {"select", data.indices(Use::kSelect).size()},
                      {"test", data.indices(Use::kTest).size()}};
+  const learning::TargetInfo& target = learning::info(data.target);
+  const double SI = target.SI_per_unit;
+  json["quantity"] = target.quantity;
   json["split"] = data.split_by_blocks ? "blocks" : "flights";
-  json["test_rmse"] = number_or_null(outcome.test_gf * stability::kGramForce_N);
-  json["test_rmse_gf"] = number_or_null(outcome.test_gf);
-  json["test_rmse_of_nothing"] = number_or_null(outcome.nothing_gf * stability::kGramForce_N);
+  json["test_rmse"] = number_or_null(outcome.all.network * SI);
+  json["test_rmse_" + std::string(target.unit)] = number_or_null(outcome.all.network);
+  json["test_rmse_of_nothing"] = number_or_null(outcome.all.nothing * SI);
+  for (std::size_t c = 0; c < outcome.components.size(); ++c) {
+    const std::string axis(1, "xyz"[c]);
+    json["test_rmse_axes"][axis] = number_or_null(outcome.components[c].network * SI);
+    json["test_rmse_of_nothing_axes"][axis] = number_or_null(outcome.components[c].nothing * SI);
+  }
   json["test"] = files::Json::array();
   for (const auto& [composition, scores] : outcome.compositions) {
-    json["test"].push_back({{"vehicles", composition},
-                            {"rmse", scores.network_gf * stability::kGramForce_N},
-                            {"rmse_of_nothing", scores.nothing_gf * stability::kGramForce_N}});
+    json["test"].push_back(
+        {{"vehicles", composition}, {"rmse", scores.network * SI}, {"rmse_of_nothing", scores.nothing * SI}});
   }
   json["bounds"] = files::Json::array();
   for (const auto& [function, upper] : outcome.certified.set_bounds)
-    json["bounds"].push_back({{"function", function}, {"upper", upper}, {"unit", "gf per unit of input"}});
+    json["bounds"].push_back({{"function", function},
+                              {"upper", upper},
+                              {"unit", fmt::format("{} per unit of input", target.unit)}});
   json["lipschitz"] = outcome.certified.largest();
   json["gamma_verdict"] = name(outcome.certified.gamma);
   json["best_epoch"] = outcome.run.best_epoch + 1;
   json["epochs"] = files::Json::array();
   for (const learning::Epoch& epoch : outcome.run.epochs)
-    json["epochs"].push_back({{"fit_rmse_gf", epoch.fit_rmse_gf}, {"select_rmse_gf", epoch.select_rmse_gf}});
+    json["epochs"].push_back({{fmt::format("fit_rmse_{}", target.unit), epoch.fit_rmse_gf},
+                              {fmt::format("select_rmse_{}", target.unit), epoch.select_rmse_gf}});
   json["problems"] = data.problems;
   return json;
 }
@@ -110,12 +144,20 @@ void print(const TrainOptions& options, const LearningData& data, const Outcome&
   if (data.split_by_blocks)
     fmt::print("blocks of the flights that are fitted select or test: these errors look too good\n");
   fmt::print("best of {} epochs: {}\n\n", outcome.run.epochs.size(), outcome.run.best_epoch + 1);
-  fmt::print("{:<34}{:>16}{:>16}\n", "vertical force on test flights", "no network [gf]", "network [gf]");
+  const learning::TargetInfo& target = learning::info(data.target);
+  fmt::print("{:<34}{:>18}{:>18}\n", fmt::format("{} on test flights", target.words),
+             fmt::format("no network [{}]", target.unit), fmt::format("network [{}]", target.unit));
   for (const auto& [composition, scores] : outcome.compositions)
-    fmt::print("{:<34}{:>16.3f}{:>16.3f}\n", composition, scores.nothing_gf, scores.network_gf);
-  fmt::print("{:<34}{:>16.3f}{:>16.3f}\n\n", "all", outcome.nothing_gf, outcome.test_gf);
+    fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", composition, scores.nothing, scores.network);
+  fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", "all", outcome.all.nothing, outcome.all.network);
+  for (std::size_t c = 0; c < outcome.components.size(); ++c) {
+    fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", fmt::format("all, along {}", "xyz"[c]),
+               outcome.components[c].nothing, outcome.components[c].network);
+  }
+  fmt::print("\n");
   for (const auto& [function, upper] : outcome.certified.set_bounds)
-    fmt::print("Lipschitz constant of {}: at most {:.8g} gf per unit of input, proved\n", function, upper);
+    fmt::print("Lipschitz constant of {}: at most {:.8g} {} per unit of input, proved\n", function, upper,
+               target.unit);
   fmt::print("gamma {} in every {}: {}\n", options.run.trainer.gamma.value, options.gamma_scope,
              name(outcome.certified.gamma));
   if (options.run.max_lipschitz > 0)
@@ -181,14 +223,15 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   const learning::LearningFlights flights = {&inputs, select ? &*select : nullptr, test ? &*test : nullptr};
   refuse_twice(flights);
   Progress loading(common.quiet);
-  const LearningData data =
-      learning::load_learning_data(flights, options.sizes, kSplits.at(options.split), common.jobs,
-                                   [&](int done, int total) { loading.show(done, total, "flights"); });
+  const LearningData data = learning::load_learning_data(
+      flights, options.sizes, kSplits.at(options.split), common.jobs,
+      [&](int done, int total) { loading.show(done, total, "flights"); }, kTargets.at(options.quantity));
   fs::create_directories(options.output);
   options.run.checkpoint = (fs::path(options.output) / "checkpoint.json").string();
   Progress training_progress(common.quiet);
   options.run.progress = [&](int done, int total, double select_gf) {
-    training_progress.show(done, total, fmt::format("epochs, {:.3f} gf", select_gf));
+    training_progress.show(done, total,
+                           fmt::format("epochs, {:.3f} {}", select_gf, learning::info(data.target).unit));
   };
   const CancelOnInterrupt interrupt;
   options.run.cancelled = interrupt.flag();
@@ -200,14 +243,15 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   }
 
   const files::Network network =
-      learning::write_network(data.layout, outcome.run.theta, trainer.gamma, options.output);
+      learning::write_network(data, outcome.run.theta, trainer.gamma, options.output);
   learning::write_models(inputs, data.layout, options.output);
   lipschitz::CertifyOptions certify_options;
   certify_options.jobs = common.jobs;
   certify_options.lower.seed = trainer.seed;
   outcome.certified = learning::write_certificate(network, options.output, certify_options);
-  outcome.test_gf = learning::rmse_gf(data, outcome.run.theta, Use::kTest, common.jobs);
-  outcome.nothing_gf = learning::rmse_of_nothing_gf(data, Use::kTest);
+  outcome.all = {learning::rmse_of_nothing_gf(data, Use::kTest),
+                 learning::rmse_gf(data, outcome.run.theta, Use::kTest, common.jobs)};
+  if (data.samples.outputs > 1) outcome.components = scores_by_component(data, outcome.run.theta);
   outcome.compositions = scores_by_composition(data, outcome.run.theta, common.jobs);
 
   std::vector<std::string> files = inputs.files();
@@ -233,14 +277,12 @@ int run_train(TrainOptions options, const CommonOptions& common) {
 Command train_command() {
   return {
       "train", "Train spectrally normalised deep sets on flights, with a certificate of the result",
-      "The network learns what the vehicles' models leave of the vertical force. A phi per kind of "
-      "neighbour, a rho "
-      "per kind\nof vehicle, and a phi of the own state for the ground. Flights are split as wholes into "
-      "fit, select "
-      "and test;\nthe epoch with the least error on the selecting flights is kept, and projected so that "
-      "gamma holds "
-      "in exact\narithmetic. An interrupted run goes on with --resume. Forces along x and y and torques are "
-      "not learned: not done.\n\n"
+      "The network learns what the vehicles' models leave of the vertical force, of the force, or of the "
+      "torque. A phi per kind\nof neighbour, a rho per kind of vehicle, and a phi of the own state for the "
+      "ground. Flights are split as wholes into fit,\nselect and test; the epoch with the least error on "
+      "the selecting flights is kept, and projected so that gamma holds in\nexact arithmetic. An "
+      "interrupted run goes on with --resume. What is flown is the vertical force; networks of a force or\n"
+      "torque act as effects of models, in simulation and in compare.\n\n"
       "Example: swarmcert train flights/ --epochs 20 -o trained",
       [](CLI::App& app) {
         const auto options = std::make_shared<TrainOptions>();
@@ -249,6 +291,10 @@ Command train_command() {
         declare_flights(app, options->flights, true);
         app.add_option("-o,--output", options->output, "Folder for networks, certificate and models")
             ->required();
+        app.add_option("--quantity", options->quantity,
+                       "force_z, force (x, y, z) or torque (x, y, z; needs logs of at least 400 Hz)")
+            ->check(CLI::IsMember({"force_z", "force", "torque"}))
+            ->capture_default_str();
         app.add_option("--test", options->test, "Flights that only test; without it every fifth flight does");
         app.add_option("--select", options->select,
                        "Flights that only decide when training ends; without it every fifth flight does");
@@ -268,10 +314,10 @@ Command train_command() {
                        "clip: at most the limit; equal: always the limit")
             ->check(CLI::IsMember({"clip", "equal"}))
             ->capture_default_str();
-        app.add_option(
-               "--max-lipschitz", options->run.max_lipschitz,
-               "Limit of the joint Lipschitz bounds in gf per unit of input, proved; layers that reach it "
-               "are clipped below gamma")
+        app.add_option("--max-lipschitz", options->run.max_lipschitz,
+                       "Limit of the joint Lipschitz bounds in gf (torque: mN m) per unit of input, proved; "
+                       "layers that reach it "
+                       "are clipped below gamma")
             ->check(CLI::PositiveNumber);
         app.add_option("--weights", options->weights,
                        "Scenarios and the compositions of kinds in them count the same (scenarios), or the "
@@ -279,10 +325,10 @@ Command train_command() {
                        "to their own errors (errors)")
             ->check(CLI::IsMember({"scenarios", "errors"}))
             ->capture_default_str();
-        app.add_option(
-               "--symmetry", options->symmetry,
-               "vertical: every epoch turns every sample about the vertical and mirrors it, which leaves a "
-               "vertical force as it is; none: samples as recorded")
+        app.add_option("--symmetry", options->symmetry,
+                       "vertical: every epoch turns every sample about the vertical and mirrors it, its "
+                       "force or torque "
+                       "included; none: samples as recorded")
             ->check(CLI::IsMember({"vertical", "none"}))
             ->capture_default_str();
         app.add_option("--phi", options->sizes.phi, "Hidden layers of phi")

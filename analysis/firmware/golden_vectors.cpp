@@ -75,10 +75,7 @@ std::vector<std::string> neighbour_kinds(const files::Network& network) {
 }
 
 float newton_per_unit(const files::Network& network) {
-  if (!network.output_quantity.empty() && network.output_quantity != "force_z") {
-    throw files::InputError({network.path, "", "output.quantity", network.output_quantity,
-                             "flight code takes a vertical force", "export a network of force_z"});
-  }
+  files::require_force_z(network);
   return network.output_unit == "N" ? 1.0f : 9.81e-3f;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "analysis/residuals/force_residual.h"
+#include "analysis/residuals/torque_residual.h"
 #include "nn/files/functions.h"
 #include "nn/files/input_error.h"
 #include "nn/files/parallel.h"
@@ -25,25 +26,39 @@ struct RawTrack {
   TrackSamples about;
   std::string kind;
   std::vector<double> time_s;
-  std::vector<float> force_gf;
+  std::vector<Eigen::Vector3f> target;    ///< only z of kForceZ
   std::vector<std::array<float, 4>> own;  ///< -z, -v
   std::vector<std::size_t> first = {0};
   std::vector<int> neighbour_kind;  ///< index into Kinds::names
   std::vector<std::array<float, kNeighbourInputs>> neighbour;
 };
 
-RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs) {
+/// What the model leaves along the track, in SI units, along the axes of the world; empty and a problem where there is
+/// none.
+std::vector<Eigen::Vector3d> left_by_model(const Track& track, const residuals::Inputs& inputs, Target target,
+                                           std::vector<std::string>& problems) {
+  const stability::Model& model = inputs.model_for(track);
+  if (target != Target::kTorque) return residuals::force_residual(model, inputs.kinds, inputs.rules, track);
+  residuals::TorqueResidual residual = residuals::torque_residual(model, inputs.kinds, track);
+  if (!residual.refused.empty())
+    problems.push_back(track.flight + " " + track.vehicle + ": no torque: " + residual.refused);
+  for (std::size_t i = 0; i < residual.torque_B_Nm.size(); ++i)
+    residual.torque_B_Nm[i] = track.instants[i].R_WB * residual.torque_B_Nm[i];
+  return std::move(residual.torque_B_Nm);
+}
+
+RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs, Target target,
+                     std::vector<std::string>& problems) {
   RawTrack raw;
   raw.about = {track.flight, track.scenario, track.vehicle, "", Use::kFit, 0, 0};
   raw.kind = track.kind;
-  const std::vector<Eigen::Vector3d> residual =
-      residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
+  const std::vector<Eigen::Vector3d> residual = left_by_model(track, inputs, target, problems);
   std::multiset<std::string> kinds;
-  for (std::size_t i = 0; i < track.instants.size(); ++i) {
-    if (track.cut[i] != residuals::Cut::kNone) continue;
+  for (std::size_t i = 0; i < residual.size(); ++i) {
+    if (track.cut[i] != residuals::Cut::kNone || residual[i].hasNaN()) continue;
     const stability::Instant& now = track.instants[i];
     raw.time_s.push_back(now.time_s);
-    raw.force_gf.push_back(static_cast<float>(residual[i].z() / stability::kGramForce_N));
+    raw.target.push_back((residual[i] / info(target).SI_per_unit).cast<float>());
     const Eigen::Vector3f v = now.v_W_m_s.cast<float>();
     raw.own.push_back({static_cast<float>(-now.p_W_m.z()), -v.x(), -v.y(), -v.z()});
     for (int j = 0; j < now.num_neighbours; ++j) {
@@ -63,7 +78,7 @@ RawTrack raw_samples(const Track& track, const residuals::Inputs& inputs) {
 }
 
 /// All flights of `inputs`, in their order.
-std::vector<std::vector<RawTrack>> load(const residuals::Inputs& inputs, int jobs,
+std::vector<std::vector<RawTrack>> load(const residuals::Inputs& inputs, Target target, int jobs,
                                         const std::function<void()>& flight_done,
                                         std::vector<std::string>& problems) {
   const std::size_t count = inputs.found.flights.size();
@@ -72,7 +87,8 @@ std::vector<std::vector<RawTrack>> load(const residuals::Inputs& inputs, int job
   files::parallel_for(static_cast<int>(count), jobs, [&](int f) {
     for (const Track& track : inputs.load(static_cast<std::size_t>(f), all_problems[f])) {
       if (track.position_only || track.used == 0 || inputs.model_of(track.kind) == nullptr) continue;
-      flights[f].push_back(raw_samples(track, inputs));
+      RawTrack raw = raw_samples(track, inputs, target, all_problems[f]);
+      if (!raw.target.empty()) flights[f].push_back(std::move(raw));
     }
     flight_done();
   });
@@ -100,7 +116,7 @@ struct HeldBack {
 
 /// Which networks there are: a phi per kind that was ever a neighbour, a rho per kind whose force is known.
 training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vector<std::string>& kinds,
-                           const NetworkSizes& sizes) {
+                           const NetworkSizes& sizes, Target target) {
   std::set<std::string> neighbours, own;
   for (const RawTrack& track : tracks) {
     own.insert(track.kind);
@@ -121,7 +137,8 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
   }
   for (const std::string& kind : neighbours)
     add("phi:" + kind, kNeighbourInputs, sizes.phi, sizes.features, {Plane{0, 1}, Plane{3, 4}});
-  for (const std::string& kind : own) add("rho:" + kind, sizes.features, sizes.rho, 1, {});
+  for (const std::string& kind : own)
+    add("rho:" + kind, sizes.features, sizes.rho, info(target).components, {});
   return training::Layout(std::move(parts));
 }
 
@@ -155,7 +172,11 @@ void append(LearningData& data, const RawTrack& raw, const std::vector<std::stri
     if (ground >= 0) data.samples.add_input(ground, {raw.own[i].begin(), raw.own[i].end()});
     for (std::size_t j = raw.first[i]; j < raw.first[i + 1]; ++j)
       data.samples.add_input(phi[raw.neighbour_kind[j]], {raw.neighbour[j].begin(), raw.neighbour[j].end()});
-    data.samples.add_sample(rho, {raw.force_gf[i]});
+    const Eigen::Vector3f& y = raw.target[i];
+    if (data.samples.outputs == 1)
+      data.samples.add_sample(rho, {y.z()});
+    else
+      data.samples.add_sample(rho, {y.x(), y.y(), y.z()});
   }
   about.end = data.samples.samples();
   data.tracks.push_back(std::move(about));
@@ -179,6 +200,15 @@ void append_blocks(LearningData& data, const RawTrack& raw, const std::vector<st
 
 }  // namespace
 
+const TargetInfo& info(Target target) {
+  static const TargetInfo kInfo[] = {
+      {"force_z", "gf", "vertical force", 1, stability::kGramForce_N},
+      {"force", "gf", "force", 3, stability::kGramForce_N},
+      {"torque", "mN_m", "torque", 3, 1e-3},
+  };
+  return kInfo[static_cast<int>(target)];
+}
+
 const char* name(Use use) { return use == Use::kFit ? "fit" : use == Use::kSelect ? "select" : "test"; }
 
 std::vector<Index> LearningData::indices(Use use) const {
@@ -191,8 +221,11 @@ std::vector<Index> LearningData::indices(Use use) const {
 }
 
 LearningData load_learning_data(const LearningFlights& named, const NetworkSizes& sizes, SplitBy split,
-                                int jobs, const Progress& progress) {
+                                int jobs, const Progress& progress, Target target) {
   LearningData data;
+  data.target = target;
+  data.samples.outputs = info(target).components;
+  data.samples.target_is_axial = target == Target::kTorque;
   const residuals::Inputs& inputs = *named.fit;
   std::mutex mutex;
   int done = 0, total = 0;
@@ -203,7 +236,7 @@ LearningData load_learning_data(const LearningFlights& named, const NetworkSizes
     const std::lock_guard<std::mutex> lock(mutex);
     progress(++done, total);
   };
-  std::vector<std::vector<RawTrack>> flights = load(inputs, jobs, flight_done, data.problems);
+  std::vector<std::vector<RawTrack>> flights = load(inputs, target, jobs, flight_done, data.problems);
   flights.erase(
       std::remove_if(flights.begin(), flights.end(), [](const auto& tracks) { return tracks.empty(); }),
       flights.end());
@@ -215,11 +248,13 @@ LearningData load_learning_data(const LearningFlights& named, const NetworkSizes
         {inputs.found.flights.empty() ? "" : inputs.found.flights.front().logs.front().second, "", "flights",
          "", what, mend});
   };
-  if (fitted.empty())
-    refuse("no usable record of a vehicle with a model", "see 'swarmcert compare' for what was cut");
+  if (fitted.empty()) {
+    refuse("no usable record of a vehicle with a model",
+           data.problems.empty() ? "see 'swarmcert compare' for what was cut" : data.problems.front());
+  }
   if (std::all_of(fitted.begin(), fitted.end(), [](const RawTrack& t) { return t.neighbour.empty(); }))
     refuse("no vehicle ever has a neighbour", "name flights of two or more vehicles");
-  data.layout = layout_of(fitted, inputs.kinds.names, sizes);
+  data.layout = layout_of(fitted, inputs.kinds.names, sizes, target);
 
   const HeldBack held_back = {named.select == nullptr, named.test == nullptr};
   const std::size_t needed = 1 + (held_back.select ? 1 : 0) + (held_back.test ? 1 : 0);
@@ -230,19 +265,19 @@ LearningData load_learning_data(const LearningFlights& named, const NetworkSizes
       if (data.split_by_blocks)
         append_blocks(data, track, inputs.kinds.names, held_back);
       else
-        append(data, track, inputs.kinds.names, 0, track.force_gf.size(),
+        append(data, track, inputs.kinds.names, 0, track.target.size(),
                held_back.of_flight(f, flights.size()));
     }
   }
   const auto append_all = [&](const residuals::Inputs* others, Use use) {
     if (others == nullptr) return;
-    for (const auto& tracks : load(*others, jobs, flight_done, data.problems)) {
+    for (const auto& tracks : load(*others, target, jobs, flight_done, data.problems)) {
       for (const RawTrack& track : tracks) {
         const std::vector<std::string>& kinds = others->kinds.names;
         const auto has_phi = [&](int kind) { return data.layout.find("phi:" + kinds[kind]) >= 0; };
         if (data.layout.find("rho:" + track.kind) >= 0 &&
             std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), has_phi)) {
-          append(data, track, kinds, 0, track.force_gf.size(), use);
+          append(data, track, kinds, 0, track.target.size(), use);
         } else {
           data.problems.push_back(track.about.flight + " " + track.about.vehicle +
                                   ": a kind of vehicle that is not in the flights to learn from");

@@ -14,6 +14,23 @@ namespace swarmcert::learning {
 enum class Use { kFit, kSelect, kTest };
 const char* name(Use use);
 
+/// What the networks learn of the wrench that the vehicle's model leaves.
+enum class Target {
+  kForceZ,  ///< the force along the world's z
+  kForce,   ///< the force along the world's x, y, z
+  kTorque,  ///< the torque about the world's x, y, z; needs logs of at least 400 Hz
+};
+
+/// How targets are stored and written.
+struct TargetInfo {
+  const char* quantity;  ///< as in network.toml
+  const char* unit;      ///< likewise
+  const char* words;
+  int components;
+  double SI_per_unit;
+};
+const TargetInfo& info(Target target);
+
 /// Hidden layers and the width H between phi and rho; the paper's are 25, 40, 40 and 40, 40, 40 with H = 40.
 struct NetworkSizes {
   std::vector<int> phi = {25, 40, 40};
@@ -34,6 +51,7 @@ struct TrackSamples {
 };
 
 struct LearningData {
+  Target target = Target::kForceZ;
   training::Layout layout;  ///< parts "phi:<kind>", with "phi:ground", and "rho:<kind>"
   training::Dataset samples;
   std::vector<TrackSamples> tracks;
@@ -60,8 +78,7 @@ struct LearningFlights {
   const residuals::Inputs* test = nullptr;    ///< decide nothing
 };
 
-/// Loads flights. The target of a sample is what the vehicle's model leaves of the vertical force, in gram-force;
-/// inputs are relative positions and velocities of the neighbours in the world frame (paper, section V-B), and own
+/// Loads flights. The target of a sample is what the vehicle's model leaves of the force or torque; inputs are relative positions and velocities of the neighbours in the world frame (paper, section V-B), and own
 /// (-z, -v) for the ground. Among the samples to
 /// fit, every group, which is a scenario and a composition of kinds, gets the same total weight: ten flights of one task
 /// say no more of another than one does. The others have weight 1.
@@ -71,6 +88,6 @@ struct LearningFlights {
 /// flight, likewise.
 /// @throws files::InputError if no record of a vehicle with a model is left, or none has a neighbour.
 LearningData load_learning_data(const LearningFlights& flights, const NetworkSizes& sizes, SplitBy split,
-                                int jobs, const Progress& progress);
+                                int jobs, const Progress& progress, Target target = Target::kForceZ);
 
 }  // namespace swarmcert::learning

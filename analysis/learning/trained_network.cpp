@@ -18,14 +18,15 @@ std::string file_of(const std::string& part) {
   return name + ".safetensors";
 }
 
-std::string network_toml(const training::Layout& layout, const files::GammaStatement& gamma) {
+std::string network_toml(const LearningData& data, const files::GammaStatement& gamma) {
   std::string text = fmt::format(
-      "schema = \"swarmcert/network/1\"\noutput = {{ quantity = \"force_z\", unit = \"gf\" }}\n"
+      "schema = \"swarmcert/network/1\"\noutput = {{ quantity = \"{}\", unit = \"{}\" }}\n"
       "gamma = {{ value = {}, scope = \"{}\", mode = \"{}\" }}\n"
       "[input]\norder = [\"dp_x_m\", \"dp_y_m\", \"dp_z_m\", \"dv_x_m_s\", \"dv_y_m_s\", \"dv_z_m_s\"]\n",
-      gamma.value, gamma.scope == files::GammaStatement::Scope::kLayer ? "layer" : "network",
+      info(data.target).quantity, info(data.target).unit, gamma.value,
+      gamma.scope == files::GammaStatement::Scope::kLayer ? "layer" : "network",
       gamma.mode == files::GammaStatement::Mode::kClip ? "clip" : "equal");
-  for (const training::Part& part : layout.parts()) {
+  for (const training::Part& part : data.layout.parts()) {
     const std::size_t colon = part.name.find(':');
     text += fmt::format("[{}.{}]\nweights = \"{}\"\n", part.name.substr(0, colon),
                         part.name.substr(colon + 1), file_of(part.name));
@@ -35,14 +36,15 @@ std::string network_toml(const training::Layout& layout, const files::GammaState
 
 }  // namespace
 
-files::Network write_network(const training::Layout& layout, const training::Vector& theta,
+files::Network write_network(const LearningData& data, const training::Vector& theta,
                              const files::GammaStatement& gamma, const std::string& folder) {
+  const training::Layout& layout = data.layout;
   for (std::size_t p = 0; p < layout.parts().size(); ++p) {
     files::save_safetensors(layout.stored(theta, static_cast<int>(p)),
                             (fs::path(folder) / file_of(layout.parts()[p].name)).string(), true);
   }
   const std::string path = (fs::path(folder) / "network.toml").string();
-  files::write_file(path, network_toml(layout, gamma), true);
+  files::write_file(path, network_toml(data, gamma), true);
   return files::load_network({path, "", "", ""});
 }
 

@@ -13,7 +13,7 @@ namespace swarmcert::learning {
 /// Writes `phi_<kind>.safetensors`, `rho_<kind>.safetensors` and network.toml into `folder`, which exists; files of these
 /// names are replaced.
 /// @returns the network as read back.
-files::Network write_network(const training::Layout& layout, const training::Vector& theta,
+files::Network write_network(const LearningData& data, const training::Vector& theta,
                              const files::GammaStatement& gamma, const std::string& folder);
 
 /// Writes `model-<kind>.toml` for every kind with a rho: the model of `inputs` with the network in `folder` as one more

@@ -147,10 +147,7 @@ double rmse_gf(const LearningData& data, const Vector& theta, Use use, int jobs)
 double rmse_of_nothing_gf(const LearningData& data, Use use) {
   double squares = 0;
   const std::vector<Eigen::Index> samples = data.indices(use);
-  for (const Eigen::Index s : samples) {
-    const double y = static_cast<double>(data.samples.target[s]);
-    squares += y * y;
-  }
+  for (const Eigen::Index s : samples) squares += data.samples.target_of(s).cast<double>().squaredNorm();
   return std::sqrt(squares / static_cast<double>(samples.size()));
 }
 

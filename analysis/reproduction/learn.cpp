@@ -74,7 +74,7 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
     setting.progress(epochs, total, fmt::format("epochs, {:.3f} gf", select_gf));
   };
   const learning::Run trained = learning::run_training(data, run);
-  const files::Network network = learning::write_network(data.layout, trained.theta, options.gamma, folder);
+  const files::Network network = learning::write_network(data, trained.theta, options.gamma, folder);
   lipschitz::CertifyOptions certify;
   certify.jobs = setting.jobs;
   certify.lower.rounds = 0;  // only upper bounds are shown

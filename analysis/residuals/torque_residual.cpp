@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <limits>
 
 #include "stability/effects/registry.h"
 
@@ -20,62 +21,85 @@ Eigen::Vector3d rotor_torque_Nm(const stability::Model& model, const std::array<
           model.torque_per_thrust_m * (f[1] + f[3] - f[0] - f[2])};
 }
 
-std::vector<Eigen::Vector3d> applied_torque_Nm(const stability::Model& model, const Track& track) {
+/// Of the rotors, behind the model's motor lag, and of its effects.
+std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model, const Kinds& kinds,
+                                                  const Track& track) {
   std::vector<Eigen::Vector3d> torque(track.instants.size());
   for (std::size_t i = 0; i < torque.size(); ++i)
     torque[i] = rotor_torque_Nm(model, track.duty[i], track.instants[i].battery_V);
-  for (const stability::EffectSpec& spec : model.effects) {
-    if (spec.name != "motor_lag") continue;
-    const stability::AppliedEffect lag(spec, {});
-    const auto stream = lag.effect().stream(lag.shape().data());
+  const stability::EffectContext context = {model.kind, kinds.names, model.path};
+  const auto add = [&](const stability::EffectSpec& spec) {
+    const stability::AppliedEffect effect(spec, context);
+    const auto stream = effect.effect().stream(effect.shape().data());
+    std::vector<stability::Wrench> columns(effect.coefficients().size());
     for (std::size_t i = 0; i < torque.size(); ++i) {
       stability::Instant now = track.instants[i];
       now.torque_B_Nm = torque[i];
       if (track.restarts[i] != 0) stream->restart();
-      stability::Wrench change;
-      stream->advance(now, &change);
-      torque[i] += lag.coefficients()[0] * change.torque_B_Nm;
+      stream->advance(now, columns.data());
+      for (std::size_t c = 0; c < columns.size(); ++c)
+        torque[i] += effect.coefficients()[c] * columns[c].torque_B_Nm;
     }
+  };
+  for (const stability::EffectSpec& spec : model.effects) {
+    if (spec.name == "motor_lag") add(spec);
+  }
+  for (const stability::EffectSpec& spec : model.effects) {
+    if (spec.name != "motor_lag" && spec.name != "delay" && spec.acts_on(track.vehicle)) add(spec);
   }
   return torque;
 }
 
 }  // namespace
 
-TorqueErrors torque_errors(const stability::Model& model, const Track& track) {
-  TorqueErrors errors;
+TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track) {
+  TorqueResidual residual;
   const std::size_t n = track.instants.size();
   if (!track.has_rates || n < 3) {
-    errors.refused = n < 3 ? "the log is empty" : "the log has no angular rates";
-    return errors;
+    residual.refused = n < 3 ? "the log is empty" : "the log has no angular rates";
+    return residual;
   }
   std::vector<double> steps_s;
   for (std::size_t i = 1; i < n; ++i)
     steps_s.push_back(track.instants[i].time_s - track.instants[i - 1].time_s);
-  errors.rate_hz = 1 / quantile(steps_s, 0.5);
-  if (errors.rate_hz < TorqueErrors::kLeastRate_hz) {
-    errors.refused = fmt::format("logs at {:.0f} Hz of a loop at 500 Hz alias", errors.rate_hz);
-    return errors;
+  residual.rate_hz = 1 / quantile(steps_s, 0.5);
+  if (residual.rate_hz < TorqueResidual::kLeastRate_hz) {
+    residual.refused = fmt::format("logs at {:.0f} Hz of a loop at 500 Hz alias", residual.rate_hz);
+    return residual;
   }
-  const std::vector<Eigen::Vector3d> applied = applied_torque_Nm(model, track);
+  const std::vector<Eigen::Vector3d> modelled = modelled_torque_B_Nm(model, kinds, track);
   const Eigen::Vector3d inertia(model.inertia_kg_m2[0], model.inertia_kg_m2[1], model.inertia_kg_m2[2]);
-  Eigen::Vector4d squares = Eigen::Vector4d::Zero(), max = squares;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  residual.torque_B_Nm.assign(n, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
   for (std::size_t i = 1; i + 1 < n; ++i) {
-    if (track.cut[i] != Cut::kNone || track.restarts[i] != 0 || track.restarts[i + 1] != 0) continue;
+    if (track.restarts[i] != 0 || track.restarts[i + 1] != 0) continue;
     const stability::Instant &before = track.instants[i - 1], &now = track.instants[i],
                              &after = track.instants[i + 1];
     const Eigen::Vector3d slope =
         (after.omega_B_rad_s - before.omega_B_rad_s) / (after.time_s - before.time_s);
     const Eigen::Vector3d momentum = inertia.cwiseProduct(now.omega_B_rad_s);
-    const Eigen::Vector3d torque = inertia.cwiseProduct(slope) + now.omega_B_rad_s.cross(momentum) -
-                                   (applied[i - 1] + 2 * applied[i] + applied[i + 1]) / 4;
+    residual.torque_B_Nm[i] = inertia.cwiseProduct(slope) + now.omega_B_rad_s.cross(momentum) -
+                              (modelled[i - 1] + 2 * modelled[i] + modelled[i + 1]) / 4;
+  }
+  return residual;
+}
+
+TorqueErrors torque_errors(const stability::Model& model, const Kinds& kinds, const Track& track) {
+  const TorqueResidual residual = torque_residual(model, kinds, track);
+  TorqueErrors errors;
+  errors.refused = residual.refused;
+  errors.rate_hz = residual.rate_hz;
+  Eigen::Vector4d squares = Eigen::Vector4d::Zero(), max = squares;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < residual.torque_B_Nm.size(); ++i) {
+    const Eigen::Vector3d& torque = residual.torque_B_Nm[i];
+    if (track.cut[i] != Cut::kNone || torque.hasNaN()) continue;
     const Eigen::Vector4d size(std::abs(torque[0]), std::abs(torque[1]), std::abs(torque[2]), torque.norm());
     squares += size.cwiseAbs2();
     max = max.cwiseMax(size);
     sum += torque;
     ++errors.records;
   }
+  if (!errors.refused.empty()) return errors;
   if (errors.records == 0) {
     errors.refused = "no usable record";
     return errors;

@@ -1,7 +1,8 @@
-/// @file What a model leaves of the torque: tau_a = J omega' + omega x J omega - tau_u, in B.
+/// @file What a model leaves of the torque: tau = J omega' + omega x J omega - tau_u - tau_a, in B.
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "analysis/residuals/statistics.h"
 #include "analysis/residuals/track.h"
@@ -9,20 +10,32 @@
 
 namespace swarmcert::residuals {
 
-/// Of the used records of one vehicle.
-struct TorqueErrors {
+/// Records of one vehicle's track.
+struct TorqueResidual {
   /// Logs below this rate are refused: the attitude loop runs at 500 Hz, and what it does aliases. At 100 Hz the
   /// published flights give an inertia that is wrong by a factor of 28.
   static constexpr double kLeastRate_hz = 400;
 
+  std::string refused;  ///< why there is none; else empty
+  double rate_hz = 0;   ///< of the log; 0 where it is empty
+  std::vector<Eigen::Vector3d>
+      torque_B_Nm;  ///< one per record, NaN where omega' is unknown; empty where refused
+};
+
+/// tau_u: thrust map of the rotors' duties, arm, torque per thrust, behind the model's motor lag; tau_a: the torque of
+/// the model's effects. omega' is the central difference over three records; tau_u and tau_a are averaged over the same.
+/// @throws files::InputError where an effect of the model cannot be made.
+TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track);
+
+/// Of the used records of one vehicle.
+struct TorqueErrors {
   std::string refused;  ///< why there is none; else empty
   double rate_hz = 0;   ///< of the log
   std::size_t records = 0;
   Axes rmse_Nm, bias_Nm, max_Nm;
 };
 
-/// tau_u: thrust map of the rotors' duties, arm, torque per thrust, behind the model's motor lag. omega' is the central
-/// difference over three records; tau_u is averaged over the same.
-TorqueErrors torque_errors(const stability::Model& model, const Track& track);
+/// Of torque_residual().
+TorqueErrors torque_errors(const stability::Model& model, const Kinds& kinds, const Track& track);
 
 }  // namespace swarmcert::residuals

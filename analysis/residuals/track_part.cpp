@@ -174,7 +174,7 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   result.moments = moments_of(track, r);
   sort_and_shorten(result.moments);
   errors.errors = errors_of({&part});
-  errors.torque = torque_errors(model, track);
+  errors.torque = torque_errors(model, inputs.kinds, track);
   const stability::Gains* const own_gains = gains_of(gains, track.kind);
   if (own_gains == nullptr) {
     errors.trajectory.refused = "no gains.toml for vehicles of kind " + track.kind;

@@ -39,9 +39,13 @@ class NetworkReader {
  private:
   void read_output(const TomlTable& output) {
     output.allow_only({"quantity", "unit"});
-    output.choice("quantity", {"force_z"});
-    output.choice("unit", {"gf", "N"});
+    output.choice("quantity", {"force_z", "force", "torque"});
     network_.output_quantity = output.text("quantity");
+    if (network_.output_quantity == "torque") {
+      output.choice("unit", {"mN_m", "N_m"});
+    } else {
+      output.choice("unit", {"gf", "N"});
+    }
     network_.output_unit = output.text("unit");
   }
 
@@ -144,8 +148,9 @@ class NetworkReader {
                  "phi." + phi_kind + " has as many outputs");
       check_size("rho", kind, "outputs", rho.outputs(), static_cast<std::size_t>(first.outputs()),
                  "rho." + first_kind + " has as many");
-      if (network_.output_quantity == "force_z") {
-        check_size("rho", kind, "outputs", rho.outputs(), 1, "output.quantity is the one number force_z");
+      if (const int stated = components(network_.output_quantity); stated > 0) {
+        check_size("rho", kind, "outputs", rho.outputs(), static_cast<std::size_t>(stated),
+                   "output.quantity is " + network_.output_quantity);
       }
     }
   }
@@ -184,6 +189,15 @@ Network load_pair(const NetworkArguments& arguments) {
 }
 
 }  // namespace
+
+int components(const std::string& quantity) { return quantity.empty() ? 0 : quantity == "force_z" ? 1 : 3; }
+
+void require_force_z(const Network& network) {
+  if (network.output_quantity.empty() || network.output_quantity == "force_z") return;
+  throw InputError({network.path, "", "output.quantity", in_quotes(network.output_quantity),
+                    "is not the vertical force that is flown",
+                    "name a network of force_z; as an effect of a model this one acts in simulation"});
+}
 
 Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load) {
   const toml::table document = parse_toml(text, path);

@@ -36,7 +36,8 @@ inline constexpr int kGroundInputs = 4;
 /// where the ground term is present iff phi has the kind "ground".
 /// Class invariant after load: every phi but "ground" has the same number of inputs, which is the length of
 /// `input_order` and of the clamp where they are given; "ground" has kGroundInputs; all phi have the same number of
-/// outputs, which is every rho's number of inputs; all rho have the same number of outputs, one for "force_z".
+/// outputs, which is every rho's number of inputs; all rho have the same number of outputs, components(output_quantity)
+/// where that is stated.
 struct Network {
   std::string path;    ///< of network.toml; empty where weight files were named directly
   std::string sha256;  ///< of network.toml; empty likewise
@@ -44,12 +45,19 @@ struct Network {
   std::map<std::string, Weights> phi;  ///< by the neighbour's kind
   std::map<std::string, Weights> rho;  ///< by the vehicle's own kind
 
-  std::string output_quantity;           ///< "force_z"; empty if not stated
-  std::string output_unit;               ///< "gf" or "N"; empty if not stated
+  std::string output_quantity;           ///< "force_z", "force" or "torque"; empty if not stated
+  std::string output_unit;               ///< "gf" or "N", of torques "mN_m" or "N_m"; empty if not stated
   std::vector<std::string> input_order;  ///< "dp_x_m", ...; empty if not stated
   std::optional<InputClamp> clamp;
   std::optional<GammaStatement> gamma;
 };
+
+/// Numbers that a quantity has: one for "force_z", the vertical force; three for "force" and "torque", along the axes of
+/// the world, as the inputs are. 0 where it is empty.
+int components(const std::string& quantity);
+
+/// @throws InputError if the network states another output than the vertical force, which is what flight code takes.
+void require_force_z(const Network& network);
 
 /// Which files make up NET: exactly one of `file`, or `phi` with `rho`.
 struct NetworkArguments {

@@ -119,7 +119,7 @@ double deep_set_loss(const Layout& layout, const Vector& theta, const Dataset& d
   double loss = 0;
   for (Index s = 0; s < count; ++s) {
     const float weight = data.weight[samples[s]];
-    error.col(s) -= Eigen::Map<const Vector>(data.target.data() + samples[s] * data.outputs, data.outputs);
+    error.col(s) -= data.target_of(samples[s]);
     loss += static_cast<double>(weight) * error.col(s).cast<double>().squaredNorm();
     error.col(s) *= 2 * weight;
   }

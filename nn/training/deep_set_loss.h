@@ -10,8 +10,9 @@ namespace swarmcert::training {
 /// Samples of the interaction force, of all vehicles of all flights. Sample s has the inputs first[s] .. first[s + 1]
 /// - 1; input i passes through part phi[i], the sum through part rho[s].
 struct Dataset {
-  int width = 6;    ///< numbers stored per input: the largest number of inputs of any phi
-  int outputs = 1;  ///< components of the force per sample
+  int width = 6;                 ///< numbers stored per input: the largest number of inputs of any phi
+  int outputs = 1;               ///< components of the target per sample
+  bool target_is_axial = false;  ///< of three components: a torque, not a force
 
   std::vector<float> x;                   ///< `width` per input; what a part does not read is 0
   std::vector<int> phi;                   ///< per input
@@ -21,6 +22,9 @@ struct Dataset {
   std::vector<float> weight;              ///< per sample, at least 0: how much it counts
 
   Eigen::Index samples() const { return static_cast<Eigen::Index>(rho.size()); }
+  Eigen::Map<const Vector> target_of(Eigen::Index sample) const {
+    return {target.data() + sample * outputs, outputs};
+  }
   /// Adds an input to the sample that the next add_sample() ends.
   void add_input(int phi_part, const std::vector<float>& values);
   void add_sample(int rho_part, const std::vector<float>& force, float sample_weight = 1);

@@ -39,6 +39,15 @@ void turn_about_vertical(const Layout& layout, const Dataset& source, files::Ran
         to[y] = turn.sine * from[x] + turn.cosine * mirrored;
       }
     }
+    if (source.outputs != 3) continue;
+    const float* const from = source.target.data() + 3 * s;
+    float* const to = turned.target.data() + 3 * s;
+    const float axial = source.target_is_axial ? turn.mirror : 1;
+    const float x = axial * from[0];
+    const float y = axial * turn.mirror * from[1];
+    to[0] = turn.cosine * x - turn.sine * y;
+    to[1] = turn.sine * x + turn.cosine * y;
+    to[2] = axial * from[2];
   }
 }
 

@@ -23,7 +23,7 @@ files::Network load(const EffectSpec& spec, const EffectContext& context) {
 
 EffectInfo DeepSetEffect::describe() {
   return {"deep_set",
-          "f_z = c f_hat(own state, neighbours)",
+          "f = c f_hat(own state, neighbours), or a torque",
           "the learned model of this project: a flexible candidate, to be tried after the physical ones",
           "deep_set",
           "the flights that the network was trained for",
@@ -35,12 +35,13 @@ EffectInfo DeepSetEffect::describe() {
 
 DeepSetEffect::DeepSetEffect(const EffectSpec& spec, const EffectContext& context)
     : Effect(describe()),
-      force_(std::make_unique<DeepSetForce>(load(spec, context), context.kind, context.kinds)) {}
+      force_(std::make_unique<DeepSetForce>(load(spec, context), context.kind, context.kinds,
+                                            DeepSetOutput::kAny)) {}
 
 DeepSetEffect::~DeepSetEffect() = default;
 
 void DeepSetEffect::columns(const Instant& now, const double*, Wrench* columns) const {
-  columns[0] = {Eigen::Vector3d(0, 0, force_->force_z_N(now)), Eigen::Vector3d::Zero()};
+  columns[0] = force_->wrench(now);
 }
 
 double DeepSetEffect::reach_m(double, const double*) const { return std::numeric_limits<double>::infinity(); }

@@ -1,4 +1,4 @@
-/// @file A learned deep set as an effect: f_z = c f_hat(own, neighbours).
+/// @file A learned deep set as an effect: c f_hat(own, neighbours), a vertical force, a force or a torque.
 #pragma once
 
 #include "stability/effects/effect.h"

@@ -61,6 +61,84 @@ TEST_F(Train, LearnsTheDownwashOfFlightsThatItDidNotSeeAndCertifiesTheResult) {
   EXPECT_LT(rmse("out/model-small.toml"), 0.7 * rmse("nominal.toml"));
 }
 
+/// Wakes push to the side and tilt; logs at 500 Hz show both.
+class TrainVectors : public Train {
+ protected:
+  void SetUp() override {
+    std::string nominal =
+        read_text(std::string(SWARMCERT_SOURCE_DIR) + "/stability/models/crazyflie-small.toml");
+    const std::string rate = "log_rate_hz = 100.0";
+    nominal.replace(nominal.find(rate), rate.size(), "log_rate_hz = 500.0");
+    // What is judged knows the motors' lag, which the loop has anyway: torques follow it.
+    write_text(folder_ / "nominal.toml", nominal + "\n[[effect]]\nname = \"motor_lag\"\n");
+    write_text(folder_ / "truth.toml", nominal + R"toml(
+[[effect]]
+name = "push_and_tilt"
+parameters = { push = 0.4, tilt = 4e-3 }
+[effect.expression]
+per_neighbour = true
+force_x_N = "-push * dx * exp(-12 * (dx^2 + dy^2 + dz^2))"
+force_y_N = "-push * dy * exp(-12 * (dx^2 + dy^2 + dz^2))"
+torque_x_Nm = "tilt * dy * exp(-12 * (dx^2 + dy^2 + dz^2))"
+torque_y_Nm = "-tilt * dx * exp(-12 * (dx^2 + dy^2 + dz^2))"
+linear = ["push", "tilt"]
+)toml");
+    for (const std::string run : {"1", "2", "3"}) {
+      const Outcome outcome =
+          execute("swarmcert simulate random-walk --duration 12 --vehicles 2 --model truth.toml --gains '" +
+                  std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' --seed " +
+                  run + " -o flights/" + run);
+      ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+    }
+  }
+};
+
+TEST_F(TrainVectors, AlsoLearnsTheWholeForceAndTheTorqueWhichModelsThenHave) {
+  for (const std::string quantity : {"force", "torque"}) {
+    SCOPED_TRACE(quantity);
+    const std::string out = quantity + "-net";
+    const Outcome outcome =
+        execute(train("--quantity " + quantity + " --epochs 12 --batch 256 --rate 5e-3 -o " + out +
+                      " --json result.json --report report-" + quantity));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+    const Json result = files::read_json(folder_ / "result.json", "swarmcert/train/1");
+    EXPECT_EQ(result["quantity"], quantity);
+    for (const std::string axis : {"x", "y"}) {
+      EXPECT_LT(result["test_rmse_axes"][axis].get<double>(),
+                0.6 * result["test_rmse_of_nothing_axes"][axis].get<double>())
+          << axis;
+    }
+    EXPECT_EQ(result["gamma_verdict"], "proved");
+    EXPECT_EQ(execute("swarmcert check " + out + "/certificate.json " + out + "/network.toml").exit_code, 0);
+
+    const auto rmse_x = [&](const std::string& model) {
+      const Outcome compared =
+          execute("swarmcert compare " + model + " flights --force --json compared.json");
+      EXPECT_EQ(compared.exit_code, 0) << compared.output;
+      const Json all = files::read_json(folder_ / "compared.json", "swarmcert/compare/1");
+      return (quantity == "force" ? all["overall"] : all["flights"][0]["torque"])["rmse"]["x"].get<double>();
+    };
+    EXPECT_LT(rmse_x(out + "/model-small.toml"), 0.6 * rmse_x("nominal.toml"));
+
+    for (const std::string& use :
+         {"simulate swap --vehicles 2 --model nominal.toml --network " + out + "/network.toml -o flown",
+          "bound --model nominal.toml --speed 1 --accel 1 --network " + out + "/network.toml"}) {
+      const Outcome flown = execute("swarmcert " + use + " --gains '" + std::string(SWARMCERT_SOURCE_DIR) +
+                                    "/controller/gains/crazyflie-small.toml'");
+      EXPECT_EQ(flown.exit_code, 3) << use;
+      EXPECT_NE(flown.output.find("is not the vertical force that is flown"), std::string::npos)
+          << flown.output;
+    }
+  }
+}
+
+TEST_F(Train, RefusesTorquesOfLogsThatAreTooSlow) {
+  const Outcome outcome = execute(train("--quantity torque --epochs 1 -o out"));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.output.find("logs at 100 Hz of a loop at 500 Hz alias"), std::string::npos)
+      << outcome.output;
+}
+
 TEST_F(Train, KeepsTheLipschitzLimitThatItWasGiven) {
   const auto learn = [&](const std::string& options) {
     const Outcome outcome =

@@ -121,6 +121,25 @@ TEST(NetworkToml, MissingKeysAreRefused) {
                                  {"line 2: phi", "no kind of vehicle"}));
 }
 
+/// kFull with another output and as many numbers from every rho.
+std::string of_quantity(const std::string& output, int numbers) {
+  std::string text = with("{ quantity = \"force_z\", unit = \"gf\" }", output);
+  for (std::size_t at = 0; (at = text.find("20x1", at)) != std::string::npos; ++at)
+    text.replace(at, 4, "20x" + std::to_string(numbers));
+  return text;
+}
+
+TEST(NetworkToml, AQuantityHasItsUnitsAndItsNumberOfOutputs) {
+  EXPECT_EQ(parse(of_quantity("{ quantity = \"force\", unit = \"gf\" }", 3)).output_quantity, "force");
+  EXPECT_EQ(parse(of_quantity("{ quantity = \"torque\", unit = \"mN_m\" }", 3)).output_unit, "mN_m");
+  EXPECT_TRUE(network_is_refused(of_quantity("{ quantity = \"torque\", unit = \"gf\" }", 3),
+                                 {"output.unit = \"gf\"", "allowed: mN_m, N_m"}));
+  EXPECT_TRUE(network_is_refused(of_quantity("{ quantity = \"force\", unit = \"N\" }", 1),
+                                 {"1 outputs", "must be 3: output.quantity is force"}));
+  EXPECT_TRUE(network_is_refused(of_quantity("{ quantity = \"force_z\", unit = \"N\" }", 3),
+                                 {"3 outputs", "must be 1: output.quantity is force_z"}));
+}
+
 TEST(NetworkToml, ValuesOfAnotherTypeAreRefused) {
   EXPECT_TRUE(network_is_refused(with("value = 3.0", "value = \"3\""),
                                  {"line 3: gamma.value = \"3\": must be a number"}));
@@ -133,8 +152,8 @@ TEST(NetworkToml, ValuesOfAnotherTypeAreRefused) {
                                  {"line 3: gamma.scope = \"layers\"", "\"layer\"?"}));
   EXPECT_TRUE(network_is_refused(with("\"clip\"", "true"), {"gamma.mode = true: must be text"}));
   EXPECT_TRUE(network_is_refused(with("\"gf\"", "\"kg\""), {"output.unit = \"kg\"", "allowed: gf, N"}));
-  EXPECT_TRUE(network_is_refused(with("\"force_z\"", "\"force\""),
-                                 {"output.quantity = \"force\"", "allowed: force_z"}));
+  EXPECT_TRUE(network_is_refused(with("\"force_z\"", "\"lift\""),
+                                 {"output.quantity = \"lift\"", "allowed: force_z, force, torque"}));
   EXPECT_TRUE(network_is_refused(with("{ quantity = \"force_z\", unit = \"gf\" }", "[]"),
                                  {"output = a list: must be a table"}));
   EXPECT_TRUE(

@@ -174,6 +174,31 @@ TEST(Symmetry, TurnedSamplesKeepHeightsAndWhatTheirVectorsAreToOneAnother) {
   EXPECT_LT(mirrored, 2 * pairs / 3);
 }
 
+/// A force that is dp and a torque that is dp x dv: whatever turns and mirrors the inputs, these stay what they are to them.
+TEST(Symmetry, TargetsTurnWithTheInputsTorquesAsAxialVectors) {
+  const Layout layout({{"phi:small", {6, 4, 3}, 0, {{0, 1}, {3, 4}}}, {"rho:small", {3, 4, 3}, 0}});
+  for (const bool is_torque : {false, true}) {
+    const auto law = [&](const float* x) -> Eigen::Vector3f {
+      const Eigen::Vector3f dp(x[0], x[1], x[2]), dv(x[3], x[4], x[5]);
+      return is_torque ? Eigen::Vector3f(dp.cross(dv)) : dp;
+    };
+    files::Random random(3);
+    Dataset data;
+    data.outputs = 3;
+    data.target_is_axial = is_torque;
+    for (int s = 0; s < 200; ++s) {
+      const std::vector<float> x = random_values(6, random);
+      const Eigen::Vector3f y = law(x.data());
+      data.add_input(0, x);
+      data.add_sample(1, {y.x(), y.y(), y.z()});
+    }
+    Dataset turned = data;
+    turn_about_vertical(layout, data, random, turned);
+    for (Index s = 0; s < data.samples(); ++s)
+      EXPECT_LT((turned.target_of(s) - law(turned.x.data() + s * turned.width)).norm(), 1e-5f) << s;
+  }
+}
+
 TEST(Layout, LoadsWhatItStored) {
   const Layout layout = mixed_layout();
   const Vector theta = initial_parameters(layout, 5);

@@ -14,6 +14,7 @@ double force_scale(Evidence& evidence, const Limit& limit) {
     throw Unfounded("network.toml states no output.unit, so that a limit in " + limit.unit +
                     " means nothing");
   if (unit == limit.unit) return 1;
+  if (unit != "gf" && unit != "N") throw Unfounded("the network's output is no force: its unit is " + unit);
   return (unit == "gf" ? stability::kGramForce_N : 1.0) / limit.unit_N;
 }
 
