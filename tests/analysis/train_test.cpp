@@ -99,7 +99,7 @@ TEST_F(TrainVectors, AlsoLearnsTheWholeForceAndTheTorqueWhichModelsThenHave) {
     const std::string out = quantity + "-net";
     const Outcome outcome =
         execute(train("--quantity " + quantity + " --epochs 12 --batch 256 --rate 5e-3 -o " + out +
-                      " --json result.json --report report-" + quantity));
+                      " --force --json result.json --report report-" + quantity));
     ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
     const Json result = files::read_json(folder_ / "result.json", "swarmcert/train/1");
     EXPECT_EQ(result["quantity"], quantity);
