@@ -27,7 +27,7 @@ std::string label_of(const LearningData& data, int component) {
 void add_curve(Report& report, const LearningData& data, const learning::Run& run) {
   std::string text;
   for (std::size_t e = 0; e < run.epochs.size(); ++e)
-    text += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse_gf, run.epochs[e].select_rmse_gf);
+    text += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse, run.epochs[e].select_rmse);
   report.figure(
       "epochs", text,
       fmt::format("set xlabel 'epoch'\nset ylabel 'RMSE [{}]'\nset yrange [0:*]\n",

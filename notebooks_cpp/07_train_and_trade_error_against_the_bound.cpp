@@ -39,7 +39,7 @@ int main() {
   const learning::LearningData data =
       learning::load_learning_data({&inputs}, sizes, learning::SplitBy::kAuto, 0, [](int, int) {});
   fmt::print("{} samples; predicting nothing leaves {:.2f} gf on the test flights\n", data.tracks.back().end,
-             learning::rmse_of_nothing_gf(data, learning::Use::kTest));
+             learning::rmse_of_nothing(data, learning::Use::kTest));
 
   // %%
   std::string rows;
@@ -51,7 +51,7 @@ int main() {
     options.trainer.learning_rate = 4e-3;
     options.trainer.gamma.value = gamma;
     const learning::Run run = learning::run_training(data, options);
-    const double error_gf = learning::rmse_gf(data, run.theta, learning::Use::kTest, 0);
+    const double error_gf = learning::rmse(data, run.theta, learning::Use::kTest, 0);
     lipschitz::CertifyOptions certify_options;
     certify_options.lower.rounds = 0;
     const lipschitz::Certification found = lipschitz::certify(network_of(data, run.theta), certify_options);

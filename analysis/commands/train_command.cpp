@@ -127,8 +127,8 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
   json["best_epoch"] = outcome.run.best_epoch + 1;
   json["epochs"] = files::Json::array();
   for (const learning::Epoch& epoch : outcome.run.epochs)
-    json["epochs"].push_back({{fmt::format("fit_rmse_{}", target.unit), epoch.fit_rmse_gf},
-                              {fmt::format("select_rmse_{}", target.unit), epoch.select_rmse_gf}});
+    json["epochs"].push_back({{fmt::format("fit_rmse_{}", target.unit), epoch.fit_rmse},
+                              {fmt::format("select_rmse_{}", target.unit), epoch.select_rmse}});
   json["problems"] = data.problems;
   return json;
 }
@@ -249,8 +249,8 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   certify_options.jobs = common.jobs;
   certify_options.lower.seed = trainer.seed;
   outcome.certified = learning::write_certificate(network, options.output, certify_options);
-  outcome.all = {learning::rmse_of_nothing_gf(data, Use::kTest),
-                 learning::rmse_gf(data, outcome.run.theta, Use::kTest, common.jobs)};
+  outcome.all = {learning::rmse_of_nothing(data, Use::kTest),
+                 learning::rmse(data, outcome.run.theta, Use::kTest, common.jobs)};
   if (data.samples.outputs > 1) outcome.components = scores_by_component(data, outcome.run.theta);
   outcome.compositions = scores_by_composition(data, outcome.run.theta, common.jobs);
 

@@ -52,7 +52,7 @@ Vector as_vector(const files::Json& json) {
 
 void write_checkpoint(const State& state, const std::string& key, const std::string& path) {
   files::Json epochs = files::Json::array();
-  for (const Epoch& epoch : state.epochs) epochs.push_back({epoch.fit_rmse_gf, epoch.select_rmse_gf});
+  for (const Epoch& epoch : state.epochs) epochs.push_back({epoch.fit_rmse, epoch.select_rmse});
   const files::Json file = {{"schema", kSchema},           {"run", key},
                             {"epochs", std::move(epochs)}, {"trainer", as_json(state.trainer)},
                             {"best", as_json(state.best)}, {"shares", state.shares}};
@@ -82,7 +82,7 @@ State read_checkpoint(const std::string& key, const std::string& path) {
 int best_of(const std::vector<Epoch>& epochs) {
   int best = 0;
   for (std::size_t e = 1; e < epochs.size(); ++e) {
-    if (epochs[e].select_rmse_gf < epochs[best].select_rmse_gf) best = static_cast<int>(e);
+    if (epochs[e].select_rmse < epochs[best].select_rmse) best = static_cast<int>(e);
   }
   return best;
 }
@@ -115,19 +115,19 @@ Run run_training(const LearningData& data, const RunOptions& options) {
     const double rate = chosen.learning_rate * 0.5 * (1 + std::cos(kPi * epoch / options.epochs));
     trainer.weigh(weights_by(options.weighing, data, trainer.theta(), chosen.jobs));
     trainer.tighten(state.shares);
-    const double fit_gf = std::sqrt(trainer.run_epoch(epoch, rate));
+    const double fit = std::sqrt(trainer.run_epoch(epoch, rate));
     Vector candidate = trainer.theta();
     if (options.max_lipschitz > 0) {
       const Tightening asked = scale_to(options.max_lipschitz, data.layout, chosen.jobs, candidate);
       for (std::size_t p = 0; p < state.shares.size(); ++p)
         state.shares[p] = std::min(1.0, state.shares[p] * asked.shares[p]);
     }
-    const double select_gf = mean_rmse_gf(data, candidate, Use::kSelect, chosen.jobs);
-    state.epochs.push_back({fit_gf, std::isnan(select_gf) ? fit_gf : select_gf});
+    const double select = mean_rmse(data, candidate, Use::kSelect, chosen.jobs);
+    state.epochs.push_back({fit, std::isnan(select) ? fit : select});
     if (best_of(state.epochs) == epoch) state.best = std::move(candidate);
     state.trainer = trainer.state();
     if (!options.checkpoint.empty()) write_checkpoint(state, key, options.checkpoint);
-    if (options.progress) options.progress(epoch + 1, options.epochs, state.epochs.back().select_rmse_gf);
+    if (options.progress) options.progress(epoch + 1, options.epochs, state.epochs.back().select_rmse);
   }
   run.theta = std::move(state.best);
   run.epochs = std::move(state.epochs);
@@ -138,13 +138,13 @@ Run run_training(const LearningData& data, const RunOptions& options) {
   return run;
 }
 
-double rmse_gf(const LearningData& data, const Vector& theta, Use use, int jobs) {
+double rmse(const LearningData& data, const Vector& theta, Use use, int jobs) {
   const std::vector<Eigen::Index> samples = data.indices(use);
   if (samples.empty()) return std::numeric_limits<double>::quiet_NaN();
   return std::sqrt(training::mean_loss(data.layout, theta, data.samples, samples, jobs));
 }
 
-double rmse_of_nothing_gf(const LearningData& data, Use use) {
+double rmse_of_nothing(const LearningData& data, Use use) {
   double squares = 0;
   const std::vector<Eigen::Index> samples = data.indices(use);
   for (const Eigen::Index s : samples) squares += data.samples.target_of(s).cast<double>().squaredNorm();

@@ -20,13 +20,13 @@ struct RunOptions {
   std::string checkpoint;  ///< file that is written after every epoch; empty: none
   bool resumes = false;    ///< begin with what the checkpoint holds
   const std::atomic<bool>* cancelled = nullptr;  ///< ends the run after the epoch in which it is set
-  std::function<void(int done, int total, double select_rmse_gf)> progress;
+  std::function<void(int done, int total, double select_rmse)> progress;
 };
 
-/// Root mean square errors in gram-force: of the flights that are fitted, met during the epoch and weighted; of those
-/// that select, the mean over groups.
+/// Root mean square errors in the unit of the targets: of the flights that are fitted, met during the epoch and
+/// weighted; of those that select, the mean over groups.
 struct Epoch {
-  double fit_rmse_gf = 0, select_rmse_gf = 0;
+  double fit_rmse = 0, select_rmse = 0;
 };
 
 struct Run {
@@ -44,9 +44,10 @@ struct Run {
 /// @throws files::InputError if the checkpoint cannot be read, or is of other networks, data or options.
 Run run_training(const LearningData& data, const RunOptions& options);
 
-/// RMSE in gram-force of theta on the samples of `use`, of kFit weighted by scenario; NaN where there are none.
-double rmse_gf(const LearningData& data, const training::Vector& theta, Use use, int jobs);
+/// RMSE, in the unit of the targets, of theta on the samples of `use`, of kFit weighted by scenario; NaN where there are
+/// none.
+double rmse(const LearningData& data, const training::Vector& theta, Use use, int jobs);
 /// The same of predicting nothing: the root mean square of the targets.
-double rmse_of_nothing_gf(const LearningData& data, Use use);
+double rmse_of_nothing(const LearningData& data, Use use);
 
 }  // namespace swarmcert::learning

@@ -28,7 +28,7 @@ std::map<std::string, double> errors_by_group(const LearningData& data, const tr
   return errors;
 }
 
-double mean_rmse_gf(const LearningData& data, const training::Vector& theta, Use use, int jobs) {
+double mean_rmse(const LearningData& data, const training::Vector& theta, Use use, int jobs) {
   const std::map<std::string, double> errors = errors_by_group(data, theta, use, 1, jobs);
   if (errors.empty()) return std::numeric_limits<double>::quiet_NaN();
   double sum = 0;

@@ -15,12 +15,12 @@ enum class Weighing {
   kErrors,  ///< the same total weight over its mean squared error so far: what falls is the mean logarithm
 };
 
-/// Mean squared error in gf^2 per group, over every `stride`-th sample of `use`.
+/// Mean squared error per group, over every `stride`-th sample of `use`.
 std::map<std::string, double> errors_by_group(const LearningData& data, const training::Vector& theta,
                                               Use use, int stride, int jobs);
 
-/// Mean over groups of the root mean square error in gram-force; NaN where `use` has no sample.
-double mean_rmse_gf(const LearningData& data, const training::Vector& theta, Use use, int jobs);
+/// Mean over groups of the root mean square error, in the unit of the targets; NaN where `use` has no sample.
+double mean_rmse(const LearningData& data, const training::Vector& theta, Use use, int jobs);
 
 /// Weights of all samples for the next epoch. kErrors: sum over groups of log(mean squared error) has, at theta,
 /// the gradient of the loss with these weights (maximum likelihood of noise whose variance each group has of its

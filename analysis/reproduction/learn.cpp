@@ -84,14 +84,14 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   files::Json bounds = files::Json::array(), epochs = files::Json::array();
   for (const auto& [function, upper] : certified.set_bounds) bounds.push_back({function, upper});
   for (const learning::Epoch& epoch : trained.epochs)
-    epochs.push_back({epoch.fit_rmse_gf, epoch.select_rmse_gf});
+    epochs.push_back({epoch.fit_rmse, epoch.select_rmse});
   const files::Json file = {{"schema", kLearnSchema},
                             {"key", whole_key},
                             {"set_bounds", std::move(bounds)},
                             {"bound", certified.largest()},
                             {"keeps_gamma", certified.gamma == lipschitz::Verdict::kProved},
-                            {"test_gf", learning::rmse_gf(data, trained.theta, Use::kTest, setting.jobs)},
-                            {"nothing_gf", learning::rmse_of_nothing_gf(data, Use::kTest)},
+                            {"test_gf", learning::rmse(data, trained.theta, Use::kTest, setting.jobs)},
+                            {"nothing_gf", learning::rmse_of_nothing(data, Use::kTest)},
                             {"samples", samples},
                             {"epochs", trained.epochs.size()},
                             {"best_epoch", trained.best_epoch + 1},
