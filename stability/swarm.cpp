@@ -6,50 +6,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "stability/reach_table.h"
 #include "stability/swarm_pairs.h"
 
 namespace swarmcert::stability {
-
-namespace {
-
-/// Largest horizontal distance at which a neighbour that is `dz_m` higher does something.
-double reach_m(const std::vector<const AppliedEffect*>& effects, double dz_m) {
-  double reach = 0;
-  for (const AppliedEffect* applied : effects) {
-    reach = std::max(reach, applied->effect().reach_m(dz_m, applied->shape().data()));
-  }
-  return reach;
-}
-
-/// An upper bound on reach_m(), which is monotone in height, from its values at some heights.
-class ReachTable {
- public:
-  ReachTable() = default;
-  explicit ReachTable(const std::vector<const AppliedEffect*>& effects) {
-    double last = reach_m(effects, -kHighest_m);
-    for (int k = 0; k < kCells; ++k) {
-      const double next = reach_m(effects, (k + 1) / kCellsPerMetre - kHighest_m);
-      at_.push_back(std::max(last, next));
-      last = next;
-    }
-  }
-  /// For heights from `lowest_m` to `highest_m`.
-  double over(double lowest_m, double highest_m) const { return std::max(at(lowest_m), at(highest_m)); }
-
- private:
-  static constexpr double kHighest_m = 10, kCellsPerMetre = 100;
-  static constexpr int kCells = static_cast<int>(2 * kHighest_m * kCellsPerMetre);
-
-  double at(double dz_m) const {
-    const double cell = (dz_m + kHighest_m) * kCellsPerMetre;
-    return cell >= 0 && cell < kCells ? at_[static_cast<std::size_t>(cell)]
-                                      : std::numeric_limits<double>::infinity();
-  }
-
-  std::vector<double> at_;
-};
-
-}  // namespace
 
 struct Swarm::Kind {
   double mass_kg = 0, offset_m = 0, yaw_m = 0;
