@@ -209,6 +209,10 @@ class Refinement {
   }
 
   std::vector<Refined> result(const Point& best) const {
+    // A shape that changes the forces by their rounding only, such as how wakes compose where there is one, is not known
+    // at all: its pull alone would make its interval narrow.
+    constexpr double kLeastShareOfPull = 1e-6;
+    const Eigen::VectorXd pull = ridge(best);
     std::vector<int> free;
     for (std::size_t k = 0; k < unknowns_.size(); ++k) {
       const Unknown& u = unknowns_[k];
@@ -216,9 +220,10 @@ class Refinement {
       const double value = u.is_shape ? best.thetas[u.member][u.index] : best.coefficients[i];
       const bool held = parameter(u).lower == parameter(u).upper;
       const bool at_end = u.is_shape && (value <= parameter(u).lower || value >= parameter(u).upper);
-      if (!held && !at_end && best.gram(i, i) > 0) free.push_back(static_cast<int>(k));
+      if (!held && !at_end && best.gram(i, i) > kLeastShareOfPull * pull[i])
+        free.push_back(static_cast<int>(k));
     }
-    const Jackknife spread = jackknife(best.blocks, free, best.coefficients, ridge(best));
+    const Jackknife spread = jackknife(best.blocks, free, best.coefficients, pull);
     std::vector<Refined> refined;
     for (std::size_t m = 0; m < candidates_.size(); ++m) {
       refined.push_back({candidates_[m], {}, best.thetas[m], {}, {}});

@@ -50,7 +50,8 @@ Member Selection::best_theta(const Members& members, int which) const {
     const bool held = is_held(after);
     if (held && !best_is_held) continue;
     const double square = mean_square(after);
-    if (square < least || (best_is_held && !held)) {
+    // Of thetas that differ by rounding only the first, which is the default.
+    if (square < least * (1 - 1e-9) || (best_is_held && !held)) {
       least = square;
       best = member;
       best_is_held = held;

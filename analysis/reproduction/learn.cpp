@@ -83,8 +83,7 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   const learning::Certified certified = learning::write_certificate(network, folder, certify);
   files::Json bounds = files::Json::array(), epochs = files::Json::array();
   for (const auto& [function, upper] : certified.set_bounds) bounds.push_back({function, upper});
-  for (const learning::Epoch& epoch : trained.epochs)
-    epochs.push_back({epoch.fit_rmse, epoch.select_rmse});
+  for (const learning::Epoch& epoch : trained.epochs) epochs.push_back({epoch.fit_rmse, epoch.select_rmse});
   const files::Json file = {{"schema", kLearnSchema},
                             {"key", whole_key},
                             {"set_bounds", std::move(bounds)},
