@@ -42,21 +42,23 @@ ReachNetwork reach_network(const files::Weights& weights) {
 }
 
 Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, std::vector<MatrixXd>* slopes,
-             std::vector<LinearForms>* forms)
+             std::vector<LinearForms>* forms, std::vector<check::Decision>* decided)
     : network_(network), box_(box) {
-  add_layers(around, slopes, forms);
+  add_layers(around, slopes, forms, decided);
 }
 
-Reach::Reach(const ReachNetwork& network, const Reach& first, const Reach* around)
+Reach::Reach(const ReachNetwork& network, const Reach& first, const Reach* around,
+             std::vector<check::Decision>* decided)
     : network_(network),
       box_(first.box_),
       bounds_(first.bounds_),
       input_magnitude_(first.input_magnitude_),
       term_magnitude_(first.term_magnitude_) {
-  add_layers(around, nullptr, nullptr);
+  add_layers(around, nullptr, nullptr, decided);
 }
 
-void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::vector<LinearForms>* forms) {
+void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::vector<LinearForms>* forms,
+                       std::vector<check::Decision>* decided) {
   const auto after_relu = [](const ReachLayer& layer, const Bounds& bounds) {
     return layer.has_relu ? VectorXd(bounds.upper.cwiseMax(0.0)) : bounds.magnitude();
   };
@@ -79,7 +81,8 @@ void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::
     for (Index i = 0; i < count; ++i)
       both(i, open[static_cast<std::size_t>(i)]) = 1, both(count + i, open[static_cast<std::size_t>(i)]) = -1;
     const LinearForms found = substituted(k, std::move(both));
-    const VectorXd ends = largest(found);
+    VectorXd ends = largest(found);
+    if (decided != nullptr && k > 0 && layer.has_relu) decide(k, open, found, ends, *decided);
     if (forms != nullptr) {
       forms->push_back({MatrixXd::Zero(2 * rows, network_.front().weights.cols()),
                         VectorXd::Constant(2 * rows, kInfinity)});
@@ -103,7 +106,8 @@ void Reach::add_layers(const Reach* around, std::vector<MatrixXd>* slopes, std::
   }
 }
 
-LinearForms Reach::substituted(std::size_t top, MatrixXd lambda) const {
+LinearForms Reach::substituted(std::size_t top, MatrixXd lambda,
+                               const std::vector<MatrixXd>* given_below) const {
   const Index rows = lambda.rows();
   VectorXd constants = VectorXd::Zero(rows);
   VectorXd absolute = VectorXd::Zero(rows);  // sum of the absolute values of all terms of `constants`
@@ -140,7 +144,7 @@ LinearForms Reach::substituted(std::size_t top, MatrixXd lambda) const {
           v *= slope;
           error(r) += 4 * kUnit * v * magnitude;
         } else {
-          v *= below;
+          v *= given_below != nullptr ? (*given_below)[j - 1](r, i) : below;
         }
       }
     }

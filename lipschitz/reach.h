@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lipschitz/box.h"
+#include "lipschitz/checker/box_states.h"
 #include "nn/files/weights.h"
 
 namespace swarmcert::lipschitz {
@@ -36,7 +37,12 @@ struct LinearForms {
 
 /// Bounds on every layer over a box by backward substitution of linear relaxations of ReLU (CROWN, Zhang et al. 2018):
 /// on l <= y <= u with l < 0 < u,  alpha y <= relu(y) <= s y + t  with s near u / (u - l), t = max(u - s u, -s l) rounded
-/// up, alpha 0 or 1.
+/// up, alpha 0 or 1: 1 where u > -l.
+///
+/// Better lower slopes. A form is largest at a corner of the box. Of the neurons before, those that are on at that corner
+/// get alpha = 1, the others 0, so that alpha y <= relu(y) is tight there; then the form is taken again. One such step
+/// is most of what optimising alpha brings (alpha-CROWN, Xu et al. 2021), and a corner says all about it (check::Decision). It
+/// is made for neurons that are nearly decided, and counts where it decides them.
 ///
 /// Rounding. A form lambda y_j + c is exact for the lambda that is stored. Multiplying it by W_j in floating point
 /// changes a coefficient by at most gamma_n |lambda| |W_j| in any order of summation, with or without fused products
@@ -52,11 +58,14 @@ class Reach {
   ///   the mean of the upper and the lower one; zero for neurons that `around` decides.
   /// @param forms if not null, per layer the forms above y and then those above -y, [2 outputs x inputs]; with infinite
   ///   constants for neurons that `around` decides.
+  /// @param decided if not null, better lower slopes are tried, and the neurons that they decide are added.
   Reach(const ReachNetwork& network, const Box& box, const Reach* around = nullptr,
-        std::vector<Eigen::MatrixXd>* slopes = nullptr, std::vector<LinearForms>* forms = nullptr);
+        std::vector<Eigen::MatrixXd>* slopes = nullptr, std::vector<LinearForms>* forms = nullptr,
+        std::vector<check::Decision>* decided = nullptr);
 
   /// Of a longer network over the same box: `first` are the bounds of its first layers, which are taken as they are.
-  Reach(const ReachNetwork& network, const Reach& first, const Reach* around);
+  Reach(const ReachNetwork& network, const Reach& first, const Reach* around,
+        std::vector<check::Decision>* decided = nullptr);
 
   /// Of y_k, before the ReLU of layer k.
   const Bounds& before_relu(std::size_t k) const { return bounds_[k]; }
@@ -72,8 +81,17 @@ class Reach {
   Eigen::VectorXd largest(const LinearForms& forms) const;
 
  private:
-  void add_layers(const Reach* around, std::vector<Eigen::MatrixXd>* slopes, std::vector<LinearForms>* forms);
-  LinearForms substituted(std::size_t top, Eigen::MatrixXd lambda) const;
+  void add_layers(const Reach* around, std::vector<Eigen::MatrixXd>* slopes, std::vector<LinearForms>* forms,
+                  std::vector<check::Decision>* decided);
+  /// @param given_below if not null, the lower slopes of each layer's undecided neurons, [rows of lambda x neurons].
+  LinearForms substituted(std::size_t top, Eigen::MatrixXd lambda,
+                          const std::vector<Eigen::MatrixXd>* given_below = nullptr) const;
+  /// The lower slopes of layers before `top` that are tight at the corners where `forms` are largest.
+  std::vector<Eigen::MatrixXd> slopes_at_corners(const Eigen::MatrixXd& forms, std::size_t top) const;
+  /// Tries better lower slopes for outputs `open` of layer k, whose forms are `found`, above y and then above -y.
+  /// @param ends their largest values, improved where that decides.
+  void decide(std::size_t k, const std::vector<Eigen::Index>& open, const LinearForms& found,
+              Eigen::VectorXd& ends, std::vector<check::Decision>& decided) const;
 
   const ReachNetwork& network_;
   Box box_;

@@ -299,6 +299,9 @@ Command certify_command() {
                        "box. Fewer boxes and a shorter certificate for the same bound, but more time")
             ->check(CLI::Range(0, 1000))
             ->capture_default_str();
+        app.add_flag_callback(
+            "--default-slopes", [options] { options->certify.branch.better_slopes = false; },
+            "With --method branch: no better lower slopes for neurons that are nearly decided (to compare)");
         auto* map = app.add_option("--map", options->map,
                                    "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
                                    "by cell; the slope in a "

@@ -19,11 +19,14 @@ struct BranchTree {
     int split = kLeaf;    ///< coordinate that is halved, or kLeaf
     int multipliers = 0;  ///< of a leaf: index into `multipliers`
     int form = kNone;  ///< of set functions: index into `forms`, the form that holds from here down; or kNone
+    bool bounds_rho = false;  ///< rho's neurons are bounded here; always where there is a form
+    std::vector<check::Decision>
+        decided;  ///< neurons that better lower slopes decide here, in the order of TreeProof
   };
   static constexpr int kNone = -1;
   std::vector<Node> nodes;
   std::vector<std::vector<double>> multipliers;  ///< one per hidden neuron of the network, in its own units
-  std::vector<std::vector<check::Conflict>> conflicts;  ///< that go with each of them
+  std::vector<std::vector<check::Conflict>> conflicts;  ///< that go with each of them; or none at all
   std::vector<check::Form> forms;                       ///< of rho
   double rho = 0;                                       ///< claimed bound on the squared Lipschitz constant
 };
@@ -36,6 +39,9 @@ struct BranchOptions {
   /// Conflict cuts: pairs of neurons that a box keeps from being in some states at once, at most so many per box. Fewer
   /// boxes and a shorter proof for the same bound, but more time.
   int pairs = 0;
+  /// Better lower slopes for neurons that are nearly decided (Reach): fewer boxes, shorter proofs that are checked sooner, in
+  /// about the time that a search takes without; for a stated number of neighbours in less.
+  bool better_slopes = true;
   /// Multipliers to start from, one per hidden neuron of the network, in its own units: those of a bound that holds
   /// everywhere. Empty: none.
   std::vector<double> start;
@@ -54,7 +60,8 @@ struct Outlook {
 
 struct BranchResult {
   BranchTree tree;
-  int nodes = 0;  ///< boxes looked at
+  int nodes = 0;                 ///< boxes looked at
+  double undecided_per_box = 0;  ///< neurons that a box leaves undecided, on average
   Outlook outlook;
   /// Centres of boxes, by falling slope at the centre, at most kSteepCentres: where a search for lower bounds may start.
   std::vector<Eigen::VectorXd> steep_centres;

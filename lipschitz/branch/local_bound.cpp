@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lipschitz/branch/search_tree.h"
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/lmi_proof.h"
 #include "lipschitz/stages.h"
@@ -21,17 +22,6 @@ check::Matrix exact(const Eigen::MatrixXd& q) {
   for (int i = 0; i < result.rows; ++i)
     for (int j = 0; j < result.cols; ++j) result(i, j) = check::Dyadic(q(i, j));
   return result;
-}
-
-std::string preorder(const BranchTree& tree) {
-  std::string text;
-  for (const BranchTree::Node& node : tree.nodes) {
-    if (!text.empty()) text += ' ';
-    if (node.form != BranchTree::kNone) text += "q" + std::to_string(node.form) + ' ';
-    text += node.split == BranchTree::kLeaf ? "t" + std::to_string(node.multipliers)
-                                            : "s" + std::to_string(node.split);
-  }
-  return text;
 }
 
 /// Boxes per kind to enclose what a neighbour adds to the sum.
@@ -102,9 +92,10 @@ void prove(const check::LocalFunction& f, const std::vector<check::Sides>& boxes
   for (const check::Sides& box : boxes) roots.push_back({box.lower, box.upper});
   BranchResult found = search(roots);
   result.nodes = found.nodes;
+  result.undecided_per_box = found.undecided_per_box;
   result.outlook = found.outlook;
   result.steep_centres = std::move(found.steep_centres);
-  proof.tree.tree = preorder(found.tree);
+  proof.tree.tree = words_of(found.tree);
   proof.tree.multipliers = std::move(found.tree.multipliers);
   proof.tree.conflicts = std::move(found.tree.conflicts);
   proof.tree.forms = std::move(found.tree.forms);

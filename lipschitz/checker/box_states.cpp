@@ -62,7 +62,9 @@ struct Relaxation {
   Row above, below, offset, error;  ///< `error`: of rounding above times a coefficient, relatively to that
   std::vector<int> used;            ///< neurons that are not off
 
-  Relaxation(const HiddenLayer& layer, const NeuronBounds& bounds, std::size_t k) {
+  /// @param lower_slopes of undecided neurons; null: as their range suggests.
+  Relaxation(const HiddenLayer& layer, const NeuronBounds& bounds, std::size_t k,
+             const Row* lower_slopes = nullptr) {
     const std::size_t size = bounds.lower[k].size();
     above.assign(size, 1);
     below.assign(size, 1);
@@ -75,7 +77,7 @@ struct Relaxation {
       if (!is_off) used.push_back(static_cast<int>(i));
       if (is_off || l >= 0 || !layer.has_relu(i)) continue;
       above[i] = bounds.slope[k][i];
-      below[i] = u > -l ? 1 : 0;
+      below[i] = lower_slopes != nullptr ? (*lower_slopes)[i] : u > -l ? 1 : 0;
       offset[i] = bounds.offset[k][i];
       error[i] = 4 * kUnit * above[i] * std::max(u, -l);
     }
@@ -117,8 +119,9 @@ struct SignedOutput {
 };
 
 /// Forms in x above the signed outputs of layer `top`.
+/// @param lower_slopes of the layers before, if not null.
 Forms above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, std::size_t top,
-            const std::vector<SignedOutput>& outputs) {
+            const std::vector<SignedOutput>& outputs, const std::vector<Row>* lower_slopes = nullptr) {
   const HiddenLayer& layer = layers[top];
   Forms forms;
   forms.count = static_cast<int>(outputs.size());
@@ -142,11 +145,52 @@ Forms above(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds, 
     forms.absolute[r] += std::abs(most);
   }
   for (std::size_t j = top; j-- > 0;) {
-    const Relaxation relu(layers[j], bounds, j);
+    const Relaxation relu(layers[j], bounds, j, lower_slopes != nullptr ? &(*lower_slopes)[j] : nullptr);
     through_relu(forms, relu);
     through_layer(forms, layers[j], bounds.terms[j], relu.used);
   }
   return forms;
+}
+
+/// 1 for outputs of the first `top` layers that are on at the corner, else 0. Roughly: any slopes will do.
+std::vector<Row> slopes_at(const std::vector<HiddenLayer>& layers, std::size_t top, const Row& lower,
+                           const Row& upper, std::uint64_t corner) {
+  Row h;
+  for (std::size_t k = 0; k < lower.size(); ++k) h.push_back((corner >> k & 1) != 0 ? upper[k] : lower[k]);
+  std::vector<Row> slopes;
+  for (std::size_t k = 0; k < top; ++k) {
+    const HiddenLayer& layer = layers[k];
+    Row next;
+    slopes.emplace_back();
+    for (std::size_t i = 0; i < static_cast<std::size_t>(layer.outputs); ++i) {
+      const double bias = layer.biases[i] + (layer.least.empty() ? 0 : (layer.least[i] + layer.most[i]) / 2);
+      double y = bias, size = std::abs(bias);
+      for (std::size_t j = 0; j < h.size(); ++j) {
+        const double term = layer.weights[i * h.size() + j] * h[j];
+        y += term;
+        size += std::abs(term);
+      }
+      slopes.back().push_back(y > kOnAtCorner * size ? 1 : 0);
+      next.push_back(layer.has_relu(i) ? std::max(0.0, y) : y);
+    }
+    h = std::move(next);
+  }
+  return slopes;
+}
+
+/// Whether the decision of an output of layer k holds; makes it so in `bounds`.
+bool decide(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, const Row& lower, const Row& upper,
+            std::size_t k, std::size_t output, const Decision& decision) {
+  double &l = bounds.lower[k][output], &u = bounds.upper[k][output];
+  if (!layers[k].has_relu(output) || lower.size() > static_cast<std::size_t>(kMostCornerInputs)) return false;
+  if (!(l < 0 && u > 0)) return true;
+  const std::vector<Row> slopes = slopes_at(layers, k, lower, upper, decision.corner);
+  const double sign = decision.is_on ? -1 : 1;
+  const double end =
+      largest(above(layers, bounds, k, {{static_cast<int>(output), sign}}, &slopes), 0, lower, upper);
+  if (!(end <= 0)) return false;
+  (decision.is_on ? l : u) = sign * end;
+  return true;
 }
 
 /// w times a form, w >= 0.
@@ -186,9 +230,12 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const Row& lo
   return bounds;
 }
 
-void add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, const Row& lower,
-                const Row& upper, const NeuronBounds* around) {
+bool add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, const Row& lower,
+                const Row& upper, const NeuronBounds* around, const std::vector<Decision>& decisions) {
   std::vector<Row>& term = bounds.terms;
+  bool all_hold = true;
+  std::size_t first = 0;  // of the layer's outputs, counted over all
+  for (std::size_t k = 0; k < bounds.lower.size(); ++k) first += bounds.lower[k].size();
   for (std::size_t k = bounds.lower.size(); k < layers.size(); ++k) {
     const HiddenLayer& layer = layers[k];
     Row magnitude;  // of the layer's input
@@ -224,6 +271,11 @@ void add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, co
       if (open[n].sign > 0) bounds.upper[k][i] = std::min(bounds.upper[k][i], end);
       if (open[n].sign < 0) bounds.lower[k][i] = std::max(bounds.lower[k][i], -end);
     }
+    for (const Decision& decision : decisions)
+      if (decision.neuron >= first && decision.neuron < first + rows &&
+          !decide(bounds, layers, lower, upper, k, decision.neuron - first, decision))
+        all_hold = false;
+    first += rows;
     for (std::size_t i = 0; i < rows; ++i) {
       const double l = bounds.lower[k][i], u = bounds.upper[k][i];
       if (!layer.has_relu(i) || !(l < 0 && u > 0)) continue;
@@ -232,6 +284,7 @@ void add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, co
       bounds.offset[k][i] = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
     }
   }
+  return all_hold;
 }
 
 }  // namespace swarmcert::check

@@ -2,6 +2,8 @@
 /// search (lipschitz/reach.h), which does the same for its own purposes.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace swarmcert::check {
@@ -34,6 +36,18 @@ struct NeuronBounds {
   std::vector<std::vector<double>> slope, offset;  ///< max(0, y) <= slope y + offset, where l < 0 < u
 };
 
+/// A neuron that other lower slopes decide: of the undecided ones before it, those get the lower slope 1 that are on at a
+/// corner of the box, the others 0. On: y > kOnAtCorner (|W| |h| + |b|), so that rounding hardly matters; to what follows
+/// it does not, since any slope in [0, 1] holds.
+struct Decision {
+  std::size_t neuron = 0;    ///< counted over all outputs of hidden layers
+  bool is_on = false;        ///< y >= 0, else y <= 0
+  std::uint64_t corner = 0;  ///< bit k: the upper end of input k, else the lower one
+};
+inline constexpr double kOnAtCorner = 0x1p-30;
+/// Boxes of more inputs have no decisions: a corner would not fit.
+inline constexpr int kMostCornerInputs = 48;
+
 /// weight y of one neuron.
 struct WeightedNeuron {
   std::size_t layer = 0;
@@ -58,9 +72,11 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const std::ve
 
 /// Adds the bounds of the layers that `bounds`, of the first ones over the same box, does not have yet.
 /// @param around of all layers over a larger box; may be null.
-void add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers,
+/// @param decisions of neurons of these layers; those of other layers are not looked at, nor are those of neurons that are
+///   decided without. @returns whether all of them hold; the bounds hold in any case.
+bool add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers,
                 const std::vector<double>& lower, const std::vector<double>& upper,
-                const NeuronBounds* around);
+                const NeuronBounds* around, const std::vector<Decision>& decisions = {});
 
 /// The largest value of first + second over the box that `bounds` are for, rounded up: each by its own form in x.
 double largest_sum(const std::vector<HiddenLayer>& layers, const NeuronBounds& bounds,

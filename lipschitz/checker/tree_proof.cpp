@@ -1,12 +1,12 @@
 #include "lipschitz/checker/tree_proof.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <utility>
 
 #include "lipschitz/checker/part_inequality.h"
+#include "lipschitz/checker/tree_words.h"
 #include "nn/files/doubles.h"
 
 namespace swarmcert::check {
@@ -23,7 +23,10 @@ constexpr std::size_t kDeepest = 2000;
 /// Where the walk is: the box and what is known of its neurons.
 struct Part {
   Row lower, upper;
-  NeuronBounds bounds;
+  std::shared_ptr<const NeuronBounds> around = {};  ///< of the box that was halved; null: of none
+  /// Of the part, once its first word is read that is no decision.
+  std::shared_ptr<const NeuronBounds> bounds = {};
+  std::vector<Decision> decisions = {};  ///< that nothing has looked at yet
   /// Since the last form: of all layers of a set function, and what the form makes of G. Null: no form yet.
   std::shared_ptr<const NeuronBounds> through_rho = {};
   std::shared_ptr<const Rounded> gram = {};
@@ -61,23 +64,37 @@ class FormChecker {
     return "";
   }
 
+  /// Bounds rho's neurons in the part, with what is decided of them; what is wrong with that, or nothing.
+  std::string look(Part& part) const {
+    if (rho_.coordinates.empty()) return "there is no rho";
+    auto through = std::make_shared<NeuronBounds>(*part.bounds);
+    if (!add_layers(*through, layers_, part.lower, part.upper, part.through_rho.get(), part.decisions))
+      return "a neuron of rho is not decided by its slopes";
+    std::size_t neurons = 0;
+    for (const HiddenLayer& layer : layers_) neurons += static_cast<std::size_t>(layer.outputs);
+    for (const Decision& decision : part.decisions)
+      if (decision.neuron >= neurons) return "there is no such neuron";
+    part.decisions.clear();
+    part.through_rho = std::move(through);
+    return "";
+  }
+
   /// Makes the form the part's; what is wrong with that, or nothing.
   std::string use(std::size_t index, Part& part) const {
     if (index >= forms_.size()) return "there is no such form";
     const Form& form = forms_[index];
-    auto through = std::make_shared<NeuronBounds>(part.bounds);
-    add_layers(*through, layers_, part.lower, part.upper, part.through_rho.get());
+    const std::string fault = look(part);
+    if (!fault.empty()) return fault;
     NeuronBounds bounds;  // of rho's neurons
     const auto first = static_cast<std::ptrdiff_t>(first_);
-    bounds.lower.assign(through->lower.begin() + first, through->lower.end());
-    bounds.upper.assign(through->upper.begin() + first, through->upper.end());
+    bounds.lower.assign(part.through_rho->lower.begin() + first, part.through_rho->lower.end());
+    bounds.upper.assign(part.through_rho->upper.begin() + first, part.through_rho->upper.end());
     const std::size_t inputs = rho_.coordinates.size();
     Row q(inputs * inputs);
     for (std::size_t i = 0, at = 0; i < inputs; ++i)
       for (std::size_t j = 0; j <= i; ++j, ++at) q[i * inputs + j] = q[j * inputs + i] = form.q[at];
     if (!PartInequality(rho_, gram_, bounds, q, form.t, {}).is_positive_definite())
       return "its multipliers do not show the form there";
-    part.through_rho = std::move(through);
     part.gram = std::make_shared<Rounded>(gram_of_form(form.q, layers_[first_ - 1]));
     return "";
   }
@@ -104,8 +121,8 @@ std::vector<const Conflict*> shown(const std::vector<HiddenLayer>& layers, const
   std::vector<const Conflict*> result;
   const auto is_undecided = [&](const WeightedNeuron& at) {
     const auto i = static_cast<std::size_t>(at.output);
-    return layers[at.layer].has_relu(i) && part.bounds.lower[at.layer][i] < 0 &&
-           part.bounds.upper[at.layer][i] > 0;
+    return layers[at.layer].has_relu(i) && part.bounds->lower[at.layer][i] < 0 &&
+           part.bounds->upper[at.layer][i] > 0;
   };
   for (const Conflict& conflict : conflicts) {
     const WeightedNeuron first =
@@ -113,7 +130,7 @@ std::vector<const Conflict*> shown(const std::vector<HiddenLayer>& layers, const
     const double rest = 1 - conflict.lambda;  // rounded: any two nonnegative weights, not both zero, will do
     const WeightedNeuron second = neuron_at(layers, conflict.second, conflict.second_on ? rest : -rest);
     if (is_undecided(first) && is_undecided(second) &&
-        largest_sum(layers, part.bounds, part.lower, part.upper, first, second) <= 0)
+        largest_sum(layers, *part.bounds, part.lower, part.upper, first, second) <= 0)
       result.push_back(&conflict);
   }
   return result;
@@ -130,52 +147,76 @@ bool is_usable(const Sides& box, const std::vector<HiddenLayer>& layers) {
   return true;
 }
 
-/// Visits the leaves of a tree: `leaf(index, part)` says what is wrong with one, or nothing; `form(index, part)` likewise
-/// with a form, and makes it the part's.
+/// Bounds the part's neurons, with what is decided of them; what is wrong with that, or nothing.
+std::string bound_neurons(const std::vector<HiddenLayer>& layers, Part& part) {
+  auto bounds = std::make_shared<NeuronBounds>();
+  if (!add_layers(*bounds, layers, part.lower, part.upper, part.around.get(), part.decisions))
+    return "a neuron is not decided by its slopes";
+  std::size_t neurons = 0;
+  for (const HiddenLayer& layer : layers) neurons += static_cast<std::size_t>(layer.outputs);
+  const auto is_looked_at = [&](const Decision& decision) { return decision.neuron < neurons; };
+  part.decisions.erase(std::remove_if(part.decisions.begin(), part.decisions.end(), is_looked_at),
+                       part.decisions.end());
+  part.bounds = std::move(bounds);
+  part.around.reset();
+  return "";
+}
+
+/// Puts both halves of the part on top of `open`, the lower one last; what is wrong with that, or nothing.
+std::string halve(const Part& part, std::size_t coordinate, std::vector<Part>& open) {
+  if (coordinate >= part.lower.size()) return "there is no such coordinate";
+  const double middle = part.lower[coordinate] + (part.upper[coordinate] - part.lower[coordinate]) / 2;
+  if (!(part.lower[coordinate] <= middle && middle <= part.upper[coordinate]))
+    return "the side cannot be halved";
+  for (const bool is_upper : {true, false}) {
+    Part half{part.lower, part.upper, part.bounds};
+    half.through_rho = part.through_rho;
+    half.gram = part.gram;
+    (is_upper ? half.lower : half.upper)[coordinate] = middle;
+    open.push_back(std::move(half));
+  }
+  return "";
+}
+
+/// Visits the leaves of a tree. `leaf(index, part)` says what is wrong with one, or nothing. `form(word, part)` likewise
+/// with a form or with bounds of rho's neurons, and makes them the part's.
 template <class Leaf, class UseForm>
 TreeVerdict walk(const std::vector<HiddenLayer>& layers, const std::vector<Sides>& boxes,
                  const std::string& tree, const Leaf& leaf, const UseForm& form) {
   TreeVerdict verdict;
   std::vector<Part> open;  // what preorder has still to visit, the next one last
-  for (auto box = boxes.rbegin(); box != boxes.rend(); ++box)
-    open.push_back({box->lower, box->upper, neuron_bounds(layers, box->lower, box->upper, nullptr)});
-  const char* at = tree.data();
-  const char* const end = at + tree.size();
-  for (long word = 1; at != end; ++word) {
-    const std::string where = "word " + std::to_string(word) + " of the tree";
-    const char kind = *at++;
-    std::size_t index = 0;
-    const auto [rest, error] = std::from_chars(at, end, index);
-    if (error != std::errc() || (rest != end && (*rest != ' ' || rest + 1 == end)) || rest - at > 15 ||
-        (kind != 's' && kind != 't' && kind != 'q'))
-      return {false, where + " is neither a split nor a leaf nor a form", verdict.leaves};
-    at = rest == end ? end : rest + 1;
-    if (open.empty()) return {false, where + ": the box is covered already", verdict.leaves};
-    if (kind == 'q') {
-      const std::string fault = form(index, open.back());
-      if (!fault.empty()) return {false, where + ": " + fault, verdict.leaves};
+  for (auto box = boxes.rbegin(); box != boxes.rend(); ++box) open.push_back({box->lower, box->upper});
+  Words words(tree);
+  for (long count = 1; words.are_left(); ++count) {
+    const auto fails = [&](const std::string& fault) {
+      return TreeVerdict{false, "word " + std::to_string(count) + " of the tree: " + fault, verdict.leaves};
+    };
+    Word word;
+    if (!words.read(word)) return fails("neither a split nor a leaf, a form or a decision");
+    if (open.empty()) return fails("the box is covered already");
+    if (word.kind == 'd') {
+      open.back().decisions.push_back(word.decision);
+      continue;
+    }
+    std::string fault;
+    if (open.back().bounds == nullptr) fault = bound_neurons(layers, open.back());
+    if (!fault.empty()) return fails(fault);
+    if (word.kind == 'q' || word.kind == 'r') {
+      fault = form(word, open.back());
+      if (!fault.empty()) return fails(fault);
       continue;
     }
     const Part part = std::move(open.back());
     open.pop_back();
-    if (kind == 's') {
-      if (index >= part.lower.size()) return {false, where + ": there is no such coordinate", verdict.leaves};
-      if (open.size() > kDeepest + boxes.size())
-        return {false, where + ": the tree is too deep", verdict.leaves};
-      const double middle = part.lower[index] + (part.upper[index] - part.lower[index]) / 2;
-      if (!(part.lower[index] <= middle && middle <= part.upper[index]))
-        return {false, where + ": the side cannot be halved", verdict.leaves};
-      for (const bool is_upper : {true, false}) {
-        Part half{part.lower, part.upper, {}, part.through_rho, part.gram};
-        (is_upper ? half.lower : half.upper)[index] = middle;
-        half.bounds = neuron_bounds(layers, half.lower, half.upper, &part.bounds);
-        open.push_back(std::move(half));
-      }
-      continue;
+    if (!part.decisions.empty()) return fails("a neuron is decided that nothing looks at");
+    if (word.kind == 's') {
+      if (open.size() > kDeepest + boxes.size()) return fails("the tree is too deep");
+      fault = halve(part, word.index, open);
+    } else {
+      ++verdict.leaves;
+      fault = leaf(word.index, part);
     }
-    ++verdict.leaves;
-    const std::string fault = leaf(index, part);
-    if (!fault.empty()) return {false, where + ": " + fault, verdict.leaves};
+    if (!fault.empty()) return fails(fault);
   }
   if (!open.empty()) return {false, "the tree ends before the box is covered", verdict.leaves};
   verdict.holds = true;
@@ -224,14 +265,15 @@ TreeVerdict check_tree(const LocalFunction& f, const std::vector<Sides>& boxes, 
     if (part.gram == nullptr && gram.rows == 0) return "there is no form yet";
     std::vector<const Conflict*> conflicts;
     if (!proof.conflicts.empty()) conflicts = shown(f.hidden, part, proof.conflicts[index]);
-    if (!PartInequality(f, part.gram != nullptr ? *part.gram : gram, part.bounds, square,
+    if (!PartInequality(f, part.gram != nullptr ? *part.gram : gram, *part.bounds, square,
                         proof.multipliers[index], conflicts)
              .is_positive_definite())
       return "its multipliers do not show the bound there";
     return "";
   };
-  return walk(f.hidden, boxes, proof.tree, leaf,
-              [&](std::size_t index, Part& part) { return forms.use(index, part); });
+  return walk(f.hidden, boxes, proof.tree, leaf, [&](const Word& word, Part& part) {
+    return word.kind == 'q' ? forms.use(word.index, part) : forms.look(part);
+  });
 }
 
 TreeVerdict check_range(const std::vector<HiddenLayer>& layers, const Row& lower, const Row& upper,
@@ -244,12 +286,12 @@ TreeVerdict check_range(const std::vector<HiddenLayer>& layers, const Row& lower
   const auto leaf = [&](std::size_t index, const Part& part) -> std::string {
     if (index != 0) return "a leaf of a range has no multipliers";
     for (std::size_t i = 0; i < outputs; ++i)
-      if (!(least[i] <= part.bounds.lower.back()[i] && part.bounds.upper.back()[i] <= most[i]))
+      if (!(least[i] <= part.bounds->lower.back()[i] && part.bounds->upper.back()[i] <= most[i]))
         return "the range is larger there";
     return "";
   };
   return walk(layers, {{lower, upper}}, tree, leaf,
-              [](std::size_t, Part&) { return "a range has no forms"; });
+              [](const Word&, Part&) { return "a range has no forms"; });
 }
 
 }  // namespace swarmcert::check

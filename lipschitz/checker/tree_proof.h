@@ -42,7 +42,10 @@ struct Form {
 };
 
 /// The words of a tree in preorder: "s3" halves coordinate 3 of the box at hand, its lower half first; "t5" is a leaf
-/// that multipliers 5 prove; "q2" says, before what becomes of the box at hand, that form 2 holds in it. Of several boxes, their trees one after the other.
+/// that multipliers 5 prove. Before what becomes of the box at hand: "q2" says that form 2 holds in it, "r" that rho's neurons
+/// are bounded in it, as before a form; "d17+5" that neuron 17 is on all over it, "d17-5" off, as the slopes of corner 5 show
+/// (Decision): neurons of phi first of all, those of rho before "q" or "r". What is decided stays so in both halves. Of
+/// several boxes, their trees one after the other.
 struct TreeProof {
   std::string tree;
   /// Each with one number per output of a hidden layer, not negative; nobody reads those of outputs without ReLU.

@@ -653,8 +653,24 @@ class Hidden:
         return total
 
 
-def above(layers, bounds, layer, neuron, sign):
-    """A linear form in x above sign * y by relaxation of ReLU: coefficients and constant."""
+def slopes_at(layers, point, top):
+    """Per layer before `top`, which outputs are on at a point. Roughly: whatever slopes follow from it hold."""
+    h, slopes = [float(x) for x in point], []
+    for layer in layers[:top]:
+        y, is_on = [], []
+        for i, (row, bias) in enumerate(zip(layer.weights, layer.biases)):
+            terms = [float(w) * x for w, x in zip(row, h)]
+            middle = float(bias + ((layer.least[i] + layer.most[i]) / 2 if layer.least else 0))
+            y.append(sum(terms) + middle)
+            is_on.append(y[-1] > 2 ** -30 * (sum(map(abs, terms)) + abs(middle)))
+        slopes.append(is_on)
+        h = [max(v, 0) if layer.has_relu(i) else v for i, v in enumerate(y)]
+    return slopes
+
+
+def above(layers, bounds, layer, neuron, sign, slopes=None):
+    """A linear form in x above sign * y by relaxation of ReLU: coefficients and constant. `slopes`: which undecided
+    neurons are bounded below by themselves, the others by 0."""
     form, constant = [Fraction(0)] * len(layers[layer].biases), Fraction(0)
     form[neuron] = Fraction(sign)
     for j in range(layer, -1, -1):
@@ -665,7 +681,8 @@ def above(layers, bounds, layer, neuron, sign):
         for c, (l, u) in enumerate(bounds[j - 1]):
             if l >= 0 or form[c] == 0 or not layers[j - 1].has_relu(c):
                 continue
-            if u <= 0 or (form[c] < 0 and u <= -l):
+            is_below = slopes[j - 1][c] if slopes else u > -l
+            if u <= 0 or (form[c] < 0 and not is_below):
                 form[c] = Fraction(0)
             elif form[c] > 0:
                 slope = min(Fraction(1), rounded_up(u / (u - l)))
@@ -678,11 +695,13 @@ def largest(form, constant, low, high):
     return rounded_up(constant + sum(c * (h if c > 0 else l) for c, l, h in zip(form, low, high)))
 
 
-def neuron_bounds(layers, low, high, around, first=()):
+def neuron_bounds(layers, low, high, around, first=(), decisions=()):
     """Bounds on every neuron over a box by linear relaxation of ReLU, layer by layer; those that `around` decides keep
     its bounds. Exact but for bounds and slopes, which are rounded so that they still hold. `first`: those of the first
-    layers, which are taken as they are."""
+    layers, which are taken as they are. `decisions`: (neuron, is on, corner), of neurons that the lower slopes tight at a
+    corner decide; those of other layers are not looked at. None where one of them does not hold."""
     bounds = list(first)
+    before = sum(len(layer.biases) for layer in layers[:len(bounds)])
     for k in range(len(bounds), len(layers)):
         layer = layers[k]
         bounds.append([])
@@ -694,6 +713,21 @@ def neuron_bounds(layers, low, high, around, first=()):
             ends = [largest(*above(layers, bounds, k, i, sign), low, high) for sign in (1, -1)]
             l, u = -ends[1], ends[0]
             bounds[k].append((l, u) if lower is None else (max(l, lower), min(u, upper)))
+        for neuron, is_on, corner in decisions:
+            if not before <= neuron < before + len(layer.biases):
+                continue
+            i = neuron - before
+            if not layer.has_relu(i) or len(low) > 48:
+                return None
+            l, u = bounds[k][i]
+            if not l < 0 < u:
+                continue
+            slopes = slopes_at(layers, [high[j] if corner >> j & 1 else low[j] for j in range(len(low))], k)
+            end = largest(*above(layers, bounds, k, i, -1 if is_on else 1, slopes), low, high)
+            if end > 0:
+                return None
+            bounds[k][i] = (-end, u) if is_on else (l, end)
+        before += len(layer.biases)
     return bounds
 
 
@@ -788,10 +822,19 @@ def scaled_identity(rho, size):
 
 
 class Part:
-    """A box, bounds on its neurons and, once a form holds in it, those of the whole set function and the form's Gram matrix."""
+    """A box, bounds on its neurons and, once a form holds in it, those of the whole set function and the form's Gram matrix.
+    `around`: bounds on the neurons of the box that was halved. `decisions`: that nothing has looked at yet."""
 
-    def __init__(self, low, high, bounds, through_rho=None, gram=None):
-        self.low, self.high, self.bounds, self.through_rho, self.gram = low, high, bounds, through_rho, gram
+    def __init__(self, low, high, around, through_rho=None, gram=None):
+        self.low, self.high, self.around, self.through_rho, self.gram = low, high, around, through_rho, gram
+        self.bounds, self.decisions = None, []
+
+    def bound_neurons(self, layers):
+        """Whether what is decided of the layers' neurons holds."""
+        self.bounds = neuron_bounds(layers, self.low, self.high, self.around, (), self.decisions)
+        count = sum(len(layer.biases) for layer in layers)
+        self.decisions = [decision for decision in self.decisions if decision[0] >= count]
+        return self.bounds is not None
 
 
 class Forms:
@@ -801,12 +844,20 @@ class Forms:
     def __init__(self, forms, hidden, behind, gram):
         self.forms, self.layers, self.first, self.gram = forms, hidden + behind, len(hidden) + 1, gram
 
+    def look(self, part):
+        """Bounds rho's neurons in the part; whether what is decided of them holds."""
+        count = sum(len(layer.biases) for layer in self.layers)
+        through = neuron_bounds(self.layers, part.low, part.high, part.through_rho, part.bounds, part.decisions)
+        if through is None or any(decision[0] >= count for decision in part.decisions):
+            return False
+        part.through_rho, part.decisions = through, []
+        return True
+
     def use(self, index, part):
         """Makes the form the part's, if it holds there."""
-        if index >= len(self.forms):
+        if index >= len(self.forms) or not self.look(part):
             return False
         q, t = self.forms[index]
-        part.through_rho = neuron_bounds(self.layers, part.low, part.high, part.through_rho, part.bounds)
         one = [Fraction(1)] * len(q)
         if not part_holds(self.layers[self.first:], self.gram, list(range(len(q))), one, part.through_rho[self.first:], q, t, []):
             return False
@@ -818,17 +869,25 @@ class Forms:
 
 def tree_fails(layers, boxes, text, proves, forms=None):
     """"" if proves(part, index) for every leaf, else why not."""
-    open_parts = [Part(low, high, neuron_bounds(layers, low, high, None)) for low, high in reversed(boxes)]
+    open_parts = [Part(low, high, None) for low, high in reversed(boxes)]
     for word in text.split(" ") if text else []:
-        if not re.fullmatch("[stq][0-9]{1,15}", word) or not open_parts:
-            return f"{word!r} is no split, no leaf and no form, or one too many"
-        index = int(word[1:])
-        if word[0] == "q":
-            if forms is None or not forms.use(index, open_parts[-1]):
+        if not re.fullmatch("[stq][0-9]{1,15}|r|d[0-9]{1,15}[+-][0-9]{1,15}", word) or not open_parts:
+            return f"{word!r} is no split, no leaf, no form and no decision, or one too many"
+        if word[0] == "d":
+            neuron, sign, corner = re.fullmatch("d([0-9]*)([+-])([0-9]*)", word).groups()
+            open_parts[-1].decisions.append((int(neuron), sign == "+", int(corner)))
+            continue
+        if open_parts[-1].bounds is None and not open_parts[-1].bound_neurons(layers):
+            return f"before {word}: a neuron is not decided by its slopes"
+        index = int(word[1:] or 0)
+        if word[0] in "qr":
+            if forms is None or not (forms.use(index, open_parts[-1]) if word[0] == "q" else forms.look(open_parts[-1])):
                 return f"{word} does not hold in its part"
             continue
         part = open_parts.pop()
         low, high = part.low, part.high
+        if part.decisions:
+            return f"before {word}: a neuron is decided that nothing looks at"
         if word[0] == "t":
             if not proves(part, index):
                 return f"{word} does not prove its part"
@@ -841,7 +900,7 @@ def tree_fails(layers, boxes, text, proves, forms=None):
         for is_upper in True, False:
             l, h = list(low), list(high)
             (l if is_upper else h)[index] = middle
-            open_parts.append(Part(l, h, neuron_bounds(layers, l, h, part.bounds), part.through_rho, part.gram))
+            open_parts.append(Part(l, h, part.bounds, part.through_rho, part.gram))
     return "the tree ends early" if open_parts else ""
 
 

@@ -1,0 +1,79 @@
+#include <cmath>
+
+#include "lipschitz/branch/root_multipliers.h"
+#include "lipschitz/branch/search.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Only if of rho's, too, fewer are undecided than this share of those then: for phi alone a program without rho is
+/// cheaper. Otherwise it looks again as if this share of its own had been undecided.
+constexpr double kLazyRho = 0.985, kFormAgain = 0.95;
+/// What a form is above the least one, relatively to its largest entry: more than rounding it to single precision takes.
+constexpr double kFormMargin = 4e-6;
+
+}  // namespace
+
+void BranchSearch::renew_form(Part& part) {
+  part.undecided_form = part.undecided;
+  const OfRho* const old = part.form >= 0 ? &forms_[static_cast<std::size_t>(part.form)] : nullptr;
+  OfRho own;
+  const std::size_t first = chain_.hidden.size() + 1;  // layer of rho
+  std::vector<check::Decision> decided;
+  own.reach = std::make_shared<const Reach>(set_->whole.hidden, *part.reach,
+                                            old != nullptr ? old->reach.get() : nullptr,
+                                            options_.better_slopes ? &decided : nullptr);
+  const std::vector<NeuronState> behind = states_of(*own.reach, set_->rho, first);
+  own.undecided = undecided_in(behind);
+  if (old != nullptr && own.undecided > kLazyRho * old->undecided) {
+    part.undecided_form = static_cast<int>(kFormAgain * part.undecided);
+    return;
+  }
+  std::vector<NeuronState> states = part.states;
+  states.insert(states.end(), static_cast<std::size_t>(set_->last.rows()), NeuronState::kOn);
+  states.insert(states.end(), behind.begin(), behind.end());
+  const NodeInequality joint(set_->whole, states);
+  const Index m = undecided_in(part.states);
+  VectorXd t;
+  if (old == nullptr) {
+    t = root_multipliers(set_->whole, joint, options_.start);
+  } else {
+    VectorXd all(set_->whole.neurons());
+    all << multipliers_of(part).t, VectorXd::Zero(set_->last.rows()), old->t;
+    DescentOptions descent;
+    descent.relative_gap = kGap;
+    descent.steps = kSteps;
+    t = descend(joint, all(joint.undecided()), descent);
+  }
+  t = t.cast<float>().cast<double>();
+  const NodeInequality rho(set_->rho, behind);
+  MatrixXd q = rho.least_form(t.tail(t.size() - m));
+  if (q.size() == 0) return;
+  q.diagonal().array() += kFormMargin * q.diagonal().maxCoeff();
+  q = MatrixXd(q.cast<float>().cast<double>().selfadjointView<Eigen::Lower>());
+  own.gram = set_->gram(q);
+  const double least = NodeInequality(chain_, part.states, own.gram).least_rho(t.head(m));
+  if (!(least < part.rho)) return;
+  part.undecided_then = least < kFar * part.rho ? std::numeric_limits<int>::max() : part.undecided;
+  part.rho = least;
+  own.t = VectorXd::Zero(set_->rho.neurons());
+  for (Index i = 0; i < t.size() - m; ++i) own.t(rho.undecided()[static_cast<std::size_t>(i)]) = t(m + i);
+  check::Form form;
+  for (Index i = 0; i < q.rows(); ++i)
+    for (Index j = 0; j <= i; ++j) form.q.push_back(std::ldexp(q(i, j), set_->form_exponent()));
+  for (Index i = 0; i < own.t.size(); ++i)
+    form.t.push_back(set_->whole.unscaled_multiplier(own.t(i), first + set_->rho.layer_of(i)));
+  result_.tree.forms.push_back(std::move(form));
+  part.form = static_cast<int>(forms_.size());
+  SearchNode& node = nodes_[static_cast<std::size_t>(part.index)];
+  node.form = static_cast<int>(result_.tree.forms.size()) - 1;
+  node.decided.insert(node.decided.end(), decided.begin(), decided.end());
+  forms_.push_back(std::move(own));
+  keep(part, t.head(m), {}, {});
+}
+
+}  // namespace swarmcert::lipschitz

@@ -1,0 +1,102 @@
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "lipschitz/branch/search.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// A neuron counts as decided only with this relative margin, so that the checker's rounding cannot see it otherwise.
+constexpr double kStateMargin = 1e-9;
+
+}  // namespace
+
+void BranchSearch::look_at_centre(const Box& box) {
+  VectorXd centre(chain_.inputs());
+  for (Index j = 0; j < centre.size(); ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    centre(j) = box.lower[k] + (box.upper[k] - box.lower[k]) / 2;
+  }
+  steep_.emplace(squared_slope(centre), centre);
+  if (steep_.size() > kSteepCentres) steep_.erase(std::prev(steep_.end()));
+}
+
+BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent, int index) {
+  ++result_.nodes;
+  look_at_centre(box);
+  Part part;
+  part.index = index;
+  std::vector<MatrixXd> slopes;
+  std::vector<LinearForms> forms;
+  if (parent != nullptr) part.around = parent->reach;
+  const bool has_pairs = parent != nullptr && !multipliers_of(*parent).pairs.empty();
+  part.reach = std::make_shared<const Reach>(chain_.hidden, box, part.around.get(), &slopes,
+                                             has_pairs ? &forms : nullptr, decided_in(index));
+  part.states = states_of(*part.reach, chain_, 0);
+  part.undecided = undecided_in(part.states);
+  result_.undecided_per_box += (part.undecided - result_.undecided_per_box) / result_.nodes;
+  if (parent != nullptr) {
+    part.rho = parent->rho;
+    part.multipliers = parent->multipliers;
+    part.undecided_then = parent->undecided_then;
+    part.form = parent->form;
+    part.undecided_form = parent->undecided_form;
+    std::vector<std::size_t> pairs;
+    if (has_pairs) pairs = still_shown(part, NeuronForms(forms, box));
+    const bool all_pairs = pairs.size() == multipliers_of(part).pairs.size();
+    if (part.states != parent->states || !all_pairs) {
+      NodeInequality inequality(chain_, part.states, gram_of(part));
+      const double rho = inequality.least_rho(inherited(part, pairs, inequality));
+      const bool is_worse = !all_pairs && !(rho <= part.rho);  // for want of a pair
+      part.rho = is_worse ? rho : std::min(part.rho, rho);
+      if (is_worse) solve(part);
+    }
+  }
+  part.split = best_split(*part.reach, slopes, part.states);
+  return part;
+}
+
+std::vector<NeuronState> BranchSearch::states_of(const Reach& reach, const LocalChain& chain,
+                                                 std::size_t first) {
+  std::vector<NeuronState> states;
+  for (std::size_t k = 0; k < chain.hidden.size(); ++k) {
+    const Bounds& bounds = reach.before_relu(first + k);
+    for (Index i = 0; i < bounds.lower.size(); ++i) {
+      const double margin = kStateMargin * std::max(std::abs(bounds.lower(i)), std::abs(bounds.upper(i)));
+      const bool has_relu = i < bounds.lower.size() - chain.without_relu[k];
+      states.push_back(!has_relu || bounds.lower(i) > margin ? NeuronState::kOn
+                       : bounds.upper(i) < -margin           ? NeuronState::kOff
+                                                             : NeuronState::kUndecided);
+    }
+  }
+  return states;
+}
+
+int BranchSearch::best_split(const Reach& reach, const std::vector<MatrixXd>& slopes,
+                             const std::vector<NeuronState>& states) const {
+  const Box& box = reach.box();
+  VectorXd width(chain_.inputs());
+  for (Index j = 0; j < width.size(); ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    width(j) = box.upper[k] - box.lower[k];
+  }
+  VectorXd score = VectorXd::Zero(chain_.inputs());
+  std::size_t neuron = 0;
+  for (std::size_t k = 0; k < slopes.size(); ++k) {
+    const VectorXd range = reach.before_relu(k).upper - reach.before_relu(k).lower;
+    for (Index i = 0; i < range.size(); ++i, ++neuron) {
+      if (states[neuron] != NeuronState::kUndecided) continue;
+      score += (slopes[k].row(i).transpose().cwiseProduct(width) / range(i)).cwiseAbs2();
+    }
+  }
+  Index best = 0;
+  score.maxCoeff(&best);
+  return static_cast<int>(best);
+}
+
+}  // namespace swarmcert::lipschitz

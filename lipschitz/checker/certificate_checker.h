@@ -1,0 +1,71 @@
+/// @file The checker of check.h: what it knows, and its steps, which fill several files.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "lipschitz/checker/certificate_text.h"
+#include "lipschitz/checker/check.h"
+#include "lipschitz/checker/dyadic.h"
+#include "lipschitz/stages.h"
+#include "nn/files/functions.h"
+
+namespace swarmcert::check {
+
+class CertificateChecker {
+ public:
+  CertificateChecker(const files::Json& certificate, const files::Network& network)
+      : certificate_(certificate),
+        network_(certificate.at("network").at("as") == "float32" ? files::as_float32(network) : network),
+        parts_(files::parts(network_)) {}
+  CheckResult run();
+
+ private:
+  using Json = files::Json;
+  using Row = std::vector<double>;
+  using Neighbours = std::map<std::string, long>;  ///< by kind
+  static constexpr long kMostNeighbours = 1000000;
+
+  // check.cpp
+  void check_weights(const Json& named);
+  void check_layer(const Json& entry, const std::string& network, const files::Layer& layer);
+  void check_bound(const Json& bound);
+  /// Of a set function, at most how many of each kind there are; empty: any number.
+  Neighbours neighbours_of(const Json& bound, const std::string& where) const;
+  static std::string key(const std::string& function, const std::string& block, const Neighbours& neighbours);
+  /// Several terms of the sum move: by the triangle inequality one after the other, each by its one_neighbour bound.
+  /// Not by single coordinates: those of the ground are others than those of a neighbour.
+  void check_law(const Json& law);
+
+  // check_local.cpp
+  /// The part's box, or what the input clamp makes of it.
+  void read_box(const std::string& part, std::vector<double>& lower, std::vector<double>& upper,
+                const std::string& where) const;
+  /// What the other terms of the sum add to the values before the first ReLU of rho: each kind's range over its box,
+  /// shown by a tree, as often as there are such neighbours or less; the ground's once.
+  void check_others(const Json& others, const std::vector<std::string>& names, Neighbours counts, Row& least,
+                    Row& most, const std::string& where) const;
+  /// sqrt(rho) <= `upper` bounds the slope on the box, or on what the input clamp makes of it; of a set function through
+  /// a quadratic form of rho, for so many neighbours one that holds for the sums that they reach. Everywhere: by a projective cover.
+  void check_local(const Json& bound, double upper, const std::vector<double>& scale,
+                   const std::string& where);
+  /// Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w), its lower triangle given row by row.
+  Matrix checked_form(const Json& form, const std::string& rho, const std::string& where) const;
+
+  // check_lower.cpp
+  /// |f(x) - f(y)| >= lower |x - y|. In a set function one neighbour moves from x to y, the others stay.
+  void check_lower(const Json& bound, double lower, const std::vector<double>& scale,
+                   const std::string& where) const;
+
+  const Json& certificate_;
+  const files::Network network_;
+  std::map<std::string, const files::Weights*> parts_;
+  std::map<std::string, Dyadic> norms_;   ///< product of the verified norms, by network
+  std::map<std::string, Dyadic> proved_;  ///< verified upper bounds, by key()
+  std::set<std::string> local_;           ///< those of them that hold on the box only
+  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_boxes_ = 0;
+};
+
+}  // namespace swarmcert::check

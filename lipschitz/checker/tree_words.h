@@ -1,0 +1,32 @@
+/// @file The words of a tree: how a proof by parts is written down.
+#pragma once
+
+#include <string>
+
+#include "lipschitz/checker/box_states.h"
+
+namespace swarmcert::check {
+
+/// One word; what its letter means is said at TreeProof.
+struct Word {
+  char kind = ' ';         ///< s, t, q, r or d
+  std::size_t index = 0;   ///< of s, t and q
+  Decision decision = {};  ///< of d
+};
+
+/// Reads a text word by word: single spaces between words, none at either end.
+class Words {
+ public:
+  explicit Words(const std::string& text) : at_(text.data()), end_(at_ + text.size()) {}
+  bool are_left() const { return at_ != end_; }
+  /// @returns false where the next word is none.
+  bool read(Word& word);
+
+ private:
+  const char *at_, *end_;
+};
+
+/// The word for a decision, such as "d17+5": neuron 17 is on, with the slopes of corner 5.
+std::string word_of(const Decision& decision);
+
+}  // namespace swarmcert::check
