@@ -107,12 +107,39 @@ const char* status_of(const UncertainNorms& norms) {
   return "enclosed";
 }
 
+const char* end_name(UncertainNorms::End end) {
+  return end == UncertainNorms::End::kGap      ? "gap reached"
+         : end == UncertainNorms::End::kBudget ? "budget spent"
+                                               : "interrupted";
+}
+
+constexpr double kUncertainGap = 0.02;
+
+/// Percent of the way to the gap asked for, or to the end of the budget.
+class WayToGap {
+ public:
+  int percent(int evaluations, int most, double gap) {
+    double way = static_cast<double>(evaluations) / most;
+    if (std::isfinite(gap)) {
+      if (!(first_ > 0)) first_ = std::max(gap, 2 * kUncertainGap);
+      way = std::max(way, std::log(first_ / gap) / std::log(first_ / kUncertainGap));
+    }
+    reached_ = std::clamp(static_cast<int>(100 * way), reached_, 99);
+    return reached_;
+  }
+
+ private:
+  double first_ = 0;
+  int reached_ = 0;
+};
+
 Json uncertain_row(int axis, Channel channel, Loop loop, const UncertainNorms& norms) {
   return {{"axis", axis_name(axis)},
           {"channel", name(channel)},
           {"loop", name(loop)},
           {"status", status_of(norms)},
           {"evaluations", norms.evaluations},
+          {"ended", end_name(norms.end)},
           {"rate", gain_json(norms.rate)},
           {"amplitude", gain_json(norms.amplitude)},
           {"edge", gain_json(norms.edge)},
@@ -134,8 +161,7 @@ void repeat_rows(Json& rows, std::size_t count, int axis) {
 
 }  // namespace
 
-Json uncertain_json(const Tracking& input, const std::vector<std::string>& words, int jobs,
-                    const std::function<void(int done, int total)>& progress) {
+Json uncertain_json(const Tracking& input, const std::vector<std::string>& words, const UncertainRun& run) {
   const UncertainPlant plant = intervals_of(input, words);
   const std::size_t rows_per_axis = input.gains.rate_hz > 0 ? 4 : 2;
   const auto repeats = [&](int axis) {
@@ -156,21 +182,28 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
     }
   }
   std::vector<UncertainNorms> found(tasks.size());
-  std::atomic<int> done{0};
   const int total = static_cast<int>(tasks.size());
-  files::parallel_for(total, jobs, [&](int i) {
+  std::atomic<int> percent_done{0};  // of each task, added up
+  files::parallel_for(total, run.jobs, [&](int i) {
     const Task& task = tasks[static_cast<std::size_t>(i)];
     const AxisLoop fixed = fixed_part(input, task.axis);
-    UncertainNorms& norms = found[static_cast<std::size_t>(i)];
-    if (task.loop == Loop::kSampled) {
-      norms = uncertain_norms(SampledLoop{fixed, 1 / input.gains.rate_hz, input.gains.integrator_step_s},
-                              plant, task.channel);
-    } else {
-      // With a delay an evaluation takes up to a tenth of a second: wider enclosures, of fewer of them.
-      norms = plant.delay_s.to > 0 ? uncertain_norms(fixed, plant, task.channel, 0.05, 400)
-                                   : uncertain_norms(fixed, plant, task.channel);
-    }
-    progress(++done, total);
+    WayToGap way;
+    int shown = 0;
+    const auto show = [&](int percent) {
+      const int all = percent_done += percent - shown;
+      shown = percent;
+      run.progress(all, 100 * total);
+    };
+    const UncertainEffort effort = {kUncertainGap, run.most_loops, [&](int evaluations, double gap) {
+                                      show(way.percent(evaluations, run.most_loops, gap));
+                                      return run.cancelled == nullptr || !*run.cancelled;
+                                    }};
+    found[static_cast<std::size_t>(i)] =
+        task.loop == Loop::kSampled
+            ? uncertain_norms(SampledLoop{fixed, 1 / input.gains.rate_hz, input.gains.integrator_step_s},
+                              plant, task.channel, effort)
+            : uncertain_norms(fixed, plant, task.channel, effort);
+    show(100);
   });
   Json gains = Json::array();
   std::size_t next = 0;
@@ -197,18 +230,24 @@ void print_uncertain(const Json& uncertain) {
     return fmt::format("{:.4g} .. {:.4g}", uncertain[key][0].get<double>(), uncertain[key][1].get<double>());
   };
   fmt::print(
-      "\nWorst over mass {} kg, thrust scale {}, motor lag {} s, delay {} s: reached .. never exceeded\n",
+      "\nWorst over mass {} kg, thrust scale {}, motor lag {} s, delay {} s: reached .. not exceeded, but "
+      "for rounding\n",
       text("mass_kg"), text("thrust_scale"), text("lag_s"), text("delay_s"));
   for (const Json& g : uncertain["gains"]) {
     fmt::print("  {} {:<8} {:<10} amplitude {}  impulse {}\n{:25}edge {}  rate {}\n",
                g["axis"].get<std::string>(), g["channel"].get<std::string>(), g["loop"].get<std::string>(),
                pair_text(g["amplitude"]), pair_text(g["impulse"]), "", pair_text(g["edge"]),
                pair_text(g["rate"]));
+    const bool interrupted = g["ended"] == "interrupted";
     if (g["status"] == "inconclusive") {
-      fmt::print("{:25}inconclusive: {} loops tried, not all of the intervals proved stable; narrow them\n",
-                 "", g["evaluations"].get<int>());
+      fmt::print("{:25}inconclusive: {} loops tried, not all of the intervals proved stable; {}\n", "",
+                 g["evaluations"].get<int>(), interrupted ? "interrupted" : "narrow them, or raise --loops");
     } else if (g["status"] == "unstable") {
       fmt::print("{:25}unstable for some values of the intervals\n", "");
+    } else if (g["ended"] != "gap reached") {
+      fmt::print("{:25}{} after {} loops, before both ends were {:g} % apart; the bounds hold\n", "",
+                 interrupted ? "interrupted" : "budget spent", g["evaluations"].get<int>(),
+                 100 * kUncertainGap);
     }
   }
 }
@@ -246,10 +285,10 @@ Json verified_json(const Tracking& input) {
         row.update(verified_gains_json(*norms));
         if (loop->delay_s > 0) row["delay_gain"] = norms->delay_gain;
       } else {
-        row["why"] = loop->delay_s > 0
-                         ? "the loop gain of what the delay changes is not below 1: a shorter delay "
-                           "or lower gains would be needed"
-                         : "stability could not be verified in intervals";
+        row["why"] = is_stable(*loop) ? "stability could not be verified in intervals"
+                     : loop->delay_s > 0
+                         ? "the loop is unstable: a shorter delay or lower gains would be needed"
+                         : "the loop is unstable";
       }
       rows.push_back(std::move(row));
       if (!sampled) continue;

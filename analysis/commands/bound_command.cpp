@@ -23,6 +23,7 @@ struct BoundOptions {
   stability::InitialError initial;
   std::vector<std::string> uncertain;
   bool is_uncertain = false;
+  int most_loops = UncertainRun{}.most_loops;
   bool verified = false;
   bool tube = false;
   TubeArguments task;
@@ -69,10 +70,16 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   }
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
   if (options.is_uncertain) {
+    const CancelOnInterrupt interrupt;
     Progress progress(common.quiet);
-    result["uncertain"] = uncertain_json(
-        input, options.uncertain, common.jobs,
-        [&progress](int done, int total) { progress.show(done, total, "loops over the intervals"); });
+    UncertainRun run;
+    run.jobs = common.jobs;
+    run.most_loops = options.most_loops;
+    run.progress = [&progress](int done, int total) {
+      progress.show(done, total, "of the enclosures over the intervals");
+    };
+    run.cancelled = interrupt.flag();
+    result["uncertain"] = uncertain_json(input, options.uncertain, run);
   }
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
@@ -136,6 +143,11 @@ Command bound_command() {
                                          "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")
                               ->expected(0, -1)
                               ->default_str("default");
+        app.add_option(
+               "--loops", options->most_loops,
+               "Loops that --uncertain may look at, for each of its rows; bounds hold wherever it ends")
+            ->check(CLI::PositiveNumber)
+            ->capture_default_str();
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
         app.add_flag("--tube", options->tube,
                      "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "

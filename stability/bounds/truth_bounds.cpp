@@ -159,7 +159,7 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
   const Values value(effect, info);
   if (name == "motor_lag" || name == "delay" || name == "thrust_ratio") {
     result.note = "acts through the loop";
-  } else if (name == "torque_bias") {
+  } else if (name == "torque_bias" || name == "downwash_torque") {
     result.note = "a torque: no force";
   } else if (name == "sensor_delay") {
     result.note = "of the accelerometer: no force";

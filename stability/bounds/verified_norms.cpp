@@ -7,91 +7,14 @@
 
 #include "nn/files/doubles.h"
 #include "stability/bounds/contracting_system.h"
+#include "stability/bounds/local_polynomial.h"
+#include "stability/bounds/verified_delay.h"
 
 namespace swarmcert::stability {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-constexpr int kTerms = 18;
-
-/// Taylor coefficients of one output along a trajectory from a point, with a remainder and an error ball.
-struct LocalOutput {
-  std::array<Interval, kTerms> c;
-  double remainder = 0;  ///< times s^kTerms
-  double error = 0;      ///< of the point, seen in this output
-
-  /// What the polynomial may miss anywhere up to `s`.
-  Interval slack(double s) const {
-    const double r = up(up(std::pow(s, kTerms) * (1 + 1e-14)) * remainder);
-    const double total = up(r + error);
-    return {-total, total};
-  }
-  Interval polynomial(double s) const {
-    Interval total;
-    for (int k = kTerms; k-- > 0;) total = total * Interval(s) + c[static_cast<std::size_t>(k)];
-    return total;
-  }
-  Interval at(double s) const { return polynomial(s) + slack(s); }
-
-  /// Range on [a, b]: the value in the middle and the slope over the stretch (mean value form).
-  Interval range(double a, double b) const {
-    const double middle = a + (b - a) / 2;
-    const Interval s(a, b);
-    Interval slope;
-    for (int k = kTerms - 1; k-- > 0;) {
-      slope = slope * s + c[static_cast<std::size_t>(k) + 1] * Interval(static_cast<double>(k + 1));
-    }
-    return polynomial(middle) + slope * (s - Interval(middle)) + slack(b);
-  }
-};
-
-/// int |f| in the order of time. Where f keeps its sign the integral is the difference of an antiderivative F between
-/// the ends of the whole run, so that enclosures of F are paid for once per change of sign and not per stretch.
-class AbsoluteIntegral {
- public:
-  void add(const LocalOutput& f, const LocalOutput& F, double a, double b, int depth) {
-    const Interval range = f.range(a, b);
-    const int sign = range.lo >= 0 ? 1 : range.hi <= 0 ? -1 : 0;
-    if (sign != 0) {
-      if (sign != sign_) {
-        close();
-        sign_ = sign;
-        start_ = F.at(a);
-      }
-      end_ = F.at(b);
-      return;
-    }
-    const double most = up(up(b - a) * range.mag());
-    // No stretch is short enough to tell the sign of what is smaller than its own error.
-    if (depth == 0 || most < 1e-19 || 8 * f.slack(b).hi > range.mag()) {
-      close();
-      total_ += Interval(0, most);
-      return;
-    }
-    const double middle = a + (b - a) / 2;
-    add(f, F, a, middle, depth - 1);
-    add(f, F, middle, b, depth - 1);
-  }
-
-  Interval finish() {
-    close();
-    return total_;
-  }
-
- private:
-  void close() {
-    if (sign_ != 0) {
-      const Interval part = sign_ > 0 ? end_ - start_ : start_ - end_;
-      total_ += Interval(std::max(0.0, part.lo), std::max(0.0, part.hi));
-    }
-    sign_ = 0;
-  }
-
-  Interval total_, start_, end_;
-  int sign_ = 0;
-};
 
 class Enclosure {
  public:
@@ -102,17 +25,17 @@ class Enclosure {
     length_ = 0.25 / sqrt(largest).hi;  // |A| <= its Frobenius norm
     for (std::size_t r = 0; r < 4; ++r) {
       taylor_[r][0] = system.rows[r];
-      for (std::size_t k = 1; k <= kTerms; ++k) {
+      for (std::size_t k = 1; k <= kLocalTerms; ++k) {
         taylor_[r][k] = taylor_[r][k - 1] * system.A;
         for (Interval& x : taylor_[r][k]) x = x / Interval(static_cast<double>(k));
       }
       row_norm_[r] = norm_above(taylor_[r][0]);
-      remainder_norm_[r] = norm_above(taylor_[r][kTerms]);
+      remainder_norm_[r] = norm_above(taylor_[r][kLocalTerms]);
     }
     // exp(A length) as intervals, by its Taylor sum; the remainder in norm.
     IntervalMatrix power(MatrixXd::Identity(static_cast<Index>(n), static_cast<Index>(n)));
     IntervalMatrix total = power;
-    for (int k = 1; k < kTerms; ++k) {
+    for (int k = 1; k < kLocalTerms; ++k) {
       power = power * system.A;
       for (std::size_t i = 0; i < n; ++i) {
         for (std::size_t j = 0; j < n; ++j) {
@@ -125,7 +48,7 @@ class Enclosure {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) step_[i * n + j] = total(i, j);
     }
-    step_remainder_ = 2 * std::pow(0.2500001, kTerms) / 6.4e15;  // 0.25^18/18! and what follows it
+    step_remainder_ = 2 * std::pow(0.2500001, kLocalTerms) / 6.4e15;  // 0.25^18/18! and what follows it
   }
 
   /// @param y which row is h': 2 with an integral, whose system's response is h; 1 without.
@@ -146,17 +69,17 @@ class Enclosure {
     double best_slope = 0;
     double size = first;
     for (long step = 0; size > std::max(1e-13 * first, 1e3 * error) && step < 4'000'000; ++step) {
-      std::array<LocalOutput, 4> local;
+      std::array<LocalPolynomial, 4> local;
       for (std::size_t r = 0; r < 4; ++r) {
-        for (std::size_t k = 0; k < kTerms; ++k) local[r].c[k] = dot(taylor_[r][k], w);
+        for (std::size_t k = 0; k < kLocalTerms; ++k) local[r].c[k] = dot(taylor_[r][k], w);
         local[r].remainder = up(remainder_norm_[r] * size * (1 + 1e-12));
         local[r].error = up(row_norm_[r] * error);
       }
       local[y - 1].c[0] += settled;
-      if (y == 2) rate.add(local[1], local[0], 0, length_, kDepth);
-      amplitude.add(local[y], local[y - 1], 0, length_, kDepth);
-      extremum(local[y - 1], local[y], 0, length_, kDepth, best_value, norms.edge);
-      extremum(local[y], local[y + 1], 0, length_, kDepth, best_slope, norms.impulse);
+      if (y == 2) rate.add(local[1], local[0], 0, length_, kLocalDepth);
+      amplitude.add(local[y], local[y - 1], 0, length_, kLocalDepth);
+      raise_supremum(local[y - 1], local[y], 0, length_, kLocalDepth, best_value, norms.edge);
+      raise_supremum(local[y], local[y + 1], 0, length_, kLocalDepth, best_slope, norms.impulse);
       advance(w, error);
       size = length(w) + error;
     }
@@ -170,8 +93,6 @@ class Enclosure {
   }
 
  private:
-  static constexpr int kDepth = 30;
-
   Interval dot_row(std::size_t i) const {
     Interval total;
     for (std::size_t j = 0; j < system_.A.size(); ++j)
@@ -200,31 +121,9 @@ class Enclosure {
     w = std::move(next);
   }
 
-  /// Raises best.lo and best.hi to enclose the supremum of |f| over all stretches seen so far.
-  void extremum(const LocalOutput& f, const LocalOutput& slope, double a, double b, int depth, double& lower,
-                Interval& best) const {
-    lower = std::max({lower, abs(f.at(a)).lo, abs(f.at(b)).lo});
-    best.lo = std::max(best.lo, lower);
-    const Interval turn = slope.range(a, b);
-    double most;
-    if (turn.lo >= 0 || turn.hi <= 0) {
-      most = std::max(f.at(a).mag(), f.at(b).mag());  // monotonic
-    } else {
-      most = f.range(a, b).mag();
-      if (most <= best.hi) return;
-      if (depth > 0 && most > lower * (1 + 1e-15) && 8 * slope.slack(b).hi < turn.mag()) {
-        const double middle = a + (b - a) / 2;
-        extremum(f, slope, a, middle, depth - 1, lower, best);
-        extremum(f, slope, middle, b, depth - 1, lower, best);
-        return;
-      }
-    }
-    best.hi = std::max(best.hi, most);
-  }
-
   const ContractingSystem& system_;
   double length_ = 0;
-  std::array<std::array<IntervalVector, kTerms + 1>, 4> taylor_;
+  std::array<std::array<IntervalVector, kLocalTerms + 1>, 4> taylor_;
   std::array<double, 4> row_norm_{};
   std::array<double, 4> remainder_norm_{};
   std::vector<Interval> step_;
@@ -274,7 +173,11 @@ std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channe
   const bool integrates = loop.Ki > 0;
   const TransferFunction y = integrates ? step_transfer(loop, channel) : impulse_transfer(loop, channel);
   if (loop.delay_s == 0) return norms_over(y, intervals(sum(y.denominator, y.feedback)), integrates);
-  constexpr double kSharp = 0.01;
+  // A delay that is short against the slowest mode takes many steps, but may be sharp by its expansion.
+  constexpr long kFewPieces = 30'000;
+  constexpr long kMostPieces = 400'000;
+  constexpr double kSharp = 1e-3;
+  if (const auto norms = norms_by_steps(y, integrates, kFewPieces)) return norms;
   std::size_t order = y.denominator.size() - y.feedback.size();
   IntervalVector denominator;
   double rest = kInfinity;
@@ -282,6 +185,9 @@ std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channe
     IntervalVector expanded = with_expanded_delay(y, order);
     const double missed = rest_of_delay(y, order, expanded);
     if (missed < rest) rest = missed, denominator = std::move(expanded);
+  }
+  if (!(rest < kSharp)) {
+    if (const auto norms = norms_by_steps(y, integrates, kMostPieces)) return norms;
   }
   if (!(rest < 1)) return std::nullopt;
   std::optional<VerifiedNorms> norms = norms_over(y, denominator, integrates);

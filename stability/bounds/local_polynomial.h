@@ -1,0 +1,115 @@
+/// @file Functions that are polynomials on short stretches, up to a bounded error: what they integrate to. Not for users.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "stability/bounds/interval.h"
+
+namespace swarmcert::stability {
+
+inline constexpr int kLocalTerms = 18;
+/// How often a stretch is halved at most.
+inline constexpr int kLocalDepth = 30;
+
+/// Taylor coefficients of one output along a trajectory from a point, with a remainder and an error ball.
+struct LocalPolynomial {
+  std::array<Interval, kLocalTerms> c;
+  double remainder = 0;  ///< times s^kLocalTerms
+  double error = 0;      ///< of the point, seen in this output
+
+  /// What the polynomial may miss anywhere up to `s`.
+  Interval slack(double s) const {
+    const double r = up(up(std::pow(s, kLocalTerms) * (1 + 1e-14)) * remainder);
+    const double total = up(r + error);
+    return {-total, total};
+  }
+  Interval polynomial(double s) const {
+    Interval total;
+    for (int k = kLocalTerms; k-- > 0;) total = total * Interval(s) + c[static_cast<std::size_t>(k)];
+    return total;
+  }
+  Interval at(double s) const { return polynomial(s) + slack(s); }
+
+  /// Range on [a, b]: the value in the middle and the slope over the stretch (mean value form).
+  Interval range(double a, double b) const {
+    const double middle = a + (b - a) / 2;
+    const Interval s(a, b);
+    Interval slope;
+    for (int k = kLocalTerms - 1; k-- > 0;) {
+      slope = slope * s + c[static_cast<std::size_t>(k) + 1] * Interval(static_cast<double>(k + 1));
+    }
+    return polynomial(middle) + slope * (s - Interval(middle)) + slack(b);
+  }
+};
+
+/// int |f| in the order of time. Where f keeps its sign the integral is the difference of an antiderivative F between
+/// the ends of the whole run, so that enclosures of F are paid for once per change of sign and not per stretch.
+class AbsoluteIntegral {
+ public:
+  void add(const LocalPolynomial& f, const LocalPolynomial& F, double a, double b, int depth) {
+    const Interval range = f.range(a, b);
+    const int sign = range.lo >= 0 ? 1 : range.hi <= 0 ? -1 : 0;
+    if (sign != 0) {
+      if (sign != sign_) {
+        close();
+        sign_ = sign;
+        start_ = F.at(a);
+      }
+      end_ = F.at(b);
+      return;
+    }
+    const double most = up(up(b - a) * range.mag());
+    // No stretch is short enough to tell the sign of what is smaller than its own error.
+    if (depth == 0 || most < 1e-19 || 8 * f.slack(b).hi > range.mag()) {
+      close();
+      total_ += Interval(0, most);
+      return;
+    }
+    const double middle = a + (b - a) / 2;
+    add(f, F, a, middle, depth - 1);
+    add(f, F, middle, b, depth - 1);
+  }
+
+  Interval finish() {
+    close();
+    return total_;
+  }
+
+ private:
+  void close() {
+    if (sign_ != 0) {
+      const Interval part = sign_ > 0 ? end_ - start_ : start_ - end_;
+      total_ += Interval(std::max(0.0, part.lo), std::max(0.0, part.hi));
+    }
+    sign_ = 0;
+  }
+
+  Interval total_, start_, end_;
+  int sign_ = 0;
+};
+
+/// Raises best.lo and best.hi to enclose the supremum of |f| over all stretches seen so far.
+inline void raise_supremum(const LocalPolynomial& f, const LocalPolynomial& slope, double a, double b,
+                           int depth, double& lower, Interval& best) {
+  lower = std::max({lower, abs(f.at(a)).lo, abs(f.at(b)).lo});
+  best.lo = std::max(best.lo, lower);
+  const Interval turn = slope.range(a, b);
+  double most;
+  if (turn.lo >= 0 || turn.hi <= 0) {
+    most = std::max(f.at(a).mag(), f.at(b).mag());  // monotonic
+  } else {
+    most = f.range(a, b).mag();
+    if (most <= best.hi) return;
+    if (depth > 0 && most > lower * (1 + 1e-15) && 8 * slope.slack(b).hi < turn.mag()) {
+      const double middle = a + (b - a) / 2;
+      raise_supremum(f, slope, a, middle, depth - 1, lower, best);
+      raise_supremum(f, slope, middle, b, depth - 1, lower, best);
+      return;
+    }
+  }
+  best.hi = std::max(best.hi, most);
+}
+
+}  // namespace swarmcert::stability
