@@ -24,7 +24,7 @@ std::string label_of(const LearningData& data, int component) {
                      target.unit);
 }
 
-void add_curve(Report& report, const LearningData& data, const learning::Run& run) {
+void add_curve(Report& report, const LearningData& data, const learning::Run& run, std::size_t teachers) {
   std::string text;
   for (std::size_t e = 0; e < run.epochs.size(); ++e)
     text += fmt::format("{} {} {}\n", e + 1, run.epochs[e].fit_rmse, run.epochs[e].select_rmse);
@@ -35,7 +35,9 @@ void add_curve(Report& report, const LearningData& data, const learning::Run& ru
           "plot 'epochs.dat' using 1:2 with linespoints lw 2 title 'flights to fit', '' using 1:3 with "
           "linespoints lw 2 "
           "title 'flights to select'\n",
-      fmt::format("Error over epochs. Kept: epoch {}.", run.best_epoch + 1));
+      fmt::format("Error over epochs{}. Kept: epoch {}.",
+                  teachers > 0 ? fmt::format(", to fit against the mean of {} teachers", teachers) : "",
+                  run.best_epoch + 1));
 }
 
 /// Share of the test samples per bin of one component of the target, before and after.
@@ -119,7 +121,7 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
   Report report("Training of a deep set");
   report.result(result);
   report.heading("Learning curve");
-  add_curve(report, data, run);
+  add_curve(report, data, run, result["teachers"].size());
   report.heading("What is left");
   const int components = data.samples.outputs;
   for (int c = 0; c < components; ++c) add_histogram(report, data, run, c);

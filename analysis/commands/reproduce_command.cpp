@@ -92,11 +92,14 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   if (setting.recorded.empty()) setting.recorded = std::string(SWARMCERT_SOURCE_DIR) + "/../shared/data";
   std::unique_ptr<Progress> progress;
   std::string part;
+  double share = 0;
   setting.progress = [&](int done, int total, const std::string& what) {
-    // A new part of the work, a new line.
+    // A new part of the work, a new line: another word, or the same one from the beginning.
     const std::string begins = what.substr(0, what.find(','));
-    if (!progress || begins != part) progress = std::make_unique<Progress>(common.quiet);
+    const double now = static_cast<double>(done) / std::max(total, 1);
+    if (!progress || begins != part || now < share) progress = std::make_unique<Progress>(common.quiet);
     part = begins;
+    share = now;
     progress->show(done, total, what);
   };
   const Finding finding = chosen.run(setting);
@@ -139,8 +142,10 @@ Command reproduce_command() {
               "networks "
               "in\nDIR/small or DIR/full are shared: what is there is not done again, and an interrupted "
               "call goes "
-              "on.\nResults are shown as found, with their seeds. Interaction torques are not learned: not "
-              "done.\n\nExample: swarmcert reproduce table -o reproduced\n"
+              "on.\nResults are shown as found, with their seeds. Interaction torques are learned by "
+              "train --quantity\ntorque, and flown by simulate --torque-network.\n\nExample: swarmcert "
+              "reproduce table -o "
+              "reproduced\n"
               "         swarmcert reproduce table --full --shard 1/2 -o reproduced",
           [words](CLI::App& app) {
             const auto options = std::make_shared<ReproduceOptions>();

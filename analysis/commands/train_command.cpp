@@ -37,6 +37,7 @@ struct TrainOptions {
   std::string gamma_scope = "layer", gamma_mode = "clip";
   std::string weights = "errors", symmetry = "vertical";
   bool no_ground = false;
+  int teachers = 0;
 };
 
 /// Root mean square errors in the unit of the targets.
@@ -84,6 +85,7 @@ files::Json number_or_null(double x) { return std::isfinite(x) ? files::Json(x) 
 
 struct Outcome {
   learning::Run run;
+  std::vector<learning::Teacher> teachers;
   Scores all;
   std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
   std::map<std::string, Scores> compositions;
@@ -124,6 +126,11 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
                               {"unit", fmt::format("{} per unit of input", target.unit)}});
   json["lipschitz"] = outcome.certified.largest();
   json["gamma_verdict"] = name(outcome.certified.gamma);
+  json["teachers"] = files::Json::array();
+  for (const learning::Teacher& teacher : outcome.teachers)
+    json["teachers"].push_back({{"seed", teacher.seed},
+                                {"best_epoch", teacher.best_epoch + 1},
+                                {fmt::format("select_rmse_{}", target.unit), teacher.select_rmse}});
   json["best_epoch"] = outcome.run.best_epoch + 1;
   json["epochs"] = files::Json::array();
   for (const learning::Epoch& epoch : outcome.run.epochs)
@@ -143,8 +150,11 @@ void print(const TrainOptions& options, const LearningData& data, const Outcome&
              flights[2].size());
   if (data.split_by_blocks)
     fmt::print("blocks of the flights that are fitted select or test: these errors look too good\n");
-  fmt::print("best of {} epochs: {}\n\n", outcome.run.epochs.size(), outcome.run.best_epoch + 1);
   const learning::TargetInfo& target = learning::info(data.target);
+  for (const learning::Teacher& teacher : outcome.teachers)
+    fmt::print("teacher of seed {}: {:.3f} {} on the selecting flights\n", teacher.seed, teacher.select_rmse,
+               target.unit);
+  fmt::print("best of {} epochs: {}\n\n", outcome.run.epochs.size(), outcome.run.best_epoch + 1);
   fmt::print("{:<34}{:>18}{:>18}\n", fmt::format("{} on test flights", target.words),
              fmt::format("no network [{}]", target.unit), fmt::format("network [{}]", target.unit));
   for (const auto& [composition, scores] : outcome.compositions)
@@ -236,9 +246,12 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   const CancelOnInterrupt interrupt;
   options.run.cancelled = interrupt.flag();
   Outcome outcome;
-  outcome.run = learning::run_training(data, options.run);
+  learning::TaughtRun taught = learning::run_with_teachers(data, options.run, options.teachers);
+  outcome.run = std::move(taught.run);
+  outcome.teachers = std::move(taught.teachers);
   if (outcome.run.was_cancelled) {
-    fmt::print(stderr, "stopped after {} epochs; --resume goes on\n", outcome.run.epochs.size());
+    fmt::print(stderr, "stopped after {} epochs{}; --resume goes on\n", outcome.run.epochs.size(),
+               options.teachers > 0 ? fmt::format(" of seed {}", outcome.run.seed) : "");
     return kInconclusive;
   }
 
@@ -269,6 +282,8 @@ int run_train(TrainOptions options, const CommonOptions& common) {
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
   fs::remove(options.run.checkpoint);
+  for (const learning::Teacher& teacher : outcome.teachers)
+    fs::remove(learning::checkpoint_of(options.run, teacher.seed));
   return kDone;
 }
 
@@ -282,7 +297,8 @@ Command train_command() {
       "ground. Flights are split as wholes into fit,\nselect and test; the epoch with the least error on "
       "the selecting flights is kept, and projected so that gamma holds in\nexact arithmetic. An "
       "interrupted run goes on with --resume. What is flown is the vertical force; networks of a force or\n"
-      "torque act as effects of models, in simulation and in compare.\n\n"
+      "torque act as effects of models, in simulation and in compare; simulate --torque-network flies a "
+      "torque.\n\n"
       "Example: swarmcert train flights/ --epochs 20 -o trained",
       [](CLI::App& app) {
         const auto options = std::make_shared<TrainOptions>();
@@ -354,6 +370,11 @@ Command train_command() {
             ->check(CLI::Range(1, 1 << 20))
             ->capture_default_str();
         app.add_option("--seed", trainer.seed, "Of initial weights and order of samples")
+            ->capture_default_str();
+        app.add_option("--teachers", options->teachers,
+                       "Train so many networks first, with the seeds after --seed, and fit the one that is "
+                       "written to the mean of what they say: what differs from seed to seed averages out")
+            ->check(CLI::Range(0, 1000))
             ->capture_default_str();
         app.add_flag("--resume", options->run.resumes, "Go on with an interrupted run in the same folder");
         app.add_flag("--published-filter", options->flights.published_filter,

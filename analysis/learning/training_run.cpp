@@ -1,6 +1,7 @@
 #include "analysis/learning/training_run.h"
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "analysis/learning/lipschitz_limit.h"
@@ -87,6 +88,30 @@ int best_of(const std::vector<Epoch>& epochs) {
   return best;
 }
 
+/// Samples that are predicted at a time: few enough for the cache, many enough for matrix products.
+constexpr std::size_t kPredicted = 4096;
+
+/// Adds the outputs for the samples of `use` to the places of their targets in `sum`.
+void add_outputs(const LearningData& data, const Vector& theta, Use use, Vector& sum) {
+  const std::vector<Eigen::Index> samples = data.indices(use);
+  for (std::size_t at = 0; at < samples.size(); at += kPredicted) {
+    const auto count = static_cast<Eigen::Index>(std::min(kPredicted, samples.size() - at));
+    const training::Matrix outputs =
+        training::predict(data.layout, theta, data.samples, samples.data() + at, count);
+    for (Eigen::Index i = 0; i < count; ++i)
+      sum.segment(samples[at + static_cast<std::size_t>(i)] * data.samples.outputs, data.samples.outputs) +=
+          outputs.col(i);
+  }
+}
+
+void set_targets(const Vector& targets, Use use, LearningData& data) {
+  const Eigen::Index outputs = data.samples.outputs;
+  for (const Eigen::Index s : data.indices(use)) {
+    for (Eigen::Index k = s * outputs; k < (s + 1) * outputs; ++k)
+      data.samples.target[static_cast<std::size_t>(k)] = targets[k];
+  }
+}
+
 }  // namespace
 
 Run run_training(const LearningData& data, const RunOptions& options) {
@@ -129,6 +154,7 @@ Run run_training(const LearningData& data, const RunOptions& options) {
     if (!options.checkpoint.empty()) write_checkpoint(state, key, options.checkpoint);
     if (options.progress) options.progress(epoch + 1, options.epochs, state.epochs.back().select_rmse);
   }
+  run.seed = chosen.seed;
   run.theta = std::move(state.best);
   run.epochs = std::move(state.epochs);
   run.best_epoch = run.epochs.empty() ? 0 : best_of(run.epochs);
@@ -136,6 +162,44 @@ Run run_training(const LearningData& data, const RunOptions& options) {
   if (options.max_lipschitz > 0)
     limit_joint_bounds(options.max_lipschitz, data.layout, chosen.jobs, run.theta);
   return run;
+}
+
+std::string checkpoint_of(const RunOptions& options, std::uint64_t seed) {
+  if (options.checkpoint.empty() || seed == options.trainer.seed) return options.checkpoint;
+  std::filesystem::path path = options.checkpoint;
+  return path.replace_filename(path.stem().string() + "-" + std::to_string(seed) + path.extension().string())
+      .string();
+}
+
+TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options, int teachers) {
+  TaughtRun taught;
+  Vector said = Vector::Zero(data.samples.target.size());
+  LearningData of_teachers;
+  for (int i = 1; i <= teachers + 1; ++i) {
+    const bool is_last = i > teachers;
+    RunOptions one = options;
+    one.trainer.seed += is_last ? 0 : static_cast<std::uint64_t>(i);
+    one.checkpoint = checkpoint_of(options, one.trainer.seed);
+    one.resumes = options.resumes && (i == 1 || std::filesystem::exists(one.checkpoint));
+    if (options.progress) {
+      one.progress = [&options, i, teachers](int done, int total, double select_rmse) {
+        options.progress((i - 1) * total + done, (teachers + 1) * total, select_rmse);
+      };
+    }
+    if (is_last && teachers > 0) {
+      of_teachers = data;
+      set_targets(said / static_cast<float>(teachers), Use::kFit, of_teachers);
+    }
+    Run run = run_training(is_last && teachers > 0 ? of_teachers : data, one);
+    if (is_last || run.was_cancelled) {
+      taught.run = std::move(run);
+      break;
+    }
+    add_outputs(data, run.theta, Use::kFit, said);
+    taught.teachers.push_back(
+        {run.seed, run.best_epoch, run.epochs[static_cast<std::size_t>(run.best_epoch)].select_rmse});
+  }
+  return taught;
 }
 
 double rmse(const LearningData& data, const Vector& theta, Use use, int jobs) {

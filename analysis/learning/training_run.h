@@ -30,6 +30,7 @@ struct Epoch {
 };
 
 struct Run {
+  std::uint64_t seed = 0;
   training::Vector
       theta;  ///< of the epoch with the best score on the selecting flights, projected onto gamma
   int best_epoch = 0;
@@ -43,6 +44,28 @@ struct Run {
 /// clipped at less than gamma in the next epoch.
 /// @throws files::InputError if the checkpoint cannot be read, or is of other networks, data or options.
 Run run_training(const LearningData& data, const RunOptions& options);
+
+/// One of the networks that another is fitted to.
+struct Teacher {
+  std::uint64_t seed;
+  int best_epoch;
+  double select_rmse;
+};
+
+struct TaughtRun {
+  Run run;
+  std::vector<Teacher> teachers;
+};
+
+/// File that keeps what `seed` has reached, of a run with teachers.
+std::string checkpoint_of(const RunOptions& options, std::uint64_t seed);
+
+/// Trains `teachers` networks, with the seeds after options.trainer.seed, and then one that is fitted to the mean of
+/// what they say of the samples to fit, in place of the recorded targets (distillation: Hinton et al. 2015). Recorded
+/// flights leave networks of several seeds with errors that differ by several percent; those average out, and the one
+/// network that is left keeps gamma and max_lipschitz like any other. The selecting flights judge by what was recorded.
+/// Without teachers it is run_training(). A run that is cancelled is returned at once, as it is.
+TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options, int teachers);
 
 /// RMSE, in the unit of the targets, of theta on the samples of `use`, of kFit weighted by scenario; NaN where there are
 /// none.

@@ -18,11 +18,11 @@ using learning::Use;
 constexpr const char* kLearnSchema = "swarmcert/learned/1";
 
 std::string text_of(const LearnOptions& options) {
-  std::string text =
-      fmt::format("groups {} {} {} {} {} {} {} {} {} {} {} {}", options.gamma.value,
-                  static_cast<int>(options.gamma.scope), static_cast<int>(options.gamma.mode),
-                  options.max_lipschitz, options.turns, options.rate, options.batch, options.steps,
-                  options.epochs, options.seed, options.sizes.features, options.sizes.ground);
+  std::string text = fmt::format("teachers {} {} {} {} {} {} {} {} {} {} {} {} {}", options.gamma.value,
+                                 static_cast<int>(options.gamma.scope), static_cast<int>(options.gamma.mode),
+                                 options.max_lipschitz, options.turns, options.rate, options.batch,
+                                 options.steps, options.epochs, options.seed, options.teachers,
+                                 options.sizes.features, options.sizes.ground);
   for (const int size : options.sizes.phi) text += fmt::format(" phi {}", size);
   for (const int size : options.sizes.rho) text += fmt::format(" rho {}", size);
   return text;
@@ -69,11 +69,13 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   run.epochs = options.steps > 0 ? std::max(1, (options.steps + per_epoch / 2) / per_epoch) : options.epochs;
   run.patience = run.epochs;
   run.checkpoint = (fs::path(folder) / ("checkpoint-" + whole_key.substr(0, 12) + ".json")).string();
-  run.resumes = fs::exists(run.checkpoint);
+  const std::uint64_t first = options.seed + (options.teachers > 0 ? 1 : 0);
+  run.resumes = fs::exists(learning::checkpoint_of(run, first));
   run.progress = [&](int epochs, int total, double select_gf) {
     setting.progress(epochs, total, fmt::format("epochs, {:.3f} gf", select_gf));
   };
-  const learning::Run trained = learning::run_training(data, run);
+  const learning::TaughtRun taught = learning::run_with_teachers(data, run, options.teachers);
+  const learning::Run& trained = taught.run;
   const files::Network network = learning::write_network(data, trained.theta, options.gamma, folder);
   lipschitz::CertifyOptions certify;
   certify.jobs = setting.jobs;
@@ -97,6 +99,8 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
                             {"fit_and_select_gf", std::move(epochs)}};
   files::write_file(done, files::to_text(file), true);
   fs::remove(run.checkpoint);
+  for (const learning::Teacher& teacher : taught.teachers)
+    fs::remove(learning::checkpoint_of(run, teacher.seed));
   return read_back(file, folder);
 }
 

@@ -31,7 +31,8 @@ void physics_first(const Setting& setting, Finding& finding) {
     inputs->vehicle_models = budget.fitted;
   std::string physics;
   for (const auto& [vehicle, model] : budget.fitted) physics += vehicle + "\n" + stability::to_toml(model);
-  const Learned learned = train_recorded(setting, recorded, "remainder", "remainder of " + physics);
+  const Learned learned =
+      train_recorded(setting, recorded, recorded_options(setting), "remainder", "remainder of " + physics);
   judge("+ deep set on the remainder", with_network(recorded.test, learned.folder + "/network.toml"));
 
   Table table = {"Physics first: vertical residual on test flights",

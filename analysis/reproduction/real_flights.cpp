@@ -129,7 +129,8 @@ void add_having_seen(const Setting& setting, const Recorded& recorded, const Tes
     all.fit.found.flights.insert(all.fit.found.flights.end(), flights.begin(), flights.end());
   }
   all.select = recorded.test;
-  const Learned learned = train_recorded(setting, all, "deep-set-seen", "deep set that saw the test flights");
+  const Learned learned = train_recorded(setting, all, recorded_options(setting), "deep-set-seen",
+                                         "deep set that saw the test flights");
   const TestBlocks blocks =
       residual_blocks(with_network(recorded.test, learned.folder + "/network.toml"), setting.jobs);
   files::Json scenarios = files::Json::array();
@@ -147,10 +148,18 @@ void add_having_seen(const Setting& setting, const Recorded& recorded, const Tes
       compared.mean_ours_gf, compared.mean_theirs_gf, compared.largest_ratio, compared.where, learned.bound));
 }
 
+/// At full size what differs between seeds is averaged out.
+LearnOptions taught_options(const Setting& setting) {
+  LearnOptions options = recorded_options(setting);
+  options.teachers = setting.full ? 4 : 0;
+  return options;
+}
+
 /// The deep set alone, with the authors' own labels: thrust behind their lag, acceleration as logged, their masses.
 void deep_set_alone(const Setting& setting, Finding& finding) {
   const Recorded recorded = recorded_flights(setting, true);
-  const Learned learned = train_recorded(setting, recorded, "deep-set", "deep set alone");
+  const Learned learned =
+      train_recorded(setting, recorded, taught_options(setting), "deep-set", "deep set alone");
   finding.json["recorded_sha256"] = files::sha256(recorded_key(setting, recorded));
   const std::string network = published_network(setting);
   const TestBlocks ours_blocks =

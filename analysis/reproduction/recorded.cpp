@@ -80,7 +80,7 @@ LearnOptions recorded_options(const Setting& setting) {
   options.turns = true;
   options.rate = 2e-3;
   options.batch = 1024;
-  options.epochs = setting.full ? 16 : 6;
+  options.epochs = setting.full ? 9 : 6;
   options.seed = setting.seed;
   return options;
 }
@@ -92,9 +92,8 @@ learning::LearningData load_recorded(const Setting& setting, const Recorded& rec
                                       [&](int done, int total) { setting.progress(done, total, "flights"); });
 }
 
-Learned train_recorded(const Setting& setting, const Recorded& recorded, const std::string& name,
-                       const std::string& what) {
-  const LearnOptions options = recorded_options(setting);
+Learned train_recorded(const Setting& setting, const Recorded& recorded, const LearnOptions& options,
+                       const std::string& name, const std::string& what) {
   return learn(setting, options, (fs::path(setting.work) / name).string(),
                what + " " + recorded_key(setting, recorded),
                [&] { return load_recorded(setting, recorded, options); });

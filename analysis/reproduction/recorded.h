@@ -27,8 +27,8 @@ LearnOptions recorded_options(const Setting& setting);
 learning::LearningData load_recorded(const Setting& setting, const Recorded& recorded,
                                      const LearnOptions& options);
 /// Into the folder `name`; `what` tells networks from the same flights apart.
-Learned train_recorded(const Setting& setting, const Recorded& recorded, const std::string& name,
-                       const std::string& what);
+Learned train_recorded(const Setting& setting, const Recorded& recorded, const LearnOptions& options,
+                       const std::string& name, const std::string& what);
 
 /// Text that changes with every flight.
 std::string recorded_key(const Setting& setting, const Recorded& recorded);

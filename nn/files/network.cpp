@@ -199,6 +199,12 @@ void require_force_z(const Network& network) {
                     "name a network of force_z; as an effect of a model this one acts in simulation"});
 }
 
+void require_torque(const Network& network) {
+  if (network.output_quantity == "torque") return;
+  throw InputError({network.path, "", "output.quantity", in_quotes(network.output_quantity),
+                    "is not a torque", "name a network of train --quantity torque"});
+}
+
 Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load) {
   const toml::table document = parse_toml(text, path);
   const TomlTable top(document, path);

@@ -58,6 +58,8 @@ int components(const std::string& quantity);
 
 /// @throws InputError if the network states another output than the vertical force, which is what flight code takes.
 void require_force_z(const Network& network);
+/// @throws InputError unless the network states a torque.
+void require_torque(const Network& network);
 
 /// Which files make up NET: exactly one of `file`, or `phi` with `rho`.
 struct NetworkArguments {

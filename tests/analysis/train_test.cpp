@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <filesystem>
 
 #include "analysis/run.h"
 #include "nn/files/json.h"
@@ -120,6 +122,27 @@ TEST_F(TrainVectors, AlsoLearnsTheWholeForceAndTheTorqueWhichModelsThenHave) {
     };
     EXPECT_LT(rmse_x(out + "/model-small.toml"), 0.6 * rmse_x("nominal.toml"));
 
+    std::string tilting = read_text(folder_ / "truth.toml");
+    tilting.replace(tilting.find("push = 0.4"), 10, "push = 0.0");
+    write_text(folder_ / "tilting.toml", tilting);
+    const auto flown_rms_m = [&](const std::string& options) {
+      const Outcome flown =
+          execute("swarmcert simulate random-walk --duration 12 --vehicles 2 --model tilting.toml --gains '" +
+                  std::string(SWARMCERT_SOURCE_DIR) +
+                  "/controller/gains/crazyflie-small.toml' --no-noise --seed 9 -o fed --force --json "
+                  "flown.json " +
+                  options);
+      EXPECT_EQ(flown.exit_code, quantity == "torque" || options.empty() ? 0 : 3) << flown.output;
+      const Json all = files::read_json(folder_ / "flown.json", "swarmcert/simulate/1");
+      return all["vehicles"][0]["rms"]["total"].get<double>() +
+             all["vehicles"][1]["rms"]["total"].get<double>();
+    };
+    const double alone = flown_rms_m(""),
+                 fed_forward = flown_rms_m("--torque-network " + out + "/network.toml");
+    if (quantity == "torque") {
+      EXPECT_LT(fed_forward, 0.95 * alone);
+    }
+
     for (const std::string& use :
          {"simulate swap --vehicles 2 --model nominal.toml --network " + out + "/network.toml -o flown",
           "bound --model nominal.toml --speed 1 --accel 1 --network " + out + "/network.toml"}) {
@@ -173,6 +196,34 @@ TEST_F(Train, SameSeedGivesTheSameFilesWhateverTheJobs) {
     EXPECT_EQ(read_text(folder_ / ("one/" + file)), read_text(folder_ / ("two/" + file))) << file;
     EXPECT_NE(read_text(folder_ / ("one/" + file)), read_text(folder_ / ("other/" + file))) << file;
   }
+}
+
+/// Of the last epoch, against what is fitted.
+double fit_rmse(const Json& result) { return result["epochs"].back()["fit_rmse_gf"].get<double>(); }
+
+TEST_F(Train, TeachersAreTheNetworksOfTheirSeedsAndWhatTheyTeachIsNotTheRecord) {
+  const auto learn = [&](const std::string& options) {
+    const Outcome outcome =
+        execute(train("--epochs 6 --batch 256 --rate 5e-3 --force --json result.json " + options));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return files::read_json(folder_ / "result.json", "swarmcert/train/1");
+  };
+  const Json taught = learn("--seed 4 --teachers 2 -o taught");
+  ASSERT_EQ(taught["teachers"].size(), 2u);
+  double least_of_teachers = 1e9;
+  for (const Json& teacher : taught["teachers"]) {
+    const Json alone = learn(fmt::format("--seed {} -o alone", teacher["seed"].get<int>()));
+    const auto epoch = alone["best_epoch"].get<std::size_t>() - 1;
+    EXPECT_EQ(teacher["select_rmse_gf"], alone["epochs"][epoch]["select_rmse_gf"]);
+    least_of_teachers = std::min(least_of_teachers, fit_rmse(alone));
+  }
+  EXPECT_LT(fit_rmse(taught), least_of_teachers) << "what networks say has no noise of measurement";
+  EXPECT_EQ(taught["gamma_verdict"], "proved");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "taught/checkpoint.json"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "taught/checkpoint-5.json"));
+  learn("--seed 4 -o untaught");
+  const std::string file = "/phi_small.safetensors";
+  EXPECT_NE(read_text(folder_ / ("taught" + file)), read_text(folder_ / ("untaught" + file)));
 }
 
 TEST_F(Train, HoldsBackNamedFlightsOrBlocksAndRefusesAFlightForTwoUses) {
