@@ -65,7 +65,7 @@ enum Fault : std::uint8_t {
   kAttitudeFault = 2,    ///< attitude or rate: as above, or not a rotation. Answer: motors off
   kReferenceFault = 4,   ///< not finite or out of range. Answer: stay at the last position that was asked for
   kBatteryFault = 8,     ///< outside kLowestVoltage_V to kHighestVoltage_V. Answer: kAssumedVoltage_V
-  kPredictionFault = 16  ///< f_a_hat not finite or out of range. Answer: f_a_hat = 0
+  kPredictionFault = 16  ///< f_a_hat or tau_a_hat not finite or out of range. Answer: 0 for it
 };
 
 /// Ages beyond which a measurement no longer describes the vehicle: three losses in a row at 30 Hz, ten at 500 Hz.
@@ -75,6 +75,8 @@ inline constexpr int kLargestSpeed_m_s = 50, kLargestAcceleration_m_s2 = 50, kLa
 inline constexpr int kLargestRateDerivative_rad_s2 = 10000;
 /// Largest |f_a_hat| per weight of the vehicle.
 inline constexpr int kLargestEffectPerWeight = 2;
+/// Largest |tau_a_hat| per weight of the vehicle, in metre.
+inline constexpr double kLargestTorquePerWeight_m = 0.1;
 /// Taken when the sensor has failed: low, so that the motors get rather more than less.
 inline constexpr double kAssumedVoltage_V = 3.4;
 /// Thrust of the level descent over weight: drag and the ground end it at a few m/s.
@@ -178,13 +180,14 @@ inline Vector3<Scalar> attitude_torque(const FlightSettings<Scalar, Gains>& sett
 }  // namespace detail
 
 /// One period of the attitude loop, with one of the position loop in it where `position_is_due`.
-/// @param effect_W_N f_a_hat; zero where there is no network.
+/// @param effect_W_N       f_a_hat; zero where there is no network.
+/// @param torque_effect_Nm tau_a_hat about the axes of the body: taken from what the attitude law asks for.
 template <typename Scalar, typename Gains>
 inline FlightCommand<Scalar> flight_step(const FlightSettings<Scalar, Gains>& settings,
                                          FlightMemory<Scalar>& memory, const Measured<Scalar>& measured,
                                          const FlightReference<Scalar>& wanted,
                                          const Vector3<Scalar>& effect_W_N, std::uint32_t now_ms,
-                                         bool position_is_due) {
+                                         bool position_is_due, const Vector3<Scalar>& torque_effect_Nm = {}) {
   FlightCommand<Scalar> command;
   unsigned faults = detail::faults(measured, now_ms);
 
@@ -206,6 +209,11 @@ inline FlightCommand<Scalar> flight_step(const FlightSettings<Scalar, Gains>& se
     faults |= kPredictionFault;
     effect = {};
   }
+  Vector3<Scalar> torque_effect = torque_effect_Nm;
+  if (!is_within(torque_effect, product(Scalar(kLargestTorquePerWeight_m), weight_N))) {
+    faults |= kPredictionFault;
+    torque_effect = {};
+  }
   command.faults = static_cast<std::uint8_t>(faults);
   if ((faults & kAttitudeFault) != 0) {
     command.motors_off = true;
@@ -220,7 +228,8 @@ inline FlightCommand<Scalar> flight_step(const FlightSettings<Scalar, Gains>& se
   }
   command.force_W_N = memory.force_W_N;
   command.wanted.thrust_N = collective_thrust(settings.thrust_rule, memory.force_W_N, measured.attitude.R_WB);
-  command.wanted.torque_N_m = detail::attitude_torque(settings, memory, measured.attitude, reference);
+  command.wanted.torque_N_m =
+      detail::attitude_torque(settings, memory, measured.attitude, reference) - torque_effect;
 
   const Scalar volts = (faults & kBatteryFault) != 0 ? Scalar(kAssumedVoltage_V) : measured.battery_V;
   const ForceLimits<Scalar> limits{settings.idle_force_N,

@@ -167,29 +167,33 @@ struct Outcome {
 };
 
 /// One control period of lanes that agree on `flags`.
-/// @returns the lanes of one side where they disagree, and then changes nothing; else 0.
+/// @param keeps whether `slot` must be as it was where lanes disagree. Where they agreed a period ago, and neither
+///              measurements nor references are new, there is little to keep.
+/// @returns the lanes of one side where they disagree; else 0.
 template <typename Settings>
 SWARMCERT_FOR_LANES [[gnu::noinline]] unsigned fly(const Settings& settings, Slot<Lanes>& slot,
                                                    Group::Flags& flags, std::uint32_t now_ms,
-                                                   bool position_is_due, Outcome* outcome) {
+                                                   bool position_is_due, bool keeps, Outcome* outcome) {
   if (settings.allocation.count != kNumRotors) __builtin_unreachable();  // so that loops over rotors unroll
-  FlightMemory<Lanes> memory = slot.memory;
+  FlightMemory<Lanes>& memory = slot.memory;
+  FlightMemory<Lanes> before;
+  if (keeps) before = memory;
+  const controller::Vector3<Lanes> rate_integral_rad = memory.rate_integral_rad;
+  const Lanes mean_p = memory.mean_p;
   memory.has_reference = flags.has_reference;
   memory.thrust_saturated = flags.thrust_saturated;
   slot.measured.position_stamp_ms = flags.position_stamp_ms;
   Lanes::split = 0;
-  const FlightCommand<Lanes> command =
-      controller::flight_step(settings, memory, slot.measured, slot.reference,
-                              {Lanes(), Lanes(), slot.prediction_N}, now_ms, position_is_due);
-  if (Lanes::split != 0) return static_cast<unsigned>(Lanes::split);
-  // mean_p stays, as in Pilot::push(). Between position loops only the attitude law's integral changes: the same wanted
-  // reference was taken over before.
-  if (position_is_due) {
-    memory.mean_p = slot.memory.mean_p;
-    slot.memory = memory;
-  } else {
-    slot.memory.rate_integral_rad = memory.rate_integral_rad;
+  const FlightCommand<Lanes> command = controller::flight_step(
+      settings, memory, slot.measured, slot.reference, {Lanes(), Lanes(), slot.prediction_N}, now_ms,
+      position_is_due, slot.torque_prediction_Nm);
+  if (Lanes::split != 0) {
+    if (keeps) memory = before;
+    memory.rate_integral_rad = rate_integral_rad;
+    memory.mean_p = mean_p;
+    return static_cast<unsigned>(Lanes::split);
   }
+  memory.mean_p = mean_p;  // as in Pilot::push()
   slot.answer.wanted = command.wanted;
   for (int r = 0; r < kNumRotors; ++r) slot.answer.forces.at_N[r] = command.mixed.forces.at_N[r];
   flags.has_reference = memory.has_reference;
@@ -202,18 +206,19 @@ SWARMCERT_FOR_LANES [[gnu::noinline]] unsigned fly(const Settings& settings, Slo
 /// returned; else 0.
 template <typename Settings>
 SWARMCERT_FOR_LANES unsigned step_lanes(const Settings& settings, Group& group, unsigned lanes,
-                                        std::uint32_t now_ms, bool position_is_due, ControlRecord* records) {
+                                        std::uint32_t now_ms, bool position_is_due, bool may_differ,
+                                        ControlRecord* records) {
   Group::Flags flags = group.flags[first_of(lanes)];
   Outcome common;
   if (lanes == Lanes::kAll) {
-    const unsigned split = fly(settings, group.slot, flags, now_ms, position_is_due, &common);
+    const unsigned split = fly(settings, group.slot, flags, now_ms, position_is_due, may_differ, &common);
     if (split != 0) return split;
   } else {
     const Lanes::Part part(lanes);
     Slot<Lanes> own;
     each(own, group.slot, Fill{part});
     own.measured.attitude_stamp_ms = now_ms;
-    const unsigned split = fly(settings, own, flags, now_ms, position_is_due, &common);
+    const unsigned split = fly(settings, own, flags, now_ms, position_is_due, false, &common);
     if (split != 0) return split & lanes;
     each(group.slot.memory, own.memory, Take{part});
     each(group.slot.answer, own.answer, Take{part});
@@ -301,15 +306,17 @@ class Bank : public ControllerBank {
     }
   }
 
-  void predict(int vehicle, double prediction_N) override {
+  void predict(int vehicle, double prediction_N, const Eigen::Vector3d& torque_B_Nm) override {
     const auto i = static_cast<std::size_t>(vehicle);
     if (group_of_[i] == nullptr) {
       slots_[i].prediction_N = static_cast<Scalar>(prediction_N);
+      slots_[i].torque_prediction_Nm = narrow<Scalar>(torque_B_Nm);
       return;
     }
     for (int lane = 0; lane < Lanes::kCount; ++lane) {
       if (group_of_[i]->vehicle_of(lane) == i) {
         group_of_[i]->slot.prediction_N.set(lane, static_cast<float>(prediction_N));
+        set(group_of_[i]->slot.torque_prediction_Nm, lane, torque_B_Nm);
       }
     }
   }
@@ -357,7 +364,8 @@ class Bank : public ControllerBank {
     slot.measured.battery_V = static_cast<Scalar>(battery_V);
     const typename Pilot<Scalar>::Push push =
         pilots_[static_cast<std::size_t>(swarm_.kind_of(static_cast<int>(i)))].push(
-            slot.memory, slot.measured, slot.reference, slot.prediction_N, now_ms, position_is_due);
+            slot.memory, slot.measured, slot.reference, slot.prediction_N, now_ms, position_is_due,
+            slot.torque_prediction_Nm);
     slot.answer = {push.wanted, push.forces};
     for (int r = 0; r < kNumRotors; ++r) record->rotor_N[r] = static_cast<double>(push.forces.at_N[r]);
     record->motors_off = push.motors_off;
@@ -383,7 +391,9 @@ class Bank : public ControllerBank {
       for (std::size_t k = 0; k < group.parts.size();) {
         const unsigned lanes = group.parts[k];
         unsigned some = may_differ ? alike(group, lanes) : lanes;
-        if (some == lanes) some = step_lanes(settings, group, lanes, now_ms, position_is_due, records.data());
+        if (some == lanes) {
+          some = step_lanes(settings, group, lanes, now_ms, position_is_due, may_differ, records.data());
+        }
         if (some == 0) {
           ++k;
         } else {

@@ -16,8 +16,9 @@ namespace swarmcert::stability {
 /// What one vehicle's controller was asked and what it answered in one control period.
 struct ControlRecord {
   Setpoint setpoint;
-  double prediction_N = 0;                      ///< f_a_hat along z, as applied
-  std::array<double, kNumRotors> rotor_N = {};  ///< commands before the delay
+  double prediction_N = 0;                                           ///< f_a_hat along z, as applied
+  Eigen::Vector3d torque_prediction_B_Nm = Eigen::Vector3d::Zero();  ///< tau_a_hat, as applied
+  std::array<double, kNumRotors> rotor_N = {};                       ///< commands before the delay
   bool motors_off = false;
   bool saturated = false;   ///< thrust was held at its upper limit
   std::uint8_t faults = 0;  ///< sum of controller::Fault
@@ -38,8 +39,8 @@ class ControllerBank {
                    std::uint32_t stamp_ms) = 0;
   /// What a vehicle shall follow, until the next call.
   virtual void follow(int vehicle, const Setpoint& setpoint) = 0;
-  /// f_a_hat along z, until the next call; 0 before the first.
-  virtual void predict(int vehicle, double prediction_N) = 0;
+  /// f_a_hat along z and tau_a_hat, until the next call; 0 before the first.
+  virtual void predict(int vehicle, double prediction_N, const Eigen::Vector3d& torque_B_Nm) = 0;
   virtual void reset_integrals(int vehicle) = 0;
   /// One control period of every vehicle: controller::flight_step().
   /// @param rows    the swarm's state in rows (rigid_bodies.h); attitudes and rates are read from it.

@@ -72,6 +72,7 @@ DeepSetForce::DeepSetForce(files::Network network, const std::string& kind,
   evaluators_.emplace_back(rho->second);
   const std::string quantity = network_.output_quantity.empty() ? "force_z" : network_.output_quantity;
   if (output == DeepSetOutput::kForceZ) files::require_force_z(network_);
+  if (output == DeepSetOutput::kTorque) files::require_torque(network_);
   if (rho->second.outputs() != files::components(quantity)) {
     refuse(network_, "rho." + rho->first, std::to_string(rho->second.outputs()) + " outputs",
            "must be 1: the force along z", "");
@@ -123,17 +124,9 @@ Eigen::Vector3d DeepSetForce::evaluate(const Instant& now) {
   return SI_per_unit_ * output;
 }
 
-double DeepSetForce::force_z_N(const Instant& now) { return evaluate(now)[0]; }
-
-Wrench DeepSetForce::wrench(const Instant& now) {
-  const Eigen::Vector3d output = evaluate(now);
-  if (is_torque_) return {Eigen::Vector3d::Zero(), now.R_WB.transpose() * output};
-  if (set_.outputs() == 1) return {Eigen::Vector3d(0, 0, output[0]), Eigen::Vector3d::Zero()};
-  return {output, Eigen::Vector3d::Zero()};
-}
-
-double DeepSetForce::force_z_N(const Instant& now, const double* weights) {
-  double sum = 0, level = 1;
+Eigen::Vector3d DeepSetForce::evaluate(const Instant& now, const double* weights) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double level = 1;
   Instant some = now;
   for (;;) {
     present_.clear();
@@ -147,10 +140,28 @@ double DeepSetForce::force_z_N(const Instant& now, const double* weights) {
     }
     some.neighbours = present_.data();
     some.num_neighbours = static_cast<int>(present_.size());
-    sum += (level - next) * force_z_N(some);
+    sum += (level - next) * evaluate(some);
     if (!(next > 0)) return sum;
     level = next;
   }
+}
+
+Wrench DeepSetForce::as_wrench(const Instant& now, const Eigen::Vector3d& output) const {
+  if (is_torque_) return {Eigen::Vector3d::Zero(), now.R_WB.transpose() * output};
+  if (set_.outputs() == 1) return {Eigen::Vector3d(0, 0, output[0]), Eigen::Vector3d::Zero()};
+  return {output, Eigen::Vector3d::Zero()};
+}
+
+double DeepSetForce::force_z_N(const Instant& now) { return evaluate(now)[0]; }
+
+double DeepSetForce::force_z_N(const Instant& now, const double* weights) {
+  return evaluate(now, weights)[0];
+}
+
+Wrench DeepSetForce::wrench(const Instant& now) { return as_wrench(now, evaluate(now)); }
+
+Wrench DeepSetForce::wrench(const Instant& now, const double* weights) {
+  return as_wrench(now, evaluate(now, weights));
 }
 
 }  // namespace swarmcert::stability

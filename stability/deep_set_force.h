@@ -14,7 +14,8 @@ namespace swarmcert::stability {
 /// What the network of a DeepSetForce may state as its output.
 enum class DeepSetOutput {
   kForceZ,  ///< a vertical force, which is what is flown
-  kAny,     ///< also all of a force, or a torque
+  kTorque,
+  kAny,  ///< also all of a force, or a torque
 };
 
 /// f_hat of one vehicle. Not for several threads at once: it keeps the evaluation's memory.
@@ -39,9 +40,14 @@ class DeepSetForce {
   /// @param weights [now.num_neighbours], in [0, 1].
   double force_z_N(const Instant& now, const double* weights);
 
+  /// wrench(), composed likewise.
+  Wrench wrench(const Instant& now, const double* weights);
+
  private:
   void reserve(int neighbours);
   Eigen::Vector3d evaluate(const Instant& now);  ///< as many entries as the network has outputs; SI units
+  Eigen::Vector3d evaluate(const Instant& now, const double* weights);
+  Wrench as_wrench(const Instant& now, const Eigen::Vector3d& output) const;
 
   files::Network network_;
   std::vector<files::Evaluator<double>> evaluators_;

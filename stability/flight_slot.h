@@ -27,6 +27,7 @@ struct Slot {
   controller::Measured<Scalar> measured{};
   controller::FlightReference<Scalar> reference{};
   Scalar prediction_N{};
+  controller::Vector3<Scalar> torque_prediction_Nm{};
   Answer<Scalar> answer;
 };
 
@@ -96,6 +97,7 @@ void each(Slot<Lanes>& to, const Slot<Lanes>& from, const Copy& copy) {
   copy(to.measured.battery_V, from.measured.battery_V);
   each(to.reference, from.reference, copy);
   copy(to.prediction_N, from.prediction_N);
+  each(to.torque_prediction_Nm, from.torque_prediction_Nm, copy);
 }
 
 template <typename Scalar>

@@ -46,14 +46,22 @@ class Lanes {
 
     SWARMCERT_LANE explicit Choice(const Mask& mask) : m(mask) {}
     SWARMCERT_LANE Choice(const Choice& other) : m(other.m) {}  // not trivial, as that of Lanes
-    SWARMCERT_LANE operator bool() const {                      // NOLINT: flight code writes `if (a < b)`
+    SWARMCERT_LANE Choice& operator=(const Choice& other) {
+      m = other.m;
+      return *this;
+    }
+    /// The lanes, as bits, in which it is true.
+    SWARMCERT_LANE unsigned lanes() const {
 #if defined(SWARMCERT_LANES_AVX2)
-      const auto both =
-          static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(reinterpret_cast<__m256i>(m))));
+      return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(reinterpret_cast<__m256i>(m))));
 #else
-      unsigned both = 0;
-      for (int i = 0; i < kCount; ++i) both |= m[i] != 0 ? 1U << i : 0U;
+      unsigned result = 0;
+      for (int i = 0; i < kCount; ++i) result |= m[i] != 0 ? 1U << i : 0U;
+      return result;
 #endif
+    }
+    SWARMCERT_LANE operator bool() const {  // NOLINT: flight code writes `if (a < b)`
+      const unsigned both = lanes();
       if (both == 0) return false;
       if (both != kAll && split == 0) split = both;
       return true;
@@ -183,8 +191,13 @@ class DoubleLanes {
   SWARMCERT_LANE DoubleLanes() : low_{}, high_{} {}
   SWARMCERT_LANE explicit DoubleLanes(int x) : low_(Half{} + x), high_(Half{} + x) {}
   SWARMCERT_LANE explicit DoubleLanes(const double* at) {
+#if defined(SWARMCERT_LANES_AVX2)
+    low_ = _mm256_loadu_pd(at);  // a copy of bytes would be two moves, and wait for each other
+    high_ = _mm256_loadu_pd(at + 4);
+#else
     std::memcpy(&low_, at, sizeof low_);
     std::memcpy(&high_, at + 4, sizeof high_);
+#endif
   }
   SWARMCERT_LANE DoubleLanes(const DoubleLanes& other) : low_(other.low_), high_(other.high_) {}
   SWARMCERT_LANE DoubleLanes& operator=(const DoubleLanes& other) {
@@ -223,15 +236,11 @@ class DoubleLanes {
   /// The reverse, which is exact.
   SWARMCERT_LANE static void widen(const Lanes& x, double* to) {
 #if defined(SWARMCERT_LANES_AVX2)
-    const Half low = _mm256_cvtps_pd(_mm256_castps256_ps128(x.v_));
-    const Half high = _mm256_cvtps_pd(_mm256_extractf128_ps(x.v_, 1));
+    _mm256_storeu_pd(to, _mm256_cvtps_pd(_mm256_castps256_ps128(x.v_)));
+    _mm256_storeu_pd(to + 4, _mm256_cvtps_pd(_mm256_extractf128_ps(x.v_, 1)));
 #else
-    Half low, high;
-    for (int i = 0; i < 4; ++i)
-      low[i] = static_cast<double>(x.v_[i]), high[i] = static_cast<double>(x.v_[4 + i]);
+    for (int i = 0; i < Lanes::kCount; ++i) to[i] = static_cast<double>(x.v_[i]);
 #endif
-    std::memcpy(to, &low, sizeof low);
-    std::memcpy(to + 4, &high, sizeof high);
   }
 
  private:

@@ -67,16 +67,15 @@ Pilot<Scalar>::Pilot(const Gains& gains, const Model& model, double attitude_ste
 }
 
 template <typename Scalar>
-controller::FlightCommand<Scalar> Pilot<Scalar>::step(controller::FlightMemory<Scalar>& memory,
-                                                      const controller::Measured<Scalar>& measured,
-                                                      const controller::FlightReference<Scalar>& reference,
-                                                      Scalar prediction_N, std::uint32_t now_ms,
-                                                      bool position_is_due) const {
+controller::FlightCommand<Scalar> Pilot<Scalar>::step(
+    controller::FlightMemory<Scalar>& memory, const controller::Measured<Scalar>& measured,
+    const controller::FlightReference<Scalar>& reference, Scalar prediction_N, std::uint32_t now_ms,
+    bool position_is_due, const controller::Vector3<Scalar>& torque_prediction_Nm) const {
   const controller::Vector3<Scalar> effect = {Scalar(0), Scalar(0), prediction_N};
   return std::visit(
       [&](const auto& settings) {
-        return controller::flight_step(settings, memory, measured, reference, effect, now_ms,
-                                       position_is_due);
+        return controller::flight_step(settings, memory, measured, reference, effect, now_ms, position_is_due,
+                                       torque_prediction_Nm);
       },
       settings_);
 }
@@ -86,11 +85,12 @@ template <typename Scalar>
 [[gnu::flatten]] typename Pilot<Scalar>::Push Pilot<Scalar>::push(
     controller::FlightMemory<Scalar>& memory, const controller::Measured<Scalar>& measured,
     const controller::FlightReference<Scalar>& reference, Scalar prediction_N, std::uint32_t now_ms,
-    bool position_is_due) const {
+    bool position_is_due, const controller::Vector3<Scalar>& torque_prediction_Nm) const {
   const auto with = [&](const auto& settings) -> Push {
     const Scalar mean_p = memory.mean_p;
-    const controller::FlightCommand<Scalar> command = controller::flight_step(
-        settings, memory, measured, reference, {Scalar(0), Scalar(0), prediction_N}, now_ms, position_is_due);
+    const controller::FlightCommand<Scalar> command =
+        controller::flight_step(settings, memory, measured, reference, {Scalar(0), Scalar(0), prediction_N},
+                                now_ms, position_is_due, torque_prediction_Nm);
     memory.mean_p = mean_p;  // on which no pilot's largest force depends
     return {command.faults, command.motors_off, command.wanted, command.mixed.forces};
   };

@@ -6,6 +6,7 @@
 #include "controller/flight_controller.h"
 #include "stability/gains.h"
 #include "stability/lanes.h"
+#include "stability/lanes_mixing.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -25,8 +26,8 @@ class Pilot {
   controller::FlightCommand<Scalar> step(controller::FlightMemory<Scalar>& memory,
                                          const controller::Measured<Scalar>& measured,
                                          const controller::FlightReference<Scalar>& reference,
-                                         Scalar prediction_N, std::uint32_t now_ms,
-                                         bool position_is_due) const;
+                                         Scalar prediction_N, std::uint32_t now_ms, bool position_is_due,
+                                         const controller::Vector3<Scalar>& torque_prediction_Nm = {}) const;
 
   /// What step() asks of the rotors.
   struct Push {
@@ -38,7 +39,8 @@ class Pilot {
   /// step() without PWM and without the memory of it: simulation calls this a million times.
   Push push(controller::FlightMemory<Scalar>& memory, const controller::Measured<Scalar>& measured,
             const controller::FlightReference<Scalar>& reference, Scalar prediction_N,
-            std::uint32_t now_ms = 0, bool position_is_due = true) const;
+            std::uint32_t now_ms = 0, bool position_is_due = true,
+            const controller::Vector3<Scalar>& torque_prediction_Nm = {}) const;
   /// The collective thrust that push() asks for.
   Scalar wanted_thrust_N(controller::FlightMemory<Scalar> memory,
                          const controller::Measured<Scalar>& measured,

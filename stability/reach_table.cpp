@@ -2,13 +2,8 @@
 
 #include <algorithm>
 
-#include "nn/files/doubles.h"
-
 namespace swarmcert::stability {
 namespace {
-
-constexpr double kHighest_m = 10, kCellsPerMetre = 100;
-constexpr int kCells = static_cast<int>(2 * kHighest_m * kCellsPerMetre);
 
 double largest_reach_m(const std::vector<const AppliedEffect*>& effects, double dz_m) {
   double reach = 0;
@@ -27,15 +22,6 @@ ReachTable::ReachTable(const std::vector<const AppliedEffect*>& effects) {
     at_.push_back(std::max(last, next));
     last = next;
   }
-}
-
-double ReachTable::over(double lowest_m, double highest_m) const {
-  return std::max(at(lowest_m), at(highest_m));
-}
-
-double ReachTable::at(double dz_m) const {
-  const double cell = (dz_m + kHighest_m) * kCellsPerMetre;
-  return cell >= 0 && cell < kCells ? at_[static_cast<std::size_t>(cell)] : kInfinity;
 }
 
 }  // namespace swarmcert::stability

@@ -1,6 +1,8 @@
 /// @file How far to the side a neighbour must be to do nothing, by its height.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "stability/effects/effect.h"
@@ -15,10 +17,17 @@ class ReachTable {
   explicit ReachTable(const std::vector<const AppliedEffect*>& effects);
 
   /// For neighbours that are from `lowest_m` to `highest_m` higher; infinite beyond 10 m.
-  double over(double lowest_m, double highest_m) const;
+  double over(double lowest_m, double highest_m) const { return std::max(at(lowest_m), at(highest_m)); }
 
  private:
-  double at(double dz_m) const;
+  static constexpr double kHighest_m = 10, kCellsPerMetre = 100;
+  static constexpr int kCells = static_cast<int>(2 * kHighest_m * kCellsPerMetre);
+
+  double at(double dz_m) const {
+    const double cell = (dz_m + kHighest_m) * kCellsPerMetre;
+    const bool is_inside = cell >= 0 && cell < kCells;
+    return is_inside ? at_[static_cast<std::size_t>(cell)] : std::numeric_limits<double>::infinity();
+  }
 
   std::vector<double> at_;
 };

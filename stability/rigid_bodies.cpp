@@ -5,32 +5,43 @@
 #endif
 
 #include <cmath>
+#include <type_traits>
 
 #include "stability/model.h"
 
 namespace swarmcert::stability {
 namespace {
 
+/// For integrators that normalise.
+struct NoPull {};
+
 #define SWARMCERT_KERNEL_FILE "stability/rigid_bodies_kernel.inc"
 #include "stability/kernel_widths.inc"
 
 struct Kernel {
   decltype(&narrow::derivatives) derivatives;
-  decltype(&narrow::stage<true>) stage[2];  ///< by whether rotors lag
+  decltype(&narrow::stages<true, true>) stages[2]
+                                              [2];  ///< by whether rotors lag, and whether all vehicles move
   decltype(&narrow::drift) drift;
   decltype(&narrow::normalise) normalise;
 };
 
 /// The widest that this processor has and `size` vehicles fill.
 Kernel choose([[maybe_unused]] int size) {
+#define SWARMCERT_KERNEL(width)                                     \
+  {                                                                 \
+    width::derivatives,                                             \
+        {{width::stages<false, false>, width::stages<false, true>}, \
+         {width::stages<true, false>, width::stages<true, true>}},  \
+        width::drift, width::normalise                              \
+  }
 #if defined(SWARMCERT_WIDE_KERNELS)
-  if (size > 4 && __builtin_cpu_supports("avx512f") != 0)
-    return {
-        avx512::derivatives, {avx512::stage<false>, avx512::stage<true>}, avx512::drift, avx512::normalise};
-  if (size > 2 && __builtin_cpu_supports("avx2") != 0)
-    return {avx2::derivatives, {avx2::stage<false>, avx2::stage<true>}, avx2::drift, avx2::normalise};
+  if (size > 4 && __builtin_cpu_supports("avx512f") != 0) return SWARMCERT_KERNEL(avx512);
+  if (size > 2 && __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0)
+    return SWARMCERT_KERNEL(avx2);
 #endif
-  return {narrow::derivatives, {narrow::stage<false>, narrow::stage<true>}, narrow::drift, narrow::normalise};
+  return SWARMCERT_KERNEL(narrow);
+#undef SWARMCERT_KERNEL
 }
 
 }  // namespace
@@ -50,9 +61,12 @@ void RigidBodies::derivative(const double* state, double stabilise, double* deri
   choice_->kernel.derivatives(rows_.data(), state, size_, stabilise, derivative);
 }
 
-void RigidBodies::stage(int which, double step_s, double* start, double* state, double* sum,
-                        int force_z) const {
-  choice_->kernel.stage[lags_ ? 1 : 0](which, rows_.data(), size_, step_s, start, state, sum, force_z);
+void RigidBodies::stage(int which, double step_s, double* start, double* state, double* sum) {
+  choice_->kernel.stages[lags_][all_move_](which, 1, rows_.data(), size_, step_s, start, state, sum);
+}
+
+void RigidBodies::two_stages(int first, double step_s, double* start, double* state, double* sum) {
+  choice_->kernel.stages[lags_][all_move_](first, 2, rows_.data(), size_, step_s, start, state, sum);
 }
 
 void RigidBodies::drift(double step_s, const double* start, const double* state, double* ahead) const {

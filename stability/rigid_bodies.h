@@ -61,7 +61,9 @@ class RigidBodies {
     kInverseInertia = 19,
     kLaterForceZ = 22,  ///< in place of the third kForce in the second and the last stage of look-ahead steps
     kDisturbanceZ = 23,  ///< that part of kForce's third, and of kLaterForceZ, which effects are added to
-    kNumRows = 24
+    kRotorThrust = 24,   ///< sum of rotor forces, and their torque: left by the first stage of a step
+    kRotorTorque = 25,
+    kNumRows = 28
   };
 
   /// Vehicles beyond `size` up to a whole block stand still.
@@ -74,6 +76,8 @@ class RigidBodies {
 
   /// Whether some kLagRate is not 0: where rotors do not lag, their states stay as they are.
   void set_lagging(bool lags) { lags_ = lags; }
+  /// Whether all vehicles move: stages then need not ask which. Lanes beyond them fall freely.
+  void set_all_moving(bool move) { all_move_ = move; }
 
   /// derivative = d state / dt.
   /// @param stabilise rate in 1/s at which |q| is drawn to 1; else 0.
@@ -83,9 +87,9 @@ class RigidBodies {
   /// @param start state before the step; the last stage makes it the state after.
   /// @param state where the next stage evaluates; read by all but the first.
   /// @param sum   scratch.
-  /// @param force_z the row of the outer force along z: kForce + 2 or kLaterForceZ.
-  void stage(int which, double step_s, double* start, double* state, double* sum,
-             int force_z = kForce + 2) const;
+  void stage(int which, double step_s, double* start, double* state, double* sum);
+  /// Stages `first`, 0 or 2, and the next, whose outer force along z is kLaterForceZ.
+  void two_stages(int first, double step_s, double* start, double* state, double* sum);
 
   /// Positions of `ahead` = positions of `start` + step_s * d position / dt at `state`: where the state after the one
   /// that is being computed will be evaluated, since positions follow velocities one stage late.
@@ -97,7 +101,7 @@ class RigidBodies {
  private:
   struct Choice;
   int size_;
-  bool lags_ = true;
+  bool lags_ = true, all_move_ = false;
   Rows rows_;
   std::unique_ptr<const Choice> choice_;  ///< of the code for this processor
 };

@@ -50,14 +50,19 @@ SampledFlight::SampledFlight(Swarm& swarm, const Gains& given, const Task& task,
   }
   controllers_ = options.flies_float ? make_float_bank(swarm, gains, period_s_)
                                      : make_double_bank(swarm, gains, period_s_);
-  if (network != nullptr) {
+  const files::Network* const torque_network = options.torque_network;
+  if (network != nullptr || torque_network != nullptr) {
     std::vector<std::string> kinds;
     for (const Model& model : swarm.models()) kinds.push_back(model.kind);
-    for (const Model& model : swarm.models()) {
-      networks_.push_back(std::make_unique<DeepSetForce>(*network, model.kind, kinds));
+    for (const std::string& kind : kinds) {
+      if (network != nullptr) networks_.push_back(std::make_unique<DeepSetForce>(*network, kind, kinds));
+      if (torque_network != nullptr) {
+        torque_networks_.push_back(
+            std::make_unique<DeepSetForce>(*torque_network, kind, kinds, DeepSetOutput::kTorque));
+      }
     }
     radio_ = std::make_unique<Radio>(swarm.size(), network_every_ * period_s_, options.radio);
-    predictions_.assign(inputs_.size(), std::vector<double>(static_cast<std::size_t>(network_late_ + 1)));
+    predictions_.assign(inputs_.size(), std::vector<Wrench>(static_cast<std::size_t>(network_late_ + 1)));
   }
   int longest = 0;
   for (int i = 0; i < swarm.size(); ++i) {
@@ -123,19 +128,25 @@ void SampledFlight::predict() {
     radio_->broadcast(sent_W_m_, now_ms, random_);
   }
   for (int i = 0; i < swarm_.size(); ++i) {
-    std::vector<double>& ring = predictions_[static_cast<std::size_t>(i)];
-    double& now = ring[static_cast<std::size_t>(period_ % slots)];
+    std::vector<Wrench>& ring = predictions_[static_cast<std::size_t>(i)];
+    Wrench& now = ring[static_cast<std::size_t>(period_ % slots)];
     if (period_ % network_every_ == 0) {
       Instant known = swarm_.instant(i, time_s(), state(), input(i));
       radio_->look(i, now_ms, &known, known_, weights_);
-      now = networks_[static_cast<std::size_t>(swarm_.kind_of(i))]->force_z_N(known, weights_.data());
+      const auto kind = static_cast<std::size_t>(swarm_.kind_of(i));
+      now = {};
+      if (!networks_.empty()) now.force_W_N.z() = networks_[kind]->force_z_N(known, weights_.data());
+      if (!torque_networks_.empty())
+        now.torque_B_Nm = torque_networks_[kind]->wrench(known, weights_.data()).torque_B_Nm;
     } else {
       now = ring[static_cast<std::size_t>((period_ + slots - 1) % slots)];
     }
     const std::int64_t applied = period_ - network_late_;
-    records_[static_cast<std::size_t>(i)].prediction_N =
-        applied < 0 ? 0 : ring[static_cast<std::size_t>(applied % slots)];
-    controllers_->predict(i, records_[static_cast<std::size_t>(i)].prediction_N);
+    const Wrench flown = applied < 0 ? Wrench() : ring[static_cast<std::size_t>(applied % slots)];
+    ControlRecord& record = records_[static_cast<std::size_t>(i)];
+    record.prediction_N = flown.force_W_N.z();
+    record.torque_prediction_B_Nm = flown.torque_B_Nm;
+    controllers_->predict(i, flown.force_W_N.z(), flown.torque_B_Nm);
   }
 }
 
@@ -256,7 +267,7 @@ void SampledFlight::step() {
   is_changed_ = false;
   if (period_ % kListEvery == 0) swarm_.find_neighbours(rows_.data(), kListEvery * period_s_);
   ran_position_ = period_ % position_every_ == 0;
-  if (!networks_.empty()) predict();
+  if (!predictions_.empty()) predict();
   control();
   move();
   ++period_;

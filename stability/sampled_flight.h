@@ -33,7 +33,9 @@ struct SampledFlightOptions {
   double battery_start_V = 4.1;
   double battery_drop_V_s = 1.5e-3;  ///< a Crazyflie's cell lasts about five minutes
   double ground_m = 0.05;            ///< vehicles cannot be lower
-  RadioOptions radio;                ///< by which the network's inputs come, at the network's rate
+  RadioOptions radio;                ///< by which the networks' inputs come, at the networks' rate
+  /// Its prediction is taken from the torque that the attitude law asks for; nullptr: none. Read by the constructor.
+  const files::Network* torque_network = nullptr;
 };
 
 class SampledFlight {
@@ -41,7 +43,7 @@ class SampledFlight {
   /// @param swarm, task must outlive this.
   /// @param network adds its prediction to the control law; nullptr: none.
   /// @throws std::invalid_argument if the position or network loop is not a whole number of control periods;
-  ///   files::InputError if the network lacks a kind.
+  ///   files::InputError if a network lacks a kind, or predicts something else.
   SampledFlight(Swarm& swarm, const Gains& gains, const Task& task, const SampledFlightOptions& options,
                 const files::Network* network = nullptr);
   ~SampledFlight();
@@ -97,12 +99,12 @@ class SampledFlight {
   mutable std::vector<ControlRecord> records_;
   mutable std::vector<char> is_complete_;  ///< by vehicle: its record has what only logs want
   std::unique_ptr<ControllerBank> controllers_;
-  std::vector<std::unique_ptr<DeepSetForce>> networks_;  ///< by kind
+  std::vector<std::unique_ptr<DeepSetForce>> networks_, torque_networks_;  ///< by kind; empty: none
   std::unique_ptr<Radio> radio_;
   std::vector<Eigen::Vector3d> sent_W_m_;
   std::vector<Neighbour> known_;
   std::vector<double> weights_;
-  std::vector<std::vector<double>> predictions_;  ///< ring by age in network_every_ periods
+  std::vector<std::vector<Wrench>> predictions_;  ///< ring by age in network_every_ periods
   std::vector<std::vector<double>> delayed_;      ///< ring of rotor commands, by age in periods
   double switch_s_ = 0;                           ///< when, inside a period, delayed commands change
   bool has_delay_ = false;

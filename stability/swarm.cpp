@@ -237,28 +237,26 @@ void Swarm::from_rows(const double* rows, double* state) const {
 }
 
 void Swarm::hold(const VehicleInput* inputs) {
+  bool same_rest = true, all_move = true;
   for (int i = 0; i < size(); ++i) {
     const VehicleInput& input = inputs[i];
-    bodies_.at(RigidBodies::kMoving, i) = input.resting ? 0 : 1;
-    for (int r = 0; r < kNumRotors; ++r) bodies_.at(RigidBodies::kCommand + r, i) = input.rotor_command_N[r];
-    for (int axis = 0; axis < 3; ++axis) {
-      bodies_.at(RigidBodies::kForce + axis, i) = input.disturbance_W_N[axis];
-    }
-    for (const auto row : {RigidBodies::kLaterForceZ, RigidBodies::kDisturbanceZ}) {
-      bodies_.at(row, i) = input.disturbance_W_N.z();
-    }
+    double* const body = &bodies_.at(0, i);
+    const auto row = [body](int which) -> double& { return body[which * kRowLength]; };
+    for (int r = 0; r < kNumRotors; ++r) row(RigidBodies::kCommand + r) = input.rotor_command_N[r];
+    for (int axis = 0; axis < 3; ++axis) row(RigidBodies::kForce + axis) = input.disturbance_W_N[axis];
+    row(RigidBodies::kLaterForceZ) = row(RigidBodies::kDisturbanceZ) = input.disturbance_W_N.z();
+    row(RigidBodies::kMoving) = input.resting ? 0 : 1;
+    char& rested = rested_[static_cast<std::size_t>(i)];
+    same_rest = same_rest && (rested != 0) == input.resting;
+    all_move = all_move && !input.resting;
+    rested = input.resting ? 1 : 0;
   }
-  pair_up(inputs);
+  bodies_.set_all_moving(all_move);
+  if (!pairs_hold_ || !same_rest) pair_up(inputs);
 }
 
 /// Who is acted on, and by whom, until find_neighbours() looks again or a vehicle comes to rest or leaves the ground.
 void Swarm::pair_up(const VehicleInput* inputs) {
-  for (int i = 0; i < size(); ++i) {
-    char& rested = rested_[static_cast<std::size_t>(i)];
-    pairs_hold_ = pairs_hold_ && (rested != 0) == inputs[i].resting;
-    rested = inputs[i].resting ? 1 : 0;
-  }
-  if (pairs_hold_) return;
   pairs_hold_ = true;
   for (const int i : acted_on_) {
     for (int axis = 0; axis < 3; ++axis) bodies_.at(RigidBodies::kTorque + axis, i) = 0;
@@ -293,8 +291,7 @@ void Swarm::pair_up(const VehicleInput* inputs) {
   for (PairBatch& batch : batches_) {
     if (batch.pairs.empty()) continue;
     sees_ahead_ = sees_ahead_ && !batch.applied->effect().pairs_need_velocity(batch.applied->shape().data());
-    batch.pairs.close();
-    batch.scratch.make_room(2 * lines_for(static_cast<std::size_t>(batch.pairs.count())));
+    batch.scratch.make_room(batch.pairs.scratch_lines());
   }
 }
 
@@ -325,7 +322,7 @@ void Swarm::act_on_pairs(const double* const* rows, int num_rows) {
     batch.applied->effect().add_force_z(batch.pairs, rows, num_rows, batch.applied->shape().data(),
                                         batch.applied->coefficients()[0], batch.scratch.data(),
                                         {from, forces, RigidBodies::kNumRows * kRowLength});
-    std::copy(forces, forces + 2, from);
+    for (int k = 0; k < 2; ++k) from[k] = forces[k];
   }
 }
 
@@ -353,8 +350,7 @@ void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleIn
         bodies_.drift(first == 0 ? step_s / 2 : step_s, start, at, ahead_.data());
         const double* const both[] = {at, ahead_.data()};
         act_on_pairs(both, 2);
-        bodies_.stage(first, step_s, start, rows, sum_.data());
-        bodies_.stage(first + 1, step_s, start, rows, sum_.data(), RigidBodies::kLaterForceZ);
+        bodies_.two_stages(first, step_s, start, rows, sum_.data());
       }
       continue;
     }

@@ -6,45 +6,93 @@
 
 namespace swarmcert::stability {
 
-void SwarmPairs::close() {
-  const std::size_t lines = lines_for(pairs_.size());
-  count_ = static_cast<int>(lines) * kRowLength;
-  own_.make_room(lines);
-  other_.make_room(lines);
-  constants_.make_room(lines);
-  const auto total = static_cast<std::size_t>(count_);
-  for (std::size_t k = 0; k < total; ++k) {
-    const Pair& pair = pairs_[std::min(k, pairs_.size() - 1)];
-    const int neighbour = k < pairs_.size() ? pair.neighbour : pair.vehicle;
-    own_.data()[k] = static_cast<std::int64_t>(row_index(pair.vehicle, kVehicleStateSize));
-    other_.data()[k] = static_cast<std::int64_t>(row_index(neighbour, kVehicleStateSize));
-    constants_.data()[k] = pair.constant;
-  }
+void LaneSums::clear(int count) {
+  count_ = count;
+  parts_.resize(std::max(parts_.size(), lines_for(static_cast<std::size_t>(count))));
+  for (std::vector<Part>& parts : parts_) parts.clear();
+}
 
-  std::vector<int>& first = first_slot_;
-  first.assign(lines_ + 1, 0);
-  const auto each = [this](const auto& visit) {
-    int slot = 0;
-    for (std::size_t k = 0; k < pairs_.size(); ++k) {
-      slot = k > 0 && pairs_[k - 1].vehicle == pairs_[k].vehicle ? slot + 1 : 0;
-      visit(k, pairs_[k].vehicle, slot);
-    }
+void LaneSums::add(int to, int from) {
+  std::vector<Part>& parts = parts_[static_cast<std::size_t>(to / kRowLength)];
+  const int line = from / kRowLength, lane = to % kRowLength;
+  // A part that has something for this lane comes before.
+  if (parts.empty() || parts.back().line != line || parts.back().mask[lane] != 0) {
+    parts.emplace_back();
+    parts.back().line = line;
+  }
+  parts.back().from[lane] = from % kRowLength;
+  parts.back().mask[lane] = -1;
+}
+
+void SwarmPairs::clear() {
+  pairs_.clear();
+  with_pairs_.clear();
+  for (Layout& layout : layouts_) layout.states_ = 0;
+}
+
+void SwarmPairs::add(int vehicle, int neighbour, double constant) {
+  if (with_pairs_.empty() || with_pairs_.back().number != vehicle) {
+    with_pairs_.push_back({vehicle, static_cast<int>(pairs_.size()), 0});
+  }
+  ++with_pairs_.back().count;
+  pairs_.push_back({neighbour, constant});
+}
+
+const SwarmPairs::Layout& SwarmPairs::layout(int states) const {
+  const int together = lines() == 1 ? states : 1;
+  Layout& layout = layouts_[together - 1];
+  if (layout.states_ == 0) lay_out(together, &layout);
+  return layout;
+}
+
+std::size_t SwarmPairs::scratch_lines() const {
+  const std::size_t states = lines() == 1 ? 2 : 1;
+  return lines_for(states * pairs_.size()) + lines_for(states * with_pairs_.size());
+}
+
+void SwarmPairs::lay_out(int states, Layout* layout) const {
+  layout->states_ = states;
+  layout->count_ = states * static_cast<int>(pairs_.size());
+  const auto lines = static_cast<std::size_t>(layout->lines());
+  layout->own_.make_room(lines);
+  layout->other_.make_room(lines);
+  layout->constants_.make_room(lines);
+  layout->sums_.clear(states * static_cast<int>(with_pairs_.size()));
+
+  std::vector<Vehicle> by_count = with_pairs_;
+  std::sort(by_count.begin(), by_count.end(), [](const Vehicle& a, const Vehicle& b) {
+    return a.count != b.count ? a.count > b.count : a.number < b.number;
+  });
+  int pair = 0;
+  const auto put = [&](int vehicle, int neighbour, int state, double constant) {
+    const auto place = [state](int number) {
+      return static_cast<std::int64_t>(row_index(number, kVehicleStateSize)) + state * kRowLength;
+    };
+    layout->own_.data()[pair] = place(vehicle);
+    layout->other_.data()[pair] = place(neighbour);
+    layout->constants_.data()[pair] = constant;
+    ++pair;
   };
-  each([&](std::size_t, int vehicle, int slot) {
-    int& slots = first[static_cast<std::size_t>(vehicle / kRowLength) + 1];
-    slots = std::max(slots, slot + 1);
-  });
-  for (std::size_t line = 0; line < lines_; ++line) first[line + 1] += first[line];
-  const auto slots = static_cast<std::size_t>(first.back());
-  slots_.make_room(slots);
-  masks_.make_room(slots);
-  std::fill_n(slots_.data(), slots * kRowLength, 0);
-  std::fill_n(masks_.data(), slots * kRowLength, 0);
-  each([&](std::size_t k, int vehicle, int slot) {
-    const int at = (first_slot(vehicle / kRowLength) + slot) * kRowLength + vehicle % kRowLength;
-    slots_.data()[at] = static_cast<std::int64_t>(k);
-    masks_.data()[at] = -1;
-  });
+  for (int which = 0; which < by_count.front().count; ++which) {
+    int sum = 0;
+    for (const Vehicle& vehicle : by_count) {
+      if (vehicle.count <= which) break;
+      const Pair& own = pairs_[static_cast<std::size_t>(vehicle.first + which)];
+      for (int state = 0; state < states; ++state) {
+        layout->sums_.add(sum++, pair);
+        put(vehicle.number, own.neighbour, state, own.constant);
+      }
+    }
+  }
+  while (pair % kRowLength != 0) put(by_count.front().number, by_count.front().number, 0, 0);
+  for (int state = 0; state < states; ++state) {
+    layout->of_vehicles_[state].clear(vehicles_);
+    int sum = state;
+    for (const Vehicle& vehicle : by_count) {
+      layout->of_vehicles_[state].add(vehicle.number, sum);
+      sum += states;
+    }
+  }
 }
 
 }  // namespace swarmcert::stability

@@ -36,9 +36,9 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
   if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
   const std::vector<std::string> known = identification::candidate_names(model);
   std::vector<std::string> all = known;
-  all.insert(all.end(), {"auto", "deep_set", "show", "torque_bias", "undo"});
+  all.insert(all.end(), {"auto", "deep_set", "downwash_torque", "show", "torque_bias", "undo"});
   for (const std::string& name : names) {
-    if (name == "deep_set" || name == "torque_bias")
+    if (identification::is_written_by_hand(name))
       throw UsageError("the effect " + name +
                        " cannot be fitted to the force of a flight; write it into the model file");
     if (std::find(known.begin(), known.end(), name) == known.end())

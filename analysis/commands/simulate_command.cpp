@@ -20,7 +20,7 @@ using files::Json;
 struct SimulateOptions {
   std::string task;
   std::vector<std::string> models;
-  std::string gains, output, report;
+  std::string gains, output, report, torque_network;
   files::NetworkArguments network;
   int vehicles = 1;
   int run = 0;
@@ -29,6 +29,10 @@ struct SimulateOptions {
   bool no_noise = false;
   stability::RadioOptions radio;
 };
+
+bool has_force_network(const SimulateOptions& options) {
+  return !options.network.file.empty() || !options.network.phi.empty();
+}
 
 Json axes(const std::array<double, 4>& values) {
   return {{"x", values[0]}, {"y", values[1]}, {"z", values[2]}, {"total", values[3]}};
@@ -44,7 +48,7 @@ Json result_json(const SimulateOptions& options, const std::vector<std::string>&
   result["loop"] = "sampled";
   result["duration_s"] = task.duration_s();
   result["noise"] = !options.no_noise;
-  if (!options.network.file.empty() || !options.network.phi.empty()) {
+  if (has_force_network(options) || !options.torque_network.empty()) {
     result["radio"] = {{"latency_s", options.radio.latency_s}, {"loss", options.radio.loss}};
   }
   result["diverged"] = flown.diverged;
@@ -148,9 +152,15 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
   const stability::Gains gains = stability::load_gains(options.gains);
   inputs.push_back(options.gains);
   std::unique_ptr<files::Network> network;
-  if (!options.network.file.empty() || !options.network.phi.empty()) {
+  if (has_force_network(options)) {
     network = std::make_unique<files::Network>(files::load_network(options.network));
     for (const std::string& path : input_files(*network)) inputs.push_back(path);
+  }
+  std::unique_ptr<files::Network> torque_network;
+  if (!options.torque_network.empty()) {
+    torque_network =
+        std::make_unique<files::Network>(files::load_network({options.torque_network, "", "", ""}));
+    for (const std::string& path : input_files(*torque_network)) inputs.push_back(path);
   }
   const std::unique_ptr<stability::Task> task =
       stability::make_task(options.task, {options.vehicles, options.duration_s, options.seed});
@@ -162,6 +172,7 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
   how.loop.noise = !options.no_noise;
   how.loop.seed = options.seed;
   how.loop.radio = options.radio;
+  how.loop.torque_network = torque_network.get();
   how.progress = [&progress](double time_s, double duration_s) {
     progress.show(static_cast<int>(time_s), std::max(static_cast<int>(duration_s), 1), "seconds flown");
   };
@@ -213,6 +224,9 @@ Command simulate_command() {
             app.add_option("--gains", options->gains, "gains.toml")->required();
             app.add_option("--network", options->network.file,
                            "network.toml whose prediction the controller uses");
+            app.add_option("--torque-network", options->torque_network,
+                           "network.toml of train --quantity torque, whose prediction is taken from the "
+                           "torque that the attitude law asks for");
             auto* phi =
                 app.add_option("--phi", options->network.phi, "Weight file of phi, in place of --network");
             auto* rho =

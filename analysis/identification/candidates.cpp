@@ -162,10 +162,14 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
   return result;
 }
 
+bool is_written_by_hand(const std::string& name) {
+  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque";
+}
+
 std::vector<std::string> candidate_names(const stability::Model& model) {
   std::vector<std::string> names;
   for (const std::string& name : stability::effect_names()) {
-    if (name != "deep_set" && name != "torque_bias") names.push_back(name);
+    if (!is_written_by_hand(name)) names.push_back(name);
   }
   for (const EffectSpec& spec : model.effects) {
     if (spec.is_expression()) names.push_back(spec.name);

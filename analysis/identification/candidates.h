@@ -55,6 +55,9 @@ std::vector<Candidate> all_candidates(const stability::Model& model, const Cover
 /// @throws std::invalid_argument if there is none.
 Candidate candidate(const std::string& name, const stability::Model& model, const Coverage& coverage);
 
+/// Whether an effect of this name cannot be fitted to the force of a flight: it acts as a torque, or is a network.
+bool is_written_by_hand(const std::string& name);
+
 /// Names that candidate() knows for `model`.
 std::vector<std::string> candidate_names(const stability::Model& model);
 

@@ -7,7 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
+#include <utility>
 
+#include "stability/effects/function_tables.h"
 #include "stability/effects/wake_shape.h"
 #include "stability/swarm_pairs.h"
 
@@ -21,31 +24,34 @@ struct PairRows {
   const double* constant;            ///< pair_constant() of the neighbour
 };
 
+constexpr int round_up(int count, int block) { return (count + block - 1) / block * block; }
+
 #define SWARMCERT_KERNEL_FILE "stability/effects/downwash_kernel.inc"
 #include "stability/kernel_widths.inc"
 
 struct Kernel {
   int block;
   decltype(&narrow::strengths) strengths;
-  decltype(&narrow::swarm_forces_of<1>) swarm_forces[2];  ///< of one state, and of two
+  decltype(&narrow::swarm_forces) swarm_forces;
+  decltype(&narrow::composed_of_one) composed_of_one;
+  decltype(&narrow::logarithm_of_one) logarithm_of_one;
 };
 
 /// The narrowest that takes `count` at once, or the widest of this processor.
 const Kernel& kernel_for([[maybe_unused]] int count) {
-  static constexpr Kernel kNarrow = {
-      narrow::kBlock, narrow::strengths, {narrow::swarm_forces_of<1>, narrow::swarm_forces_of<2>}};
 #if defined(SWARMCERT_WIDE_KERNELS)
-  static constexpr Kernel kAvx2 = {
-      avx2::kBlock, avx2::strengths, {avx2::swarm_forces_of<1>, avx2::swarm_forces_of<2>}};
-  static constexpr Kernel kAvx512 = {
-      avx512::kBlock, avx512::strengths, {avx512::swarm_forces_of<1>, avx512::swarm_forces_of<2>}};
+  static constexpr Kernel kAvx2 = {avx2::kBlock, avx2::strengths, avx2::swarm_forces, avx2::composed_of_one,
+                                   avx2::logarithm_of_one};
+  static constexpr Kernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::swarm_forces,
+                                     avx512::composed_of_one, avx512::logarithm_of_one};
   if (count > avx2::kBlock && __builtin_cpu_supports("avx512f") != 0) return kAvx512;
-  if (count > narrow::kBlock && __builtin_cpu_supports("avx2") != 0) return kAvx2;
+  // Also for fewer: the narrow one has no fused operations of its own.
+  if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) return kAvx2;
 #endif
+  static constexpr Kernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::swarm_forces,
+                                     narrow::composed_of_one, narrow::logarithm_of_one};
   return kNarrow;
 }
-
-int round_up(int count, int block) { return (count + block - 1) / block * block; }
 
 }  // namespace
 
@@ -76,34 +82,41 @@ void Downwash::columns(const Instant& now, const double* shape, Wrench* columns)
   double sum = 0;
   for (int first = 0; first < now.num_neighbours; first += kMost) {
     const int count = std::min(kMost, now.num_neighbours - first);
-    for (int k = 0; k < round_up(count, kRowLength); ++k) {
-      const Neighbour& neighbour = now.neighbours[first + std::min(k, count - 1)];
+    for (int k = 0; k < count; ++k) {
+      const Neighbour& neighbour = now.neighbours[first + k];
       rows[0][k] = neighbour.dp_W_m.x();
       rows[1][k] = neighbour.dp_W_m.y();
       rows[2][k] = neighbour.dp_W_m.z();
       rows[3][k] = neighbour.v_W_m_s.x();
       rows[4][k] = neighbour.v_W_m_s.y();
-      rows[5][k] = pair_constant(neighbour.mass_kg, shape);
+      const bool is_as_before = k > 0 && neighbour.mass_kg == now.neighbours[first + k - 1].mass_kg;
+      rows[5][k] = is_as_before ? rows[5][k - 1] : pair_constant(neighbour.mass_kg, shape);
     }
+    for (auto& row : rows) std::fill(row + count, row + round_up(count, kRowLength), row[count - 1]);
     const Kernel& kernel = kernel_for(count);
     kernel.strengths({rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]}, round_up(count, kernel.block),
                      shape, power);
     for (int k = 0; k < count; ++k) sum += power[k];
   }
   columns[0] = {};
-  columns[0].force_W_N.z() = -narrow::composed_of_one(sum, 1 / shape[kNorm]);
+  columns[0].force_W_N.z() = -kernel_for(1).composed_of_one(sum, 1 / shape[kNorm]);
 }
 
 double Downwash::pair_constant(double neighbour_mass_kg, const double* shape) const {
-  const bool differs = neighbour_mass_kg != kWakeReferenceMass_kg;
-  return differs ? shape[kMassExponent] * std::log(neighbour_mass_kg / kWakeReferenceMass_kg) : 0;
+  static const double log_of_reference = kernel_for(1).logarithm_of_one(kWakeReference_m);
+  double of_g = shape[kDecay] * log_of_reference;
+  if (neighbour_mass_kg != kWakeReferenceMass_kg) {
+    of_g += shape[kMassExponent] * kernel_for(1).logarithm_of_one(neighbour_mass_kg / kWakeReferenceMass_kg);
+  }
+  constexpr double kLargest = 600;
+  return std::min(shape[kNorm] * of_g, kLargest);
 }
 
 void Downwash::add_force_z(const SwarmPairs& pairs, const double* const* states, int num_states,
                            const double* shape, double coefficient, double* scratch,
                            const ForceRows& forces) const {
   if (pairs.empty()) return;
-  kernel_for(pairs.count()).swarm_forces[num_states - 1](pairs, states, shape, coefficient, scratch, forces);
+  kernel_for(kRowLength).swarm_forces(pairs, states, num_states, shape, coefficient, scratch, forces);
 }
 
 bool Downwash::in_support(const Instant& now, const double* shape) const {

@@ -24,7 +24,7 @@ class Downwash : public Effect {
   void columns(const Instant& now, const double* shape, Wrench* columns) const override;
   bool takes_pairs() const override { return true; }
   bool pairs_need_velocity(const double* shape) const override { return shape[kConvection] != 0; }
-  /// The logarithm of what the neighbour's mass does.
+  /// The logarithm of the part of g^p that neither place nor motion changes.
   double pair_constant(double neighbour_mass_kg, const double* shape) const override;
   void add_force_z(const SwarmPairs& pairs, const double* const* states, int num_states, const double* shape,
                    double coefficient, double* scratch, const ForceRows& forces) const override;

@@ -144,7 +144,7 @@ class Effect {
   /// Adds a coefficient times the column's vertical force to the forces on a swarm's vehicles, the same bits as
   /// columns() gives.
   /// @param states  [num_states], 1 or 2: the swarm in rows (rigid_bodies.h).
-  /// @param scratch num_states pairs.count() numbers, in lines.
+  /// @param scratch pairs.scratch_lines() lines of kRowLength.
   virtual void add_force_z(const SwarmPairs& pairs, const double* const* states, int num_states,
                            const double* shape, double coefficient, double* scratch,
                            const ForceRows& forces) const;

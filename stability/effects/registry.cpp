@@ -11,6 +11,7 @@
 #include "stability/effects/deep_set.h"
 #include "stability/effects/delay.h"
 #include "stability/effects/downwash.h"
+#include "stability/effects/downwash_torque.h"
 #include "stability/effects/drag_linear.h"
 #include "stability/effects/drag_quadratic.h"
 #include "stability/effects/drag_rotor.h"
@@ -46,10 +47,11 @@ Entry entry() {
 std::deque<Entry>& entries() {
   static std::deque<Entry> all = {
       // a deque keeps references when users add theirs
-      entry<MotorLag>(),  entry<Delay>(),         entry<SensorDelay>(),   entry<ThrustRatio>(),
-      entry<Battery>(),   entry<DragLinear>(),    entry<DragQuadratic>(), entry<DragRotor>(),
-      entry<Inflow>(),    entry<Ground>(),        entry<Ceiling>(),       entry<Downwash>(),
-      entry<UpperLift>(), entry<ConstantForce>(), entry<TorqueBias>(),    entry<DeepSetEffect>(),
+      entry<MotorLag>(),      entry<Delay>(),         entry<SensorDelay>(),   entry<ThrustRatio>(),
+      entry<Battery>(),       entry<DragLinear>(),    entry<DragQuadratic>(), entry<DragRotor>(),
+      entry<Inflow>(),        entry<Ground>(),        entry<Ceiling>(),       entry<Downwash>(),
+      entry<UpperLift>(),     entry<ConstantForce>(), entry<TorqueBias>(),    entry<DownwashTorque>(),
+      entry<DeepSetEffect>(),
   };
   return all;
 }

@@ -30,7 +30,7 @@ class FlightTest : public testing::Test {
   }
 
   FlightCommand<float> step() {
-    return flight_step(settings_, memory_, measured_, reference_, effect_, kNow_ms, true);
+    return flight_step(settings_, memory_, measured_, reference_, effect_, kNow_ms, true, torque_effect_);
   }
 
   static constexpr std::uint32_t kNow_ms = 5000;
@@ -38,7 +38,7 @@ class FlightTest : public testing::Test {
   FlightMemory<float> memory_;
   Measured<float> measured_{};
   FlightReference<float> reference_{};
-  Vector3<float> effect_{};
+  Vector3<float> effect_{}, torque_effect_{};
 };
 
 TEST_F(FlightTest, HoverGivesTheWeightToFourEqualMotors) {
@@ -109,6 +109,20 @@ TEST_F(FlightTest, BadPredictionsAreLeftOut) {
   effect_ = {0, 0, -0.05f};
   EXPECT_EQ(step().faults, kNoFault);
   EXPECT_NEAR(step().wanted.thrust_N, 0.034 * 9.81 + 0.05, 1e-6);
+}
+
+TEST_F(FlightTest, PredictedTorquesAreTakenFromWhatIsAskedForUnlessTheyAreBad) {
+  torque_effect_ = {1e-4f, -2e-4f, 5e-5f};
+  const FlightCommand<float> command = step();
+  EXPECT_EQ(command.faults, kNoFault);
+  EXPECT_EQ(command.wanted.torque_N_m.x, -1e-4f);
+  EXPECT_EQ(command.wanted.torque_N_m.y, 2e-4f);
+  EXPECT_EQ(command.wanted.torque_N_m.z, -5e-5f);
+  for (const float bad : {kNaN, 1.0f}) {
+    torque_effect_.y = bad;
+    EXPECT_EQ(step().faults, kPredictionFault);
+    EXPECT_EQ(norm(step().wanted.torque_N_m), 0.0f);
+  }
 }
 
 TEST_F(FlightTest, BadVoltagesAreReplacedByALowOne) {

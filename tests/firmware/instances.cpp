@@ -12,11 +12,11 @@ template DeepSetStatus evaluate(const DeepSet<float>&, const float*, const Neigh
 namespace swarmcert::controller {
 template FlightCommand<float> flight_step(const FlightSettings<float, PidGains<float>>&, FlightMemory<float>&,
                                           const Measured<float>&, const FlightReference<float>&,
-                                          const Vector3<float>&, std::uint32_t, bool);
+                                          const Vector3<float>&, std::uint32_t, bool, const Vector3<float>&);
 template FlightCommand<float> flight_step(const FlightSettings<float, CompositeGains<float>>&,
                                           FlightMemory<float>&, const Measured<float>&,
                                           const FlightReference<float>&, const Vector3<float>&, std::uint32_t,
-                                          bool);
+                                          bool, const Vector3<float>&);
 template Prediction<float> predict(const nn::DeepSet<float>&, const PredictionSettings<float>&,
                                    const Vector3<float>&, const Vector3<float>&, const NeighbourTrack<float>*,
                                    int, std::uint32_t, const Vector3<float>&,

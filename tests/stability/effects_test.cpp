@@ -34,10 +34,10 @@ double default_of(const std::string& effect, const std::string& parameter) {
 }
 
 TEST(Effects, HaveTheNamesOfTheCommandLine) {
-  const std::set<std::string> wanted = {"motor_lag",  "delay",          "sensor_delay",   "thrust_ratio",
-                                        "battery",    "drag_linear",    "drag_quadratic", "drag_rotor",
-                                        "inflow",     "ground",         "ceiling",        "downwash",
-                                        "upper_lift", "constant_force", "torque_bias",    "deep_set"};
+  const std::set<std::string> wanted = {
+      "motor_lag",      "delay",          "sensor_delay", "thrust_ratio", "battery",        "drag_linear",
+      "drag_quadratic", "drag_rotor",     "inflow",       "ground",       "ceiling",        "downwash",
+      "upper_lift",     "constant_force", "torque_bias",  "deep_set",     "downwash_torque"};
   const std::vector<std::string> names = effect_names();
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), wanted);
 }
@@ -244,8 +244,7 @@ TEST(Downwash, HasTheSameBitsForOneVehicleAndForASwarm) {
       }
     }
     if (pairs.empty()) continue;
-    pairs.close();
-    Rows scratch(2 * static_cast<std::size_t>(pairs.count() / kRowLength));
+    Rows scratch(pairs.scratch_lines());
     const double* const at[] = {states[0].data(), states[1].data()};
     const double* const from[] = {before.data(), before.data()};
     double* const to[] = {after[0].data(), after[1].data()};
@@ -277,6 +276,56 @@ TEST(Downwash, HasTheSameBitsForOneVehicleAndForASwarm) {
   }
   EXPECT_GT(acting, 1000);
   EXPECT_GT(composed, 300);
+}
+
+/// The neighbours of a level vehicle that is moved by (x, y).
+double downwash_N(const Instant& now, double x, double y) {
+  std::vector<Neighbour> seen(now.neighbours, now.neighbours + now.num_neighbours);
+  for (Neighbour& neighbour : seen) neighbour.dp_W_m -= Eigen::Vector3d(x, y, 0);
+  Instant moved = now;
+  moved.neighbours = seen.data();
+  return AppliedEffect(spec_of("downwash"), kContext).wrench(moved).force_W_N.z();
+}
+
+TEST(DownwashTorque, OfShortArmsIsTheSlopeOfDownwash) {
+  std::mt19937_64 random(21);
+  constexpr double kArm_m = 0.01, kStep_m = 1e-5;
+  EffectSpec spec = spec_of("downwash_torque");
+  spec.parameters["arm_m"] = kArm_m;
+  const AppliedEffect effect(spec, kContext);
+  int tilted = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    RandomInstant instant(random, 1 + trial % 3);
+    instant.now.R_WB.setIdentity();
+    const auto slope = [&](double x, double y) {
+      return (downwash_N(instant.now, x, y) - downwash_N(instant.now, -x, -y)) / (2 * kStep_m);
+    };
+    const Eigen::Vector3d expected =
+        kArm_m * kArm_m / 2 * Eigen::Vector3d(slope(0, kStep_m), -slope(kStep_m, 0), 0);
+    const Wrench wrench = effect.wrench(instant.now);
+    EXPECT_EQ(wrench.force_W_N.norm(), 0);
+    // The next term is (arm / wake width)^2 of it; the narrowest wake is 0.04 m wide.
+    EXPECT_LT((wrench.torque_B_Nm - expected).norm(), 0.15 * expected.norm() + 2e-6) << trial;
+    if (expected.norm() > 2e-5) ++tilted;
+  }
+  EXPECT_GT(tilted, 30);
+}
+
+TEST(DownwashTorque, TiltsTowardsTheWakeAndTurnsWithTheSwarm) {
+  const AppliedEffect effect(spec_of("downwash_torque"), kContext);
+  Neighbour above = {{0.08, 0, 0.3}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.034, 0};
+  Instant now;
+  now.neighbours = &above;
+  now.num_neighbours = 1;
+  const Eigen::Vector3d towards = effect.wrench(now).torque_B_Nm;
+  EXPECT_GT(towards.y(), 1e-5) << "about +y: the thrust axis falls towards +x, where the wake pushes";
+  EXPECT_NEAR(towards.x(), 0, 1e-15);
+  // A quarter turn of world and vehicle leaves what the body feels.
+  now.R_WB = Eigen::AngleAxisd(1.5707963267948966, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  above.dp_W_m = now.R_WB * above.dp_W_m;
+  EXPECT_LT((effect.wrench(now).torque_B_Nm - towards).norm(), 1e-15);
+  above.dp_W_m = {0, 0, 0.3};
+  EXPECT_LT(effect.wrench(now).torque_B_Nm.norm(), 1e-15) << "straight above: every rotor is pushed alike";
 }
 
 TEST(Downwash, ANeighbourThatIsNowhereGivesNoNumber) {
