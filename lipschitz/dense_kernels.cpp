@@ -4,6 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <mutex>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -23,10 +24,20 @@ using Eigen::VectorXd;
 /// Below this size LAPACK's unblocked inversion is as fast as anything.
 constexpr int kSmallTriangle = 32;
 
+/// Hold it while OpenBLAS works. A build without threads may leave its buffers unguarded (Debian's does): two calls at
+/// once then give wrong numbers, so there they take turns.
+std::unique_lock<std::mutex> blas_turn() {
+  static std::mutex mutex;
+  std::unique_lock<std::mutex> turn(mutex, std::defer_lock);
+  if (openblas_get_parallel() == OPENBLAS_SEQUENTIAL) turn.lock();
+  return turn;
+}
+
 void multiply(CBLAS_TRANSPOSE transpose_a, CBLAS_TRANSPOSE transpose_b, Eigen::Ref<MatrixXd> c,
               const Eigen::Ref<const MatrixXd>& a, const Eigen::Ref<const MatrixXd>& b) {
   const Eigen::Index inner = transpose_a == CblasNoTrans ? a.cols() : a.rows();
   if (c.size() == 0 || inner == 0) return;
+  const auto turn = blas_turn();
   cblas_dgemm(CblasColMajor, transpose_a, transpose_b, static_cast<int>(c.rows()), static_cast<int>(c.cols()),
               static_cast<int>(inner), 1.0, a.data(), static_cast<int>(a.outerStride()), b.data(),
               static_cast<int>(b.outerStride()), 1.0, c.data(), static_cast<int>(c.outerStride()));
@@ -82,6 +93,7 @@ void add_transposed_product(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const Matri
 bool cholesky_in_place(Eigen::Ref<MatrixXd> x) {
   const int n = static_cast<int>(x.rows()), stride = static_cast<int>(x.outerStride());
   int info = 0;
+  const auto turn = blas_turn();
   dpotrf_("L", &n, x.data(), &stride, &info);
   return info == 0 && x.diagonal().allFinite();
 }
@@ -93,6 +105,7 @@ MatrixXd cholesky(const MatrixXd& x) {
 }
 
 void invert_from_cholesky(Eigen::Ref<MatrixXd> l) {
+  const auto turn = blas_turn();
   invert_lower(l);
   const int n = static_cast<int>(l.rows()), stride = static_cast<int>(l.outerStride());
   int info = 0;
@@ -109,33 +122,38 @@ MatrixXd inverse_from_cholesky(const MatrixXd& l) {
 VectorXd congruence_times(const MatrixXd& l, const MatrixXd& d, const VectorXd& v) {
   const int n = static_cast<int>(l.rows());
   VectorXd u = v;
-  cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, n, l.data(), n, u.data(), 1);
   VectorXd w = VectorXd::Zero(n);
-  add_symmetric_product(w, 1.0, d, u);
+  const auto turn = blas_turn();
+  cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, n, l.data(), n, u.data(), 1);
+  cblas_dsymv(CblasColMajor, CblasLower, n, 1.0, d.data(), n, u.data(), 1, 0.0, w.data(), 1);
   cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, l.data(), n, w.data(), 1);
   return w;
 }
 
 void solve_lower(const Eigen::Ref<const MatrixXd>& l, Eigen::Ref<MatrixXd> b) {
   const int n = static_cast<int>(l.rows()), stride = static_cast<int>(l.outerStride());
+  const auto turn = blas_turn();
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, n, static_cast<int>(b.cols()),
               1.0, l.data(), stride, b.data(), static_cast<int>(b.outerStride()));
 }
 
 void solve_lower_transposed(const Eigen::Ref<const MatrixXd>& l, Eigen::Ref<MatrixXd> b) {
   const int n = static_cast<int>(l.rows()), stride = static_cast<int>(l.outerStride());
+  const auto turn = blas_turn();
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, n, static_cast<int>(b.cols()),
               1.0, l.data(), stride, b.data(), static_cast<int>(b.outerStride()));
 }
 
 void solve_cholesky(const MatrixXd& l, VectorXd& b) {
   const int n = static_cast<int>(l.rows());
+  const auto turn = blas_turn();
   cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, n, l.data(), n, b.data(), 1);
   cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, n, l.data(), n, b.data(), 1);
 }
 
 void add_symmetric_product(VectorXd& y, double factor, const MatrixXd& x, const VectorXd& v) {
   const int n = static_cast<int>(x.rows());
+  const auto turn = blas_turn();
   cblas_dsymv(CblasColMajor, CblasLower, n, factor, x.data(), n, v.data(), 1, 1.0, y.data(), 1);
 }
 
