@@ -1,0 +1,52 @@
+// The kernels of the interior point method give one thread's bits to every thread.
+#include "lipschitz/dense_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Every kernel once; what they factorise is well conditioned.
+MatrixXd through_all_kernels(const MatrixXd& a) {
+  const Eigen::Index n = a.rows();
+  MatrixXd x = n * MatrixXd::Identity(n, n);
+  add_product_transposed(x, a, a);
+  const MatrixXd factor = cholesky(x);
+  MatrixXd result = inverse_from_cholesky(factor);
+  add_product(result, a, x);
+  add_transposed_product(result, a, result.eval());
+  solve_lower(factor, result);
+  solve_lower_transposed(factor, result);
+  VectorXd column = result.col(0);
+  solve_cholesky(factor, column);
+  result.col(1) = column;
+  result.col(2) = congruence_times(factor, x, column);
+  add_symmetric_product(column, 0.5, x, result.col(2));
+  result.col(0) = column;
+  return result;
+}
+
+TEST(DenseKernels, ThreadsThatWorkAtTheSameTimeGetTheBitsOfOneAlone) {
+  use_one_blas_thread();
+  constexpr int kThreads = 4, kRounds = 300;
+  std::atomic<int> different{0};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < kThreads; ++i) {
+    const MatrixXd matrix = MatrixXd::Random(70, 70);
+    threads.emplace_back([&different, matrix, alone = through_all_kernels(matrix)] {
+      for (int round = 0; round < kRounds; ++round) different += through_all_kernels(matrix) == alone ? 0 : 1;
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(different, 0) << "of " << kThreads * kRounds;
+}
+
+}  // namespace
+}  // namespace swarmcert::lipschitz
