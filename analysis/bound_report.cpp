@@ -1,8 +1,13 @@
 #include "analysis/bound_report.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
 
 namespace swarmcert::analysis {
 namespace {
@@ -89,9 +94,25 @@ Json facts_json(const AxisFacts& f) {
           {"noise_command_m_s2", finite(f.noise.command_m_s2)}};
 }
 
+/// Axes that Lambda or K couples to others: they have no loops, and so no rows, of their own.
+std::vector<std::string> coupled_axes(const TrackingReport& report) {
+  std::vector<std::string> names;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto is_this = [axis](const AxisFacts& f) { return f.axis == axis; };
+    if (std::none_of(report.facts.begin(), report.facts.end(), is_this)) names.push_back(axis_name(axis));
+  }
+  return names;
+}
+
+/// What the vector gain makes of the rate, where the theorem's loop is the one that flies.
+std::optional<double> vector_error_m(const DisturbanceSource& source, const TrackingReport& report) {
+  if (!report.ball_m || !report.vector) return std::nullopt;
+  return report.vector->upper * source.rate_norm_N_s;
+}
+
 std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : "-"; }
 
-void print_theorem(const TrackingReport& report) {
+void print_theorem(const DisturbanceSource& source, const TrackingReport& report) {
   const Theorem& theorem = report.theorem;
   fmt::print("Theorem (limsup |e| <= d_m / (lmin(Lambda)^2 lmin(K)), continuous loop): {}\n",
              theorem.applies ? "applies" : "does not apply");
@@ -107,10 +128,21 @@ void print_theorem(const TrackingReport& report) {
         "{:.3f})\n",
         report.vector->lower, report.vector->upper, report.vector->direction[0], report.vector->direction[1],
         report.vector->direction[2]);
+    if (const auto error_m = vector_error_m(source, report)) {
+      fmt::print("  no error is larger than {:.6g} m in the long run, all axes together\n", *error_m);
+    }
   }
 }
 
 void print_exact(const TrackingReport& report) {
+  if (const std::vector<std::string> coupled = coupled_axes(report); !coupled.empty()) {
+    fmt::print(
+        "\nLambda or K couples the axes {}: none has rows of its own. Ball, transient and vector gain hold "
+        "for "
+        "all together.\n",
+        fmt::join(coupled, ", "));
+  }
+  if (report.exact.empty()) return;
   fmt::print("\nWorst tracking error per unit of force error (exact)\n");
   fmt::print("  {:<4} {:<8} {:<11} {:>13} {:>13} {:>13} {:>13}\n", "axis", "channel", "loop", "rate",
              "amplitude", "edge", "impulse");
@@ -124,6 +156,7 @@ void print_exact(const TrackingReport& report) {
 }
 
 void print_facts(const TrackingReport& report) {
+  if (report.facts.empty()) return;
   fmt::print("\n  {:<4} {:>7} {:>11} {:>11} {:>13} {:>11} {:>12} {:>12}\n", "axis", "stable", "lag limit",
              "delay limit", "lag floor", "effort", "Ki acts as", "I cancels");
   fmt::print("  {:<4} {:>7} {:>11} {:>11} {:>13} {:>11} {:>12} {:>12}\n", "", "", "s", "s", "m per N/s",
@@ -144,12 +177,13 @@ void print_facts(const TrackingReport& report) {
 }
 
 void print_bounds(const DisturbanceSource& source, const TrackingReport& report) {
-  if (report.bounds.empty()) {
+  if (source.kind == "none") {
     fmt::print(
         "\nNo disturbance is declared: --rate, --amplitude, --edge, --impulse or --from compare.json give "
         "bounds in metres.\n");
     return;
   }
+  if (report.bounds.empty()) return;
   fmt::print("\nBounds on the tracking error, m ({})\n", source.kind);
   fmt::print("  {:<4} {:<8} {:<11} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}  {}\n", "axis", "channel",
              "loop", "rate", "amplitude", "edge", "impulse", "amp+rate", "smallest", "by");
@@ -187,11 +221,14 @@ void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSou
     if (row.loop == Loop::kSampled) json["between_samples"] = norms_json(row.all_times);
     result["exact"].push_back(std::move(json));
   }
+  result["coupled_axes"] = coupled_axes(report);
   result["vector"] = nullptr;
   if (report.vector) {
     result["vector"] = {{"peak_gain", {report.vector->lower, report.vector->upper}},
                         {"direction", report.vector->direction},
                         {"exact", report.vector->is_exact()}};
+    const auto error_m = vector_error_m(source, report);
+    result["vector"]["worst_error_m"] = error_m ? Json(*error_m) : Json();
   }
   result["bounds"] = Json::array();
   for (const AxisBounds& row : report.bounds) {
@@ -211,7 +248,7 @@ void print_tracking(const Tracking& input, const DisturbanceSource& source, cons
   fmt::print("{} on {} ({} kg)\n", input.gains.path, input.model.path, input.plant.mass_kg);
   for (const std::string& note : input.notes) fmt::print("  with {}\n", note);
   fmt::print("\n");
-  print_theorem(report);
+  print_theorem(source, report);
   print_exact(report);
   print_facts(report);
   if (source.f_hat_rate_known) {

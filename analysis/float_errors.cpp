@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace swarmcert::analysis {
@@ -27,10 +28,15 @@ void print_float_errors(const FloatErrors& errors) {
   fmt::print(
       "\nfloat32 against double: f_d within {:.3g}, {:.3g}, {:.3g} N, thrust {:.3g} N, torque {:.3g}, "
       "{:.3g}, "
-      "{:.3g} N m; adds at most {:.3g}, {:.3g}, {:.3g} m\n",
+      "{:.3g} N m",
       errors.force_N[0], errors.force_N[1], errors.force_N[2], errors.thrust_N, errors.torque_N_m[0],
-      errors.torque_N_m[1], errors.torque_N_m[2], errors.tracking_error_m[0], errors.tracking_error_m[1],
-      errors.tracking_error_m[2]);
+      errors.torque_N_m[1], errors.torque_N_m[2]);
+  const double* const e = errors.tracking_error_m;
+  if (std::all_of(e, e + 3, [](double x) { return std::isfinite(x); })) {
+    fmt::print("; adds at most {:.3g}, {:.3g}, {:.3g} m\n", e[0], e[1], e[2]);
+  } else {
+    fmt::print("; what that adds to the tracking error is not bounded on every axis\n");
+  }
 }
 
 }  // namespace swarmcert::analysis

@@ -36,9 +36,9 @@ struct IssRun {
   RateDisturbance disturbance;
   double ratio = 0;  ///< largest |p~| / ball; only for runs that start at rest without bias
   double transient_ratio =
-      0;  ///< largest |p~(t)| / transient bound(t), where that is more than 1 % of the ball
+      0;  ///< largest |p~(t)| / transient bound(t), where that is more than a thousandth of the ball
   double largest_m = 0, at_s = 0;
-  bool is_violation = false;
+  bool is_violation = false;  ///< one of the ratios is above 1
 };
 
 struct IssOptions {

@@ -9,6 +9,8 @@ namespace swarmcert::stability {
 namespace {
 
 constexpr double kTolerance = 1e-6;  ///< of a violation; the integrator's is a thousandth of it
+/// Transient bounds smaller than this share of the ball are not compared: the integrator's absolute tolerance is.
+constexpr double kLeastShare = 1e-3;
 
 }  // namespace
 
@@ -98,10 +100,10 @@ bool IssJudge::weigh(double error_m, int k, bool from_rest, const std::array<dou
     run->ratio = std::max(run->ratio, error_m / ball_m);
     run->is_violation = run->is_violation || error_m > ball_m * (1 + kTolerance);
   }
-  if (check_.has_ball) {
-    const double limit_m = table_->at(k, sizes);
-    if (limit_m > 0.01 * ball_m) run->transient_ratio = std::max(run->transient_ratio, error_m / limit_m);
-    run->is_violation = run->is_violation || error_m > limit_m * (1 + kTolerance) + 1e-8 * ball_m;
+  if (!check_.has_ball) return error_m < 1e6 * ball_m;
+  if (const double limit_m = table_->at(k, sizes); limit_m > kLeastShare * ball_m) {
+    run->transient_ratio = std::max(run->transient_ratio, error_m / limit_m);
+    run->is_violation = run->is_violation || error_m > limit_m * (1 + kTolerance);
   }
   return error_m < 1e6 * ball_m;
 }

@@ -31,10 +31,26 @@ struct BoundOptions {
   std::string report;
 };
 
+/// What is asked for axis by axis needs loops of single axes.
+void refuse_coupled_axes(const BoundOptions& options, const Tracking& input) {
+  const char* const asked = options.is_uncertain ? "--uncertain"
+                            : options.verified   ? "--verified"
+                            : options.tube       ? "--tube"
+                                                 : nullptr;
+  if (asked == nullptr) return;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis_loop(input.gains, input.plant, axis)) return;
+  }
+  throw UsageError(std::string(asked) + ": Lambda or K of " + options.tracking.gains +
+                   " couples all axes, and this bounds the loop of one axis at a time; leave " + asked +
+                   " out, or make Lambda and K diagonal");
+}
+
 int run_bound(const BoundOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const Tracking input = load_tracking(options.tracking);
+  refuse_coupled_axes(options, input);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
   const bool has_task = !options.task.task.empty();

@@ -46,14 +46,20 @@ std::map<std::string, KindSummary> by_kind(const IssCheck& check) {
   return kinds;
 }
 
-/// The run that shows most: a violation if there is one, else the largest ratio.
+/// Of the ball where that is exceeded, or nothing is and the run started at rest; else of the transient bound.
+bool is_about_ball(const IssRun& run) { return run.ratio > 1 || (run.ratio > 0 && !run.is_violation); }
+
+double shown_ratio(const IssRun& run) { return is_about_ball(run) ? run.ratio : run.transient_ratio; }
+
+/// The run that shows most: a violation of the ball if there is one, else one of the transient bound, else the largest
+/// ratio.
 const IssRun* witness(const IssCheck& check) {
   const IssRun* best = nullptr;
   for (const IssRun& run : check.runs) {
     const auto better = [&] {
       if (run.is_violation != best->is_violation) return run.is_violation;
-      return std::max(run.ratio, run.transient_ratio * (run.ratio > 0 ? 0 : 1)) >
-             std::max(best->ratio, best->transient_ratio * (best->ratio > 0 ? 0 : 1));
+      if (run.is_violation && is_about_ball(run) != is_about_ball(*best)) return is_about_ball(run);
+      return shown_ratio(run) > shown_ratio(*best);
     };
     if (best == nullptr || better()) best = &run;
   }
@@ -160,9 +166,10 @@ void print(const IssCheckOptions& options, const IssCheck& check,
   }
   if (check.violations > 0) {
     const IssRun& run = *witness(check);
-    fmt::print("VIOLATED in {} runs. The worst: {}, |error| {:.6g} m at {:.3f} s, {:.6f} of the {}\n",
-               check.violations, run.kind, run.largest_m, run.at_s,
-               run.ratio > 0 ? run.ratio : run.transient_ratio, run.ratio > 0 ? "ball" : "transient bound");
+    fmt::print(
+        "VIOLATED in {} runs. The worst: {}, largest |error| {:.6g} m at {:.3f} s, up to {:.6f} of the {}\n",
+        check.violations, run.kind, run.largest_m, run.at_s, shown_ratio(run),
+        is_about_ball(run) ? "ball" : "transient bound");
   } else {
     fmt::print("No violation found in {} runs{}. {}\n", options.check.runs,
                check.cancelled ? ", which were interrupted" : "",

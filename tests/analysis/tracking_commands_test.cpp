@@ -303,6 +303,34 @@ TEST(BoundCommand, ADelayIsVerifiedAndADelayIntervalOnTheFlownGainsEnds) {
   EXPECT_EQ(unstable["uncertain"]["gains"][0]["status"], "unstable");
 }
 
+TEST(BoundCommand, CoupledAxesAreNamedAndWhatNeedsASingleAxisIsRefused) {
+  const ScratchFolder folder;
+  const std::string all = gains_file(
+      folder,
+      "[position]\nLambda = [[3.1, 0.4, -0.2], [0.4, 2.5, 0.3], [-0.2, 0.3, 4.2]]\nK = [0.12, 0.2, 0.09]\n");
+  const Outcome text = run_shell("swarmcert bound" + all + " --rate 0.2 --amplitude 0.1", folder.path());
+  EXPECT_EQ(text.exit_code, 0) << text.output;
+  EXPECT_NE(text.output.find("couples the axes x, y, z"), std::string::npos) << text.output;
+  EXPECT_EQ(text.output.find("No disturbance is declared"), std::string::npos) << text.output;
+  EXPECT_EQ(text.output.find("inf"), std::string::npos) << text.output;
+  const Json json = json_of(folder, "bound" + all + " --rate 0.2");
+  EXPECT_EQ(json["coupled_axes"], Json({"x", "y", "z"}));
+  EXPECT_NEAR(json["vector"]["worst_error_m"].get<double>(),
+              0.2 * json["vector"]["peak_gain"][1].get<double>(), 1e-15);
+  EXPECT_LT(json["vector"]["worst_error_m"], json["theorem"]["ball"]);
+  for (const char* const asked : {"--verified", "--uncertain", "--tube --amplitude 0.1"}) {
+    const Outcome refused = run_shell("swarmcert bound" + all + " " + asked, folder.path());
+    EXPECT_EQ(refused.exit_code, 2) << asked;
+    EXPECT_NE(refused.output.find("gains.toml couples all axes"), std::string::npos) << refused.output;
+  }
+  const std::string two = gains_file(
+      folder, "[position]\nLambda = [[3.1, 0.4, 0], [0.4, 2.5, 0], [0, 0, 4.2]]\nK = [0.12, 0.2, 0.09]\n");
+  const Json one_axis = json_of(folder, "bound" + two + " --verified");
+  EXPECT_EQ(one_axis["coupled_axes"], Json({"x", "y"}));
+  for (const Json& row : one_axis["verified"]) EXPECT_EQ(row["axis"], "z");
+  EXPECT_EQ(one_axis["verified"].size(), 2u);
+}
+
 TEST(IssCheckCommand, WithoutAViolationAndWithoutTheTheoremItIsInconclusive) {
   // A delay takes away the theorem, and the integrated loop has none: nothing is violated, and nothing is shown.
   const ScratchFolder folder;

@@ -93,6 +93,18 @@ TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
   }
 }
 
+TEST(IssCheck, EveryViolationShowsInARatioAboveOne) {
+  // Unequal gains leave the ball far away; the lag breaks the transient bound at its start.
+  const IssCheck check =
+      check_iss(composite("[3.1, 2.5, 4.2]", "[0.12, 0.2, 0.09]", "[lag]\nmotor_s = 0.03\n"),
+                tests::small_vehicle(), with_runs(45));
+  EXPECT_LT(check.worst_ratio, 1);
+  EXPECT_GT(check.violations, 0);
+  for (const IssRun& run : check.runs) {
+    EXPECT_EQ(run.is_violation, std::max(run.ratio, run.transient_ratio) > 1 + 1e-6) << run.kind;
+  }
+}
+
 TEST(IssCheck, DoesNotDependOnJobsOrOnTheRate) {
   IssOptions options;
   options.runs = 60;
