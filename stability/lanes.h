@@ -10,6 +10,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "stability/kernel_width.h"
+
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #include <immintrin.h>
 #define SWARMCERT_LANES_AVX2
@@ -252,8 +254,7 @@ class DoubleLanes {
 /// False where this processor cannot execute them.
 inline bool lanes_are_fast() {
 #if defined(SWARMCERT_LANES_AVX2)
-  static const bool has = __builtin_cpu_supports("avx2") != 0;
-  return has;
+  return widest_kernels() >= KernelWidth::kAvx2;
 #else
   return true;
 #endif

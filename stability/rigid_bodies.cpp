@@ -7,6 +7,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "stability/kernel_width.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -36,9 +37,8 @@ Kernel choose([[maybe_unused]] int size) {
         width::drift, width::normalise                              \
   }
 #if defined(SWARMCERT_WIDE_KERNELS)
-  if (size > 4 && __builtin_cpu_supports("avx512f") != 0) return SWARMCERT_KERNEL(avx512);
-  if (size > 2 && __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0)
-    return SWARMCERT_KERNEL(avx2);
+  if (size > 4 && widest_kernels() == KernelWidth::kAvx512) return SWARMCERT_KERNEL(avx512);
+  if (size > 2 && widest_kernels() >= KernelWidth::kAvx2) return SWARMCERT_KERNEL(avx2);
 #endif
   return SWARMCERT_KERNEL(narrow);
 #undef SWARMCERT_KERNEL

@@ -12,6 +12,7 @@
 
 #include "stability/effects/function_tables.h"
 #include "stability/effects/wake_shape.h"
+#include "stability/kernel_width.h"
 #include "stability/swarm_pairs.h"
 
 namespace swarmcert::stability {
@@ -44,9 +45,9 @@ const Kernel& kernel_for([[maybe_unused]] int count) {
                                    avx2::logarithm_of_one};
   static constexpr Kernel kAvx512 = {avx512::kBlock, avx512::strengths, avx512::swarm_forces,
                                      avx512::composed_of_one, avx512::logarithm_of_one};
-  if (count > avx2::kBlock && __builtin_cpu_supports("avx512f") != 0) return kAvx512;
+  if (count > avx2::kBlock && widest_kernels() == KernelWidth::kAvx512) return kAvx512;
   // Also for fewer: the narrow one has no fused operations of its own.
-  if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) return kAvx2;
+  if (widest_kernels() >= KernelWidth::kAvx2) return kAvx2;
 #endif
   static constexpr Kernel kNarrow = {narrow::kBlock, narrow::strengths, narrow::swarm_forces,
                                      narrow::composed_of_one, narrow::logarithm_of_one};

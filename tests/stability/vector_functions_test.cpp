@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "stability/effects/function_tables.h"
+#include "stability/kernel_width.h"
 #include "stability/rigid_bodies.h"
 
 namespace swarmcert::stability {
@@ -32,12 +33,12 @@ struct Widths {
   /// Those that this processor has.
   Widths() {
 #if defined(SWARMCERT_WIDE_KERNELS)
-    if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) {
+    if (widest_kernels() >= KernelWidth::kAvx2) {
       logarithms.push_back(avx2::logarithms);
       logarithms_of_one_plus.push_back(avx2::logarithms_of_one_plus);
       exponentials.push_back(avx2::exponentials);
     }
-    if (__builtin_cpu_supports("avx512f") != 0) {
+    if (widest_kernels() == KernelWidth::kAvx512) {
       logarithms.push_back(avx512::logarithms);
       logarithms_of_one_plus.push_back(avx512::logarithms_of_one_plus);
       exponentials.push_back(avx512::exponentials);
