@@ -58,9 +58,9 @@ int main() {
     for (const lipschitz::CertifiedBound& bound : found.bounds) {
       if (bound.function != "set:small:small") continue;
       fmt::print(
-          "gamma {:.1f}: test RMSE {:.2f} gf, proved L <= {:#.3g} gf/(m, m/s), product of norms {:#.3g}\n",
+          "gamma {:.1f}: test RMSE {:.2f} gf, proved L <= {:.4g} gf/(m, m/s), product of norms {:.4g}\n",
           gamma, error_gf, bound.upper.value(), bound.product.value());
-      rows += fmt::format("{:.1f} {:.2f} {:#.3g}\n", gamma, error_gf, bound.upper.value());
+      rows += fmt::format("{:.1f} {:.2f} {:.4g}\n", gamma, error_gf, bound.upper.value());
     }
   }
   notebook::plot("trade", rows,

@@ -274,6 +274,26 @@ TEST(SpectralNormalization, EqualMakesTheProductOfTheNormsGamma) {
   }
 }
 
+TEST(Adam, StepIsTheFormulaInFloatToTheBit) {
+  files::Random random(31);
+  constexpr int kSize = 1001;
+  Adam adam(kSize);
+  Vector theta = Vector::Zero(kSize), expected = theta, m = theta, v = theta;
+  for (int step = 1; step <= 20; ++step) {
+    Vector gradient(kSize);
+    for (Index i = 0; i < kSize; ++i) gradient(i) = static_cast<float>(std::pow(random.symmetric(), 5));
+    adam.step(theta, gradient, 1e-3);
+    const auto first = static_cast<float>(1e-3 / (1 - std::pow(0.9, step)));
+    const auto second = static_cast<float>(1 / (1 - std::pow(0.999, step)));
+    for (Index i = 0; i < kSize; ++i) {
+      m(i) = 0.9f * m(i) + 0.1f * gradient(i);
+      v(i) = 0.999f * v(i) + 0.001f * (gradient(i) * gradient(i));
+      expected(i) -= first * m(i) / (std::sqrt(second * v(i)) + 1e-8f);
+    }
+    ASSERT_EQ(theta, expected) << "step " << step << ": training would depend on the processor";
+  }
+}
+
 TEST(Trainer, SameBitsForAnyNumberOfThreads) {
   const Layout layout = mixed_layout();
   const Dataset data = mixed_dataset(900, 4);
@@ -283,6 +303,21 @@ TEST(Trainer, SameBitsForAnyNumberOfThreads) {
     options.batch = 700;
     options.jobs = jobs;
     Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1), options);
+    for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
+    results.push_back(trainer.theta());
+  }
+  EXPECT_EQ(results[0], results[1]);
+  EXPECT_EQ(results[0], results[2]);
+}
+
+TEST(Trainer, SameBitsForAnySizeOfTheProcessorsCaches) {
+  const Layout layout = mixed_layout();
+  const Dataset data = mixed_dataset(900, 4);
+  std::vector<Vector> results;
+  for (const int l1_bytes : {4 << 10, 32 << 10, 48 << 10}) {
+    Eigen::setCpuCacheSizes(l1_bytes, 16 * l1_bytes, 64 * l1_bytes);
+    Trainer trainer(layout, data, all_samples(data), initial_parameters(layout, 1),
+                    options_with(2, Scope::kLayer, Mode::kClip));
     for (int epoch = 0; epoch < 3; ++epoch) trainer.run_epoch(epoch, 1e-2);
     results.push_back(trainer.theta());
   }
