@@ -77,13 +77,16 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
     w[i] = (system->b[i].lo + system->b[i].hi) / 2;
     error = up(error + (system->b[i].hi - system->b[i].lo));
   }
+  const double row_norm = norm_above(system->rows[1]);
   const auto value = [&] {
-    return up(abs(dot(system->rows[1], w)).hi + up(norm_above(system->rows[1]) * error));
+    const double missed = up(row_norm * error);
+    return dot(system->rows[1], w) + Interval(-missed, missed);
   };
   KernelCells cells;
-  double last = value();
+  Interval last = value();
   for (int k = 0; k < count; ++k) {
     double integral = 0;
+    Interval net;
     for (int p = 0; p < parts; ++p) {
       // The state's norm falls, so what it is at the step's start bounds y'' in all of the step.
       const double size = up(norm_above(w) + error);
@@ -99,17 +102,22 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
       }
       error = up(up(error + sqrt(missed).hi) + up(step.remainder * norm_above(w)));
       w = std::move(next);
-      const double now = value();
-      cells.peak = std::max(cells.peak, up(std::max(last, now) + bend / 8));
-      integral = up(integral + up(step_s * up(up(last + now) / 2 + bend / 12)));
+      const Interval now = value();
+      cells.peak = std::max(cells.peak, up(std::max(last.mag(), now.mag()) + bend / 8));
+      integral = up(integral + up(step_s * up(up(last.mag() + now.mag()) / 2 + bend / 12)));
+      const double bent = up(bend / 12);
+      net += Interval(step_s) * ((last + now) * Interval(0.5) + Interval(-bent, bent));
       last = now;
     }
     cells.integral.push_back(integral);
+    cells.net.push_back(net);
   }
   // Cell borders k cell_s and sums of step_s differ by a few units in the last place of the time; |y| is at most `peak`.
   for (std::size_t k = 0; k < cells.integral.size(); ++k) {
     const double shift_s = 1e-15 * (parts + 4) * static_cast<double>(k + 2) * cell_s;
-    cells.integral[k] = up(cells.integral[k] * (1 + 1e-13) + cells.peak * shift_s);
+    const double more = 1e-13 * cells.integral[k] + cells.peak * shift_s;
+    cells.integral[k] = up(cells.integral[k] + up(more));
+    cells.net[k] += Interval(-more, more) * Interval(1 + 1e-12);
   }
   if (!std::isfinite(cells.peak)) return std::nullopt;
   return cells;
@@ -130,6 +138,32 @@ std::vector<double> convolved(const KernelCells& kernel, const std::vector<doubl
     result[n] = total * rounding;
   }
   return result;
+}
+
+Interval answer(const KernelCells& kernel, std::size_t m, Interval w) {
+  const double centre = w.lo + (w.hi - w.lo) / 2;
+  const double radius = up(std::max(w.hi - centre, centre - w.lo));
+  const double spread = up(kernel.integral[m] * up(radius));
+  return kernel.net[m] * centre + Interval(-spread, spread);
+}
+
+Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& w, std::size_t n) {
+  // The terms of answer(), summed to nearest: each is off by a few units, their sum by n units of the sum of sizes.
+  double centre = 0;
+  double spread = 0;
+  double size = 0;
+  for (std::size_t m = 1; m <= n; ++m) {
+    const Interval both = hull(w[n - m], m < n ? w[n - m - 1] : Interval(0));
+    const double c = both.lo + (both.hi - both.lo) / 2;
+    const double radius = std::max(both.hi - c, c - both.lo);
+    const Interval& net = kernel.net[m];
+    const double g = net.lo + (net.hi - net.lo) / 2;
+    centre += g * c;
+    size += std::abs(g * c);
+    spread += kernel.integral[m] * radius + std::max(net.hi - g, g - net.lo) * std::abs(c);
+  }
+  spread += 4e-16 * static_cast<double>(n + 8) * (size + spread) + 1e-300;
+  return {down(centre - spread), up(centre + spread)};
 }
 
 }  // namespace swarmcert::stability

@@ -5,12 +5,14 @@
 #include <vector>
 
 #include "stability/bounds/impulse_response.h"
+#include "stability/bounds/interval.h"
 
 namespace swarmcert::stability {
 
 /// Upper bounds, in real arithmetic, for y(t) = L^-1[Y] at t > 0.
 struct KernelCells {
   std::vector<double> integral;  ///< at least int |y| over [k cell_s, (k + 1) cell_s]
+  std::vector<Interval> net;     ///< contains int y over the same cell
   double peak = 0;               ///< at least sup |y| over all of them
   double total() const;          ///< at least int |y| over all of them
 };
@@ -27,5 +29,14 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
 /// |y|_oo int|w| for a short w: both bounds at once.
 /// @returns one bound per cell of `sizes`. Precondition: as many cells in the kernel.
 std::vector<double> convolved(const KernelCells& kernel, const std::vector<double>& sizes);
+
+/// Contains int y(u) w(u) du over cell m for every w with values in `w`: with c + [-r, r] = w it is
+///   c net[m] + [-r, r] integral[m].
+Interval answer(const KernelCells& kernel, std::size_t m, Interval w);
+
+/// Contains what cells 1, 2, ... of the kernel add to (y * w)(t) for t in cell n, where w is 0 before the start and in w[k]
+/// in cell k < n: for u in cell m, t - u lies in cell n - m or n - m - 1. All of (y * w)(t) is this and answer() of cell 0
+/// to the hull of w[n] and w[n - 1].
+Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& w, std::size_t n);
 
 }  // namespace swarmcert::stability

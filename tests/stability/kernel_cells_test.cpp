@@ -46,10 +46,16 @@ TEST(KernelCells, EveryCellIsAtLeastTheFineSumOfItsResponse) {
     const std::vector<double> values = sampled_response(y, 0.05 / parts, 100 * parts + 1);
     for (int k = 0; k < 100; ++k) {
       double sum = 0;
+      double net = 0;
       for (int i = 0; i < parts; ++i) {
         const auto at = static_cast<std::size_t>(k * parts + i);
         sum += (std::abs(values[at]) + std::abs(values[at + 1])) / 2 * 0.05 / parts;
+        net += (values[at] + values[at + 1]) / 2 * 0.05 / parts;
       }
+      const Interval& in_cell = cells->net[static_cast<std::size_t>(k)];
+      ASSERT_GE(net, in_cell.lo - 1e-5 * sum);
+      ASSERT_LE(net, in_cell.hi + 1e-5 * sum);
+      ASSERT_LE(in_cell.hi - in_cell.lo, 3e-5 * cells->total());
       ASSERT_GE(cells->integral[static_cast<std::size_t>(k)], sum * (1 - 1e-5));
       ASSERT_LE(cells->integral[static_cast<std::size_t>(k)], sum + 2e-5 * cells->total());
     }
@@ -85,6 +91,65 @@ TEST(KernelCells, NoErrorUnderRandomForcesOfTheSizesExceedsTheConvolution) {
     }
   }
   EXPECT_GT(nearest, 0.6) << "the worst force must come near";
+}
+
+/// How often responses to signals within intervals lie outside what the kernel answers, and the share of its width that
+/// they take at most.
+struct Outside {
+  int count = 0;
+  double widest = 0;
+};
+
+Outside outside(const KernelCells& kernel, const std::vector<double>& y, double step_s, int parts) {
+  files::Random random(9);
+  const int cells = static_cast<int>(kernel.integral.size());
+  Outside result;
+  for (int run = 0; run < 60; ++run) {
+    std::vector<Interval> w;
+    for (int k = 0; k < cells; ++k) {
+      const double middle = std::sin(0.07 * k + run) + random.symmetric() * 0.1;
+      const double half = 0.2 * random.uniform();
+      w.emplace_back(middle - half, middle + half);
+    }
+    const auto n = static_cast<std::size_t>(20 + random.below(static_cast<std::uint64_t>(cells - 20)));
+    const Interval answered = answer_to_past(kernel, w, n) + answer(kernel, 0, hull(w[n], w[n - 1]));
+    // Anywhere in cell n; the signals that bring the response furthest down and up.
+    const int end =
+        static_cast<int>(n) * parts + 1 + static_cast<int>(random.below(static_cast<std::uint64_t>(parts)));
+    double reached[2] = {0, 0};
+    for (int i = 0; i < end; ++i) {
+      const double y_at =
+          (y[static_cast<std::size_t>(end - i)] + y[static_cast<std::size_t>(end - i - 1)]) / 2;
+      const Interval& range = w[static_cast<std::size_t>(i / parts)];
+      reached[0] += y_at * (y_at >= 0 ? range.lo : range.hi) * step_s;
+      reached[1] += y_at * (y_at >= 0 ? range.hi : range.lo) * step_s;
+    }
+    if (reached[0] < answered.lo || reached[1] > answered.hi) ++result.count;
+    result.widest = std::max(result.widest, (reached[1] - reached[0]) / (answered.hi - answered.lo));
+  }
+  return result;
+}
+
+TEST(KernelCells, NoResponseToSignalsWithinIntervalsLeavesWhatTheyAnswer) {
+  for (const AxisLoop& loop : kLoops) {
+    const TransferFunction y = impulse_transfer(loop, Channel::kCommand);
+    const int parts = 25;
+    const auto kernel = kernel_cells(y, 0.025, 120);
+    ASSERT_TRUE(kernel);
+    const std::vector<double> values = sampled_response(y, 0.001, 120 * parts + 1);
+    const Outside found = outside(*kernel, values, 0.001, parts);
+    EXPECT_EQ(found.count, 0);
+    EXPECT_GT(found.widest, 0.4);
+    // The same look at kernels that are wrong: too small, moved by a cell, of the wrong sign.
+    KernelCells small = *kernel;
+    for (double& x : small.integral) x *= 0.3;
+    KernelCells late = *kernel;
+    late.net.insert(late.net.begin(), 4, Interval(0));
+    KernelCells negative = *kernel;
+    for (Interval& x : negative.net) x = -x;
+    for (const KernelCells* broken : {&small, &late, &negative})
+      EXPECT_GT(outside(*broken, values, 0.001, parts).count, 0);
+  }
 }
 
 TEST(KernelCells, UnstableLoopsAndDelaysHaveNone) {
