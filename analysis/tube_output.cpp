@@ -150,20 +150,30 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
     assumptions.push_back({{"name", a.name}, {"status", a.status}, {"note", a.note}});
   json["assumptions"] = std::move(assumptions);
   Json at = Json::array();
-  if (tube.proved) {
-    const std::size_t count = tube.history.front()[2].position_m.size();
-    const std::size_t every = std::max<std::size_t>(1, (count + kCurvePoints - 1) / kCurvePoints);
-    for (std::size_t first = 0; first < count; first += every) {
-      const std::size_t last = std::min(count, first + every);
-      Json errors = Json::array();
-      for (const auto& of_vehicle : tube.history) {
-        const std::vector<double>& z = of_vehicle[2].position_m;
-        errors.push_back(*std::max_element(z.begin() + static_cast<std::ptrdiff_t>(first),
-                                           z.begin() + static_cast<std::ptrdiff_t>(last)));
+  Json slices = Json::array();
+  const std::size_t count = tube.proved ? tube.slices.size() : 0;
+  const std::size_t every = std::max<std::size_t>(1, (count + kCurvePoints - 1) / kCurvePoints);
+  for (std::size_t first = 0; first < count; first += every) {
+    const std::size_t last = std::min(count, first + every);
+    Json largest = Json::array();
+    Json vehicles = Json::array();
+    for (std::size_t i = 0; i < tube.slices.front().size(); ++i) {
+      Json axes = Json::array();
+      for (std::size_t k = 0; k < 3; ++k) {
+        stability::Interval e = tube.slices[first][i].position_m[k];
+        for (std::size_t n = first + 1; n < last; ++n)
+          e = stability::hull(e, tube.slices[n][i].position_m[k]);
+        axes.push_back({e.lo, e.hi});
+        if (k == 2) largest.push_back(e.mag());
       }
-      at.push_back({{"until_s", static_cast<double>(last) * tube.slice_s}, {"error_z_m", std::move(errors)}});
+      vehicles.push_back(std::move(axes));
     }
+    const double until_s = static_cast<double>(last) * tube.slice_s;
+    at.push_back({{"until_s", until_s}, {"error_z_m", std::move(largest)}});
+    slices.push_back({{"until_s", until_s}, {"error_xyz_m", std::move(vehicles)}});
   }
+  json["slices"] = std::move(slices);
+  json["one_radius"] = verdict_json(tube.one_radius);
   json["at"] = std::move(at);
   return json;
 }
@@ -177,6 +187,10 @@ void print_local_tube(const Json& tube) {
     const Json& r = tube["radius_xyz_m"];
     fmt::print("  errors stay below x {:.4g} m, y {:.4g} m, z {:.4g} m\n", r[0].get<double>(),
                r[1].get<double>(), r[2].get<double>());
+    const Json& one = tube["one_radius"];
+    fmt::print("  with one radius for the whole flight: {} (loop gain {:.3g})\n",
+               radius_text(one["radius_m"]),
+               one["loop_gain"].is_number() ? one["loop_gain"].get<double>() : INFINITY);
     for (const Json& b : tube["bounds"]) {
       const auto number = [](const Json& x) {
         return x.is_number() ? fmt::format("{:.4g}", x.get<double>()) : std::string("-");
@@ -220,33 +234,34 @@ void add_local_tube_plot(Report& report, const LocalTube& tube, const Json& json
                                json["verdict"].get<std::string>()));
   if (!tube.proved) report.paragraph(tube.why + ".");
   std::vector<std::vector<std::string>> rows;
-  rows.push_back({"difference of both forces", radius_text(json["radius_m"]),
-                  fmt::format("{:.3g}", tube.tube.loop_gain)});
+  rows.push_back({"difference of both forces, slice by slice", radius_text(json["radius_m"]), "any"});
+  rows.push_back({"difference of both forces, one radius", radius_text(json["one_radius"]["radius_m"]),
+                  fmt::format("{:.3g}", tube.one_radius.loop_gain)});
   for (const TubeRow& row : tube.rows) {
     rows.push_back({row.name + " Lipschitz bound alone", radius_text(json[row.name]["radius_m"]),
                     fmt::format("{:.3g}", row.tube.loop_gain)});
   }
   report.table({"force error from", "radius", "loop gain"}, rows);
   if (!tube.proved) return;
-  std::string data = "# until_s, then a bound of |e_z| per vehicle, m\n";
-  for (const Json& at : json["at"]) {
+  std::string data = "# until_s, then least and largest e_z per vehicle, m\n";
+  for (const Json& at : json["slices"]) {
     data += fmt::format("{:.6g}", at["until_s"].get<double>());
-    for (const Json& e : at["error_z_m"]) data += fmt::format(" {:.6g}", e.get<double>());
+    for (const Json& e : at["error_xyz_m"])
+      data += fmt::format(" {:.6g} {:.6g}", e[2][0].get<double>(), e[2][1].get<double>());
     data += "\n";
   }
   std::string script = "set xlabel 'time [s]'\nset ylabel 'height error [m]'\nplot ";
-  for (std::size_t i = 0; i < tube.history.size(); ++i) {
+  for (std::size_t i = 0; i < tube.slices.front().size(); ++i) {
     script += fmt::format(
-        "{}'local_tube.dat' using 1:{} with steps linetype {} title 'cf{}', '' using 1:(-${}) with "
+        "{}'local_tube.dat' using 1:{} with steps linetype {} title 'cf{}', '' using 1:{} with "
         "steps linetype {} notitle",
-        i == 0 ? "" : ", ", i + 2, i + 1, i + 1, i + 2, i + 1);
+        i == 0 ? "" : ", ", 2 * i + 2, i + 1, i + 1, 2 * i + 3, i + 1);
   }
-  report.figure(
-      "local_tube", data, script + "\n",
-      fmt::format(
-          "What the height error of each vehicle cannot exceed by each time while all stay within {:.4g} m "
-          "of height of their set points, which this proves.",
-          tube.tube.radius_m(2)));
+  report.figure("local_tube", data, script + "\n",
+                fmt::format("Between which values the height error of each vehicle lies at each time: "
+                            "proved, and within {:.4g} m "
+                            "over the whole flight.",
+                            tube.tube.radius_m(2)));
 }
 
 }  // namespace swarmcert::analysis

@@ -95,7 +95,8 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
     }
     loops.axis[axis] =
         last && same_loop(*loop, *last) ? loops.axis[axis - 1] : error_loop(*loop, slice_s, slices);
-    if (!loops.axis[axis].h1 || !loops.axis[axis].h2) {
+    const ErrorLoop& made = loops.axis[axis];
+    if (!made.h1 || !made.h2 || (made.has_lag && (!made.g1 || !made.g2))) {
       loops.refusal =
           std::string("the loop of axis ") + stability::axis_name(axis) + " is not verifiably stable";
       return loops;

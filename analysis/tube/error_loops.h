@@ -13,7 +13,7 @@ namespace swarmcert::analysis {
 /// One axis of the continuous loop without delay: m D e = s (f_a - f_hat) + s (L - 1)(f_a - m p_d''), with f_a the force
 /// that acts, f_hat what the controller believes, L the lags of its command. So e = h' * (f_a - f_hat) + g' * w with
 ///   h = L^-1[1/(m D)] (command channel),   g = L^-1[(L - 1)/(m D)],   w = f_a - m p_d''.
-/// Each entry bounds |kernel| in real arithmetic. A kernel that does not decay (Ki = 0) is missing.
+/// Each entry bounds its kernel in real arithmetic. h and g, which do not decay where Ki = 0, may be missing.
 struct ErrorLoop {
   std::optional<stability::KernelCells> h, h1, h2;  ///< h, h', h''
   std::optional<stability::KernelCells> g, g1, g2;  ///< all missing where there is no lag

@@ -3,10 +3,9 @@
 
 #include <atomic>
 #include <functional>
-#include <memory>
 #include <vector>
 
-#include "analysis/tube/scene.h"
+#include "analysis/tube/force_difference.h"
 
 namespace swarmcert::analysis {
 
@@ -29,10 +28,7 @@ struct EnclosureOptions {
   std::function<void(int done, int total)> progress;
 };
 
-/// The difference itself: on each part of a box, the network between linear forms by outward-rounded relaxation (Reach),
-/// the truth between its mean value forms f_a(x_0) + G (x - x_0) in intervals; their difference is one linear form, so that
-/// slopes which agree cancel. A form holds on its whole part: for a smaller tube its largest value over what is left of the
-/// part holds as well, and costs nothing.
+/// From the difference itself, made ready stretch by stretch for the largest tube.
 class Enclosure final : public ForceBound {
  public:
   Enclosure(const Scene& scene, EnclosureOptions options) : scene_(scene), options_(std::move(options)) {}
@@ -40,12 +36,7 @@ class Enclosure final : public ForceBound {
   std::vector<double> sizes(const Radii& radii) const override;
 
  private:
-  struct Form;
-  struct Part;
-  /// @param all the stretch's states, of which `box` is a part.
-  Part part(const std::vector<Interval>& all, const lipschitz::Box& box, const TruthForce::Rest& rest,
-            const LearnedForce::Forms* around) const;
-  std::vector<std::vector<std::shared_ptr<const Part>>> parts_;  ///< per stretch
+  std::vector<ForceDifference> differences_;  ///< per stretch
   const Scene& scene_;
   EnclosureOptions options_;
 };

@@ -117,17 +117,6 @@ class Trial {
   std::vector<std::array<ErrorHistory, 3>> others_;
 };
 
-Radii larger(const Radii& a, const Radii& b) {
-  Radii result = a;
-  for (std::size_t i = 0; i < a.position_m.size(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      result.position_m[i][k] = std::max(a.position_m[i][k], b.position_m[i][k]);
-      result.velocity_m_s[i][k] = std::max(a.velocity_m_s[i][k], b.velocity_m_s[i][k]);
-    }
-  }
-  return result;
-}
-
 }  // namespace
 
 double LeastTube::radius_m() const { return std::max({radius_m(0), radius_m(1), radius_m(2)}); }

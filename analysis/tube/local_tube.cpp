@@ -16,11 +16,45 @@ namespace {
 
 /// How much wider than the tube the box is on which local constants are sought.
 constexpr double kLocalBox = 1.6;
+/// More parts slice by slice, where each slice is made ready once or twice, than for one radius, where all are many times.
+constexpr int kSlicedParts = 4;
 
 /// The bound of a row that has better constants is at most that of a row with worse ones: a tube proved by the latter is
 /// proved by the former.
 void inherit(LeastTube& better, const LeastTube& worse) {
   if (worse.proved && (!better.proved || worse.radius_m(2) < better.radius_m(2))) better = worse;
+}
+
+void unite(TruthSizes& a, const TruthSizes& b) {
+  for (std::size_t k = 0; k < 3; ++k) a.force_N[k] = stability::hull(a.force_N[k], b.force_N[k]);
+  a.rest_width_N = std::max(a.rest_width_N, b.rest_width_N);
+  for (std::size_t n = 0; n < a.gradient_N_m.size(); ++n)
+    a.gradient_N_m[n] = std::max(a.gradient_N_m[n], b.gradient_N_m[n]);
+}
+
+/// A tube of one radius, as far as it is proved, cut down to what holds slice by slice.
+LeastTube narrowed(const LeastTube& tube, const SlicedTube& sliced, const Motion& motion) {
+  if (!sliced.proved) return tube;
+  LeastTube result = tube;
+  const Radii radii = sliced.radii();
+  std::vector<double> force_N(motion.stretches.size(), 0.0);
+  std::vector<TruthSizes> truth(motion.stretches.size());
+  for (std::size_t i = 0; i < sliced.truth.size(); ++i) {
+    for (std::size_t n = 0; n < sliced.truth[i].size(); ++n) {
+      const auto s = static_cast<std::size_t>(motion.stretch_of[i][n]);
+      force_N[s] = std::max(force_N[s], sliced.force_error_N[i][n].mag());
+      if (truth[s].gradient_N_m.empty()) truth[s] = sliced.truth[i][n];
+      unite(truth[s], sliced.truth[i][n]);
+    }
+  }
+  result.radii = tube.proved ? smaller(radii, tube.radii) : radii;
+  for (std::size_t s = 0; tube.proved && s < force_N.size(); ++s)
+    force_N[s] = std::min(force_N[s], tube.force_N[s]);
+  result.force_N = std::move(force_N);
+  result.truth = std::move(truth);
+  result.proved = true;
+  result.why.clear();
+  return result;
 }
 
 class Steps {
@@ -57,21 +91,33 @@ LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::
   const auto is_cancelled = [cancelled] { return cancelled != nullptr && *cancelled; };
   const Radii none = Radii::none(vehicles);
 
-  Steps steps(options, 5);
+  Steps steps(options, 6);
   steps.next("forces at the set points");
   Enclosure at_set_points(scene, options.enclosure);
   const bool has_start = at_set_points.prepare(none, {});
-  steps.next("tube from the difference of both forces");
   EnclosureOptions with_progress = options.enclosure;
-  with_progress.progress = [&options](int done, int total) {
-    if (options.progress) options.progress(total + done, 5 * total, "parts of the tube");
+  const auto show = [&](int step, const char* what) {
+    steps.next(what);
+    with_progress.progress = [&options, step, what](int done, int total) {
+      if (options.progress) options.progress(step * total + done, 6 * total, what);
+    };
   };
-  Enclosure enclosure(scene, with_progress);
-  if (has_start) result.tube = least_tube(scene, enclosure);
+  if (has_start) {
+    const std::vector<double> start_N = at_set_points.sizes(none);
+    const double tolerance_N =
+        options.enclosure.tolerance * *std::max_element(start_N.begin(), start_N.end());
+    show(1, "tube slice by slice");
+    EnclosureOptions finer = with_progress;
+    finer.boxes *= kSlicedParts;
+    result.sliced = sliced_tube(scene, finer, tolerance_N);
+    show(2, "tube of one radius");
+    Enclosure enclosure(scene, with_progress);
+    result.one_radius = least_tube(scene, enclosure);
+  }
   steps.next("tubes from global constants");
   if (!has_start || is_cancelled()) {
     result.cancelled = true;
-    if (!has_start) result.tube.why = "interrupted";
+    if (!has_start) result.one_radius.why = "interrupted";
   }
   if (has_start && !is_cancelled()) {
     const std::vector<double> start_N = at_set_points.sizes(none);
@@ -85,8 +131,9 @@ LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::
     row("global", std::vector<ForceConstants>(per_vehicle, global.sdp));
     steps.next("local constants");
     // On the tube that is proved, or on what errors would be if they did not feed back.
-    Radii box = result.tube.proved ? result.tube.radii.scaled(kLocalBox, 1e-4) : none;
-    if (!result.tube.proved) {
+    const LeastTube so_far = narrowed(result.one_radius, result.sliced, scene.motion());
+    Radii box = so_far.proved ? so_far.radii.scaled(kLocalBox, 1e-4) : none;
+    if (!so_far.proved) {
       SlopeBound still(scene, start_N, std::vector<ForceConstants>(per_vehicle));
       const LeastTube without = least_tube(scene, still);
       if (without.proved) box = without.radii.scaled(kLocalBox, 1e-4);
@@ -95,7 +142,7 @@ LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::
         local_constants(network, scene, box, global, options.nodes, options.enclosure.jobs, cancelled,
                         [&](int done, int total) {
                           if (options.progress)
-                            options.progress(3 * total + done, 5 * total, "local constants");
+                            options.progress(4 * total + done, 6 * total, "local constants");
                         });
     SlopeBound bound(scene, start_N, local);
     LeastTube of_local = least_tube(scene, bound);
@@ -106,9 +153,12 @@ LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::
     result.rows.push_back({"local", std::move(local), std::move(of_local)});
     inherit(result.rows[1].tube, result.rows[0].tube);
     inherit(result.rows[2].tube, result.rows[1].tube);
-    inherit(result.tube, result.rows[2].tube);
+    inherit(result.one_radius, result.rows[2].tube);
     result.cancelled = is_cancelled();
   }
+  result.tube = narrowed(result.one_radius, result.sliced, scene.motion());
+  if (!result.tube.proved && !result.sliced.why.empty())
+    result.tube.why = result.sliced.why + "; with one radius for the whole flight, " + result.tube.why;
   result.proved = result.tube.proved;
   result.why = result.tube.why;
   if (result.proved) {

@@ -9,6 +9,7 @@
 
 #include "analysis/tube/force_constants.h"
 #include "analysis/tube/least_tube.h"
+#include "analysis/tube/sliced_tube.h"
 #include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
@@ -28,7 +29,7 @@ struct ForceErrorBounds {
          impulse_N_s = 0;  ///< sup|eps|, sup|eps'|, TV, int|eps| dt
   double lag_m = 0;        ///< what the lag of the feed-forward adds to each of the following
   double by_rate_m = 0, by_amplitude_m = 0, by_edges_m = 0, by_impulse_m = 0;  ///< B1 .. B4
-  double by_slices_m = 0;  ///< B2 and B4 slice by slice: see convolved()
+  double by_slices_m = 0;  ///< B2 and B4 slice by slice: LocalTube::slices
   double least_m() const;
 };
 
@@ -42,10 +43,13 @@ struct TubeRow {
 struct LocalTube {
   bool proved = false;
   std::string why;  ///< where not proved
-  LeastTube tube;  ///< from the difference of both forces, or from the local constants where these are better
+  LeastTube tube;   ///< the smallest that follows from all of the following together
+  LeastTube
+      one_radius;  ///< for the whole flight, from the difference of both forces or from the local constants
+  SlicedTube sliced;  ///< from the difference of both forces, an interval per slice
   std::vector<TubeRow> rows;
-  std::vector<ForceErrorBounds> bounds;              ///< per vehicle; empty where nothing is proved
-  std::vector<std::array<ErrorHistory, 3>> history;  ///< per vehicle and axis, likewise
+  std::vector<ForceErrorBounds> bounds;  ///< per vehicle; empty where nothing is proved
+  std::vector<Deviations> slices;        ///< errors of every vehicle slice by slice, likewise
   double slice_s = 0, duration_s = 0;
   bool cancelled = false;
   std::vector<stability::Assumption> assumptions;
@@ -53,9 +57,10 @@ struct LocalTube {
 
 /// The least radii r >= 0 that the errors reproduce: while every vehicle is within r of its set point, the force error
 /// f_hat - f_a along z, the lag of the feed-forward and the truth along x and y push none of them further than r. From rest
-/// the errors then stay within r for the whole task.
+/// the errors then stay within r for the whole task. Likewise slice by slice (sliced_tube()), which needs no gain below one
+/// over the whole flight. What holds is within both.
 ///
-/// Beside it the same from constants of the network alone: product of spectral norms, global and local Lipschitz bounds.
+/// Beside it least_tube() from constants of the network alone: product of spectral norms, global and local Lipschitz bounds.
 /// @param tracking gains and model of every vehicle; @param truth what the force really is; @param vehicles 2 to 10.
 /// @param task one whose trajectories have enclosures (Task::over()).
 /// @return an upper bound in real arithmetic of the continuous loop under `assumptions`; where `proved` is false nothing is

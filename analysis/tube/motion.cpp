@@ -10,7 +10,6 @@ namespace {
 
 using stability::SetpointRange;
 
-constexpr double kSlice_s = 0.025;
 /// Ends are moved outwards to multiples of this, so that periods which differ by rounding alone are found to be the same.
 constexpr double kGrid = 0x1p-24;
 
@@ -18,10 +17,10 @@ Interval snapped(Interval x) { return {std::floor(x.lo / kGrid) * kGrid, std::ce
 
 }  // namespace
 
-Motion sliced(const stability::Task& task, int vehicles, double memory_s) {
+Motion sliced(const stability::Task& task, int vehicles, double memory_s, double longest_s) {
   Motion motion;
   motion.vehicles = vehicles;
-  motion.slices = static_cast<int>(std::ceil(task.duration_s() / kSlice_s - 1e-9));
+  motion.slices = static_cast<int>(std::ceil(task.duration_s() / longest_s - 1e-9));
   motion.slice_s = task.duration_s() / motion.slices;
   motion.stretch_of.resize(static_cast<std::size_t>(vehicles));
   std::map<std::vector<double>, int> known;
@@ -64,7 +63,9 @@ Motion sliced(const stability::Task& task, int vehicles, double memory_s) {
       add(own.p_W_m[2]);
       for (int a = 0; a < 3; ++a) add(own.v_W_m_s[a]);
       for (int a = 0; a < 3; ++a) {
-        stretch.acceleration_m_s2[a] = largest(own.a_W_m_s2[a]);
+        stretch.acceleration_m_s2[a] = snapped(own.a_W_m_s2[a]);
+        key.push_back(stretch.acceleration_m_s2[a].lo);
+        key.push_back(stretch.acceleration_m_s2[a].hi);
         stretch.jerk_m_s3[a] = largest(own.jerk_W_m_s3[a]);
       }
       const auto [found, is_new] = known.emplace(std::move(key), static_cast<int>(motion.stretches.size()));

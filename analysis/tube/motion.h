@@ -16,7 +16,7 @@ struct Stretch {
   int vehicle = 0;
   std::vector<Interval>
       state;  ///< see learned_force.h: offsets and relative velocities, own height and velocity
-  double acceleration_m_s2[3] = {0, 0, 0};  ///< largest |a_d| per axis
+  Interval acceleration_m_s2[3];  ///< a_d per axis
   double jerk_m_s3[3] = {0, 0, 0};
   std::vector<double> relative_acceleration_m_s2;  ///< per neighbour, largest |a_j - a|
 };
@@ -29,9 +29,11 @@ struct Motion {
   std::vector<std::vector<int>> stretch_of;  ///< [vehicle][slice]: index into `stretches`
 };
 
-/// Slices of at most 25 ms that begin and end with the task's knots where these are multiples of it.
+inline constexpr double kSlice_s = 0.0125;
+
+/// Slices of at most `longest_s` that begin and end with the task's knots where these are multiples of it.
 /// @param memory_s how old the states are that a controller may act upon.
 /// @returns no slices where the task has no enclosure.
-Motion sliced(const stability::Task& task, int vehicles, double memory_s);
+Motion sliced(const stability::Task& task, int vehicles, double memory_s, double longest_s = kSlice_s);
 
 }  // namespace swarmcert::analysis

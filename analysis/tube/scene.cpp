@@ -29,6 +29,18 @@ bool every(const Radii& a, const Radii& b, const Compare& compare) {
   return true;
 }
 
+template <class Choose>
+Radii each_of(const Radii& a, const Radii& b, const Choose& choose) {
+  Radii result = a;
+  for (std::size_t i = 0; i < a.position_m.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      result.position_m[i][k] = choose(a.position_m[i][k], b.position_m[i][k]);
+      result.velocity_m_s[i][k] = choose(a.velocity_m_s[i][k], b.velocity_m_s[i][k]);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 Radii Radii::none(int vehicles) {
@@ -60,13 +72,32 @@ double Radii::largest_position_m(int axis) const {
   return largest;
 }
 
+Radii smaller(const Radii& a, const Radii& b) {
+  return each_of(a, b, [](double x, double y) { return std::min(x, y); });
+}
+Radii larger(const Radii& a, const Radii& b) {
+  return each_of(a, b, [](double x, double y) { return std::max(x, y); });
+}
+
+Deviations all_within(const Radii& radii) {
+  Deviations result(radii.position_m.size());
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      result[i].position_m[k] = {-radii.position_m[i][k], radii.position_m[i][k]};
+      result[i].velocity_m_s[k] = {-radii.velocity_m_s[i][k], radii.velocity_m_s[i][k]};
+    }
+  }
+  return result;
+}
+
 Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
-             const files::Network& network, const stability::Task& task, int vehicles, double network_age_s)
+             const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
+             double longest_slice_s)
     : tracking_(tracking),
       network_age_s_(network_age_s),
       learned_(network, tracking.model.kind, vehicles - 1),
       truth_(truth, tracking.plant.largest_thrust_N),
-      motion_(sliced(task, vehicles, network_age_s)),
+      motion_(sliced(task, vehicles, network_age_s, longest_slice_s)),
       loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices) : ErrorLoops{}) {}
 
 std::string Scene::refusal() const {
@@ -74,20 +105,17 @@ std::string Scene::refusal() const {
   return !truth_.refusal().empty() ? truth_.refusal() : loops_.refusal;
 }
 
-std::vector<Interval> Scene::states(const Stretch& stretch, const Radii& radii) const {
+std::vector<Interval> Scene::states(const Stretch& stretch, const Deviations& deviations) const {
   std::vector<Interval> states = stretch.state;
-  const auto i = static_cast<std::size_t>(stretch.vehicle);
+  const Deviation& own = deviations[static_cast<std::size_t>(stretch.vehicle)];
   std::size_t at = 0;
   for (int n = 0; n + 1 < vehicles(); ++n) {
-    const auto j = static_cast<std::size_t>(neighbour(stretch.vehicle, n));
-    for (std::size_t k = 0; k < 3; ++k, ++at)
-      states[at] = widened(states[at], up(radii.position_m[i][k] + radii.position_m[j][k]));
-    for (std::size_t k = 0; k < 3; ++k, ++at)
-      states[at] = widened(states[at], up(radii.velocity_m_s[i][k] + radii.velocity_m_s[j][k]));
+    const Deviation& other = deviations[static_cast<std::size_t>(neighbour(stretch.vehicle, n))];
+    for (std::size_t k = 0; k < 3; ++k, ++at) states[at] += other.position_m[k] - own.position_m[k];
+    for (std::size_t k = 0; k < 3; ++k, ++at) states[at] += other.velocity_m_s[k] - own.velocity_m_s[k];
   }
-  states[at] = widened(states[at], radii.position_m[i][2]);
-  for (std::size_t k = 0; k < 3; ++k)
-    states[at + 1 + k] = widened(states[at + 1 + k], radii.velocity_m_s[i][k]);
+  states[at] += own.position_m[2];
+  for (std::size_t k = 0; k < 3; ++k) states[at + 1 + k] += own.velocity_m_s[k];
   return states;
 }
 
@@ -104,8 +132,9 @@ std::vector<Offset> Scene::offsets(const std::vector<Interval>& states,
   return result;
 }
 
-TruthForce::Rest Scene::rest(const Stretch& stretch, const Radii& radii, double acceleration_m_s2) const {
-  const std::vector<Interval> states = this->states(stretch, radii);
+TruthForce::Rest Scene::rest(const Stretch& stretch, const Deviations& deviations,
+                             double acceleration_m_s2) const {
+  const std::vector<Interval> states = this->states(stretch, deviations);
   const Interval* const own = &states[states.size() - kOwnState];
   const Interval velocity[3] = {own[1], own[2], own[3]};
   // The thrust's vector behind a first-order lag: |T'| <= |command - T| / tau.
@@ -116,14 +145,14 @@ TruthForce::Rest Scene::rest(const Stretch& stretch, const Radii& radii, double 
                      thrust_rate_N_s);
 }
 
-TruthSizes Scene::truth_sizes(const Stretch& stretch, const Radii& radii) const {
+TruthSizes Scene::truth_sizes(const Stretch& stretch, const Deviations& deviations) const {
   TruthSizes sizes;
-  const std::vector<Interval> all = states(stretch, radii);
+  const std::vector<Interval> all = states(stretch, deviations);
   const TruthForce::Wake wake = truth_.wake(offsets(all, all));
-  const TruthForce::Rest rest = this->rest(stretch, radii, 0);
-  sizes.force_N[0] = rest.force_N[0].mag();
-  sizes.force_N[1] = rest.force_N[1].mag();
-  sizes.force_N[2] = (rest.force_N[2] + wake.value_N).mag();
+  const TruthForce::Rest rest = this->rest(stretch, deviations, 0);
+  sizes.force_N[0] = rest.force_N[0];
+  sizes.force_N[1] = rest.force_N[1];
+  sizes.force_N[2] = rest.force_N[2] + wake.value_N;
   sizes.rest_width_N = up(rest.force_N[2].hi - rest.force_N[2].lo);
   for (const Offset& g : wake.gradient_N_m) {
     sizes.gradient_N_m.push_back(wake.has_gradient ? length(g[0].mag(), g[1].mag(), g[2].mag())
@@ -134,7 +163,7 @@ TruthSizes Scene::truth_sizes(const Stretch& stretch, const Radii& radii) const 
 
 std::vector<TruthSizes> Scene::truth_sizes(const Radii& radii) const {
   std::vector<TruthSizes> sizes;
-  for (const Stretch& stretch : motion_.stretches) sizes.push_back(truth_sizes(stretch, radii));
+  for (const Stretch& stretch : motion_.stretches) sizes.push_back(truth_sizes(stretch, all_within(radii)));
   return sizes;
 }
 
@@ -145,9 +174,9 @@ std::array<ErrorHistory, 3> Scene::other_errors(int vehicle, const std::vector<T
     Signal feed_forward, force;
     for (const int s : motion_.stretch_of[static_cast<std::size_t>(vehicle)]) {
       const auto at = static_cast<std::size_t>(s);
-      feed_forward.size.push_back(up(mass_kg * motion_.stretches[at].acceleration_m_s2[axis]));
+      feed_forward.size.push_back(up(mass_kg * motion_.stretches[at].acceleration_m_s2[axis].mag()));
       feed_forward.rate.push_back(up(mass_kg * motion_.stretches[at].jerk_m_s3[axis]));
-      force.size.push_back(truth[at].force_N[axis]);
+      force.size.push_back(truth[at].force_N[axis].mag());
     }
     feed_forward.at_start = feed_forward.size.front();
     const ErrorLoop& loop = loops_.axis[axis];

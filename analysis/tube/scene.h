@@ -25,9 +25,21 @@ struct Radii {
   double largest_position_m(int axis) const;
 };
 
-/// The declared truth at the states of one stretch: bounds of |f_a| and of how it changes.
+Radii smaller(const Radii& a, const Radii& b);  ///< entry by entry
+Radii larger(const Radii& a, const Radii& b);
+
+/// Where one vehicle may be about its set point: e and e' lie in these.
+struct Deviation {
+  std::array<Interval, 3> position_m, velocity_m_s;
+};
+using Deviations = std::vector<Deviation>;  ///< of every vehicle
+
+/// All that is within radii.
+Deviations all_within(const Radii& radii);
+
+/// The declared truth at the states of one stretch: f_a and how it changes.
 struct TruthSizes {
-  double force_N[3] = {0, 0, 0};
+  Interval force_N[3];
   double rest_width_N = 0;           ///< along z, of all but wakes: largest change within the tube
   std::vector<double> gradient_N_m;  ///< per neighbour, |d f_z / d p_j|; infinite where the field jumps
 };
@@ -37,7 +49,8 @@ class Scene {
   /// @param network_age_s how old the states are, at most, that a prediction rests on when it acts.
   /// @throws files::InputError as LearnedForce.
   Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
-        const files::Network& network, const stability::Task& task, int vehicles, double network_age_s);
+        const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
+        double longest_slice_s = kSlice_s);
 
   const stability::TrackingSetup& tracking() const { return tracking_; }
   const LearnedForce& learned() const { return learned_; }
@@ -50,12 +63,12 @@ class Scene {
   std::string refusal() const;
 
   /// Every state that a vehicle can meet in a stretch while all are within `radii`.
-  std::vector<Interval> states(const Stretch& stretch, const Radii& radii) const;
+  std::vector<Interval> states(const Stretch& stretch, const Deviations& deviations) const;
   /// Offsets of the neighbours, of `states` and of what these become within network_age_s.
   /// @param all the stretch's states: the velocities at which offsets may change.
   std::vector<Offset> offsets(const std::vector<Interval>& states, const std::vector<Interval>& all) const;
-  TruthForce::Rest rest(const Stretch& stretch, const Radii& radii, double acceleration_m_s2) const;
-  TruthSizes truth_sizes(const Stretch& stretch, const Radii& radii) const;
+  TruthForce::Rest rest(const Stretch& stretch, const Deviations& deviations, double acceleration_m_s2) const;
+  TruthSizes truth_sizes(const Stretch& stretch, const Deviations& deviations) const;
   std::vector<TruthSizes> truth_sizes(const Radii& radii) const;  ///< of every stretch
 
   /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's lag,

@@ -103,6 +103,8 @@ TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
     } else if (!effect.is_expression() && effect.name == "upper_lift") {
       lift_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
                        value_of(effect, "spread_m"), for_some_only});
+    } else if (effect.name == "motor_lag") {
+      motor_lag_s_ = value_of(effect, "tau_s");
     } else if (effect.name == "thrust_ratio" || effect.name == "delay") {
       refuse("acts through the loop, where a tube does not follow it");
     } else {

@@ -23,6 +23,8 @@ class TruthForce {
 
   /// Why this truth has no enclosure; empty where it has one.
   const std::string& refusal() const { return refusal_; }
+  /// Of its motors; no force, and the loop has a lag of its own. 0 where it declares none.
+  double motor_lag_s() const { return motor_lag_s_; }
 
   /// Force along z of the neighbours' wakes (downwash, upper_lift).
   struct Wake {
@@ -60,6 +62,7 @@ class TruthForce {
 
   stability::Model model_;
   double largest_thrust_N_;
+  double motor_lag_s_ = 0;
   std::vector<Downwash> downwash_;
   std::vector<Lift> lift_;
   std::vector<stability::EffectSpec> others_;

@@ -46,9 +46,9 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
     std::vector<double> error_N, lagged_N, planned_m_s2, jerk_m_s3;
     for (const int s : motion.stretch_of[i]) {
       const auto at = static_cast<std::size_t>(s);
-      const double truth_N = tube.tube.truth[at].force_N[axis];
+      const double truth_N = tube.tube.truth[at].force_N[axis].mag();
       error_N.push_back(axis == 2 ? tube.tube.force_N[at] : truth_N);
-      planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis]);
+      planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis].mag());
       jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis]);
       lagged_N.push_back(up(truth_N + up(mass_kg * planned_m_s2.back())));
     }
@@ -67,7 +67,7 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
       const double by_jerk = starts_at_rest ? up(up(loop.lags_s * largest(jerk_m_s3)) + 1e-6) : kNotKnown;
       double truth_N = 0;
       for (const int s : motion.stretch_of[i])
-        truth_N = std::max(truth_N, tube.tube.truth[static_cast<std::size_t>(s)].force_N[axis]);
+        truth_N = std::max(truth_N, tube.tube.truth[static_cast<std::size_t>(s)].force_N[axis].mag());
       lag_N = up(2 * truth_N + up(mass_kg * std::min(2 * planned, by_jerk)));
     }
     result.acceleration_m_s2[axis] = up(feedback + up(up(largest(error_N) + lag_N) / mass_kg));
@@ -76,7 +76,7 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
     if (axis == 2) {
       for (const int s : motion.stretch_of[i]) {
         const auto at = static_cast<std::size_t>(s);
-        fed_N = std::max(fed_N, up(tube.tube.truth[at].force_N[2] + tube.tube.force_N[at]));
+        fed_N = std::max(fed_N, up(tube.tube.truth[at].force_N[2].mag() + tube.tube.force_N[at]));
       }
     }
     result.command_N[axis] = up(up(mass_kg * up(feedback + largest(planned_m_s2))) + fed_N);
@@ -85,13 +85,13 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
 }
 
 ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std::vector<Loads>& loads,
-                           int vehicle, const std::vector<ForceConstants>& constants, const ErrorHistory& z,
+                           int vehicle, const std::vector<ForceConstants>& constants,
                            const ErrorHistory& lag) {
   ForceErrorBounds result;
   result.vehicle = vehicle;
   const Motion& motion = scene.motion();
   const auto i = static_cast<std::size_t>(vehicle);
-  const Radii& radii = tube.tube.radii;
+  const Deviations deviations = all_within(tube.tube.radii);
   const double slice_s = up(motion.slice_s * (1 + 1e-12));
   double learned_rate = 0;
   double abrupt_N = 0;
@@ -102,13 +102,14 @@ ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std:
     result.amplitude_N = std::max(result.amplitude_N, size_N);
     result.impulse_N_s = up(result.impulse_N_s + up(size_N * slice_s));
     // Rates: the network's by its constants, the truth's by its gradient.
-    const std::vector<Interval> states = scene.states(stretch, radii);
+    const std::vector<Interval> states = scene.states(stretch, deviations);
     const ForceConstants none{kNotKnown, kNotKnown, kNotKnown, kNotKnown};
     const ForceConstants& c = constants.empty() ? none : constants[i];
     double learned = 0;
     const double own_acceleration =
-        up(length(loads[i].acceleration_m_s2) + length(stretch.acceleration_m_s2));
-    const TruthForce::Rest rest = scene.rest(stretch, radii, own_acceleration);
+        up(length(loads[i].acceleration_m_s2) +
+           length(stretch.acceleration_m_s2[0], stretch.acceleration_m_s2[1], stretch.acceleration_m_s2[2]));
+    const TruthForce::Rest rest = scene.rest(stretch, deviations, own_acceleration);
     abrupt_N = std::max(abrupt_N, rest.abrupt_N[2]);
     double truth = rest.rate_N_s[2];
     for (int n = 0; n + 1 < scene.vehicles(); ++n) {
@@ -148,8 +149,25 @@ ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std:
   }
   result.by_amplitude_m = with_lag(up(loop.h1->total() * result.amplitude_N));
   result.by_impulse_m = with_lag(up(loop.h1->peak * result.impulse_N_s));
-  result.by_slices_m = z.largest_position_m();
+  for (const Deviations& slice : tube.slices)
+    result.by_slices_m = std::max(result.by_slices_m, slice[i].position_m[2].mag());
   return result;
+}
+
+Interval common(Interval a, Interval b) { return {std::max(a.lo, b.lo), std::min(a.hi, b.hi)}; }
+
+/// The errors of one vehicle slice by slice: what the sizes of all signals allow, within what is known already.
+void add_slices(const std::array<ErrorHistory, 3>& history, std::size_t vehicle,
+                std::vector<Deviations>& slices) {
+  for (std::size_t n = 0; n < slices.size(); ++n) {
+    Deviation& one = slices[n][vehicle];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double p = history[k].position_m[n];
+      const double v = history[k].velocity_m_s[n];
+      one.position_m[k] = common(one.position_m[k], {-p, p});
+      one.velocity_m_s[k] = common(one.velocity_m_s[k], {-v, v});
+    }
+  }
 }
 
 }  // namespace
@@ -182,26 +200,35 @@ void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants
                    one.command_N[2] < tracking.plant.mass_kg * kGravity_m_s2;
   }
   bool near = true;
+  const Deviations deviations = all_within(tube.tube.radii);
   for (const Stretch& stretch : scene.motion().stretches) {
-    const std::vector<Interval> states = scene.states(stretch, tube.tube.radii);
+    const std::vector<Interval> states = scene.states(stretch, deviations);
     for (int n = 0; n + 1 < scene.vehicles(); ++n) {
       for (std::size_t k = 0; k < 3; ++k)
         near = near && states[static_cast<std::size_t>(n * kPerNeighbour) + k].mag() <= kFade_m;
     }
   }
+  tube.slices.assign(static_cast<std::size_t>(scene.motion().slices), all_within(tube.tube.radii));
+  if (tube.sliced.proved) tube.slices = tube.sliced.slices;
   for (int i = 0; i < scene.vehicles(); ++i) {
     std::array<ErrorHistory, 3> history = scene.other_errors(i, tube.tube.truth);
     const ErrorHistory lag = history[2];
     history[2] = scene.errors_z(i, tube.tube.force_N, lag);
-    tube.bounds.push_back(bounds_of(scene, tube, all, i, constants, history[2], lag));
-    tube.history.push_back(std::move(history));
+    add_slices(history, static_cast<std::size_t>(i), tube.slices);
+    tube.bounds.push_back(bounds_of(scene, tube, all, i, constants, lag));
   }
   const auto add = [&tube](const char* name, const char* status, const std::string& note) {
     tube.assumptions.push_back({name, status, note});
   };
   add("the force is that of the declared truth", "assumed", "enclosed at every state of the tube");
   add("continuous position loop, axes apart, first-order lags", "assumed",
-      "Ki as the firmware's step makes it act; the direction of thrust is linear");
+      "Ki as the firmware's step makes it act; sampling and the tilt of the thrust are left out");
+  const double truth_lag_s = scene.truth().motor_lag_s();
+  if (std::abs(truth_lag_s - gains.motor_lag_s) > 0.01 * truth_lag_s) {
+    add("motors lag as in [lag]", "assumed",
+        fmt::format("{:.3g} s; the truth's motor_lag of {:.3g} s is left out", gains.motor_lag_s,
+                    truth_lag_s));
+  }
   add("all vehicles have these gains and this model", "assumed", "and start at rest at their set points");
   add("exact position and velocity", "assumed", "also of neighbours, known from the start");
   add("predictions are a staircase", "proved",

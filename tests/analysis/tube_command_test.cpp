@@ -58,12 +58,44 @@ TEST(TubeCommand, ProvesATubeAroundASwapAndReportsItBesideLipschitzBounds) {
   }
   for (const Json& at : tube["at"])
     for (const Json& e : at["error_z_m"]) EXPECT_LE(e.get<double>(), tube["radius_xyz_m"][2].get<double>());
+  EXPECT_GE(tube["one_radius"]["radius_m"].get<double>(), radius_m);
+  ASSERT_EQ(tube["slices"].size(), tube["at"].size());
+  for (std::size_t n = 0; n < tube["slices"].size(); ++n) {
+    const Json& vehicles = tube["slices"][n]["error_xyz_m"];
+    ASSERT_EQ(vehicles.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double low = vehicles[i][k][0].get<double>();
+        const double high = vehicles[i][k][1].get<double>();
+        EXPECT_LE(low, high);
+        EXPECT_LE(std::max(-low, high), tube["radii"][i]["position_m"][k].get<double>());
+      }
+    }
+  }
   EXPECT_NE(read_text(folder / "r/report.html").find("Tube around the task"), std::string::npos);
   std::istringstream data(read_text(folder / "r/local_tube.dat"));
   std::string line;
   int rows = 0;
   while (std::getline(data, line)) ++rows;
   EXPECT_GT(rows, 100);
+}
+
+TEST(TubeCommand, ProvesTheGainsThatFlewAndThreeVehicles) {
+  const ScratchFolder folder;
+  for (const char* const arguments : {"crazyflie-small.toml", "composite.toml --vehicles 3"}) {
+    const std::string all = arguments;
+    const std::size_t end = all.find(' ');
+    const std::string rest = end == std::string::npos ? "" : all.substr(end);
+    const Outcome outcome = run_shell(bound(all.substr(0, end)) + rest + kNetwork + kTruth +
+                                          " --tube --task swap --duration 4.5 --json out.json --force",
+                                      folder.path());
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+    const Json tube = files::parse_json(read_text(folder / "out.json"), "out.json")["local_tube"];
+    EXPECT_EQ(tube["verdict"], "proved") << all;
+    EXPECT_EQ(tube["one_radius"]["verdict"], "inconclusive");
+    EXPECT_LT(tube["radius_m"].get<double>(), 0.08);
+    EXPECT_FALSE(tube["slices"].empty());
+  }
 }
 
 TEST(TubeCommand, TheResultDoesNotDependOnTheThreads) {
@@ -111,16 +143,17 @@ TEST(TubeCommand, WeightsThatAreNoNumberAreRefused) {
 
 TEST(TubeCommand, WhereNothingIsProvedTheExitCodeAndTheReasonSaySo) {
   const ScratchFolder folder;
-  write_text(folder / "weak.toml", "schema = \"swarmcert/gains/1\"\n[position]\nLambda = 0.6\nK = 0.04\n");
+  write_text(folder / "weak.toml", "schema = \"swarmcert/gains/1\"\n[position]\nLambda = 0.1\nK = 0.005\n");
   const Outcome outcome = run_shell("swarmcert bound --gains weak.toml --model " + kSources +
                                         "/stability/models/crazyflie-small.toml" + kNetwork + kTruth +
-                                        " --tube --task swap --duration 4.5 --json out.json",
+                                        " --tube --task swap --duration 6 --json out.json",
                                     folder.path());
   EXPECT_EQ(outcome.exit_code, 4) << outcome.output;
   const Json tube = files::parse_json(read_text(folder / "out.json"), "out.json")["local_tube"];
   EXPECT_EQ(tube["verdict"], "inconclusive");
   EXPECT_TRUE(tube["radius_m"].is_null());
   EXPECT_NE(tube["why"].get<std::string>().find("f_hat"), std::string::npos);
+  EXPECT_TRUE(tube["slices"].empty());
 }
 
 }  // namespace

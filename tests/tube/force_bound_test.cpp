@@ -6,57 +6,14 @@
 #include <cmath>
 
 #include "analysis/tube/force_constants.h"
-#include "stability/deep_set_force.h"
-#include "stability/effects/effect.h"
+#include "tube/forces.h"
 #include "tube/scenes.h"
 
 namespace swarmcert::analysis {
 namespace {
 
-using stability::AppliedEffect;
-using stability::Instant;
-using stability::Neighbour;
 using tests::between;
-
-/// Both forces as the simulator has them.
-class Forces {
- public:
-  Forces(const files::Network& network, const stability::Model& truth)
-      : learned_(network, "small", {"small"}) {
-    for (const stability::EffectSpec& spec : truth.effects) {
-      if (spec.name == "motor_lag") continue;
-      effects_.push_back(std::make_unique<AppliedEffect>(
-          spec, stability::EffectContext{truth.kind, {truth.kind}, truth.path}));
-    }
-  }
-  Instant at(const std::vector<double>& x, int neighbours) {
-    others_.clear();
-    for (int n = 0; n < neighbours; ++n) {
-      const double* const s = x.data() + n * kPerNeighbour;
-      others_.push_back({{s[0], s[1], s[2]}, {s[3], s[4], s[5]}, Eigen::Vector3d::Zero(), 0.034, 0});
-    }
-    const double* const own = x.data() + neighbours * kPerNeighbour;
-    Instant now;
-    now.mass_kg = 0.034;
-    now.p_W_m = {0, 0, own[0]};
-    now.v_W_m_s = {own[1], own[2], own[3]};
-    now.thrust_N = 0.034 * 9.81;
-    now.neighbours = others_.data();
-    now.num_neighbours = neighbours;
-    return now;
-  }
-  double learned(const Instant& now) { return learned_.force_z_N(now); }
-  double truth(const Instant& now) const {
-    double sum = 0;
-    for (const auto& effect : effects_) sum += effect->wrench(now).force_W_N.z();
-    return sum;
-  }
-
- private:
-  stability::DeepSetForce learned_;
-  std::vector<std::unique_ptr<AppliedEffect>> effects_;
-  std::vector<Neighbour> others_;
-};
+using tests::Forces;
 
 Radii some_radii(int vehicles, double position_m, double velocity_m_s) {
   Radii radii = Radii::none(vehicles);
@@ -73,7 +30,7 @@ double largest_share(const Scene& scene, const files::Network& network, const st
   files::Random random(seed);
   double share = 0;
   for (std::size_t s = 0; s < bounds.size(); ++s) {
-    const std::vector<Interval> states = scene.states(scene.motion().stretches[s], radii);
+    const std::vector<Interval> states = scene.states(scene.motion().stretches[s], all_within(radii));
     for (int i = 0; i < 60; ++i) {
       std::vector<double> seen, now;
       for (const Interval& x : states)
@@ -87,7 +44,7 @@ double largest_share(const Scene& scene, const files::Network& network, const st
         }
       }
       const double learned = forces.learned(forces.at(seen, scene.vehicles() - 1));
-      const double error = std::abs(learned - forces.truth(forces.at(now, scene.vehicles() - 1)));
+      const double error = std::abs(learned - forces.truth(forces.at(now, scene.vehicles() - 1)).z());
       share = std::max(share, error / bounds[s]);
     }
   }

@@ -51,8 +51,11 @@ stability::Model truth_for(const stability::Gains& gains) {
 
 TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
   const files::Network network = tests::demo_network();
-  const stability::TrackingSetup loop = tests::loop_of("composite");
-  const stability::Model truth = truth_for(loop.gains);
+  // Gains that state how fast the vehicle turns, which the simulator has and composite.toml leaves out. Left out of every
+  // tube: that the loop is sampled, and that a tilted thrust lifts less.
+  const double left_out_m = 1e-4;
+  const stability::TrackingSetup loop = tests::loop_of("firmware-defaults");
+  const stability::Model truth = tests::truth_model();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   const LocalTube tube = local_tube(loop, truth, network, *task, 2, quick());
   ASSERT_TRUE(tube.proved) << tube.why;
@@ -62,7 +65,8 @@ TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
     const auto errors = flown(loop.gains, truth, network, 2, 4.5, seed, false);
     for (std::size_t i = 0; i < errors.size(); ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis)
-        EXPECT_LE(errors[i][axis], tube.tube.radii.position_m[i][axis]) << seed << " " << i << " " << axis;
+        EXPECT_LE(errors[i][axis], tube.tube.radii.position_m[i][axis] + left_out_m)
+            << seed << " " << i << " " << axis;
       reached = std::max(reached, errors[i][2] / tube.tube.radius_m(2));
     }
   }
@@ -77,7 +81,7 @@ TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
   // The bounds of the reference hold the tube's own number from above, up to what proving it costs.
   for (const ForceErrorBounds& b : tube.bounds) {
     const double radius_m = tube.tube.radii.position_m[static_cast<std::size_t>(b.vehicle)][2];
-    EXPECT_LT(b.by_slices_m, radius_m);
+    EXPECT_LE(b.by_slices_m, radius_m);
     EXPECT_LE(b.by_slices_m, b.by_amplitude_m * (1 + 1e-9));
     EXPECT_GT(b.by_rate_m, 0);
     EXPECT_TRUE(std::isfinite(b.by_edges_m));
@@ -87,14 +91,45 @@ TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
 
 TEST(LocalTube, GainsTooWeakForTheForceAreInconclusiveAndSayHowMuchComesBack) {
   stability::TrackingSetup loop = tests::loop_of("composite");
-  for (double& x : loop.gains.composite->Lambda) x *= 0.15;
-  for (double& x : loop.gains.composite->K) x *= 0.3;
-  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  for (double& x : loop.gains.composite->Lambda) x *= 0.03;
+  for (double& x : loop.gains.composite->K) x *= 0.05;
+  const auto task = stability::make_task("swap", {2, 9, 0});
   const LocalTube tube = local_tube(loop, truth_for(loop.gains), tests::demo_network(), *task, 2, quick());
   EXPECT_FALSE(tube.proved);
   EXPECT_NE(tube.why.find("grow"), std::string::npos) << tube.why;
+  EXPECT_NE(tube.why.find("errors could exceed 0.5 m"), std::string::npos) << tube.why;
   EXPECT_GT(tube.tube.loop_gain, 0.5);
   EXPECT_TRUE(tube.bounds.empty());
+}
+
+TEST(LocalTube, SliceBySliceTheShippedGainsAreProvedWhereOneRadiusHasAGainAboveOneAndNeverWider) {
+  const files::Network network = tests::demo_network();
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  for (const auto& [gains, one_radius] : {std::pair("composite", true), std::pair("crazyflie-small", false),
+                                          std::pair("crazyflie-large", false)}) {
+    SCOPED_TRACE(gains);
+    const LocalTube tube =
+        local_tube(tests::loop_of(gains), tests::truth_model(), network, *task, 2, quick());
+    ASSERT_TRUE(tube.proved) << tube.why;
+    ASSERT_TRUE(tube.sliced.proved);
+    EXPECT_EQ(tube.one_radius.proved, one_radius);
+    EXPECT_TRUE(tube.tube.radii.within(tube.sliced.radii()));
+    if (one_radius) {
+      EXPECT_TRUE(tube.tube.radii.within(tube.one_radius.radii));
+      EXPECT_LT(tube.tube.radius_m(2), 0.7 * tube.one_radius.radius_m(2));
+    }
+    ASSERT_EQ(tube.slices.size(), tube.sliced.slices.size());
+    for (std::size_t n = 0; n < tube.slices.size(); ++n) {
+      for (std::size_t i = 0; i < 2; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Interval e = tube.slices[n][i].position_m[k];
+          ASSERT_LE(e.lo, e.hi);
+          ASSERT_GE(e.lo, tube.sliced.slices[n][i].position_m[k].lo);
+          ASSERT_LE(e.mag(), tube.tube.radii.position_m[i][k]);
+        }
+      }
+    }
+  }
 }
 
 TEST(LocalTube, UnstableOrDelayedLoopsAndTruthsWithoutEnclosureAreRefused) {

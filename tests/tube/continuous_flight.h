@@ -1,0 +1,140 @@
+/// @file Flights of the loop that tubes are about: continuous, axes apart, first-order lags, predictions a staircase.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <functional>
+
+#include "stability/bounds/axis_loop.h"
+#include "stability/bounds/sampled_loop.h"
+#include "stability/tasks/task.h"
+#include "tube/forces.h"
+#include "tube/scenes.h"
+
+namespace swarmcert::tests {
+
+/// Runge-Kutta in steps of a millisecond. When each vehicle predicts is random; predictions reach the controller late.
+class ContinuousFlight {
+ public:
+  /// Called with the time, the vehicle, e and e'.
+  using Look = std::function<void(double, int, const std::array<double, 3>&, const std::array<double, 3>&)>;
+
+  ContinuousFlight(const stability::TrackingSetup& tracking, const stability::Model& truth,
+                   const files::Network& network, const stability::Task& task, int vehicles)
+      : gains_(tracking.gains), task_(task), vehicles_(vehicles), forces_(network, truth) {
+    for (int k = 0; k < 3; ++k) {
+      loops_[k] = *axis_loop(gains_, tracking.plant, k);
+      if (const auto sampled = sampled_axis_loop(gains_, tracking.plant, k))
+        loops_[k].Ki = stability::effective_Ki(*sampled);
+    }
+  }
+
+  void fly(files::Random& random, const Look& look) {
+    std::vector<Vehicle> now(static_cast<std::size_t>(vehicles_));
+    const double period_s = gains_.network_rate_hz > 0 ? 1 / gains_.network_rate_hz : 0;
+    std::vector<double> next_s, predicted, acting;
+    for (int i = 0; i < vehicles_; ++i) {
+      next_s.push_back(std::round(between(random, 0, period_s) / kStep_s) * kStep_s);
+      predicted.push_back(forces_.learned(forces_.at(state(now, i, 0), vehicles_ - 1)));
+    }
+    acting = predicted;
+    const int steps = static_cast<int>(std::lround(task_.duration_s() / kStep_s));
+    for (int s = 0; s < steps; ++s) {
+      const double t = s * kStep_s;
+      for (int i = 0; i < vehicles_ && period_s > 0; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        if (t > next_s[at] - kStep_s / 2) {
+          predicted[at] = forces_.learned(forces_.at(state(now, i, t), vehicles_ - 1));
+          next_s[at] += period_s;
+        }
+        // next_s - period_s is when the last prediction was made.
+        if (t > next_s[at] - period_s + gains_.network_latency_s - kStep_s / 2) acting[at] = predicted[at];
+      }
+      const auto rate = [&](const std::vector<Vehicle>& x, double time_s) {
+        std::vector<Vehicle> result(x.size());
+        for (int i = 0; i < vehicles_; ++i) {
+          const auto at = static_cast<std::size_t>(i);
+          const stability::Instant instant = forces_.at(state(x, i, time_s), vehicles_ - 1);
+          result[at] = derivative(x[at], task_.at(i, time_s).a_W_m_s2, forces_.truth(instant),
+                                  period_s > 0 ? acting[at] : forces_.learned(instant));
+        }
+        return result;
+      };
+      const auto k1 = rate(now, t);
+      const auto k2 = rate(moved(now, k1, kStep_s / 2), t + kStep_s / 2);
+      const auto k3 = rate(moved(now, k2, kStep_s / 2), t + kStep_s / 2);
+      const auto k4 = rate(moved(now, k3, kStep_s), t + kStep_s);
+      now =
+          moved(moved(moved(moved(now, k1, kStep_s / 6), k2, kStep_s / 3), k3, kStep_s / 3), k4, kStep_s / 6);
+      for (int i = 0; i < vehicles_; ++i) {
+        const Vehicle& v = now[static_cast<std::size_t>(i)];
+        look(t + kStep_s, i, {v[0][0], v[1][0], v[2][0]}, {v[0][1], v[1][1], v[2][1]});
+      }
+    }
+  }
+
+ private:
+  static constexpr double kStep_s = 0.001;
+  /// Per axis: e, e', int e, and what the lags let through so far.
+  using Axis = std::array<double, 6>;
+  using Vehicle = std::array<Axis, 3>;
+
+  static std::vector<Vehicle> moved(std::vector<Vehicle> x, const std::vector<Vehicle>& by, double step) {
+    for (std::size_t i = 0; i < x.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t c = 0; c < x[i][k].size(); ++c) x[i][k][c] += step * by[i][k][c];
+    return x;
+  }
+
+  Vehicle derivative(const Vehicle& x, const Eigen::Vector3d& planned, const Eigen::Vector3d& force,
+                     double learned) const {
+    Vehicle result{};
+    for (int k = 0; k < 3; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      const stability::AxisLoop& loop = loops_[at];
+      const Axis& a = x[at];
+      Axis& d = result[at];
+      double applied = loop.mass_kg * (planned[k] - loop.Kp * a[0] - loop.Kd * a[1] - loop.Ki * a[2]) -
+                       (k == 2 ? learned : 0);
+      std::size_t c = 3;
+      for (const double tau_s : loop.lags_s) {
+        if (tau_s <= 0) continue;
+        d[c] = (applied - a[c]) / tau_s;
+        applied = a[c++];
+      }
+      d[0] = a[1];
+      d[1] = (applied + force[k]) / loop.mass_kg - planned[k];
+      d[2] = a[0];
+    }
+    return result;
+  }
+
+  std::vector<double> state(const std::vector<Vehicle>& x, int vehicle, double time_s) const {
+    const auto place = [&](int i, bool is_velocity) {
+      const stability::Setpoint goal = task_.at(i, time_s);
+      const Vehicle& v = x[static_cast<std::size_t>(i)];
+      const std::size_t c = is_velocity ? 1 : 0;
+      return Eigen::Vector3d((is_velocity ? goal.v_W_m_s : goal.p_W_m) +
+                             Eigen::Vector3d(v[0][c], v[1][c], v[2][c]));
+    };
+    std::vector<double> result;
+    for (int j = 0; j < vehicles_; ++j) {
+      for (const bool is_velocity : {false, true}) {
+        const Eigen::Vector3d apart = place(j, is_velocity) - place(vehicle, is_velocity);
+        if (j != vehicle) result.insert(result.end(), apart.data(), apart.data() + 3);
+      }
+    }
+    result.push_back(place(vehicle, false).z());
+    const Eigen::Vector3d velocity = place(vehicle, true);
+    result.insert(result.end(), velocity.data(), velocity.data() + 3);
+    return result;
+  }
+
+  const stability::Gains& gains_;
+  const stability::Task& task_;
+  int vehicles_;
+  Forces forces_;
+  std::array<stability::AxisLoop, 3> loops_;
+};
+
+}  // namespace swarmcert::tests

@@ -1,0 +1,139 @@
+// Tubes slice by slice against flights of the loop they are about.
+#include "analysis/tube/sliced_tube.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tube/continuous_flight.h"
+#include "tube/scenes.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+constexpr double kTolerance_N = 1e-3;
+
+double network_age_s(const stability::Gains& gains) {
+  return gains.network_latency_s + (gains.network_rate_hz > 0 ? 1 / gains.network_rate_hz : 0);
+}
+
+EnclosureOptions boxes(int count) {
+  EnclosureOptions options;
+  options.boxes = count;
+  return options;
+}
+
+/// How often flights were outside their slice, and how near they came to the edge where they were inside: 1 at the edge.
+struct Seen {
+  int looks = 0, outside = 0;
+  double nearest = 0;
+};
+
+Seen fly(const stability::TrackingSetup& loop, const stability::Model& truth, const stability::Task& task,
+         const SlicedTube& tube, double slice_s, int flights) {
+  const int vehicles = static_cast<int>(tube.slices.front().size());
+  const files::Network network = tests::demo_network();
+  tests::ContinuousFlight flight(loop, truth, network, task, vehicles);
+  files::Random random(11);
+  Seen seen;
+  const auto check = [&seen](Interval range, double value) {
+    ++seen.looks;
+    const double middle = (range.lo + range.hi) / 2;
+    const double share = std::abs(value - middle) / (range.hi - middle);
+    if (value < range.lo || value > range.hi) ++seen.outside;
+    // What moves by less than a tenth of a millimetre shows rounding alone.
+    if (range.hi - range.lo > 1e-4) seen.nearest = std::max(seen.nearest, share);
+  };
+  for (int i = 0; i < flights; ++i) {
+    flight.fly(random,
+               [&](double t, int vehicle, const std::array<double, 3>& e, const std::array<double, 3>& v) {
+                 const auto at = static_cast<std::size_t>(std::floor((t - 1e-9) / slice_s));
+                 const Deviation& slice = tube.slices[at][static_cast<std::size_t>(vehicle)];
+                 for (std::size_t k = 0; k < 3; ++k) {
+                   check(slice.position_m[k], e[k]);
+                   check(slice.velocity_m_s[k], v[k]);
+                 }
+               });
+  }
+  return seen;
+}
+
+TEST(SlicedTube, HoldsEveryFlightInEverySliceForAllShippedGainsAndTwoAndThreeVehicles) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  for (const auto& [gains, vehicles] :
+       {std::pair("composite", 2), std::pair("composite", 3), std::pair("crazyflie-small", 2),
+        std::pair("crazyflie-large", 2), std::pair("crazyflie-small-nominal", 2),
+        std::pair("firmware-defaults", 2)}) {
+    SCOPED_TRACE(gains + std::string(", vehicles: ") + std::to_string(vehicles));
+    const stability::TrackingSetup loop = tests::loop_of(gains);
+    const auto task = stability::make_task("swap", {vehicles, 4.5, 0});
+    const Scene scene(loop, truth, network, *task, vehicles, network_age_s(loop.gains));
+    const SlicedTube tube = sliced_tube(scene, boxes(vehicles == 2 ? 8 : 2), kTolerance_N);
+    ASSERT_TRUE(tube.proved) << tube.why;
+    ASSERT_EQ(tube.slices.size(), static_cast<std::size_t>(scene.motion().slices));
+    const Seen seen = fly(loop, truth, *task, tube, scene.motion().slice_s, 3);
+    EXPECT_EQ(seen.outside, 0) << "of " << seen.looks;
+    EXPECT_GT(seen.nearest, 0.4) << "a tube that no flight comes near to would hide a fault";
+  }
+}
+
+TEST(SlicedTube, FlightsOfAnotherLoopOrAnotherTruthLeaveIt) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  const Scene scene(loop, truth, network, *task, 2, network_age_s(loop.gains));
+  const SlicedTube tube = sliced_tube(scene, boxes(8), kTolerance_N);
+  ASSERT_TRUE(tube.proved) << tube.why;
+  stability::TrackingSetup slower = loop;
+  slower.gains.attitude_lag_s *= 1.5;
+  EXPECT_GT(fly(slower, truth, *task, tube, scene.motion().slice_s, 1).outside, 0);
+  stability::Model stronger = truth;
+  for (stability::EffectSpec& effect : stronger.effects)
+    if (effect.name == "drag_linear") effect.parameters["drag_N_s_m"] *= 3;
+  EXPECT_GT(fly(loop, stronger, *task, tube, scene.motion().slice_s, 1).outside, 0);
+}
+
+TEST(SlicedTube, FinerSlicesAreNeverWiderAndLaterSlicesChangeNothingBefore) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  double last_m = 1;
+  for (const double slice_s : {0.05, 0.025, 0.0125}) {
+    const auto task = stability::make_task("swap", {2, 4.5, 0});
+    const Scene scene(loop, truth, network, *task, 2, network_age_s(loop.gains), slice_s);
+    const SlicedTube tube = sliced_tube(scene, boxes(8), kTolerance_N);
+    ASSERT_TRUE(tube.proved) << slice_s << " " << tube.why;
+    const double radius_m = tube.radii().largest_position_m(2);
+    EXPECT_LT(radius_m, last_m) << slice_s;
+    last_m = radius_m;
+    const auto shorter = stability::make_task("swap", {2, 3, 0});
+    const Scene start(loop, truth, network, *shorter, 2, network_age_s(loop.gains), slice_s);
+    const SlicedTube first = sliced_tube(start, boxes(8), kTolerance_N);
+    ASSERT_TRUE(first.proved);
+    for (std::size_t n = 0; n + 1 < first.slices.size(); ++n) {
+      EXPECT_NEAR(first.slices[n][0].position_m[2].lo, tube.slices[n][0].position_m[2].lo, 1e-9) << n;
+      EXPECT_NEAR(first.slices[n][0].position_m[2].hi, tube.slices[n][0].position_m[2].hi, 1e-9) << n;
+    }
+  }
+}
+
+TEST(SlicedTube, SaysWhenErrorsCouldGoTooFarAndProvesNothingWhenInterrupted) {
+  const files::Network network = tests::demo_network();
+  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains));
+  const SlicedTube near = sliced_tube(scene, boxes(1), kTolerance_N, 0.02);
+  EXPECT_FALSE(near.proved);
+  EXPECT_NE(near.why.find("0.02 m"), std::string::npos) << near.why;
+  const std::atomic<bool> cancelled{true};
+  EnclosureOptions options = boxes(1);
+  options.cancelled = &cancelled;
+  const SlicedTube none = sliced_tube(scene, options, kTolerance_N);
+  EXPECT_FALSE(none.proved);
+  EXPECT_TRUE(none.cancelled);
+}
+
+}  // namespace
+}  // namespace swarmcert::analysis
