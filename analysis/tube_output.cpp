@@ -253,8 +253,8 @@ void add_local_tube_plot(Report& report, const LocalTube& tube, const Json& json
   std::string script = "set xlabel 'time [s]'\nset ylabel 'height error [m]'\nplot ";
   for (std::size_t i = 0; i < tube.slices.front().size(); ++i) {
     script += fmt::format(
-        "{}'local_tube.dat' using 1:{} with steps linetype {} title 'cf{}', '' using 1:{} with "
-        "steps linetype {} notitle",
+        "{}'local_tube.dat' using 1:{} with fsteps linetype {} title 'cf{}', '' using 1:{} with "
+        "fsteps linetype {} notitle",
         i == 0 ? "" : ", ", 2 * i + 2, i + 1, i + 1, 2 * i + 3, i + 1);
   }
   report.figure("local_tube", data, script + "\n",
