@@ -46,6 +46,11 @@ UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string
     const std::string name = word.substr(0, equals);
     const Range range = range_of(word, equals == std::string::npos ? "" : word.substr(equals + 1));
     if (name == "mass" && range.from > 0) {
+      const double lifted_kg = input.plant.largest_thrust_N / kGravity_m_s2;
+      if (lifted_kg > 0 && range.from > lifted_kg) {
+        throw UsageError(
+            fmt::format("--uncertain {}: the rotors lift {:.3g} kg; mass is in kg", word, lifted_kg));
+      }
       plant.mass_kg = range;
     } else if (name == "thrust" && range.from > 0) {
       plant.thrust_scale = range;

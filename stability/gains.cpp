@@ -30,6 +30,16 @@ double positive(const TomlTable& table, const std::string& key) {
   return value;
 }
 
+/// A time of the loop. None that flies is longer than a second: longer ones were written in milliseconds.
+double seconds(const TomlTable& table, const std::string& key, double value) {
+  constexpr double kLongest_s = 1;
+  if (value > kLongest_s) {
+    table.refuse(key, text_of(value), "is longer than " + text_of(kLongest_s) + " s",
+                 "it is in seconds: 20 ms are 0.02");
+  }
+  return value;
+}
+
 /// Three numbers, or one that stands for all axes; none negative.
 PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zero) {
   PerAxis result{};
@@ -106,7 +116,7 @@ void read_position(const TomlTable& position, Gains& gains) {
       position.refuse("integrator_step_s", text_of(position.number("integrator_step_s")),
                       "has a meaning only for a sampled loop", "add rate_hz");
     }
-    gains.integrator_step_s = positive(position, "integrator_step_s");
+    gains.integrator_step_s = seconds(position, "integrator_step_s", positive(position, "integrator_step_s"));
   }
 }
 
@@ -133,15 +143,19 @@ Gains parse_gains(const std::string& text, const std::string& path) {
   if (top.has("lag")) {
     const TomlTable lag = top.table("lag");
     lag.allow_only({"motor_s", "attitude_s", "delay_s"});
-    if (lag.has("motor_s")) gains.motor_lag_s = non_negative(lag, "motor_s");
-    if (lag.has("attitude_s")) gains.attitude_lag_s = non_negative(lag, "attitude_s");
-    if (lag.has("delay_s")) gains.delay_s = non_negative(lag, "delay_s");
+    const auto time = [&lag](const char* key) {
+      return lag.has(key) ? seconds(lag, key, non_negative(lag, key)) : 0;
+    };
+    gains.motor_lag_s = time("motor_s");
+    gains.attitude_lag_s = time("attitude_s");
+    gains.delay_s = time("delay_s");
   }
   if (top.has("network")) {
     const TomlTable network = top.table("network");
     network.allow_only({"rate_hz", "latency_s"});
     if (network.has("rate_hz")) gains.network_rate_hz = positive(network, "rate_hz");
-    if (network.has("latency_s")) gains.network_latency_s = non_negative(network, "latency_s");
+    if (network.has("latency_s"))
+      gains.network_latency_s = seconds(network, "latency_s", non_negative(network, "latency_s"));
   }
   return gains;
 }

@@ -1,6 +1,9 @@
 #include "stability/model.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "nn/files/file_io.h"
@@ -37,6 +40,23 @@ std::pair<double, double> interval(const TomlTable& table, const std::string& ke
   return {numbers[0], numbers[1]};
 }
 
+/// Refuses numbers that no rigid body has, or that put its mass far from where its rotors are: they are in other units.
+void check_inertia(const TomlTable& vehicle, const Model& model) {
+  std::array<double, 3> J = model.inertia_kg_m2;
+  std::sort(J.begin(), J.end());
+  const auto refuse = [&vehicle](double value, const std::string& problem) {
+    vehicle.refuse("inertia_kg_m2", fmt::format("{:g}", value), problem,
+                   "inertia is in kg m^2 and arm_m, from the centre to a rotor, in m: 1 g cm^2 is 1e-7");
+  };
+  // A rigid body's largest is at most the sum of the others; measured ones may miss that by their errors.
+  if (J[2] > 2 * (J[0] + J[1])) refuse(J[2], "is more than twice the other two together");
+  const double from_axis_m = std::sqrt(J[2] / model.mass_kg);
+  if (from_axis_m > 10 * model.arm_m || from_axis_m < 1e-3 * model.arm_m) {
+    refuse(J[2], fmt::format("means that the mass lies {:.3g} m from the axis, and the rotors are at {:g} m",
+                             from_axis_m, model.arm_m));
+  }
+}
+
 void read_vehicle(const TomlTable& vehicle, Model* model) {
   vehicle.allow_only({"kind", "mass_kg", "inertia_kg_m2", "arm_m", "torque_per_thrust_m", "thrust"});
   model->kind = vehicle.text("kind");
@@ -48,7 +68,16 @@ void read_vehicle(const TomlTable& vehicle, Model* model) {
   }
   std::copy(inertia.begin(), inertia.end(), model->inertia_kg_m2.begin());
   model->arm_m = positive(vehicle, "arm_m");
+  check_inertia(vehicle, *model);
   model->torque_per_thrust_m = positive(vehicle, "torque_per_thrust_m");
+  if (model->torque_per_thrust_m > model->arm_m) {
+    vehicle.refuse(
+        "torque_per_thrust_m", fmt::format("{:g}", model->torque_per_thrust_m),
+        fmt::format("is more than arm_m, {:g} m: rotors turn a vehicle about its thrust less than about "
+                    "the other axes",
+                    model->arm_m),
+        "it is torque in N m per newton of thrust");
+  }
   const TomlTable thrust = vehicle.table("thrust");
   thrust.allow_only({"c00", "c10", "c01", "c20", "c11"});
   model->thrust = {thrust.number("c00"), thrust.number("c10"), thrust.number("c01"), thrust.number("c20"),

@@ -57,7 +57,8 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
 
 int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
   if (options.question.steps > 1 && !(options.question.from_m < options.question.to_m)) {
-    throw UsageError("--from is a smaller height gap than --to");
+    throw UsageError(fmt::format("--from {:g} --to {:g}: --from is the smaller height gap",
+                                 options.question.from_m, options.question.to_m));
   }
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);

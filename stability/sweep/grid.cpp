@@ -1,8 +1,11 @@
 #include "stability/sweep/grid.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "nn/files/file_io.h"
 #include "nn/files/input_error.h"
@@ -30,11 +33,13 @@ GridAxis read_axis(const TomlTable& axes, const std::string& name) {
   const double to = table.number("to");
   const double steps = table.number("steps");
   if (!(steps >= 1) || steps > kMostCells || steps != std::floor(steps)) {
-    table.refuse("steps", std::to_string(steps), "must be a whole number from 1");
+    table.refuse("steps", fmt::format("{:g}", steps), "must be a whole number from 1");
   }
   const bool is_log = table.has("scale") && table.choice("scale", {"linear", "log"}) == 1;
-  if (is_log && !(from > 0 && to > 0)) table.refuse("from", "", "and to must be positive on a log scale");
-  if (from < 0 || to < 0) table.refuse("from", "", "and to must not be negative");
+  for (const auto& [key, value] : {std::pair("from", from), std::pair("to", to)}) {
+    if (value < 0) table.refuse(key, fmt::format("{:g}", value), "must not be negative");
+    if (is_log && value == 0) table.refuse(key, "0", "must be positive on a log scale", "or leave scale out");
+  }
   GridAxis axis = {name, {}};
   for (int i = 0; i < static_cast<int>(steps); ++i) {
     const double share = steps > 1 ? i / (steps - 1) : 0;
@@ -42,6 +47,17 @@ GridAxis read_axis(const TomlTable& axes, const std::string& name) {
                                  : from + share * (to - from));
   }
   if (steps > 1) axis.values.back() = to;  // exactly
+  const bool is_time = name.size() > 2 && name.compare(name.size() - 2, 2, "_s") == 0;
+  if (is_time && to > 1) {
+    table.refuse("to", fmt::format("{:g}", to), "is longer than 1 s", "it is in seconds: 20 ms are 0.02");
+  }
+  const bool is_count = name == "neighbours" || name == "vehicles";
+  for (const double value : axis.values) {
+    if (is_count && value != std::floor(value)) {
+      table.refuse("steps", fmt::format("{:g}", steps), fmt::format("gives {:.3g} {}", value, name),
+                   "choose steps that meet whole numbers only");
+    }
+  }
   return axis;
 }
 
@@ -143,7 +159,7 @@ Grid load_grid(const std::string& path) {
     cells *= static_cast<double>(grid.axes.back().values.size());
   }
   if (grid.axes.empty()) axes.refuse("", "", "has no axis", "e.g. [axes.Kp] from = 5, to = 20, steps = 50");
-  if (cells > kMostCells) axes.refuse("", std::to_string(cells) + " cells", "are more than ten million");
+  if (cells > kMostCells) axes.refuse("", fmt::format("{:.0f} cells", cells), "are more than ten million");
   const bool pid_axis = axes.has("Kp") || axes.has("Kd") || axes.has("Ki");
   const bool composite_axis = axes.has("Lambda") || axes.has("K");
   if (pid_axis && (composite_axis || !grid.gains.pid)) {
@@ -170,8 +186,13 @@ Grid load_grid(const std::string& path) {
     for (const std::string& name : limits.keys()) {
       const TomlTable limit = limits.table(name);
       limit.allow_only({"least", "most"});
-      grid.limits.push_back({name, limit.has("least") ? limit.number("least") : -INFINITY,
-                             limit.has("most") ? limit.number("most") : INFINITY});
+      const double least = limit.has("least") ? limit.number("least") : -INFINITY;
+      const double most = limit.has("most") ? limit.number("most") : INFINITY;
+      if (least > most) {
+        limit.refuse("least", fmt::format("{:g}", least), fmt::format("is more than most = {:g}", most),
+                     "no cell can meet both");
+      }
+      grid.limits.push_back({name, least, most});
     }
   }
   if (top.has("disturbance")) read_disturbance(top.table("disturbance"), grid.disturbance);

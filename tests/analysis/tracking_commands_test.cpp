@@ -444,6 +444,34 @@ TEST(SweepCommand, AnExistingShardIsKeptUnlessToldOtherwise) {
   EXPECT_NE(twice.output.find("another shard has too"), std::string::npos) << twice.output;
 }
 
+TEST(SweepCommand, AxesAndLimitsThatCannotBeMeantAreRefused) {
+  const ScratchFolder folder;
+  write_grid(folder);
+  const std::string grid = read_text(folder / "grid.toml");
+  for (const auto& [more, words] :
+       {std::pair("vehicles = {from = 1, to = 4, steps = 3}\n",
+                  "axes.vehicles.steps = 3: gives 2.5 vehicles"),
+        std::pair("Ki = {from = -2, to = 4, steps = 3}\n", "axes.Ki.from = -2: must not be negative"),
+        std::pair("Ki = {from = 0, to = 4, steps = 3, scale = \"log\"}\n",
+                  "from = 0: must be positive on a log"),
+        std::pair("motor_s = {from = 0, to = 57, steps = 3}\n", "axes.motor_s.to = 57: is longer than 1 s"),
+        std::pair("[limits.impulse]\nleast = 6\nmost = 5\n",
+                  "limits.impulse.least = 6: is more than most = 5")}) {
+    write_text(folder / "grid.toml", grid + more);
+    const Outcome outcome = run_shell("swarmcert sweep grid.toml -o out", folder.path());
+    EXPECT_EQ(outcome.exit_code, 3);
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output << "\nlacks: " << words;
+  }
+}
+
+TEST(BoundCommand, AnIntervalOfMassThatCannotFlyIsRefused) {
+  const ScratchFolder folder;
+  const Outcome outcome = run_shell("swarmcert bound" + kFlown + " --uncertain mass=32:36", folder.path());
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_NE(outcome.output.find("mass=32:36: the rotors lift 0.086 kg; mass is in kg"), std::string::npos)
+      << outcome.output;
+}
+
 TEST(SweepCommand, AFolderWithOtherThingsIsLeftAlone) {
   const ScratchFolder folder;
   write_grid(folder);

@@ -85,6 +85,10 @@ TEST(Gains, RefusalsNameLineKeyValueAndMend) {
   EXPECT_TRUE(refused("[position]\nLambda = [[1,0],[0,1]]\nK = 1\n", {"position.Lambda", "2 rows"}));
   EXPECT_TRUE(refused("[position]\nLambda = 1\nK = 1\nintegrator_step_s = 0.002\n", {"rate_hz"}));
   EXPECT_TRUE(refused("[position]\nLambda = 1\nK = 1\n[lag]\nmotor_s = -0.1\n", {"lag.motor_s", "-0.1"}));
+  EXPECT_TRUE(refused("[position]\nLambda = 1\nK = 1\n[lag]\nmotor_s = 57.5\n",
+                      {"line", "lag.motor_s = 57.5", "in seconds: 20 ms are 0.02"}));
+  EXPECT_TRUE(
+      refused("[position]\nLambda = 1\nK = 1\n[network]\nlatency_s = 4\n", {"network.latency_s = 4"}));
   EXPECT_TRUE(refused("[position]\nLambda = 1\nK = inf\n", {"position.K", "finite"}));
   EXPECT_TRUE(refuses([] { parse_gains("schema = \"swarmcert/model/1\"\n", "g"); }, {"schema", "gains/1"}));
 }
