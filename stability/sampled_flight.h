@@ -4,7 +4,8 @@
 ///
 /// Every control period (the attitude loop's, 2 ms): the position loop where it is due, the network's prediction where
 /// it is due (a staircase, applied late by its latency, from neighbours' positions that came by radio), the attitude law and mixing; then the plant moves by classical
-/// Runge-Kutta under held commands, which change inside a period only where a command delay says so. Quaternions are
+/// Runge-Kutta under held commands, which change inside a period only where a command delay says so. A step that would
+/// take a vehicle across a height where an effect bends (Effect::bends_m()) ends there and goes on. Quaternions are
 /// normalised between periods, never inside one.
 #pragma once
 
@@ -82,6 +83,7 @@ class SampledFlight {
   void move();
   void apply_delayed(bool late);
   void advance(double from_s, double h_s);
+  void step_onto_bends(double from_s, double h_s);
   void touch_ground();
 
   Swarm& swarm_;
@@ -92,6 +94,7 @@ class SampledFlight {
   std::int64_t period_ = 0;
   bool ran_position_ = false;
   Rows rows_;                          ///< the state, unless is_changed_
+  Rows start_, in_one_step_;           ///< scratch of step_onto_bends()
   mutable std::vector<double> state_;  ///< the state vehicle after vehicle, if is_unpacked_
   mutable bool is_unpacked_ = false;
   bool is_changed_ = true;

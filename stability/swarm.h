@@ -81,6 +81,15 @@ class Swarm {
   void find_neighbours(const double* rows, double horizon_s);
   void forget_neighbours();
 
+  /// Whether a vehicle may come, before find_neighbours() is called again, to a height below another at which an effect
+  /// bends (Effect::bends_m()).
+  bool may_meet_bends() const { return !meetings_.empty(); }
+  /// The share of a step after which the first such height is met; 1 where none is, or only at its very ends.
+  /// @param before, after the state in rows, `step_s` apart.
+  double first_bend(const double* before, const double* after, double step_s) const;
+  /// Vehicles that no other reaches get their numbers of `from`. Both are states in rows.
+  void copy_unreached(const double* from, double* rows) const;
+
  private:
   struct Kind;
   struct PairBatch;
@@ -98,6 +107,7 @@ class Swarm {
     }
   };
 
+  void find_meetings(const double* rows, double horizon_s);
   static void set_lag(Kind* kind);
   const Kind& kind(int vehicle) const;
   States by_vehicle(const double* state) const { return {state, false}; }
@@ -118,6 +128,12 @@ class Swarm {
   bool listed_ = false;
   std::vector<std::vector<int>> near_;  ///< by vehicle, if listed_
   std::vector<int> found_;              ///< scratch
+  /// `upper` may come to be higher than `lower` by bend_m, where the force on `lower` bends.
+  struct Meeting {
+    int lower, upper;
+    double bend_m;
+  };
+  std::vector<Meeting> meetings_;
   std::vector<int> acted_on_;  ///< vehicles on which effects act, but for those in batches_; since hold()
   std::vector<PairBatch> batches_;  ///< by kind
   /// Nothing acts but what pairs' positions tell. Two stages of a Runge-Kutta step, the first and the second or the other

@@ -146,6 +146,8 @@ std::vector<std::vector<double>> Downwash::grid(const FlightRange&) const {
   return thetas;
 }
 
+std::vector<double> Downwash::bends_m() const { return {kWakeTouching_m, kWakeNearest_m}; }
+
 double Downwash::reach_m(double dz_m, const double* shape) const {
   if (dz_m <= kWakeTouching_m) return 0;
   if (shape[kTail] > 0) return std::numeric_limits<double>::infinity();

@@ -31,6 +31,7 @@ class Downwash : public Effect {
   bool in_support(const Instant& now, const double* shape) const override;
   std::vector<std::vector<double>> grid(const FlightRange& range) const override;
   double reach_m(double dz_m, const double* shape) const override;
+  std::vector<double> bends_m() const override;
 };
 
 }  // namespace swarmcert::stability
