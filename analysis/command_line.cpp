@@ -27,7 +27,8 @@ void remember_command_line(int argc, const char* const* argv) {
     if (word == "-o" || word == "--output") remembered().has_output = true;
     if (word == "--report") remembered().has_report = true;
   };
-  static const std::set<std::string> flags = {"-q", "--quiet", "--force", "--github"};
+  // An interrupted run that went on has the result of an unbroken one.
+  static const std::set<std::string> flags = {"-q", "--quiet", "--force", "--github", "--resume"};
   // "-j2", "-qj2", "-qj 2", "-ofile": one dash, then flags, then perhaps an option with its value.
   const auto short_options = [](const std::string& word) {
     if (word.size() < 3 || word[0] != '-' || word[1] == '-') return std::string::npos;

@@ -28,7 +28,7 @@ class Progress {
   bool drawn_ = false;
 };
 
-/// Set by Ctrl-C while an instance exists; a second Ctrl-C ends the process.
+/// Set by Ctrl-C while an instance exists; another Ctrl-C a second later ends the process.
 class CancelOnInterrupt {
  public:
   CancelOnInterrupt();

@@ -55,7 +55,7 @@ ScaledProblem scale(const ReluChain& chain) {
     problem.exponents.push_back(unit - unit_before);
     m *= std::ldexp(1.0, unit_before - unit);
     unit_before = unit;
-    const double t = largest > 0 ? 1 / largest : 1.0;
+    const double t = largest > 0 ? 1 / largest : std::ldexp(1.0, -2 * unit);  // nothing comes: of its units
     x_inverse = (2 * t * MatrixXd::Identity(m.rows(), m.rows()) - t * t * g).inverse();
   }
   problem.begin.pop_back();  // the output is no variable

@@ -177,12 +177,24 @@ void print(const TrainOptions& options, const LearningData& data, const Outcome&
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
 
-void refuse_to_mix(const TrainOptions& options, const CommonOptions& common) {
-  const bool is_used =
-      fs::exists(options.output) && (!fs::is_directory(options.output) || !fs::is_empty(options.output));
-  if (!is_used || common.force || options.run.resumes) return;
-  throw files::InputError({options.output, "", "-o", "", "the folder is not empty",
-                           "--resume goes on with the run in it, --force replaces it"});
+/// A run that was killed before its first epoch ended left nothing: --resume then begins, so that a job that is
+/// started again needs no other words.
+void choose_beginning(const CommonOptions& common, TrainOptions& options) {
+  if (fs::exists(options.output) && !fs::is_directory(options.output))
+    throw files::InputError({options.output, "", "-o", "", "is a file", "name a folder"});
+  options.run.checkpoint = (fs::path(options.output) / "checkpoint.json").string();
+  if (!fs::exists(options.output) || fs::is_empty(options.output)) {
+    options.run.resumes = false;
+    return;
+  }
+  const std::uint64_t first = options.run.trainer.seed + (options.teachers > 0 ? 1 : 0);
+  if (options.run.resumes && !fs::exists(learning::checkpoint_of(options.run, first)))
+    throw files::InputError({options.output, "", "--resume", "",
+                             fmt::format("the folder holds no interrupted run of seed {}", first),
+                             "name the folder and the seed of one, or begin anew with --force instead"});
+  if (!options.run.resumes && !common.force)
+    throw files::InputError({options.output, "", "-o", "", "the folder is not empty",
+                             "--resume goes on with the run in it, --force replaces it"});
 }
 
 /// Flights that are not fitted, with the same models; nothing where none are named.
@@ -212,7 +224,7 @@ void refuse_twice(const learning::LearningFlights& flights) {
 
 int run_train(TrainOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
-  refuse_to_mix(options, common);
+  choose_beginning(common, options);
   refuse_folder(common, options.report);
   options.sizes.ground = !options.no_ground;
   training::TrainerOptions& trainer = options.run.trainer;
@@ -237,7 +249,6 @@ int run_train(TrainOptions options, const CommonOptions& common) {
       flights, options.sizes, kSplits.at(options.split), common.jobs,
       [&](int done, int total) { loading.show(done, total, "flights"); }, kTargets.at(options.quantity));
   fs::create_directories(options.output);
-  options.run.checkpoint = (fs::path(options.output) / "checkpoint.json").string();
   Progress training_progress(common.quiet);
   options.run.progress = [&](int done, int total, double select_gf) {
     training_progress.show(done, total,
@@ -349,9 +360,11 @@ Command train_command() {
             ->capture_default_str();
         app.add_option("--phi", options->sizes.phi, "Hidden layers of phi")
             ->delimiter(',')
+            ->check(CLI::Range(1, 4096))
             ->capture_default_str();
         app.add_option("--rho", options->sizes.rho, "Hidden layers of rho")
             ->delimiter(',')
+            ->check(CLI::Range(1, 4096))
             ->capture_default_str();
         app.add_option("--features", options->sizes.features, "Width between phi and rho")
             ->check(CLI::Range(1, 4096))

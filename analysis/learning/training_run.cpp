@@ -1,5 +1,8 @@
 #include "analysis/learning/training_run.h"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -34,11 +37,15 @@ std::string fingerprint(const LearningData& data, const RunOptions& options) {
   for (const TrackSamples& track : data.tracks) text += name(track.use) + std::to_string(track.end);
   for (const training::Part& part : data.layout.parts()) text += part.name + bytes(part.sizes);
   const training::TrainerOptions& t = options.trainer;
-  for (const double x :
-       {t.gamma.value, t.learning_rate, static_cast<double>(t.gamma.scope), static_cast<double>(t.gamma.mode),
-        static_cast<double>(t.batch), static_cast<double>(t.turns), static_cast<double>(options.weighing),
-        options.max_lipschitz})
-    text += std::to_string(x) + ",";
+  const std::array<double, 8> numbers = {t.gamma.value,
+                                         t.learning_rate,
+                                         static_cast<double>(t.gamma.scope),
+                                         static_cast<double>(t.gamma.mode),
+                                         static_cast<double>(t.batch),
+                                         static_cast<double>(t.turns),
+                                         static_cast<double>(options.weighing),
+                                         options.max_lipschitz};
+  text += bytes(numbers);
   return files::sha256(text + std::to_string(t.seed) + "," + std::to_string(options.epochs));
 }
 
@@ -141,6 +148,10 @@ Run run_training(const LearningData& data, const RunOptions& options) {
     trainer.weigh(weights_by(options.weighing, data, trainer.theta(), chosen.jobs));
     trainer.tighten(state.shares);
     const double fit = std::sqrt(trainer.run_epoch(epoch, rate));
+    if (!std::isfinite(fit) || !trainer.theta().allFinite())
+      throw files::InputError({"", "", "--rate", fmt::format("{}", chosen.learning_rate),
+                               fmt::format("the weights grew beyond all numbers in epoch {}", epoch + 1),
+                               "give a smaller rate, or a smaller --gamma"});
     Vector candidate = trainer.theta();
     if (options.max_lipschitz > 0) {
       const Tightening asked = scale_to(options.max_lipschitz, data.layout, chosen.jobs, candidate);

@@ -29,11 +29,12 @@ VectorXd given_multipliers(const LocalChain& chain, const std::vector<double>& s
   return all;
 }
 
-/// A point well inside: in a balanced chain all-ones is nearly feasible, and earlier layers want more.
+/// A point well inside: in a balanced chain all-ones is nearly feasible, and earlier layers want more. Empty where the
+/// numbers leave the range of double first.
 VectorXd interior(const LocalChain& chain, const NodeInequality& inequality) {
-  for (double shrink = 0.5;; shrink *= 0.5) {
+  for (double shrink = 0.5; shrink > 1e-60; shrink *= 0.5) {
     VectorXd layers(chain.neurons());
-    double level = 4;
+    double level = 2 / shrink;
     Index end = layers.size();
     for (std::size_t k = chain.hidden.size(); k-- > 0; level /= shrink) {
       const Index rows = chain.hidden[k].weights.rows();
@@ -47,6 +48,7 @@ VectorXd interior(const LocalChain& chain, const NodeInequality& inequality) {
       y(1 + i) = layers(inequality.undecided()[static_cast<std::size_t>(i)]);
     if (inequality.least_rho(y.tail(inequality.neurons())) < 0.9 * y(0)) return y;
   }
+  return {};
 }
 
 }  // namespace
@@ -59,10 +61,12 @@ VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequal
     descent.steps = kRootSteps;
     if (std::isfinite(inequality.least_rho(t))) return descend(inequality, t, descent);
   }
+  const VectorXd inside = interior(chain, inequality);
+  if (inside.size() == 0) return VectorXd::Zero(inequality.neurons());  // proves nothing
   InteriorPointOptions options;
   options.relative_gap = kRootGap;
   options.infeasibility = std::numeric_limits<double>::infinity();  // every iterate is a bound
-  const InteriorPointResult found = minimise(inequality, interior(chain, inequality), options);
+  const InteriorPointResult found = minimise(inequality, inside, options);
   return found.points.back().tail(inequality.neurons());
 }
 

@@ -248,6 +248,36 @@ TEST_F(Train, HoldsBackNamedFlightsOrBlocksAndRefusesAFlightForTwoUses) {
   EXPECT_EQ(learn("flights/1 --select flights/2 --test flights/2").exit_code, 2);
 }
 
+/// Interrupted runs go on to the files, and the JSON, of an unbroken one; one Ctrl-C may be delivered twice.
+TEST_F(Train, GoesOnWhereCtrlCStoppedIt) {
+  const std::string options = "--epochs 150 --patience 150 --batch 64 --rate 2e-3 -q ";
+  ASSERT_EQ(execute(train(options + "-o whole --json whole.json")).exit_code, 0);
+  const Outcome cut = execute(train(options + "-o cut --json cut.json") +
+                              " & run=$!; for i in $(seq 3000); do [ -e cut/checkpoint.json ] && break; "
+                              "sleep 0.01; done; kill -INT $run; kill -INT $run; wait $run");
+  ASSERT_EQ(cut.exit_code, 4) << cut.output;
+  EXPECT_NE(cut.output.find("--resume goes on"), std::string::npos) << cut.output;
+  Outcome outcome = execute(train("--epochs 150 --batch 64 --rate 2.0000001e-3 -q --resume -o cut"));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.output.find("other flights, options or seed"), std::string::npos) << outcome.output;
+  outcome = execute(train(options + "--resume -o cut --json cut.json"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(execute("diff -r whole cut && cmp whole.json cut.json").exit_code, 0);
+
+  outcome = execute(train(options + "--resume -o cut"));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.output.find("no interrupted run"), std::string::npos) << outcome.output;
+  EXPECT_EQ(execute(train("--epochs 1 --resume -o begun")).exit_code, 0) << "killed before its first epoch";
+}
+
+TEST_F(Train, RefusesSizesAndRatesThatCannotBe) {
+  for (const std::string word : {"--phi 0", "--rho 8,-1", "--phi 100000000"})
+    EXPECT_EQ(execute("swarmcert train nominal.toml flights -o out " + word).exit_code, 2) << word;
+  const Outcome outcome = execute(train("--epochs 2 --rate 1e10 -o out"));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.output.find("smaller rate"), std::string::npos) << outcome.output;
+}
+
 TEST_F(Train, RefusesAFolderThatIsNotEmptyAndFlightsWithoutNeighbours) {
   write_text(folder_ / "kept.txt", "");
   Outcome outcome = execute(train("--epochs 1 -o ."));

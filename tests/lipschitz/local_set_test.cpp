@@ -234,6 +234,18 @@ TEST(ProjectiveCover, FindsThatTwoSlopesNeverMeet) {
   EXPECT_NEAR(bound_of(network, everywhere(), {}, 200), 5, 0.01);
 }
 
+TEST(ProjectiveCover, EndsWhereALayerIsZeroAndTheOneBeforeItSteep) {
+  std::mt19937 generator(13);
+  files::Weights steep = tests::random_network({3, 3, 4, 1}, generator);
+  for (double& weight : steep.layers[0].weights) weight *= 64;
+  for (double& weight : steep.layers[1].weights) weight = 0;
+  const files::Network network = plain(std::move(steep));
+  const SdpBound global = tests::sdp_bound_of(network);
+  EXPECT_LT(proved(global), 1e-40);
+  const std::map<std::string, Box> no_box;
+  EXPECT_GT(local_bound(network, everywhere(), no_box, global.proof->t, so_many_boxes(20)).nodes, 0);
+}
+
 TEST(ProjectiveCover, BoundsTheSlopeOfRandomNetworksEverywhere) {
   std::mt19937 generator(6);
   double closest = 0, gain = 1;
