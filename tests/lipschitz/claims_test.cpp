@@ -185,6 +185,16 @@ TEST(Claims, LawsBoundTheJointFunctionOfMixedKinds) {
   EXPECT_GE(law_bound(LawKind::kAllMax, terms).value(), law);
 }
 
+TEST(Claims, LawsOfTinyAndHugeBoundsAreNeitherLostNorEndless) {
+  for (const double k : {0.0, 5e-324, 3e-310, 1e-170, 1.0, 1e170, 1e300}) {
+    const double stacked = law_bound(LawKind::kAllStacked, {{UpperBound(k), 4}}).value();
+    EXPECT_EQ(stacked, 2 * k) << k;
+    EXPECT_EQ(law_bound(LawKind::kAllMax, {{UpperBound(k), 4}}).value(), 4 * k) << k;
+  }
+  EXPECT_TRUE(std::isinf(law_bound(LawKind::kAllMax, {{UpperBound(1e308), 4}}).value()));
+  EXPECT_TRUE(std::isinf(law_bound(LawKind::kAllStacked, {{UpperBound(INFINITY), 4}}).value()));
+}
+
 TEST(Claims, LawsAddUpTheirTermsAndTheGround) {
   std::mt19937 generator(8);
   const Network network = mixed_network(generator);
