@@ -88,9 +88,15 @@ void declare_common(CLI::App& app, CommonOptions& common) {
   app.add_flag("-q,--quiet", common.quiet, "No progress on standard error");
 }
 
-/// Range checks let NaN pass, and no option means anything by it.
-void refuse_nan(const CLI::App& command) {
+/// Range checks let NaN pass, and no option means anything by it; where no number may be negative, the parser makes a
+/// huge one of it.
+void refuse_nan_and_wrapped(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
+    if (option->get_type_name().rfind("UINT", 0) == 0) {
+      for (const std::string& value : option->results())
+        if (value[0] == '-')
+          throw swarmcert::analysis::UsageError(option->get_name() + " " + value + ": must not be negative");
+    }
     if (option->get_type_name().rfind("FLOAT", 0) != 0) continue;
     for (std::string value : option->results()) {
       std::transform(value.begin(), value.end(), value.begin(),
@@ -154,7 +160,7 @@ int run(int argc, char** argv) {
     return swarmcert::analysis::kUsage;
   }
   for (const CLI::App* sub : app.get_subcommands()) {
-    refuse_nan(*sub);
+    refuse_nan_and_wrapped(*sub);
     refuse_shared_output(*sub);
   }
   swarmcert::analysis::remember_command_line(argc, argv);

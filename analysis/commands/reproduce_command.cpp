@@ -10,6 +10,7 @@
 #include "analysis/report.h"
 #include "analysis/reproduction/experiments.h"
 #include "nn/files/file_io.h"
+#include "nn/files/input_error.h"
 #include "nn/files/suggest.h"
 
 namespace swarmcert::analysis {
@@ -82,8 +83,12 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   read_shard(options.shard, options.setting);
   const fs::path result_file = fs::path(options.output) / options.name / "result.json";
   refuse_to_replace(common, common.json);
-  refuse_to_replace(common, result_file.string());
   reproduction::Setting& setting = options.setting;
+  const bool is_part = setting.shards > 1;
+  if (!is_part) refuse_to_replace(common, result_file.string());
+  if (!setting.recorded.empty() && !fs::is_directory(setting.recorded))
+    throw files::InputError({setting.recorded, "", "--recorded", "", "is not a folder",
+                             "name the one of the published data, with flights/ and weights/"});
   setting.jobs = common.jobs;
   setting.work = (fs::path(options.output) / (setting.full ? "full" : "small")).string();
   setting.models = bundled_folder("models", "stability/models");
@@ -105,20 +110,21 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   const Finding finding = chosen.run(setting);
   progress.reset();
 
-  files::Json result = result_head("reproduce", {setting.gains});
+  std::vector<std::string> inputs = {setting.gains, setting.models + "/crazyflie-small-effects.toml"};
+  inputs.insert(inputs.end(), finding.inputs.begin(), finding.inputs.end());
+  files::Json result = result_head("reproduce", inputs);
   result["seed"] = setting.seed;
   result["experiment"] = options.name;
   result["size"] = setting.full ? "full" : "small";
   result["updraft"] = setting.updraft;
-  result["complete"] = finding.complete;
+  result["complete"] = !is_part;
   result.update(finding.json);
   write_result(common, result);
   if (common.prints_text()) print(finding);
-  if (!finding.complete) {
+  if (is_part) {
     if (common.prints_text())
-      fmt::print(
-          "Part {} of {} is done. When all are, the same command without --shard puts them together.\n",
-          setting.shard, setting.shards);
+      fmt::print("Part {} is done. When all are, the same command without --shard puts them together.\n",
+                 options.shard);
     return kDone;
   }
   const std::string report = write_report(options, finding);

@@ -21,8 +21,8 @@ struct Figure {
 };
 
 struct Finding {
-  bool complete = true;  ///< false: other shards have not run yet
-  files::Json json;      ///< fields of the result, without its head
+  files::Json json;                 ///< fields of the result, without its head
+  std::vector<std::string> inputs;  ///< recorded files that it rests on
   std::vector<std::string> notes;
   std::vector<Table> tables;
   std::vector<Figure> figures;

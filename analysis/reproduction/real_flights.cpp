@@ -219,7 +219,10 @@ Finding real_flights(const Setting& setting) {
   finding.json["test"] = "visible_test";
   if (setting.computes(0)) deep_set_alone(setting, finding);
   if (setting.computes(1)) physics_first(setting, finding);
-  finding.complete = setting.shards == 1;
+  const Recorded recorded = recorded_flights(setting, true);
+  for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test})
+    for (const residuals::FlightFiles& flight : inputs->found.flights)
+      for (const auto& [vehicle, path] : flight.logs) finding.inputs.push_back(path);
   return finding;
 }
 

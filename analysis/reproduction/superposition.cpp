@@ -122,6 +122,7 @@ void add_recorded(const Setting& setting, const Truth& truth, Table& table, Find
   Blocks blocks;
   std::size_t records = 0;
   for (std::size_t f = 0; f < inputs.found.flights.size(); ++f) {
+    for (const auto& [vehicle, path] : inputs.found.flights[f].logs) finding.inputs.push_back(path);
     for (const residuals::Track& track : inputs.load(f, finding.notes)) {
       if (track.position_only) continue;
       const std::vector<Eigen::Vector3d> residual =

@@ -107,6 +107,7 @@ TEST(Suggest, FindsTypingErrors) {
   EXPECT_EQ(nearest("wieghts", {"schema", "weights"}), "weights");
   EXPECT_EQ(nearest("ouput", {"input", "output"}), "output");
   EXPECT_EQ(nearest("gama", {"gamma"}), "gamma");
+  EXPECT_EQ(nearest("tabel", {"data", "table"}), "table");
   EXPECT_EQ(nearest("weights", {"weights"}), "weights");
 }
 

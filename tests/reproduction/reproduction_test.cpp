@@ -32,9 +32,9 @@ class Reproduction : public testing::Test {
 /// One test, because the experiments share flights and networks: each of them would make its own.
 TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
   // Shards, one after the other; the last call puts them together.
-  EXPECT_NE(reproduce("table -o out --shard 1/2").output.find("Part 1 of 2"), std::string::npos);
-  reproduce("table -o out --shard 2/2 --force");
-  reproduce("table -o out --force");
+  EXPECT_NE(reproduce("table -o out --shard 1/2").output.find("Part 1/2 is done"), std::string::npos);
+  EXPECT_NE(reproduce("table -o out --shard 2/2").output.find("Part 2/2 is done"), std::string::npos);
+  reproduce("table -o out");
   const Json table = result("table");
   EXPECT_TRUE(table["complete"].get<bool>());
   ASSERT_EQ(table["columns"].size(), 2u);
@@ -108,6 +108,8 @@ TEST_F(Reproduction, RefusesUnknownExperimentsAndShards) {
   EXPECT_EQ(exit_code("table --shard 3/2"), 2);
   EXPECT_EQ(exit_code("table --shard 1"), 2);
   EXPECT_EQ(exit_code("real-flights --recorded nowhere"), 3);
+  EXPECT_EQ(exit_code("superposition --recorded nowhere"), 3);
+  EXPECT_EQ(exit_code("intro --seed -1"), 2);
 }
 
 }  // namespace
