@@ -189,6 +189,10 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
   parse_blocks(options.blocks, options.certify);
   files::Network network = load_net(options.network);
+  if (!options.neighbours.empty() && network.plain)
+    throw UsageError(
+        "--neighbours " + options.neighbours +
+        ": the file holds one plain network, which has none; give a network.toml or --phi and --rho");
   if (options.as == "float32") network = files::as_float32(std::move(network));
   if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
   lipschitz::SlopeMapOptions map = options.slope_map;
@@ -208,6 +212,8 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
     if (!options.nodes && options.seconds > 0) options.certify.branch.nodes = std::numeric_limits<int>::max();
     options.certify.branch.seconds = options.seconds;
   } else {
+    if (options.certify.branch.pairs > 0 || !options.certify.branch.better_slopes)
+      throw UsageError("--cuts and --default-slopes are options of the search: they need --method branch");
     options.certify.lower.rounds = options.nodes;
     options.certify.lower.seconds = options.seconds;
   }

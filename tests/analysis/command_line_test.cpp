@@ -196,7 +196,10 @@ TEST_F(CommandLine, OptionsThatAskForWhatTheNetworkHasNotAreUsageErrors) {
   expect("certify " + net + " --blocks=position", 2, {"position"});
   expect("certify " + net + " --scale 1,2,3", 2, {"3 inputs"});
   expect("certify " + net + " --neighbours many", 2, {"--neighbours many", "small=1"});
-  expect("certify " + net + " --neighbours a=1", 2, {"\"a\""});
+  expect("certify " + net + " --neighbours 2", 2, {"plain network"});
+  expect("certify " + net + " --cuts 5", 2, {"--method branch"});
+  const std::string set = tests::source_path("nn/networks/demo/network.toml");
+  expect("certify " + set + " --neighbours a=1", 2, {"\"a\""});
   expect("certify " + net + " --range", 2, {"--domain"});
   expect("certify " + net + " --as float16", 2, {"--as"});
   write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1]\nupper = [1, 2]\n");
