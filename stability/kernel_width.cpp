@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <stdexcept>
 #include <string>
+
+#include "nn/files/input_error.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -23,8 +24,8 @@ KernelWidth asked_for() {
   if (text == "narrow") return KernelWidth::kNarrow;
   if (text == "avx2") return KernelWidth::kAvx2;
   if (text == "avx512") return KernelWidth::kAvx512;
-  throw std::invalid_argument("environment variable SWARMCERT_KERNELS = '" + text +
-                              "': narrow, avx2 or avx512");
+  throw files::InputError({"environment", "", "SWARMCERT_KERNELS", text, "is no width of registers",
+                           "say narrow, avx2 or avx512"});
 }
 
 }  // namespace

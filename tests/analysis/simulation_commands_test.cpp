@@ -191,5 +191,18 @@ TEST(SweepCommand, AJobArrayOnARealSlurmMergesToTheBytesOfAnUndividedRun) {
   EXPECT_EQ(read_text(folder / "whole/sweep.json"), read_text(folder / "array/sweep.json"));
 }
 
+TEST(SimulateCommand, LogsAreTheSameBytesForEveryWidthOfRegisters) {
+  const ScratchFolder folder;
+  for (const std::string task : {"circle --vehicles 5", "swap --vehicles 3"}) {
+    const std::string simulate = "swarmcert simulate " + task + " --duration 3 --seed 3 -q --force --model " +
+                                 kSource + "/stability/models/crazyflie-small-effects.toml --gains " +
+                                 kSource + "/controller/gains/crazyflie-small.toml -o $k";
+    const Outcome result = run_shell("for k in narrow avx2 avx512; do SWARMCERT_KERNELS=$k " + simulate +
+                                         " || exit 9; done; diff -r narrow avx2 && diff -r narrow avx512",
+                                     folder.path());
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+  }
+}
+
 }  // namespace
 }  // namespace swarmcert::tests
