@@ -121,7 +121,8 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
   Report report("Training of a deep set");
   report.result(result);
   report.heading("Learning curve");
-  add_curve(report, data, run, result["teachers"].size());
+  const bool was_taught = result["kept_seed"] == result["seed"];
+  add_curve(report, data, run, was_taught ? result["teachers"].size() : 0);
   report.heading("What is left");
   const int components = data.samples.outputs;
   for (int c = 0; c < components; ++c) add_histogram(report, data, run, c);

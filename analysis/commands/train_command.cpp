@@ -84,8 +84,7 @@ std::vector<Scores> scores_by_component(const LearningData& data, const training
 files::Json number_or_null(double x) { return std::isfinite(x) ? files::Json(x) : files::Json(); }
 
 struct Outcome {
-  learning::Run run;
-  std::vector<learning::Teacher> teachers;
+  learning::TaughtRun trained;
   Scores all;
   std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
   std::map<std::string, Scores> compositions;
@@ -127,13 +126,19 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
   json["lipschitz"] = outcome.certified.largest();
   json["gamma_verdict"] = name(outcome.certified.gamma);
   json["teachers"] = files::Json::array();
-  for (const learning::Teacher& teacher : outcome.teachers)
-    json["teachers"].push_back({{"seed", teacher.seed},
-                                {"best_epoch", teacher.best_epoch + 1},
-                                {fmt::format("select_rmse_{}", target.unit), teacher.select_rmse}});
-  json["best_epoch"] = outcome.run.best_epoch + 1;
+  const learning::TaughtRun& trained = outcome.trained;
+  const auto json_of = [&target](const learning::Score& score) {
+    return files::Json{{"seed", score.seed},
+                       {"best_epoch", score.best_epoch + 1},
+                       {fmt::format("select_rmse_{}", target.unit), score.select_rmse}};
+  };
+  for (std::size_t i = 0; i + 1 < trained.scores.size(); ++i)
+    json["teachers"].push_back(json_of(trained.scores[i]));
+  json["taught"] = trained.scores.size() > 1 ? json_of(trained.scores.back()) : files::Json();
+  json["kept_seed"] = trained.kept_score().seed;
+  json["best_epoch"] = trained.run.best_epoch + 1;
   json["epochs"] = files::Json::array();
-  for (const learning::Epoch& epoch : outcome.run.epochs)
+  for (const learning::Epoch& epoch : trained.run.epochs)
     json["epochs"].push_back({{fmt::format("fit_rmse_{}", target.unit), epoch.fit_rmse},
                               {fmt::format("select_rmse_{}", target.unit), epoch.select_rmse}});
   json["problems"] = data.problems;
@@ -151,10 +156,14 @@ void print(const TrainOptions& options, const LearningData& data, const Outcome&
   if (data.split_by_blocks)
     fmt::print("blocks of the flights that are fitted select or test: these errors look too good\n");
   const learning::TargetInfo& target = learning::info(data.target);
-  for (const learning::Teacher& teacher : outcome.teachers)
-    fmt::print("teacher of seed {}: {:.3f} {} on the selecting flights\n", teacher.seed, teacher.select_rmse,
-               target.unit);
-  fmt::print("best of {} epochs: {}\n\n", outcome.run.epochs.size(), outcome.run.best_epoch + 1);
+  const learning::TaughtRun& trained = outcome.trained;
+  for (std::size_t i = 0; i < trained.scores.size() && trained.scores.size() > 1; ++i) {
+    const learning::Score& score = trained.scores[i];
+    fmt::print("{} of seed {}: {:.3f} {} on the selecting flights{}\n",
+               i + 1 < trained.scores.size() ? "teacher" : "taught", score.seed, score.select_rmse,
+               target.unit, i == trained.kept ? ", kept" : "");
+  }
+  fmt::print("best of {} epochs: {}\n\n", trained.run.epochs.size(), trained.run.best_epoch + 1);
   fmt::print("{:<34}{:>18}{:>18}\n", fmt::format("{} on test flights", target.words),
              fmt::format("no network [{}]", target.unit), fmt::format("network [{}]", target.unit));
   for (const auto& [composition, scores] : outcome.compositions)
@@ -257,26 +266,24 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   const CancelOnInterrupt interrupt;
   options.run.cancelled = interrupt.flag();
   Outcome outcome;
-  learning::TaughtRun taught = learning::run_with_teachers(data, options.run, options.teachers);
-  outcome.run = std::move(taught.run);
-  outcome.teachers = std::move(taught.teachers);
-  if (outcome.run.was_cancelled) {
-    fmt::print(stderr, "stopped after {} epochs{}; --resume goes on\n", outcome.run.epochs.size(),
-               options.teachers > 0 ? fmt::format(" of seed {}", outcome.run.seed) : "");
+  outcome.trained = learning::run_with_teachers(data, options.run, options.teachers);
+  const learning::Run& run = outcome.trained.run;
+  if (run.was_cancelled) {
+    fmt::print(stderr, "stopped after {} epochs{}; --resume goes on\n", run.epochs.size(),
+               options.teachers > 0 ? fmt::format(" of seed {}", run.seed) : "");
     return kInconclusive;
   }
 
-  const files::Network network =
-      learning::write_network(data, outcome.run.theta, trainer.gamma, options.output);
+  const files::Network network = learning::write_network(data, run.theta, trainer.gamma, options.output);
   learning::write_models(inputs, data.layout, options.output);
   lipschitz::CertifyOptions certify_options;
   certify_options.jobs = common.jobs;
   certify_options.lower.seed = trainer.seed;
   outcome.certified = learning::write_certificate(network, options.output, certify_options);
   outcome.all = {learning::rmse_of_nothing(data, Use::kTest),
-                 learning::rmse(data, outcome.run.theta, Use::kTest, common.jobs)};
-  if (data.samples.outputs > 1) outcome.components = scores_by_component(data, outcome.run.theta);
-  outcome.compositions = scores_by_composition(data, outcome.run.theta, common.jobs);
+                 learning::rmse(data, run.theta, Use::kTest, common.jobs)};
+  if (data.samples.outputs > 1) outcome.components = scores_by_component(data, run.theta);
+  outcome.compositions = scores_by_composition(data, run.theta, common.jobs);
 
   std::vector<std::string> files = inputs.files();
   for (const residuals::Inputs* more : {flights.select, flights.test}) {
@@ -289,12 +296,11 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   write_result(common, result);
   if (common.prints_text()) print(options, data, outcome);
   if (!options.report.empty()) {
-    const std::string path = write_train_report(data, outcome.run, result, options.report, common.force);
+    const std::string path = write_train_report(data, run, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
-  fs::remove(options.run.checkpoint);
-  for (const learning::Teacher& teacher : outcome.teachers)
-    fs::remove(learning::checkpoint_of(options.run, teacher.seed));
+  for (const learning::Score& score : outcome.trained.scores)
+    fs::remove(learning::checkpoint_of(options.run, score.seed));
   return kDone;
 }
 
@@ -384,9 +390,10 @@ Command train_command() {
             ->capture_default_str();
         app.add_option("--seed", trainer.seed, "Of initial weights and order of samples")
             ->capture_default_str();
-        app.add_option("--teachers", options->teachers,
-                       "Train so many networks first, with the seeds after --seed, and fit the one that is "
-                       "written to the mean of what they say: what differs from seed to seed averages out")
+        app.add_option(
+               "--teachers", options->teachers,
+               "Train so many networks first, with the seeds after --seed, and fit one to the mean of what "
+               "they say; of all of them, the one is written that the selecting flights prefer")
             ->check(CLI::Range(0, 1000))
             ->capture_default_str();
         app.add_flag("--resume", options->run.resumes, "Go on with an interrupted run in the same folder");

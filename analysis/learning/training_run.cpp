@@ -184,6 +184,7 @@ std::string checkpoint_of(const RunOptions& options, std::uint64_t seed) {
 
 TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options, int teachers) {
   TaughtRun taught;
+  const bool selects = !data.indices(Use::kSelect).empty();
   Vector said = Vector::Zero(data.samples.target.size());
   LearningData of_teachers;
   for (int i = 1; i <= teachers + 1; ++i) {
@@ -202,13 +203,19 @@ TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options,
       set_targets(said / static_cast<float>(teachers), Use::kFit, of_teachers);
     }
     Run run = run_training(is_last && teachers > 0 ? of_teachers : data, one);
-    if (is_last || run.was_cancelled) {
+    if (run.was_cancelled) {
       taught.run = std::move(run);
       break;
     }
-    add_outputs(data, run.theta, Use::kFit, said);
-    taught.teachers.push_back(
-        {run.seed, run.best_epoch, run.epochs[static_cast<std::size_t>(run.best_epoch)].select_rmse});
+    if (!is_last) add_outputs(data, run.theta, Use::kFit, said);
+    const Score score = {run.seed, run.best_epoch,
+                         run.epochs[static_cast<std::size_t>(run.best_epoch)].select_rmse};
+    const bool is_first = taught.scores.empty();
+    taught.scores.push_back(score);
+    if (is_first || (is_last && !selects) || score.select_rmse < taught.kept_score().select_rmse) {
+      taught.run = std::move(run);
+      taught.kept = taught.scores.size() - 1;
+    }
   }
   return taught;
 }

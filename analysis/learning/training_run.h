@@ -45,16 +45,17 @@ struct Run {
 /// @throws files::InputError if the checkpoint cannot be read, or is of other networks, data or options.
 Run run_training(const LearningData& data, const RunOptions& options);
 
-/// One of the networks that another is fitted to.
-struct Teacher {
+struct Score {
   std::uint64_t seed;
   int best_epoch;
   double select_rmse;
 };
 
 struct TaughtRun {
-  Run run;
-  std::vector<Teacher> teachers;
+  Run run;  ///< of those below the one that the selecting flights prefer, or the cancelled one
+  std::vector<Score> scores;  ///< of the teachers, and last of the one that they taught
+  std::size_t kept = 0;       ///< which of `scores` is run's
+  const Score& kept_score() const { return scores[kept]; }
 };
 
 /// File that keeps what `seed` has reached, of a run with teachers.
@@ -63,8 +64,9 @@ std::string checkpoint_of(const RunOptions& options, std::uint64_t seed);
 /// Trains `teachers` networks, with the seeds after options.trainer.seed, and then one that is fitted to the mean of
 /// what they say of the samples to fit, in place of the recorded targets (distillation: Hinton et al. 2015). Recorded
 /// flights leave networks of several seeds with errors that differ by several percent; those average out, and the one
-/// network that is left keeps gamma and max_lipschitz like any other. The selecting flights judge by what was recorded.
-/// Without teachers it is run_training(). A run that is cancelled is returned at once, as it is.
+/// network that is taught keeps gamma and max_lipschitz like any other. Of all of them the one is kept that the selecting
+/// flights, as recorded, prefer; where no flights select, the one that was taught. Without teachers it is run_training().
+/// A run that is cancelled is returned at once, as it is.
 TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options, int teachers);
 
 /// RMSE, in the unit of the targets, of theta on the samples of `use`, of kFit weighted by scenario; NaN where there are

@@ -18,11 +18,11 @@ using learning::Use;
 constexpr const char* kLearnSchema = "swarmcert/learned/1";
 
 std::string text_of(const LearnOptions& options) {
-  std::string text = fmt::format("teachers {} {} {} {} {} {} {} {} {} {} {} {} {}", options.gamma.value,
-                                 static_cast<int>(options.gamma.scope), static_cast<int>(options.gamma.mode),
-                                 options.max_lipschitz, options.turns, options.rate, options.batch,
-                                 options.steps, options.epochs, options.seed, options.teachers,
-                                 options.sizes.features, options.sizes.ground);
+  std::string text = fmt::format("best of teachers and taught {} {} {} {} {} {} {} {} {} {} {} {} {}",
+                                 options.gamma.value, static_cast<int>(options.gamma.scope),
+                                 static_cast<int>(options.gamma.mode), options.max_lipschitz, options.turns,
+                                 options.rate, options.batch, options.steps, options.epochs, options.seed,
+                                 options.teachers, options.sizes.features, options.sizes.ground);
   for (const int size : options.sizes.phi) text += fmt::format(" phi {}", size);
   for (const int size : options.sizes.rho) text += fmt::format(" rho {}", size);
   return text;
@@ -41,6 +41,9 @@ Learned read_back(const files::Json& file, const std::string& folder) {
   learned.samples = file.at("samples").get<int>();
   learned.epochs = file.at("epochs").get<int>();
   learned.best_epoch = file.at("best_epoch").get<int>();
+  learned.kept_seed = file.at("kept_seed").get<std::uint64_t>();
+  for (const files::Json& score : file.at("scores"))
+    learned.scores.emplace_back(score.at(0).get<std::uint64_t>(), score.at(1).get<double>());
   return learned;
 }
 
@@ -83,7 +86,8 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   if (!setting.full && options.max_lipschitz == 0)
     certify.method = lipschitz::UpperMethod::kProduct;  // looser, but at once
   const learning::Certified certified = learning::write_certificate(network, folder, certify);
-  files::Json bounds = files::Json::array(), epochs = files::Json::array();
+  files::Json bounds = files::Json::array(), epochs = files::Json::array(), scores = files::Json::array();
+  for (const learning::Score& score : taught.scores) scores.push_back({score.seed, score.select_rmse});
   for (const auto& [function, upper] : certified.set_bounds) bounds.push_back({function, upper});
   for (const learning::Epoch& epoch : trained.epochs) epochs.push_back({epoch.fit_rmse, epoch.select_rmse});
   const files::Json file = {{"schema", kLearnSchema},
@@ -96,11 +100,11 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
                             {"samples", samples},
                             {"epochs", trained.epochs.size()},
                             {"best_epoch", trained.best_epoch + 1},
-                            {"fit_and_select_gf", std::move(epochs)}};
+                            {"fit_and_select_gf", std::move(epochs)},
+                            {"kept_seed", trained.seed},
+                            {"scores", std::move(scores)}};
   files::write_file(done, files::to_text(file), true);
-  fs::remove(run.checkpoint);
-  for (const learning::Teacher& teacher : taught.teachers)
-    fs::remove(learning::checkpoint_of(run, teacher.seed));
+  for (const learning::Score& score : taught.scores) fs::remove(learning::checkpoint_of(run, score.seed));
   return read_back(file, folder);
 }
 

@@ -32,6 +32,9 @@ struct Learned {
   bool keeps_gamma = false;                                ///< proved
   double test_gf = 0, nothing_gf = 0;  ///< RMSE on the test flights, with and without the network
   int samples = 0, epochs = 0, best_epoch = 0;
+  /// Seed and error on the selecting flights, gf, of every network that was trained: teachers, and the taught one last.
+  std::vector<std::pair<std::uint64_t, double>> scores;
+  std::uint64_t kept_seed = 0;  ///< of the one that stands here
 };
 
 /// Trains on what `load` returns, which is called only where there is something to do, and writes network, certificate

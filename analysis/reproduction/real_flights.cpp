@@ -148,7 +148,7 @@ void add_having_seen(const Setting& setting, const Recorded& recorded, const Tes
       compared.mean_ours_gf, compared.mean_theirs_gf, compared.largest_ratio, compared.where, learned.bound));
 }
 
-/// At full size what differs between seeds is averaged out.
+/// At full size several networks compete on the selecting flights, with one that is fitted to what they say.
 LearnOptions taught_options(const Setting& setting) {
   LearnOptions options = recorded_options(setting);
   options.teachers = setting.full ? 4 : 0;
@@ -160,6 +160,20 @@ void deep_set_alone(const Setting& setting, Finding& finding) {
   const Recorded recorded = recorded_flights(setting, true);
   const Learned learned =
       train_recorded(setting, recorded, taught_options(setting), "deep-set", "deep set alone");
+  finding.json["networks"] = files::Json::array();
+  std::string select_gf;
+  for (const auto& [seed, score_gf] : learned.scores) {
+    finding.json["networks"].push_back({{"seed", seed}, {"select_gf", score_gf}});
+    select_gf += fmt::format("{}{:.3f} (seed {})", select_gf.empty() ? "" : ", ", score_gf, seed);
+  }
+  finding.json["kept_seed"] = learned.kept_seed;
+  if (learned.scores.size() > 1) {
+    finding.notes.push_back(
+        fmt::format("Errors on the selecting flights, in gf, of {} networks and of one fitted to what they "
+                    "say: {}. The least "
+                    "decided: seed {}.",
+                    learned.scores.size() - 1, select_gf, learned.kept_seed));
+  }
   finding.json["recorded_sha256"] = files::sha256(recorded_key(setting, recorded));
   const std::string network = published_network(setting);
   const TestBlocks ours_blocks =
