@@ -151,7 +151,7 @@ void add_having_seen(const Setting& setting, const Recorded& recorded, const Tes
 /// At full size several networks compete on the selecting flights, with one that is fitted to what they say.
 LearnOptions taught_options(const Setting& setting) {
   LearnOptions options = recorded_options(setting);
-  options.teachers = setting.full ? 4 : 0;
+  options.teachers = setting.full ? 8 : 0;
   return options;
 }
 
