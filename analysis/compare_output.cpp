@@ -291,15 +291,7 @@ void print_damage(const Comparison& comparison) {
   }
 }
 
-}  // namespace
-
-void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
-  for (const stability::Model& model : inputs.models) {
-    fmt::print("Model {}: {}, {:.1f} g, {} effects\n", model.path, model.kind, 1000 * model.mass_kg,
-               model.effects.size());
-  }
-  fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
-  print_cuts(comparison);
+void print_errors(const Comparison& comparison, const Comparison* own) {
   print_torque(comparison);
   fmt::print("\n");
   fmt::print("{:<28}{:>9}{:>22}{:>22}{:>10}{:>9}\n", "", "records", "RMSE x y z [gf]", "bias x y z [gf]",
@@ -331,6 +323,18 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
                worst.residual_N.norm() / stability::kGramForce_N);
   }
   print_trajectories(comparison.trajectories);
+}
+
+}  // namespace
+
+void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
+  for (const stability::Model& model : inputs.models) {
+    fmt::print("Model {}: {}, {:.1f} g, {} effects\n", model.path, model.kind, 1000 * model.mass_kg,
+               model.effects.size());
+  }
+  fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
+  print_cuts(comparison);
+  if (comparison.overall.statistics.samples > 0) print_errors(comparison, own);
   print_damage(comparison);
   for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);
   if (!inputs.found.skipped.empty())
