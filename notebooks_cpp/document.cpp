@@ -3,11 +3,8 @@
 #include <cmark.h>
 #include <openssl/evp.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <memory>
-#include <regex>
 #include <sstream>
 
 namespace swarmcert::notebook {
@@ -58,35 +55,6 @@ files::Json json_of(const Output& output) {
   return {{"data", std::move(data)},
           {"metadata", {{"swarmcert", {{"data", lines_of(output.data)}}}}},
           {"output_type", "display_data"}};
-}
-
-/// Whether two texts differ at most by one in the last digit of numbers that are printed with decimals: processors pick
-/// other kernels of a library, and these round otherwise.
-bool is_same_print(const std::string& before, const std::string& now) {
-  static const std::regex number(R"([-+]?\d+\.(\d+)(?:[eE]([-+]?\d+))?)");
-  std::sregex_iterator a(before.begin(), before.end(), number), b(now.begin(), now.end(), number), end;
-  auto from_a = before.begin(), from_b = now.begin();
-  for (; a != end && b != end; ++a, ++b) {
-    if (!std::equal(from_a, (*a)[0].first, from_b, (*b)[0].first)) return false;
-    const long decimals = std::min((*a)[1].length(), (*b)[1].length());
-    const long exponent = (*a)[2].matched ? std::stol((*a)[2]) : 0;
-    const double last_digit = std::pow(10.0, static_cast<double>(exponent - decimals));
-    if (!(std::abs(std::stod((*a)[0]) - std::stod((*b)[0])) < 1.5 * last_digit)) return false;
-    from_a = (*a)[0].second, from_b = (*b)[0].second;
-  }
-  return a == end && b == end && std::equal(from_a, before.end(), from_b, now.end());
-}
-
-bool is_same_output(const files::Json& before, const files::Json& now) {
-  if (before.is_string() && now.is_string())
-    return is_same_print(before.get<std::string>(), now.get<std::string>());
-  if (!before.is_structured() || before.type() != now.type() || before.size() != now.size())
-    return before == now;
-  for (auto a = before.begin(), b = now.begin(); a != before.end(); ++a, ++b) {
-    if (before.is_object() && a.key() != b.key()) return false;
-    if (!is_same_output(*a, *b)) return false;
-  }
-  return true;
 }
 
 }  // namespace
@@ -160,11 +128,8 @@ std::string first_difference(const files::Json& committed, const files::Json& fr
            " ran";
   for (std::size_t i = 0; i < old_cells.size(); ++i) {
     int old_images = 0, new_images = 0;
-    files::Json before = without_images(old_cells[i], old_images);
-    files::Json now = without_images(new_cells[i], new_images);
-    if (before.contains("outputs") && now.contains("outputs") &&
-        is_same_output(before["outputs"], now["outputs"]))
-      now["outputs"] = before["outputs"];
+    const files::Json before = without_images(old_cells[i], old_images);
+    const files::Json now = without_images(new_cells[i], new_images);
     if (before != now)
       return "cell " + std::to_string(i) + "\ncommitted: " + before.dump(1) + "\nfresh: " + now.dump(1);
     if (old_images != new_images)

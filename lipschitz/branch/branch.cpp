@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "lipschitz/branch/search.h"
 #include "lipschitz/dense_kernels.h"
@@ -136,14 +137,29 @@ void BranchSearch::polish(std::priority_queue<Part>& queue) {
   }
 }
 
-BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options) {
+namespace {
+
+/// A few parts, each solved in a few steps, may prove less than the boxes as they were given, solved well: then those.
+BranchResult search(const LocalChain& chain, const SetChain* set, const std::vector<Box>& boxes,
+                    const BranchOptions& options) {
   keep_freed_memory();
-  return BranchSearch(chain, nullptr, boxes, options).run();
+  BranchResult found = BranchSearch(chain, set, boxes, options).run();
+  BranchOptions uncut = options;
+  uncut.nodes = static_cast<int>(boxes.size());
+  if (found.nodes <= uncut.nodes || found.nodes > 2 * static_cast<int>(kFewParts)) return found;
+  BranchResult whole = BranchSearch(chain, set, boxes, uncut).run();
+  if (whole.tree.rho < found.tree.rho) found.tree = std::move(whole.tree);
+  return found;
+}
+
+}  // namespace
+
+BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options) {
+  return search(chain, nullptr, boxes, options);
 }
 
 BranchResult branch(const SetChain& set, const std::vector<Box>& boxes, const BranchOptions& options) {
-  keep_freed_memory();
-  return BranchSearch(set.phi, &set, boxes, options).run();
+  return search(set.phi, &set, boxes, options);
 }
 
 }  // namespace swarmcert::lipschitz

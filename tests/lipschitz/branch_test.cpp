@@ -77,17 +77,14 @@ TEST(LocalBound, IsAboveEverySampledSlopeAndNoMoreThanTheGlobalBound) {
   EXPECT_GT(closest, 0.9) << "the samples do not come near the bounds: they test nothing";
 }
 
-/// A search's last parts are solved up to a gap, more of them less well.
-constexpr double kSolvedTo = 2e-3;
-
-TEST(LocalBound, MoreBoxesNeverGiveAWorseBoundButForWhatTheirProgramsAreSolvedTo) {
+TEST(LocalBound, MoreBoxesNeverGiveAWorseBound) {
   std::mt19937 generator(4);
   const files::Network network = plain(tests::random_network({3, 10, 10, 1}, generator));
   double before = proved_on(network, kBox, 1);
   const double first = before;
   for (const int nodes : {20, 100, 500}) {
     const double bound = proved_on(network, kBox, nodes);
-    EXPECT_LE(bound, before * (1 + kSolvedTo)) << nodes << " boxes";
+    EXPECT_LE(bound, before * (1 + 1e-6)) << nodes << " boxes";
     before = bound;
   }
   EXPECT_LT(before, 0.99 * first) << "halving never helped: the test shows nothing";

@@ -96,23 +96,6 @@ TEST(Notebook, ComparisonSeesNumbersAndPlotsAndForgivesImageBytes) {
   EXPECT_NE(first_difference(committed, to_ipynb(other)), "") << "code";
 }
 
-TEST(Notebook, ComparisonForgivesOneInTheLastDigitOfNumbersWithDecimalsAndNoMore) {
-  const auto is_same = [](const char* before, const char* now) {
-    std::vector<RunCell> a = run_guide(), b = run_guide();
-    a[1].outputs[0].text = before;
-    b[1].outputs[0].text = now;
-    return first_difference(to_ipynb(a), to_ipynb(b)).empty();
-  };
-  EXPECT_TRUE(is_same("L = 1.25, 3 runs", "L = 1.26, 3 runs"));
-  EXPECT_TRUE(is_same("-2.50e-07 m", "-2.49e-07 m"));
-  EXPECT_TRUE(is_same("0.30", "0.299"));
-  EXPECT_FALSE(is_same("L = 1.25", "L = 1.27"));
-  EXPECT_FALSE(is_same("2.5e-07", "2.5e-06"));
-  EXPECT_FALSE(is_same("3 runs", "4 runs"));
-  EXPECT_FALSE(is_same("L = 1.25", "L = 1.25 m"));
-  EXPECT_FALSE(is_same("1.25 proved", "1.25 refuted"));
-}
-
 TEST(Notebook, EveryCommittedOneHasTheFieldsOfItsFormat) {
   int notebooks = 0, plots = 0;
   for (const auto& entry : std::filesystem::directory_iterator(SWARMCERT_SOURCE_DIR "/notebooks_cpp")) {
