@@ -16,11 +16,11 @@
 #include <regex>
 #include <system_error>
 
-#include "analysis/command_line.h"
-#include "analysis/command_pages.h"
-#include "analysis/commands/command.h"
-#include "nn/files/input_error.h"
-#include "nn/files/suggest.h"
+#include "analysis/cli/command_line.h"
+#include "analysis/cli/command_pages.h"
+#include "analysis/commands/commands.h"
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
 
 namespace {
 

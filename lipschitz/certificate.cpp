@@ -1,7 +1,7 @@
 #include "lipschitz/certify.h"
-#include "lipschitz/statement.h"
-#include "nn/files/content_hash.h"
-#include "nn/files/functions.h"
+#include "lipschitz/checker/statement.h"
+#include "nn/base/content_hash.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

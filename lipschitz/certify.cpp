@@ -7,10 +7,10 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/range.h"
-#include "lipschitz/stages.h"
-#include "nn/files/functions.h"
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -15,8 +15,8 @@
 #include "lipschitz/lower_bound.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/spectral_norm.h"
-#include "nn/files/json.h"
-#include "nn/files/network.h"
+#include "nn/base/json.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 

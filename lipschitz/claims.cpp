@@ -4,9 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "nn/files/file_io.h"
-#include "nn/files/functions.h"
-#include "nn/files/toml.h"
+#include "nn/base/file_io.h"
+#include "nn/base/toml.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -9,11 +9,11 @@
 #include <map>
 
 #include "lipschitz/checker/lipschitz_lmi.h"
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/dense_kernels.h"
 #include "lipschitz/sdp_bound.h"
-#include "lipschitz/stages.h"
-#include "nn/files/functions.h"
-#include "nn/files/random.h"
+#include "nn/base/random.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -9,7 +9,7 @@
 #include "lipschitz/bounds.h"
 #include "lipschitz/checker/dyadic.h"
 #include "lipschitz/lmi_proof.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 

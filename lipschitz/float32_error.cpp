@@ -7,13 +7,13 @@
 #include <queue>
 #include <stdexcept>
 
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/range.h"
 #include "lipschitz/reach.h"
 #include "lipschitz/sdp_bound.h"
-#include "lipschitz/stages.h"
-#include "nn/files/doubles.h"
-#include "nn/files/functions.h"
-#include "nn/files/parallel.h"
+#include "nn/base/doubles.h"
+#include "nn/base/parallel.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

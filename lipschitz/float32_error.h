@@ -7,7 +7,7 @@
 
 #include "lipschitz/bounds.h"
 #include "lipschitz/box.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/files/doubles.h"
-#include "nn/files/random.h"
+#include "nn/base/doubles.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::lipschitz {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lipschitz/witness.h"
-#include "nn/files/functions.h"
+#include "lipschitz/checker/witness.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

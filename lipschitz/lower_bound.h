@@ -11,7 +11,7 @@
 
 #include "lipschitz/claims.h"
 #include "lipschitz/slope_search.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 

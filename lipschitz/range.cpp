@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "nn/files/doubles.h"
-#include "nn/files/functions.h"
-#include "nn/files/parallel.h"
+#include "nn/base/doubles.h"
+#include "nn/base/parallel.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "lipschitz/box.h"
+#include "lipschitz/checker/witness.h"
 #include "lipschitz/claims.h"
 #include "lipschitz/reach.h"
-#include "lipschitz/witness.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 

@@ -5,7 +5,7 @@
 #include <queue>
 
 #include "lipschitz/dense_kernels.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::lipschitz {
 namespace {

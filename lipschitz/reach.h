@@ -6,7 +6,7 @@
 
 #include "lipschitz/box.h"
 #include "lipschitz/checker/box_states.h"
-#include "nn/files/weights.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert::lipschitz {
 

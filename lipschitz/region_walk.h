@@ -10,7 +10,7 @@
 
 #include "lipschitz/linear_region.h"
 #include "lipschitz/search_network.h"
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::lipschitz {
 

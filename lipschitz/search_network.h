@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "lipschitz/box.h"
-#include "lipschitz/witness.h"
+#include "lipschitz/checker/witness.h"
 
 namespace swarmcert::lipschitz {
 

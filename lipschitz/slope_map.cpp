@@ -5,9 +5,9 @@
 #include <stdexcept>
 
 #include "lipschitz/range.h"
-#include "nn/files/functions.h"
-#include "nn/files/parallel.h"
-#include "nn/files/suggest.h"
+#include "nn/base/parallel.h"
+#include "nn/base/suggest.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

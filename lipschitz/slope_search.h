@@ -10,7 +10,7 @@
 
 #include "lipschitz/bounds.h"
 #include "lipschitz/box.h"
-#include "lipschitz/witness.h"
+#include "lipschitz/checker/witness.h"
 
 namespace swarmcert::lipschitz {
 

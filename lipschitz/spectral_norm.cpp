@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "lipschitz/witness.h"
+#include "lipschitz/checker/witness.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "lipschitz/bounds.h"
 #include "lipschitz/lmi_proof.h"
-#include "nn/files/weights.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert::lipschitz {
 

@@ -15,7 +15,7 @@
 
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
-#include "nn/files/content_hash.h"
+#include "nn/base/content_hash.h"
 #include "notebooks_cpp/notebook.h"
 
 using namespace swarmcert;

@@ -14,7 +14,7 @@
 
 #include "analysis/gate/gate.h"
 #include "lipschitz/certify.h"
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "notebooks_cpp/notebook.h"
 
 using namespace swarmcert;

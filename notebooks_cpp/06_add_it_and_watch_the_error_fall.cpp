@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "analysis/identification/ladder.h"
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "notebooks_cpp/flights.h"
 #include "notebooks_cpp/notebook.h"
 

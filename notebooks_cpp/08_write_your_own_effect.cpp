@@ -15,7 +15,7 @@
 
 #include "analysis/identification/diagnose.h"
 #include "analysis/residuals/force_residual.h"
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "notebooks_cpp/flights.h"
 #include "notebooks_cpp/notebook.h"
 #include "stability/effects/registry.h"

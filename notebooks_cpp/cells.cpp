@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::notebook {
 namespace {

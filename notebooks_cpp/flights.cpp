@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "stability/model.h"
-#include "stability/simulate.h"
+#include "stability/simulation/simulate.h"
 
 namespace swarmcert::notebook {
 

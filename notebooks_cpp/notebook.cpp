@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 
 namespace swarmcert::notebook {
 namespace {

@@ -14,7 +14,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "notebooks_cpp/document.h"
 #include "notebooks_cpp/notebook.h"
 

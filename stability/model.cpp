@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/suggest.h"
-#include "nn/files/toml.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
+#include "nn/base/toml.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::stability {

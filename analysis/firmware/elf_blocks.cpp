@@ -5,7 +5,7 @@
 #include <type_traits>
 
 #include "analysis/firmware/float_blocks.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::firmware {
 namespace {

@@ -9,10 +9,10 @@
 #include "analysis/firmware/flight_headers.h"
 #include "analysis/firmware/float_blocks.h"
 #include "analysis/firmware/golden_vectors.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
 #include "nn/deep_set.h"
-#include "nn/files/functions.h"
-#include "nn/files/input_error.h"
-#include "nn/files/json.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::firmware {
 namespace {

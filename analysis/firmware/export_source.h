@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::firmware {
 

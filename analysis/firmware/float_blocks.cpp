@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cstring>
 
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::firmware {
 namespace {

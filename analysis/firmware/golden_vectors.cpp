@@ -4,9 +4,9 @@
 #include <cmath>
 #include <map>
 
-#include "nn/files/functions.h"
-#include "nn/files/input_error.h"
-#include "nn/files/random.h"
+#include "nn/base/input_error.h"
+#include "nn/base/random.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::firmware {
 namespace {

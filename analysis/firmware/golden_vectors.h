@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "nn/deep_set.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::firmware {
 

@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "nn/dense_layer.h"
-#include "nn/files/functions.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::firmware {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/firmware/float_blocks.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::firmware {
 

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <filesystem>
 
-#include "nn/files/content_hash.h"
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/json.h"
+#include "nn/base/content_hash.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::gate {
 namespace {

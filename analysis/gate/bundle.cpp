@@ -13,10 +13,10 @@
 #include <system_error>
 
 #include "analysis/gate/checks/checks.h"
-#include "nn/files/content_hash.h"
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/json.h"
+#include "nn/base/content_hash.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::gate {
 namespace {

@@ -9,9 +9,9 @@
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/range.h"
-#include "nn/files/functions.h"
-#include "nn/files/input_error.h"
-#include "stability/tracking_setup.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/functions.h"
+#include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::gate {
 namespace {

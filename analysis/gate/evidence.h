@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "analysis/gate/policy.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::check {
 struct CheckResult;

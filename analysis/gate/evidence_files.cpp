@@ -3,8 +3,8 @@
 
 #include "analysis/gate/evidence.h"
 #include "analysis/residuals/flight_set.h"
-#include "nn/files/functions.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/functions.h"
 #include "stability/model.h"
 
 namespace swarmcert::gate {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::gate {
 namespace {

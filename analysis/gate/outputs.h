@@ -4,7 +4,7 @@
 #include <string>
 
 #include "analysis/gate/gate.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::gate {
 

@@ -9,7 +9,7 @@
 
 #include "stability/bounds/sampled_bounds.h"
 #include "stability/bounds/theorem.h"
-#include "stability/float_errors.h"
+#include "stability/simulation/float_errors.h"
 
 namespace swarmcert::gate {
 namespace {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "stability/bounds/tracking_bounds.h"
+#include "stability/bounds/tracking_setup.h"
 #include "stability/bounds/uncertain_norms.h"
-#include "stability/tracking_setup.h"
 
 namespace swarmcert::gate {
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/toml.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/toml.h"
 #include "stability/model.h"
 
 namespace swarmcert::gate {

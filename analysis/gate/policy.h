@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "analysis/gate/check.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::files {
 class TomlTable;

@@ -5,7 +5,7 @@
 
 #include "analysis/identification/column_run.h"
 #include "analysis/residuals/force_residual.h"
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::identification {
 namespace {

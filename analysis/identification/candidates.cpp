@@ -9,7 +9,7 @@
 
 #include "analysis/identification/column_run.h"
 #include "analysis/logs/read_log.h"
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {

@@ -8,7 +8,7 @@
 
 #include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/covariance.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::identification {
 namespace {

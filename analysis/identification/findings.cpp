@@ -6,7 +6,7 @@
 
 #include "analysis/identification/covariance.h"
 #include "analysis/residuals/statistics.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::identification {
 namespace {

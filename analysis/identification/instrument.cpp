@@ -7,7 +7,7 @@
 
 #include "analysis/identification/column_run.h"
 #include "analysis/identification/covariance.h"
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::identification {
 namespace {

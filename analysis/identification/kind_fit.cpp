@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "analysis/identification/box_least_squares.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::identification {
 

@@ -7,8 +7,8 @@
 
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
-#include "nn/files/input_error.h"
-#include "nn/files/parallel.h"
+#include "nn/base/input_error.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::identification {
 namespace {

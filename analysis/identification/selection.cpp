@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "analysis/identification/covariance.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::identification {
 

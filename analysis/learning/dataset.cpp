@@ -8,9 +8,9 @@
 
 #include "analysis/residuals/force_residual.h"
 #include "analysis/residuals/torque_residual.h"
-#include "nn/files/functions.h"
-#include "nn/files/input_error.h"
-#include "nn/files/parallel.h"
+#include "nn/base/input_error.h"
+#include "nn/base/parallel.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::learning {
 namespace {

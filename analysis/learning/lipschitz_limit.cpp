@@ -4,11 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/spectral_norm.h"
-#include "lipschitz/stages.h"
-#include "nn/files/network.h"
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::learning {
 namespace {

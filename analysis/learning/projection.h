@@ -1,8 +1,8 @@
 /// @file The last step of training: weights that keep gamma in exact arithmetic.
 #pragma once
 
-#include "nn/files/network.h"
 #include "nn/training/layout.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::learning {
 

@@ -9,9 +9,9 @@
 
 #include "analysis/learning/lipschitz_limit.h"
 #include "analysis/learning/projection.h"
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/json.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::learning {
 namespace {

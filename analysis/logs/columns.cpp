@@ -3,9 +3,9 @@
 #include <set>
 
 #include "analysis/logs/signals.h"
-#include "nn/files/file_io.h"
-#include "nn/files/suggest.h"
-#include "nn/files/toml.h"
+#include "nn/base/file_io.h"
+#include "nn/base/suggest.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::logs {
 namespace {

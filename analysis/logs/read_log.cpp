@@ -7,7 +7,7 @@
 #include <regex>
 
 #include "analysis/logs/byte_window.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 namespace {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <optional>
 
-#include "nn/files/input_error.h"
-#include "nn/files/suggest.h"
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
 
 namespace swarmcert::logs {
 namespace {

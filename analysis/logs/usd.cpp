@@ -5,7 +5,7 @@
 
 #include "analysis/logs/byte_window.h"
 #include "analysis/logs/record_source.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::reproduction {
 

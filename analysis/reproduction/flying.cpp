@@ -5,7 +5,7 @@
 #include <limits>
 #include <memory>
 
-#include "stability/sampled_flight.h"
+#include "stability/simulation/sampled_flight.h"
 #include "stability/tasks/task.h"
 
 namespace swarmcert::reproduction {

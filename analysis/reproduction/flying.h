@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "analysis/reproduction/setting.h"
-#include "nn/files/network.h"
-#include "stability/deep_set_force.h"
+#include "nn/weights/network.h"
+#include "stability/effects/deep_set_force.h"
 #include "stability/effects/effect.h"
-#include "stability/flight_log.h"
+#include "stability/simulation/flight_log.h"
 
 namespace swarmcert::reproduction {
 

@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "analysis/learning/trained_network.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::reproduction {
 namespace {

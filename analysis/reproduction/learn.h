@@ -6,7 +6,7 @@
 
 #include "analysis/learning/training_run.h"
 #include "analysis/reproduction/setting.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::reproduction {
 

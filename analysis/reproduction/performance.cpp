@@ -10,8 +10,8 @@
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/stages.h"
 #include "analysis/residuals/statistics.h"
-#include "nn/files/file_io.h"
-#include "nn/files/parallel.h"
+#include "nn/base/file_io.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::reproduction {
 namespace {

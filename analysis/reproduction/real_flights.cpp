@@ -8,8 +8,8 @@
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/nearest_labels.h"
 #include "analysis/reproduction/recorded.h"
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::reproduction {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 
 namespace swarmcert::reproduction {
 namespace {

@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "analysis/residuals/force_residual.h"
-#include "nn/files/parallel.h"
-#include "nn/files/random.h"
+#include "nn/base/parallel.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::reproduction {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::reproduction {
 namespace {

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <numeric>
 
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
-#include "nn/files/parallel.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::reproduction {
 namespace {

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "analysis/residuals/track_part.h"
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::residuals {
 namespace {

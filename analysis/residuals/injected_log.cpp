@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "analysis/residuals/force_residual.h"
-#include "stability/sensors.h"
+#include "stability/simulation/sensors.h"
 
 namespace swarmcert::residuals {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "analysis/residuals/inputs.h"
-#include "stability/flight_log.h"
+#include "stability/simulation/flight_log.h"
 
 namespace swarmcert::residuals {
 

@@ -5,9 +5,9 @@
 #include <set>
 
 #include "analysis/residuals/force_residual.h"
-#include "nn/files/functions.h"
-#include "nn/files/input_error.h"
-#include "nn/files/network.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/functions.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::residuals {
 namespace {

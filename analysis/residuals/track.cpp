@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "analysis/logs/read_log.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::residuals {
 namespace {

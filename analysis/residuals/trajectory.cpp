@@ -5,8 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "nn/files/input_error.h"
-#include "stability/sampled_flight.h"
+#include "nn/base/input_error.h"
+#include "stability/simulation/sampled_flight.h"
 
 namespace swarmcert::residuals {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "lipschitz/branch/search_tree.h"
 #include "lipschitz/checker/projective_cover.h"
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/lmi_proof.h"
-#include "lipschitz/stages.h"
-#include "nn/files/functions.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

@@ -10,7 +10,7 @@
 #include "lipschitz/branch/sum_range.h"
 #include "lipschitz/checker/tree_proof.h"
 #include "lipschitz/claims.h"
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "lipschitz/checker/products.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::check {
 namespace {

@@ -9,8 +9,8 @@
 #include "lipschitz/checker/certificate_text.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/dyadic.h"
-#include "lipschitz/stages.h"
-#include "nn/files/functions.h"
+#include "lipschitz/checker/stages.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::check {
 

@@ -6,7 +6,7 @@
 
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/tree_proof.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::check {
 

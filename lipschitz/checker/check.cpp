@@ -2,7 +2,7 @@
 #include <stdexcept>
 
 #include "lipschitz/checker/certificate_checker.h"
-#include "nn/files/content_hash.h"
+#include "nn/base/content_hash.h"
 
 namespace swarmcert::check {
 namespace {

@@ -1,15 +1,15 @@
 /// @file The independent checker: does this certificate prove its statements for these weights?
 ///
 /// It trusts no optimiser. What it relies on: the readers of weight files, SHA-256, GMP's integers, the short files
-/// beside this one and, for lower bounds, the exact slope of lipschitz/witness.h. It never rounds, but for proofs on a
+/// beside this one and, for lower bounds, the exact slope of lipschitz/checker/witness.h. It never rounds, but for proofs on a
 /// box (tree_proof.h): those have thousands of parts and are verified in double, with every rounding accounted for.
 #pragma once
 
 #include <string>
 
-#include "lipschitz/statement.h"
-#include "nn/files/json.h"
-#include "nn/files/network.h"
+#include "lipschitz/checker/statement.h"
+#include "nn/base/json.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::check {
 

@@ -2,7 +2,7 @@
 #include <stdexcept>
 
 #include "lipschitz/checker/certificate_checker.h"
-#include "lipschitz/witness.h"
+#include "lipschitz/checker/witness.h"
 
 namespace swarmcert::check {
 

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "lipschitz/checker/products.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::check {
 namespace {

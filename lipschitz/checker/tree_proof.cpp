@@ -7,7 +7,7 @@
 
 #include "lipschitz/checker/part_inequality.h"
 #include "lipschitz/checker/tree_words.h"
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::check {
 namespace {

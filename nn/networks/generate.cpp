@@ -19,8 +19,8 @@
 #include <string>
 #include <vector>
 
-#include "nn/files/random.h"
-#include "nn/files/weights.h"
+#include "nn/base/random.h"
+#include "nn/weights/weights.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::training {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/files/weights.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert::training {
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "nn/files/network.h"
 #include "nn/training/layout.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::training {
 

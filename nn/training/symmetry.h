@@ -1,7 +1,7 @@
 /// @file The air does not know north: samples turned about the vertical are samples as well.
 #pragma once
 
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 #include "nn/training/deep_set_loss.h"
 
 namespace swarmcert::training {

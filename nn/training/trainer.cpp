@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
 #include "nn/training/symmetry.h"
 
 namespace swarmcert::training {

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 #include "nn/training/adam.h"
 #include "nn/training/deep_set_loss.h"
 #include "nn/training/spectral_normalization.h"

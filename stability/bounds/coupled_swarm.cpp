@@ -4,9 +4,9 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/toml.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::stability {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <complex>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/amplitude_and_rate.h"
 
 namespace swarmcert::stability {

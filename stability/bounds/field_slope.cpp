@@ -3,7 +3,7 @@
 #include <cmath>
 #include <queue>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/interval_functions.h"
 #include "stability/effects/wake_shape.h"
 

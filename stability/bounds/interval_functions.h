@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/interval.h"
 
 namespace swarmcert::stability {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/amplitude_and_rate.h"
 #include "stability/bounds/sampled_adjoint.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/kernel_sum.h"
 #include "stability/bounds/sampled_adjoint.h"
 #include "stability/bounds/sampled_model.h"

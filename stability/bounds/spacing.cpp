@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/field_slope.h"
 #include "stability/bounds/interval_functions.h"
 #include "stability/effects/registry.h"

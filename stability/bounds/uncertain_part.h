@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/axis_loop.h"
 #include "stability/bounds/sampled_loop.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/local_polynomial.h"
 
 namespace swarmcert::stability {

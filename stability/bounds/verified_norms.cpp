@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/bounds/contracting_system.h"
 #include "stability/bounds/local_polynomial.h"
 #include "stability/bounds/verified_delay.h"

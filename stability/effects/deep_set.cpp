@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <limits>
 
-#include "nn/files/input_error.h"
-#include "nn/files/network.h"
-#include "stability/deep_set_force.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/network.h"
+#include "stability/effects/deep_set_force.h"
 
 namespace swarmcert::stability {
 namespace {

@@ -10,10 +10,10 @@
 #include <type_traits>
 #include <utility>
 
+#include "stability/bodies/kernel_width.h"
+#include "stability/bodies/swarm_pairs.h"
 #include "stability/effects/function_tables.h"
 #include "stability/effects/wake_shape.h"
-#include "stability/kernel_width.h"
-#include "stability/swarm_pairs.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -28,7 +28,7 @@ struct PairRows {
 constexpr int round_up(int count, int block) { return (count + block - 1) / block * block; }
 
 #define SWARMCERT_KERNEL_FILE "stability/effects/downwash_kernel.inc"
-#include "stability/kernel_widths.inc"
+#include "stability/bodies/kernel_widths.inc"
 
 struct Kernel {
   int block;

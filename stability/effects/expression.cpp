@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "nn/files/doubles.h"
-#include "nn/files/input_error.h"
-#include "nn/files/suggest.h"
+#include "nn/base/doubles.h"
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
 
 namespace swarmcert::stability {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <map>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 #include "stability/sweep/grid.h"
 
 namespace swarmcert::stability {

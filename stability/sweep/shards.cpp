@@ -7,9 +7,9 @@
 #include <map>
 #include <set>
 
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/parallel.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/parallel.h"
 
 namespace swarmcert::stability {
 namespace {

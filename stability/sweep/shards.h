@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 #include "stability/sweep/grid.h"
 
 namespace swarmcert::stability {

@@ -8,7 +8,7 @@
 #include <complex>
 #include <memory>
 
-#include "nn/files/doubles.h"
+#include "nn/base/doubles.h"
 
 namespace swarmcert::stability {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::stability {
 namespace {

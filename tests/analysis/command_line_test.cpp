@@ -5,8 +5,8 @@
 
 #include "analysis/run.h"
 #include "data.h"
-#include "nn/files/json.h"
-#include "nn/files/weights.h"
+#include "nn/base/json.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert {
 namespace {

@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include "analysis/commands/command.h"
+#include "analysis/cli/command.h"
 #include "analysis/run.h"
 
 namespace swarmcert::analysis {

@@ -7,7 +7,7 @@
 
 #include "analysis/run.h"
 #include "data.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::tests {
 namespace {

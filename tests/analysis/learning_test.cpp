@@ -6,7 +6,7 @@
 #include "analysis/learning/lipschitz_limit.h"
 #include "analysis/learning/weighing.h"
 #include "analysis/reproduction/nearest_labels.h"
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::learning {
 namespace {

@@ -8,7 +8,7 @@
 #include "analysis/logs/read_log.h"
 #include "analysis/run.h"
 #include "data.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::tests {
 namespace {

@@ -9,8 +9,8 @@
 #include "analysis/residuals/force_residual.h"
 #include "analysis/run.h"
 #include "data.h"
-#include "nn/files/input_error.h"
-#include "nn/files/json.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::tests {
 namespace {

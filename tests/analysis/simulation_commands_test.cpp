@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "analysis/run.h"
-#include "nn/files/json.h"
-#include "stability/sampled_flight.h"
+#include "nn/base/json.h"
+#include "stability/simulation/sampled_flight.h"
 
 namespace swarmcert::tests {
 namespace {

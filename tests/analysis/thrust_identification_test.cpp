@@ -1,4 +1,4 @@
-#include "analysis/thrust_identification.h"
+#include "analysis/identification/thrust/thrust_identification.h"
 
 #include <fmt/core.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 #include "run.h"
 
 namespace swarmcert::analysis {

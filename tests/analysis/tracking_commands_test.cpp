@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "analysis/run.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::tests {
 namespace {

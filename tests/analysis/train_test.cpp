@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "analysis/run.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert {
 namespace {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "data.h"
-#include "stability/continuous_flight.h"
-#include "stability/pilot.h"
-#include "stability/sampled_flight.h"
+#include "stability/simulation/continuous_flight.h"
+#include "stability/simulation/pilot.h"
+#include "stability/simulation/sampled_flight.h"
 
 namespace {
 

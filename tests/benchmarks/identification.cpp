@@ -21,7 +21,7 @@
 #include "analysis/identification/diagnose.h"
 #include "data.h"
 #include "hidden_effect/truths.h"
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 
 namespace {
 

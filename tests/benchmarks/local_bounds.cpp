@@ -20,10 +20,10 @@
 
 #include "data.h"
 #include "lipschitz/branch/local_bound.h"
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/lower_bound.h"
 #include "lipschitz/sdp_bound.h"
-#include "lipschitz/stages.h"
-#include "nn/files/functions.h"
+#include "nn/weights/functions.h"
 
 namespace {
 

@@ -15,10 +15,10 @@
 #include "data.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/lipschitz_lmi.h"
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/spectral_norm.h"
-#include "lipschitz/stages.h"
-#include "nn/files/functions.h"
+#include "nn/weights/functions.h"
 
 namespace {
 

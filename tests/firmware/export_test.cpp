@@ -6,9 +6,9 @@
 #include <cstring>
 
 #include "analysis/run.h"
-#include "nn/files/json.h"
-#include "nn/files/network.h"
-#include "nn/files/random.h"
+#include "nn/base/json.h"
+#include "nn/base/random.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert {
 namespace {

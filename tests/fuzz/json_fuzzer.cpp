@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "nn/files/input_error.h"
-#include "nn/files/json.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
 
 namespace {
 

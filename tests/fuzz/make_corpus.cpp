@@ -5,10 +5,10 @@
 #include <random>
 
 #include "analysis/log_writer.h"
-#include "nn/files/safetensors.h"
-#include "nn/files/weights.h"
 #include "nn/onnx_writer.h"
 #include "nn/pth_writer.h"
+#include "nn/weights/safetensors.h"
+#include "nn/weights/weights.h"
 
 namespace {
 

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "nn/files/input_error.h"
-#include "nn/files/network.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/network.h"
 
 namespace {
 

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "nn/files/input_error.h"
-#include "nn/files/safetensors.h"
-#include "nn/files/weights.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/safetensors.h"
+#include "nn/weights/weights.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 
 #include "data.h"
 #include "gate/release.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::tests {
 namespace {

@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "gate/release.h"
-#include "nn/files/content_hash.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
-#include "nn/files/random.h"
+#include "nn/base/content_hash.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::tests {
 namespace {

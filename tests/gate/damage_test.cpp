@@ -6,9 +6,9 @@
 
 #include "analysis/gate/baseline.h"
 #include "gate/release.h"
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/random.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::tests {
 namespace {

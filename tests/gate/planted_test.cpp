@@ -7,7 +7,7 @@
 
 #include "analysis/gate/baseline.h"
 #include "gate/release.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::tests {
 namespace {

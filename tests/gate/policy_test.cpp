@@ -7,7 +7,7 @@
 
 #include "data.h"
 #include "gate/release.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::tests {
 namespace {

@@ -4,12 +4,12 @@
 
 #include "analysis/gate/outputs.h"
 #include "data.h"
-#include "nn/files/file_io.h"
-#include "nn/files/functions.h"
-#include "nn/files/json.h"
-#include "nn/files/network.h"
-#include "nn/files/random.h"
-#include "nn/files/weights.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
+#include "nn/base/random.h"
+#include "nn/weights/functions.h"
+#include "nn/weights/network.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert::tests {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "analysis/run.h"
 #include "data.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::tests {
 namespace {

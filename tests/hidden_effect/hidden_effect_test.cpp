@@ -13,7 +13,7 @@
 #include "analysis/run.h"
 #include "data.h"
 #include "hidden_effect/campaign.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::tests {
 namespace {

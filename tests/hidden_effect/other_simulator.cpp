@@ -10,7 +10,7 @@
 #include <fstream>
 #include <random>
 
-#include "stability/flight_log.h"
+#include "stability/simulation/flight_log.h"
 
 namespace swarmcert::tests {
 namespace {

@@ -2,7 +2,7 @@
 ///
 /// Point-mass translation, attitude that follows its command through a rate loop, rotors of first or second order,
 /// forces as any C++ function. Semi-implicit Euler at 1 kHz: accurate to far less than the sensors' noise. Only the
-/// bytes of the log come from the library (stability/flight_log.h), because the format is tested elsewhere.
+/// bytes of the log come from the library (stability/simulation/flight_log.h), because the format is tested elsewhere.
 #pragma once
 
 #include <Eigen/Core>

@@ -7,7 +7,7 @@
 #include "data.h"
 #include "lipschitz/branch/local_bound.h"
 #include "lipschitz/networks.h"
-#include "nn/files/weights.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert::lipschitz {
 namespace {

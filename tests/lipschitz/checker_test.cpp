@@ -4,8 +4,8 @@
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/networks.h"
-#include "nn/files/content_hash.h"
-#include "nn/files/file_io.h"
+#include "nn/base/content_hash.h"
+#include "nn/base/file_io.h"
 
 namespace swarmcert {
 namespace {

@@ -6,7 +6,7 @@
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
 #include "lipschitz/networks.h"
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "nn/refusal.h"
 #include "nn/temp_folder.h"
 

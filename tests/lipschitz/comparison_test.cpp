@@ -2,7 +2,7 @@
 
 #include "data.h"
 #include "lipschitz/networks.h"
-#include "nn/files/functions.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

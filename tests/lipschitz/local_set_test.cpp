@@ -10,7 +10,7 @@
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/lower_bound.h"
 #include "lipschitz/networks.h"
-#include "nn/files/functions.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {

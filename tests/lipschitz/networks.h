@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "lipschitz/checker/stages.h"
 #include "lipschitz/sdp_bound.h"
-#include "lipschitz/stages.h"
-#include "nn/files/network.h"
 #include "nn/random_network.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::tests {
 

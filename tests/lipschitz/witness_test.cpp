@@ -1,4 +1,4 @@
-#include "lipschitz/witness.h"
+#include "lipschitz/checker/witness.h"
 
 #include <gtest/gtest.h>
 

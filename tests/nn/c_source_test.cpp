@@ -1,14 +1,14 @@
 /// The authors' generated C layout. Its text is made here, from matrices of our own and from the published networks.
-#include "nn/files/c_source.h"
+#include "nn/weights/c_source.h"
 
 #include <gtest/gtest.h>
 
 #include <charconv>
 
 #include "data.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
-#include "nn/files/network.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
+#include "nn/weights/network.h"
 #include "random_network.h"
 #include "refusal.h"
 #include "temp_folder.h"

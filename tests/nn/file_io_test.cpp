@@ -1,4 +1,4 @@
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "nn/files/suggest.h"
+#include "nn/base/suggest.h"
 #include "refusal.h"
 #include "temp_folder.h"
 

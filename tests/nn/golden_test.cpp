@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "data.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
-#include "nn/files/weights.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert::files {
 namespace {

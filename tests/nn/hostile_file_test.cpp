@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "nn/files/safetensors.h"
-#include "nn/files/weights.h"
+#include "nn/weights/safetensors.h"
+#include "nn/weights/weights.h"
 #include "pth_writer.h"
 #include "refusal.h"
 

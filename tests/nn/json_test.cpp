@@ -1,4 +1,4 @@
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "refusal.h"
 #include "temp_folder.h"
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "nn/files/weights.h"
+#include "nn/weights/weights.h"
 #include "refusal.h"
 
 namespace swarmcert {

@@ -1,4 +1,4 @@
-#include "nn/files/network.h"
+#include "nn/weights/network.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "data.h"
-#include "nn/files/file_io.h"
+#include "nn/base/file_io.h"
 #include "random_network.h"
 #include "refusal.h"
 #include "temp_folder.h"

@@ -1,4 +1,4 @@
-#include "nn/files/parallel.h"
+#include "nn/base/parallel.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "nn/files/weights.h"
+#include "nn/weights/weights.h"
 #include "pth_writer.h"
 #include "refusal.h"
 

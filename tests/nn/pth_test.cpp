@@ -1,8 +1,8 @@
 /// State dicts that must load, in every form in which torch.save writes them.
 #include <gtest/gtest.h>
 
-#include "nn/files/file_io.h"
-#include "nn/files/weights.h"
+#include "nn/base/file_io.h"
+#include "nn/weights/weights.h"
 #include "pth_writer.h"
 #include "refusal.h"
 #include "temp_folder.h"

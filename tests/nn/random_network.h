@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/files/weights.h"
+#include "nn/weights/weights.h"
 
 namespace swarmcert::tests {
 

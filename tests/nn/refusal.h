@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::tests {
 

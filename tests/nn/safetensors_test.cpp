@@ -1,10 +1,10 @@
-#include "nn/files/safetensors.h"
+#include "nn/weights/safetensors.h"
 
 #include <gtest/gtest.h>
 
 #include "data.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
 #include "pth_writer.h"
 #include "random_network.h"
 #include "refusal.h"

@@ -1,5 +1,5 @@
 /// Our strict reading of TOML: the right value, or an error with line, dotted key, value and what is expected.
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
 
 #include <gtest/gtest.h>
 

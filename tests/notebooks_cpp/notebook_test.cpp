@@ -4,8 +4,8 @@
 #include <set>
 #include <string>
 
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
 #include "notebooks_cpp/cells.h"
 #include "notebooks_cpp/document.h"
 

@@ -1,5 +1,5 @@
 /// Reports: what users put into them stays text, in HTML, JSON, SVG, gnuplot and the shell.
-#include "analysis/report.h"
+#include "analysis/report/report.h"
 
 #include <gtest/gtest.h>
 
@@ -7,12 +7,12 @@
 #include <cmath>
 #include <random>
 
-#include "analysis/command_line.h"
-#include "analysis/report_svg.h"
-#include "analysis/report_text.h"
+#include "analysis/cli/command_line.h"
+#include "analysis/report/report_svg.h"
+#include "analysis/report/report_text.h"
 #include "analysis/run.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::analysis {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "analysis/run.h"
 #include "data.h"
-#include "nn/files/json.h"
+#include "nn/base/json.h"
 
 namespace swarmcert {
 namespace {

@@ -10,8 +10,8 @@
 #include "data.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/networks.h"
-#include "nn/files/functions.h"
-#include "nn/files/random.h"
+#include "nn/base/random.h"
+#include "nn/weights/functions.h"
 #include "soundness/distance.h"
 
 namespace swarmcert {

@@ -11,8 +11,8 @@
 #include "lipschitz/float32_error.h"
 #include "lipschitz/networks.h"
 #include "lipschitz/range.h"
-#include "nn/files/functions.h"
-#include "nn/files/random.h"
+#include "nn/base/random.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert {
 namespace {

@@ -1,4 +1,4 @@
-#include "stability/continuous_flight.h"
+#include "stability/simulation/continuous_flight.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "data.h"
-#include "stability/sampled_flight.h"
+#include "stability/simulation/sampled_flight.h"
 
 namespace swarmcert::stability {
 namespace {

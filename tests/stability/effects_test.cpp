@@ -5,12 +5,12 @@
 #include <set>
 
 #include "data.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 #include "random_instant.h"
+#include "stability/bodies/swarm_pairs.h"
+#include "stability/bodies/vehicle_state.h"
 #include "stability/effects/downwash.h"
 #include "stability/effects/registry.h"
-#include "stability/swarm_pairs.h"
-#include "stability/vehicle_state.h"
 
 namespace swarmcert::stability {
 namespace {

@@ -1,4 +1,4 @@
-#include "stability/flight_log.h"
+#include "stability/simulation/flight_log.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -7,8 +7,8 @@
 #include <cstring>
 
 #include "data.h"
-#include "nn/files/file_io.h"
-#include "stability/simulate.h"
+#include "nn/base/file_io.h"
+#include "stability/simulation/simulate.h"
 
 namespace swarmcert::stability {
 namespace {

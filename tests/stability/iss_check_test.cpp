@@ -1,4 +1,4 @@
-#include "stability/iss_check.h"
+#include "stability/iss/iss_check.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <map>
 
 #include "data.h"
-#include "stability/iss_full_loop.h"
+#include "stability/iss/iss_full_loop.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "nn/files/random.h"
+#include "nn/base/random.h"
 #include "stability/bounds/axis_loop.h"
 #include "stability/bounds/verified_norms.h"
 

@@ -1,4 +1,4 @@
-#include "stability/lanes_mixing.h"
+#include "stability/simulation/lanes_mixing.h"
 
 #include <gtest/gtest.h>
 

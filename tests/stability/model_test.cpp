@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "data.h"
-#include "nn/files/input_error.h"
+#include "nn/base/input_error.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::stability {

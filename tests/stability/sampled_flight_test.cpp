@@ -1,4 +1,4 @@
-#include "stability/sampled_flight.h"
+#include "stability/simulation/sampled_flight.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "data.h"
 #include "stability/effects/registry.h"
-#include "stability/simulate.h"
+#include "stability/simulation/simulate.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {

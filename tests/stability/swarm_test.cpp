@@ -1,4 +1,4 @@
-#include "stability/swarm.h"
+#include "stability/simulation/swarm.h"
 
 #include <gtest/gtest.h>
 

@@ -13,15 +13,15 @@
 #include <utility>
 #include <vector>
 
+#include "stability/bodies/kernel_width.h"
+#include "stability/bodies/rigid_bodies.h"
 #include "stability/effects/function_tables.h"
-#include "stability/kernel_width.h"
-#include "stability/rigid_bodies.h"
 
 namespace swarmcert::stability {
 namespace {
 
 #define SWARMCERT_KERNEL_FILE "stability/vector_functions_kernel.inc"
-#include "stability/kernel_widths.inc"
+#include "stability/bodies/kernel_widths.inc"
 
 constexpr int kCount = 1 << 18;
 

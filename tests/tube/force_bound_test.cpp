@@ -1,11 +1,11 @@
 // Bounds of |f_hat - f_a| over a tube against states inside it.
-#include "analysis/tube/force_bound.h"
+#include "analysis/tracking/tube/force_bound.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "analysis/tube/force_constants.h"
+#include "analysis/tracking/tube/force_constants.h"
 #include "tube/forces.h"
 #include "tube/scenes.h"
 

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "analysis/tube/learned_force.h"
-#include "stability/deep_set_force.h"
+#include "analysis/tracking/tube/learned_force.h"
+#include "stability/effects/deep_set_force.h"
 #include "stability/effects/effect.h"
 
 namespace swarmcert::tests {

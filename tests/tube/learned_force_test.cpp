@@ -1,12 +1,12 @@
 // The network's linear forms against the force that the simulator flies.
-#include "analysis/tube/learned_force.h"
+#include "analysis/tracking/tube/learned_force.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "nn/files/functions.h"
-#include "stability/deep_set_force.h"
+#include "nn/weights/functions.h"
+#include "stability/effects/deep_set_force.h"
 #include "tube/scenes.h"
 
 namespace swarmcert::analysis {

@@ -1,12 +1,12 @@
 // Tubes that were proved, against flights; tubes that must not be.
-#include "analysis/tube/local_tube.h"
+#include "analysis/tracking/tube/local_tube.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "stability/simulate.h"
+#include "stability/simulation/simulate.h"
 #include "tube/scenes.h"
 
 namespace swarmcert::analysis {

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "nn/files/network.h"
-#include "nn/files/random.h"
-#include "stability/tracking_setup.h"
+#include "nn/base/random.h"
+#include "nn/weights/network.h"
+#include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::tests {
 

@@ -1,5 +1,5 @@
 // Tubes slice by slice against flights of the loop they are about.
-#include "analysis/tube/sliced_tube.h"
+#include "analysis/tracking/tube/sliced_tube.h"
 
 #include <gtest/gtest.h>
 

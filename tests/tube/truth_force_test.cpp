@@ -1,5 +1,5 @@
 // Enclosures of declared truths against the effects that the simulator flies.
-#include "analysis/tube/truth_force.h"
+#include "analysis/tracking/tube/truth_force.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "lipschitz/checker/check.h"
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "analysis/residuals/comparison.h"
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 namespace {

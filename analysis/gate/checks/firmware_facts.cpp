@@ -4,10 +4,10 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
-#include "nn/files/functions.h"
-#include "nn/files/input_error.h"
-#include "nn/files/json.h"
-#include "nn/files/toml.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
+#include "nn/base/toml.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::gate {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/force_unit.h"
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 

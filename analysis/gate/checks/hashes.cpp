@@ -1,9 +1,9 @@
 #include <filesystem>
 
 #include "analysis/gate/checks/checks.h"
-#include "nn/files/file_io.h"
-#include "nn/files/input_error.h"
-#include "nn/files/toml.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 

@@ -7,8 +7,8 @@
 #include "analysis/gate/checks/force_unit.h"
 #include "analysis/gate/evidence.h"
 #include "lipschitz/box.h"
-#include "nn/files/json.h"
-#include "nn/files/toml.h"
+#include "nn/base/json.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 namespace {

@@ -5,9 +5,9 @@
 #include "analysis/firmware/float_blocks.h"
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
-#include "nn/files/file_io.h"
-#include "nn/files/json.h"
-#include "nn/files/toml.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf) {

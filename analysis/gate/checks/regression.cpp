@@ -5,8 +5,8 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
-#include "nn/files/input_error.h"
-#include "nn/files/toml.h"
+#include "nn/base/input_error.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 namespace {

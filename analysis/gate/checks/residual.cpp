@@ -6,7 +6,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "analysis/residuals/comparison.h"
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
 #include "stability/model.h"
 
 namespace swarmcert::gate {

@@ -4,9 +4,9 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
 #include "stability/bounds/coupled_swarm.h"
-#include "stability/tracking_setup.h"
+#include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::gate {
 

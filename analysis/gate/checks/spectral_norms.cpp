@@ -4,8 +4,8 @@
 #include "analysis/gate/evidence.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/spectral_norm.h"
-#include "nn/files/functions.h"
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::gate {
 namespace {

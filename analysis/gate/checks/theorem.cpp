@@ -2,8 +2,8 @@
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/disturbance.h"
-#include "nn/files/toml.h"
-#include "stability/tracking_setup.h"
+#include "nn/base/toml.h"
+#include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::gate {
 

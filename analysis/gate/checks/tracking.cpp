@@ -8,7 +8,7 @@
 #include "analysis/gate/checks/disturbance.h"
 #include "analysis/gate/plant_box.h"
 #include "analysis/residuals/comparison.h"
-#include "nn/files/toml.h"
+#include "nn/base/toml.h"
 
 namespace swarmcert::gate {
 namespace {

@@ -11,9 +11,9 @@
 
 #include "call_graph.h"
 #include "cycle_counter.h"
-#include "nn/files/file_io.h"
-#include "nn/files/functions.h"
-#include "nn/files/json.h"
+#include "nn/base/file_io.h"
+#include "nn/base/json.h"
+#include "nn/weights/functions.h"
 
 namespace {
 

@@ -1,0 +1,252 @@
+#include <fmt/core.h>
+
+#include <memory>
+#include <sstream>
+
+#include "analysis/cli/progress.h"
+#include "analysis/commands/add/add_report.h"
+#include "analysis/commands/commands.h"
+#include "analysis/commands/shared/effect_output.h"
+#include "analysis/commands/shared/flight_options.h"
+#include "analysis/identification/ladder.h"
+#include "nn/base/file_io.h"
+#include "nn/base/suggest.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::Ladder;
+using stability::LadderRow;
+
+struct AddOptions {
+  FlightOptions flights;
+  std::string effects, output, report;
+  bool keep_anyway = false;
+};
+
+std::vector<std::string> split_names(const std::string& text) {
+  std::vector<std::string> names;
+  std::istringstream words(text);
+  for (std::string name; std::getline(words, name, ',');) {
+    if (!name.empty()) names.push_back(name);
+  }
+  return names;
+}
+
+void check(const std::vector<std::string>& names, const stability::Model& model) {
+  if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
+  const std::vector<std::string> known = identification::candidate_names(model);
+  std::vector<std::string> all = known;
+  all.insert(all.end(), {"auto", "deep_set", "downwash_torque", "show", "torque_bias", "undo"});
+  for (const std::string& name : names) {
+    if (identification::is_written_by_hand(name))
+      throw UsageError("the effect " + name +
+                       " cannot be fitted to the force of a flight; write it into the model file");
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw UsageError("unknown effect " + name + ": " + files::did_you_mean(name, all));
+    if (identification::is_taken(name, model))
+      throw UsageError("the model has the effect " + name +
+                       " already; remove it from the file to fit it anew");
+  }
+}
+
+files::Json names_of(const residuals::Inputs& inputs, const std::vector<int>& which) {
+  files::Json names = files::Json::array();
+  for (const int i : which) names.push_back(inputs.found.flights[static_cast<std::size_t>(i)].name);
+  return names;
+}
+
+files::Json json_of(const LadderRow& row) {
+  return {{"effect", row.effect},
+          {"fit_rmse", row.fit_rmse_N},
+          {"select_rmse", row.select_rmse_N},
+          {"test_rmse", row.test_rmse_N},
+          {"over_noise_floor",
+           row.noise_floor_N > 0 ? files::Json(row.test_rmse_N / row.noise_floor_N) : nullptr},
+          {"test_looks", row.test_looks},
+          {"accepted", row.accepted},
+          {"reason", row.note}};
+}
+
+files::Json json_of(const std::vector<LadderRow>& rows) {
+  files::Json json = files::Json::array();
+  for (const LadderRow& row : rows) json.push_back(json_of(row));
+  return json;
+}
+
+files::Json json_of(const std::vector<stability::EffectSpec>& effects) {
+  files::Json json = files::Json::array();
+  for (const stability::EffectSpec& effect : effects) {
+    files::Json entry = {{"effect", effect.name},
+                         {"parameters", values_json(effect.parameters, effect.fit.interval)}};
+    if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+void print(const std::vector<LadderRow>& rows) {
+  fmt::print("  {:<18}{:>10}{:>10}{:>10}{:>14}\n", "", "fit", "select", "test", "test / floor");
+  for (const LadderRow& row : rows) {
+    fmt::print("  {:<18}{:>10.5f}{:>10.5f}{:>10.5f}{:>14}{}\n",
+               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N, row.select_rmse_N,
+               row.test_rmse_N,
+               row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
+               row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
+  }
+}
+
+void print(const Ladder& ladder) {
+  if (!ladder.earlier.empty()) {
+    fmt::print("The model's ladder so far, on the flights of then:\n");
+    print(ladder.earlier);
+  }
+  fmt::print("RMSE of the force residual, in newton; flights for fit / select / test: {} / {} / {}{}\n",
+             ladder.split.fit.size(), ladder.split.select.size(), ladder.split.test.size(),
+             ladder.split.by_flight ? "" : " (too few to split: all for everything)");
+  print(ladder.rows);
+  fmt::print("Test flights looked at: {} time{}\n", ladder.test_looks, ladder.test_looks == 1 ? "" : "s");
+  for (const stability::EffectSpec& effect : ladder.model.effects) {
+    print_values(effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle) + " ",
+                 effect.parameters, effect.fit.interval);
+  }
+}
+
+void report_ladders(const AddOptions& options, const CommonOptions& common, const files::Json& result,
+                    const std::vector<LadderOfModel>& ladders) {
+  if (options.report.empty()) return;
+  const std::string path = write_ladder_report(ladders, result, options.report, common.force);
+  if (common.prints_text()) fmt::print("report: {}\n", path);
+}
+
+/// `add undo`: back to the model before the last accepted effect.
+int undo(const AddOptions& options, const CommonOptions& common) {
+  if (options.flights.models.size() != 1) throw UsageError("add undo takes one --model");
+  if (options.output.empty()) throw UsageError("add undo writes a new model: name it with -o");
+  const std::string& path = options.flights.models[0];
+  const stability::Model model = identification::undone(stability::read_model(path));
+  files::write_file(options.output,
+                    stability::to_toml(model, {"Effects fitted to flights by swarmcert add."}), common.force);
+  files::Json result = result_head("add", {path});
+  result["ladder"] = json_of(model.ladder);
+  result["effects"] = json_of(model.effects);
+  write_result(common, result);
+  if (common.prints_text()) {
+    print(model.ladder);
+    fmt::print("Written: {}\n", options.output);
+  }
+  report_ladders(options, common, result, {{model.path, model.ladder, model.effects}});
+  return kDone;
+}
+
+/// `add show`: the ladders that model files keep, one below the other.
+int show(const AddOptions& options, const CommonOptions& common) {
+  files::Json result = result_head("add", options.flights.models);
+  result["ladders"] = files::Json::array();
+  std::vector<LadderOfModel> ladders;
+  for (const std::string& path : options.flights.models) {
+    const stability::Model model = stability::read_model(path);
+    result["ladders"].push_back(
+        {{"model", path}, {"ladder", json_of(model.ladder)}, {"effects", json_of(model.effects)}});
+    ladders.push_back({path, model.ladder, model.effects});
+    if (!common.prints_text()) continue;
+    fmt::print("{}{}\n", path, model.ladder.empty() ? ": no ladder" : "");
+    if (!model.ladder.empty()) print(model.ladder);
+  }
+  write_result(common, result);
+  report_ladders(options, common, result, ladders);
+  return kDone;
+}
+
+int climb(const AddOptions& options, const CommonOptions& common) {
+  if (options.output.empty()) throw UsageError("add writes a new model: name it with -o");
+  if (options.flights.words.empty()) throw UsageError("add needs flights: name logs or folders of them");
+  refuse_to_replace(common, options.output);
+  if (options.flights.models.size() != 1) throw UsageError("add takes one --model");
+  const residuals::Inputs inputs = read_flights(options.flights);
+  identification::LadderOptions what;
+  what.automatic = options.effects == "auto";
+  if (!what.automatic) {
+    what.effects = split_names(options.effects);
+    check(what.effects, inputs.models[0]);
+  }
+  what.keep_anyway = options.keep_anyway;
+  Progress progress(common.quiet);
+  const Ladder ladder = identification::climb(
+      inputs, what, common.jobs, [&](int done, int total) { progress.show(done, total, "flights"); });
+  if (ladder.any_accepted) {
+    files::write_file(options.output,
+                      stability::to_toml(ladder.model, {"Effects fitted to flights by swarmcert add."}),
+                      common.force);
+  }
+  files::Json result = result_head("add", inputs.files());
+  result["ladder"] = json_of(ladder.rows);
+  result["earlier"] = json_of(ladder.earlier);
+  result["test_looks"] = ladder.test_looks;
+  result["split"] = {{"by_flight", ladder.split.by_flight},
+                     {"fit", names_of(inputs, ladder.split.fit)},
+                     {"select", names_of(inputs, ladder.split.select)},
+                     {"test", names_of(inputs, ladder.split.test)}};
+  result["effects"] = json_of(ladder.model.effects);
+  result["written"] = ladder.any_accepted;
+  result["problems"] = ladder.problems;
+  if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;
+  for (const std::string& problem : ladder.problems) fmt::print(stderr, "warning: {}\n", problem);
+  write_result(common, result);
+  if (!ladder.too_poor.empty()) {
+    fmt::print(stderr, "inconclusive: {}; 'swarmcert compare' says what was cut\n", ladder.too_poor);
+    return kInconclusive;
+  }
+  if (common.prints_text()) {
+    print(ladder);
+    if (ladder.any_accepted)
+      fmt::print("Written: {}\n", options.output);
+    else
+      fmt::print("Nothing helped: {} is not written. --keep-anyway writes it all the same.\n",
+                 options.output);
+  }
+  std::vector<LadderOfModel> ladders;
+  if (!ladder.earlier.empty())
+    ladders.push_back({"The model's ladder so far, on the flights of then", ladder.earlier, {}});
+  ladders.push_back({"On these flights", ladder.rows, ladder.model.effects});
+  report_ladders(options, common, result, ladders);
+  return kDone;
+}
+
+int run_add(const AddOptions& options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  if (options.effects == "undo") return undo(options, common);
+  if (options.effects == "show") return show(options, common);
+  return climb(options, common);
+}
+
+}  // namespace
+
+Command add_command() {
+  return {
+      "add", "Fit effects to flights and add them to a model, with the errors before and after",
+      "EFFECT is one name, several with commas, or auto: what diagnose finds on the flights of the fit. "
+      "An effect\n"
+      "is accepted if the error of flights that the fit has not seen falls; the test flights are only "
+      "shown.\n"
+      "vehicle_offset is a constant force of each vehicle. undo goes back by one accepted effect; show "
+      "prints "
+      "the\n"
+      "ladders of all --model files.\n\n"
+      "Examples: swarmcert add auto --model stability/models/crazyflie-small.toml flights/ -o fitted.toml\n"
+      "          swarmcert add undo --model fitted.toml -o before.toml",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<AddOptions>();
+        app.add_option("EFFECT", options->effects, "Names of effects with commas between, auto, undo or show")
+            ->required();
+        declare_flights(app, options->flights, false);
+        app.add_option("-o,--output", options->output, "The new model.toml");
+        app.add_flag("--keep-anyway", options->keep_anyway, "Add also what does not help");
+        app.add_option("--report", options->report,
+                       "Write an HTML report with the error ladder into this folder");
+        return [options](const CommonOptions& common) { return run_add(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,69 @@
+#include "analysis/commands/add/add_report.h"
+
+#include <fmt/core.h>
+
+#include "analysis/report/report.h"
+#include "analysis/report/report_text.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+std::string step(const stability::LadderRow& row) {
+  return (row.effect == "nominal" ? "" : row.accepted ? "+ " : "refused: ") + row.effect;
+}
+
+void add_ladder(Report& report, const std::vector<stability::LadderRow>& rows, std::size_t number) {
+  std::string data = "# fit_N select_N test_N step\n";
+  std::vector<std::vector<std::string>> cells;
+  for (const stability::LadderRow& row : rows) {
+    data += fmt::format("{:.8g} {:.8g} {:.8g} {}\n", row.fit_rmse_N, row.select_rmse_N, row.test_rmse_N,
+                        plot_field(step(row)));
+    cells.push_back({step(row), fmt::format("{:.5f}", row.fit_rmse_N),
+                     fmt::format("{:.5f}", row.select_rmse_N), fmt::format("{:.5f}", row.test_rmse_N),
+                     row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
+                     row.note});
+  }
+  const std::string name = fmt::format("ladder_{}", number);
+  report.figure(
+      name, data,
+      "set style data histograms\nset style fill solid 0.9 noborder\nset boxwidth 0.9\n"
+      "set ylabel 'RMSE of the force residual [N]'\nset yrange [0:*]\nset xtics rotate by -30\nplot '" +
+          name +
+          ".dat' using 1:xtic(4) title 'flights to fit' linecolor rgb '#999999', "
+          "'' using 2 title 'flights to select' linetype 6, '' using 3 title 'test flights' linetype 1\n",
+      "Error ladder: how the error falls from the nominal model on, effect by effect, on the flights of "
+      "the fit, those that decide, and those that are only shown.");
+  report.table({"", "fit [N]", "select [N]", "test [N]", "test / noise floor", "note"}, cells);
+}
+
+}  // namespace
+
+std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const files::Json& result,
+                                const std::string& folder, bool overwrite) {
+  Report report("Error ladder");
+  report.result(result);
+  std::size_t number = 0;
+  for (const LadderOfModel& ladder : ladders) {
+    report.heading(ladder.title);
+    if (ladder.rows.empty()) {
+      report.paragraph("No ladder is kept.");
+    } else {
+      add_ladder(report, ladder.rows, ++number);
+    }
+    std::vector<std::vector<std::string>> rows;
+    for (const stability::EffectSpec& effect : ladder.effects) {
+      for (const auto& [name, value] : effect.parameters) {
+        const auto interval = effect.fit.interval.find(name);
+        rows.push_back(
+            {effect.name, effect.vehicle, name, fmt::format("{:.6g}", value),
+             interval == effect.fit.interval.end()
+                 ? "-"
+                 : fmt::format("{:.4g} .. {:.4g}", interval->second.first, interval->second.second)});
+      }
+    }
+    if (!rows.empty()) report.table({"effect", "vehicle", "parameter", "value", "90 %"}, rows);
+  }
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

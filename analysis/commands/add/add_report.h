@@ -1,0 +1,24 @@
+/// @file The report of `add`: the error ladder.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nn/base/json.h"
+#include "stability/model.h"
+
+namespace swarmcert::analysis {
+
+/// One ladder with the model that it led to.
+struct LadderOfModel {
+  std::string title;
+  std::vector<stability::LadderRow> rows;
+  std::vector<stability::EffectSpec> effects;
+};
+
+/// Writes FOLDER/report.html with a plot and a table per ladder, the effects' numbers and the JSON `result`; returns its
+/// path. @throws files::InputError as Report::write().
+std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const files::Json& result,
+                                const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,181 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "analysis/cli/progress.h"
+#include "analysis/commands/bound/bound_extras.h"
+#include "analysis/commands/bound/bound_output.h"
+#include "analysis/commands/bound/bound_report.h"
+#include "analysis/commands/bound/disturbance_input.h"
+#include "analysis/commands/bound/float_errors.h"
+#include "analysis/commands/bound/tube_output.h"
+#include "analysis/commands/commands.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+struct BoundOptions {
+  TrackingArguments tracking;
+  DisturbanceArguments disturbance;
+  stability::InitialError initial;
+  std::vector<std::string> uncertain;
+  bool is_uncertain = false;
+  int most_loops = UncertainRun{}.most_loops;
+  bool verified = false;
+  bool tube = false;
+  TubeArguments task;
+  std::string swarm;
+  std::string report;
+};
+
+/// What is asked for axis by axis needs loops of single axes.
+void refuse_coupled_axes(const BoundOptions& options, const Tracking& input) {
+  const char* const asked = options.is_uncertain ? "--uncertain"
+                            : options.verified   ? "--verified"
+                            : options.tube       ? "--tube"
+                                                 : nullptr;
+  if (asked == nullptr) return;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis_loop(input.gains, input.plant, axis)) return;
+  }
+  throw UsageError(std::string(asked) + ": Lambda or K of " + options.tracking.gains +
+                   " couples all axes, and this bounds the loop of one axis at a time; leave " + asked +
+                   " out, or make Lambda and K diagonal");
+}
+
+int run_bound(const BoundOptions& options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  const Tracking input = load_tracking(options.tracking);
+  refuse_coupled_axes(options, input);
+  std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
+  if (!options.swarm.empty()) inputs.push_back(options.swarm);
+  const bool has_task = !options.task.task.empty();
+  if (has_task && !options.tube) throw UsageError("--task is that of a tube: add --tube");
+  DisturbanceArguments told = options.disturbance;
+  // The tube makes its own bounds of how vehicles move; without --speed there are no others.
+  if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
+  const LoadedDisturbance disturbance = load_disturbance(told, input);
+  const stability::DisturbanceSource& source = disturbance.source;
+  inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
+  if (options.tube && !has_task &&
+      std::none_of(std::begin(source.axis), std::end(source.axis), [](const auto& d) {
+        return std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s);
+      })) {
+    throw UsageError("--tube needs a force of known size: --amplitude E or --impulse J, --from or --truth");
+  }
+  std::optional<LocalTube> local;
+  if (has_task) local = load_local_tube(options.task, options.disturbance, input, common, inputs);
+  const stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
+
+  files::Json result = result_head("bound", inputs);
+  add_tracking_json(result, input, source, report);
+  const FloatErrors float32 = float_errors(input, report);
+  result["float32"] = float_errors_json(float32);
+  // The error budget of every row: its bound, what the staircase adds, what float32 adds.
+  for (files::Json& row : result["bounds"]) {
+    const std::string& axis = row["axis"].get_ref<const std::string&>();
+    const double of_float = float32.tracking_error_m[axis == "x" ? 0 : axis == "y" ? 1 : 2];
+    row["float32"] = finite(of_float);
+    row["total"] = row["minimum"].is_number()
+                       ? finite(row["minimum"].get<double>() + row["staircase"].get<double>() + of_float)
+                       : files::Json();
+  }
+  if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
+  if (options.is_uncertain) {
+    const CancelOnInterrupt interrupt;
+    Progress progress(common.quiet);
+    UncertainRun run;
+    run.jobs = common.jobs;
+    run.most_loops = options.most_loops;
+    run.progress = [&progress](int done, int total) {
+      progress.show(done, total, "of the enclosures over the intervals");
+    };
+    run.cancelled = interrupt.flag();
+    result["uncertain"] = uncertain_json(input, options.uncertain, run);
+  }
+  if (options.verified) result["verified"] = verified_json(input);
+  if (options.tube) result["tube"] = tube_json(input, source, 101);
+  if (local) result["local_tube"] = local_tube_json(options.task, *local);
+  if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
+  std::string report_path;
+  if (!options.report.empty()) {
+    report_path = write_bound_report(input, disturbance, report, local, result, options.report, common.force);
+  }
+  write_result(common, result);
+  if (common.prints_text()) {
+    print_tracking(input, source, report);
+    print_float_errors(float32);
+    if (disturbance.truth) print_truth(*disturbance.truth);
+    if (options.is_uncertain) print_uncertain(result["uncertain"]);
+    if (options.verified) print_verified(result["verified"]);
+    if (!report.transient && (options.initial.position_m != 0 || options.initial.velocity_m_s != 0 ||
+                              options.initial.learning_error_N != 0)) {
+      fmt::print("\nInitial errors enter the theorem's transient bound; these gains have none.\n");
+    }
+    if (local) print_local_tube(result["local_tube"]);
+    if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
+    if (!options.swarm.empty()) print_swarm(result["swarm"]);
+    if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
+  }
+  if (!options.swarm.empty() && result["swarm"]["verdict"] == "refuted") return kViolated;
+  if (local && !local->proved) return kInconclusive;
+  if (options.swarm.empty() || result["swarm"]["verdict"] == "proved") return kDone;
+  return kInconclusive;
+}
+
+}  // namespace
+
+Command bound_command() {
+  return {
+      "bound", "Tracking error that gains and a vehicle give under a bounded force error",
+      "Says whether the tracking theorem applies and why not, its ball, the exact gains of every axis "
+      "for the\n"
+      "continuous and the sampled loop, and, for a declared or measured force error, the smallest of "
+      "five bounds.\n"
+      "A certificate or a network bounds the rate of f_hat only and gives no ball; --truth declares what the "
+      "force\n"
+      "really is, and encloses its constants; --from takes measured quantiles.\n\n"
+      "Example: swarmcert bound --gains controller/gains/crazyflie-small.toml --model "
+      "stability/models/crazyflie-small.toml \\\n"
+      "           --amplitude 0.097 --impulse 0.0202 --rate 0.75\n"
+      "         swarmcert bound --gains controller/gains/composite.toml --model "
+      "stability/models/crazyflie-small.toml --tube --task swap \\\n"
+      "           --network nn/networks/demo/network.toml --truth "
+      "stability/models/crazyflie-small-effects.toml",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<BoundOptions>();
+        declare_tracking(app, options->tracking);
+        declare_disturbance(app, options->disturbance);
+        app.add_option("--initial-error", options->initial.position_m, "|e| at t = 0, m, for the transient");
+        app.add_option("--initial-speed", options->initial.velocity_m_s, "|e'| at t = 0, m/s");
+        app.add_option("--initial-learning-error", options->initial.learning_error_N,
+                       "|f_hat - f_a| at t = 0, bias included, N");
+        auto* uncertain = app.add_option("--uncertain", options->uncertain,
+                                         "Worst over intervals: mass=A:B, thrust=A:B, lag=A:B, delay=A:B, "
+                                         "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")
+                              ->expected(0, -1)
+                              ->default_str("default");
+        app.add_option(
+               "--loops", options->most_loops,
+               "Loops that --uncertain may look at, for each of its rows; bounds hold wherever it ends")
+            ->check(CLI::PositiveNumber)
+            ->capture_default_str();
+        app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
+        app.add_flag("--tube", options->tube,
+                     "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "
+                     "trajectories that the network and the truth prove");
+        declare_tube(app, options->task);
+        app.add_option("--swarm", options->swarm, "swarm.toml: do the vehicles' mutual forces stay bounded?");
+        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+        return [options, uncertain](const CommonOptions& common) {
+          options->is_uncertain = uncertain->count() > 0;
+          return run_bound(*options, common);
+        };
+      }};
+}
+
+}  // namespace swarmcert::analysis

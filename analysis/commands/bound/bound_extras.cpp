@@ -1,0 +1,380 @@
+#include "analysis/commands/bound/bound_extras.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "analysis/commands/bound/bound_output.h"
+#include "nn/base/input_error.h"
+#include "nn/base/parallel.h"
+#include "stability/bounds/uncertain_norms.h"
+#include "stability/bounds/verified_norms.h"
+#include "stability/bounds/verified_sampled_norms.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using files::Json;
+using namespace stability;  // NOLINT: every name below is of that library
+
+/// "0.032:0.037"
+Range range_of(const std::string& word, const std::string& text) {
+  char* end = nullptr;
+  Range range;
+  range.from = std::strtod(text.c_str(), &end);
+  const bool has_colon = end != text.c_str() && *end == ':';
+  const char* second = has_colon ? end + 1 : end;
+  if (has_colon) range.to = std::strtod(second, &end);
+  if (!has_colon || end == second || *end != '\0' || !(range.from <= range.to) || !(range.from >= 0) ||
+      !std::isfinite(range.to)) {
+    throw UsageError("--uncertain " + word + ": write NAME=FROM:TO, e.g. mass=0.032:0.037");
+  }
+  return range;
+}
+
+Range about(double value, double share) { return {value * (1 - share), value * (1 + share)}; }
+
+/// The vehicle's intervals; those of the battery act on the thrust.
+UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string>& words) {
+  UncertainPlant plant = {about(input.plant.mass_kg, 0.05), about(input.plant.thrust_scale, 0.1),
+                          about(input.gains.motor_lag_s, 0.2), about(input.gains.delay_s, 0.2)};
+  for (const std::string& word : words) {
+    if (word == "default") continue;
+    const std::size_t equals = word.find('=');
+    const std::string name = word.substr(0, equals);
+    const Range range = range_of(word, equals == std::string::npos ? "" : word.substr(equals + 1));
+    if (name == "mass" && range.from > 0) {
+      const double lifted_kg = input.plant.largest_thrust_N / kGravity_m_s2;
+      if (lifted_kg > 0 && range.from > lifted_kg) {
+        throw UsageError(
+            fmt::format("--uncertain {}: the rotors lift {:.3g} kg; mass is in kg", word, lifted_kg));
+      }
+      plant.mass_kg = range;
+    } else if (name == "thrust" && range.from > 0) {
+      plant.thrust_scale = range;
+    } else if (name == "lag") {
+      plant.lag_s = range;
+    } else if (name == "delay") {
+      plant.delay_s = range;
+    } else if (name == "battery" && range.from > 0) {
+      // Thrust at the PWM that hovers with a full battery, without compensation.
+      const double hover = input.model.thrust.pwm(input.model.weight_N() / 4, kFullBattery_V);
+      const auto ratio = [&](double v) {
+        return input.model.thrust.force_N(hover, v) * 4 / input.model.weight_N();
+      };
+      const double a = ratio(range.from);
+      const double b = ratio(range.to);
+      plant.thrust_scale = {plant.thrust_scale.from * std::min(a, b), plant.thrust_scale.to * std::max(a, b)};
+    } else {
+      throw UsageError("--uncertain " + word +
+                       ": names are mass, thrust, lag, delay, battery; mass and thrust positive");
+    }
+  }
+  return plant;
+}
+
+Json gain_json(const UncertainGain& gain) { return {finite(gain.lower), finite(gain.upper)}; }
+
+Json worst_json(const UncertainGain& g) {
+  return {
+      {"mass_kg", g.mass_kg}, {"thrust_scale", g.thrust_scale}, {"lag_s", g.lag_s}, {"delay_s", g.delay_s}};
+}
+
+/// The loop of an axis without what varies.
+AxisLoop fixed_part(const Tracking& input, int axis) {
+  Plant nominal = input.plant;
+  nominal.thrust_scale = 1;
+  AxisLoop loop = *axis_loop(input.gains, nominal, axis);
+  loop.lags_s.clear();
+  if (axis < 2 && input.gains.attitude_lag_s > 0) loop.lags_s.push_back(input.gains.attitude_lag_s);
+  loop.delay_s = 0;
+  return loop;
+}
+
+bool is_same(const AxisLoop& a, const AxisLoop& b) {
+  return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
+}
+
+std::string number_text(const Json& x) {
+  return x.is_null() ? std::string("unbounded") : fmt::format("{:.8g}", x.get<double>());
+}
+
+std::string pair_text(const Json& pair) { return number_text(pair[0]) + " .. " + number_text(pair[1]); }
+
+/// An upper bound that is missing where a gain is finite at every point tried proves nothing.
+const char* status_of(const UncertainNorms& norms) {
+  if (std::isinf(norms.amplitude.lower)) return "unstable";
+  for (const UncertainGain* const gain : {&norms.rate, &norms.amplitude, &norms.edge, &norms.impulse}) {
+    if (std::isfinite(gain->lower) && !std::isfinite(gain->upper)) return "inconclusive";
+  }
+  return "enclosed";
+}
+
+const char* end_name(UncertainNorms::End end) {
+  return end == UncertainNorms::End::kGap      ? "gap reached"
+         : end == UncertainNorms::End::kBudget ? "budget spent"
+                                               : "interrupted";
+}
+
+constexpr double kUncertainGap = 0.02;
+
+/// Percent of the way to the gap asked for, or to the end of the budget.
+class WayToGap {
+ public:
+  int percent(int evaluations, int most, double gap) {
+    double way = static_cast<double>(evaluations) / most;
+    if (std::isfinite(gap)) {
+      if (!(first_ > 0)) first_ = std::max(gap, 2 * kUncertainGap);
+      way = std::max(way, std::log(first_ / gap) / std::log(first_ / kUncertainGap));
+    }
+    reached_ = std::clamp(static_cast<int>(100 * way), reached_, 99);
+    return reached_;
+  }
+
+ private:
+  double first_ = 0;
+  int reached_ = 0;
+};
+
+Json uncertain_row(int axis, Channel channel, Loop loop, const UncertainNorms& norms) {
+  return {{"axis", axis_name(axis)},
+          {"channel", name(channel)},
+          {"loop", name(loop)},
+          {"status", status_of(norms)},
+          {"evaluations", norms.evaluations},
+          {"ended", end_name(norms.end)},
+          {"rate", gain_json(norms.rate)},
+          {"amplitude", gain_json(norms.amplitude)},
+          {"edge", gain_json(norms.edge)},
+          {"impulse", gain_json(norms.impulse)},
+          {"worst_rate", worst_json(norms.rate)},
+          {"worst_amplitude", worst_json(norms.amplitude)},
+          {"worst_edge", worst_json(norms.edge)},
+          {"worst_impulse", worst_json(norms.impulse)}};
+}
+
+/// Rows of the axis before, for an axis that is the same.
+void repeat_rows(Json& rows, std::size_t count, int axis) {
+  for (std::size_t i = 0; i < count; ++i) {
+    Json row = rows[rows.size() - count];
+    row["axis"] = axis_name(axis);
+    rows.push_back(std::move(row));
+  }
+}
+
+}  // namespace
+
+Json uncertain_json(const Tracking& input, const std::vector<std::string>& words, const UncertainRun& run) {
+  const UncertainPlant plant = intervals_of(input, words);
+  const std::size_t rows_per_axis = input.gains.rate_hz > 0 ? 4 : 2;
+  const auto repeats = [&](int axis) {
+    return axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
+           is_same(fixed_part(input, axis), fixed_part(input, axis - 1));
+  };
+  struct Task {
+    int axis;
+    Channel channel;
+    Loop loop;
+  };
+  std::vector<Task> tasks;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!axis_loop(input.gains, input.plant, axis) || repeats(axis)) continue;
+    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+      tasks.push_back({axis, channel, Loop::kContinuous});
+      if (input.gains.rate_hz > 0) tasks.push_back({axis, channel, Loop::kSampled});
+    }
+  }
+  std::vector<UncertainNorms> found(tasks.size());
+  const int total = static_cast<int>(tasks.size());
+  std::atomic<int> percent_done{0};  // of each task, added up
+  files::parallel_for(total, run.jobs, [&](int i) {
+    const Task& task = tasks[static_cast<std::size_t>(i)];
+    const AxisLoop fixed = fixed_part(input, task.axis);
+    WayToGap way;
+    int shown = 0;
+    const auto show = [&](int percent) {
+      const int all = percent_done += percent - shown;
+      shown = percent;
+      run.progress(all, 100 * total);
+    };
+    const UncertainEffort effort = {kUncertainGap, run.most_loops, [&](int evaluations, double gap) {
+                                      show(way.percent(evaluations, run.most_loops, gap));
+                                      return run.cancelled == nullptr || !*run.cancelled;
+                                    }};
+    found[static_cast<std::size_t>(i)] =
+        task.loop == Loop::kSampled
+            ? uncertain_norms(SampledLoop{fixed, 1 / input.gains.rate_hz, input.gains.integrator_step_s},
+                              plant, task.channel, effort)
+            : uncertain_norms(fixed, plant, task.channel, effort);
+    show(100);
+  });
+  Json gains = Json::array();
+  std::size_t next = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!axis_loop(input.gains, input.plant, axis)) continue;
+    if (repeats(axis)) {
+      repeat_rows(gains, rows_per_axis, axis);
+      continue;
+    }
+    for (std::size_t i = 0; i < rows_per_axis; ++i, ++next) {
+      gains.push_back(uncertain_row(axis, tasks[next].channel, tasks[next].loop, found[next]));
+    }
+  }
+  const auto range = [](const Range& r) { return Json{r.from, r.to}; };
+  return {{"mass_kg", range(plant.mass_kg)},
+          {"thrust_scale", range(plant.thrust_scale)},
+          {"lag_s", range(plant.lag_s)},
+          {"delay_s", range(plant.delay_s)},
+          {"gains", std::move(gains)}};
+}
+
+void print_uncertain(const Json& uncertain) {
+  const auto text = [&](const char* key) {
+    return fmt::format("{:.4g} .. {:.4g}", uncertain[key][0].get<double>(), uncertain[key][1].get<double>());
+  };
+  fmt::print(
+      "\nWorst over mass {} kg, thrust scale {}, motor lag {} s, delay {} s: reached .. not exceeded, but "
+      "for rounding\n",
+      text("mass_kg"), text("thrust_scale"), text("lag_s"), text("delay_s"));
+  for (const Json& g : uncertain["gains"]) {
+    fmt::print("  {} {:<8} {:<10} amplitude {}  impulse {}\n{:25}edge {}  rate {}\n",
+               g["axis"].get<std::string>(), g["channel"].get<std::string>(), g["loop"].get<std::string>(),
+               pair_text(g["amplitude"]), pair_text(g["impulse"]), "", pair_text(g["edge"]),
+               pair_text(g["rate"]));
+    const bool interrupted = g["ended"] == "interrupted";
+    if (g["status"] == "inconclusive") {
+      fmt::print("{:25}inconclusive: {} loops tried, not all of the intervals proved stable; {}\n", "",
+                 g["evaluations"].get<int>(), interrupted ? "interrupted" : "narrow them, or raise --loops");
+    } else if (g["status"] == "unstable") {
+      fmt::print("{:25}unstable for some values of the intervals\n", "");
+    } else if (g["ended"] != "gap reached") {
+      fmt::print("{:25}{} after {} loops, before both ends were {:g} % apart; the bounds hold\n", "",
+                 interrupted ? "interrupted" : "budget spent", g["evaluations"].get<int>(),
+                 100 * kUncertainGap);
+    }
+  }
+}
+
+namespace {
+
+Json enclosure_json(const Interval& x) { return {finite(x.lo), finite(x.hi)}; }
+
+Json verified_gains_json(const VerifiedNorms& norms) {
+  return {{"rate", enclosure_json(norms.rate)},
+          {"amplitude", enclosure_json(norms.amplitude)},
+          {"edge", enclosure_json(norms.edge)},
+          {"impulse", enclosure_json(norms.impulse)}};
+}
+
+}  // namespace
+
+Json verified_json(const Tracking& input) {
+  Json rows = Json::array();
+  std::optional<AxisLoop> last;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
+    if (!loop) continue;
+    const std::optional<SampledLoop> sampled = sampled_axis_loop(input.gains, input.plant, axis);
+    if (axis > 0 && last && is_same(*loop, *last)) {
+      repeat_rows(rows, sampled ? 4 : 2, axis);
+      continue;
+    }
+    last = loop;
+    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+      Json row = {{"axis", axis_name(axis)}, {"channel", name(channel)}, {"loop", "continuous"}};
+      const std::optional<VerifiedNorms> norms = verified_norms(*loop, channel);
+      row["status"] = norms ? "proved" : "inconclusive";
+      if (norms) {
+        row.update(verified_gains_json(*norms));
+        if (loop->delay_s > 0) row["delay_gain"] = norms->delay_gain;
+      } else {
+        row["why"] = is_stable(*loop) ? "stability could not be verified in intervals"
+                     : loop->delay_s > 0
+                         ? "the loop is unstable: a shorter delay or lower gains would be needed"
+                         : "the loop is unstable";
+      }
+      rows.push_back(std::move(row));
+      if (!sampled) continue;
+      row = {{"axis", axis_name(axis)}, {"channel", name(channel)}, {"loop", "sampled"}};
+      const std::optional<VerifiedSampledNorms> held = verified_sampled_norms(*sampled, channel);
+      row["status"] = held ? "proved" : "inconclusive";
+      if (held) {
+        row.update(verified_gains_json(held->at_samples));
+        row["between_samples"] = verified_gains_json(held->all_times);
+      } else {
+        row["why"] = "stability could not be verified in intervals";
+      }
+      rows.push_back(std::move(row));
+    }
+  }
+  return rows;
+}
+
+void print_verified(const Json& verified) {
+  fmt::print("\nVerified enclosures of the gains\n");
+  for (const Json& row : verified) {
+    fmt::print("  {} {:<8} {:<10} ", row["axis"].get<std::string>(), row["channel"].get<std::string>(),
+               row["loop"].get<std::string>());
+    if (row["status"] != "proved") {
+      fmt::print("inconclusive: {}\n", row["why"].get<std::string>());
+      continue;
+    }
+    const auto text = [&row](const char* key) {
+      if (row[key][0].is_null()) return fmt::format("{} unbounded", key);
+      return fmt::format("{} [{:.13g}, {:.13g}]", key, row[key][0].get<double>(), row[key][1].get<double>());
+    };
+    fmt::print("{}  {}\n                        {}  {}\n", text("rate"), text("amplitude"), text("edge"),
+               text("impulse"));
+    if (row.contains("delay_gain")) {
+      fmt::print("{:24}the delay alone makes them {:.2g} % wide\n", "",
+                 200 * row["delay_gain"].get<double>());
+    }
+  }
+}
+
+Json tube_json(const Tracking& input, const DisturbanceSource& source, int count) {
+  Json rows = Json::array();
+  constexpr int kSamples = 20001;
+  constexpr double kHorizon_s = 10;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
+    const Disturbance& d = source.axis[axis];
+    if (!loop) continue;
+    if (!is_stable(*loop) || !(std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s))) {
+      rows.push_back({{"axis", axis_name(axis)},
+                      {"channel", "force"},
+                      {"loop", "continuous"},
+                      {"status", "inconclusive"},
+                      {"why", is_stable(*loop) ? "neither amplitude nor impulse is known" : "unstable"},
+                      {"at", Json::array()}});
+      continue;
+    }
+    const double step_s = kHorizon_s / (kSamples - 1);
+    const std::vector<double> kernel =
+        sampled_response(impulse_transfer(*loop, Channel::kForce), step_s, kSamples);
+    double area = 0;
+    double peak = 0;
+    Json at = Json::array();
+    const int every = (kSamples - 1) / (count - 1);
+    for (int i = 0; i < kSamples; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (i > 0) area += (std::abs(kernel[k]) + std::abs(kernel[k - 1])) / 2 * step_s;
+      peak = std::max(peak, std::abs(kernel[k]));
+      if (i % every != 0) continue;
+      double bound = std::numeric_limits<double>::infinity();
+      if (std::isfinite(d.amplitude_N)) bound = area * d.amplitude_N;
+      if (std::isfinite(d.impulse_N_s)) bound = std::min(bound, peak * d.impulse_N_s);
+      at.push_back({{"t_s", i * step_s}, {"error_m", bound}});
+    }
+    rows.push_back({{"axis", axis_name(axis)},
+                    {"channel", "force"},
+                    {"loop", "continuous"},
+                    {"status", "estimate"},
+                    {"at", std::move(at)}});
+  }
+  return rows;
+}
+
+}  // namespace swarmcert::analysis

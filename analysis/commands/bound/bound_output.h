@@ -1,0 +1,20 @@
+/// @file How `bound` tells its result: as JSON and as text.
+#pragma once
+
+#include "analysis/commands/shared/tracking_input.h"
+#include "stability/bounds/tracking_bounds.h"
+
+namespace swarmcert::analysis {
+
+/// Numbers that are not finite become null.
+files::Json finite(double value);
+
+/// The members of the result after its head.
+void add_tracking_json(files::Json& result, const Tracking& input, const stability::DisturbanceSource& source,
+                       const stability::TrackingReport& report);
+
+/// The table a controls engineer wants: hypotheses, gains, bounds and which of them is smallest.
+void print_tracking(const Tracking& input, const stability::DisturbanceSource& source,
+                    const stability::TrackingReport& report);
+
+}  // namespace swarmcert::analysis

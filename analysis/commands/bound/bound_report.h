@@ -1,0 +1,21 @@
+/// @file The report of `bound`: tables, and plots of the error inside its bounds over time.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "analysis/commands/bound/disturbance_input.h"
+#include "analysis/tracking/tube/local_tube.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html; returns its path. Plots: the theorem's transient with the response to a ramp inside the
+/// ball, per axis the response to the worst force of the amplitude class inside its tube, the gains and the bounds; the tube around a task.
+/// The JSON `result` goes into the page.
+/// @throws files::InputError as Report::write().
+std::string write_bound_report(const Tracking& input, const LoadedDisturbance& disturbance,
+                               const stability::TrackingReport& report,
+                               const std::optional<LocalTube>& local_tube, const files::Json& result,
+                               const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,306 @@
+#include "analysis/commands/bound/disturbance_input.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using files::InputError;
+using files::Json;
+using stability::DisturbanceSource;
+
+/// A number for `axis` in what compare wrote: a number, or an object with axes, with quantiles, or with both.
+double measured_number(const Json& value, const std::string& axis, const std::string& quantile,
+                       const std::string& path, const std::string& field) {
+  if (value.is_number()) return value.get<double>();
+  if (value.is_object()) {
+    if (value.contains(axis)) return measured_number(value[axis], axis, quantile, path, field + "." + axis);
+    if (value.contains(quantile)) {
+      return measured_number(value[quantile], axis, quantile, path, field + "." + quantile);
+    }
+  }
+  throw InputError({path, "", field, value.is_object() ? "an object" : value.dump().substr(0, 40),
+                    "has no number for axis " + axis + " and quantile " + quantile,
+                    "--quantile names one that is there"});
+}
+
+void read_measured(const DisturbanceArguments& arguments, DisturbanceSource& source) {
+  const Json document = files::read_json(arguments.from, "swarmcert/compare/1");
+  if (!document.contains("learning_error") || !document["learning_error"].is_object()) {
+    throw InputError(
+        {arguments.from, "", "learning_error", "", "is missing", "write it with swarmcert compare --json"});
+  }
+  const Json& error = document["learning_error"];
+  double square = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name = stability::axis_name(axis);
+    const auto get = [&](const char* key) {
+      if (!error.contains(key)) return std::numeric_limits<double>::infinity();
+      return std::abs(measured_number(error[key], name, arguments.quantile, arguments.from,
+                                      std::string("learning_error.") + key));
+    };
+    stability::Disturbance& d = source.axis[axis];
+    d.rate_N_s = get("rate");
+    d.amplitude_N = get("amplitude");
+    d.variation_N = get("variation");
+    d.impulse_N_s = get("impulse");
+    source.bias_N[axis] = error.contains("bias") ? get("bias") : 0;
+    square += d.rate_N_s * d.rate_N_s;
+  }
+  // Of quantiles per axis: at least the vector's where they coincide.
+  source.rate_norm_N_s = std::sqrt(square);
+  source.kind = "measured";
+  source.note = arguments.quantile + " over windows of flights, of which one follows the other";
+  // Variation and impulse are those of one window: every window of the flight brings as much again.
+  if (!error.contains("window_s") || !error["window_s"].is_number()) return;
+  const double window_s = error["window_s"].get<double>();
+  if (!(window_s > 0)) {
+    throw InputError(
+        {arguments.from, "", "learning_error.window_s", error["window_s"].dump(), "must be positive", ""});
+  }
+  source.note =
+      fmt::format("{} over windows of {} s, each of which may bring as much", arguments.quantile, window_s);
+  for (stability::Disturbance& d : source.axis) {
+    d.passes = stability::Disturbance::kManyPasses;
+    d.pass_period_s = d.pass_length_s = window_s;
+    d.variation_per_pass = true;
+  }
+}
+
+double newtons(const std::string& unit, double value, const std::string& path) {
+  if (unit.rfind("gf", 0) == 0) return value * stability::kGramForce_N;
+  if (unit.rfind("N", 0) == 0 && unit.rfind("N_m", 0) != 0) return value;
+  throw InputError({path, "", "unit", files::in_quotes(unit), "is not a unit of force",
+                    "state a force and its unit as output in network.toml"});
+}
+
+/// Lipschitz constants of f_hat in newton per unit of input: of one neighbour's input, and of the vehicle's own state.
+struct Constants {
+  double neighbour = -1, own = 0;
+};
+
+/// Largest bounds among the set functions (or the plain network) of a list of bounds.
+template <class Bounds, class Function, class Upper, class Unit>
+Constants largest(const Bounds& bounds, const Function& function, const Upper& upper, const Unit& unit,
+                  const std::string& path) {
+  Constants result;
+  for (const auto& bound : bounds) {
+    const std::string of = function(bound);
+    if (of.rfind("set:", 0) != 0 && of != "network") continue;
+    const bool is_ground = of.rfind(std::string("set:") + files::kGroundKind + ":", 0) == 0;
+    double& constant = is_ground ? result.own : result.neighbour;
+    constant = std::max(constant, newtons(unit(bound), upper(bound), path));
+  }
+  if (result.neighbour < 0)
+    throw InputError({path, "", "bounds", "",
+                      "has no bound of a whole network for all inputs and all their coordinates",
+                      "certify without --domain, --blocks and --scale"});
+  return result;
+}
+
+void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& source,
+                    std::vector<std::string>& inputs, std::vector<std::string>& notes) {
+  if (arguments.speed < 0) {
+    throw UsageError(
+        "a Lipschitz constant gives a rate only with --speed V (and --accel A) of a neighbour "
+        "relative to the vehicle");
+  }
+  const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
+  Constants lipschitz_N;
+  if (!arguments.certificate.empty()) {
+    inputs.push_back(arguments.certificate);
+    const Json certificate = files::read_json(arguments.certificate, check::kCertificateSchema);
+    if (!has_network) {
+      throw UsageError(
+          "--certificate C proves nothing without the network that it is about: add --network NET");
+    }
+    const files::Network network = load_net(arguments.network);
+    files::require_force_z(network);
+    for (const std::string& path : input_files(network)) inputs.push_back(path);
+    const check::CheckResult verdict = check::check(certificate, network);
+    if (!verdict.accepted) {
+      throw InputError({arguments.certificate, "", "", "", "is rejected by the checker: " + verdict.reason,
+                        "certify the network again"});
+    }
+    lipschitz_N = largest(
+        certificate["bounds"],
+        [](const Json& b) {
+          // Only what bounds one neighbour's whole input, anywhere, in the Euclidean norm; the checker knows the rest.
+          const bool is_plain = b.value("block", "all") == "all" && b.value("domain", "global") == "global" &&
+                                (!b.contains("scale") || b["scale"].empty());
+          return is_plain ? b.value("function", "") : std::string();
+        },
+        [](const Json& b) { return b["upper"].get<double>(); },
+        [&](const Json& b) { return files::unit(network, b["function"].get<std::string>()); },
+        arguments.certificate);
+  } else {
+    const files::Network network = load_net(arguments.network);
+    files::require_force_z(network);
+    for (const std::string& path : input_files(network)) inputs.push_back(path);
+    lipschitz::CertifyOptions options;
+    options.method = lipschitz::UpperMethod::kProduct;
+    options.lower.rounds = 0;
+    const lipschitz::Certification found = certify(network, options);
+    lipschitz_N = largest(
+        found.bounds, [](const lipschitz::CertifiedBound& b) { return b.function; },
+        [](const lipschitz::CertifiedBound& b) { return b.upper.value(); },
+        [&](const lipschitz::CertifiedBound& b) { return files::unit(network, b.function); },
+        arguments.network.file.empty() ? arguments.network.phi + ", " + arguments.network.rho
+                                       : arguments.network.file);
+  }
+  // A neighbour's input moves at |(v_rel, a_rel)|, and every neighbour adds its own; the ground's input is the own state.
+  if (arguments.acceleration < 0) notes.emplace_back("neighbours fly at constant velocity: no --accel");
+  double rate = arguments.neighbours * lipschitz_N.neighbour *
+                std::hypot(arguments.speed, std::max(0.0, arguments.acceleration));
+  if (lipschitz_N.own > 0) {
+    if (arguments.own_speed < 0) notes.emplace_back("own speed at most --speed: no --own-speed");
+    if (arguments.own_accel < 0) notes.emplace_back("own acceleration at most --accel: no --own-accel");
+    rate += lipschitz_N.own *
+            std::hypot(arguments.own_speed < 0 ? arguments.speed : arguments.own_speed,
+                       std::max(0.0, arguments.own_accel < 0 ? arguments.acceleration : arguments.own_accel));
+  }
+  source.f_hat_rate_N_s = rate * (1 + 1e-15 * 8);  // the few roundings above
+  source.f_hat_rate_known = true;
+  if (source.kind != "none") return;
+  source.kind = "rate of f_hat";
+  source.axis[2].rate_N_s = source.f_hat_rate_N_s;  // the network's output is the force along z
+}
+
+}  // namespace
+
+void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
+  app.add_option("--rate", arguments.rate, "sup |eps'|, N/s: how fast the force error changes")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--amplitude", arguments.amplitude, "sup |eps|, N")->check(CLI::NonNegativeNumber);
+  app.add_option("--edge", arguments.edge, "Total variation of eps, N")->check(CLI::NonNegativeNumber);
+  app.add_option("--impulse", arguments.impulse, "int |eps| dt of one pass, N s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--bias", arguments.bias, "Constant part of the force error, N");
+  auto* passes = app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
+                     ->check(CLI::PositiveNumber);
+  app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(passes);
+  app.add_option("--pass-length", arguments.pass_s, "How long one pass lasts, s")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(passes);
+  auto* from =
+      app.add_option("--from", arguments.from, "Result of compare: measured quantiles of the learning error");
+  app.add_option("--quantile", arguments.quantile, "Which quantile of --from (default p99)")->needs(from);
+  app.add_option("--certificate", arguments.certificate,
+                 "Certificate of --network: bounds the rate of f_hat");
+  app.add_option("--network", arguments.network.file, "network.toml or weight file of f_hat");
+  app.add_option("--phi", arguments.network.phi, "Weight file of phi, with --rho");
+  app.add_option("--rho", arguments.network.rho, "Weight file of rho, with --phi");
+  app.add_option("--speed", arguments.speed, "Largest relative speed of a neighbour, m/s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--accel", arguments.acceleration, "Largest relative acceleration of a neighbour, m/s^2")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--neighbours", arguments.neighbours, "How many neighbours at once (default 1)")
+      ->check(CLI::PositiveNumber);
+  auto* truth = app.add_option("--truth", arguments.truth,
+                               "model.toml whose effects are declared to be the true force");
+  app.add_option("--gap", arguments.gap, "Of --truth: height differences between vehicles, FROM:TO in m")
+      ->needs(truth);
+  app.add_option("--own-speed", arguments.own_speed, "Largest speed of any vehicle, m/s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--own-accel", arguments.own_accel, "Largest acceleration of any vehicle, m/s^2")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--thrust-rate", arguments.thrust_rate, "Of --truth: sup |d/dt (thrust vector)|, N/s")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(truth);
+  app.add_option("--least-height", arguments.least_height, "Of --truth: lowest height, m (default 0)")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(truth);
+  app.add_option("--largest-height", arguments.largest_height, "Of --truth: largest height, m")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(truth);
+  app.add_option("--neighbour-mass", arguments.neighbour_mass,
+                 "Of --truth: mass of the heaviest neighbour, kg (default: that of the truth's vehicle)")
+      ->check(CLI::PositiveNumber)
+      ->needs(truth);
+}
+
+namespace {
+
+/// Refuses options that would change nothing: a user who gave them expects that they do.
+void refuse_alone(const DisturbanceArguments& arguments) {
+  const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
+  if (!has_network && arguments.certificate.empty() && arguments.truth.empty()) {
+    const std::pair<const char*, bool> motions[] = {{"--speed", arguments.speed >= 0},
+                                                    {"--accel", arguments.acceleration >= 0},
+                                                    {"--own-speed", arguments.own_speed >= 0},
+                                                    {"--own-accel", arguments.own_accel >= 0},
+                                                    {"--neighbours", arguments.neighbours != 1}};
+    for (const auto& [option, is_given] : motions) {
+      if (is_given) {
+        throw UsageError(std::string(option) +
+                         " says how vehicles move, which matters to a learned or a declared force only: add "
+                         "--network NET or --truth MODEL");
+      }
+    }
+  }
+  if (arguments.passes > 1 && arguments.every_s <= 0) throw UsageError("--passes needs --every S");
+  if (arguments.passes > 1 && !arguments.from.empty()) {
+    throw UsageError("--passes: the windows of --from already follow one another");
+  }
+  if (arguments.passes > 1 && arguments.impulse < 0) {
+    throw UsageError("--passes repeats the impulse of one pass: add --impulse J");
+  }
+}
+
+}  // namespace
+
+LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const Tracking& tracking) {
+  refuse_alone(arguments);
+  LoadedDisturbance result;
+  DisturbanceSource& source = result.source;
+  const bool is_declared =
+      std::max({arguments.rate, arguments.amplitude, arguments.edge, arguments.impulse}) >= 0;
+  if (int{is_declared} + int{!arguments.from.empty()} + int{!arguments.truth.empty()} > 1) {
+    throw UsageError(
+        "--from, --truth and --rate, --amplitude, --edge, --impulse each say what the disturbance is: give "
+        "one");
+  }
+  if (is_declared) {
+    source.kind = "declared";
+    for (stability::Disturbance& d : source.axis) {
+      if (arguments.rate >= 0) d.rate_N_s = arguments.rate;
+      if (arguments.amplitude >= 0) d.amplitude_N = arguments.amplitude;
+      if (arguments.edge >= 0) d.variation_N = arguments.edge;
+      if (arguments.impulse >= 0) d.impulse_N_s = arguments.impulse;
+    }
+    if (arguments.rate >= 0) source.rate_norm_N_s = arguments.rate;
+    source.note = "as given";
+  }
+  for (stability::Disturbance& d : source.axis) {
+    d.passes = arguments.passes;
+    d.pass_period_s = arguments.every_s;
+    d.pass_length_s = arguments.pass_s;
+  }
+  if (!arguments.from.empty()) {
+    result.inputs.push_back(arguments.from);
+    read_measured(arguments, source);
+  }
+  if (arguments.bias != 0) std::fill(std::begin(source.bias_N), std::end(source.bias_N), arguments.bias);
+  const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
+  if (!arguments.certificate.empty() || has_network) {
+    read_lipschitz(arguments, source, result.inputs, source.further_assumptions);
+  }
+  if (!arguments.truth.empty()) {
+    result.inputs.push_back(arguments.truth);
+    result.truth = read_truth(arguments, tracking);
+    add_truth(*result.truth, source);
+  }
+  return result;
+}
+
+}  // namespace swarmcert::analysis

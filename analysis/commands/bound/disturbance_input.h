@@ -1,0 +1,44 @@
+/// @file Where the numbers of a force error come from: declared, measured, a declared truth, or a network's constant.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/commands/bound/truth_input.h"
+
+namespace swarmcert::analysis {
+
+struct DisturbanceArguments {
+  double rate = -1, amplitude = -1, edge = -1, impulse = -1;  ///< negative: not given
+  double bias = 0;
+  int passes = 1;
+  double every_s = 0, pass_s = 0;
+  std::string from;  ///< compare.json
+  std::string quantile = "p99";
+  std::string certificate;
+  files::NetworkArguments network;
+  std::string truth;                      ///< model.toml whose effects are the true force
+  double speed = -1, acceleration = -1;   ///< of a neighbour relative to the vehicle
+  double own_speed = -1, own_accel = -1;  ///< of every vehicle
+  double thrust_rate = -1;
+  double least_height = 0, largest_height = -1;
+  double neighbour_mass = 0;  ///< 0: as the truth's own
+  std::string gap;            ///< "FROM:TO"
+  int neighbours = 1;
+};
+
+void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments);
+
+struct LoadedDisturbance {
+  stability::DisturbanceSource source;
+  std::optional<Truth> truth;
+  std::vector<std::string> inputs;  ///< files that were read
+};
+
+/// In order: --rate and the like (declared), --from (measured), --truth (with the network's rate where one is named),
+/// a certificate or a network with --speed (rate of f_hat, which is no learning error).
+/// @throws UsageError for combinations that mean nothing; files::InputError for bad files.
+LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const Tracking& tracking);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,72 @@
+#include <fmt/core.h>
+
+#include "analysis/commands/bound/bound_extras.h"
+#include "stability/bounds/coupled_swarm.h"
+
+namespace swarmcert::analysis {
+
+using files::Json;
+using namespace stability;  // NOLINT: every name below is of that library
+
+Json swarm_json(const Tracking& input, const std::string& path) {
+  const CoupledSwarm swarm = read_coupled_swarm(path);
+  if (!axis_loop(input.gains, input.plant, 2))
+    throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
+  const CoupledVerdict verdict = couple(swarm, input.gains, input.plant);
+  const SmallGain& found = verdict.small_gain;
+  Json entries = Json::array();
+  for (std::size_t i = 0; i < swarm.couplings.size(); ++i) {
+    entries.push_back({{"on", swarm.couplings[i].on},
+                       {"by", swarm.couplings[i].by},
+                       {"missing_factor", found.proved ? Json() : Json(found.missing_factor_of[i])}});
+  }
+  const std::optional<UnstableSwarm>& unstable = verdict.unstable;
+  Json witness;
+  if (unstable) {
+    witness = {{"of", unstable->is_declared ? "the swarm as declared" : "one swarm of the class"},
+               {"signs", unstable->sign},
+               {"growth_1_s", unstable->growth_1_s},
+               {"simulated_s", unstable->seconds},
+               {"error_over_initial", unstable->largest_error}};
+  }
+  return {{"verdict", found.proved           ? "proved"
+                      : verdict.is_refuted() ? "refuted"
+                                             : "inconclusive"},
+          {"witness", std::move(witness)},
+          {"loop", "continuous"},
+          {"axis", "z"},
+          {"Gamma", found.Gamma},
+          {"spectral_radius", {found.spectral_radius_lower, found.spectral_radius_upper}},
+          {"rate_N_s", found.rate_N_s},
+          {"error_m", found.error_m},
+          {"missing_factor", found.missing_factor},
+          {"couplings", std::move(entries)}};
+}
+
+void print_swarm(const Json& swarm) {
+  fmt::print("\nSwarm small gain (z, continuous): rho(Gamma) <= {:.6g}: {}\n",
+             swarm["spectral_radius"][1].get<double>(), swarm["verdict"].get<std::string>());
+  if (swarm["verdict"] == "proved") {
+    for (std::size_t i = 0; i < swarm["rate_N_s"].size(); ++i) {
+      fmt::print("  vehicle {}: |eps'| at most {:.6g} N/s, |e| at most {:.6g} m in the long run\n", i,
+                 swarm["rate_N_s"][i].get<double>(), swarm["error_m"][i].get<double>());
+    }
+    return;
+  }
+  if (!swarm["witness"].is_null()) {
+    fmt::print("  {}: errors grow by {:.4g} 1/s; simulated, {:.4g} times the initial error\n",
+               swarm["verdict"] == "refuted" ? "with the directions stated"
+                                             : "if all forces of the class are allowed",
+               swarm["witness"]["growth_1_s"].get<double>(),
+               swarm["witness"]["error_over_initial"].get<double>());
+  }
+  fmt::print("  all couplings times {:.4g} would do\n", swarm["missing_factor"].get<double>());
+  for (const Json& c : swarm["couplings"]) {
+    const double factor = c["missing_factor"].get<double>();
+    fmt::print("  force on {} by {}: {}\n", c["on"].get<int>(), c["by"].get<int>(),
+               factor > 0 ? fmt::format("alone times {:.4g} would do", factor)
+                          : std::string("alone does not suffice"));
+  }
+}
+
+}  // namespace swarmcert::analysis

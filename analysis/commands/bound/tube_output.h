@@ -1,0 +1,34 @@
+/// @file `bound --tube --task`: the tube around a task, from the command line to JSON, text and a plot.
+#pragma once
+
+#include <string>
+
+#include "analysis/commands/bound/disturbance_input.h"
+#include "analysis/commands/shared/tracking_input.h"
+#include "analysis/tracking/tube/local_tube.h"
+
+namespace swarmcert::analysis {
+
+class Report;
+
+struct TubeArguments {
+  std::string task;  ///< empty: no tube around a task
+  int vehicles = 2;
+  double duration_s = 0;  ///< 0: the task's own
+};
+
+/// Declares --task, --vehicles, --duration.
+void declare_tube(CLI::App& app, TubeArguments& arguments);
+
+/// Reads the network and the truth that `disturbance` names and looks for the tube, with progress.
+/// @throws UsageError where network, truth or task are missing or make no sense; files::InputError for bad files.
+LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
+                          const Tracking& tracking, const CommonOptions& common,
+                          std::vector<std::string>& inputs);
+
+files::Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube);
+void print_local_tube(const files::Json& tube);
+/// Errors allowed over time, per vehicle, inside the radius.
+void add_local_tube_plot(Report& report, const LocalTube& tube, const files::Json& json);
+
+}  // namespace swarmcert::analysis

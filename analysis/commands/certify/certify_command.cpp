@@ -1,0 +1,353 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <limits>
+#include <memory>
+#include <sstream>
+
+#include "analysis/cli/progress.h"
+#include "analysis/commands/certify/certify_output.h"
+#include "analysis/commands/certify/certify_report.h"
+#include "analysis/commands/commands.h"
+#include "lipschitz/certify.h"
+#include "nn/base/file_io.h"
+#include "nn/base/parallel.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using lipschitz::Certification;
+using lipschitz::CertifiedBound;
+using lipschitz::CertifiedLayer;
+using lipschitz::Verdict;
+
+struct CertifyOptions {
+  files::NetworkArguments network;
+  std::string method = "auto";
+  std::string as;
+  std::string blocks;
+  std::string neighbours;
+  std::string domain;
+  std::string map, cells;
+  bool range = false;
+  bool explain = false;
+  double input_step = 0;
+  std::string output;
+  std::string report;
+  std::optional<int> nodes;
+  double seconds = 0;
+  double gamma = 0;
+  double max_lipschitz = 0;
+  lipschitz::SlopeMapOptions slope_map;
+  lipschitz::CertifyOptions certify;
+};
+
+bool is_composed(const CertifiedBound& bound) {
+  return bound.function == "network" || bound.function.rfind("set:", 0) == 0;
+}
+
+/// Refuted if anything is, inconclusive if anything else is, proved if all is.
+Verdict all_of(const std::vector<Verdict>& verdicts) {
+  Verdict total = Verdict::kProved;
+  for (const Verdict verdict : verdicts) {
+    if (verdict == Verdict::kRefuted) return Verdict::kRefuted;
+    if (verdict == Verdict::kInconclusive) total = Verdict::kInconclusive;
+  }
+  return total;
+}
+
+/// Whether gamma holds in every layer and --max-lipschitz for every composed function, where they are stated.
+Verdict judge(const Certification& found, double max_lipschitz) {
+  std::vector<Verdict> verdicts;
+  for (const CertifiedLayer& layer : found.layers) {
+    if (layer.respects_gamma) verdicts.push_back(*layer.respects_gamma);
+  }
+  for (const CertifiedBound& bound : found.bounds) {
+    if (max_lipschitz <= 0 || !is_composed(bound)) continue;
+    if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
+    const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
+    verdicts.push_back(bound.upper.value() <= max_lipschitz ? Verdict::kProved
+                       : lower > max_lipschitz              ? Verdict::kRefuted
+                                                            : Verdict::kInconclusive);
+  }
+  return all_of(verdicts);
+}
+
+/// "3": as many of each kind; "small=1,large=2": that group.
+void parse_neighbours(const std::string& text, lipschitz::ClaimOptions& claims) {
+  const auto refuse = [&text]() {
+    throw UsageError("--neighbours " + text + ": give a number (3) or a group (small=1,large=2)");
+  };
+  const auto number = [&refuse](const std::string& digits) {
+    int value = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error != std::errc() || end != digits.data() + digits.size() || value < 1 || value > 1000000)
+      refuse();
+    return value;
+  };
+  if (text.find('=') == std::string::npos) {
+    claims.neighbours = number(text);
+    return;
+  }
+  std::istringstream list(text);
+  for (std::string item; std::getline(list, item, ',');) {
+    const std::size_t equals = item.rfind('=');
+    if (equals == std::string::npos ||
+        !claims.mixture.emplace(item.substr(0, equals), number(item.substr(equals + 1))).second)
+      refuse();
+  }
+}
+
+void parse_blocks(const std::string& text, lipschitz::ClaimOptions& claims) {
+  std::istringstream list(text);
+  for (std::string item; std::getline(list, item, ',');) claims.blocks.push_back(item);
+}
+
+/// certify(); what the options ask for and NET has not is a matter of usage.
+Certification certify_or_refuse(const files::Network& network, const lipschitz::CertifyOptions& options) {
+  try {
+    return certify(network, options);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+}
+
+void add_comparisons(const files::Network& network, const lipschitz::CertifyOptions& options,
+                     CertifyOutput& output) {
+  const std::vector<CertifiedBound>& bounds = output.found.bounds;
+  output.comparisons.resize(bounds.size());
+  files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
+    const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
+    if (bound.block == "all" && bound.scale.empty() && bound.neighbours.empty())
+      output.comparisons[static_cast<std::size_t>(i)] =
+          lipschitz::compare(network, bound.function, bound.block, bound.scale);
+  });
+}
+
+/// Range and float32 error over the box of --domain, or over what the clamp lets through.
+void add_ranges(const files::Network& network, const CertifyOptions& options, CertifyOutput& output) {
+  const std::map<std::string, lipschitz::Box> domain =
+      options.domain.empty() ? lipschitz::clamp_domain(network) : options.certify.domain;
+  if (domain.empty()) throw UsageError("--range needs a box: give --domain, or a clamp in network.toml");
+  std::map<std::string, double> bounds, rho_bounds;
+  for (const CertifiedBound& bound : output.found.bounds) {
+    if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
+    bounds[bound.function] = bound.upper.value();
+    if (bound.function.rfind("rho:", 0) == 0) rho_bounds[bound.function.substr(4)] = bound.upper.value();
+  }
+  lipschitz::RangeOptions range;
+  range.neighbours = std::max(1, options.certify.neighbours);
+  range.jobs = options.certify.jobs;
+  output.ranges = lipschitz::ranges(network, domain, rho_bounds, range);
+  for (const auto& [name, weights] : files::parts(network))
+    if (weights->precision != files::Precision::kFloat32)
+      return;  // what flies are other weights: --as float32
+  lipschitz::Float32Options float32;
+  float32.neighbours = range.neighbours;
+  float32.input_step = options.input_step;
+  float32.jobs = range.jobs;
+  output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
+}
+
+/// "dp_x_m,dp_z_m" and "12" or "12,8".
+void parse_map(const CertifyOptions& options, const files::Network& network,
+               lipschitz::SlopeMapOptions& map) {
+  const auto halves = [](const std::string& text, const char* option, const char* form) {
+    const std::size_t comma = text.find(',');
+    if (comma == std::string::npos || text.find(',', comma + 1) != std::string::npos)
+      throw UsageError(fmt::format("{} {}: {}", option, text, form));
+    return std::array<std::string, 2>{text.substr(0, comma), text.substr(comma + 1)};
+  };
+  const auto names = halves(options.map, "--map", "name two inputs, e.g. dp_x_m,dp_z_m");
+  try {
+    for (std::size_t d = 0; d < 2; ++d) map.coordinates[d] = lipschitz::map_coordinate(network, names[d]);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--map: ") + error.what());
+  }
+  if (map.coordinates[0] == map.coordinates[1]) throw UsageError("--map: name two different inputs");
+  if (options.cells.empty()) return;
+  constexpr const char* kForm = "give 2 to 200 cells along each input, e.g. 12 or 12,8";
+  const auto counts = options.cells.find(',') == std::string::npos
+                          ? std::array<std::string, 2>{options.cells, options.cells}
+                          : halves(options.cells, "--cells", kForm);
+  for (std::size_t d = 0; d < 2; ++d) {
+    int& count = map.cells[d];
+    const char* const last = counts[d].data() + counts[d].size();
+    const auto [end, error] = std::from_chars(counts[d].data(), last, count);
+    if (error != std::errc() || end != last || count < 2 || count > 200)
+      throw UsageError(fmt::format("--cells {}: {}", options.cells, kForm));
+  }
+}
+
+int run_certify(CertifyOptions options, const CommonOptions& common) {
+  refuse_to_replace(common, options.output);
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
+  parse_blocks(options.blocks, options.certify);
+  files::Network network = load_net(options.network);
+  if (!options.neighbours.empty() && network.plain)
+    throw UsageError(
+        "--neighbours " + options.neighbours +
+        ": the file holds one plain network, which has none; give a network.toml or --phi and --rho");
+  if (options.as == "float32") network = files::as_float32(std::move(network));
+  if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
+  lipschitz::SlopeMapOptions map = options.slope_map;
+  if (!options.map.empty()) {
+    if (options.domain.empty()) throw UsageError("--map needs the box of --domain");
+    parse_map(options, network, map);
+  }
+  if (options.gamma != 0) options.certify.gamma = files::GammaStatement{options.gamma};
+  options.certify.method = options.method == "branch"    ? lipschitz::UpperMethod::kBranch
+                           : options.method == "sdp"     ? lipschitz::UpperMethod::kSdp
+                           : options.method == "product" ? lipschitz::UpperMethod::kProduct
+                                                         : lipschitz::UpperMethod::kAuto;
+  options.certify.jobs = common.jobs;
+  if (options.method == "branch") {
+    if (options.nodes == 0) throw UsageError("--nodes 0: branch and bound looks at one box at least");
+    if (options.nodes) options.certify.branch.nodes = *options.nodes;
+    if (!options.nodes && options.seconds > 0) options.certify.branch.nodes = std::numeric_limits<int>::max();
+    options.certify.branch.seconds = options.seconds;
+  } else {
+    if (options.certify.branch.pairs > 0 || !options.certify.branch.better_slopes)
+      throw UsageError("--cuts and --default-slopes are options of the search: they need --method branch");
+    options.certify.lower.rounds = options.nodes;
+    options.certify.lower.seconds = options.seconds;
+  }
+  Progress progress(common.quiet);
+  options.certify.progress = [&progress](int done, int total, const std::string& what) {
+    progress.show(done, total, what);
+  };
+  const CancelOnInterrupt interrupt;
+  options.certify.cancelled = interrupt.flag();
+
+  CertifyOutput output;
+  output.found = certify_or_refuse(network, options.certify);
+  output.found.as_float32 = options.as == "float32";
+  output.seed = options.certify.lower.seed;
+  output.max_lipschitz = options.max_lipschitz;
+  output.domain_file = options.domain;
+  const Certification& found = output.found;
+  if (options.explain) add_comparisons(network, options.certify, output);
+  if (!options.domain.empty() || options.range) add_ranges(network, options, output);
+  if (!options.map.empty()) {
+    map.domain = options.certify.domain;
+    map.seed = options.certify.lower.seed;
+    map.jobs = common.jobs;
+    map.cancelled = interrupt.flag();
+    map.progress = [&progress](int done, int total) { progress.show(done, total, "cells of the map"); };
+    output.map = map;
+    output.maps = lipschitz::slope_maps(network, found, map);
+  }
+  const Verdict verdict = output.verdict = judge(found, options.max_lipschitz);
+  if (!options.output.empty()) {
+    files::write_file(options.output, files::to_text(certificate(network, found)), common.force);
+  }
+  const files::Json result = certify_json(network, output);
+  write_result(common, result);
+  if (common.prints_text()) {
+    print_certification(network, output);
+    if (options.max_lipschitz > 0)
+      fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
+    if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
+    fmt::print("verdict: {}\n", name(verdict));
+  }
+  if (!options.report.empty()) {
+    const std::string path = write_certify_report(network, output, result, options.report, common.force);
+    if (common.prints_text()) fmt::print("report: {}\n", path);
+  }
+  return verdict == Verdict::kProved ? kDone : verdict == Verdict::kRefuted ? kViolated : kInconclusive;
+}
+
+}  // namespace
+
+Command certify_command() {
+  return {
+      "certify", "Spectral norms and Lipschitz bounds of a network that hold in exact arithmetic",
+      "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
+      "the proofs\n"
+      "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
+      "float32 points.\n"
+      "Verdict: proved (exit 0), refuted (1) or inconclusive (4), of --gamma and --max-lipschitz where "
+      "given, and of\n"
+      "the gamma that a network.toml states.\n\n"
+      "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<CertifyOptions>();
+        declare_network(app, options->network);
+        app.add_option(
+               "--method", options->method,
+               "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), auto, the smaller one, "
+               "or branch: branch "
+               "and bound over the box of --domain, for bounds that hold there only, or over all inputs")
+            ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
+            ->capture_default_str();
+        app.add_option("--as", options->as,
+                       "Certify the weights rounded to this precision, as a C compiler flashes them")
+            ->check(CLI::IsMember({"float32"}));
+        app.add_flag(
+            "--blocks{every}", options->blocks,
+            "Bounds per block of inputs as well: --blocks for all, or --blocks=position,velocity,x2");
+        app.add_option("--scale", options->certify.scale,
+                       "Bounds in the norm sqrt(sum (dx_k / scale_k)^2) as well: one number per input")
+            ->delimiter(',');
+        app.add_option(
+            "--neighbours", options->neighbours,
+            "Laws for several neighbours: a number of each kind, or a group such as small=1,large=2. With "
+            "--method branch also the bound for one that moves among at most so many, all in the box");
+        app.add_option("--domain", options->domain,
+                       "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
+        app.add_option("--cuts", options->certify.branch.pairs,
+                       "With --method branch: pairs of neurons that exclude each other, at most so many per "
+                       "box. Fewer boxes and a shorter certificate for the same bound, but more time")
+            ->check(CLI::Range(0, 1000))
+            ->capture_default_str();
+        app.add_flag_callback(
+            "--default-slopes", [options] { options->certify.branch.better_slopes = false; },
+            "With --method branch: no better lower slopes for neurons that are nearly decided (to compare)");
+        auto* map = app.add_option("--map", options->map,
+                                   "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
+                                   "by cell; the slope in a "
+                                   "cell is proved above and witnessed below, the other inputs range over "
+                                   "the box (JSON and report)");
+        app.add_option("--cells", options->cells, "Cells of --map along each input (default: 12), e.g. 12,8")
+            ->needs(map);
+        app.add_option("--cell-nodes", options->slope_map.nodes,
+                       "Boxes that branch and bound looks at, per cell of --map")
+            ->needs(map)
+            ->check(CLI::Range(1, 1000000))
+            ->capture_default_str();
+        app.add_flag("--range", options->range,
+                     "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it");
+        app.add_option("--input-step", options->input_step,
+                       "Inputs are quantised to multiples of this (float32 error)")
+            ->check(CLI::NonNegativeNumber);
+        app.add_flag("--explain", options->explain,
+                     "Other bounds for comparison, and where the bound is lost");
+        app.add_option("--gamma", options->gamma, "Limit that every layer's spectral norm must keep")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--max-lipschitz", options->max_lipschitz,
+                       "Limit on the Lipschitz constant of the network, or of every set function")
+            ->check(CLI::PositiveNumber);
+        app.add_option(
+               "--nodes", options->nodes,
+               "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
+               "networks). With --method branch: boxes to look at, per bound (default: 20000)")
+            ->check(CLI::NonNegativeNumber);
+        app.add_option(
+               "--time", options->seconds,
+               "End the search for a lower bound after the round in which this many seconds pass; with "
+               "--method branch: the search for an upper bound, per bound")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--seed", options->certify.lower.seed, "Of the search for lower bounds")
+            ->capture_default_str();
+        app.add_option("-o,--output", options->output, "Where the certificate goes");
+        app.add_option("--report", options->report, "Folder for an HTML report with its plots");
+        return [options](const CommonOptions& common) { return run_certify(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,374 @@
+#include "analysis/commands/certify/certify_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "analysis/cli/command.h"
+#include "analysis/commands/certify/branch_outlook.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using files::Json;
+using lipschitz::Attained;
+using lipschitz::Certification;
+using lipschitz::CertifiedBound;
+using lipschitz::CertifiedLayer;
+using lipschitz::coordinate_name;
+using lipschitz::Verdict;
+
+std::string output_unit(const files::Network& network) {
+  return network.output_unit.empty() ? "output" : network.output_unit;
+}
+
+Json attained_json(const Attained& attained) {
+  Json points = Json::array();
+  for (std::size_t j = 0; j < attained.points.size(); ++j)
+    points.push_back({{"network", attained.networks[j]}, {"x", attained.points[j]}});
+  return {{"value", attained.value}, {"points", std::move(points)}};
+}
+
+Json range_json(const files::Network& network, const lipschitz::CertifiedRange& range) {
+  return {{"function", range.function},
+          {"output", range.output},
+          {"domain", "box"},
+          {"neighbours", range.neighbours_at_most},
+          {"unit", output_unit(network)},
+          {"lower", range.lower},
+          {"upper", range.upper},
+          {"largest_magnitude", range.largest()},
+          {"lower_witness", attained_json(range.least)},
+          {"upper_witness", attained_json(range.greatest)},
+          {"cut_off_jump", range.jump}};
+}
+
+double slope_of(const CertifiedBound& bound) {
+  return bound.lower.witness ? bound.lower.witness->slope.value() : 0;
+}
+
+Json comparison_json(const CertifiedBound& bound, const lipschitz::Comparison& comparison) {
+  Json stages = Json::array();
+  for (const lipschitz::StageLoss& stage : comparison.stages)
+    stages.push_back(
+        {{"layer", stage.name}, {"norm", stage.norm}, {"gain", stage.gain}, {"loss", stage.loss()}});
+  Json json = {{"combettes_pesquet_upper", nullptr},
+               {"eclipse_fast_upper", nullptr},
+               {"pattern_floor_estimate", comparison.floor.slope.value()},
+               {"stages", std::move(stages)},
+               {"words", explain(comparison, bound.product.value(), bound.upper.value(), slope_of(bound))}};
+  if (comparison.combettes_pesquet) json["combettes_pesquet_upper"] = comparison.combettes_pesquet->value();
+  if (comparison.eclipse_fast) json["eclipse_fast_upper"] = comparison.eclipse_fast->upper.value();
+  return json;
+}
+
+Json outlook_json(const CertifiedBound& bound) {
+  const std::optional<BranchOutlook> outlook = branch_outlook(bound);
+  if (!outlook) return nullptr;
+  return {{"ratio", BranchOutlook::kRatio},
+          {"boxes_estimate", outlook->boxes ? Json(*outlook->boxes) : Json()},
+          {"gap_halfway", outlook->gap_halfway},
+          {"undecided", bound.outlook.undecided},
+          {"neurons", bound.outlook.neurons},
+          {"slope_in_part_estimate", bound.outlook.slope_in_part},
+          {"relaxation_share_estimate", outlook->relaxation_share},
+          {"words", branch_outlook_words(bound)}};
+}
+
+Json witness_json(const lipschitz::FoundSlope& found) {
+  if (!found.witness) return nullptr;
+  Json others = Json::array();
+  for (std::size_t j = 0; j < found.witness->others.size(); ++j) {
+    others.push_back({{"network", found.other_networks[j]}, {"x", found.witness->others[j]}});
+  }
+  return {{"x", found.witness->x}, {"y", found.witness->y}, {"others", std::move(others)}};
+}
+
+std::string group_label(const lipschitz::Neighbours& neighbours) {
+  std::string text;
+  for (const auto& [kind, count] : neighbours)
+    text += fmt::format("{}{} {}", text.empty() ? "" : " + ", count, kind);
+  return text;
+}
+
+}  // namespace
+
+std::string label(const CertifiedBound& bound) {
+  return bound.function + (bound.block == "all" ? "" : " " + bound.block) +
+         (bound.scale.empty() ? "" : " scaled") +
+         (bound.neighbours.empty() ? "" : ", at most " + group_label(bound.neighbours));
+}
+
+std::vector<std::string> explain(const lipschitz::Comparison& comparison, double product, double upper,
+                                 double lower) {
+  std::vector<std::string> words;
+  const double floor = comparison.floor.slope.value();
+  words.push_back(fmt::format(
+      "The product of norms is {:.3g} times the proved bound: it takes every layer at its steepest "
+      "direction and every ReLU as open.",
+      product / upper));
+  const lipschitz::StageLoss* worst = nullptr;
+  for (const lipschitz::StageLoss& stage : comparison.stages)
+    if (worst == nullptr || stage.loss() > worst->loss()) worst = &stage;
+  if (worst != nullptr && worst->gain > 0)
+    words.push_back(fmt::format(
+        "{} wastes most: its norm is {:.4g}, but along the steepest pattern it amplifies by {:.4g} "
+        "(a factor {:.3g}). Regularising it further costs the least.",
+        worst->name, worst->norm, worst->gain, worst->loss()));
+  double open = 1;
+  std::size_t tightest = 0;
+  for (std::size_t k = 0; k < comparison.floor.relu_gains.size(); ++k) {
+    open *= comparison.floor.relu_gains[k];
+    if (comparison.floor.relu_gains[k] < comparison.floor.relu_gains[tightest]) tightest = k;
+  }
+  if (!comparison.floor.relu_gains.empty() && open > 0)
+    words.push_back(
+        fmt::format("ReLUs that close take a factor {:.3g} off the product, most of it behind {}.", 1 / open,
+                    comparison.stages[tightest].name));
+  if (floor > 0)
+    words.push_back(fmt::format(
+        "At most {:.2g} % of the bound is the relaxation: some ReLU pattern has the slope {:.8g}, and "
+        "no method that ignores which patterns are reachable gets below it.",
+        100 * (upper / floor - 1), floor));
+  if (lower > 0 && floor > lower)
+    words.push_back(
+        fmt::format("The remaining factor {:.4g} down to the steepest slope found is patterns that no input "
+                    "reaches, or slopes that the search did not find.",
+                    floor / lower));
+  return words;
+}
+
+namespace {
+
+/// A cell's box holds the two coordinates of the map; the others are the same for all cells.
+Json map_json(const files::Network& network, const lipschitz::SlopeMapOptions& options,
+              const lipschitz::SlopeMap& map) {
+  const auto [first, second] = options.coordinates;
+  const std::string names[] = {coordinate_name(network, first), coordinate_name(network, second)};
+  const auto interval = [](const lipschitz::Box& box, int k) {
+    return Json{box.lower[static_cast<std::size_t>(k)], box.upper[static_cast<std::size_t>(k)]};
+  };
+  Json others = Json::object(), cells = Json::array();
+  const lipschitz::Box& any = map.cells.front().box;
+  for (int k = 0; k < static_cast<int>(any.lower.size()); ++k) {
+    if (k != first && k != second) others[coordinate_name(network, k)] = interval(any, k);
+  }
+  for (const lipschitz::SlopeCell& cell : map.cells) {
+    cells.push_back({{"box", {{names[0], interval(cell.box, first)}, {names[1], interval(cell.box, second)}}},
+                     {"upper", cell.upper.value()},
+                     {"upper_method", cell.is_local ? "branch" : "everywhere"},
+                     {"lower", cell.lower.witness ? Json(cell.lower.witness->slope.value()) : Json()},
+                     {"lower_witness", witness_json(cell.lower)}});
+  }
+  return {{"function", map.function},
+          {"coordinates", names},
+          {"shape", options.cells},
+          {"others", std::move(others)},
+          {"norm", "l2"},
+          {"unit", files::unit(network, map.function)},
+          {"nodes", options.nodes},
+          {"cells", std::move(cells)}};
+}
+
+}  // namespace
+
+Json certify_json(const files::Network& network, const CertifyOutput& output) {
+  const Certification& found = output.found;
+  Json layers = Json::array();
+  for (const CertifiedLayer& layer : found.layers) {
+    Json respects;
+    if (layer.respects_gamma == Verdict::kProved) respects = true;
+    if (layer.respects_gamma == Verdict::kRefuted) respects = false;
+    layers.push_back({{"network", layer.network},
+                      {"name", layer.name},
+                      {"spectral_norm", {layer.norm.norm.lower.value(), layer.norm.norm.upper.value()}},
+                      {"respects_gamma", respects}});
+  }
+  Json bounds = Json::array();
+  for (std::size_t i = 0; i < found.bounds.size(); ++i) {
+    const CertifiedBound& bound = found.bounds[i];
+    Json json = summary(network, bound);
+    json["lower_witness"] = witness_json(bound.lower);
+    json["product_upper"] = bound.product.value();
+    json["search_rounds"] = bound.lower.rounds;
+    if (bound.nodes > 0) {
+      json["nodes"] = bound.nodes;
+      const bool has_lower = bound.lower.witness && bound.lower.witness->slope.value() > 0;
+      json["gap"] = has_lower ? Json(bound.upper.value() / bound.lower.witness->slope.value() - 1) : Json();
+      json["outlook"] = outlook_json(bound);
+    }
+    if (bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) json["sdp_stop"] = name(bound.sdp.stop);
+    if (i < output.comparisons.size() && output.comparisons[i])
+      json["comparison"] = comparison_json(bound, *output.comparisons[i]);
+    bounds.push_back(std::move(json));
+  }
+  for (const lipschitz::CertifiedLaw& law : found.laws) bounds.push_back(summary(network, law));
+  std::vector<std::string> inputs = input_files(network);
+  if (!output.domain_file.empty()) inputs.push_back(output.domain_file);
+  Json result = result_head("certify", inputs);
+  result["seed"] = output.seed;
+  result["as"] = found.as_float32 ? Json("float32") : Json();
+  result["gamma"] = found.gamma ? Json(found.gamma->value) : Json();
+  result["max_lipschitz"] = output.max_lipschitz > 0 ? Json(output.max_lipschitz) : Json();
+  result["layers"] = std::move(layers);
+  result["bounds"] = std::move(bounds);
+  if (!output.maps.empty()) {
+    result["slope_maps"] = Json::array();
+    for (const lipschitz::SlopeMap& map : output.maps)
+      result["slope_maps"].push_back(map_json(network, output.map, map));
+  }
+  result["range"] = Json::array();
+  for (const lipschitz::CertifiedRange& range : output.ranges)
+    result["range"].push_back(range_json(network, range));
+  result["float32_error"] = Json::array();
+  for (const lipschitz::Float32Error& error : output.float32_errors) {
+    result["float32_error"].push_back({{"function", error.function},
+                                       {"neighbours", error.neighbours_at_most},
+                                       {"unit", output_unit(network)},
+                                       {"bound", error.total.value()},
+                                       {"evaluation", error.evaluation.value()},
+                                       {"inputs", error.inputs.value()}});
+  }
+  result["verdict"] = name(output.verdict);
+  return result;
+}
+
+namespace {
+
+std::string sizes(const files::Weights& weights) {
+  std::string text = std::to_string(weights.inputs());
+  for (const files::Layer& layer : weights.layers) text += "-" + std::to_string(layer.outputs);
+  return text;
+}
+
+void print_layers(const files::Network& network, const Certification& found) {
+  fmt::print("Spectral norms, enclosed from both sides in exact arithmetic\n");
+  for (const auto& [name, weights] : files::parts(network)) {
+    fmt::print("  {}  {}  ({}, {})\n", name, weights->path, sizes(*weights), files::name(weights->precision));
+    for (const CertifiedLayer& layer : found.layers) {
+      if (layer.network != name) continue;
+      const double lower = layer.norm.norm.lower.value();
+      const double upper = layer.norm.norm.upper.value();
+      std::string remark;
+      if (layer.respects_gamma) {
+        const double value = found.gamma->value;
+        const bool per_layer = found.gamma->scope == files::GammaStatement::Scope::kLayer;
+        const bool is_equal = found.gamma->mode == files::GammaStatement::Mode::kEqual;
+        const std::string limit = per_layer  ? fmt::format("gamma {}", value)
+                                  : is_equal ? fmt::format("its share of gamma {}", value)
+                                             : fmt::format("gamma {} over all layers", value);
+        remark = *layer.respects_gamma == Verdict::kProved    ? "  within " + limit
+                 : *layer.respects_gamma == Verdict::kRefuted ? "  VIOLATES " + limit
+                                                              : "  too close to " + limit + " to tell";
+        if (per_layer && *layer.respects_gamma == Verdict::kRefuted)
+          remark += fmt::format(" by {:+.3g}", lower - value);
+      }
+      fmt::print("    {:<8} {:.15g} .. {:.15g}{}\n", layer.name, lower, upper, remark);
+    }
+  }
+}
+
+void print_bounds(const files::Network& network, const Certification& found) {
+  std::size_t width = 8;
+  for (const CertifiedBound& bound : found.bounds) width = std::max(width, label(bound).size());
+  fmt::print("\nLipschitz constants over {}, Euclidean norms\n",
+             found.domain.empty() ? "all inputs" : "the box");
+  fmt::print("  {:<{}}  {:>14}  {:<7}  {:>12}  {:>14}  {:>6}  {}\n", "function", width, "proved upper",
+             "method", "product", "witnessed", "ratio", "unit");
+  for (const CertifiedBound& bound : found.bounds) {
+    const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
+    fmt::print("  {:<{}}  {:>14.10g}  {:<7}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
+               bound.upper.value(), name(bound.method), bound.product.value(),
+               bound.lower.witness ? fmt::format("{:.8g}", lower) : "-",
+               lower > 0 ? fmt::format("{:.3f}", bound.upper.value() / lower) : "-",
+               files::unit(network, bound.function, bound.block));
+    const bool unproved = !bound.proof && !bound.sdp.proof && !bound.local;
+    if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) {
+      fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
+                 name(bound.sdp.stop));
+    }
+    const std::string outlook = branch_outlook_words(bound);
+    if (!outlook.empty()) fmt::print("    {}\n", outlook);
+  }
+  if (!network.rho.empty()) {
+    fmt::print("  set: per neighbour that moves, whatever the number and the places of the others\n");
+    const auto is_counted = [](const CertifiedBound& bound) { return !bound.neighbours.empty(); };
+    if (std::any_of(found.bounds.begin(), found.bounds.end(), is_counted))
+      fmt::print("  at most: while all neighbours are in the box, and no more than these\n");
+  }
+  const auto is_block = [](const CertifiedBound& bound) { return bound.block == "position"; };
+  if (std::any_of(found.bounds.begin(), found.bounds.end(), is_block))
+    fmt::print("  blocks add up: |df| <= L_position |dp| + L_velocity |dv|\n");
+}
+
+void print_comparisons(const CertifyOutput& output) {
+  for (std::size_t i = 0; i < output.comparisons.size(); ++i) {
+    if (!output.comparisons[i]) continue;
+    const lipschitz::Comparison& comparison = *output.comparisons[i];
+    const CertifiedBound& bound = output.found.bounds[i];
+    const auto shown = [](double value) {
+      return value > 0 ? fmt::format("{:.10g}", value) : std::string("none proved");
+    };
+    fmt::print("\nWhere the bound of {} is lost\n", label(bound));
+    fmt::print(
+        "  product of norms {:.8g}, ECLipsE-Fast {}, Combettes-Pesquet {}, proved {:.10g}, pattern floor "
+        "{:.8g}\n",
+        bound.product.value(), shown(comparison.eclipse_fast ? comparison.eclipse_fast->upper.value() : 0),
+        shown(comparison.combettes_pesquet ? comparison.combettes_pesquet->value() : 0), bound.upper.value(),
+        comparison.floor.slope.value());
+    for (const std::string& sentence :
+         explain(comparison, bound.product.value(), bound.upper.value(), slope_of(bound)))
+      fmt::print("  {}\n", sentence);
+  }
+}
+
+void print_ranges(const files::Network& network, const CertifyOutput& output) {
+  if (!output.ranges.empty())
+    fmt::print("\nRange over the box, proved (attained by points in brackets), in {}\n",
+               output_unit(network));
+  for (const lipschitz::CertifiedRange& range : output.ranges) {
+    const std::string many =
+        range.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", range.neighbours_at_most) : "";
+    fmt::print("  {}{}: {:.6g} ({:.6g}) .. ({:.6g}) {:.6g}", range.function, many, range.lower,
+               range.least.value, range.greatest.value, range.upper);
+    if (range.neighbours_at_most == 1)
+      fmt::print("; a neighbour at a cut-off: a jump of at most {:.6g}", range.jump);
+    fmt::print("\n");
+  }
+  if (!output.float32_errors.empty())
+    fmt::print("\nFloat32 evaluation against the exact function over the box, proved, in {}\n",
+               output_unit(network));
+  for (const lipschitz::Float32Error& error : output.float32_errors) {
+    const std::string many =
+        error.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", error.neighbours_at_most) : "";
+    fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})\n", error.function, many,
+               error.total.value(), error.evaluation.value(), error.inputs.value());
+  }
+}
+
+void print_laws(const files::Network& network, const Certification& found) {
+  if (found.laws.empty()) return;
+  fmt::print("\nSeveral neighbours at once{}{}\n",
+             network.phi.count(files::kGroundKind) == 1 ? ", and the ground's input with them" : "",
+             found.laws.front().domain == "box" ? ", all in the box" : "");
+  for (const lipschitz::CertifiedLaw& law : found.laws) {
+    const char* meaning = law.law == lipschitz::LawKind::kAllStacked ? "|df| <= L sqrt(sum_j |dx_j|^2)"
+                          : law.law == lipschitz::LawKind::kAllMax   ? "|df| <= L max_j |dx_j|"
+                                                                     : "|df| <= L |d own state|";
+    fmt::print("  {:<24} rho:{:<8} {:<9} {:<11} {:>14.10g}  {}\n", group_label(law.neighbours), law.rho,
+               law.block, name(law.law), law.upper.value(), meaning);
+  }
+}
+
+}  // namespace
+
+void print_certification(const files::Network& network, const CertifyOutput& output) {
+  print_layers(network, output.found);
+  print_bounds(network, output.found);
+  print_laws(network, output.found);
+  print_comparisons(output);
+  print_ranges(network, output);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,46 @@
+/// @file What `certify` found, as text and as JSON.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lipschitz/certify.h"
+#include "lipschitz/comparison.h"
+#include "lipschitz/float32_error.h"
+#include "lipschitz/range.h"
+#include "lipschitz/slope_map.h"
+#include "nn/base/json.h"
+#include "nn/weights/network.h"
+
+namespace swarmcert::analysis {
+
+struct CertifyOutput {
+  lipschitz::Certification found;
+  std::vector<std::optional<lipschitz::Comparison>>
+      comparisons;  ///< per bound of `found`; empty where not asked for
+  std::vector<lipschitz::CertifiedRange> ranges;
+  std::vector<lipschitz::Float32Error> float32_errors;
+  lipschitz::Verdict verdict = lipschitz::Verdict::kInconclusive;
+  double max_lipschitz = 0;  ///< 0: no limit was given
+  std::uint64_t seed = 1;
+  std::string domain_file;  ///< box.toml; empty: none
+  lipschitz::SlopeMapOptions map;
+  std::vector<lipschitz::SlopeMap> maps;
+};
+
+/// "set:small:large", "set:small:large position scaled", "set:small:large, at most 2 small".
+std::string label(const lipschitz::CertifiedBound& bound);
+
+/// What the numbers mean, in sentences.
+/// @param product product of spectral norms, `upper` the best proved bound, `lower` the steepest slope found (0: none).
+std::vector<std::string> explain(const lipschitz::Comparison& comparison, double product, double upper,
+                                 double lower);
+
+/// The fields of the schema swarmcert/certify/1.
+files::Json certify_json(const files::Network& network, const CertifyOutput& output);
+
+void print_certification(const files::Network& network, const CertifyOutput& output);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,153 @@
+#include "analysis/commands/certify/certify_report.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "analysis/report/report.h"
+#include "analysis/report/report_text.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using lipschitz::CertifiedBound;
+using lipschitz::CertifiedLayer;
+using lipschitz::coordinate_name;
+using lipschitz::SlopeCell;
+using lipschitz::SlopeMap;
+
+double slope_of(const lipschitz::FoundSlope& found) {
+  return found.witness ? found.witness->slope.value() : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string number(double x, int digits) {
+  return std::isfinite(x) ? fmt::format("{:.{}g}", x, digits) : "-";
+}
+
+void add_bounds(Report& report, const files::Network& network, const CertifyOutput& output) {
+  report.heading("Lipschitz constants");
+  std::vector<std::vector<std::string>> rows;
+  std::string data = "# function product proved witnessed\n";
+  for (const CertifiedBound& bound : output.found.bounds) {
+    const double lower = slope_of(bound.lower);
+    rows.push_back({label(bound), bound.domain, number(bound.upper.value(), 10), name(bound.method),
+                    number(bound.product.value(), 8), number(lower, 8),
+                    files::unit(network, bound.function, bound.block)});
+    // A logarithmic axis has no zero.
+    data += fmt::format("{} {:.17g} {:.17g} {}\n", plot_field(label(bound)), bound.product.value(),
+                        bound.upper.value(), lower > 0 ? fmt::format("{:.17g}", lower) : "NaN");
+  }
+  report.table(
+      {"function", "domain", "proved upper", "method", "product of norms", "witnessed lower", "unit"}, rows);
+  report.figure(
+      "bounds", data,
+      "set style data histograms\nset style fill solid 0.9 noborder\nset logscale y\n"
+      "set ylabel 'Lipschitz constant [unit: see table]'\nset xtics rotate by -30\nset boxwidth 0.9\n"
+      "plot 'bounds.dat' using 2:xtic(1) title 'product of norms' linecolor rgb '#999999', "
+      "'' using 3 title 'proved upper (joint)' linetype 1, "
+      "'' using 4 title 'witnessed lower' linetype 5\n",
+      "Product of spectral norms, proved joint bound and witnessed slope of each function: the true "
+      "constant lies between the last two. Logarithmic scale.");
+}
+
+void add_layers(Report& report, const CertifyOutput& output) {
+  report.heading("Spectral norms of the layers");
+  std::vector<std::vector<std::string>> rows;
+  std::vector<Bar> bars;
+  for (const CertifiedLayer& layer : output.found.layers) {
+    const double lower = layer.norm.norm.lower.value(), upper = layer.norm.norm.upper.value();
+    rows.push_back({layer.network, layer.name, number(lower, 15), number(upper, 15),
+                    layer.respects_gamma ? name(*layer.respects_gamma) : "not stated"});
+    bars.push_back({layer.network + " " + layer.name, upper, lower, upper});
+  }
+  report.bars(
+      "layers", bars, "spectral norm [output per input of the layer]",
+      output.found.gamma
+          ? fmt::format("Spectral norms of the layers, at most {:.6g} where gamma holds in each layer.",
+                        output.found.gamma->value)
+          : std::string("Spectral norms of the layers."));
+  report.table({"network", "layer", "at least", "at most", "within gamma"}, rows);
+}
+
+void add_map(Report& report, const files::Network& network, const CertifyOutput& output, std::size_t index) {
+  const SlopeMap& map = output.maps[index];
+  const auto first = static_cast<std::size_t>(output.map.coordinates[0]);
+  const auto second = static_cast<std::size_t>(output.map.coordinates[1]);
+  const std::string names[] = {coordinate_name(network, output.map.coordinates[0]),
+                               coordinate_name(network, output.map.coordinates[1])};
+  const auto middle = [](const SlopeCell& cell, std::size_t k) {
+    return (cell.box.lower[k] + cell.box.upper[k]) / 2;
+  };
+  const SlopeCell* steepest = &map.cells.front();
+  int local = 0;
+  std::string data = "# first second upper lower\n";
+  for (std::size_t i = 0; i < map.cells.size(); ++i) {
+    const SlopeCell& cell = map.cells[i];
+    if (cell.upper.value() > steepest->upper.value()) steepest = &cell;
+    local += cell.is_local ? 1 : 0;
+    if (i > 0 && i % static_cast<std::size_t>(output.map.cells[1]) == 0) data += "\n";
+    const double lower = slope_of(cell.lower);
+    data += fmt::format("{:.10g} {:.10g} {:.10g} {}\n", middle(cell, first), middle(cell, second),
+                        cell.upper.value(), std::isfinite(lower) ? fmt::format("{:.10g}", lower) : "NaN");
+  }
+  const std::string file = fmt::format("map_{}", index + 1);
+  const std::string unit = files::unit(network, map.function);
+  std::string others;
+  for (std::size_t k = 0; k < steepest->box.lower.size(); ++k) {
+    if (k == first || k == second) continue;
+    others += fmt::format("{}{} in {:.6g} .. {:.6g}", others.empty() ? "" : ", ",
+                          coordinate_name(network, static_cast<int>(k)), steepest->box.lower[k],
+                          steepest->box.upper[k]);
+  }
+  report.heading("Where " + map.function + " is steep");
+  report.paragraph(fmt::format(
+      "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by branch and bound; "
+      "the others keep the bound for all inputs. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
+      "at "
+      "most {:.6g}, witnessed {} {}.",
+      names[0], names[1], others.empty() ? "there are no other inputs" : "the other inputs: " + others, local,
+      map.cells.size(), names[0], middle(*steepest, first), names[1], middle(*steepest, second),
+      steepest->upper.value(), number(slope_of(steepest->lower), 6), unit));
+  const auto script = [&](const std::string& figure, int column, const std::string& label) {
+    return "set key off\nset xlabel " + plot_string("input " + names[0]) + "\nset ylabel " +
+           plot_string("input " + names[1]) + "\nset cblabel " + plot_string(label + " [" + unit + "]") +
+           fmt::format(
+               "\nset autoscale xfix\nset autoscale yfix\nset cbrange [0:{:.6g}]\nplot '{}.dat' using "
+               "1:2:{} with image\n",
+               std::max(steepest->upper.value(), 1e-300), figure, column);
+  };
+  report.figure(file + "_upper", data, script(file + "_upper", 3, "slope at most"),
+                "Proved: in no cell is " + map.function + " steeper than this.");
+  report.figure(
+      file + "_lower", data, script(file + "_lower", 4, "slope at least"),
+      "Witnessed: between two points of the cell the slope of " + map.function +
+          " is this large. Colours as above; where both maps are bright the network is steep, where "
+          "only the upper one is, the bound is loose or no steep points were found.");
+}
+
+}  // namespace
+
+std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
+                                 const files::Json& result, const std::string& folder, bool overwrite) {
+  Report report("Lipschitz certificate");
+  report.result(result);
+  report.paragraph(fmt::format(
+      "Verdict: {}. Every upper bound is proved in exact arithmetic for the weights as stored, in "
+      "Euclidean norms, over all inputs or over the box where the table says so; every witnessed "
+      "value is the slope between two float32 points.",
+      name(output.verdict)));
+  add_bounds(report, network, output);
+  add_layers(report, output);
+  for (std::size_t i = 0; i < output.maps.size(); ++i) add_map(report, network, output, i);
+  report.heading("Inputs");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [part, weights] : files::parts(network))
+    rows.push_back({part, weights->path, weights->sha256});
+  report.table({"network", "file", "sha256"}, rows);
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,16 @@
+/// @file The report of `certify`: bounds, norms, slope maps and inputs, with plots.
+#pragma once
+
+#include <string>
+
+#include "analysis/commands/certify/certify_output.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html and its plots; returns the path of report.html. The numbers carry the guarantees that
+/// `output` has; the JSON `result` goes into the page.
+/// @throws files::InputError if the folder is not empty and `overwrite` is false.
+std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
+                                 const files::Json& result, const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

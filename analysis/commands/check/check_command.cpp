@@ -1,0 +1,59 @@
+#include <fmt/core.h>
+
+#include <memory>
+
+#include "analysis/commands/commands.h"
+#include "lipschitz/checker/check.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+struct CheckOptions {
+  std::string certificate;
+  files::NetworkArguments network;
+};
+
+int run_check(const CheckOptions& options, const CommonOptions& common) {
+  const files::Json certificate = files::read_json(options.certificate, check::kCertificateSchema);
+  const files::Network network = load_net(options.network);
+  const check::CheckResult verdict = check::check(certificate, network);
+
+  std::vector<std::string> inputs = {options.certificate};
+  for (const std::string& path : input_files(network)) inputs.push_back(path);
+  files::Json result = result_head("check", inputs);
+  result["accepted"] = verdict.accepted;
+  result["reason"] = verdict.reason;
+  result["spectral_norms"] = verdict.spectral_norms;
+  result["upper_bounds"] = verdict.upper_bounds;
+  result["lower_bounds"] = verdict.lower_bounds;
+  write_result(common, result);
+  if (common.prints_text()) {
+    if (verdict.accepted) {
+      fmt::print("accepted: {}: {} spectral norms, {} upper bounds, {} lower bounds\n", verdict.reason,
+                 verdict.spectral_norms, verdict.upper_bounds, verdict.lower_bounds);
+    } else {
+      fmt::print("rejected: {}\n", verdict.reason);
+    }
+  }
+  return verdict.accepted ? kDone : kViolated;
+}
+
+}  // namespace
+
+Command check_command() {
+  return {"check", "Verify a certificate against the weights, independently of what wrote it",
+          "Rebuilds every matrix inequality from the weights and verifies it in exact integer arithmetic, "
+          "proofs on a box\n"
+          "in double with every rounding accounted for; uses no optimiser. Accepted: exit 0. Rejected, with "
+          "the reason: exit 1.\n\n"
+          "Example: swarmcert check cert.json nn/networks/demo/network.toml",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<CheckOptions>();
+            app.add_option("CERTIFICATE", options->certificate, "Certificate that certify wrote with -o")
+                ->required();
+            declare_network(app, options->network);
+            return [options](const CommonOptions& common) { return run_check(*options, common); };
+          }};
+}
+
+}  // namespace swarmcert::analysis

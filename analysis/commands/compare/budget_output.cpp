@@ -1,0 +1,103 @@
+#include "analysis/commands/compare/budget_output.h"
+
+#include <fmt/core.h>
+
+#include <filesystem>
+
+#include "nn/base/file_io.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::Budget;
+using identification::BudgetRow;
+
+const BudgetRow* network_row(const Budget& budget) {
+  return budget.rows.back().name == "network" ? &budget.rows.back() : nullptr;
+}
+
+/// The row with all effects.
+const BudgetRow& last_row(const Budget& budget) {
+  return budget.rows[budget.rows.size() - (network_row(budget) != nullptr ? 2 : 1)];
+}
+
+double rmse_z(const BudgetRow& row, const std::string& group) {
+  const auto found = row.of.find(group);
+  return found == row.of.end() ? 0 : found->second.rmse.z;
+}
+
+double drop(const Budget& budget, const std::string& group) {
+  const double before = rmse_z(budget.rows[0], group);
+  return before > 0 ? 1 - rmse_z(last_row(budget), group) / before : 0;
+}
+
+}  // namespace
+
+files::Json json_of(const Budget& budget) {
+  files::Json json = {{"unit", "N"},
+                      {"quantity", "root mean square of the vertical force residual"},
+                      {"fit_flights", budget.fit_flights},
+                      {"test_flights", budget.test_flights},
+                      {"nominal_mass_kg", budget.masses_kg}};
+  json["rows"] = files::Json::array();
+  for (const BudgetRow& row : budget.rows) {
+    files::Json entry = {{"name", row.name}};
+    for (const auto& [group, statistics] : row.of) entry["rmse_z"][group] = statistics.rmse.z;
+    json["rows"].push_back(std::move(entry));
+  }
+  const BudgetRow* const network = network_row(budget);
+  for (const auto& [group, statistics] : budget.rows[0].of) {
+    json["records"][group] = statistics.samples;
+    json["drop"][group] = drop(budget, group);
+    if (network != nullptr && rmse_z(*network, group) > 0)
+      json["rest_over_network"][group] = rmse_z(last_row(budget), group) / rmse_z(*network, group);
+  }
+  return json;
+}
+
+void print(const Budget& budget) {
+  fmt::print(
+      "\nError budget: root mean square of the vertical residual [gf]; fitted to {} flights, judged on "
+      "{}\n{:<12}",
+      budget.fit_flights, budget.test_flights, "");
+  for (const auto& [group, statistics] : budget.rows[0].of)
+    fmt::print("{:>{}}", group, group.size() > 6 ? group.size() + 2 : 8);
+  fmt::print("\n");
+  const auto line = [&](const std::string& name, auto value, const char* format) {
+    fmt::print("{:<12}", name);
+    for (const auto& [group, statistics] : budget.rows[0].of)
+      fmt::print("{:>{}}", fmt::format(fmt::runtime(format), value(group)),
+                 group.size() > 6 ? group.size() + 2 : 8);
+    fmt::print("\n");
+  };
+  for (const BudgetRow& row : budget.rows) {
+    const bool adds = row.name != "nominal" && row.name != "network";
+    line((adds ? "+ " : "") + row.name,
+         [&](const std::string& group) { return rmse_z(row, group) / stability::kGramForce_N; }, "{:.2f}");
+  }
+  line(
+      "drop [%]", [&](const std::string& group) { return 100 * drop(budget, group); }, "{:.0f}");
+  if (const BudgetRow* const network = network_row(budget)) {
+    line(
+        "over network",
+        [&](const std::string& group) { return rmse_z(last_row(budget), group) / rmse_z(*network, group); },
+        "{:.2f}");
+  }
+  for (const auto& [kind, mass_kg] : budget.masses_kg)
+    fmt::print("nominal mass {}: {:.1f} g\n", kind, 1000 * mass_kg);
+}
+
+void write_fitted(const Budget& budget, const std::string& folder, bool overwrite) {
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path path(folder);
+  std::string fleet = "schema = \"swarmcert/flights/1\"\n";
+  for (const auto& [vehicle, model] : budget.fitted) {
+    files::write_file((path / (vehicle + ".toml")).string(),
+                      stability::to_toml(model, {"Fitted jointly to flights by swarmcert compare --budget."}),
+                      overwrite);
+    fleet += "\n[vehicle." + vehicle + "]\nmodel = \"" + vehicle + ".toml\"\n";
+  }
+  files::write_file((path / "flights.toml").string(), fleet, overwrite);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,20 @@
+/// @file An error budget as JSON, as text and as model files.
+#pragma once
+
+#include <string>
+
+#include "analysis/identification/budget.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// `rows[]: {name, rmse_z: {composition: newton}}`, `drop` of the last model row against the first, its ratio to the
+/// network's row.
+files::Json json_of(const identification::Budget& budget);
+
+void print(const identification::Budget& budget);
+
+/// `FOLDER/<vehicle>.toml` for each vehicle, and a flights.toml that names them.
+void write_fitted(const identification::Budget& budget, const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,208 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "analysis/cli/progress.h"
+#include "analysis/commands/commands.h"
+#include "analysis/commands/compare/budget_output.h"
+#include "analysis/commands/compare/compare_output.h"
+#include "analysis/commands/compare/compare_report.h"
+#include "analysis/commands/shared/flight_options.h"
+#include "analysis/residuals/comparison.h"
+#include "analysis/residuals/injected_log.h"
+#include "nn/base/file_io.h"
+#include "nn/base/suggest.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+struct CompareOptions {
+  FlightOptions flights;
+  std::string report;
+  std::vector<std::string> gains;
+  std::vector<std::string> budget;
+  std::string fitted;
+  std::string inject;
+};
+
+/// "FILE" for every kind, "KIND=FILE" for one.
+residuals::GainsOfKinds read_gains(const std::vector<std::string>& words) {
+  residuals::GainsOfKinds gains;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('=');
+    const std::string kind = equals == std::string::npos ? "" : word.substr(0, equals);
+    const std::string path = equals == std::string::npos ? word : word.substr(equals + 1);
+    if (!gains.emplace(kind, stability::load_gains(path)).second)
+      throw UsageError("--gains names " + (kind.empty() ? "every kind" : "the kind " + kind) + " twice");
+  }
+  return gains;
+}
+
+/// @throws UsageError where gains are for a kind that no vehicle of the comparison has.
+void check_kinds(const residuals::GainsOfKinds& gains, const residuals::Inputs& inputs) {
+  std::vector<std::string> kinds;
+  for (const stability::Model& model : inputs.models) kinds.push_back(model.kind);
+  for (const auto& [kind, file] : gains) {
+    if (kind.empty() || std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) continue;
+    throw UsageError("--gains is for kind " + kind +
+                     ", which no vehicle has: " + files::did_you_mean(kind, kinds));
+  }
+}
+
+/// The fit sees the models and rules of the comparison, and other flights.
+identification::Budget budget_of(const CompareOptions& options, const residuals::Inputs& inputs,
+                                 const CommonOptions& common) {
+  FlightOptions words = options.flights;
+  words.words.clear();
+  words.network.clear();
+  for (const std::string& word : options.flights.words) {
+    if (std::filesystem::path(word).extension() == ".toml") words.words.push_back(word);
+  }
+  words.words.insert(words.words.end(), options.budget.begin(), options.budget.end());
+  residuals::Inputs fit = read_flights(words, true);
+  for (const residuals::FlightFiles& flight : fit.found.flights) {
+    for (const residuals::FlightFiles& judged : inputs.found.flights) {
+      if (flight.logs == judged.logs) {
+        throw UsageError("--budget names a flight that is judged as well: " + flight.logs[0].second);
+      }
+    }
+  }
+  Progress progress(common.quiet);
+  return identification::error_budget(fit, inputs, options.flights.network, common.jobs,
+                                      [&](int done, int total) { progress.show(done, total, "passes"); });
+}
+
+/// Writes every log with what the model's effects would have added to its accelerometer; those of vehicles without a
+/// model as they are. Same folder names and file names, so that flights stay flights.
+files::Json inject(const residuals::Inputs& inputs, const std::string& folder, bool overwrite) {
+  namespace fs = std::filesystem;
+  files::Json injected = files::Json::array(), unchanged = files::Json::array();
+  const auto place_of = [](const std::string& log) {
+    const fs::path from = fs::absolute(log).lexically_normal();
+    return (from.parent_path().filename() / from.filename()).string();
+  };
+  std::map<std::string, std::string> places;
+  for (const residuals::FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, log] : flight.logs) {
+      const auto [other, is_new] = places.emplace(fs::path(place_of(log)).replace_extension().string(), log);
+      if (!is_new)
+        throw UsageError("--inject would write " + other->second + " and " + log +
+                         " to the same place: inject them one after the other, into folders of their own");
+    }
+  }
+  for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
+    std::vector<std::string> problems;
+    for (const residuals::Track& track : inputs.load(i, problems)) {
+      const std::string place = place_of(track.path);
+      fs::path to = fs::path(folder) / place;
+      if (!track.position_only) to.replace_extension();
+      fs::create_directories(to.parent_path());
+      files::write_file(to.string(),
+                        track.position_only ? files::read_file(track.path)
+                                            : stability::to_usd_log(residuals::injected_log(inputs, track)),
+                        overwrite);
+      (track.position_only ? unchanged : injected).push_back(place);
+    }
+  }
+  return {{"loop", "open: vehicles do not react"},
+          {"logs", std::move(injected)},
+          {"unchanged", std::move(unchanged)}};
+}
+
+int run_compare(const CompareOptions& options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  if (!options.inject.empty() &&
+      !(std::filesystem::is_directory(options.inject) && std::filesystem::is_empty(options.inject)))
+    refuse_to_replace(common, options.inject);
+  if (!options.fitted.empty()) {
+    if (options.budget.empty()) throw UsageError("--fitted writes what --budget fits: name its flights");
+    refuse_to_replace(common, (std::filesystem::path(options.fitted) / "flights.toml").string());
+  }
+  const residuals::GainsOfKinds gains = read_gains(options.gains);
+  const residuals::Inputs inputs = read_flights(options.flights, true);
+  check_kinds(gains, inputs);
+  Progress progress(common.quiet);
+  const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };
+  const residuals::Comparison comparison = residuals::compare(inputs, common.jobs, show, gains);
+  std::vector<std::string> files = inputs.files();
+  for (const auto& [kind, file] : gains) files.push_back(file.path);
+  files::Json result = result_head("compare", files);
+  add_comparison(comparison, inputs, result);
+  std::optional<residuals::Comparison> own;
+  if (options.flights.published_filter) {
+    FlightOptions without = options.flights;
+    without.published_filter = false;
+    own = residuals::compare(read_flights(without, true), common.jobs, show);
+    result["mean_square_z_gf2_own_filter"] = mean_squares_gf2(*own);
+  }
+  std::optional<identification::Budget> budget;
+  if (!options.budget.empty()) {
+    budget = budget_of(options, inputs, common);
+    result["budget"] = json_of(*budget);
+    if (!options.fitted.empty()) write_fitted(*budget, options.fitted, common.force);
+  }
+  if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
+  write_result(common, result);
+  if (common.prints_text()) print_comparison(comparison, inputs, own ? &*own : nullptr);
+  if (common.prints_text() && budget) print(*budget);
+  if (!options.report.empty()) {
+    const std::string path = write_compare_report(comparison, inputs, result, options.report, common.force);
+    if (common.prints_text()) fmt::print("Report: {}\n", path);
+  }
+  if (comparison.overall.statistics.samples > 0) return kDone;
+  fmt::print(stderr, "no usable record: nothing was compared{}\n",
+             comparison.problems.empty() ? "; 'swarmcert inspect LOG' says what is in a log"
+                                         : ": " + comparison.problems[0]);
+  return kInconclusive;
+}
+
+}  // namespace
+
+Command compare_command() {
+  return {
+      "compare", "A model against flights: force residuals, and where the model fails",
+      "Records on the ground, after a crash, with rotors off, after gaps and without a known neighbour are "
+      "cut;\n"
+      "the result counts them. Forces are in newton in the JSON, in gram-force on the terminal.\n\n"
+      "Example: swarmcert compare stability/models/crazyflie-small.toml flights/ --report out\n"
+      "         swarmcert compare flights/ --network network.toml --published-filter\n"
+      "         swarmcert compare test/ --budget development/ --network network.toml\n"
+      "         swarmcert compare truth.toml flights/ --inject injected\n"
+      "         swarmcert compare flights/ --gains small=small.toml --gains large=large.toml",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<CompareOptions>();
+        declare_flights(app, options->flights, true);
+        app.add_option("--report", options->report, "Write an HTML report into this folder");
+        app.add_option(
+               "--gains", options->gains,
+               "gains.toml, or KIND=gains.toml for each kind: also simulates the closed loop from the "
+               "logs' set points")
+            ->allow_extra_args(false);
+        app.add_option("--network", options->flights.network,
+                       "network.toml: a learned force that every model gets, in place of its own");
+        app.add_option(
+               "--budget", options->budget,
+               "Flights to fit: how the error of FLIGHTS falls from the nominal model by motor lag, offset "
+               "per vehicle, ground, downwash and the rest; --network adds a row")
+            ->allow_extra_args(false);
+        app.add_option("--fitted", options->fitted,
+                       "Folder for what --budget fitted: a model per vehicle and their flights.toml");
+        app.add_option(
+            "--inject", options->inject,
+            "Write FLIGHTS into this folder as if the model's effects had acted on them besides what "
+            "did: their force is added to the accelerometer, open loop, nothing else changes");
+        app.add_flag(
+            "--published-filter", options->flights.published_filter,
+            "Cut and filter as the networks' authors did: 32 g (small) and 67 g (large), thrust lag 0.16 "
+            "per record, clocks as they are, |f_a,z| < 50 gf, contact kept; prints the mean squares with "
+            "this project's own filter beside");
+        return [options](const CommonOptions& common) { return run_compare(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,344 @@
+#include "analysis/commands/compare/compare_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "analysis/commands/shared/flight_options.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using analysis::json_of;
+using residuals::Comparison;
+
+files::Json json_of(const Eigen::Vector3d& v) {
+  // JSON has no NaN: null where a spectrum could not be had.
+  const auto number = [](double x) { return std::isfinite(x) ? files::Json(x) : files::Json(nullptr); };
+  return {{"x", number(v[0])}, {"y", number(v[1])}, {"z", number(v[2])}};
+}
+
+files::Json json_of(const residuals::ErrorStatistics& s) {
+  return {{"samples", s.samples},
+          {"rmse", json_of(s.rmse)},
+          {"bias", json_of(s.bias)},
+          {"p95", json_of(s.p95)},
+          {"p999", json_of(s.p999)},
+          {"max", json_of(s.max)},
+          {"variance_explained", json_of(s.variance_explained)}};
+}
+
+files::Json json_of(const residuals::GroupErrors& g) {
+  files::Json json = json_of(g.statistics);
+  const char* const kAxes[] = {"x", "y", "z", "total"};
+  for (std::size_t k = 0; k < 4; ++k)
+    json["rmse_interval_90"][kAxes[k]] = {g.rmse_interval[k].lower, g.rmse_interval[k].upper};
+  json["nrmse"] = json_of(g.nrmse);
+  json["low_band_to_floor"] = json_of(g.low_band_to_floor);
+  json["noise_floor"] = json_of(g.noise_floor_N);
+  return json;
+}
+
+files::Json json_of(const residuals::LearningError::Quantiles& q) {
+  return {{"p50", json_of(q.p50)}, {"p95", json_of(q.p95)}, {"p99", json_of(q.p99)}, {"max", json_of(q.max)}};
+}
+
+files::Json json_of(const residuals::TrajectoryErrors& trajectory) {
+  if (!trajectory.refused.empty()) return {{"refused", trajectory.refused}};
+  return {{"seconds", trajectory.seconds},
+          {"pieces", trajectory.pieces},
+          {"diverged", trajectory.diverged},
+          {"rmse", json_of(trajectory.rmse)},
+          {"max", json_of(trajectory.max)},
+          {"measured_rms", json_of(trajectory.measured_rms)},
+          {"measured_max", json_of(trajectory.measured_max)},
+          {"simulated_rms", json_of(trajectory.simulated_rms)},
+          {"simulated_max", json_of(trajectory.simulated_max)},
+          {"replayed_max", json_of(trajectory.replayed_max)}};
+}
+
+files::Json json_of(const residuals::Trajectories& all) {
+  if (!all.refused.empty()) return {{"refused", all.refused}};
+  return {{"unit", "m"},
+          {"loop", "sampled"},
+          {"tracks", all.tracks},
+          {"diverged", all.diverged},
+          {"seconds", all.seconds},
+          {"settle_s", residuals::TrajectoryErrors::kSettle_s},
+          {"rmse", json_of(all.rmse_m)},
+          {"max", json_of(all.max_m)},
+          {"measured_rms", json_of(all.measured_rms_m)},
+          {"simulated_rms", json_of(all.simulated_rms_m)}};
+}
+
+files::Json json_of(const residuals::Trajectories::PeakRatio& ratio) {
+  if (ratio.tracks == 0) return nullptr;
+  return {{"p50", json_of(ratio.p50)},
+          {"p95", json_of(ratio.p95)},
+          {"max", json_of(ratio.max)},
+          {"coverage", json_of(ratio.coverage)},
+          {"tracks", ratio.tracks}};
+}
+
+files::Json json_of(const residuals::NeighbourMap& map) {
+  using Map = residuals::NeighbourMap;
+  files::Json cells = files::Json::array();
+  for (int i = 0; i < Map::kHeights; ++i) {
+    for (int j = 0; j < Map::kLateral; ++j) {
+      const Map::Cell& cell = map.cells[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+      if (cell.records == 0) continue;
+      const auto n = static_cast<double>(cell.records);
+      cells.push_back({{"height_m", Map::kLowest_m + (i + 0.5) * Map::kHeightStep_m},
+                       {"lateral_m", (j + 0.5) * Map::kLateralStep_m},
+                       {"records", cell.records},
+                       {"bias_z", cell.sum_N / n},
+                       {"rmse_z", std::sqrt(cell.squares_N2 / n)}});
+    }
+  }
+  return {
+      {"meaning", "neighbour above the vehicle by height_m, laterally away by lateral_m; middles of cells"},
+      {"cells", std::move(cells)}};
+}
+
+files::Json json_of(const residuals::TorqueErrors& torque) {
+  if (!torque.refused.empty()) return {{"refused", torque.refused}};
+  return {{"unit", "N m"},
+          {"records", torque.records},
+          {"rate_hz", torque.rate_hz},
+          {"rmse", json_of(torque.rmse_Nm)},
+          {"bias", json_of(torque.bias_Nm)},
+          {"max", json_of(torque.max_Nm)}};
+}
+
+/// How many logs have a torque residual; where none has, why.
+files::Json torque_json(const Comparison& comparison) {
+  std::size_t tracks = 0;
+  std::string refused = "no vehicle has a model";
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    if (track.torque.refused.empty()) ++tracks;
+    if (!track.torque.refused.empty() && !track.position_only) refused = track.torque.refused;
+  }
+  if (tracks == 0) return {{"refused", refused}};
+  return {{"tracks", tracks}, {"where", "flights[].torque"}};
+}
+
+void print_torque(const Comparison& comparison) {
+  const files::Json summary = torque_json(comparison);
+  if (summary.contains("refused")) {
+    fmt::print("Torque residual refused: {}.\n", summary["refused"].get<std::string>());
+    return;
+  }
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    const residuals::TorqueErrors& t = track.torque;
+    if (!t.refused.empty()) continue;
+    fmt::print("Torque residual of {} {}, RMS x y z [uN m]: {:.1f} {:.1f} {:.1f}\n", track.flight,
+               track.vehicle, 1e6 * t.rmse_Nm.x, 1e6 * t.rmse_Nm.y, 1e6 * t.rmse_Nm.z);
+  }
+}
+
+void print_cuts(const Comparison& comparison) {
+  std::array<std::size_t, static_cast<std::size_t>(residuals::Cut::kCount)> sums{};
+  double largest_s = 0;
+  std::size_t estimated = 0, tracks = 0;
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += track.cut[k];
+    ++tracks;
+    if (track.clock_onsets > 0) ++estimated;
+    largest_s = std::max(largest_s, std::abs(track.clock_offset_s));
+  }
+  fmt::print("Records cut:");
+  bool any = false;
+  for (std::size_t k = 1; k < sums.size(); ++k) {
+    if (sums[k] == 0) continue;
+    fmt::print("{} {} {}", any ? "," : "", sums[k], residuals::name(static_cast<residuals::Cut>(k)));
+    any = true;
+  }
+  fmt::print(
+      "{}. Clocks: {} of {} logs have an offset estimated against the first of their flight, up to {:.1f} "
+      "ms.\n",
+      any ? "" : " none", estimated, tracks, 1000 * largest_s);
+}
+
+files::Json json_of(const residuals::TrackErrors& track) {
+  files::Json json = {{"flight", track.flight},
+                      {"scenario", track.scenario},
+                      {"vehicle", track.vehicle},
+                      {"kind", track.kind},
+                      {"composition", track.composition},
+                      {"file", track.path},
+                      {"position_only", track.position_only},
+                      {"clock_offset_s", track.clock_offset_s},
+                      {"clock_onsets", track.clock_onsets},
+                      {"findings", track.findings}};
+  files::Json& records = json["records"] = files::Json::object();
+  for (std::size_t k = 0; k < track.cut.size(); ++k)
+    records[residuals::name(static_cast<residuals::Cut>(k))] = track.cut[k];
+  json.update(json_of(track.errors));
+  json["trajectory"] = json_of(track.trajectory);
+  json["torque"] = json_of(track.torque);
+  return json;
+}
+
+files::Json groups(const std::map<std::string, residuals::GroupErrors>& members) {
+  files::Json json = files::Json::object();
+  for (const auto& [name, errors] : members) json[name] = json_of(errors);
+  return json;
+}
+
+}  // namespace
+
+void add_comparison(const Comparison& comparison, const residuals::Inputs& inputs, files::Json& json) {
+  json["unit"] = "N";
+  json["overall"] = json_of(comparison.overall);
+  json["flights"] = files::Json::array();
+  for (const residuals::TrackErrors& track : comparison.tracks) json["flights"].push_back(json_of(track));
+  json["scenarios"] = groups(comparison.scenarios);
+  json["vehicles"] = groups(comparison.vehicles);
+  json["kinds"] = groups(comparison.kinds);
+  json["compositions"] = groups(comparison.compositions);
+  json["mean_square_z_gf2"] = mean_squares_gf2(comparison);
+  json["regions"] = files::Json::array();
+  for (const residuals::RegionErrors& region : comparison.regions) {
+    files::Json entry = {{"variable", residuals::variable_name(region.variable)},
+                         {"words", region.words},
+                         {"share", region.share}};
+    entry.update(json_of(region.statistics));
+    json["regions"].push_back(std::move(entry));
+  }
+  json["neighbour_map"] = json_of(comparison.neighbours);
+  json["moments"] = files::Json::array();
+  for (const residuals::Moment& moment : comparison.moments) {
+    json["moments"].push_back({{"flight", moment.flight},
+                               {"vehicle", moment.vehicle},
+                               {"time_s", moment.time_s},
+                               {"residual", json_of(moment.residual_N)}});
+  }
+  const residuals::LearningError& learning = comparison.learning_error;
+  json["learning_error"] = {{"windows", learning.windows},
+                            {"window_s", residuals::LearningError::kWindow_s},
+                            {"bandwidth_hz", residuals::LearningError::kBandwidth_hz},
+                            {"bias", json_of(learning.bias_N)},
+                            {"amplitude", json_of(learning.amplitude_N)},
+                            {"rate", json_of(learning.rate_N_s)},
+                            {"variation", json_of(learning.variation_N)},
+                            {"impulse", json_of(learning.impulse_N_s)},
+                            {"peak_ratio", json_of(comparison.trajectories.peak_ratio)}};
+  json["trajectory"] = json_of(comparison.trajectories);
+  for (int k = 1; k < static_cast<int>(residuals::Cut::kCount); ++k) {
+    const auto cut = static_cast<residuals::Cut>(k);
+    json["cut_rules"][residuals::name(cut)] = residuals::rule(cut);
+  }
+  json["torque"] = torque_json(comparison);
+  json["problems"] = comparison.problems;
+  json["skipped_files"] = inputs.found.skipped;
+}
+
+files::Json mean_squares_gf2(const Comparison& comparison) {
+  files::Json json = files::Json::object();
+  for (const auto& [name, group] : comparison.compositions)
+    json[name] = std::pow(group.statistics.rmse.z / stability::kGramForce_N, 2);
+  return json;
+}
+
+namespace {
+
+void print_trajectories(const residuals::Trajectories& all) {
+  if (!all.refused.empty()) {
+    fmt::print("\nTrajectories were not simulated: {} (--gains).\n", all.refused);
+    return;
+  }
+  fmt::print("\nClosed loop from the logs' set points, {} tracks, {:.0f} s; RMS over x, y, z, vector [mm]:\n",
+             all.tracks, all.seconds);
+  const auto line = [](const char* what, const residuals::Axes& a, double scale) {
+    fmt::print("  {:<34}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", what, scale * a.x, scale * a.y, scale * a.z,
+               scale * a.total);
+  };
+  line("simulated minus measured", all.rmse_m, 1000);
+  line("measured minus set point", all.measured_rms_m, 1000);
+  line("simulated minus set point", all.simulated_rms_m, 1000);
+  if (all.diverged > 0) fmt::print("  {} tracks diverged in simulation and are left out\n", all.diverged);
+  const residuals::Trajectories::PeakRatio& ratio = all.peak_ratio;
+  if (ratio.tracks == 0) return;
+  fmt::print("Peaks, measured over replayed with the residual as force, {} tracks:\n", ratio.tracks);
+  line("median", ratio.p50, 1);
+  line("95 % of tracks below", ratio.p95, 1);
+  line("share of tracks that replay covers", ratio.coverage, 1);
+}
+
+void print_compositions(const Comparison& comparison, const Comparison* own) {
+  fmt::print("\n{:<28}{:>9}{:>16}{}\n", "Kinds: neighbours 2 vehicle", "records", "z, mean [gf^2]",
+             own != nullptr ? "   with own filter" : "");
+  for (const auto& [name, group] : comparison.compositions) {
+    fmt::print("{:<28}{:>9}{:>16.2f}", name, group.statistics.samples,
+               std::pow(group.statistics.rmse.z / stability::kGramForce_N, 2));
+    if (own != nullptr) {
+      const auto same = own->compositions.find(name);
+      if (same != own->compositions.end())
+        fmt::print("{:>18.2f}", std::pow(same->second.statistics.rmse.z / stability::kGramForce_N, 2));
+    }
+    fmt::print("\n");
+  }
+}
+
+void print_damage(const Comparison& comparison) {
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    if (track.is_sound) continue;
+    std::string text;
+    for (const std::string& finding : track.findings) text += (text.empty() ? "" : "; ") + finding;
+    fmt::print("damaged: {}: {}\n", track.path, text);
+  }
+}
+
+void print_errors(const Comparison& comparison, const Comparison* own) {
+  print_torque(comparison);
+  fmt::print("\n");
+  fmt::print("{:<28}{:>9}{:>22}{:>22}{:>10}{:>9}\n", "", "records", "RMSE x y z [gf]", "bias x y z [gf]",
+             "p99.9 z", "max z");
+  const auto line = [&](const std::string& name, const residuals::GroupErrors& group) {
+    const residuals::ErrorStatistics& s = group.statistics;
+    fmt::print("{:<28}{:>9}{:>8.2f}{:>7.2f}{:>7.2f}{:>8.2f}{:>7.2f}{:>7.2f}{:>10.2f}{:>9.2f}\n", name,
+               s.samples, s.rmse.x / stability::kGramForce_N, s.rmse.y / stability::kGramForce_N,
+               s.rmse.z / stability::kGramForce_N, s.bias.x / stability::kGramForce_N,
+               s.bias.y / stability::kGramForce_N, s.bias.z / stability::kGramForce_N,
+               s.p999.z / stability::kGramForce_N, s.max.z / stability::kGramForce_N);
+  };
+  for (const auto& [name, errors] : comparison.scenarios) line(name, errors);
+  for (const auto& [name, errors] : comparison.vehicles) line(name, errors);
+  line("all", comparison.overall);
+  print_compositions(comparison, own);
+  const auto& interval = comparison.overall.rmse_interval;
+  fmt::print("\nRMSE of all: {:.4f} N, 90 % interval {:.4f} .. {:.4f}; {:.1f} % of the weight.\n",
+             comparison.overall.statistics.rmse.total, interval[3].lower, interval[3].upper,
+             100 * comparison.overall.nrmse.total);
+  fmt::print("\nWhere it fails most:\n");
+  for (std::size_t i = 0; i < comparison.regions.size() && i < 8; ++i) {
+    const residuals::RegionErrors& region = comparison.regions[i];
+    fmt::print("  {} ({} records)\n", region.words, region.statistics.samples);
+  }
+  if (!comparison.moments.empty()) {
+    const residuals::Moment& worst = comparison.moments[0];
+    fmt::print("Worst moment: {} {} at {:.2f} s, {:.2f} gf\n", worst.flight, worst.vehicle, worst.time_s,
+               worst.residual_N.norm() / stability::kGramForce_N);
+  }
+  print_trajectories(comparison.trajectories);
+}
+
+}  // namespace
+
+void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
+  for (const stability::Model& model : inputs.models) {
+    fmt::print("Model {}: {}, {:.1f} g, {} effects\n", model.path, model.kind, 1000 * model.mass_kg,
+               model.effects.size());
+  }
+  fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
+  print_cuts(comparison);
+  if (comparison.overall.statistics.samples > 0) print_errors(comparison, own);
+  print_damage(comparison);
+  for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);
+  if (!inputs.found.skipped.empty())
+    fmt::print("{} files are no logs and were skipped\n", inputs.found.skipped.size());
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,277 @@
+#include "analysis/commands/compare/compare_report.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "analysis/report/report.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+std::string gf(double newton) { return fmt::format("{:.2f}", newton / stability::kGramForce_N); }
+
+std::vector<std::string> row(const std::string& name, const residuals::GroupErrors& group) {
+  const residuals::ErrorStatistics& s = group.statistics;
+  return {name,
+          std::to_string(s.samples),
+          gf(s.rmse.x),
+          gf(s.rmse.y),
+          gf(s.rmse.z),
+          gf(group.rmse_interval[2].lower) + " .. " + gf(group.rmse_interval[2].upper),
+          gf(s.bias.z),
+          gf(s.p95.z),
+          gf(s.p999.z),
+          gf(s.max.z),
+          fmt::format("{:.1f} %", 100 * group.nrmse.total),
+          fmt::format("{:.1f} %", 100 * s.variance_explained.total),
+          fmt::format("{:.1f}", group.low_band_to_floor.z())};
+}
+
+const std::vector<std::string> kHeader = {"",
+                                          "records",
+                                          "RMSE x",
+                                          "y",
+                                          "z",
+                                          "90 % of z",
+                                          "bias z",
+                                          "p95 z",
+                                          "p99.9 z",
+                                          "max z",
+                                          "of weight",
+                                          "variance explained",
+                                          "low band / floor"};
+
+/// Mean and spread of the vertical residual over the ranges of one variable.
+void add_region_plot(Report& report, const residuals::Comparison& comparison, int variable,
+                     const std::string& unit) {
+  std::vector<const residuals::RegionErrors*> regions;
+  for (const residuals::RegionErrors& region : comparison.regions) {
+    if (region.variable == variable) regions.push_back(&region);
+  }
+  if (regions.size() < 2) return;
+  std::sort(regions.begin(), regions.end(),
+            [](const auto* a, const auto* b) { return a->region < b->region; });
+  std::string data;
+  for (const residuals::RegionErrors* region : regions) {
+    const residuals::ErrorStatistics& s = region->statistics;
+    data += fmt::format("{} {} {}\n", residuals::region_middle(variable, region->region),
+                        s.bias.z / stability::kGramForce_N, s.rmse.z / stability::kGramForce_N);
+  }
+  const std::string name = fmt::format("over_{}", variable);
+  const std::string label = residuals::variable_name(variable);
+  report.figure(name, data,
+                "set xlabel '" + label + " " + unit + "'\nset ylabel 'vertical residual [gf]'\nplot '" +
+                    name +
+                    ".dat' using 1:2 with linespoints title 'mean', '' using 1:3 with linespoints title "
+                    "'root mean square', 0 lc 'gray' notitle\n",
+                "Vertical residual over " + label + ".");
+}
+
+/// Mean vertical residual by the place of the nearest neighbour.
+void add_neighbour_map(Report& report, const residuals::NeighbourMap& map) {
+  using Map = residuals::NeighbourMap;
+  constexpr std::size_t kFewest = 20;
+  std::string data;
+  bool any = false;
+  for (int i = 0; i < Map::kHeights; ++i) {
+    for (int j = 0; j < Map::kLateral; ++j) {
+      const Map::Cell& cell = map.cells[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+      const bool enough = cell.records >= kFewest;
+      any = any || enough;
+      data += fmt::format("{} {} {}\n", (j + 0.5) * Map::kLateralStep_m,
+                          Map::kLowest_m + (i + 0.5) * Map::kHeightStep_m,
+                          enough ? gf(cell.sum_N / static_cast<double>(cell.records)) : "NaN");
+    }
+    data += "\n";
+  }
+  if (!any) return;
+  report.figure(
+      "neighbours", data,
+      "stats 'neighbours.dat' using 3 nooutput\n"
+      "m = abs(STATS_min) > abs(STATS_max) ? abs(STATS_min) : abs(STATS_max)\n"
+      "set xlabel 'lateral distance [m]'\nset ylabel 'height of the neighbour above the vehicle [m]'\n"
+      "set cblabel 'mean vertical residual [gf]'\nset palette @signed_colours\nset xrange [0:0.6]\nset "
+      "yrange [-1:1]\n"
+      "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\n"
+      "plot 'neighbours.dat' using 1:2:3 with image notitle\n",
+      "Mean vertical residual over the place of the laterally nearest neighbour; cells of fewer than 20 "
+      "records are empty.");
+}
+
+/// Vehicles with the worst moments first, then the others, as far as a page can hold them.
+void add_time_series(Report& report, const residuals::Comparison& comparison) {
+  constexpr std::size_t kMost = 12;
+  std::vector<const residuals::TrackErrors*> chosen;
+  const auto choose = [&](const residuals::TrackErrors& track) {
+    if (chosen.size() < kMost && !track.series.empty() &&
+        std::find(chosen.begin(), chosen.end(), &track) == chosen.end())
+      chosen.push_back(&track);
+  };
+  const auto is_of = [](const residuals::Moment& moment, const residuals::TrackErrors& track) {
+    return moment.path == track.path;
+  };
+  for (const residuals::Moment& moment : comparison.moments) {
+    for (const residuals::TrackErrors& track : comparison.tracks) {
+      if (is_of(moment, track)) choose(track);
+    }
+  }
+  for (const residuals::TrackErrors& track : comparison.tracks) choose(track);
+  std::vector<TimeSeries> all;
+  for (const residuals::TrackErrors* track : chosen) {
+    TimeSeries series;
+    series.name = track->flight + " " + track->vehicle;
+    float last_s = track->series.front()[0];
+    for (std::array<float, 5> row : track->series) {
+      constexpr float kBreak_s = 0.1F;
+      constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+      if (row[0] - last_s > kBreak_s) series.rows.push_back({(row[0] + last_s) / 2, kNaN, kNaN, kNaN, kNaN});
+      last_s = row[0];
+      for (std::size_t k = 1; k < row.size(); ++k) row[k] /= static_cast<float>(stability::kGramForce_N);
+      series.rows.push_back(row);
+    }
+    for (std::size_t k = 0; k < comparison.moments.size(); ++k) {
+      const residuals::Moment& moment = comparison.moments[k];
+      if (!is_of(moment, *track)) continue;
+      const auto nearest =
+          std::min_element(track->series.begin(), track->series.end(), [&](const auto& a, const auto& b) {
+            return std::abs(static_cast<double>(a[0]) - moment.time_s) <
+                   std::abs(static_cast<double>(b[0]) - moment.time_s);
+          });
+      series.marks.push_back(
+          {(*nearest)[0], static_cast<int>(k) + 1, moment.residual_N.norm() / stability::kGramForce_N});
+    }
+    all.push_back(std::move(series));
+  }
+  if (all.empty()) return;
+  report.heading("Over time");
+  report.time_series(
+      all, fmt::format("Force residual of {} of {} logs, those with the worst moments first; drag to "
+                       "zoom, double click to zoom out. Flags mark the worst moments.",
+                       all.size(), comparison.tracks.size()));
+}
+
+void add_trajectories(Report& report, const residuals::Comparison& comparison) {
+  const residuals::Trajectories& all = comparison.trajectories;
+  report.heading("Closed loop from the logs' set points");
+  if (!all.refused.empty()) {
+    report.paragraph("Not simulated: " + all.refused + " (--gains).");
+    return;
+  }
+  const auto row = [](const std::string& name, const residuals::Axes& a, double scale) {
+    return std::vector<std::string>{name, fmt::format("{:.2f}", scale * a.x),
+                                    fmt::format("{:.2f}", scale * a.y), fmt::format("{:.2f}", scale * a.z),
+                                    fmt::format("{:.2f}", scale * a.total)};
+  };
+  report.paragraph(fmt::format("{} logs, {:.0f} s, sampled loop; {} diverged and are left out.", all.tracks,
+                               all.seconds, all.diverged));
+  std::vector<std::vector<std::string>> rows = {
+      row("simulated minus measured, RMS [mm]", all.rmse_m, 1000),
+      row("measured minus set point, RMS [mm]", all.measured_rms_m, 1000),
+      row("simulated minus set point, RMS [mm]", all.simulated_rms_m, 1000)};
+  if (all.peak_ratio.tracks > 0) {
+    rows.push_back(row("peaks, measured over replayed: median", all.peak_ratio.p50, 1));
+    rows.push_back(row("95 % of logs below", all.peak_ratio.p95, 1));
+    rows.push_back(row("share of logs that replay covers", all.peak_ratio.coverage, 1));
+  }
+  report.table({"", "x", "y", "z", "vector"}, rows);
+}
+
+void add_learning_error(Report& report, const residuals::LearningError& learning) {
+  report.heading("What bound --from takes from these flights");
+  report.paragraph(fmt::format(
+      "Quantiles over {} windows of {} s of the residual behind a low-pass of {} Hz; bias: "
+      "mean of a flight.",
+      learning.windows, residuals::LearningError::kWindow_s, residuals::LearningError::kBandwidth_hz));
+  std::vector<std::vector<std::string>> rows;
+  const auto add = [&rows](const std::string& name, const residuals::LearningError::Quantiles& q) {
+    const auto cell = [](const residuals::Axes& a) {
+      return fmt::format("{:.4f} {:.4f} {:.4f}", a.x, a.y, a.z);
+    };
+    rows.push_back({name, cell(q.p50), cell(q.p95), cell(q.p99), cell(q.max)});
+  };
+  add("bias [N]", learning.bias_N);
+  add("amplitude [N]", learning.amplitude_N);
+  add("rate [N/s]", learning.rate_N_s);
+  add("variation per pass [N]", learning.variation_N);
+  add("impulse per pass [N s]", learning.impulse_N_s);
+  report.table({"x y z", "median", "95 %", "99 %", "largest"}, rows);
+}
+
+}  // namespace
+
+std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
+                                 const files::Json& result, const std::string& folder, bool overwrite) {
+  Report report("Model against flights");
+  report.result(result);
+  for (const stability::Model& model : inputs.models) {
+    std::string effects;
+    for (const stability::EffectSpec& effect : model.effects)
+      effects += (effects.empty() ? "" : ", ") + effect.name;
+    report.paragraph(fmt::format("Model {}: {}, {:.1f} g; effects: {}.", model.path, model.kind,
+                                 1000 * model.mass_kg, effects.empty() ? "none" : effects));
+  }
+  report.paragraph(
+      "Force residual: mass times measured specific force minus thrust and effects, in the world frame, in "
+      "gram-force. "
+      "A torque residual needs logs of at least 400 Hz: slower ones alias what the attitude loop does.");
+  report.heading("Scenarios and vehicles");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [name, errors] : comparison.scenarios) rows.push_back(row(name, errors));
+  for (const auto& [name, errors] : comparison.vehicles) rows.push_back(row(name, errors));
+  rows.push_back(row("all", comparison.overall));
+  report.table(kHeader, rows);
+  report.paragraph("By kinds of the neighbours, then of the vehicle; Ge flies alone:");
+  rows.clear();
+  for (const auto& [name, errors] : comparison.compositions) rows.push_back(row(name, errors));
+  report.table(kHeader, rows);
+
+  report.heading("Where the model fails");
+  rows.clear();
+  for (std::size_t i = 0; i < comparison.regions.size() && i < 12; ++i) {
+    const residuals::RegionErrors& region = comparison.regions[i];
+    rows.push_back({region.words, std::to_string(region.statistics.samples), gf(region.statistics.rmse.total),
+                    fmt::format("{:.1f} %", 100 * region.share)});
+  }
+  report.table({"region", "records", "RMSE", "share of all squared residual in its mean"}, rows);
+  const char* const kUnits[] = {"[m]", "[m/s]", "[-]", "[V]", "[s]", "[degrees]"};
+  for (int variable = 0; variable < 6; ++variable)
+    add_region_plot(report, comparison, variable, kUnits[variable]);
+  add_neighbour_map(report, comparison.neighbours);
+  add_time_series(report, comparison);
+  add_trajectories(report, comparison);
+  add_learning_error(report, comparison.learning_error);
+
+  report.heading("Flights");
+  rows.clear();
+  for (const residuals::TrackErrors& track : comparison.tracks)
+    if (!track.position_only) rows.push_back(row(track.flight + " " + track.vehicle, track.errors));
+  report.table(kHeader, rows);
+  report.heading("What was cut, and why");
+  rows.clear();
+  for (int k = 1; k < static_cast<int>(residuals::Cut::kCount); ++k) {
+    const auto cut = static_cast<residuals::Cut>(k);
+    rows.push_back({name(cut), rule(cut)});
+  }
+  report.table({"cut", "rule"}, rows);
+  rows.clear();
+  for (const residuals::TrackErrors& track : comparison.tracks) {
+    std::string cuts, findings;
+    for (std::size_t k = 1; k < track.cut.size(); ++k) {
+      if (track.cut[k] > 0)
+        cuts += fmt::format("{}{} {}", cuts.empty() ? "" : ", ", track.cut[k],
+                            name(static_cast<residuals::Cut>(k)));
+    }
+    for (const std::string& finding : track.findings) findings += (findings.empty() ? "" : "; ") + finding;
+    rows.push_back({track.flight + " " + track.vehicle, track.position_only ? "position only" : cuts,
+                    findings,
+                    track.clock_onsets > 0 ? fmt::format("{:.0f} ms", 1000 * track.clock_offset_s) : "-"});
+  }
+  report.table({"", "records cut", "the log", "clock offset"}, rows);
+  for (const std::string& problem : comparison.problems) report.paragraph("Not judged: " + problem);
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

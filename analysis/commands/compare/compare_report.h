@@ -1,0 +1,15 @@
+/// @file The HTML report of a comparison.
+#pragma once
+
+#include <string>
+
+#include "analysis/residuals/comparison.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html with plots and the JSON `result`; returns its path. @throws as Report::write().
+std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
+                                 const files::Json& result, const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,121 @@
+#include "analysis/commands/diagnose/diagnose_report.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/report/report.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::Diagnosis;
+using identification::Missing;
+
+double drop(const Missing& missing) {
+  return 1 - missing.finding.rmse_after_N / missing.finding.rmse_before_N;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string values_of(const Missing& missing) {
+  std::vector<std::string> values;
+  for (const auto& [name, value] : missing.parameters) {
+    const auto interval = missing.intervals.find(name);
+    values.push_back(fmt::format("{} = {:.4g}", name, value));
+    if (interval != missing.intervals.end())
+      values.back() += fmt::format(" ({:.4g} .. {:.4g})", interval->second.first, interval->second.second);
+  }
+  return joined(values);
+}
+
+/// @param name of the figure.
+void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& name) {
+  std::vector<std::vector<std::string>> rows;
+  std::vector<Bar> bars;
+  for (const Missing& missing : diagnosis.ranking) {
+    const identification::Finding& finding = missing.finding;
+    const bool each = !missing.specs.empty() && !missing.specs[0].vehicle.empty();
+    rows.push_back({missing.effect + (each ? " of each vehicle" : ""),
+                    fmt::format("{:.5f} -> {:.5f}", finding.rmse_before_N, finding.rmse_after_N),
+                    fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * drop(missing),
+                                100 * finding.drop_interval.first, 100 * finding.drop_interval.second),
+                    values_of(missing),
+                    missing.equivalence_class == missing.effect ? "" : missing.equivalence_class,
+                    joined(finding.confounded_with()), missing.excitation});
+    bars.push_back({missing.effect, 100 * drop(missing), 100 * finding.drop_interval.first,
+                    100 * finding.drop_interval.second});
+  }
+  report.table({"effect", "RMSE [N]", "fall, 90 %", "values, 90 %", "flights cannot tell apart",
+                "these flights cannot tell it from", "what separates them"},
+               rows);
+  // Kinds come from users: figures are numbered.
+  report.bars(name, bars, "fall of the error [%]",
+              "How far each effect lowers the cross-validated error when it is added to those above it, with "
+              "90 % intervals from resampled blocks.");
+}
+
+void add_left(Report& report, const Diagnosis& diagnosis) {
+  const identification::Remainder& rest = diagnosis.remainder;
+  report.paragraph(fmt::format(
+      "Left: {:.5f} N; low frequencies {:.1f} times the noise floor: {}{}", diagnosis.rmse_after_N,
+      rest.ratio, rest.flag ? "not everything is explained" : "nothing stands out",
+      rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
+  if (!diagnosis.contradicted.empty()) {
+    report.paragraph(
+        "Not counted, because set points contradict them (the controller's answer to something "
+        "else): " +
+        joined(diagnosis.contradicted) + ".");
+  }
+  if (!diagnosis.suspected.empty()) {
+    report.paragraph("Not counted, because they explain little of what is left over: " +
+                     joined(diagnosis.suspected) + ".");
+  }
+  if (diagnosis.thrust_scale.is_known) {
+    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
+    report.paragraph(fmt::format(
+        "Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f}).",
+        1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.first, 1 + scale.interval.second));
+  }
+  report.paragraph(
+      "Smallest sizes that these flights show in 9 of 10 injections (open loop: the flight does not react):");
+  std::vector<std::vector<std::string>> rows;
+  for (const identification::Detectable& entry : diagnosis.detectable) {
+    const bool shows = std::isfinite(entry.size);
+    rows.push_back({entry.effect, entry.parameter,
+                    shows ? fmt::format("{:.3g}", entry.size) : "not at any size",
+                    shows ? "" : entry.excitation});
+  }
+  report.table({"effect", "number", "size", "what would show it"}, rows);
+}
+
+}  // namespace
+
+std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses, const files::Json& result,
+                                  const std::string& folder, bool overwrite) {
+  Report report("Which physical effect is missing");
+  report.result(result);
+  for (std::size_t i = 0; i < diagnoses.size(); ++i) {
+    const Diagnosis& diagnosis = diagnoses[i];
+    report.heading("Vehicles of kind " + diagnosis.kind);
+    report.paragraph(fmt::format("{} records of {} flights, {} blocks of 2 s.", diagnosis.records,
+                                 diagnosis.flights, diagnosis.blocks));
+    if (!diagnosis.too_poor.empty()) {
+      report.paragraph("No answer: " + diagnosis.too_poor + ".");
+      continue;
+    }
+    if (diagnosis.ranking.empty())
+      report.paragraph("No effect of the library is missing above the sizes below.");
+    else
+      add_ranking(report, diagnosis, "ranking_" + std::to_string(i + 1));
+    add_left(report, diagnosis);
+  }
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,18 @@
+/// @file The HTML report of a diagnosis.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/identification/diagnose.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html with the ranking of every kind of vehicle as a plot and the JSON `result`; returns its
+/// path.
+/// @throws as Report::write().
+std::string write_diagnose_report(const std::vector<identification::Diagnosis>& diagnoses,
+                                  const files::Json& result, const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

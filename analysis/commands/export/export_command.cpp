@@ -1,0 +1,111 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "analysis/commands/commands.h"
+#include "analysis/commands/shared/flown_network.h"
+#include "analysis/firmware/export_source.h"
+#include "nn/base/content_hash.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportOptions {
+  files::NetworkArguments network;
+  std::string output, certificate, as;
+  firmware::ExportOptions source;
+};
+
+/// The content hash of the certificate in `path`, after a look whether it speaks of these weights as they are exported.
+std::string certificate_of(const files::Network& network, const std::string& path, bool as_float32) {
+  const auto refuse = [&](const std::string& field, const std::string& value, const std::string& what) {
+    throw files::InputError({path, "", field, value, what, "certify the network that you export"});
+  };
+  const files::Json certificate = files::parse_json(files::read_file(path), path);
+  if (!certificate.is_object() || !certificate.contains("content_sha256") ||
+      !certificate["content_sha256"].is_string() || !certificate.contains("network") ||
+      !certificate["network"].contains("weights"))
+    refuse("content_sha256", "", "no certificate: certify -o writes one");
+  std::string hash = certificate["content_sha256"].get<std::string>();
+  if (hash != files::content_sha256(certificate))
+    refuse("content_sha256", hash, "is not this document's: it was changed");
+  const files::Json& weights = certificate["network"]["weights"];
+  for (const auto& [part, one] : files::parts(network)) {
+    if (!weights.contains(part)) refuse("network.weights", part, "is not in the certificate");
+    if (weights[part].value("sha256", "") != one->sha256)
+      refuse("network.weights." + part + ".sha256", weights[part].value("sha256", ""),
+             "is not the hash of " + one->path);
+  }
+  const bool certified_as_float32 = certificate["network"].value("as", files::Json()) == "float32";
+  if (as_float32 && !certified_as_float32)
+    refuse("network.as", "null",
+           "is about float64 weights, and float32 ones are exported: certify with --as float32");
+  return hash;
+}
+
+int run_export(ExportOptions options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  bool is_rounded = false;
+  const files::Network network = load_flown_net(options.network, options.as, is_rounded);
+  std::vector<std::string> inputs = input_files(network);
+  if (!options.certificate.empty()) {
+    inputs.push_back(options.certificate);
+    options.source.certificate_sha256 = certificate_of(network, options.certificate, is_rounded);
+  }
+  const std::vector<firmware::SourceFile> sources = firmware::export_source(network, options.source);
+  for (const firmware::SourceFile& source : sources) {
+    if (fs::exists(fs::path(options.output) / source.name))
+      refuse_to_replace(common, (fs::path(options.output) / source.name).string());
+  }
+  files::Json list = files::Json::array();
+  for (const firmware::SourceFile& source : sources) {
+    const fs::path path = fs::path(options.output) / source.name;
+    fs::create_directories(path.parent_path());
+    files::write_file(path.string(), source.contents, common.force);
+    list.push_back({{"name", source.name}, {"sha256", files::sha256(source.contents)}});
+  }
+  files::Json result = result_head("export", inputs);
+  result["as"] = is_rounded ? files::Json("float32") : files::Json();
+  result["seed"] = options.source.seed;
+  result["files"] = std::move(list);
+  result["golden_vectors"] = options.source.golden_vectors * static_cast<int>(network.rho.size());
+  write_result(common, result);
+  if (common.prints_text()) {
+    for (const firmware::SourceFile& source : sources)
+      fmt::print("written: {}/{}\n", options.output, source.name);
+    fmt::print("compile swarmcert_network.cpp with -std=c++17 -O2 -ffp-contract=off -I{}\n", options.output);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Command export_command() {
+  return {
+      "export", "Firmware source of a network, with golden vectors and a self-test",
+      "Weights as hexadecimal floats, the clamp, the scale to newton, the evaluator, and golden vectors "
+      "which the "
+      "firmware\nchecks at start. 'swarmcert match' proves that a source file or an ELF still holds these "
+      "weights.\n\n"
+      "Example: swarmcert export nn/networks/demo/network.toml -o firmware",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<ExportOptions>();
+        declare_network(app, options->network);
+        app.add_option("-o,--output", options->output, "Folder for the source")->required();
+        declare_as(app, options->as);
+        app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source");
+        app.add_option("--most-neighbours", options->source.most_neighbours, "Neighbours of one evaluation")
+            ->check(CLI::Range(1, 64))
+            ->capture_default_str();
+        app.add_option("--seed", options->source.seed, "Of the golden vectors")->capture_default_str();
+        return [options](const CommonOptions& common) { return run_export(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

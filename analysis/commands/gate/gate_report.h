@@ -1,0 +1,17 @@
+/// @file A gate's result as a page: what of every limit is used, and what shows a failure.
+#pragma once
+
+#include <string>
+
+#include "analysis/gate/gate.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html: verdict, bars of value over limit, the checks, the files with their SHA-256.
+/// @param json what --json writes
+/// @returns path of report.html. @throws files::InputError as Report::write() does.
+std::string write_gate_report(const gate::GateResult& result, const files::Json& json,
+                              const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

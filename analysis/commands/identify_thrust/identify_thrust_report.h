@@ -1,0 +1,17 @@
+/// @file The report of `identify-thrust`: measured thrust and the fitted polynomial.
+#pragma once
+
+#include <string>
+
+#include "analysis/identification/thrust/thrust_data.h"
+#include "analysis/identification/thrust/thrust_identification.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html with the fit, its residuals, the coefficients and the JSON `result`; returns its path.
+/// @throws files::InputError as Report::write().
+std::string write_thrust_report(const ThrustData& data, const ThrustIdentification& found,
+                                const files::Json& result, const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

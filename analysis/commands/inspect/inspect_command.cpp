@@ -1,0 +1,275 @@
+#include <fmt/core.h>
+
+#include <limits>
+#include <memory>
+#include <sstream>
+
+#include "analysis/commands/commands.h"
+#include "analysis/logs/read_log.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/toml.h"
+#include "nn/weights/functions.h"
+#include "stability/model.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+struct InspectOptions {
+  std::vector<std::string> files;
+  std::string key;
+  std::string csv;
+  std::string columns;
+  double t0_s = -std::numeric_limits<double>::infinity();
+  double t1_s = std::numeric_limits<double>::infinity();
+};
+
+files::Json describe(const files::Weights& weights) {
+  files::Json layers = files::Json::array();
+  for (const files::Layer& layer : weights.layers) {
+    layers.push_back({{"name", layer.name}, {"inputs", layer.inputs}, {"outputs", layer.outputs}});
+  }
+  return {{"file", weights.path},
+          {"sha256", weights.sha256},
+          {"precision", files::name(weights.precision)},
+          {"layers", std::move(layers)}};
+}
+
+bool is_json(const std::string& path) {
+  const std::string text = files::read_file(path);
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  return first != std::string::npos && text[first] == '{';
+}
+
+/// A member as people read it; nothing in it can reach the terminal unescaped.
+std::string cell(const files::Json& object, const char* key) {
+  if (!object.is_object() || !object.contains(key) || object[key].is_null()) return "-";
+  const files::Json& value = object[key];
+  if (value.is_number_float()) return fmt::format("{:.10g}", value.get<double>());
+  const std::string text = value.dump();
+  return value.is_string() ? text.substr(1, text.size() - 2) : text;
+}
+
+void print_bound_row(const std::string& function, const files::Json& bound) {
+  fmt::print("  {:<22} {:<10} {:<8} {:<14} {:>14} {:<8} {:>14}  {}\n", function, cell(bound, "block"),
+             cell(bound, "domain"), cell(bound, "law"), cell(bound, "upper"), cell(bound, "upper_method"),
+             cell(bound, "lower"), cell(bound, "unit"));
+}
+
+files::Json inspect_certificate(const std::string& path, bool print) {
+  const files::Json certificate = files::read_json(path, "swarmcert/certificate/1");
+  files::Json bounds = files::Json::array();
+  if (print) {
+    fmt::print("{}: certificate, not checked here ('swarmcert check' does)\n", path);
+    fmt::print("  {:<22} {:<10} {:<8} {:<14} {:>14} {:<8} {:>14}  {}\n", "function", "block", "domain", "law",
+               "upper", "method", "witnessed", "unit");
+  }
+  for (const files::Json& bound : certificate.value("bounds", files::Json::array())) {
+    files::Json line = files::Json::object();
+    for (const char* key : {"function", "domain", "block", "law", "norm", "scale", "unit", "upper",
+                            "upper_method", "lower", "neighbours"}) {
+      if (bound.contains(key)) line[key] = bound[key];
+    }
+    if (print) print_bound_row(cell(bound, "function"), bound);
+    bounds.push_back(std::move(line));
+  }
+  for (const files::Json& law : certificate.value("laws", files::Json::array())) {
+    files::Json line = law;
+    if (line.is_object()) line.erase("upper_hex");
+    if (print) print_bound_row("rho:" + cell(law, "rho") + " " + cell(law, "neighbours"), law);
+    bounds.push_back(std::move(line));
+  }
+  return {{"file", path}, {"kind", "certificate"}, {"bounds", std::move(bounds)}};
+}
+
+/// What network.toml says beyond its weights, null where it says nothing.
+files::Json description(const files::Network& network) {
+  using Gamma = files::GammaStatement;
+  files::Json gamma, clamp;
+  if (network.gamma) {
+    gamma = {{"value", network.gamma->value},
+             {"scope", network.gamma->scope == Gamma::Scope::kLayer ? "layer" : "network"},
+             {"mode", network.gamma->mode == Gamma::Mode::kClip ? "clip" : "equal"}};
+  }
+  if (network.clamp) clamp = {{"lower", network.clamp->lower}, {"upper", network.clamp->upper}};
+  return {{"output", {{"quantity", network.output_quantity}, {"unit", network.output_unit}}},
+          {"gamma", std::move(gamma)},
+          {"input", {{"order", network.input_order}, {"clamp", std::move(clamp)}}}};
+}
+
+void print_description(const files::Network& network) {
+  if (network.path.empty()) return;
+  fmt::print("{}: output {} in {}", network.path,
+             network.output_quantity.empty() ? "not stated" : network.output_quantity,
+             network.output_unit.empty() ? "no stated unit" : network.output_unit);
+  if (network.gamma) {
+    const bool is_layer = network.gamma->scope == files::GammaStatement::Scope::kLayer;
+    const bool is_clip = network.gamma->mode == files::GammaStatement::Mode::kClip;
+    fmt::print("; gamma {} {} per {}", is_clip ? "at most" : "equal to", network.gamma->value,
+               is_layer ? "layer" : "network");
+  }
+  fmt::print("\n");
+  for (std::size_t k = 0; k < network.input_order.size(); ++k) {
+    fmt::print("  input {}: {}", k, network.input_order[k]);
+    if (network.clamp) fmt::print(", clamped to {} .. {}", network.clamp->lower[k], network.clamp->upper[k]);
+    fmt::print("\n");
+  }
+}
+
+files::Json inspect_network(const std::string& path, const std::string& key, bool print) {
+  files::NetworkArguments arguments;
+  arguments.file = path;
+  arguments.key = key;
+  const files::Network network = files::load_network(arguments);
+  if (print) print_description(network);
+  files::Json parts = files::Json::object();
+  for (const auto& [name, weights] : files::parts(network)) {
+    parts[name] = describe(*weights);
+    if (!print) continue;
+    fmt::print("{}: {} {}, sha256 {}\n", weights->path, name, files::name(weights->precision),
+               weights->sha256);
+    for (const files::Layer& layer : weights->layers) {
+      fmt::print("  {:<10} {} -> {}\n", layer.name, layer.inputs, layer.outputs);
+    }
+  }
+  files::Json json = {{"file", path}, {"kind", "network"}};
+  json.update(description(network));
+  json["networks"] = std::move(parts);
+  return json;
+}
+
+bool is_model(const std::string& path) {
+  if (path.size() < 5 || path.compare(path.size() - 5, 5, ".toml") != 0) return false;
+  const toml::table document = files::parse_toml(files::read_file(path), path);
+  return document["schema"].value_or(std::string()).rfind("swarmcert/model/", 0) == 0;
+}
+
+files::Json inspect_model(const std::string& path, bool print) {
+  const stability::Model model = stability::read_model(path);
+  files::Json effects = files::Json::array();
+  for (const stability::EffectSpec& effect : model.effects) {
+    effects.push_back({{"effect", effect.name}, {"parameters", effect.parameters}});
+    if (!effect.vehicle.empty()) effects.back()["vehicle"] = effect.vehicle;
+  }
+  const stability::ThrustMap& map = model.thrust;
+  if (print) {
+    fmt::print("{}: model of kind {}: {} kg, arm {} m, at most {:.3f} N per rotor\n", path, model.kind,
+               model.mass_kg, model.arm_m, map.largest_N(stability::kFullBattery_V));
+    for (const files::Json& effect : effects) fmt::print("  {}\n", effect.dump());
+    if (effects.empty()) fmt::print("  no effects\n");
+  }
+  return {{"file", path},
+          {"kind", "model"},
+          {"vehicle",
+           {{"kind", model.kind},
+            {"mass_kg", model.mass_kg},
+            {"inertia_kg_m2", model.inertia_kg_m2},
+            {"arm_m", model.arm_m},
+            {"torque_per_thrust_m", model.torque_per_thrust_m},
+            {"thrust",
+             {{"c00", map.c00}, {"c10", map.c10}, {"c01", map.c01}, {"c20", map.c20}, {"c11", map.c11}}}}},
+          {"effects", std::move(effects)}};
+}
+
+files::Json inspect_log(const std::string& path, const InspectOptions& options, const CommonOptions& common) {
+  const logs::Log log = options.columns.empty() ? logs::read_log(path)
+                                                : logs::read_log(path, logs::read_columns(options.columns));
+  const logs::LogHealth& health = log.health;
+  const std::vector<logs::Sample>& samples = log.samples;
+  const double t0_s = samples.empty() ? 0 : samples.front().time_us * 1e-6;
+  const double t1_s = samples.empty() ? 0 : samples.back().time_us * 1e-6;
+  if (!options.csv.empty()) {
+    std::ostringstream text;
+    logs::write_csv(log, options.t0_s, options.t1_s, text);
+    files::write_file(options.csv, text.str(), common.force);
+  }
+  if (common.prints_text()) {
+    fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {} columns\n", path, log.format,
+               health.records, t0_s, t1_s, log.channels.size());
+    for (const std::string& finding : logs::findings(health)) fmt::print("  {}\n", finding);
+    if (!log.signals.force) fmt::print("  no force can be computed: position only\n");
+  }
+  return {{"file", path},
+          {"kind", "log"},
+          {"format", log.format},
+          {"channels", log.channels},
+          {"records", health.records},
+          {"t0_s", t0_s},
+          {"t1_s", t1_s},
+          {"signals",
+           {{"force", log.signals.force},
+            {"rates", log.signals.rates},
+            {"targets", log.signals.targets},
+            {"commands", log.signals.commands}}},
+          {"health",
+           {{"sound", logs::is_sound(health)},
+            {"blocks", health.blocks},
+            {"damaged_blocks", health.damaged_blocks},
+            {"skipped_bytes", health.skipped_bytes},
+            {"damaged_lines", health.damaged_lines},
+            {"not_finite", health.not_finite},
+            {"clock_jumps", health.clock_jumps},
+            {"gaps", health.gaps},
+            {"longest_gap_s", health.longest_gap_s},
+            {"truncated", health.truncated},
+            {"checksum_failed", health.checksum_failed}}}};
+}
+
+files::Json inspect(const std::string& path, const InspectOptions& options, const CommonOptions& common) {
+  if (logs::looks_like_log(path)) return inspect_log(path, options, common);
+  if (is_model(path)) return inspect_model(path, common.prints_text());
+  return is_json(path) ? inspect_certificate(path, common.prints_text())
+                       : inspect_network(path, options.key, common.prints_text());
+}
+
+int run_inspect(const InspectOptions& options, const CommonOptions& common) {
+  if (!options.csv.empty()) {
+    if (options.files.size() != 1 || !logs::looks_like_log(options.files[0]))
+      throw UsageError("--csv takes one flight log");
+    if (!(options.t0_s < options.t1_s)) throw UsageError("--t0 must be before --t1");
+    refuse_to_replace(common, options.csv);
+  }
+  files::Json found = files::Json::array();
+  std::vector<std::string> readable;
+  for (const std::string& path : options.files) {
+    try {
+      found.push_back(inspect(path, options, common));
+    } catch (const files::InputError& error) {
+      fmt::print(stderr, "swarmcert: {}\n", error.what());
+      found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
+      continue;
+    }
+    readable.push_back(path);
+  }
+  files::Json result = result_head("inspect", readable);
+  result["files"] = std::move(found);
+  write_result(common, result);
+  return readable.size() == options.files.size() ? kDone : kBadInput;
+}
+
+}  // namespace
+
+Command inspect_command() {
+  return {"inspect",
+          "What is in a weight file, network.toml, model, certificate or flight log, and is it sound",
+          "Exit 0 if every file can be read, else 3 with what is wrong and where. Damage inside a flight log "
+          "is skipped,\n"
+          "counted and shown.\n\n"
+          "Example: swarmcert inspect nn/networks/demo/network.toml\n"
+          "         swarmcert inspect cf50_00 --csv cf50_00.csv --t0 2 --t1 12",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<InspectOptions>();
+            app.add_option("FILE", options->files,
+                           "Weight files, network.toml and model.toml files, certificates, flight logs")
+                ->required();
+            app.add_option("--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
+            app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
+            app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
+            app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
+            app.add_option("--key", options->key,
+                           "Where the state dict lies inside a nested checkpoint, e.g. model");
+            return [options](const CommonOptions& common) { return run_inspect(*options, common); };
+          }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,66 @@
+#include "analysis/commands/iss_check/iss_check_report.h"
+
+#include <fmt/core.h>
+
+#include <map>
+
+#include "analysis/report/report.h"
+#include "analysis/report/report_text.h"
+
+namespace swarmcert::analysis {
+
+std::string write_iss_check_report(const stability::IssCheck& check, const files::Json& result,
+                                   const std::string& folder, bool overwrite) {
+  Report report("The tracking theorem's ball under disturbances");
+  report.result(result);
+  report.paragraph(check.theorem_applies ? "The theorem's hypotheses hold for these gains."
+                                         : "The theorem does not apply:");
+  for (const std::string& why : check.why_not) report.paragraph(why + ".");
+  report.paragraph(
+      fmt::format("Ball: {:.6g} m for a learning error that changes by at most {:.4g} N/s{}. {} of {} runs "
+                  "violate it{}. No "
+                  "violation is no proof.",
+                  check.ball_m, check.rate_N_s,
+                  check.has_ball ? "" : " (these gains lack the theorem's form: what one might take for it)",
+                  check.violations, check.runs.size(), check.cancelled ? "; the check was interrupted" : ""));
+  struct Kind {
+    int row = 0, runs = 0, violations = 0;
+    double ratio = 0, transient_ratio = 0;
+  };
+  std::map<std::string, Kind> kinds;
+  for (const stability::IssRun& run : check.runs) {
+    Kind& kind = kinds[run.kind];
+    ++kind.runs;
+    kind.violations += run.is_violation ? 1 : 0;
+    kind.ratio = std::max(kind.ratio, run.ratio);
+    kind.transient_ratio = std::max(kind.transient_ratio, run.transient_ratio);
+  }
+  int next = 0;
+  std::vector<std::vector<std::string>> rows;
+  for (auto& [name, kind] : kinds) {
+    kind.row = next++;
+    rows.push_back({name, std::to_string(kind.runs), std::to_string(kind.violations),
+                    fmt::format("{:.6f}", kind.ratio), fmt::format("{:.6f}", kind.transient_ratio)});
+  }
+  std::string data = "# row ratio transient_ratio disturbance\n";
+  for (const stability::IssRun& run : check.runs) {
+    data += fmt::format("{} {} {:.8g} {}\n", kinds[run.kind].row,
+                        run.ratio > 0 ? fmt::format("{:.8g}", run.ratio) : "NaN", run.transient_ratio,
+                        plot_field(run.kind));
+  }
+  report.figure(
+      "ratios", data,
+      fmt::format("set xlabel 'largest error over its bound [-]'\nset yrange [{}.5:-0.5]\n"
+                  "set xrange [0:*]\nset arrow from 1,graph 0 to 1,graph 1 nohead linetype 2\n"
+                  "plot 'ratios.dat' using 2:($1-0.12):ytic(4) with points title 'over the ball', "
+                  "'' using 3:($1+0.12) with points linetype 3 title 'over the transient bound', "
+                  "NaN with lines linetype 2 title 'the bound'\n",
+                  next - 1),
+      "Largest error of every run over the ball (runs from rest) and over the transient bound, by kind "
+      "of disturbance. Right of 1 lies a violation.",
+      140 + 50 * next);
+  report.table({"disturbance", "runs", "violations", "worst ratio", "over transient"}, rows);
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

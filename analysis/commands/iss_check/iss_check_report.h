@@ -1,0 +1,16 @@
+/// @file The report of `iss-check`: how near the runs came to the ball.
+#pragma once
+
+#include <string>
+
+#include "nn/base/json.h"
+#include "stability/iss/iss_check.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html with every run's ratio and the JSON `result`; returns its path.
+/// @throws files::InputError as Report::write().
+std::string write_iss_check_report(const stability::IssCheck& check, const files::Json& result,
+                                   const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

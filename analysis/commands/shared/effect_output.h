@@ -1,0 +1,20 @@
+/// @file Fitted numbers of effects in the results and texts of diagnose and add.
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// {"tau_s": {"value": 0.06, "interval_90": [0.05, 0.07]}}; without the interval where there is none.
+files::Json values_json(const std::map<std::string, double>& values,
+                        const std::map<std::string, std::pair<double, double>>& intervals);
+
+/// A line per number, each after `prefix`: "tau_s = 0.06, 90 % 0.05 .. 0.07".
+void print_values(const std::string& prefix, const std::map<std::string, double>& values,
+                  const std::map<std::string, std::pair<double, double>>& intervals);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,69 @@
+#include "analysis/commands/shared/flight_options.h"
+
+#include <filesystem>
+
+#include "nn/base/input_error.h"
+
+namespace swarmcert::analysis {
+
+std::string bundled_folder(const std::string& name, const std::string& source) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path tool = fs::read_symlink("/proc/self/exe", error);
+  const fs::path installed = tool.parent_path().parent_path() / "share/swarmcert" / name;
+  if (!error && fs::exists(installed)) return installed.string();
+  return (fs::path(SWARMCERT_SOURCE_DIR) / source).string();
+}
+
+void declare_flights(CLI::App& app, FlightOptions& options, bool positional_models) {
+  if (positional_models) {
+    app.add_option(
+           "MODEL... FLIGHTS...", options.words,
+           "model.toml files, one per kind of vehicle (may be left out for known vehicles), then flight logs "
+           "or folders of them")
+        ->required();
+  } else {
+    app.add_option("FLIGHTS", options.words, "Flight logs or folders of them");
+    app.add_option("--model", options.models, "model.toml")->required()->allow_extra_args(false);
+  }
+  app.add_option("--flights", options.fleet,
+                 "flights.toml: vehicles with their models (default: the published ones)");
+  app.add_option(
+      "--columns", options.columns,
+      "columns.toml: what the columns of CSV logs mean, per signal column, unit and frame, as in position_x "
+      "= { "
+      "column = \"px\", unit = \"mm\" }: time, position_x .. z, velocity_x .. z, specific_force_x .. z, "
+      "attitude_x .. z and _w, duty_1 .. 4, battery; if there, rate_x .. z, target_position_x .. z, "
+      "target_velocity_x .. z");
+}
+
+residuals::Inputs read_flights(const FlightOptions& options, bool own_models) {
+  residuals::InputArguments arguments;
+  arguments.models = options.models;
+  for (const std::string& word : options.words) {
+    const bool is_model = std::filesystem::path(word).extension() == ".toml";
+    (is_model ? arguments.models : arguments.flights).push_back(word);
+  }
+  if (arguments.flights.empty()) throw UsageError("no flights: name logs or folders of them");
+  arguments.fleet = options.fleet.empty()
+                        ? bundled_folder("analysis/flights", "analysis/flights") + "/flights.toml"
+                        : options.fleet;
+  arguments.columns = options.columns;
+  arguments.network = options.network;
+  arguments.rules.published = options.published_filter;
+  arguments.rules.published_signals = options.published_signals;
+  residuals::Inputs inputs = residuals::read_inputs(arguments);
+  if (!own_models && !inputs.vehicle_models.empty()) {
+    throw files::InputError({arguments.fleet, "",
+                             "vehicle." + inputs.vehicle_models.begin()->first + ".model", "",
+                             "is not the model of the other vehicles of its kind",
+                             "this command works on one model per kind: name it on the command line"});
+  }
+  return inputs;
+}
+
+files::Json json_of(const residuals::Axes& axes) {
+  return {{"x", axes.x}, {"y", axes.y}, {"z", axes.z}, {"total", axes.total}};
+}
+
+}  // namespace swarmcert::analysis

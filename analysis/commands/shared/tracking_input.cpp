@@ -1,0 +1,16 @@
+#include "analysis/commands/shared/tracking_input.h"
+
+namespace swarmcert::analysis {
+
+void declare_tracking(CLI::App& app, TrackingArguments& arguments) {
+  app.add_option("--gains", arguments.gains, "gains.toml: position gains, loop rate, lags")->required();
+  app.add_option("--model", arguments.model, "model.toml of the vehicle")->required();
+  app.add_option("--battery", arguments.battery_V, "Battery voltage, for the largest thrust (default 4.2)")
+      ->check(CLI::PositiveNumber);
+}
+
+Tracking load_tracking(const TrackingArguments& arguments) {
+  return stability::load_tracking_setup(arguments.gains, arguments.model, arguments.battery_V);
+}
+
+}  // namespace swarmcert::analysis

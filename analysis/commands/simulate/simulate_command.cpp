@@ -1,0 +1,255 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "analysis/cli/progress.h"
+#include "analysis/commands/commands.h"
+#include "analysis/report/report.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
+#include "stability/simulation/simulate.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using files::Json;
+
+struct SimulateOptions {
+  std::string task;
+  std::vector<std::string> models;
+  std::string gains, output, report, torque_network;
+  files::NetworkArguments network;
+  int vehicles = 1;
+  int run = 0;
+  double duration_s = 0;
+  std::uint64_t seed = 0;
+  bool no_noise = false;
+  stability::RadioOptions radio;
+};
+
+bool has_force_network(const SimulateOptions& options) {
+  return !options.network.file.empty() || !options.network.phi.empty();
+}
+
+Json axes(const std::array<double, 4>& values) {
+  return {{"x", values[0]}, {"y", values[1]}, {"z", values[2]}, {"total", values[3]}};
+}
+
+std::string log_name(int vehicle, int run) { return fmt::format("cf{}_{:02}", vehicle + 1, run); }
+
+Json result_json(const SimulateOptions& options, const std::vector<std::string>& inputs,
+                 const stability::Simulation& flown, const stability::Task& task) {
+  Json result = result_head("simulate", inputs);
+  result["seed"] = options.seed;
+  result["task"] = options.task;
+  result["loop"] = "sampled";
+  result["duration_s"] = task.duration_s();
+  result["noise"] = !options.no_noise;
+  if (has_force_network(options) || !options.torque_network.empty()) {
+    result["radio"] = {{"latency_s", options.radio.latency_s}, {"loss", options.radio.loss}};
+  }
+  result["diverged"] = flown.diverged;
+  result["unit"] = "m";
+  Json vehicles = Json::array();
+  for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
+    const stability::SimulatedVehicle& vehicle = flown.vehicles[i];
+    vehicles.push_back({{"name", fmt::format("cf{}", i + 1)},
+                        {"kind", vehicle.kind},
+                        {"max", axes(vehicle.error.max_m)},
+                        {"rms", axes(vehicle.error.rms_m)},
+                        {"saturated_share", vehicle.saturated_share},
+                        {"largest_tilt_deg", vehicle.largest_tilt_rad * 57.29577951308232},
+                        {"smallest_height_m", vehicle.smallest_height_m}});
+  }
+  result["vehicles"] = std::move(vehicles);
+  return result;
+}
+
+void print(const SimulateOptions& options, const stability::Simulation& flown, const stability::Task& task) {
+  fmt::print(
+      "{}: {} vehicles, {:g} s in the sampled loop (Runge-Kutta per control period, float32 control)\n",
+      options.task, flown.vehicles.size(), task.duration_s());
+  fmt::print("  {:<8} {:<8} {:>27}   {:>27}   {}\n", "vehicle", "kind", "largest error x, y, z [m]",
+             "rms error x, y, z [m]", "thrust at its limit");
+  for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
+    const stability::SimulatedVehicle& vehicle = flown.vehicles[i];
+    const auto& max = vehicle.error.max_m;
+    const auto& rms = vehicle.error.rms_m;
+    fmt::print("  {:<8} {:<8} {:>8.4f} {:>8.4f} {:>8.4f}    {:>8.4f} {:>8.4f} {:>8.4f}   {:.1f} %\n",
+               fmt::format("cf{}", i + 1), vehicle.kind, max[0], max[1], max[2], rms[0], rms[1], rms[2],
+               100 * vehicle.saturated_share);
+  }
+  if (flown.diverged) fmt::print("  DIVERGED at {:.2f} s: the flight ends there\n", flown.end_s);
+}
+
+void write_report(const SimulateOptions& options, const CommonOptions& common,
+                  const stability::Simulation& flown, const Json& result) {
+  Report report(fmt::format("{} with {} vehicles", options.task, flown.vehicles.size()));
+  report.result(result);
+  report.paragraph(
+      "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per "
+      "control "
+      "period. One run shows what happened in it, not what is the largest error possible.");
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
+    const auto& error = flown.vehicles[i].error;
+    std::vector<std::string> row = {fmt::format("cf{}", i + 1), flown.vehicles[i].kind};
+    for (const auto* values : {&error.max_m, &error.rms_m}) {
+      for (std::size_t axis = 0; axis < 3; ++axis) row.push_back(fmt::format("{:.4f}", (*values)[axis]));
+    }
+    rows.push_back(std::move(row));
+  }
+  report.table(
+      {"vehicle", "kind", "max x [m]", "max y [m]", "max z [m]", "rms x [m]", "rms y [m]", "rms z [m]"},
+      rows);
+  std::string data;
+  for (const auto& errors : flown.errors) {
+    for (const auto& e : errors) {
+      data += fmt::format("{:.3f} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g}\n", e[0], e[1], e[2], e[3], e[4],
+                          e[5], e[6]);
+    }
+    data += "\n\n";
+  }
+  const std::string each = fmt::format("for [i=0:{}] 'NAME.dat' index i", flown.errors.size() - 1);
+  const auto script = [&](const std::string& name, const std::string& columns) {
+    std::string plot = each;
+    plot.replace(plot.find("NAME"), 4, name);
+    return "set xlabel 'time [s]'\nset ylabel 'height error [m]'\nplot " + plot + " using " + columns +
+           " with lines title sprintf('cf%d', i + 1)\n";
+  };
+  report.figure("height_error", data, script("height_error", "1:4"),
+                "Height error p_z - p_d,z of each vehicle.");
+  report.write(options.report, common.force);
+}
+
+int run_simulate(SimulateOptions options, const CommonOptions& common) {
+  const std::vector<std::string> tasks = stability::task_names();
+  if (std::find(tasks.begin(), tasks.end(), options.task) == tasks.end()) {
+    throw UsageError("unknown task " + options.task + ": " + files::did_you_mean(options.task, tasks));
+  }
+  const bool one_each = static_cast<int>(options.models.size()) == options.vehicles;
+  if (!one_each && options.models.size() != 1) {
+    throw UsageError(fmt::format("{} models for {} vehicles: give one for all, or one for each",
+                                 options.models.size(), options.vehicles));
+  }
+  refuse_folder(common, options.output);
+  refuse_folder(common, options.report);
+  refuse_to_replace(common, common.json);
+  std::vector<stability::Model> models;
+  std::vector<int> kind_of;
+  std::vector<std::string> inputs;
+  for (int i = 0; i < options.vehicles; ++i) {
+    const std::string& path = options.models[one_each ? static_cast<std::size_t>(i) : 0];
+    const auto known = std::find(inputs.begin(), inputs.end(), path);
+    kind_of.push_back(static_cast<int>(known - inputs.begin()));
+    if (known != inputs.end()) continue;
+    models.push_back(stability::read_model(path));
+    inputs.push_back(path);
+  }
+  const stability::Gains gains = stability::load_gains(options.gains);
+  inputs.push_back(options.gains);
+  std::unique_ptr<files::Network> network;
+  if (has_force_network(options)) {
+    network = std::make_unique<files::Network>(files::load_network(options.network));
+    for (const std::string& path : input_files(*network)) inputs.push_back(path);
+  }
+  std::unique_ptr<files::Network> torque_network;
+  if (!options.torque_network.empty()) {
+    torque_network =
+        std::make_unique<files::Network>(files::load_network({options.torque_network, "", "", ""}));
+    for (const std::string& path : input_files(*torque_network)) inputs.push_back(path);
+  }
+  const std::unique_ptr<stability::Task> task =
+      stability::make_task(options.task, {options.vehicles, options.duration_s, options.seed});
+  stability::Swarm swarm(std::move(models), std::move(kind_of));
+  swarm.assume_lag(gains.motor_lag_s, gains.delay_s);
+
+  Progress progress(common.quiet);
+  stability::SimulationOptions how;
+  how.loop.noise = !options.no_noise;
+  how.loop.seed = options.seed;
+  how.loop.radio = options.radio;
+  how.loop.torque_network = torque_network.get();
+  how.progress = [&progress](double time_s, double duration_s) {
+    progress.show(static_cast<int>(time_s), std::max(static_cast<int>(duration_s), 1), "seconds flown");
+  };
+  stability::Simulation flown;
+  try {
+    flown = stability::simulate(swarm, gains, *task, how, network.get());
+  } catch (const std::invalid_argument& error) {
+    throw files::InputError(
+        {options.gains, "", "rate_hz", "", error.what(), "choose rates that divide 500 Hz"});
+  }
+
+  std::filesystem::create_directories(options.output);
+  for (std::size_t i = 0; i < flown.logs.size(); ++i) {
+    const auto path = std::filesystem::path(options.output) / log_name(static_cast<int>(i), options.run);
+    files::write_file(path.string(), stability::to_usd_log(flown.logs[i]), common.force);
+  }
+  const Json result = result_json(options, inputs, flown, *task);
+  if (!options.report.empty()) write_report(options, common, flown, result);
+  write_result(common, result);
+  if (common.prints_text()) {
+    print(options, flown, *task);
+    fmt::print("Logs: {}\n", (std::filesystem::path(options.output) / log_name(0, options.run)).string());
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Command simulate_command() {
+  std::string tasks;
+  for (const std::string& name : stability::task_names()) {
+    tasks += fmt::format("  {:<12} {}\n", name, stability::task_summary(name));
+  }
+  return {"simulate", "Fly a task in simulation and write flight logs",
+          "Tasks\n" + tasks +
+              "\nWrites one log per vehicle, DIR/cf<vehicle>_<run>, in the binary format of the published "
+              "flights.\n"
+              "Example\n"
+              "  swarmcert simulate swap --vehicles 2 --model stability/models/crazyflie-small.toml \\\n"
+              "      --gains controller/gains/crazyflie-small.toml -o flights",
+          [](CLI::App& app) {
+            auto options = std::make_shared<SimulateOptions>();
+            app.add_option("TASK", options->task, "What to fly, see above")
+                ->type_name(fmt::format("{{{}}}", fmt::join(stability::task_names(), ",")))
+                ->required();
+            app.add_option("--vehicles", options->vehicles, "How many")->check(CLI::Range(1, 1000));
+            app.add_option("--model", options->models, "model.toml: one for all vehicles, or one for each")
+                ->required();
+            app.add_option("--gains", options->gains, "gains.toml")->required();
+            app.add_option("--network", options->network.file,
+                           "network.toml whose prediction the controller uses");
+            app.add_option("--torque-network", options->torque_network,
+                           "network.toml of train --quantity torque, whose prediction is taken from the "
+                           "torque that the attitude law asks for");
+            auto* phi =
+                app.add_option("--phi", options->network.phi, "Weight file of phi, in place of --network");
+            auto* rho =
+                app.add_option("--rho", options->network.rho, "Weight file of rho, in place of --network");
+            phi->needs(rho);
+            rho->needs(phi);
+            app.add_option("-o,--output", options->output, "Folder for the logs")->required();
+            app.add_option("--report", options->report, "Folder for an HTML report with plots");
+            app.add_option("--duration", options->duration_s, "Seconds (default: the task's own)")
+                ->check(CLI::PositiveNumber);
+            app.add_option("--seed", options->seed, "Of noise, clocks and random goals (default 0)");
+            app.add_option("--run", options->run, "Number of the run in the logs' names (default 0)")
+                ->check(CLI::NonNegativeNumber);
+            app.add_option("--radio-latency", options->radio.latency_s,
+                           "Seconds until neighbours' positions arrive at the network (default 0)")
+                ->check(CLI::Range(0.0, 10.0));
+            app.add_option("--radio-loss", options->radio.loss,
+                           "Share of neighbours' positions that are lost (default 0); after 500 ms without "
+                           "one, a neighbour no longer counts")
+                ->check(CLI::Range(0.0, 1.0));
+            app.add_flag("--no-noise", options->no_noise, "The controller sees the true state");
+            return [options](const CommonOptions& common) { return run_simulate(*options, common); };
+          }};
+}
+
+}  // namespace swarmcert::analysis

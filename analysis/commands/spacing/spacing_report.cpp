@@ -1,0 +1,70 @@
+#include "analysis/commands/spacing/spacing_report.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "analysis/report/report.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+std::string cell_or_never(double x) { return std::isfinite(x) ? fmt::format("{:.4g}", x) : "never"; }
+
+std::string gap(double x) { return std::isfinite(x) ? fmt::format("{:.3f} m", x) : "none in range"; }
+
+}  // namespace
+
+std::string write_spacing_report(const stability::SpacingQuestion& question, const stability::Spacing& found,
+                                 const files::Json& result, const std::string& folder, bool overwrite) {
+  Report report("How close vehicles may fly");
+  report.result(result);
+  report.paragraph(
+      fmt::format("Below {} vehicle(s), the vertical error is to stay within {:.6g} m without feed-forward; "
+                  "predicted forces "
+                  "times {:.6g}. Least height gap to stay below: {}; to cross below: {}.",
+                  question.neighbours, question.max_error_m, question.guard, gap(found.least_gap_to_stay_m),
+                  gap(found.least_gap_to_cross_m)));
+  std::string shape = "# height_gap_m keep_out_radius_m left_m\n", speed = "# height_gap_m least_speed_m_s\n";
+  std::vector<std::vector<std::string>> rows;
+  int passable = 0;
+  for (const stability::SpacingRow& row : found.shape) {
+    const bool is_known = std::isfinite(row.keep_out_radius_m);
+    shape += fmt::format("{:.6g} {} {}\n", row.height_gap_m,
+                         is_known ? fmt::format("{:.6g}", row.keep_out_radius_m) : "NaN",
+                         is_known ? fmt::format("{:.6g}", -row.keep_out_radius_m) : "NaN");
+    const bool may_cross = std::isfinite(row.least_speed_m_s);
+    passable += may_cross ? 1 : 0;
+    speed += fmt::format("{:.6g} {}\n", row.height_gap_m,
+                         may_cross ? fmt::format("{:.6g}", row.least_speed_m_s) : "NaN");
+    rows.push_back(
+        {fmt::format("{:.3f}", row.height_gap_m), cell_or_never(row.peak_force_N),
+         cell_or_never(row.stay_error_m), row.may_stay ? "yes" : "no", cell_or_never(row.keep_out_radius_m),
+         row.may_stay ? "may stay" : cell_or_never(row.least_speed_m_s), cell_or_never(row.thrust_margin_N)});
+  }
+  report.figure(
+      "keep_out", shape,
+      "set xlabel 'horizontal distance from below the upper vehicle [m]'\n"
+      "set ylabel 'height gap [m]'\nset yrange [*:0] reverse\nset style fill solid 0.5 noborder\n"
+      "plot 'keep_out.dat' using 2:1:3 with filledcurves notitle, "
+      "'' using 2:1 with linespoints linetype 1 title 'keep out', "
+      "'' using 3:1 with linespoints linetype 1 notitle, "
+      "'-' using 1:2 with points linetype 2 pointsize 2 title 'upper vehicle'\n0 0\ne\n",
+      "Keep-out shape below the upper vehicle, which is at the top in the middle: outside of it any "
+      "motion keeps the error within the limit.");
+  if (passable > 1) {
+    report.figure(
+        "speed", speed,
+        "set xlabel 'height gap [m]'\nset ylabel 'least crossing speed [m/s]'\nset yrange [0:*]\n"
+        "plot 'speed.dat' using 1:2 with linespoints notitle\n",
+        "Least speed of a straight pass below; 0 where the vehicle may stay, no point where no speed "
+        "suffices.");
+  }
+  report.heading("Rows");
+  report.table({"height gap [m]", "force [N]", "error if it stays [m]", "may stay", "keep-out radius [m]",
+                "cross at least at [m/s]", "thrust left [N]"},
+               rows);
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,16 @@
+/// @file The report of `spacing`: the keep-out shape.
+#pragma once
+
+#include <string>
+
+#include "nn/base/json.h"
+#include "stability/bounds/spacing.h"
+
+namespace swarmcert::analysis {
+
+/// Writes FOLDER/report.html with the keep-out shape, the least crossing speeds and the JSON `result`; returns its path.
+/// @throws files::InputError as Report::write().
+std::string write_spacing_report(const stability::SpacingQuestion& question, const stability::Spacing& found,
+                                 const files::Json& result, const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,138 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "analysis/cli/progress.h"
+#include "analysis/commands/commands.h"
+#include "analysis/commands/sweep/sweep_report.h"
+#include "nn/base/file_io.h"
+#include "stability/sweep/shards.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using stability::MergedSweep;
+
+struct SweepOptions {
+  std::string grid, folder, shard, report;
+  bool resume = false;
+};
+
+/// "2/8"
+void read_shard(const std::string& text, stability::SweepOptions& options) {
+  if (text.empty()) return;
+  const std::size_t slash = text.find('/');
+  char* end = nullptr;
+  const long shard = std::strtol(text.c_str(), &end, 10);
+  const bool has_shard = slash != std::string::npos && end == text.c_str() + slash && slash > 0;
+  const long count = has_shard ? std::strtol(text.c_str() + slash + 1, &end, 10) : 0;
+  if (!has_shard || *end != '\0' || count < 1 || count > 1'000'000 || shard < 0 || shard > count) {
+    throw UsageError("--shard " + text + ": write I/N with 0 <= I <= N, e.g. 2/8");
+  }
+  options.shard = static_cast<int>(shard);
+  options.count = static_cast<int>(count);
+}
+
+std::string report_folder(const std::string& folder, const std::string& report) {
+  return report.empty() ? (std::filesystem::path(folder) / "report").string() : report;
+}
+
+/// Writes FOLDER/sweep.json and the report; what both commands do at their end.
+int finish(const std::string& command, const std::string& folder, const std::string& report_wanted,
+           const std::vector<std::string>& inputs, const CommonOptions& common, bool may_replace) {
+  const MergedSweep sweep = stability::read_shards(folder);
+  const files::Json points = sweep_json(sweep);
+  const std::string path = (std::filesystem::path(folder) / "sweep.json").string();
+  const std::string text = files::to_text(points);
+  const bool is_there = std::filesystem::exists(path) && files::read_file(path) == text;
+  if (!is_there) files::write_file(path, text, common.force || may_replace);
+  const std::string report = write_sweep_report(sweep, report_folder(folder, report_wanted),
+                                                common.force || may_replace || is_there);
+  files::Json result = result_head(command, command == "merge" ? sweep.files : inputs);
+  for (const char* key : {"axes", "compute", "pareto", "points"}) result[key] = points[key];
+  write_result(common, result);
+  if (!common.prints_text()) return kDone;
+  print_sweep(sweep);
+  fmt::print("\npoints: {}\nreport: {}\n", path, report);
+  return kDone;
+}
+
+int run_sweep(const SweepOptions& options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  if (options.shard.empty() && !options.resume)
+    refuse_folder(common, report_folder(options.folder, options.report));
+  const stability::Grid grid = stability::load_grid(options.grid);
+  stability::SweepOptions sweep;
+  read_shard(options.shard, sweep);
+  sweep.resume = options.resume;
+  sweep.overwrite = common.force;
+  sweep.jobs = common.jobs;
+  Progress progress(common.quiet);
+  sweep.progress = [&progress](long done, long total) {
+    progress.show(static_cast<int>(done), static_cast<int>(total), "cells");
+  };
+  const CancelOnInterrupt interrupt;
+  sweep.cancelled = interrupt.flag();
+  const stability::SweepOutcome outcome = run_shard(grid, options.folder, sweep);
+  if (!outcome.complete()) {
+    fmt::print(stderr, "swarmcert: interrupted after {} of {} cells, kept in {}; --resume continues\n",
+               outcome.done, outcome.total, outcome.file);
+    return kInconclusive;
+  }
+  if (sweep.count == 1)
+    return finish("sweep", options.folder, options.report, grid.inputs, common, options.resume);
+  files::Json result = result_head("sweep", grid.inputs);
+  result["shard"] = {{"file", outcome.file}, {"cells", outcome.done}};
+  write_result(common, result);
+  if (common.prints_text()) {
+    fmt::print("{} cells in {}\nwhen all shards are there: swarmcert merge {}\n", outcome.done, outcome.file,
+               options.folder);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Command sweep_command() {
+  return {"sweep", "Bounds over a grid of gains and vehicles: tables, heatmaps, Pareto front",
+          "Writes shard files, points as sweep.json, and a report with heatmaps into the folder. Cells that "
+          "are not\n"
+          "feasible carry the reason. --shard I/N computes every N-th cell: a job array runs one shard per "
+          "task, and\n"
+          "'swarmcert merge' makes the same bytes of them as an undivided run. Ctrl-C keeps what is done.\n\n"
+          "Example: swarmcert sweep grid.toml -o sweep",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<SweepOptions>();
+            app.add_option("GRID", options->grid, "grid.toml: axes and what to compute")->required();
+            app.add_option("-o,--output", options->folder, "Folder for the results")->required();
+            app.add_option("--report", options->report,
+                           "Folder for the report (default: report in that folder)");
+            app.add_option(
+                "--shard", options->shard,
+                "I/N: compute only the I-th of N parts; I counts 0 .. N-1 or 1 .. N, N being the same as 0");
+            app.add_flag("--resume", options->resume, "Keep the cells that the shard's file already has");
+            return [options](const CommonOptions& common) { return run_sweep(*options, common); };
+          }};
+}
+
+Command merge_command() {
+  return {
+      "merge", "Put the shards of a sweep together",
+      "Checks that no cell is missing or there twice, then writes what an undivided sweep writes, byte for "
+      "byte.\n\n"
+      "Example: swarmcert merge sweep",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<SweepOptions>();
+        app.add_option("DIR", options->folder, "Folder with the shard files")->required();
+        app.add_option("--report", options->report, "Folder for the report (default: report in that folder)");
+        return [options](const CommonOptions& common) {
+          refuse_to_replace(common, common.json);
+          refuse_folder(common, options->report);
+          return finish("merge", options->folder, options->report, {}, common, false);
+        };
+      }};
+}
+
+}  // namespace swarmcert::analysis

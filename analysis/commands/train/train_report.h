@@ -1,0 +1,15 @@
+/// @file Report of a training run: learning curve, residuals before and after, map of the learned force.
+#pragma once
+
+#include <string>
+
+#include "analysis/learning/training_run.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// Writes it into `folder`, with the command's result inside; returns the path of the HTML file.
+std::string write_train_report(const learning::LearningData& data, const learning::Run& run,
+                               const files::Json& result, const std::string& folder, bool overwrite);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,245 @@
+#include <fmt/core.h>
+
+#include <cmath>
+#include <memory>
+
+#include "analysis/cli/progress.h"
+#include "analysis/commands/bound/bound_output.h"
+#include "analysis/commands/commands.h"
+#include "analysis/commands/shared/tracking_input.h"
+#include "analysis/commands/tune/tune_report.h"
+#include "nn/base/input_error.h"
+#include "stability/sweep/tune.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using stability::TunedPoint;
+using stability::TuneResult;
+
+struct TuneOptions {
+  TrackingArguments tracking;
+  stability::TuneOptions tune;
+  std::string objective = "impulse";
+  std::string axis = "z";
+  std::string report;
+};
+
+/// Part of the further lag that the shipped gains bear and that tuned ones must still bear, where nothing else is said.
+constexpr double kKeptLag = 0.5;
+
+files::Json norms_json(const stability::GainNorms& norms) {
+  return {{"rate", finite(norms.rate)},
+          {"amplitude", finite(norms.amplitude)},
+          {"edge", finite(norms.edge)},
+          {"impulse", finite(norms.impulse)}};
+}
+
+files::Json point_json(const TunedPoint& p, const stability::GainNorms& sampled) {
+  files::Json json = {{"Kp", p.Kp},
+                      {"Kd", p.Kd},
+                      {"Ki", p.Ki},
+                      {"objective", finite(p.objective)},
+                      {"sampled", norms_json(sampled)},
+                      {"noise_command_m_s2", finite(p.noise_m_s2)},
+                      {"lag_limit_s", finite(p.lag_limit_s)},
+                      {"effort", finite(p.effort)},
+                      {"feasible", p.feasible}};
+  json.update(norms_json(p.norms));
+  return json;
+}
+
+/// The gains as the published firmware calls them.
+struct FirmwareGain {
+  const char* name;
+  double TunedPoint::*value;
+  const char* unit;
+};
+constexpr FirmwareGain kFirmwareGains[] = {{"Kpos_P", &TunedPoint::Kp, "1/s^2"},
+                                           {"Kpos_D", &TunedPoint::Kd, "1/s"},
+                                           {"Kpos_I", &TunedPoint::Ki, "1/s^3"}};
+
+files::Json firmware_json(const std::string& axis, const TuneResult& found) {
+  files::Json rows = files::Json::array();
+  for (const FirmwareGain& gain : kFirmwareGains) {
+    const double before = found.shipped.*gain.value;
+    const double after = found.best.*gain.value;
+    rows.push_back({{"name", gain.name},
+                    {"axis", axis},
+                    {"shipped", before},
+                    {"tuned", after},
+                    {"relative_change", after / before - 1},
+                    {"unit", gain.unit}});
+  }
+  return rows;
+}
+
+std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult& found) {
+  const TunedPoint& a = found.shipped;
+  const TunedPoint& b = found.best;
+  std::vector<TunedQuantity> all;
+  for (const FirmwareGain& gain : kFirmwareGains)
+    all.push_back({fmt::format("{} {}", gain.name, axis), a.*gain.value, b.*gain.value, gain.unit});
+  all.insert(all.end(),
+             {{"rate", a.norms.rate, b.norms.rate, "m per N/s"},
+              {"amplitude", a.norms.amplitude, b.norms.amplitude, "m/N"},
+              {"edge", a.norms.edge, b.norms.edge, "m/N"},
+              {"impulse", a.norms.impulse, b.norms.impulse, "m per N s"},
+              {"impulse, sampled", found.shipped_sampled.impulse, found.best_sampled.impulse, "m per N s"},
+              {"noise of the command", a.noise_m_s2, b.noise_m_s2, "m/s^2"},
+              {"further lag borne", a.lag_limit_s, b.lag_limit_s, "s"},
+              {"effort", a.effort, b.effort, "N/N"}});
+  return all;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+void print_result(const TuneOptions& options, const TuneResult& found,
+                  const stability::TuneConstraints& limits) {
+  const TunedPoint& a = found.shipped;
+  const TunedPoint& b = found.best;
+  fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, further lag of {:.6g} s borne",
+             options.axis, options.objective, limits.most_noise_m_s2, limits.least_lag_limit_s);
+  if (limits.most_rate > 0) fmt::print(", rate gain at most {:.6g}", limits.most_rate);
+  if (limits.most_effort > 0) fmt::print(", effort at most {:.6g}", limits.most_effort);
+  fmt::print("\n\n");
+  if (!b.feasible) {
+    if (found.infeasible.empty()) {
+      fmt::print(
+          "NONE FOUND: no gains within a factor {} of the given ones were found that satisfy all "
+          "constraints\n",
+          options.tune.range);
+    } else {
+      fmt::print("INFEASIBLE: {}\n", found.infeasible);
+    }
+    fmt::print("nearest: Kp {:.6g}, Kd {:.6g}, Ki {:.6g}; violates {} by {:.3g} %\nsearch: {}\n", b.Kp, b.Kd,
+               b.Ki, listed(found.violated), 100 * b.excess, found.stopped);
+    return;
+  }
+  fmt::print("  {:<22} {:>12} {:>12}\n", "", "shipped", "tuned");
+  for (const TunedQuantity& q : quantities(options.axis, found)) {
+    fmt::print("  {:<22} {:>12.6g} {:>12.6g} {:>+9.1f} %  {}\n", q.name, q.shipped, q.tuned,
+               100 * (q.tuned / q.shipped - 1), q.unit);
+  }
+  fmt::print("\nactive constraints: {}\n", listed(found.active_constraints));
+  if (!a.feasible) fmt::print("the shipped gains violate a constraint\n");
+  fmt::print("search: {}; good gains, not proved to be the best\n", found.stopped);
+}
+
+int run_tune(TuneOptions options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  const Tracking input = load_tracking(options.tracking);
+  const int axis = options.axis == "x" ? 0 : options.axis == "y" ? 1 : 2;
+  std::optional<stability::SampledLoop> loop = sampled_axis_loop(input.gains, input.plant, axis);
+  if (!loop) {
+    const std::optional<stability::AxisLoop> continuous = axis_loop(input.gains, input.plant, axis);
+    if (!continuous) throw UsageError("Lambda or K couples axes: there are no gains of one axis to tune");
+    throw files::InputError({options.tracking.gains, "", "position.rate_hz", "", "is missing",
+                             "the noise of the command depends on the rate of the loop"});
+  }
+  if (!(loop->plant.Ki > 0)) throw UsageError("Ki of axis " + options.axis + " is 0: tune needs a PID law");
+  options.tune.objective = options.objective == "amplitude" ? stability::TuneObjective::kAmplitude
+                           : options.objective == "edge"    ? stability::TuneObjective::kEdge
+                           : options.objective == "rate"    ? stability::TuneObjective::kRate
+                                                            : stability::TuneObjective::kImpulse;
+  const TunedPoint shipped = evaluate_gains(*loop, options.tune.objective);
+  stability::TuneConstraints& limits = options.tune.constraints;
+  // By default nothing may get worse than it is, except the lag that is borne; the slack is for rounding.
+  constexpr double kSlack = 1e-9;
+  if (limits.most_noise_m_s2 == 0) limits.most_noise_m_s2 = shipped.noise_m_s2 * (1 + kSlack);
+  if (limits.least_lag_limit_s == 0) limits.least_lag_limit_s = kKeptLag * shipped.lag_limit_s;
+  if (limits.most_rate == 0) limits.most_rate = shipped.norms.rate * (1 + kSlack);
+  Progress progress(common.quiet);
+  options.tune.progress = [&progress](int done, int total) { progress.show(done, total, "evaluations"); };
+  const TuneResult found = stability::tune(*loop, options.tune);
+
+  files::Json result = result_head("tune", {options.tracking.gains, options.tracking.model});
+  result["seed"] = options.tune.seed;
+  result["axis"] = options.axis;
+  result["objective"] = options.objective;
+  result["constraints"] = {
+      {"most_noise_m_s2", limits.most_noise_m_s2},
+      {"least_lag_limit_s", limits.least_lag_limit_s},
+      {"most_rate", finite(limits.most_rate)},
+      {"most_effort", limits.most_effort > 0 ? files::Json(limits.most_effort) : files::Json()}};
+  const TunedPoint& best = found.best;
+  result["verdict"] = !best.feasible ? (found.infeasible.empty() ? "none found" : "infeasible")
+                      : found.shipped.feasible && best.objective > found.shipped.objective * (1 - 1e-6)
+                          ? "no better gains found"
+                          : "found";
+  result["gains"] =
+      best.feasible ? files::Json{{"Kp", best.Kp}, {"Kd", best.Kd}, {"Ki", best.Ki}} : files::Json();
+  result["firmware_parameters"] = best.feasible ? firmware_json(options.axis, found) : files::Json();
+  result["shipped"] = point_json(found.shipped, found.shipped_sampled);
+  result["tuned"] = best.feasible ? point_json(best, found.best_sampled) : files::Json();
+  result["nearest"] = best.feasible ? files::Json() : point_json(best, found.best_sampled);
+  result["violated_constraints"] = found.violated;
+  result["why_infeasible"] = found.infeasible;
+  result["active_constraints"] = found.active_constraints;
+  result["stopped"] = found.stopped;
+  write_result(common, result);
+  if (common.prints_text()) print_result(options, found, limits);
+  if (!options.report.empty()) {
+    const std::string verdict = fmt::format(
+        "Axis {}, least {} gain: {}. Active constraints: {}. Good gains, not proved to be the best.",
+        options.axis, options.objective, result["verdict"].get<std::string>(),
+        listed(found.active_constraints));
+    const std::string path = write_tune_report(
+        verdict, best.feasible ? quantities(options.axis, found) : std::vector<TunedQuantity>(), result,
+        options.report, common.force);
+    if (common.prints_text()) fmt::print("report: {}\n", path);
+  }
+  if (!best.feasible) return found.infeasible.empty() ? kInconclusive : kViolated;
+  return kDone;
+}
+
+}  // namespace
+
+Command tune_command() {
+  return {
+      "tune", "Better gains for one axis under constraints",
+      "Searches Kp, Kd, Ki of one axis, globally and then locally (NLopt), for the least worst-case error "
+      "under\n"
+      "limits on the command's noise, the lag that must be borne, the rate gain, and the effort. Says which "
+      "limits "
+      "hold\n"
+      "it back and what changes against the gains given. Exit code 4: no gains found; 1: proved that there "
+      "are none.\n\n"
+      "Example: swarmcert tune --gains controller/gains/crazyflie-small.toml --model "
+      "stability/models/crazyflie-small.toml",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<TuneOptions>();
+        declare_tracking(app, options->tracking);
+        app.add_option("--axis", options->axis, "x, y or z (default z)")
+            ->check(CLI::IsMember({"x", "y", "z"}));
+        app.add_option("--objective", options->objective, "Gain to make least (default impulse)")
+            ->check(CLI::IsMember({"rate", "amplitude", "edge", "impulse"}));
+        auto& limits = options->tune.constraints;
+        app.add_option(
+               "--max-noise", limits.most_noise_m_s2,
+               "Most noise of the command, m/s^2, for 1 mm and 0.05 m/s of sensor noise (default: as now)")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--min-lag", limits.least_lag_limit_s,
+                       "Further lag that the loop must bear, s (default: half of what it bears now)")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--max-rate", limits.most_rate,
+                       "Largest rate gain, m per N/s (default: as now; keeps Ki up)")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--max-effort", limits.most_effort, "Largest effort gain, N/N")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--range", options->tune.range, "Gains at most this factor away (default 8)")
+            ->check(CLI::Range(1.01, 100.0));
+        app.add_option("--nodes", options->tune.global_evaluations, "Evaluations of the global search")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--seed", options->tune.seed, "Seed of the global search (default 1)");
+        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+        return [options](const CommonOptions& common) { return run_tune(*options, common); };
+      }};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,34 @@
+#include "analysis/commands/tune/tune_report.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <limits>
+
+#include "analysis/report/report.h"
+
+namespace swarmcert::analysis {
+
+std::string write_tune_report(const std::string& verdict, const std::vector<TunedQuantity>& quantities,
+                              const files::Json& result, const std::string& folder, bool overwrite) {
+  Report report("Tuned gains");
+  report.result(result);
+  report.paragraph(verdict);
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Bar> bars;
+  std::vector<std::vector<std::string>> rows;
+  for (const TunedQuantity& quantity : quantities) {
+    const double percent = 100 * quantity.tuned / quantity.shipped;
+    const bool is_finite = std::isfinite(percent);
+    rows.push_back({quantity.name, fmt::format("{:.6g}", quantity.shipped),
+                    fmt::format("{:.6g}", quantity.tuned),
+                    is_finite ? fmt::format("{:+.1f} %", percent - 100) : "-", quantity.unit});
+    if (is_finite) bars.push_back({quantity.name, percent, kNone, kNone});
+  }
+  report.bars("tuned", bars, "tuned, of the value under the gains given [%]",
+              "What the tuned gains make of each quantity; 100 % is what the gains given have.");
+  if (!rows.empty()) report.table({"", "given", "tuned", "change", "unit"}, rows);
+  return report.write(folder, overwrite);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,55 @@
+/// @file The calibration polynomials of controller/battery.h, fitted to load-cell data.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/identification/thrust/thrust_data.h"
+
+namespace swarmcert::analysis {
+
+/// A fitted number and the ends of its confidence interval.
+struct Coefficient {
+  std::string name;  ///< as in controller/battery.h, e.g. "c10"
+  double value = 0, lower = 0, upper = 0;
+};
+
+/// One polynomial, fitted by least squares.
+///
+/// The intervals are Student's, for errors that are independent, of equal variance and in the fitted quantity only.
+/// Rows of a slow ramp are not independent: their intervals are too narrow.
+struct PolynomialFit {
+  bool determined = false;
+  std::string why_not;                    ///< what the data lack; empty if determined
+  std::vector<Coefficient> coefficients;  ///< empty unless determined
+  std::string method;                     ///< what was fitted to what
+  std::string unit;                       ///< of the fitted quantity and of the two numbers below
+  int samples = 0;
+  double residual_rms = 0;
+  double largest_residual = 0;
+  /// Largest half-width of the confidence interval of the polynomial's value, over the corners of PWM as measured
+  /// and a battery from empty to full.
+  double largest_uncertainty = 0;
+};
+
+struct ThrustIdentification {
+  PolynomialFit thrust;      ///< g = c00 + c10 p + c01 v + c20 p^2 + c11 p v
+  PolynomialFit pwm;         ///< p = d00 + d10 g + d01 v + d20 g^2 + d11 g v
+  PolynomialFit max_thrust;  ///< g_max = e00 + e10 p + e01 v
+  double smallest_p = 0, largest_p = 0, smallest_v = 0, largest_v = 0;
+  double confidence = 0;
+};
+
+/// Fits the three polynomials.
+///
+/// Data determine a polynomial if its columns are independent (smallest singular value of the columns, scaled to
+/// norm 1, above 1e-6), if PWM spans 0.2 and the battery 0.1 V at least, and if the fit is not uncertain by more than
+/// a tenth of the largest measured value where it will be used.
+///
+/// Largest thrust: where at least three ramps reach 98 % PWM (rows with the same `run`, or without that column rows in
+/// which PWM does not fall), the largest thrust of each ramp is fitted to p and v of the ramp's rows, so that e10
+/// says how much the battery will still sag. Otherwise it is the thrust polynomial at p = 1, and e10 is 0.
+/// @param confidence of the intervals, between 0 and 1.
+ThrustIdentification identify_thrust(const ThrustData& data, double confidence);
+
+}  // namespace swarmcert::analysis

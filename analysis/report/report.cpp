@@ -1,0 +1,184 @@
+#include "analysis/report/report.h"
+
+#include <fmt/core.h>
+#include <openssl/evp.h>
+#include <openssl/sha.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "analysis/cli/command_line.h"
+#include "analysis/report/report_drawing.h"
+#include "analysis/report/report_scripts.h"
+#include "analysis/report/report_svg.h"
+#include "analysis/report/report_text.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+/// The source "'sha256-...'" by which a policy admits exactly this script or style.
+std::string policy_source(std::string_view text) {
+  unsigned char digest[SHA256_DIGEST_LENGTH];
+  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest);
+  unsigned char base64[4 * ((SHA256_DIGEST_LENGTH + 2) / 3) + 1];
+  EVP_EncodeBlock(base64, digest, sizeof digest);
+  return "'sha256-" + std::string(reinterpret_cast<const char*>(base64)) + "'";
+}
+
+/// JSON that may stand inside an HTML script element.
+std::string data_of(const std::vector<TimeSeries>& all) {
+  files::Json json = files::Json::array();
+  for (const TimeSeries& series : all) {
+    files::Json rows = files::Json::array(), marks = files::Json::array();
+    for (const std::array<float, 5>& row : series.rows) {
+      files::Json cells = files::Json::array();
+      for (const float x : row) {
+        // A thousandth of the unit is less than a pixel; more digits would double the file.
+        cells.push_back(std::isfinite(x) ? files::Json(std::round(static_cast<double>(x) * 1000) / 1000)
+                                         : files::Json(nullptr));
+      }
+      rows.push_back(std::move(cells));
+    }
+    for (const TimeSeries::Mark& mark : series.marks) {
+      marks.push_back({{"time", std::round(static_cast<double>(mark.time_s) * 1000) / 1000},
+                       {"rank", mark.rank},
+                       {"gf", mark.size_gf}});
+    }
+    json.push_back({{"name", series.name}, {"rows", std::move(rows)}, {"marks", std::move(marks)}});
+  }
+  return script_json(json.dump(-1, ' ', true, files::Json::error_handler_t::replace));
+}
+
+/// Numbers with their units stand to the right.
+bool is_number(const std::string& cell) {
+  return !cell.empty() && cell.find_first_not_of("0123456789.+-eE %") == std::string::npos;
+}
+
+}  // namespace
+
+Report::Report(std::string title) : title_(std::move(title)) {}
+
+void Report::result(const nlohmann::ordered_json& result) { result_json_ = files::to_text(result); }
+
+void Report::made_by(const std::string& command) { command_ = command; }
+
+void Report::heading(const std::string& text) { body_.push_back("<h2>" + html_text(text) + "</h2>\n"); }
+
+void Report::paragraph(const std::string& text) { body_.push_back("<p>" + html_text(text) + "</p>\n"); }
+
+void Report::table(const std::vector<std::string>& header,
+                   const std::vector<std::vector<std::string>>& rows) {
+  // Wide tables scroll by themselves, with keys too.
+  std::string html =
+      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"table\"><table><thead><tr>";
+  for (const std::string& cell : header) html += "<th scope=\"col\">" + html_text(cell) + "</th>";
+  html += "</tr></thead><tbody>\n";
+  for (const std::vector<std::string>& row : rows) {
+    html += "<tr>";
+    for (const std::string& cell : row)
+      html += (is_number(cell) ? "<td class=\"number\">" : "<td>") + html_text(cell) + "</td>";
+    html += "</tr>\n";
+  }
+  body_.push_back(html + "</tbody></table></div>\n");
+}
+
+void Report::figure(const std::string& name, const std::string& data, const std::string& script,
+                    const std::string& caption, int height) {
+  figures_.push_back({name, data, script, caption, height});
+  body_.emplace_back();
+}
+
+void Report::bars(const std::string& name, const std::vector<Bar>& bars, const std::string& quantity,
+                  const std::string& caption) {
+  if (bars.empty()) return;
+  std::string data = "# value lower upper name\n";
+  for (const Bar& bar : bars) {
+    const auto end = [&bar](double x) { return std::isfinite(x) ? x : bar.value; };
+    data += fmt::format("{:.10g} {:.10g} {:.10g} {}\n", bar.value, end(bar.lower), end(bar.upper),
+                        plot_field(bar.name));
+  }
+  figure(name, data,
+         fmt::format(
+             "set xlabel {0}\nset key off\nset style fill solid 0.9 noborder\nset ytics nomirror\n"
+             "set yrange [{1}.6:-0.6]\nset xrange [*<0:*]\nset grid x noy\n"
+             "plot '{2}.dat' using (0):0:(0):1:($0-0.35):($0+0.35):ytic(4) with boxxyerror, "
+             "'' using 1:0:2:3 with xerrorbars linecolor rgb 'black' dashtype 1 pointtype 0 linewidth 1.5\n",
+             plot_string(quantity), bars.size() - 1, name),
+         caption, 120 + 32 * static_cast<int>(bars.size()));
+}
+
+void Report::time_series(const std::vector<TimeSeries>& all, const std::string& caption) {
+  if (kTimeSeriesScript.empty()) {
+    paragraph("Time series with zoom are missing: the tool was built without dygraphs (libjs-dygraphs).");
+    return;
+  }
+  has_time_series_ = true;
+  body_.push_back(
+      "<figure><div id=\"time-series\"></div>\n<script type=\"application/json\" id=\"time-series-data\">" +
+      data_of(all) + "</script>\n<figcaption>" + html_text(caption) + "</figcaption></figure>\n");
+}
+
+std::string Report::drawn(const Figure& figure, const std::string& folder) const {
+  const std::filesystem::path path(folder);
+  const std::string script = figure.name + ".gp";
+  files::write_file((path / (figure.name + ".dat")).string(), figure.data, true);
+  files::write_file((path / script).string(), plot_script(figure.script, figure.height), true);
+  const std::string wide = draw(folder, script, false);
+  std::string html = "<figure class=\"drawing\">\n";
+  const std::string label = "Plot: " + figure.caption;
+  const std::string wide_part = inline_svg(wide, figure.name + "-", "wide", label);
+  const std::string narrow_part =
+      inline_svg(draw(folder, script, true), figure.name + "-narrow-", "narrow", label);
+  if (!wide_part.empty() && !narrow_part.empty()) {
+    files::write_file((path / (figure.name + ".svg")).string(), wide, true);
+    html += wide_part + narrow_part;
+  } else {
+    html += "<p>Not drawn: gnuplot is missing or failed. The data are in " + html_text(figure.name) +
+            ".dat.</p>\n";
+  }
+  return html + "<figcaption>" + html_text(figure.caption) + "</figcaption></figure>\n";
+}
+
+std::string Report::write(const std::string& folder, bool overwrite) const {
+  const std::filesystem::path path(folder);
+  if (std::filesystem::exists(path) && !overwrite &&
+      (!std::filesystem::is_directory(path) || !std::filesystem::is_empty(path))) {
+    throw files::InputError(
+        {folder, "", "--report", "", "the folder is not empty", "--force writes into it"});
+  }
+  std::filesystem::create_directories(path);
+  const std::string style = std::string(kPageStyle) + (has_time_series_ ? std::string(kTimeSeriesStyle) : "");
+  const std::string script =
+      std::string(kPageScript) + (has_time_series_ ? std::string(kTimeSeriesScript) : "");
+  std::string html =
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
+      "form-action "
+      "'none'; img-src data:; style-src " +
+      policy_source(style) + "; script-src " + policy_source(script) +
+      "\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+      html_text(title_) + "</title>\n<style>" + style + "</style></head><body>\n<h1>" + html_text(title_) +
+      "</h1>\n";
+  std::size_t next_figure = 0;
+  for (const std::string& part : body_) html += part.empty() ? drawn(figures_[next_figure++], folder) : part;
+  html += "<h2>How it was made</h2>\n";
+  if (const std::string command = command_.empty() ? command_to_copy() : command_; !command.empty()) {
+    html += "<pre id=\"command\">" + html_text(command) +
+            "</pre>\n<button type=\"button\" data-copies=\"command\" hidden>Copy the command</button>\n";
+  }
+  if (!result_json_.empty()) {
+    html +=
+        "<button type=\"button\" data-copies=\"result\" hidden>Copy the result as JSON</button>\n"
+        "<script type=\"application/json\" id=\"result\">" +
+        script_json(result_json_) + "</script>\n";
+  }
+  html += "<p>swarmcert " SWARMCERT_VERSION "</p>\n<script>" + script + "</script>\n</body></html>\n";
+  const std::string report = (path / "report.html").string();
+  files::write_file(report, html, true);
+  return report;
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,136 @@
+#include "analysis/tracking/tube/error_loops.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "stability/bounds/interval.h"
+#include "stability/bounds/sampled_loop.h"
+
+namespace swarmcert::analysis {
+
+using stability::up;
+
+namespace {
+
+using stability::AxisLoop;
+using stability::KernelCells;
+using stability::Polynomial;
+
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
+/// s^power p
+Polynomial shifted(Polynomial p, int power) {
+  p.insert(p.begin(), static_cast<std::size_t>(power), 0.0);
+  return p;
+}
+
+bool same_loop(const AxisLoop& a, const AxisLoop& b) {
+  return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
+}
+
+ErrorLoop error_loop(const AxisLoop& loop, double slice_s, int slices) {
+  ErrorLoop result;
+  result.Kp = loop.Kp;
+  result.Kd = loop.Kd;
+  result.Ki = loop.Ki;
+  Polynomial lag = {1};
+  for (const double tau : loop.lags_s) {
+    if (tau <= 0) continue;
+    lag = stability::product(lag, {1, tau});
+    result.lags_s = up(result.lags_s + tau);
+  }
+  const int integrates = loop.Ki > 0 ? 1 : 0;
+  const Polynomial feedback =
+      integrates == 1 ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
+  const Polynomial open = shifted(lag, 2 + integrates);
+  const auto cells = [&](const Polynomial& numerator) {
+    return stability::kernel_cells({numerator, open, feedback, 0}, slice_s, slices);
+  };
+  const Polynomial unit = {1 / loop.mass_kg};
+  if (integrates == 1) result.h = cells(unit);
+  result.h1 = cells(shifted(unit, integrates));
+  result.h2 = cells(shifted(unit, integrates + 1));
+  result.has_lag = lag.size() > 1;
+  if (!result.has_lag) return result;
+  const Polynomial rest = stability::scaled(Polynomial(lag.begin() + 1, lag.end()), 1 / loop.mass_kg);
+  result.g = cells(shifted(rest, integrates));
+  result.g1 = cells(shifted(rest, integrates + 1));
+  result.g2 = cells(shifted(rest, integrates + 2));
+  return result;
+}
+
+std::vector<double> least(const std::optional<KernelCells>& by_size,
+                          const std::optional<KernelCells>& by_rate, const Signal& signal) {
+  std::vector<double> result(signal.size.size(), kUnknown);
+  if (by_size) result = convolved(*by_size, signal.size);
+  if (!by_rate || signal.rate.empty()) return result;
+  const std::vector<double> other = convolved(*by_rate, signal.rate);
+  const double jump = up(by_rate->peak * signal.at_start);
+  for (std::size_t k = 0; k < result.size(); ++k) result[k] = std::min(result[k], up(other[k] + jump));
+  return result;
+}
+
+}  // namespace
+
+ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices) {
+  ErrorLoops loops;
+  if (tracking.gains.delay_s > 0) {
+    loops.refusal = "the loop has a delay, whose kernel has no enclosure: set [lag] delay_s = 0";
+    return loops;
+  }
+  if (tracking.plant.thrust_scale != 1) {
+    loops.refusal =
+        "the force that acts is not the force commanded (thrust_ratio), which a tube does not follow";
+    return loops;
+  }
+  std::optional<AxisLoop> last;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::optional<AxisLoop> loop = axis_loop(tracking.gains, tracking.plant, axis);
+    if (!loop) {
+      loops.refusal = "Lambda or K couples the axes";
+      return loops;
+    }
+    if (const auto sampled = sampled_axis_loop(tracking.gains, tracking.plant, axis)) {
+      loop->Ki = stability::effective_Ki(*sampled);
+    }
+    loops.axis[axis] =
+        last && same_loop(*loop, *last) ? loops.axis[axis - 1] : error_loop(*loop, slice_s, slices);
+    const ErrorLoop& made = loops.axis[axis];
+    if (!made.h1 || !made.h2 || (made.has_lag && (!made.g1 || !made.g2))) {
+      loops.refusal =
+          std::string("the loop of axis ") + stability::axis_name(axis) + " is not verifiably stable";
+      return loops;
+    }
+    last = loop;
+  }
+  return loops;
+}
+
+void ErrorHistory::add(const ErrorHistory& other) {
+  if (position_m.empty()) {
+    *this = other;
+    return;
+  }
+  for (std::size_t k = 0; k < position_m.size(); ++k) {
+    // Without a term there is nothing to round.
+    if (other.position_m[k] != 0) position_m[k] = up(position_m[k] + other.position_m[k]);
+    if (other.velocity_m_s[k] != 0) velocity_m_s[k] = up(velocity_m_s[k] + other.velocity_m_s[k]);
+  }
+}
+
+double ErrorHistory::largest_position_m() const {
+  return *std::max_element(position_m.begin(), position_m.end());
+}
+double ErrorHistory::largest_velocity_m_s() const {
+  return *std::max_element(velocity_m_s.begin(), velocity_m_s.end());
+}
+
+ErrorHistory respond(const ErrorLoop& loop, bool lagging, const Signal& signal) {
+  if (lagging && !loop.has_lag) {
+    return {std::vector<double>(signal.size.size(), 0.0), std::vector<double>(signal.size.size(), 0.0)};
+  }
+  if (lagging) return {least(loop.g1, loop.g, signal), least(loop.g2, loop.g1, signal)};
+  return {least(loop.h1, loop.h, signal), least(loop.h2, loop.h1, signal)};
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,52 @@
+/// @file From forces over time to tracking errors: the kernels of the position loops, cell by cell.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/kernel_cells.h"
+#include "stability/bounds/tracking_setup.h"
+
+namespace swarmcert::analysis {
+
+/// One axis of the continuous loop without delay: m D e = s (f_a - f_hat) + s (L - 1)(f_a - m p_d''), with f_a the force
+/// that acts, f_hat what the controller believes, L the lags of its command. So e = h' * (f_a - f_hat) + g' * w with
+///   h = L^-1[1/(m D)] (command channel),   g = L^-1[(L - 1)/(m D)],   w = f_a - m p_d''.
+/// Each entry bounds its kernel in real arithmetic. h and g, which do not decay where Ki = 0, may be missing.
+struct ErrorLoop {
+  std::optional<stability::KernelCells> h, h1, h2;  ///< h, h', h''
+  std::optional<stability::KernelCells> g, g1, g2;  ///< all missing where there is no lag
+  bool has_lag = false;
+  double Kp = 0, Kd = 0, Ki = 0;
+  double lags_s = 0;  ///< sum of the time constants
+};
+
+struct ErrorLoops {
+  ErrorLoop axis[3];
+  std::string refusal;  ///< why there are none; empty where there are
+};
+
+/// The loops of all axes, their kernels over `slices` slices, with the integral gain as the firmware's step makes it act.
+ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices);
+
+/// Bounds of |e| and |e'| at the times of each slice.
+struct ErrorHistory {
+  std::vector<double> position_m, velocity_m_s;
+  void add(const ErrorHistory& other);
+  double largest_position_m() const;
+  double largest_velocity_m_s() const;
+};
+
+/// What is known of a signal slice by slice: sup |w|, and sup |w'| where it has a rate; w(0) may jump from 0.
+struct Signal {
+  std::vector<double> size;
+  std::vector<double> rate;  ///< empty: not known
+  double at_start = 0;       ///< at least |w(0)|; matters to the rate
+};
+
+/// From rest: |e| <= |h'| * size, or |h| * rate + sup|h| |w(0)|, the smaller at each time; |e'| likewise, one derivative on.
+/// @param lagging the kernels g instead of h.
+ErrorHistory respond(const ErrorLoop& loop, bool lagging, const Signal& signal);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,73 @@
+/// @file How far vehicles stray from a task when they fly a network in the world of a declared truth: proved, and compared
+/// with what Lipschitz constants of the network alone would have proved.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/tracking/tube/force_constants.h"
+#include "analysis/tracking/tube/least_tube.h"
+#include "analysis/tracking/tube/sliced_tube.h"
+#include "stability/bounds/tracking_bounds.h"
+
+namespace swarmcert::analysis {
+
+struct LocalTubeOptions {
+  EnclosureOptions enclosure;  ///< its progress is set here
+  int nodes = 100;             ///< boxes of branch and bound per local constant
+  /// Steps done, of how many; what is being done. From any thread.
+  std::function<void(int done, int total, const std::string& what)> progress;
+};
+
+/// The force error of one vehicle along z within the tube, and what each bound of the reference makes of it. All hold in
+/// real arithmetic for the continuous loop of error_loops.h, from rest, up to the end of the task.
+struct ForceErrorBounds {
+  int vehicle = 0;
+  double amplitude_N = 0, rate_N_s = 0, variation_N = 0,
+         impulse_N_s = 0;  ///< sup|eps|, sup|eps'|, TV, int|eps| dt
+  double lag_m = 0;        ///< what the lag of the feed-forward adds to each of the following
+  double by_rate_m = 0, by_amplitude_m = 0, by_edges_m = 0, by_impulse_m = 0;  ///< B1 .. B4
+  double by_slices_m = 0;  ///< B2 and B4 slice by slice: LocalTube::slices
+  double least_m() const;
+};
+
+/// One way to bound the force error, and the tube that it proves.
+struct TubeRow {
+  std::string name;                       ///< "product", "global" or "local"
+  std::vector<ForceConstants> constants;  ///< per vehicle
+  LeastTube tube;
+};
+
+struct LocalTube {
+  bool proved = false;
+  std::string why;  ///< where not proved
+  LeastTube tube;   ///< the smallest that follows from all of the following together
+  LeastTube
+      one_radius;  ///< for the whole flight, from the difference of both forces or from the local constants
+  SlicedTube sliced;  ///< from the difference of both forces, an interval per slice
+  std::vector<TubeRow> rows;
+  std::vector<ForceErrorBounds> bounds;  ///< per vehicle; empty where nothing is proved
+  std::vector<Deviations> slices;        ///< errors of every vehicle slice by slice, likewise
+  double slice_s = 0, duration_s = 0;
+  bool cancelled = false;
+  std::vector<stability::Assumption> assumptions;
+};
+
+/// The least radii r >= 0 that the errors reproduce: while every vehicle is within r of its set point, the force error
+/// f_hat - f_a along z, the lag of the feed-forward and the truth along x and y push none of them further than r. From rest
+/// the errors then stay within r for the whole task. Likewise slice by slice (sliced_tube()), which needs no gain below one
+/// over the whole flight. What holds is within both.
+///
+/// Beside it least_tube() from constants of the network alone: product of spectral norms, global and local Lipschitz bounds.
+/// @param tracking gains and model of every vehicle; @param truth what the force really is; @param vehicles 2 to 10.
+/// @param task one whose trajectories have enclosures (Task::over()).
+/// @return an upper bound in real arithmetic of the continuous loop under `assumptions`; where `proved` is false nothing is
+///   known (inconclusive), for the reason in `why`.
+/// @throws files::InputError if the network lacks functions of these vehicles' kind or has no unit of force.
+LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,
+                     const files::Network& network, const stability::Task& task, int vehicles,
+                     const LocalTubeOptions& options);
+
+}  // namespace swarmcert::analysis

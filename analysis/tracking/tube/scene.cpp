@@ -1,0 +1,218 @@
+#include "analysis/tracking/tube/scene.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace swarmcert::analysis {
+
+using stability::up;
+
+namespace {
+
+double length(double x, double y, double z) {
+  return stability::sqrt(Interval(x) * Interval(x) + Interval(y) * Interval(y) + Interval(z) * Interval(z))
+      .hi;
+}
+
+Interval widened(Interval x, double by) { return x + Interval(-by, by); }
+
+template <class Compare>
+bool every(const Radii& a, const Radii& b, const Compare& compare) {
+  for (std::size_t i = 0; i < a.position_m.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!compare(a.position_m[i][k], b.position_m[i][k]) ||
+          !compare(a.velocity_m_s[i][k], b.velocity_m_s[i][k])) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+template <class Choose>
+Radii each_of(const Radii& a, const Radii& b, const Choose& choose) {
+  Radii result = a;
+  for (std::size_t i = 0; i < a.position_m.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      result.position_m[i][k] = choose(a.position_m[i][k], b.position_m[i][k]);
+      result.velocity_m_s[i][k] = choose(a.velocity_m_s[i][k], b.velocity_m_s[i][k]);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Radii Radii::none(int vehicles) {
+  const std::vector<std::array<double, 3>> zero(static_cast<std::size_t>(vehicles), {0, 0, 0});
+  return {zero, zero};
+}
+
+bool Radii::within(const Radii& other) const {
+  return every(*this, other, [](double a, double b) { return a <= b; });
+}
+
+bool Radii::below(const Radii& other) const {
+  return every(*this, other, [](double a, double b) { return a < b; });
+}
+
+Radii Radii::scaled(double factor, double more) const {
+  Radii result = *this;
+  for (auto* all : {&result.position_m, &result.velocity_m_s}) {
+    for (auto& of_vehicle : *all) {
+      for (double& x : of_vehicle) x = factor * x + more;
+    }
+  }
+  return result;
+}
+
+double Radii::largest_position_m(int axis) const {
+  double largest = 0;
+  for (const auto& p : position_m) largest = std::max(largest, p[static_cast<std::size_t>(axis)]);
+  return largest;
+}
+
+Radii smaller(const Radii& a, const Radii& b) {
+  return each_of(a, b, [](double x, double y) { return std::min(x, y); });
+}
+Radii larger(const Radii& a, const Radii& b) {
+  return each_of(a, b, [](double x, double y) { return std::max(x, y); });
+}
+
+Deviations all_within(const Radii& radii) {
+  Deviations result(radii.position_m.size());
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      result[i].position_m[k] = {-radii.position_m[i][k], radii.position_m[i][k]};
+      result[i].velocity_m_s[k] = {-radii.velocity_m_s[i][k], radii.velocity_m_s[i][k]};
+    }
+  }
+  return result;
+}
+
+Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
+             const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
+             double longest_slice_s)
+    : tracking_(tracking),
+      network_age_s_(network_age_s),
+      learned_(network, tracking.model.kind, vehicles - 1),
+      truth_(truth, tracking.plant.largest_thrust_N),
+      motion_(sliced(task, vehicles, network_age_s, longest_slice_s)),
+      loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices) : ErrorLoops{}) {}
+
+std::string Scene::refusal() const {
+  if (motion_.slices == 0) return "the task's trajectories have no enclosure";
+  return !truth_.refusal().empty() ? truth_.refusal() : loops_.refusal;
+}
+
+std::vector<Interval> Scene::states(const Stretch& stretch, const Deviations& deviations) const {
+  std::vector<Interval> states = stretch.state;
+  const Deviation& own = deviations[static_cast<std::size_t>(stretch.vehicle)];
+  std::size_t at = 0;
+  for (int n = 0; n + 1 < vehicles(); ++n) {
+    const Deviation& other = deviations[static_cast<std::size_t>(neighbour(stretch.vehicle, n))];
+    for (std::size_t k = 0; k < 3; ++k, ++at) states[at] += other.position_m[k] - own.position_m[k];
+    for (std::size_t k = 0; k < 3; ++k, ++at) states[at] += other.velocity_m_s[k] - own.velocity_m_s[k];
+  }
+  states[at] += own.position_m[2];
+  for (std::size_t k = 0; k < 3; ++k) states[at + 1 + k] += own.velocity_m_s[k];
+  return states;
+}
+
+std::vector<Offset> Scene::offsets(const std::vector<Interval>& states,
+                                   const std::vector<Interval>& all) const {
+  std::vector<Offset> result;
+  for (int n = 0; n + 1 < vehicles(); ++n) {
+    const auto at = static_cast<std::size_t>(n * kPerNeighbour);
+    Offset offset;
+    for (std::size_t k = 0; k < 3; ++k)
+      offset[k] = widened(states[at + k], up(network_age_s_ * all[at + 3 + k].mag()));
+    result.push_back(offset);
+  }
+  return result;
+}
+
+TruthForce::Rest Scene::rest(const Stretch& stretch, const Deviations& deviations,
+                             double acceleration_m_s2) const {
+  const std::vector<Interval> states = this->states(stretch, deviations);
+  const Interval* const own = &states[states.size() - kOwnState];
+  const Interval velocity[3] = {own[1], own[2], own[3]};
+  // The thrust's vector behind a first-order lag: |T'| <= |command - T| / tau.
+  const double tau_s = tracking_.gains.motor_lag_s;
+  const double thrust_rate_N_s =
+      tau_s > 0 ? up(2 * tracking_.plant.largest_thrust_N / tau_s) : std::numeric_limits<double>::infinity();
+  return truth_.rest(widened(own[0], up(network_age_s_ * own[3].mag())), velocity, acceleration_m_s2,
+                     thrust_rate_N_s);
+}
+
+TruthSizes Scene::truth_sizes(const Stretch& stretch, const Deviations& deviations) const {
+  TruthSizes sizes;
+  const std::vector<Interval> all = states(stretch, deviations);
+  const TruthForce::Wake wake = truth_.wake(offsets(all, all));
+  const TruthForce::Rest rest = this->rest(stretch, deviations, 0);
+  sizes.force_N[0] = rest.force_N[0];
+  sizes.force_N[1] = rest.force_N[1];
+  sizes.force_N[2] = rest.force_N[2] + wake.value_N;
+  sizes.rest_width_N = up(rest.force_N[2].hi - rest.force_N[2].lo);
+  for (const Offset& g : wake.gradient_N_m) {
+    sizes.gradient_N_m.push_back(wake.has_gradient ? length(g[0].mag(), g[1].mag(), g[2].mag())
+                                                   : std::numeric_limits<double>::infinity());
+  }
+  return sizes;
+}
+
+std::vector<TruthSizes> Scene::truth_sizes(const Radii& radii) const {
+  std::vector<TruthSizes> sizes;
+  for (const Stretch& stretch : motion_.stretches) sizes.push_back(truth_sizes(stretch, all_within(radii)));
+  return sizes;
+}
+
+std::array<ErrorHistory, 3> Scene::other_errors(int vehicle, const std::vector<TruthSizes>& truth) const {
+  std::array<ErrorHistory, 3> result;
+  const double mass_kg = tracking_.plant.mass_kg;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Signal feed_forward, force;
+    for (const int s : motion_.stretch_of[static_cast<std::size_t>(vehicle)]) {
+      const auto at = static_cast<std::size_t>(s);
+      feed_forward.size.push_back(up(mass_kg * motion_.stretches[at].acceleration_m_s2[axis].mag()));
+      feed_forward.rate.push_back(up(mass_kg * motion_.stretches[at].jerk_m_s3[axis]));
+      force.size.push_back(truth[at].force_N[axis].mag());
+    }
+    feed_forward.at_start = feed_forward.size.front();
+    const ErrorLoop& loop = loops_.axis[axis];
+    result[axis] = respond(loop, true, feed_forward);
+    result[axis].add(respond(loop, true, force));
+    if (axis < 2) result[axis].add(respond(loop, false, force));
+  }
+  return result;
+}
+
+std::vector<double> Scene::by_slice(int vehicle, const std::vector<double>& by_stretch) const {
+  std::vector<double> result;
+  for (const int s : motion_.stretch_of[static_cast<std::size_t>(vehicle)])
+    result.push_back(by_stretch[static_cast<std::size_t>(s)]);
+  return result;
+}
+
+ErrorHistory Scene::errors_z(int vehicle, const std::vector<double>& force_N,
+                             const ErrorHistory& other) const {
+  Signal signal;
+  signal.size = by_slice(vehicle, force_N);
+  ErrorHistory result = respond(loops_.axis[2], false, signal);
+  result.add(other);
+  return result;
+}
+
+double Scene::position_deviation_m(const Radii& radii, int vehicle, int neighbour) const {
+  const auto& a = radii.position_m[static_cast<std::size_t>(vehicle)];
+  const auto& b = radii.position_m[static_cast<std::size_t>(neighbour)];
+  return length(up(a[0] + b[0]), up(a[1] + b[1]), up(a[2] + b[2]));
+}
+
+double Scene::velocity_deviation_m_s(const Radii& radii, int vehicle, int neighbour) const {
+  const auto& a = radii.velocity_m_s[static_cast<std::size_t>(vehicle)];
+  const auto& b = radii.velocity_m_s[static_cast<std::size_t>(neighbour)];
+  return length(up(a[0] + b[0]), up(a[1] + b[1]), up(a[2] + b[2]));
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,97 @@
+/// @file Vehicles that fly a task with a network, in the world of a declared truth: what every tube about them rests on.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "analysis/tracking/tube/error_loops.h"
+#include "analysis/tracking/tube/learned_force.h"
+#include "analysis/tracking/tube/motion.h"
+#include "analysis/tracking/tube/truth_force.h"
+
+namespace swarmcert::analysis {
+
+/// How far each vehicle may be from its set point, axis by axis: |e| and |e'| of vehicle i are at most these.
+struct Radii {
+  std::vector<std::array<double, 3>> position_m, velocity_m_s;
+
+  static Radii none(int vehicles);
+  /// Whether every entry is at most `other`'s. False for NaN.
+  bool within(const Radii& other) const;
+  /// Whether every entry is below `other`'s. False for NaN.
+  bool below(const Radii& other) const;
+  Radii scaled(double factor, double more) const;  ///< factor x + more
+  double largest_position_m(int axis) const;
+};
+
+Radii smaller(const Radii& a, const Radii& b);  ///< entry by entry
+Radii larger(const Radii& a, const Radii& b);
+
+/// Where one vehicle may be about its set point: e and e' lie in these.
+struct Deviation {
+  std::array<Interval, 3> position_m, velocity_m_s;
+};
+using Deviations = std::vector<Deviation>;  ///< of every vehicle
+
+/// All that is within radii.
+Deviations all_within(const Radii& radii);
+
+/// The declared truth at the states of one stretch: f_a and how it changes.
+struct TruthSizes {
+  Interval force_N[3];
+  double rest_width_N = 0;           ///< along z, of all but wakes: largest change within the tube
+  std::vector<double> gradient_N_m;  ///< per neighbour, |d f_z / d p_j|; infinite where the field jumps
+};
+
+class Scene {
+ public:
+  /// @param network_age_s how old the states are, at most, that a prediction rests on when it acts.
+  /// @throws files::InputError as LearnedForce.
+  Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
+        const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
+        double longest_slice_s = kSlice_s);
+
+  const stability::TrackingSetup& tracking() const { return tracking_; }
+  const LearnedForce& learned() const { return learned_; }
+  const TruthForce& truth() const { return truth_; }
+  const Motion& motion() const { return motion_; }
+  const ErrorLoops& loops() const { return loops_; }
+  double network_age_s() const { return network_age_s_; }
+  int vehicles() const { return motion_.vehicles; }
+  /// Why nothing can be said; empty otherwise.
+  std::string refusal() const;
+
+  /// Every state that a vehicle can meet in a stretch while all are within `radii`.
+  std::vector<Interval> states(const Stretch& stretch, const Deviations& deviations) const;
+  /// Offsets of the neighbours, of `states` and of what these become within network_age_s.
+  /// @param all the stretch's states: the velocities at which offsets may change.
+  std::vector<Offset> offsets(const std::vector<Interval>& states, const std::vector<Interval>& all) const;
+  TruthForce::Rest rest(const Stretch& stretch, const Deviations& deviations, double acceleration_m_s2) const;
+  TruthSizes truth_sizes(const Stretch& stretch, const Deviations& deviations) const;
+  std::vector<TruthSizes> truth_sizes(const Radii& radii) const;  ///< of every stretch
+
+  /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's lag,
+  /// and along x and y the truth itself.
+  std::array<ErrorHistory, 3> other_errors(int vehicle, const std::vector<TruthSizes>& truth) const;
+  /// One number per slice from one per stretch.
+  std::vector<double> by_slice(int vehicle, const std::vector<double>& by_stretch) const;
+  /// Of |e_z| while |f_hat - f_a| is at most `force_N` (per stretch), `other` included.
+  ErrorHistory errors_z(int vehicle, const std::vector<double>& force_N, const ErrorHistory& other) const;
+
+  /// Deviation of a neighbour's relative position and velocity, Euclidean norms.
+  double position_deviation_m(const Radii& radii, int vehicle, int neighbour) const;
+  double velocity_deviation_m_s(const Radii& radii, int vehicle, int neighbour) const;
+  /// The vehicle that is the j-th neighbour of `vehicle`.
+  static int neighbour(int vehicle, int j) { return j < vehicle ? j : j + 1; }
+
+ private:
+  const stability::TrackingSetup& tracking_;
+  double network_age_s_;
+  LearnedForce learned_;
+  TruthForce truth_;
+  Motion motion_;
+  ErrorLoops loops_;
+};
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,219 @@
+#include "analysis/tracking/tube/sliced_tube.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "nn/base/parallel.h"
+
+namespace swarmcert::analysis {
+
+using stability::up;
+
+namespace {
+
+using stability::KernelCells;
+
+constexpr int kMostTries = 12;
+/// What is tried is this much wider than what came out last, relatively and in m or m/s.
+constexpr double kWiderBy = 0.02, kWiderBy_m = 1e-6;
+
+Interval wider(Interval x) {
+  const double more = kWiderBy * (x.hi - x.lo) + kWiderBy_m;
+  return {x.lo - more, x.hi + more};
+}
+
+bool inside(Interval inner, Interval outer) { return inner.lo > outer.lo && inner.hi < outer.hi; }
+
+template <class Change>
+Deviations each(const Deviations& a, const Deviations& b, const Change& change) {
+  Deviations result = a;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      result[i].position_m[k] = change(a[i].position_m[k], b[i].position_m[k]);
+      result[i].velocity_m_s[k] = change(a[i].velocity_m_s[k], b[i].velocity_m_s[k]);
+    }
+  }
+  return result;
+}
+
+bool every_inside(const Deviations& inner, const Deviations& outer) {
+  bool result = true;
+  each(inner, outer, [&result](Interval a, Interval b) {
+    result = result && inside(a, b);
+    return a;
+  });
+  return result;
+}
+
+Deviations hull_of(const Deviations& a, const Deviations& b) {
+  return each(a, b, [](Interval x, Interval y) { return stability::hull(x, y); });
+}
+
+/// Signals of one vehicle and axis, and what all but the present slice do to the error.
+struct Axis {
+  const ErrorLoop* loop = nullptr;
+  std::vector<Interval> force, lagging;  ///< d and w, slices so far
+  Interval position_m, velocity_m_s;     ///< from the slices before
+
+  void begin_slice() {
+    const std::size_t n = force.size();
+    position_m = answer_to_past(*loop->h1, force, n);
+    velocity_m_s = answer_to_past(*loop->h2, force, n);
+    if (!loop->has_lag) return;
+    position_m += answer_to_past(*loop->g1, lagging, n);
+    velocity_m_s += answer_to_past(*loop->g2, lagging, n);
+  }
+
+  /// The errors of this slice if its signals are these.
+  void answer(Interval d, Interval w, Interval& position, Interval& velocity) const {
+    const Interval both_d = stability::hull(d, force.empty() ? Interval(0) : force.back());
+    position = position_m + stability::answer(*loop->h1, 0, both_d);
+    velocity = velocity_m_s + stability::answer(*loop->h2, 0, both_d);
+    if (!loop->has_lag) return;
+    const Interval both_w = stability::hull(w, lagging.empty() ? Interval(0) : lagging.back());
+    position += stability::answer(*loop->g1, 0, both_w);
+    velocity += stability::answer(*loop->g2, 0, both_w);
+  }
+};
+
+class Sweep {
+ public:
+  Sweep(const Scene& scene, const EnclosureOptions& options, double tolerance_N)
+      : scene_(scene), options_(options), tolerance_N_(tolerance_N) {
+    for (int i = 0; i < scene.vehicles(); ++i) {
+      axes_.emplace_back();
+      for (std::size_t k = 0; k < 3; ++k) axes_.back()[k].loop = &scene.loops().axis[k];
+    }
+    remembered_ = static_cast<int>(std::ceil(scene.network_age_s() / scene.motion().slice_s + 1e-9));
+  }
+
+  /// @returns false where no tube was found for the next slice, or it was cancelled.
+  bool advance(SlicedTube& tube, double farthest_m) {
+    const auto n = static_cast<int>(tube.slices.size());
+    const auto count = static_cast<std::size_t>(scene_.vehicles());
+    for (auto& of_vehicle : axes_)
+      for (Axis& axis : of_vehicle) axis.begin_slice();
+    // As if the signals stood still.
+    Signals signals = n == 0 ? Signals(count) : last_;
+    Deviations tried;
+    for (int i = 0; i < kMostTries; ++i) {
+      const Deviations answered = answers(signals);
+      if (i > 0 && every_inside(answered, tried)) {
+        keep(signals, answered, tube);
+        return true;
+      }
+      const Deviations next = each(answered, answered, [](Interval x, Interval) { return wider(x); });
+      tried = i == 0 ? next : hull_of(tried, next);
+      double largest_m = 0;
+      for (const Deviation& one : tried)
+        for (const Interval& x : one.position_m) largest_m = std::max(largest_m, x.mag());
+      if (!(largest_m <= farthest_m)) {
+        tube.why =
+            fmt::format("at {:.3g} s errors could exceed {:g} m", n * scene_.motion().slice_s, farthest_m);
+        return false;
+      }
+      Deviations seen = tried;
+      for (int back = 1; back <= std::min(remembered_, n); ++back)
+        seen = hull_of(seen, tube.slices[static_cast<std::size_t>(n - back)]);
+      files::parallel_for(scene_.vehicles(), options_.jobs,
+                          [&](int v) { signals[static_cast<std::size_t>(v)] = signals_of(v, n, seen); });
+      if (options_.cancelled != nullptr && *options_.cancelled) return false;
+    }
+    tube.why = fmt::format("no tube was found that holds at {:.3g} s", n * scene_.motion().slice_s);
+    return false;
+  }
+
+ private:
+  struct Signal {
+    Interval difference_N;  ///< f_hat - f_a
+    TruthSizes truth;
+    Interval lagging_N[3];
+  };
+  using Signals = std::vector<Signal>;
+
+  Signal signals_of(int vehicle, int slice, const Deviations& seen) const {
+    const Motion& motion = scene_.motion();
+    const int s = motion.stretch_of[static_cast<std::size_t>(vehicle)][static_cast<std::size_t>(slice)];
+    const Stretch& stretch = motion.stretches[static_cast<std::size_t>(s)];
+    ForceDifference difference(scene_, stretch, seen);
+    difference.refine(options_.boxes, tolerance_N_, options_.cancelled);
+    Signal signal;
+    signal.difference_N = difference.over(seen);
+    signal.truth = scene_.truth_sizes(stretch, seen);
+    const Interval mass_kg(scene_.tracking().plant.mass_kg);
+    for (std::size_t k = 0; k < 3; ++k)
+      signal.lagging_N[k] = signal.truth.force_N[k] - mass_kg * stretch.acceleration_m_s2[k];
+    return signal;
+  }
+
+  static Interval force(const Signal& signal, std::size_t axis) {
+    return axis == 2 ? -signal.difference_N : signal.truth.force_N[axis];
+  }
+
+  Deviations answers(const Signals& signals) const {
+    Deviations result(signals.size());
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        axes_[i][k].answer(force(signals[i], k), signals[i].lagging_N[k], result[i].position_m[k],
+                           result[i].velocity_m_s[k]);
+      }
+    }
+    return result;
+  }
+
+  void keep(const Signals& signals, const Deviations& answered, SlicedTube& tube) {
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        axes_[i][k].force.push_back(force(signals[i], k));
+        axes_[i][k].lagging.push_back(signals[i].lagging_N[k]);
+      }
+      tube.force_error_N[i].push_back(signals[i].difference_N);
+      tube.truth[i].push_back(signals[i].truth);
+    }
+    tube.slices.push_back(answered);
+    last_ = signals;
+  }
+
+  const Scene& scene_;
+  const EnclosureOptions& options_;
+  double tolerance_N_;
+  int remembered_ = 0;  ///< slices before the present one whose states the network may still act upon
+  std::vector<std::array<Axis, 3>> axes_;
+  Signals last_;
+};
+
+}  // namespace
+
+Radii SlicedTube::radii() const {
+  Radii result = Radii::none(static_cast<int>(force_error_N.size()));
+  for (const Deviations& slice : slices) {
+    for (std::size_t i = 0; i < slice.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        result.position_m[i][k] = std::max(result.position_m[i][k], slice[i].position_m[k].mag());
+        result.velocity_m_s[i][k] = std::max(result.velocity_m_s[i][k], slice[i].velocity_m_s[k].mag());
+      }
+    }
+  }
+  return result;
+}
+
+SlicedTube sliced_tube(const Scene& scene, const EnclosureOptions& options, double tolerance_N,
+                       double farthest_m) {
+  SlicedTube tube;
+  tube.force_error_N.resize(static_cast<std::size_t>(scene.vehicles()));
+  tube.truth.resize(tube.force_error_N.size());
+  Sweep sweep(scene, options, tolerance_N);
+  for (int n = 0; n < scene.motion().slices; ++n) {
+    if (!sweep.advance(tube, farthest_m)) {
+      tube.cancelled = tube.why.empty();
+      return tube;
+    }
+    if (options.progress) options.progress(n + 1, scene.motion().slices);
+  }
+  tube.proved = true;
+  return tube;
+}
+
+}  // namespace swarmcert::analysis

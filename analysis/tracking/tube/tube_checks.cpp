@@ -1,0 +1,243 @@
+#include "analysis/tracking/tube/tube_checks.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swarmcert::analysis {
+
+using stability::up;
+
+namespace {
+
+constexpr double kNotKnown = std::numeric_limits<double>::infinity();
+constexpr double kGravity_m_s2 = stability::kGravity_m_s2;
+/// Where neighbours begin to fade in flight (controller::CutOffs): 1 m less 0.1 m.
+constexpr double kFade_m = 0.9;
+
+double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
+
+double length(Interval x, Interval y, Interval z) {
+  const auto square = [](Interval a) { return stability::abs(a) * stability::abs(a); };
+  return stability::sqrt(square(x) + square(y) + square(z)).hi;
+}
+
+double length(const double (&x)[3]) { return length(x[0], x[1], x[2]); }
+
+/// a x, where a factor of 0 wins over one that is not known.
+double times(double a, double x) { return a == 0 || x == 0 ? 0 : up(a * x); }
+
+/// What the tube says of one vehicle's loop.
+struct Loads {
+  double integral_m_s[3] = {0, 0, 0};       ///< sup |int e|
+  double acceleration_m_s2[3] = {0, 0, 0};  ///< sup |e''|
+  double command_N[3] = {0, 0, 0};          ///< sup of the force commanded, without gravity
+};
+
+Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
+  Loads result;
+  const Motion& motion = scene.motion();
+  const double mass_kg = scene.tracking().plant.mass_kg;
+  const auto i = static_cast<std::size_t>(vehicle);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const ErrorLoop& loop = scene.loops().axis[axis];
+    std::vector<double> error_N, lagged_N, planned_m_s2, jerk_m_s3;
+    for (const int s : motion.stretch_of[i]) {
+      const auto at = static_cast<std::size_t>(s);
+      const double truth_N = tube.tube.truth[at].force_N[axis].mag();
+      error_N.push_back(axis == 2 ? tube.tube.force_N[at] : truth_N);
+      planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis].mag());
+      jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis]);
+      lagged_N.push_back(up(truth_N + up(mass_kg * planned_m_s2.back())));
+    }
+    // int e = h * (f_a - f_hat) + g * w
+    if (loop.h) result.integral_m_s[axis] = largest(convolved(*loop.h, error_N));
+    if (loop.g && loop.Ki > 0)
+      result.integral_m_s[axis] = up(result.integral_m_s[axis] + largest(convolved(*loop.g, lagged_N)));
+    const double feedback = up(times(loop.Kp, tube.tube.radii.position_m[i][axis]) +
+                               up(times(loop.Kd, tube.tube.radii.velocity_m_s[i][axis]) +
+                                  times(loop.Ki, result.integral_m_s[axis])));
+    // A lag is a mean over the past: it moves w by at most its time constants times sup |w'|, or by twice sup |w|.
+    double lag_N = 0;
+    if (loop.has_lag) {
+      const double planned = largest(planned_m_s2);
+      const bool starts_at_rest = planned_m_s2.front() < 1e-6;
+      const double by_jerk = starts_at_rest ? up(up(loop.lags_s * largest(jerk_m_s3)) + 1e-6) : kNotKnown;
+      double truth_N = 0;
+      for (const int s : motion.stretch_of[i])
+        truth_N = std::max(truth_N, tube.tube.truth[static_cast<std::size_t>(s)].force_N[axis].mag());
+      lag_N = up(2 * truth_N + up(mass_kg * std::min(2 * planned, by_jerk)));
+    }
+    result.acceleration_m_s2[axis] = up(feedback + up(up(largest(error_N) + lag_N) / mass_kg));
+    // f_hat = f_a + (f_hat - f_a) is fed forward along z.
+    double fed_N = 0;
+    if (axis == 2) {
+      for (const int s : motion.stretch_of[i]) {
+        const auto at = static_cast<std::size_t>(s);
+        fed_N = std::max(fed_N, up(tube.tube.truth[at].force_N[2].mag() + tube.tube.force_N[at]));
+      }
+    }
+    result.command_N[axis] = up(up(mass_kg * up(feedback + largest(planned_m_s2))) + fed_N);
+  }
+  return result;
+}
+
+ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std::vector<Loads>& loads,
+                           int vehicle, const std::vector<ForceConstants>& constants,
+                           const ErrorHistory& lag) {
+  ForceErrorBounds result;
+  result.vehicle = vehicle;
+  const Motion& motion = scene.motion();
+  const auto i = static_cast<std::size_t>(vehicle);
+  const Deviations deviations = all_within(tube.tube.radii);
+  const double slice_s = up(motion.slice_s * (1 + 1e-12));
+  double learned_rate = 0;
+  double abrupt_N = 0;
+  for (const int s : motion.stretch_of[i]) {
+    const auto at = static_cast<std::size_t>(s);
+    const Stretch& stretch = motion.stretches[at];
+    const double size_N = tube.tube.force_N[at];
+    result.amplitude_N = std::max(result.amplitude_N, size_N);
+    result.impulse_N_s = up(result.impulse_N_s + up(size_N * slice_s));
+    // Rates: the network's by its constants, the truth's by its gradient.
+    const std::vector<Interval> states = scene.states(stretch, deviations);
+    const ForceConstants none{kNotKnown, kNotKnown, kNotKnown, kNotKnown};
+    const ForceConstants& c = constants.empty() ? none : constants[i];
+    double learned = 0;
+    const double own_acceleration =
+        up(length(loads[i].acceleration_m_s2) +
+           length(stretch.acceleration_m_s2[0], stretch.acceleration_m_s2[1], stretch.acceleration_m_s2[2]));
+    const TruthForce::Rest rest = scene.rest(stretch, deviations, own_acceleration);
+    abrupt_N = std::max(abrupt_N, rest.abrupt_N[2]);
+    double truth = rest.rate_N_s[2];
+    for (int n = 0; n + 1 < scene.vehicles(); ++n) {
+      const auto k = static_cast<std::size_t>(n * kPerNeighbour);
+      const auto j = static_cast<std::size_t>(Scene::neighbour(vehicle, n));
+      const double speed = length(states[k + 3], states[k + 4], states[k + 5]);
+      const double* const a = loads[i].acceleration_m_s2;
+      const double* const b = loads[j].acceleration_m_s2;
+      const double acceleration = up(stretch.relative_acceleration_m_s2[static_cast<std::size_t>(n)] +
+                                     length(up(a[0] + b[0]), up(a[1] + b[1]), up(a[2] + b[2])));
+      learned = up(learned + slope_cost_N(c, speed, acceleration));
+      truth = up(truth + times(tube.tube.truth[at].gradient_N_m[static_cast<std::size_t>(n)], speed));
+    }
+    if (c.own > 0) {
+      const std::size_t own = states.size() - kOwnState;
+      const double speed = states[own + 3].mag();
+      learned = up(learned + times(c.own, length(speed, own_acceleration, 0)));
+    }
+    const double rate = up(learned + truth);
+    learned_rate = std::max(learned_rate, learned);
+    result.rate_N_s = std::max(result.rate_N_s, rate);
+    result.variation_N = up(result.variation_N + up(rate * slice_s));
+  }
+  // The force error begins at once: an edge of its own, which rate and variation do not see.
+  const double start_N = tube.tube.force_N[static_cast<std::size_t>(motion.stretch_of[i].front())];
+  result.variation_N = up(result.variation_N + start_N);
+  const ErrorLoop& loop = scene.loops().axis[2];
+  result.lag_m = lag.largest_position_m();
+  const auto with_lag = [&](double bound) { return up(bound + result.lag_m); };
+  // What is not continuous counts as an amplitude: what the staircase differs from its source, abrupt effects.
+  const double stair_m = times(loop.h1->total(), up(times(scene.network_age_s(), learned_rate) + abrupt_N));
+  result.by_rate_m = result.by_edges_m = kNotKnown;
+  if (loop.h) {
+    result.by_rate_m =
+        with_lag(up(up(times(loop.h->total(), result.rate_N_s) + up(loop.h->peak * start_N)) + stair_m));
+    result.by_edges_m = with_lag(up(times(loop.h->peak, result.variation_N) + stair_m));
+  }
+  result.by_amplitude_m = with_lag(up(loop.h1->total() * result.amplitude_N));
+  result.by_impulse_m = with_lag(up(loop.h1->peak * result.impulse_N_s));
+  for (const Deviations& slice : tube.slices)
+    result.by_slices_m = std::max(result.by_slices_m, slice[i].position_m[2].mag());
+  return result;
+}
+
+Interval common(Interval a, Interval b) { return {std::max(a.lo, b.lo), std::min(a.hi, b.hi)}; }
+
+/// The errors of one vehicle slice by slice: what the sizes of all signals allow, within what is known already.
+void add_slices(const std::array<ErrorHistory, 3>& history, std::size_t vehicle,
+                std::vector<Deviations>& slices) {
+  for (std::size_t n = 0; n < slices.size(); ++n) {
+    Deviation& one = slices[n][vehicle];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double p = history[k].position_m[n];
+      const double v = history[k].velocity_m_s[n];
+      one.position_m[k] = common(one.position_m[k], {-p, p});
+      one.velocity_m_s[k] = common(one.velocity_m_s[k], {-v, v});
+    }
+  }
+}
+
+}  // namespace
+
+void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants, LocalTube& tube) {
+  const stability::TrackingSetup& tracking = scene.tracking();
+  const stability::Gains& gains = tracking.gains;
+  std::vector<Loads> all;
+  bool keeps_thrust = tracking.plant.largest_thrust_N > 0;
+  double command_N = 0;
+  const double share = gains.rate_hz > 0 ? up(gains.integrator_step_s * gains.rate_hz) : 1;
+  for (int i = 0; i < scene.vehicles(); ++i) {
+    all.push_back(loads(scene, tube, i));
+    const Loads& one = all.back();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double limit_m_s = gains.integrator_limit_m_s[axis];
+      const double demand_m_s = up(share * one.integral_m_s[axis]);
+      if (scene.loops().axis[axis].Ki > 0 && !(demand_m_s <= limit_m_s) && tube.proved) {
+        tube.proved = false;
+        tube.why = fmt::format(
+            "the integrator of axis {} could reach {:.3g} m s, beyond its limit of {:.3g} m s, where the "
+            "loop is another",
+            stability::axis_name(static_cast<int>(axis)), demand_m_s, limit_m_s);
+      }
+    }
+    const double weight_N = up(tracking.plant.mass_kg * kGravity_m_s2);
+    command_N =
+        std::max(command_N, length(one.command_N[0], one.command_N[1], up(weight_N + one.command_N[2])));
+    keeps_thrust = keeps_thrust && command_N <= tracking.plant.largest_thrust_N &&
+                   one.command_N[2] < tracking.plant.mass_kg * kGravity_m_s2;
+  }
+  bool near = true;
+  const Deviations deviations = all_within(tube.tube.radii);
+  for (const Stretch& stretch : scene.motion().stretches) {
+    const std::vector<Interval> states = scene.states(stretch, deviations);
+    for (int n = 0; n + 1 < scene.vehicles(); ++n) {
+      for (std::size_t k = 0; k < 3; ++k)
+        near = near && states[static_cast<std::size_t>(n * kPerNeighbour) + k].mag() <= kFade_m;
+    }
+  }
+  tube.slices.assign(static_cast<std::size_t>(scene.motion().slices), all_within(tube.tube.radii));
+  if (tube.sliced.proved) tube.slices = tube.sliced.slices;
+  for (int i = 0; i < scene.vehicles(); ++i) {
+    std::array<ErrorHistory, 3> history = scene.other_errors(i, tube.tube.truth);
+    const ErrorHistory lag = history[2];
+    history[2] = scene.errors_z(i, tube.tube.force_N, lag);
+    add_slices(history, static_cast<std::size_t>(i), tube.slices);
+    tube.bounds.push_back(bounds_of(scene, tube, all, i, constants, lag));
+  }
+  const auto add = [&tube](const char* name, const char* status, const std::string& note) {
+    tube.assumptions.push_back({name, status, note});
+  };
+  add("the force is that of the declared truth", "assumed", "enclosed at every state of the tube");
+  add("continuous position loop, axes apart, first-order lags", "assumed",
+      "Ki as the firmware's step makes it act; sampling and the tilt of the thrust are left out");
+  const double truth_lag_s = scene.truth().motor_lag_s();
+  if (std::abs(truth_lag_s - gains.motor_lag_s) > 0.01 * truth_lag_s) {
+    add("motors lag as in [lag]", "assumed",
+        fmt::format("{:.3g} s; the truth's motor_lag of {:.3g} s is left out", gains.motor_lag_s,
+                    truth_lag_s));
+  }
+  add("all vehicles have these gains and this model", "assumed", "and start at rest at their set points");
+  add("exact position and velocity", "assumed", "also of neighbours, known from the start");
+  add("predictions are a staircase", "proved",
+      fmt::format("states up to {:.3g} s old are in the bounds", scene.network_age_s()));
+  add("the integrator stays within its limit", tube.proved ? "proved" : "assumed", "");
+  add("no saturation of the thrust", keeps_thrust ? "proved" : "assumed",
+      fmt::format("commands of at most {:.3g} N, of {:.3g} N", command_N, tracking.plant.largest_thrust_N));
+  add("neighbours count fully", near ? "proved" : "assumed",
+      "within 0.9 m along each axis, where none fades");
+}
+
+}  // namespace swarmcert::analysis

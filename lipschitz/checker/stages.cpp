@@ -1,0 +1,112 @@
+#include "lipschitz/checker/stages.h"
+
+#include <map>
+#include <stdexcept>
+
+#include "lipschitz/checker/lipschitz_lmi.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::check {
+
+std::vector<Matrix> stages(const files::Network& network, const std::string& function,
+                           const std::string& block, const std::vector<double>& scale) {
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<std::string> names = files::networks_of(function);
+  const std::vector<int> coordinates = files::block_coordinates(network, function, block);
+  Matrix selector(parts.at(names.front())->inputs(), static_cast<int>(coordinates.size()));
+  if (!scale.empty() && scale.size() != static_cast<std::size_t>(selector.rows)) {
+    throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function +
+                                " has " + std::to_string(selector.rows) + " inputs");
+  }
+  for (int j = 0; j < selector.cols; ++j)
+    selector(coordinates[j], j) = scale.empty() ? 1.0 : scale[coordinates[j]];
+  std::vector<Matrix> chain = {selector};
+  for (const std::string& name : names) {
+    bool joins = true;  // the first layer acts on the selected inputs, and that of rho on the last of phi
+    for (const files::Layer& layer : parts.at(name)->layers) {
+      const Matrix w(layer.outputs, layer.inputs, layer.weights);
+      if (joins) {
+        chain.back() = product(w, chain.back());
+      } else {
+        chain.push_back(w);
+      }
+      joins = false;
+    }
+  }
+  return chain;
+}
+
+namespace {
+
+HiddenLayer hidden_layer(const files::Layer& layer, bool has_relu) {
+  return {layer.outputs, layer.inputs, layer.weights, layer.biases, has_relu ? 0 : layer.outputs};
+}
+
+/// The moving coordinates of `part` and their weights.
+void set_coordinates(LocalFunction& f, const files::Network& network, const std::string& part,
+                     const std::string& block, const std::vector<double>& scale) {
+  f.coordinates = files::block_coordinates(network, part, block);
+  if (!scale.empty() && scale.size() != static_cast<std::size_t>(f.hidden.front().inputs))
+    throw std::invalid_argument("scale has not one number per input of " + part);
+  for (const int k : f.coordinates)
+    f.weight.push_back(scale.empty() ? 1.0 : scale.at(static_cast<std::size_t>(k)));
+}
+
+/// W' Q W of the last layer; no rows: W' W.
+Matrix gram(const files::Layer& last, const Matrix& q) {
+  const Matrix w(last.outputs, last.inputs, last.weights);
+  Matrix transposed(last.inputs, last.outputs);
+  for (int i = 0; i < last.outputs; ++i)
+    for (int j = 0; j < last.inputs; ++j) transposed(j, i) = w(i, j);
+  return product(transposed, q.rows == 0 ? w : product(q, w));
+}
+
+}  // namespace
+
+LocalFunction local_function(const files::Network& network, const std::string& part, const std::string& block,
+                             const std::vector<double>& scale, const Matrix& q) {
+  const std::vector<files::Layer>& layers = files::parts(network).at(part)->layers;
+  const files::Layer& last = layers.back();
+  if (layers.size() < 2) throw std::invalid_argument(part + " has no hidden layer");
+  if (q.rows != 0 && q.rows != last.outputs)
+    throw std::invalid_argument("the form is not of the outputs of " + part);
+  LocalFunction f;
+  for (std::size_t k = 0; k + 1 < layers.size(); ++k) f.hidden.push_back(hidden_layer(layers[k], true));
+  f.gram = gram(last, q);
+  set_coordinates(f, network, part, block, scale);
+  return f;
+}
+
+std::vector<HiddenLayer> term_layers(const files::Network& network, const std::string& phi,
+                                     const std::string& rho) {
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<files::Layer>& behind = parts.at(rho)->layers;
+  if (behind.size() < 2) throw std::invalid_argument(rho + " has no hidden layer");
+  std::vector<HiddenLayer> result;
+  for (const files::Layer& layer : parts.at(phi)->layers) result.push_back(hidden_layer(layer, true));
+  result.back().without_relu = result.back().outputs;
+  result.push_back(hidden_layer(behind.front(), false));
+  result.back().biases.assign(result.back().biases.size(), 0.0);
+  return result;
+}
+
+LocalFunction coupled_function(const files::Network& network, const std::string& function,
+                               const std::string& block, const std::vector<double>& scale,
+                               const std::vector<double>& least, const std::vector<double>& most) {
+  const std::vector<std::string> names = files::networks_of(function);
+  LocalFunction f;
+  f.hidden = term_layers(network, names[0], names[1]);
+  if (f.hidden.size() < 3) throw std::invalid_argument(names[0] + " has no hidden layer");
+  f.hidden.resize(f.hidden.size() - 2);
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const std::vector<files::Layer>& behind = parts.at(names[1])->layers;
+  f.behind = {hidden_layer(parts.at(names[0])->layers.back(), false)};
+  for (std::size_t k = 0; k + 1 < behind.size(); ++k) f.behind.push_back(hidden_layer(behind[k], true));
+  f.behind_gram = gram(behind.back(), Matrix(0, 0));
+  f.behind[1].least = least;
+  f.behind[1].most = most;
+  set_coordinates(f, network, names[0], block, scale);
+  return f;
+}
+
+}  // namespace swarmcert::check

@@ -1,0 +1,40 @@
+/// @file What the functions of NET are to a bound: chains of exact matrices with ReLU between them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lipschitz/checker/dyadic.h"
+#include "lipschitz/checker/tree_proof.h"
+#include "nn/weights/network.h"
+
+namespace swarmcert::check {
+
+/// M_1 .. M_K of `function` ("network", "phi:<kind>", "rho:<kind>", "set:<phi kind>:<rho kind>"), exactly, as they act
+/// on the input coordinates of `block`, each in units of its `scale` (empty: 1). In a set function the last layer of
+/// phi and the first of rho, which no ReLU separates, are one stage: their product.
+/// @throws std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` has not one
+///   number per input.
+std::vector<Matrix> stages(const files::Network& network, const std::string& function,
+                           const std::string& block = "all", const std::vector<double>& scale = {});
+
+/// "network" or "phi:<kind>" in front of |.|^2, or of the form Q, exactly, as a proof on a box sees it.
+/// @param q [outputs x outputs]; no rows: the identity.
+/// @throws as stages(), and std::invalid_argument if the network has no hidden layer or Q another size.
+LocalFunction local_function(const files::Network& network, const std::string& part, const std::string& block,
+                             const std::vector<double>& scale, const Matrix& q);
+
+/// What `phi` adds to the values before the first ReLU of `rho`: V phi(x), with V the first layer of rho, its bias left
+/// out. The last layer of phi and V have no ReLU.
+/// @throws std::out_of_range if NET has no such part; std::invalid_argument if rho has no hidden layer.
+std::vector<HiddenLayer> term_layers(const files::Network& network, const std::string& phi,
+                                     const std::string& rho);
+
+/// x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>", for any s with least <= V s <= most; V as in term_layers(). What
+/// takes the place of rho, a tree's forms say.
+/// @throws as local_function() and term_layers().
+LocalFunction coupled_function(const files::Network& network, const std::string& function,
+                               const std::string& block, const std::vector<double>& scale,
+                               const std::vector<double>& least, const std::vector<double>& most);
+
+}  // namespace swarmcert::check

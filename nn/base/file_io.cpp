@@ -1,0 +1,159 @@
+#include "nn/base/file_io.h"
+
+#include <fcntl.h>
+#include <openssl/evp.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+#include "nn/base/input_error.h"
+
+namespace swarmcert::files {
+namespace {
+
+[[noreturn]] void refuse(const std::string& path, const std::string& what, const std::string& mend = "") {
+  throw InputError({path, "", "", "", what, mend});
+}
+
+[[noreturn]] void refuse_with_errno(const std::string& path, const std::string& what) {
+  refuse(path, what + " (" + std::strerror(errno) + ")");
+}
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  int number() const { return number_; }
+  bool is_open() const { return number_ >= 0; }
+
+ private:
+  int number_;
+};
+
+bool write_all(int descriptor, std::string_view contents) {
+  while (!contents.empty()) {
+    const ssize_t written = ::write(descriptor, contents.data(), contents.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    contents.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+[[noreturn]] void refuse_existing(const std::string& path) {
+  refuse(path, "the file exists", "replace it with --force, or choose another name");
+}
+
+/// Makes the rename itself survive a power cut. Not every file system can, and the file is whole either way.
+void sync_folder_of(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  const Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (descriptor.is_open()) ::fsync(descriptor.number());
+}
+
+/// Moves `temporary` to `path`; without `overwrite` a file that appeared meanwhile is kept. 0, or an errno.
+int move_into_place(const std::string& temporary, const std::string& path, bool overwrite) {
+  if (!overwrite) {
+    if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0) return 0;
+    if (errno != EINVAL && errno != ENOSYS) return errno;
+    if (::access(path.c_str(), F_OK) == 0) return EEXIST;  // a file system that cannot do both in one step
+  }
+  return std::rename(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path, std::size_t limit_bytes) {
+  const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!descriptor.is_open()) refuse_with_errno(path, "cannot be opened");
+  struct stat status = {};
+  if (::fstat(descriptor.number(), &status) != 0) refuse_with_errno(path, "cannot be read");
+  if (S_ISDIR(status.st_mode)) refuse(path, "is a folder", "name a file in it");
+
+  const auto refuse_size = [&] { refuse(path, "is larger than " + std::to_string(limit_bytes) + " bytes"); };
+  std::string contents;
+  if (S_ISREG(status.st_mode)) {
+    if (static_cast<std::uintmax_t>(status.st_size) > limit_bytes) refuse_size();
+    contents.reserve(static_cast<std::size_t>(status.st_size));
+  }
+  char block[1 << 16];
+  for (;;) {  // to the end rather than to st_size: a pipe has none, and a log may still grow
+    const ssize_t count = ::read(descriptor.number(), block, sizeof block);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) refuse_with_errno(path, "cannot be read");
+    if (count == 0) return contents;
+    if (static_cast<std::size_t>(count) > limit_bytes - contents.size()) refuse_size();
+    contents.append(block, static_cast<std::size_t>(count));
+  }
+}
+
+void write_file(const std::string& path, std::string_view contents, bool overwrite) {
+  if (path == "-") {
+    std::fflush(stdout);
+    if (!write_all(STDOUT_FILENO, contents)) refuse_with_errno("standard output", "cannot be written");
+    return;
+  }
+  struct stat status = {};
+  if (::stat(path.c_str(), &status) == 0) {
+    if (S_ISDIR(status.st_mode)) refuse(path, "is a folder", "name a file in it");
+    if (!S_ISREG(status.st_mode)) {  // a device or a pipe is written to, never replaced
+      const Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+      if (!device.is_open() || !write_all(device.number(), contents))
+        refuse_with_errno(path, "cannot be written");
+      return;
+    }
+    if (!overwrite) refuse_existing(path);
+  }
+
+  std::string temporary;
+  int number = -1;
+  for (int attempt = 0; attempt < 100 && number < 0; ++attempt) {
+    temporary = path + ".part-" + std::to_string(::getpid()) + "-" + std::to_string(attempt);
+    number = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (number < 0 && errno != EEXIST) break;
+  }
+  if (number < 0) refuse_with_errno(path, "cannot be created");
+  bool written;
+  int error;
+  {
+    const Descriptor file(number);
+    written = write_all(file.number(), contents) && ::fsync(file.number()) == 0;
+    error = errno;
+  }
+  if (written) error = move_into_place(temporary, path, overwrite);
+  if (!written || error != 0) {
+    ::unlink(temporary.c_str());
+    if (written && error == EEXIST) refuse_existing(path);
+    errno = error;
+    refuse_with_errno(path, "cannot be written");
+  }
+  sync_folder_of(path);
+}
+
+std::string sha256(std::string_view bytes) {
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned int size = 0;
+  if (EVP_Digest(bytes.data(), bytes.size(), digest, &size, EVP_sha256(), nullptr) != 1) {
+    throw std::runtime_error("sha256: OpenSSL has no SHA-256 in this configuration");
+  }
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (unsigned int i = 0; i < size; ++i) {
+    text += kDigits[digest[i] >> 4];
+    text += kDigits[digest[i] & 15];
+  }
+  return text;
+}
+
+}  // namespace swarmcert::files

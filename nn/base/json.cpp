@@ -1,0 +1,201 @@
+#include "nn/base/json.h"
+
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <unordered_set>
+
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
+
+namespace swarmcert::files {
+namespace {
+
+constexpr int kDeepest = 64;
+constexpr std::size_t kMostKeys = 10'000;  // ordered_json looks a key up by linear search
+
+std::string line_and_column(const std::string& text, std::size_t offset) {
+  std::size_t line = 1;
+  std::size_t column = 1;
+  for (std::size_t i = 0; i < offset && i < text.size(); ++i) {
+    ++column;
+    if (text[i] == '\n') ++line, column = 1;
+  }
+  return "line " + std::to_string(line) + ", column " + std::to_string(column);
+}
+
+/// Walks over `text` and tells through `position` how far the parser has come: its callback is not told.
+class TrackingIterator {
+ public:
+  using iterator_category = std::input_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
+
+  TrackingIterator(const char* at, const char** position) : at_(at), position_(position) {}
+  reference operator*() const { return *at_; }
+  TrackingIterator& operator++() {
+    *position_ = ++at_;
+    return *this;
+  }
+  TrackingIterator operator++(int) {
+    const TrackingIterator before = *this;
+    ++*this;
+    return before;
+  }
+  bool operator==(const TrackingIterator& other) const { return at_ == other.at_; }
+  bool operator!=(const TrackingIterator& other) const { return at_ != other.at_; }
+
+ private:
+  const char* at_;
+  const char** position_;
+};
+
+/// "is not JSON (...)" from "[json.exception.parse_error.101] parse error at line 1, column 2: ...".
+std::string reason(const std::string& message) {
+  const std::size_t colon = message.find(": ");
+  return "is not JSON (" + (colon == std::string::npos ? message : message.substr(colon + 2)) + ")";
+}
+
+}  // namespace
+
+std::string hex_float(double value) {
+  if (std::isnan(value)) return "nan";
+  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+  char digits[40];
+  const auto result = std::to_chars(digits, digits + sizeof digits, std::abs(value), std::chars_format::hex);
+  return (std::signbit(value) ? "-0x" : "0x") + std::string(digits, result.ptr);
+}
+
+double parse_hex_float(const std::string& text) {
+  const auto refuse = [&text]() -> double {
+    throw std::invalid_argument("parse_hex_float: " + in_quotes(text) +
+                                " is not a finite hex float of a double");
+  };
+  std::size_t at = 0;
+  const auto accept = [&](char lower) {
+    const bool is_here =
+        at < text.size() && (text[at] == lower || (lower >= 'a' && text[at] == lower - 'a' + 'A'));
+    if (is_here) ++at;
+    return is_here;
+  };
+  const bool is_negative = accept('-');
+  if (!accept('0') || !accept('x')) return refuse();
+
+  std::uint64_t mantissa = 0;
+  long exponent = 0;  // of the mantissa's last digit
+  bool has_digits = false;
+  bool is_fraction = false;
+  for (;;) {
+    if (!is_fraction && accept('.')) {
+      is_fraction = true;
+      continue;
+    }
+    const char c = at < text.size() ? text[at] : '\0';
+    const int digit = c >= '0' && c <= '9'   ? c - '0'
+                      : c >= 'a' && c <= 'f' ? c - 'a' + 10
+                      : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                             : -1;
+    if (digit < 0) break;
+    has_digits = true;
+    ++at;
+    if (mantissa >> 60 == 0) {
+      mantissa = mantissa << 4 | static_cast<std::uint64_t>(digit);
+      exponent -= is_fraction ? 4 : 0;
+    } else {  // 64 bits are full: more digits may only be zeros
+      if (digit != 0) return refuse();
+      exponent += is_fraction ? 0 : 4;
+    }
+  }
+  if (!has_digits || !accept('p')) return refuse();
+  const bool is_small = accept('-');
+  if (!is_small) accept('+');
+  long power = 0;
+  const std::size_t first = at;
+  for (; at < text.size() && text[at] >= '0' && text[at] <= '9'; ++at) {
+    if (power > 100'000) return refuse();
+    power = 10 * power + (text[at] - '0');
+  }
+  if (at == first || at != text.size()) return refuse();
+  exponent += is_small ? -power : power;
+
+  if (mantissa == 0) return is_negative ? -0.0 : 0.0;
+  while (mantissa % 2 == 0) mantissa /= 2, ++exponent;
+  const bool is_exact =
+      mantissa >> 53 == 0 && exponent >= -1074;  // 53 bits, and none below the least subnormal
+  const double value =
+      is_exact ? std::ldexp(static_cast<double>(mantissa), static_cast<int>(exponent)) : INFINITY;
+  if (std::isinf(value)) return refuse();
+  return is_negative ? -value : value;
+}
+
+void require_keys(const Json& object, const std::set<std::string>& keys, const std::string& where) {
+  if (!object.is_object()) throw std::invalid_argument(where + " is not an object");
+  for (const auto& [key, value] : object.items()) {
+    if (keys.count(key) == 0) throw std::invalid_argument(where + " has unknown field " + key);
+  }
+  for (const std::string& key : keys) {
+    if (!object.contains(key)) throw std::invalid_argument(where + " lacks field " + key);
+  }
+}
+
+std::vector<double> parse_hex_floats(const Json& array) {
+  if (!array.is_array()) throw std::invalid_argument("parse_hex_floats: not an array");
+  std::vector<double> values;
+  for (const Json& text : array) values.push_back(parse_hex_float(text.get<std::string>()));
+  return values;
+}
+
+Json parse_json(const std::string& text, const std::string& path) {
+  const char* position = text.data();
+  const auto here = [&] { return line_and_column(text, static_cast<std::size_t>(position - text.data())); };
+  std::vector<std::unordered_set<std::string>> keys;  // of the objects that are open
+  const auto check = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start) {
+      if (depth >= kDeepest)
+        throw InputError({path, here(), "", "", "is nested more than 64 levels deep", ""});
+    }
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key) {
+      const std::string key = parsed.get<std::string>();
+      if (!keys.back().insert(key).second)
+        throw InputError({path, here(), in_quotes(key), "", "appears twice", ""});
+      if (keys.back().size() > kMostKeys)
+        throw InputError({path, here(), "", "", "an object has too many keys", ""});
+    }
+    return true;
+  };
+  try {
+    const char* const end = text.data() + text.size();
+    return Json::parse(TrackingIterator(text.data(), &position), TrackingIterator(end, &position), check);
+  } catch (const Json::exception& error) {
+    throw InputError({path, here(), "", "", reason(error.what()), ""});
+  }
+}
+
+Json parse_json(const std::string& text, const std::string& path, const std::string& schema) {
+  Json document = parse_json(text, path);
+  if (!document.is_object()) throw InputError({path, "line 1", "", "", "is not a JSON object", ""});
+  const std::string found = document.contains("schema") && document["schema"].is_string()
+                                ? document["schema"].get<std::string>()
+                                : "";
+  if (found != schema) {
+    throw InputError({path, "", "schema", found.empty() ? "" : in_quotes(found),
+                      "must be " + in_quotes(schema), "is this the right file?"});
+  }
+  return document;
+}
+
+Json read_json(const std::string& path, const std::string& schema) {
+  return parse_json(read_file(path), path, schema);
+}
+
+std::string to_text(const Json& document) {
+  // A path may hold bytes that are not UTF-8; a report that shows "?" there is better than none.
+  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace swarmcert::files

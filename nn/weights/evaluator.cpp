@@ -1,0 +1,70 @@
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "nn/base/input_error.h"
+#include "nn/weights/weights.h"
+
+namespace swarmcert::files {
+namespace {
+
+template <typename Scalar>
+std::vector<Scalar> converted(const std::vector<double>& values, const std::string& path,
+                              const std::string& field) {
+  // The first double that no longer rounds to a finite float: halfway between the largest float and 2^128.
+  constexpr bool kIsNarrow = sizeof(Scalar) < sizeof(double);
+  constexpr double kOverflow = kIsNarrow ? 0x1.ffffffp127 : std::numeric_limits<double>::infinity();
+  std::vector<Scalar> result;
+  result.reserve(values.size());
+  for (const double value : values) {
+    if (!(std::abs(value) < kOverflow)) {
+      throw InputError({path, "", field, std::to_string(value),
+                        kIsNarrow ? "is beyond the range of float32" : "is not finite",
+                        "evaluate this network in float64"});
+    }
+    result.push_back(static_cast<Scalar>(value));
+  }
+  return result;
+}
+
+}  // namespace
+
+Weights as_float32(Weights weights) {
+  for (Layer& layer : weights.layers) {
+    const auto weight = converted<float>(layer.weights, weights.path, layer.name + ".weight");
+    const auto bias = converted<float>(layer.biases, weights.path, layer.name + ".bias");
+    layer.weights.assign(weight.begin(), weight.end());
+    layer.biases.assign(bias.begin(), bias.end());
+  }
+  weights.precision = Precision::kFloat32;
+  return weights;
+}
+
+template <typename Scalar>
+Evaluator<Scalar>::Evaluator(const Weights& weights) {
+  arrays_.reserve(2 * weights.layers.size());
+  for (const Layer& layer : weights.layers) {
+    arrays_.push_back(converted<Scalar>(layer.weights, weights.path, layer.name + ".weight"));
+    const Scalar* const w = arrays_.back().data();
+    arrays_.push_back(converted<Scalar>(layer.biases, weights.path, layer.name + ".bias"));
+    layers_.push_back({w, arrays_.back().data(), layer.outputs, layer.inputs});
+  }
+}
+
+template <typename Scalar>
+std::vector<Scalar> Evaluator<Scalar>::operator()(const std::vector<Scalar>& input) const {
+  const nn::Mlp<Scalar> network = mlp();
+  if (input.size() != static_cast<std::size_t>(network.inputs())) {
+    throw std::invalid_argument("Evaluator: input has " + std::to_string(input.size()) +
+                                " entries, the network has " + std::to_string(network.inputs()) + " inputs");
+  }
+  std::vector<Scalar> output(static_cast<std::size_t>(network.outputs()));
+  std::vector<Scalar> scratch(static_cast<std::size_t>(nn::scratch_size(network)));
+  nn::evaluate(network, input.data(), output.data(), scratch.data());
+  return output;
+}
+
+template class Evaluator<float>;
+template class Evaluator<double>;
+
+}  // namespace swarmcert::files

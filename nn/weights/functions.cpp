@@ -1,0 +1,124 @@
+#include "nn/weights/functions.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace swarmcert::files {
+namespace {
+
+bool starts_with(const std::string& text, const std::string& prefix) { return text.rfind(prefix, 0) == 0; }
+
+bool ends_with(const std::string& text, const std::string& suffix) {
+  return text.size() >= suffix.size() &&
+         text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0;
+}
+
+/// The unit that the names of inputs end in: "dp_x_m" is in m, "dv_x_m_s" in m/s.
+std::string input_unit(const std::vector<std::string>& order) {
+  const auto all = [&order](const std::string& suffix) {
+    return std::all_of(order.begin(), order.end(),
+                       [&](const std::string& name) { return ends_with(name, suffix); });
+  };
+  if (order.empty()) return "input";
+  if (all("_m_s")) return "(m/s)";
+  if (all("_m")) return "m";
+  return "(m, m/s)";
+}
+
+std::vector<std::string> ground_names() {
+  return {"minus_z_m", "minus_v_x_m_s", "minus_v_y_m_s", "minus_v_z_m_s"};
+}
+
+/// Names that show which inputs are positions and which velocities; empty where nobody knows.
+std::vector<std::string> input_names(const Network& network, const std::string& part, int inputs) {
+  if (part == std::string("phi:") + kGroundKind) return ground_names();
+  if (starts_with(part, "rho:")) return {};
+  if (!network.input_order.empty()) return network.input_order;
+  if (inputs != 6) return {};
+  return {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
+}
+
+}  // namespace
+
+std::map<std::string, const Weights*> parts(const Network& network) {
+  std::map<std::string, const Weights*> result;
+  if (network.plain) result["network"] = &*network.plain;
+  for (const auto& [kind, weights] : network.phi) result["phi:" + kind] = &weights;
+  for (const auto& [kind, weights] : network.rho) result["rho:" + kind] = &weights;
+  return result;
+}
+
+std::vector<std::string> networks_of(const std::string& function) {
+  if (function == "network" || starts_with(function, "phi:") || starts_with(function, "rho:"))
+    return {function};
+  const std::size_t colon = function.find(':', 4);
+  if (!starts_with(function, "set:") || colon == std::string::npos) {
+    throw std::invalid_argument("networks_of: no function is called \"" + function + "\"");
+  }
+  return {"phi:" + function.substr(4, colon - 4), "rho:" + function.substr(colon + 1)};
+}
+
+std::vector<std::string> functions(const Network& network) {
+  std::vector<std::string> names;
+  for (const auto& [name, weights] : parts(network)) names.push_back(name);
+  for (const auto& [phi_kind, phi] : network.phi) {
+    for (const auto& [rho_kind, rho] : network.rho) names.push_back("set:" + phi_kind + ":" + rho_kind);
+  }
+  return names;
+}
+
+bool is_clamped(const std::string& name) {
+  return name == "network" || (starts_with(name, "phi:") && name != std::string("phi:") + kGroundKind);
+}
+
+std::vector<int> block_coordinates(const Network& network, const std::string& function,
+                                   const std::string& block) {
+  const std::string first = networks_of(function).front();
+  const int inputs = parts(network).at(first)->inputs();
+  const std::vector<std::string> names = input_names(network, first, inputs);
+  std::vector<int> result;
+  for (int k = 0; k < inputs; ++k) {
+    const bool named = static_cast<std::size_t>(k) < names.size();
+    const bool is_velocity = named && ends_with(names[k], "_m_s");
+    const bool is_position = named && ends_with(names[k], "_m");
+    if (block == "all" || block == "x" + std::to_string(k) || (block == "position" && is_position) ||
+        (block == "velocity" && is_velocity)) {
+      result.push_back(k);
+    }
+  }
+  if (result.empty())
+    throw std::invalid_argument("block_coordinates: " + function + " has no block \"" + block + "\"");
+  return result;
+}
+
+std::vector<std::string> blocks(const Network& network, const std::string& function) {
+  const std::string first = networks_of(function).front();
+  const int inputs = parts(network).at(first)->inputs();
+  if (starts_with(first, "rho:") || inputs == 1) return {};
+  std::vector<std::string> result;
+  const std::vector<std::string> names = input_names(network, first, inputs);
+  const auto has = [&names](const char* suffix) {
+    return std::any_of(names.begin(), names.end(), [&](const auto& n) { return ends_with(n, suffix); });
+  };
+  if (has("_m") && has("_m_s")) result = {"position", "velocity"};
+  for (int k = 0; k < inputs; ++k) result.push_back("x" + std::to_string(k));
+  return result;
+}
+
+std::string unit(const Network& network, const std::string& function, const std::string& block) {
+  const std::string output = network.output_unit.empty() ? "output" : network.output_unit;
+  const std::string first = networks_of(function).front();
+  std::vector<std::string> moved;  // stays empty where NET states no names: then their units are unknown
+  if (!network.input_order.empty()) moved = input_names(network, first, parts(network).at(first)->inputs());
+  if (block != "all" && !moved.empty()) {
+    std::vector<std::string> names;
+    for (const int k : block_coordinates(network, function, block)) names.push_back(moved.at(k));
+    moved = names;
+  }
+  const std::string input = input_unit(moved);
+  if (starts_with(function, "phi:")) return "hidden/" + input;
+  if (starts_with(function, "rho:")) return output + "/hidden";
+  return output + "/" + input;
+}
+
+}  // namespace swarmcert::files

@@ -1,0 +1,246 @@
+#include "nn/weights/network.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/toml.h"
+
+namespace swarmcert::files {
+namespace {
+
+constexpr char kSchema[] = "swarmcert/network/1";
+constexpr char kGround[] = "ground";
+
+class NetworkReader {
+ public:
+  NetworkReader(const TomlTable& top, const std::string& path, const WeightsLoader& load)
+      : top_(top), path_(path), load_(load) {}
+
+  Network run() {
+    if (top_.text("schema") != kSchema) {
+      top_.refuse("schema", in_quotes(top_.text("schema")), "must be " + in_quotes(kSchema),
+                  "is this the right file?");
+    }
+    top_.allow_only({"schema", "output", "gamma", "input", "phi", "rho"});
+    network_.path = path_;
+    if (top_.has("output")) read_output(top_.table("output"));
+    if (top_.has("gamma")) read_gamma(top_.table("gamma"));
+    if (top_.has("input")) read_input(top_.table("input"));
+    read_weights("phi", network_.phi);
+    read_weights("rho", network_.rho);
+    check_phi();
+    check_rho();
+    return std::move(network_);
+  }
+
+ private:
+  void read_output(const TomlTable& output) {
+    output.allow_only({"quantity", "unit"});
+    output.choice("quantity", {"force_z", "force", "torque"});
+    network_.output_quantity = output.text("quantity");
+    if (network_.output_quantity == "torque") {
+      output.choice("unit", {"mN_m", "N_m"});
+    } else {
+      output.choice("unit", {"gf", "N"});
+    }
+    network_.output_unit = output.text("unit");
+  }
+
+  void read_gamma(const TomlTable& gamma) {
+    gamma.allow_only({"value", "scope", "mode"});
+    GammaStatement statement;
+    statement.value = gamma.number("value");
+    if (!(statement.value > 0)) gamma.refuse("value", std::to_string(statement.value), "must be positive");
+    statement.scope = gamma.choice("scope", {"layer", "network"}) == 0 ? GammaStatement::Scope::kLayer
+                                                                       : GammaStatement::Scope::kNetwork;
+    statement.mode = gamma.choice("mode", {"clip", "equal"}) == 0 ? GammaStatement::Mode::kClip
+                                                                  : GammaStatement::Mode::kEqual;
+    network_.gamma = statement;
+  }
+
+  void read_input(const TomlTable& input) {
+    input.allow_only({"order", "clamp"});
+    if (input.has("order")) {
+      network_.input_order = input.texts("order");
+      std::vector<std::string> sorted = network_.input_order;
+      std::sort(sorted.begin(), sorted.end());
+      const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
+      if (twice != sorted.end()) input.refuse("order", in_quotes(*twice), "appears twice");
+      if (sorted.empty()) input.refuse("order", "", "is empty");
+    }
+    if (!input.has("clamp")) return;
+    const TomlTable clamp = input.table("clamp");
+    clamp.allow_only({"lower", "upper"});
+    InputClamp box = {clamp.numbers("lower"), clamp.numbers("upper")};
+    const std::size_t inputs = network_.input_order.empty() ? box.lower.size() : network_.input_order.size();
+    check_length(clamp, "lower", box.lower, inputs, "inputs");
+    check_length(clamp, "upper", box.upper, inputs, "inputs");
+    for (std::size_t i = 0; i < box.lower.size(); ++i) {
+      if (box.lower[i] > box.upper[i]) {
+        clamp.refuse("lower", std::to_string(box.lower[i]),
+                     "entry " + std::to_string(i) + " is above upper, " + std::to_string(box.upper[i]));
+      }
+    }
+    network_.clamp = std::move(box);
+  }
+
+  static void check_length(const TomlTable& table, const std::string& key, const std::vector<double>& numbers,
+                           std::size_t expected, const std::string& of) {
+    if (numbers.size() == expected && expected > 0) return;
+    table.refuse(key, std::to_string(numbers.size()) + " numbers",
+                 "there are " + std::to_string(expected) + " " + of);
+  }
+
+  void read_weights(const std::string& role, std::map<std::string, Weights>& weights) {
+    const TomlTable kinds = top_.table(role);
+    if (kinds.keys().empty()) kinds.refuse("", "", "names no kind of vehicle", "add [" + role + ".<kind>]");
+    for (const std::string& kind : kinds.keys()) {
+      const TomlTable entry = kinds.table(kind);
+      entry.allow_only({"weights"});
+      const std::string file = entry.text("weights");
+      if (file.empty() || file.find('\0') != std::string::npos) {
+        entry.refuse("weights", in_quotes(file), "is not the name of a file");
+      }
+      const std::filesystem::path folder = std::filesystem::path(path_).parent_path();
+      weights.emplace(kind, load_((folder / file).string()));
+    }
+  }
+
+  /// What kind's network has, against what it must have.
+  void check_size(const std::string& role, const std::string& kind, const char* what, int found,
+                  std::size_t expected, const std::string& because) const {
+    if (found >= 0 && static_cast<std::size_t>(found) == expected) return;
+    top_.table(role).table(kind).refuse("weights", std::to_string(found) + " " + what,
+                                        "must be " + std::to_string(expected) + ": " + because);
+  }
+
+  void check_phi() const {
+    const auto& [first_kind, first] = *network_.phi.begin();
+    std::size_t inputs = network_.input_order.size();
+    std::string because = "input.order names as many";
+    if (inputs == 0 && network_.clamp) {
+      inputs = network_.clamp->lower.size();
+      because = "input.clamp has as many";
+    }
+    for (const auto& [kind, phi] : network_.phi) {
+      check_size("phi", kind, "outputs", phi.outputs(), static_cast<std::size_t>(first.outputs()),
+                 "all phi are summed, and phi." + first_kind + " has as many");
+      if (kind == kGround) {
+        check_size("phi", kind, "inputs", phi.inputs(), kGroundInputs, "the vehicle's own -z and -v");
+        continue;
+      }
+      if (inputs == 0) {
+        inputs = static_cast<std::size_t>(phi.inputs());
+        because = "phi." + kind + " has as many";
+      }
+      check_size("phi", kind, "inputs", phi.inputs(), inputs, because);
+    }
+  }
+
+  void check_rho() const {
+    const auto& [first_kind, first] = *network_.rho.begin();
+    const auto& [phi_kind, phi] = *network_.phi.begin();
+    for (const auto& [kind, rho] : network_.rho) {
+      check_size("rho", kind, "inputs", rho.inputs(), static_cast<std::size_t>(phi.outputs()),
+                 "phi." + phi_kind + " has as many outputs");
+      check_size("rho", kind, "outputs", rho.outputs(), static_cast<std::size_t>(first.outputs()),
+                 "rho." + first_kind + " has as many");
+      if (const int stated = components(network_.output_quantity); stated > 0) {
+        check_size("rho", kind, "outputs", rho.outputs(), static_cast<std::size_t>(stated),
+                   "output.quantity is " + network_.output_quantity);
+      }
+    }
+  }
+
+  const TomlTable& top_;
+  const std::string& path_;
+  const WeightsLoader& load_;
+  Network network_;
+};
+
+bool is_network_toml(const std::string& path, const std::string& bytes) {
+  constexpr std::string_view kSuffix = ".toml";
+  if (path.size() >= kSuffix.size() &&
+      path.compare(path.size() - kSuffix.size(), kSuffix.size(), kSuffix) == 0) {
+    return true;
+  }
+  const std::string_view beginning = std::string_view(bytes).substr(0, 1024);
+  return beginning.find("swarmcert/network/") != std::string_view::npos &&
+         beginning.find('\0') == std::string_view::npos;
+}
+
+/// --phi F --rho F, which have no network.toml to take a line from.
+Network load_pair(const NetworkArguments& arguments) {
+  Network network;
+  const Weights& phi =
+      network.phi.emplace("default", load_weights(arguments.phi, arguments.key)).first->second;
+  const Weights& rho =
+      network.rho.emplace("default", load_weights(arguments.rho, arguments.key)).first->second;
+  if (phi.outputs() != rho.inputs()) {
+    throw InputError(
+        {arguments.rho, "", rho.layers.front().name + ".weight", std::to_string(rho.inputs()) + " inputs",
+         "must be " + std::to_string(phi.outputs()) + ": " + arguments.phi + " has as many outputs",
+         "name a phi and a rho that were trained together"});
+  }
+  return network;
+}
+
+}  // namespace
+
+int components(const std::string& quantity) { return quantity.empty() ? 0 : quantity == "force_z" ? 1 : 3; }
+
+void require_force_z(const Network& network) {
+  if (network.output_quantity.empty() || network.output_quantity == "force_z") return;
+  throw InputError({network.path, "", "output.quantity", in_quotes(network.output_quantity),
+                    "is not the vertical force that is flown",
+                    "name a network of force_z; as an effect of a model this one acts in simulation"});
+}
+
+void require_torque(const Network& network) {
+  if (network.output_quantity == "torque") return;
+  throw InputError({network.path, "", "output.quantity", in_quotes(network.output_quantity),
+                    "is not a torque", "name a network of train --quantity torque"});
+}
+
+Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load) {
+  const toml::table document = parse_toml(text, path);
+  const TomlTable top(document, path);
+  Network network = NetworkReader(top, path, load).run();
+  network.sha256 = sha256(text);
+  return network;
+}
+
+Network as_float32(Network network) {
+  if (network.plain) network.plain = as_float32(std::move(*network.plain));
+  for (auto& [kind, weights] : network.phi) weights = as_float32(std::move(weights));
+  for (auto& [kind, weights] : network.rho) weights = as_float32(std::move(weights));
+  return network;
+}
+
+Network load_network(const NetworkArguments& arguments) {
+  const bool is_pair = !arguments.phi.empty() && !arguments.rho.empty();
+  if (arguments.file.empty() ? !is_pair : !(arguments.phi.empty() && arguments.rho.empty())) {
+    throw std::invalid_argument("load_network: name one file, or a phi and a rho");
+  }
+  if (is_pair) return load_pair(arguments);
+  const bool names_a_key =
+      arguments.file.find('#') != std::string::npos && !std::filesystem::exists(arguments.file);
+  if (names_a_key) {
+    Network network;
+    network.plain = load_weights(arguments.file, arguments.key);
+    return network;
+  }
+  const std::string bytes = read_file(arguments.file);
+  if (is_network_toml(arguments.file, bytes)) {
+    const WeightsLoader load = [&](const std::string& path) { return load_weights(path, arguments.key); };
+    return parse_network(bytes, arguments.file, load);
+  }
+  Network network;
+  network.plain = parse_weights(bytes, arguments.file, arguments.key);
+  return network;
+}
+
+}  // namespace swarmcert::files

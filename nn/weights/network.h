@@ -1,0 +1,86 @@
+/// @file What the command line calls NET: one plain network, or a deep set with its kinds, units and clamp.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nn/weights/weights.h"
+
+namespace swarmcert::files {
+
+/// What the networks were declared to satisfy: `gamma = { value, scope, mode }`.
+struct GammaStatement {
+  enum class Scope { kLayer, kNetwork };
+  enum class Mode { kClip, kEqual };
+  double value = 0;  ///< spectral norm per layer, or product of the norms over a network's layers
+  Scope scope = Scope::kLayer;
+  Mode mode = Mode::kClip;  ///< kClip: at most `value`; kEqual: equal to it up to the stored precision
+};
+
+/// A neighbour's inputs are clamped to [lower, upper] before phi sees them; part of the function. The ground's
+/// phi, which sees the vehicle's own state, has no clamp.
+struct InputClamp {
+  std::vector<double> lower, upper;
+};
+
+/// Inputs of the phi of kind "ground": the vehicle's own -z and -v.
+inline constexpr int kGroundInputs = 4;
+
+/// NET. Either `plain` is set, or `phi` and `rho` hold at least one kind each.
+///
+/// Deep set of a vehicle of kind r with neighbours x_1..x_n of kinds c_1..c_n:
+///   f(x) = rho_r(phi_ground(own) + sum_j phi_{c_j}(x_j)),
+/// where the ground term is present iff phi has the kind "ground".
+/// Class invariant after load: every phi but "ground" has the same number of inputs, which is the length of
+/// `input_order` and of the clamp where they are given; "ground" has kGroundInputs; all phi have the same number of
+/// outputs, which is every rho's number of inputs; all rho have the same number of outputs, components(output_quantity)
+/// where that is stated.
+struct Network {
+  std::string path;    ///< of network.toml; empty where weight files were named directly
+  std::string sha256;  ///< of network.toml; empty likewise
+  std::optional<Weights> plain;
+  std::map<std::string, Weights> phi;  ///< by the neighbour's kind
+  std::map<std::string, Weights> rho;  ///< by the vehicle's own kind
+
+  std::string output_quantity;           ///< "force_z", "force" or "torque"; empty if not stated
+  std::string output_unit;               ///< "gf" or "N", of torques "mN_m" or "N_m"; empty if not stated
+  std::vector<std::string> input_order;  ///< "dp_x_m", ...; empty if not stated
+  std::optional<InputClamp> clamp;
+  std::optional<GammaStatement> gamma;
+};
+
+/// Numbers that a quantity has: one for "force_z", the vertical force; three for "force" and "torque", along the axes of
+/// the world, as the inputs are. 0 where it is empty.
+int components(const std::string& quantity);
+
+/// @throws InputError if the network states another output than the vertical force, which is what flight code takes.
+void require_force_z(const Network& network);
+/// @throws InputError unless the network states a torque.
+void require_torque(const Network& network);
+
+/// Which files make up NET: exactly one of `file`, or `phi` with `rho`.
+struct NetworkArguments {
+  std::string file;      ///< network.toml or one plain weight file
+  std::string phi, rho;  ///< weight files; their kind is "default"
+  std::string key;       ///< see load_weights(); holds for every weight file
+};
+
+/// Loads NET. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files
+/// named in a network.toml are relative to its folder.
+/// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean.
+Network load_network(const NetworkArguments& arguments);
+
+/// as_float32() of every part.
+Network as_float32(Network network);
+
+/// Reads the weight file at a path.
+using WeightsLoader = std::function<Weights(const std::string& path)>;
+
+/// A network.toml from memory: `path` gives its folder and the name in messages, `load` reads the weight files.
+/// @throws InputError as load_network().
+Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load);
+
+}  // namespace swarmcert::files

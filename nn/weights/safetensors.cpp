@@ -1,0 +1,253 @@
+#include "nn/weights/safetensors.h"
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
+#include "nn/weights/tensors.h"
+
+namespace swarmcert::files {
+namespace {
+
+constexpr std::uint64_t kLargestHeader_bytes = std::uint64_t{4} << 20;
+/// Key in "__metadata__" with the names of our layers in order of evaluation: safetensors itself has no order.
+constexpr char kOrderKey[] = "swarmcert.layers";
+
+std::uint64_t header_length(const std::string& bytes) {
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes.data(), sizeof length);
+  return length;
+}
+
+/// Compares runs of digits by value, so that fc2 comes before fc10.
+bool naturally_before(const std::string& a, const std::string& b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+      continue;
+    }
+    const auto number = [&is_digit](const std::string& text, std::size_t& at) {
+      while (at < text.size() && text[at] == '0') ++at;
+      const std::size_t first = at;
+      while (at < text.size() && is_digit(text[at])) ++at;
+      return text.substr(first, at - first);
+    };
+    const std::string m = number(a, i);
+    const std::string n = number(b, j);
+    if (m.size() != n.size()) return m.size() < n.size();
+    if (m != n) return m < n;
+  }
+  return a.size() - i < b.size() - j;
+}
+
+struct Entry {
+  DeclaredTensor tensor;
+  std::uint64_t begin = 0, end = 0;  ///< in the data behind the header
+};
+
+class Reader {
+ public:
+  Reader(const std::string& bytes, const std::string& path) : path_(path) {
+    if (bytes.size() < 8) refuse("", "", "is shorter than a safetensors header", kCopyAgain);
+    const std::uint64_t length = header_length(bytes);
+    if (length > bytes.size() - 8 || length > kLargestHeader_bytes) {
+      refuse("", std::to_string(length) + " bytes", "the header is longer than the file or than 4 MiB",
+             kCopyAgain);
+    }
+    header_ = parse_json(bytes.substr(8, length), path);
+    data_ = std::string_view(bytes).substr(8 + length);
+  }
+
+  Weights run() {
+    for (const auto& [name, value] : header_.items()) {
+      if (name != "__metadata__") entries_.push_back(entry(name, value));
+    }
+    check_layout();
+    sort_by_layer();
+    std::vector<DeclaredTensor> tensors;
+    for (const Entry& entry : entries_) tensors.push_back(entry.tensor);
+    const TensorReader read = [this](std::size_t i) {
+      const Entry& entry = entries_[i];
+      const Precision precision = *entry.tensor.precision;
+      const std::uint64_t count = (entry.end - entry.begin) / width(precision);
+      std::vector<double> numbers;
+      numbers.reserve(count);
+      append_numbers(data_.data() + entry.begin, count, 1, precision, numbers);
+      return numbers;
+    };
+    return assemble(tensors, read, path_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
+                           const std::string& mend = "") const {
+    throw InputError({path_, "", field, value, what, mend});
+  }
+
+  Entry entry(const std::string& name, const Json& value) const {
+    const std::string field = in_quotes(name);
+    if (!value.is_object()) refuse(field, "", "the header of a tensor is not an object");
+    for (const auto& item : value.items()) {
+      const std::string& key = item.key();
+      if (key != "dtype" && key != "shape" && key != "data_offsets")
+        refuse(field, in_quotes(key), "is not a known key");
+    }
+    if (!value.contains("dtype") || !value["dtype"].is_string()) refuse(field, "", "has no dtype");
+    Entry entry;
+    entry.tensor.name = name;
+    entry.tensor.type = value["dtype"].get<std::string>();
+    if (entry.tensor.type == "F32") entry.tensor.precision = Precision::kFloat32;
+    if (entry.tensor.type == "F64") entry.tensor.precision = Precision::kFloat64;
+    entry.tensor.shape = counts(value, field, "shape");
+    const std::vector<std::uint64_t> offsets = counts(value, field, "data_offsets");
+    if (offsets.size() != 2 || offsets[0] > offsets[1] || offsets[1] > data_.size()) {
+      refuse(field + ".data_offsets", shape_text(offsets),
+             "is not a range in the " + std::to_string(data_.size()) + " bytes of data", kCopyAgain);
+    }
+    entry.begin = offsets[0];
+    entry.end = offsets[1];
+    if (!entry.tensor.precision) return entry;
+    const std::optional<std::uint64_t> count = element_count(entry.tensor.shape);
+    if (!count || *count * width(*entry.tensor.precision) != entry.end - entry.begin) {
+      refuse(field + ".shape", shape_text(entry.tensor.shape),
+             "does not fit the " + std::to_string(entry.end - entry.begin) + " bytes of its data",
+             kCopyAgain);
+    }
+    return entry;
+  }
+
+  std::vector<std::uint64_t> counts(const Json& value, const std::string& field, const char* key) const {
+    const std::string whole = field + "." + key;
+    if (!value.contains(key) || !value[key].is_array()) refuse(whole, "", "is not a list");
+    std::vector<std::uint64_t> result;
+    for (const Json& number : value[key]) {
+      if (!number.is_number_unsigned())
+        refuse(whole, "", "holds something that is not a non-negative integer");
+      result.push_back(number.get<std::uint64_t>());
+      if (result.size() > 8) refuse(whole, "", "has more than 8 entries");
+    }
+    return result;
+  }
+
+  /// The format demands that tensors cover the data without overlap or gap.
+  void check_layout() const {
+    std::vector<const Entry*> by_begin;
+    for (const Entry& entry : entries_) by_begin.push_back(&entry);
+    std::sort(by_begin.begin(), by_begin.end(), [](const Entry* a, const Entry* b) {
+      return std::make_pair(a->begin, a->end) < std::make_pair(b->begin, b->end);
+    });
+    std::uint64_t covered = 0;
+    for (const Entry* entry : by_begin) {
+      if (entry->begin != covered) {
+        refuse(in_quotes(entry->tensor.name) + ".data_offsets", shape_text({entry->begin, entry->end}),
+               entry->begin < covered ? "overlaps another tensor" : "leaves a gap before it", kCopyAgain);
+      }
+      covered = entry->end;
+    }
+    if (covered != data_.size())
+      refuse("", std::to_string(data_.size() - covered) + " bytes", "belong to no tensor");
+  }
+
+  void sort_by_layer() {
+    const std::vector<std::string> order = layer_order();
+    const auto layer_of = [](const std::string& tensor) {
+      const std::size_t dot = tensor.rfind('.');
+      return dot == std::string::npos ? std::string() : tensor.substr(0, dot);
+    };
+    const auto rank = [&](const Entry& entry) {
+      return std::find(order.begin(), order.end(), layer_of(entry.tensor.name)) - order.begin();
+    };
+    std::vector<std::size_t> indices(entries_.size());
+    std::iota(indices.begin(), indices.end(), std::size_t{0});
+    std::vector<std::ptrdiff_t> ranks;
+    for (const Entry& entry : entries_) ranks.push_back(rank(entry));
+    std::sort(indices.begin(), indices.end(), [&](std::size_t a, std::size_t b) {
+      if (ranks[a] != ranks[b]) return ranks[a] < ranks[b];
+      return naturally_before(entries_[a].tensor.name, entries_[b].tensor.name);
+    });
+    std::vector<Entry> sorted;
+    sorted.reserve(entries_.size());
+    for (const std::size_t i : indices) sorted.push_back(entries_[i]);
+    entries_ = std::move(sorted);
+  }
+
+  /// Empty where the file does not say.
+  std::vector<std::string> layer_order() const {
+    if (!header_.contains("__metadata__")) return {};
+    const Json& metadata = header_["__metadata__"];
+    if (!metadata.is_object()) refuse("__metadata__", "", "is not an object");
+    if (!metadata.contains(kOrderKey)) return {};
+    const std::string field = std::string("__metadata__.") + kOrderKey;
+    if (!metadata[kOrderKey].is_string()) refuse(field, "", "is not text");
+    const Json names = parse_json(metadata[kOrderKey].get<std::string>(), path_ + ": " + field);
+    if (!names.is_array() || names.size() > 4096) refuse(field, "", "is not a list of layers");
+    std::vector<std::string> order;
+    for (const Json& name : names) {
+      if (!name.is_string()) refuse(field, "", "is not a list of layers");
+      order.push_back(name.get<std::string>());
+    }
+    return order;
+  }
+
+  const std::string& path_;
+  Json header_;
+  std::string_view data_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace
+
+bool looks_like_safetensors(const std::string& bytes) {
+  return bytes.size() >= 10 && header_length(bytes) <= kLargestHeader_bytes && bytes[8] == '{';
+}
+
+Weights parse_safetensors(const std::string& bytes, const std::string& path) {
+  return Reader(bytes, path).run();
+}
+
+std::string safetensors_bytes(const Weights& weights) {
+  Json header = Json::object();
+  Json names = Json::array();
+  for (const Layer& layer : weights.layers) names.push_back(layer.name);
+  header["__metadata__"] = {{kOrderKey, names.dump(-1, ' ', false, Json::error_handler_t::ignore)}};
+  std::string data;
+  const auto append = [&](const std::string& name, const std::vector<double>& numbers, const Json& shape) {
+    const std::size_t begin = data.size();
+    for (const double number : numbers) {
+      const auto narrow = static_cast<float>(number);
+      const bool is_narrow = weights.precision == Precision::kFloat32;
+      const char* const raw =
+          is_narrow ? reinterpret_cast<const char*>(&narrow) : reinterpret_cast<const char*>(&number);
+      data.append(raw, width(weights.precision));
+    }
+    header[name] = {{"dtype", weights.precision == Precision::kFloat32 ? "F32" : "F64"},
+                    {"shape", shape},
+                    {"data_offsets", {begin, data.size()}}};
+  };
+  for (const Layer& layer : weights.layers) {
+    append(tensor_name(layer, "weight"), layer.weights, {layer.outputs, layer.inputs});
+    append(tensor_name(layer, "bias"), layer.biases, Json::array({layer.outputs}));
+  }
+  std::string text;
+  try {
+    text = header.dump();
+  } catch (const Json::type_error&) {
+    throw InputError({weights.path, "", "", "", "the name of a layer is not UTF-8", "rename the layers"});
+  }
+  text.resize((text.size() + 7) / 8 * 8, ' ');  // so that the numbers lie on multiples of 8
+  const std::uint64_t length = text.size();
+  return std::string(reinterpret_cast<const char*>(&length), sizeof length) + text + data;
+}
+
+void save_safetensors(const Weights& weights, const std::string& path, bool overwrite) {
+  write_file(path, safetensors_bytes(weights), overwrite);
+}
+
+}  // namespace swarmcert::files

@@ -1,0 +1,120 @@
+#include "nn/weights/state_dict.h"
+
+#include <optional>
+
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
+
+namespace swarmcert::files {
+namespace {
+
+using Kind = PickledValue::Kind;
+using Index = std::uint32_t;
+
+constexpr std::size_t kMostKeysListed = 20;
+constexpr std::size_t kLongestKey = 200;
+
+class Selector {
+ public:
+  Selector(const Pickle& pickle, const std::string& path) : pickle_(pickle), path_(path) {}
+
+  StateDict select(const std::string& key) const {
+    const Index index = key.empty() ? pickle_.root : find(key);
+    const PickledValue& dict = value(index);
+    if (dict.kind != Kind::kDict) {
+      throw InputError(
+          {path_, "", key, name(dict.kind), "is not a state dict (names and tensors)", choose(key)});
+    }
+    StateDict entries;
+    for (std::size_t i = 0; i + 1 < dict.items.size(); i += 2) {
+      const PickledValue& entry_name = value(dict.items[i]);
+      const PickledValue& tensor = value(dict.items[i + 1]);
+      if (entry_name.kind != Kind::kText) {
+        throw InputError({path_, "", key, name(entry_name.kind), "is a key that is not text", ""});
+      }
+      if (tensor.kind != Kind::kTensor) {
+        throw InputError(
+            {path_, "", in_quotes(entry_name.text), name(tensor.kind), "is not a tensor", choose(key)});
+      }
+      entries.emplace_back(entry_name.text, static_cast<std::size_t>(tensor.integer));
+    }
+    if (entries.empty()) throw InputError({path_, "", key, "", "is an empty state dict", choose(key)});
+    return entries;
+  }
+
+ private:
+  const PickledValue& value(Index index) const { return pickle_.values[index]; }
+
+  /// Follows `key`. A name in the file may itself hold dots: the longest one that fits is taken.
+  Index find(const std::string& key) const {
+    Index at = pickle_.root;
+    std::string_view rest = key;
+    for (;;) {
+      const PickledValue& dict = value(at);
+      std::optional<Index> next;
+      std::size_t longest = 0;
+      for (std::size_t i = 0; dict.kind == Kind::kDict && i + 1 < dict.items.size(); i += 2) {
+        const PickledValue& candidate = value(dict.items[i]);
+        if (candidate.kind != Kind::kText || candidate.text.size() < longest || candidate.text.empty())
+          continue;
+        const bool fits = rest.substr(0, candidate.text.size()) == candidate.text &&
+                          (rest.size() == candidate.text.size() || rest[candidate.text.size()] == '.');
+        if (!fits) continue;
+        next = dict.items[i + 1];
+        longest = candidate.text.size();
+      }
+      if (!next) throw InputError({path_, "", "", in_quotes(key), "the file has no such key", choose(key)});
+      at = *next;
+      if (longest == rest.size()) return at;
+      rest.remove_prefix(longest + 1);
+    }
+  }
+
+  /// The mend: other keys that lead to a dict with tensors.
+  std::string choose(const std::string& key) const {
+    std::vector<std::string> keys = keys_of_state_dicts();
+    if (keys.empty()) return "save one with torch.save(model.state_dict(), ...)";
+    if (!key.empty()) {
+      const std::string best = nearest(key, keys);
+      if (!best.empty()) return "did you mean " + in_quotes(best) + "?";
+    }
+    std::string list = "choose a state dict with --key: ";
+    for (std::size_t i = 0; i < keys.size(); ++i) list += (i == 0 ? "" : ", ") + in_quotes(keys[i]);
+    return list;
+  }
+
+  /// Breadth first, each dict once, because a pickle may contain itself.
+  std::vector<std::string> keys_of_state_dicts() const {
+    std::vector<std::string> keys;
+    std::vector<std::pair<std::string, Index>> queue = {{"", pickle_.root}};
+    std::vector<bool> seen(pickle_.values.size(), false);
+    seen[pickle_.root] = true;
+    for (std::size_t head = 0; head < queue.size() && keys.size() < kMostKeysListed; ++head) {
+      const auto [prefix, index] = queue[head];
+      const PickledValue& dict = value(index);
+      bool has_tensor = false;
+      for (std::size_t i = 0; i + 1 < dict.items.size(); i += 2) {
+        const PickledValue& entry_name = value(dict.items[i]);
+        const Index child = dict.items[i + 1];
+        has_tensor = has_tensor || value(child).kind == Kind::kTensor;
+        if (value(child).kind != Kind::kDict || entry_name.kind != Kind::kText || seen[child]) continue;
+        if (prefix.size() + entry_name.text.size() > kLongestKey) continue;
+        seen[child] = true;
+        queue.emplace_back((prefix.empty() ? "" : prefix + ".") + std::string(entry_name.text), child);
+      }
+      if (has_tensor && !prefix.empty()) keys.push_back(prefix);
+    }
+    return keys;
+  }
+
+  const Pickle& pickle_;
+  const std::string& path_;
+};
+
+}  // namespace
+
+StateDict select_state_dict(const Pickle& pickle, const std::string& key, const std::string& path) {
+  return Selector(pickle, path).select(key);
+}
+
+}  // namespace swarmcert::files

@@ -1,0 +1,21 @@
+/// @file Finding the state dict inside a pickled checkpoint.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "nn/weights/pickle.h"
+
+namespace swarmcert::files {
+
+/// Names and indices into Pickle::tensors, in the file's order.
+using StateDict = std::vector<std::pair<std::string, std::size_t>>;
+
+/// The state dict at the dotted path `key` (empty: the top).
+/// @throws InputError if there is no such key, if it is not a dict, or if an entry of it is not a tensor; the
+///         message lists the keys under which state dicts lie.
+StateDict select_state_dict(const Pickle& pickle, const std::string& key, const std::string& path);
+
+}  // namespace swarmcert::files

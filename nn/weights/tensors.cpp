@@ -1,0 +1,265 @@
+#include "nn/weights/tensors.h"
+
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include "nn/base/input_error.h"
+
+#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "weight files are little-endian, and append_numbers() copies their bytes as they are"
+#endif
+
+namespace swarmcert::files {
+namespace {
+
+constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+constexpr std::size_t kMostTensors = 4096;
+
+/// Which tensors make up a layer; indices into the declared ones.
+struct LayerParts {
+  std::string name;
+  std::size_t weight = kNone;
+  std::size_t bias = kNone;
+};
+
+class Assembler {
+ public:
+  Assembler(const std::vector<DeclaredTensor>& tensors, const TensorReader& read, const std::string& path)
+      : tensors_(tensors), read_(read), path_(path) {}
+
+  Weights run() {
+    if (tensors_.size() > kMostTensors) {
+      throw InputError(
+          {path_, "", "", "", "holds more than " + std::to_string(kMostTensors) + " tensors", ""});
+    }
+    refuse_parametrised();
+    for (std::size_t i = 0; i < tensors_.size(); ++i) find_weight(i);
+    for (std::size_t i = 0; i < tensors_.size(); ++i) find_bias(i);
+    if (parts_.empty()) {
+      throw InputError({path_, "", "", "", "holds no tensor named \"<layer>.weight\"",
+                        "save a state dict of a "
+                        "network of linear layers"});
+    }
+    check_chain();
+    Weights weights;
+    weights.path = path_;
+    weights.precision = *tensors_[parts_.front().weight].precision;
+    for (const LayerParts& parts : parts_) weights.layers.push_back(layer(parts));
+    return weights;
+  }
+
+ private:
+  [[noreturn]] void refuse(std::size_t i, const std::string& value, const std::string& what,
+                           const std::string& mend = "") const {
+    throw InputError({path_, "", tensors_[i].name, value, what, mend});
+  }
+
+  /// Reparametrised weights are recomputed by Python code at every call; the stored tensors are not W.
+  void refuse_parametrised() const {
+    for (std::size_t i = 0; i < tensors_.size(); ++i) {
+      const std::string& name = tensors_[i].name;
+      const auto ends_with = [&name](const std::string& suffix) {
+        return name.size() >= suffix.size() &&
+               name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0;
+      };
+      if (name.find("parametrizations.") != std::string::npos) {
+        refuse(i, "",
+               "the weight is parametrised (spectral_norm), so the file does not hold the weight itself",
+               "call torch.nn.utils.parametrize.remove_parametrizations(layer, \"weight\") before saving");
+      }
+      if (ends_with("weight_g")) {
+        refuse(i, "",
+               "the weight is parametrised by weight_norm, so the file does not hold the weight itself",
+               "call torch.nn.utils.remove_weight_norm(layer) before saving");
+      }
+      if (ends_with("weight_orig") || ends_with("weight_u")) {
+        refuse(i, "",
+               "the weight is parametrised by spectral_norm, so the file does not hold the weight itself",
+               "call torch.nn.utils.remove_spectral_norm(layer) before saving");
+      }
+    }
+  }
+
+  /// True if the i-th tensor is named "<layer>.<part>" or just "<part>"; sets `layer`.
+  bool is_part(std::size_t i, const std::string& part, std::string& layer) const {
+    const std::string& name = tensors_[i].name;
+    layer.clear();
+    if (name == part) return true;
+    const std::size_t dot = name.rfind('.');
+    if (dot == std::string::npos || name.compare(dot + 1, std::string::npos, part) != 0) return false;
+    layer = name.substr(0, dot);
+    return true;
+  }
+
+  void check_type(std::size_t i) const {
+    const DeclaredTensor& tensor = tensors_[i];
+    if (!tensor.precision) {
+      refuse(i, tensor.type, "weights must be float32 or float64",
+             "convert before saving: model.float().state_dict()");
+    }
+    const DeclaredTensor& first = parts_.empty() ? tensor : tensors_[parts_.front().weight];
+    if (tensor.precision != first.precision) {
+      refuse(i, name(*tensor.precision),
+             first.name + " is " + name(*first.precision) + ", and one file has one type",
+             "convert before saving: model.float() or model.double()");
+    }
+    for (const std::uint64_t size : tensor.shape) {
+      if (size == 0) refuse(i, shape_text(tensor.shape), "has a dimension of size 0");
+    }
+    const std::optional<std::uint64_t> count = element_count(tensor.shape);
+    if (!count || *count > kMostElements - elements_in(parts_)) {
+      refuse(i, shape_text(tensor.shape),
+             "the network has more than " + std::to_string(kMostElements) + " numbers");
+    }
+  }
+
+  std::uint64_t elements_in(const std::vector<LayerParts>& parts) const {
+    std::uint64_t sum = 0;  // weights alone: a bias is never larger than its weight
+    for (const LayerParts& part : parts) sum += *element_count(tensors_[part.weight].shape);
+    return sum;
+  }
+
+  void find_weight(std::size_t i) {
+    LayerParts parts;
+    if (!is_part(i, "weight", parts.name)) return;
+    if (tensors_[i].shape.size() != 2) {
+      refuse(i, shape_text(tensors_[i].shape),
+             "a linear layer's weight has two dimensions, [outputs, inputs]",
+             "only networks of linear layers with ReLU between them can be read");
+    }
+    if (!names_.insert(parts.name).second) refuse(i, "", "appears twice");
+    check_type(i);
+    parts.weight = i;
+    parts_.push_back(parts);
+  }
+
+  void find_bias(std::size_t i) {
+    std::string layer;
+    if (is_part(i, "weight", layer)) return;
+    LayerParts* owner = nullptr;
+    if (is_part(i, "bias", layer)) {
+      for (LayerParts& parts : parts_) {
+        if (parts.name == layer) owner = &parts;
+      }
+    }
+    if (owner == nullptr) {
+      refuse(i, shape_text(tensors_[i].shape), "is neither the weight nor the bias of a linear layer",
+             "only networks of linear layers with ReLU between them can be read");
+    }
+    if (owner->bias != kNone) refuse(i, "", "appears twice");
+    const DeclaredTensor& weight = tensors_[owner->weight];
+    if (tensors_[i].shape.size() != 1 || tensors_[i].shape[0] != weight.shape[0]) {
+      refuse(i, shape_text(tensors_[i].shape),
+             "does not fit " + weight.name + " of shape " + shape_text(weight.shape));
+    }
+    check_type(i);
+    owner->bias = i;
+  }
+
+  void check_chain() const {
+    for (std::size_t k = 1; k < parts_.size(); ++k) {
+      const DeclaredTensor& before = tensors_[parts_[k - 1].weight];
+      const DeclaredTensor& weight = tensors_[parts_[k].weight];
+      if (weight.shape[1] != before.shape[0]) {
+        refuse(parts_[k].weight, shape_text(weight.shape),
+               "takes " + std::to_string(weight.shape[1]) + " inputs, but " + before.name +
+                   " before it gives " + std::to_string(before.shape[0]) + " outputs",
+               "the layers must follow one another in the file in the order of evaluation");
+      }
+    }
+  }
+
+  Layer layer(const LayerParts& parts) const {
+    const std::vector<std::uint64_t>& shape = tensors_[parts.weight].shape;
+    Layer layer;
+    layer.name = parts.name;
+    layer.outputs = static_cast<int>(shape[0]);
+    layer.inputs = static_cast<int>(shape[1]);
+    layer.weights = finite_numbers(parts.weight);
+    layer.biases = parts.bias == kNone ? std::vector<double>(shape[0], 0.0) : finite_numbers(parts.bias);
+    return layer;
+  }
+
+  std::vector<double> finite_numbers(std::size_t i) const {
+    std::vector<double> numbers = read_(i);
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      if (!std::isfinite(numbers[k])) refuse_number(i, k, numbers[k]);
+    }
+    return numbers;
+  }
+
+  [[noreturn]] void refuse_number(std::size_t i, std::size_t k, double number) const {
+    const DeclaredTensor& tensor = tensors_[i];
+    std::string entry = std::to_string(k);
+    if (tensor.shape.size() == 2) {
+      const std::size_t columns = tensor.shape[1];
+      entry = std::to_string(k / columns) + "," + std::to_string(k % columns);
+    }
+    throw InputError({path_, "", tensor.name + "[" + entry + "]",
+                      std::isnan(number) ? "nan"
+                      : number > 0       ? "inf"
+                                         : "-inf",
+                      "not finite",
+                      "the training has diverged, or the file is damaged: take an earlier checkpoint"});
+  }
+
+  const std::vector<DeclaredTensor>& tensors_;
+  const TensorReader& read_;
+  const std::string& path_;
+  std::vector<LayerParts> parts_;
+  std::set<std::string> names_;
+};
+
+template <typename Stored>
+void append_as(const char* bytes, std::uint64_t count, std::uint64_t stride, std::vector<double>& numbers) {
+  for (std::uint64_t i = 0; i < count; ++i) {
+    Stored number;
+    std::memcpy(&number, bytes + i * stride * sizeof number, sizeof number);
+    numbers.push_back(static_cast<double>(number));
+  }
+}
+
+}  // namespace
+
+Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
+                 const std::string& path) {
+  return Assembler(tensors, read, path).run();
+}
+
+std::string tensor_name(const Layer& layer, const char* part) {
+  return layer.name.empty() ? part : layer.name + "." + part;
+}
+
+void append_numbers(const char* bytes, std::uint64_t count, std::uint64_t stride, Precision precision,
+                    std::vector<double>& numbers) {
+  if (precision == Precision::kFloat32) {
+    append_as<float>(bytes, count, stride, numbers);
+  } else {
+    append_as<double>(bytes, count, stride, numbers);
+  }
+}
+
+std::size_t width(Precision precision) {
+  return precision == Precision::kFloat32 ? sizeof(float) : sizeof(double);
+}
+
+std::string shape_text(const std::vector<std::uint64_t>& shape) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < shape.size(); ++i) text += (i == 0 ? "" : ", ") + std::to_string(shape[i]);
+  return text + "]";
+}
+
+std::optional<std::uint64_t> element_count(const std::vector<std::uint64_t>& factors) {
+  std::uint64_t product = 1;
+  for (const std::uint64_t factor : factors) {
+    if (factor == 0) return 0;
+  }
+  for (const std::uint64_t factor : factors) {
+    if (factor > kMostElements / product) return std::nullopt;
+    product *= factor;
+  }
+  return product;
+}
+
+}  // namespace swarmcert::files

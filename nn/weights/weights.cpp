@@ -1,0 +1,71 @@
+#include "nn/weights/weights.h"
+
+#include <filesystem>
+
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/c_source.h"
+#include "nn/weights/onnx.h"
+#include "nn/weights/pth.h"
+#include "nn/weights/safetensors.h"
+
+namespace swarmcert::files {
+namespace {
+
+[[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
+  std::string what = "is neither a PyTorch state dict (.pth), safetensors, ONNX nor generated C weights";
+  std::string mend = "save one with torch.save(model.state_dict(), ...)";
+  if (bytes.empty()) {
+    what = "is empty";
+    mend = "copy it again";
+  } else if (bytes[0] == '\x80') {
+    what = "is a bare pickle, which torch.save does not write";
+  } else if (bytes.compare(0, 24, "version https://git-lfs.") == 0) {
+    what = "is a Git LFS pointer, not the file itself";
+    mend = "fetch it: git lfs pull";
+  }
+  throw InputError({path, "offset 0", "", "", what, mend});
+}
+
+void refuse_key(const std::string& key, const std::string& path, const std::string& format) {
+  if (key.empty()) return;
+  throw InputError({path, "", "--key", in_quotes(key), format + " files are not nested", "leave --key out"});
+}
+
+}  // namespace
+
+const char* name(Precision precision) { return precision == Precision::kFloat32 ? "float32" : "float64"; }
+
+Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key) {
+  Weights weights;
+  if (looks_like_pth_zip(bytes)) {
+    weights = parse_pth_zip(bytes, path, key);
+  } else if (looks_like_pth_legacy(bytes)) {
+    weights = parse_pth_legacy(bytes, path, key);
+  } else if (looks_like_safetensors(bytes)) {
+    refuse_key(key, path, "safetensors");
+    weights = parse_safetensors(bytes, path);
+  } else if (looks_like_onnx(bytes)) {
+    refuse_key(key, path, "ONNX");
+    weights = parse_onnx(bytes, path);
+  } else if (looks_like_c_source(bytes)) {
+    weights = parse_c_source(bytes, path, key);
+  } else {
+    refuse_format(bytes, path);
+  }
+  weights.sha256 = sha256(bytes);
+  return weights;
+}
+
+Weights load_weights(const std::string& path, const std::string& key) {
+  const std::size_t mark = path.rfind('#');
+  if (mark == std::string::npos || mark + 1 == path.size() || std::filesystem::exists(path))
+    return parse_weights(read_file(path), path, key);
+  const std::string file = path.substr(0, mark);
+  if (!key.empty())
+    throw InputError(
+        {file, "", "--key", in_quotes(key), "the name of the file already names a key", "name one key"});
+  return parse_weights(read_file(file), file, path.substr(mark + 1));
+}
+
+}  // namespace swarmcert::files

@@ -1,0 +1,109 @@
+#include "stability/iss/position_loop.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmcert::stability {
+namespace {
+
+using Map = Eigen::Map<const Eigen::Vector3d>;
+
+enum Block : int { kP = 0, kV = 3, kI = 6, kMotor = 9, kAttitude = 12 };
+
+Eigen::Matrix3d matrix_of(const Matrix3& m) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data());
+}
+
+}  // namespace
+
+PositionLoop::PositionLoop(const Gains& gains, const Model& model)
+    : limit_m_s_(gains.integrator_limit_m_s),
+      mass_kg_(model.mass_kg),
+      motor_s_(gains.motor_lag_s),
+      attitude_s_(gains.attitude_lag_s),
+      largest_N_(4 * model.thrust.largest_N(kFullBattery_V)) {
+  if (gains.composite) {
+    // f_d = m v_r' - K s: -(m Lambda^2 + 2 K Lambda) p~ - (2 m Lambda + K) v - K Lambda^2 I.
+    const Eigen::Matrix3d lambda = matrix_of(gains.composite->Lambda), k = matrix_of(gains.composite->K);
+    position_ = mass_kg_ * lambda * lambda + 2 * k * lambda;
+    velocity_ = 2 * mass_kg_ * lambda + k;
+    integral_ = k * lambda * lambda;
+  } else {
+    position_ = mass_kg_ * Map(gains.pid->Kp.data()).asDiagonal().toDenseMatrix();
+    velocity_ = mass_kg_ * Map(gains.pid->Kd.data()).asDiagonal().toDenseMatrix();
+    integral_ = mass_kg_ * Map(gains.pid->Ki.data()).asDiagonal().toDenseMatrix();
+    // A loop that adds another step than its period has, in effect, another Ki.
+    if (gains.rate_hz > 0 && gains.integrator_step_s > 0)
+      integral_ *= gains.integrator_step_s * gains.rate_hz;
+  }
+}
+
+Eigen::Vector3d PositionLoop::feedback(const double* x) const {
+  Eigen::Vector3d clamped = Map(x + kI);
+  for (int i = 0; i < 3; ++i) {
+    const double limit = limit_m_s_[static_cast<std::size_t>(i)];
+    clamped[i] = std::clamp(clamped[i], -limit, limit);
+  }
+  return -(position_ * Map(x + kP) + velocity_ * Map(x + kV) + integral_ * clamped);
+}
+
+void PositionLoop::derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const {
+  Eigen::Vector3d force = feedback(x);
+  force.z() += mass_kg_ * kGravity_m_s2;
+  if (const double size = force.norm(); size > largest_N_) force *= largest_N_ / size;
+  Eigen::Vector3d motor = force, applied = force;
+  if (motor_s_ > 0) motor = Map(x + kMotor);
+  applied = motor;
+  if (attitude_s_ > 0) applied.head<2>() = Map(x + kAttitude).head<2>();
+  for (int i = 0; i < 3; ++i) {
+    dx[kP + i] = x[kV + i];
+    dx[kV + i] = (applied[i] - eps_W_N[i]) / mass_kg_ - (i == 2 ? kGravity_m_s2 : 0);
+    const double limit = limit_m_s_[static_cast<std::size_t>(i)];
+    const bool held = std::abs(x[kI + i]) >= limit && x[kI + i] * x[kP + i] > 0;
+    dx[kI + i] = held ? 0 : x[kP + i];
+    dx[kMotor + i] = motor_s_ > 0 ? (force[i] - x[kMotor + i]) / motor_s_ : 0;
+    dx[kAttitude + i] = attitude_s_ > 0 && i < 2 ? (motor[i] - x[kAttitude + i]) / attitude_s_ : 0;
+  }
+}
+
+PositionLoop::State PositionLoop::start(const Eigen::Vector3d& position_m,
+                                        const Eigen::Vector3d& velocity_m_s) const {
+  State state = State::Zero();
+  state.segment<3>(kP) = position_m;
+  state.segment<3>(kV) = velocity_m_s;
+  state[kMotor + 2] = state[kAttitude + 2] = mass_kg_ * kGravity_m_s2;
+  return state;
+}
+
+Eigen::Matrix<double, PositionLoop::kSize, PositionLoop::kSize> PositionLoop::matrix() const {
+  Eigen::Matrix<double, kSize, kSize> a = Eigen::Matrix<double, kSize, kSize>::Zero();
+  const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
+  a.block<3, 3>(kP, kV) = one;
+  a.block<3, 3>(kI, kP) = one;
+  // Where a lag is absent its states are kept, decaying, and nobody reads them.
+  constexpr double kUnread_1_s = 1e3;
+  Eigen::Matrix<double, 3, kSize> force = Eigen::Matrix<double, 3, kSize>::Zero();
+  force.block<3, 3>(0, kP) = -position_;
+  force.block<3, 3>(0, kV) = -velocity_;
+  force.block<3, 3>(0, kI) = -integral_;
+  Eigen::Matrix<double, 3, kSize> motor = force;
+  a.block<3, 3>(kMotor, kMotor) = -kUnread_1_s * one;
+  a.block<3, 3>(kAttitude, kAttitude) = -kUnread_1_s * one;
+  if (motor_s_ > 0) {
+    a.middleRows<3>(kMotor) = force / motor_s_;
+    a.block<3, 3>(kMotor, kMotor) -= one / motor_s_;
+    motor.setZero();
+    motor.block<3, 3>(0, kMotor) = one;
+  }
+  Eigen::Matrix<double, 3, kSize> applied = motor;
+  if (attitude_s_ > 0) {
+    a.middleRows<2>(kAttitude) = motor.topRows<2>() / attitude_s_;
+    a.block<2, 2>(kAttitude, kAttitude) -= one.topLeftCorner<2, 2>() / attitude_s_;
+    applied.topRows<2>().setZero();
+    applied.block<2, 2>(0, kAttitude) = one.topLeftCorner<2, 2>();
+  }
+  a.middleRows<3>(kV) = applied / mass_kg_;
+  return a;
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,39 @@
+/// @file The translational closed loop in continuous time, about a point at rest.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "stability/gains.h"
+#include "stability/iss/iss_check.h"
+#include "stability/model.h"
+
+namespace swarmcert::stability {
+
+/// States: p~, v, integral, force behind the motor lag, force behind the attitude lag; world, three each.
+class PositionLoop {
+ public:
+  static constexpr int kSize = 15;
+  using State = Eigen::Matrix<double, kSize, 1>;
+
+  PositionLoop(const Gains& gains, const Model& model);
+
+  /// dx/dt of the state x under the learning error `eps` (f_a_hat - f_a, in newton).
+  void derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const;
+
+  /// At rest with these errors: integral 0, forces those that hold the weight.
+  State start(const Eigen::Vector3d& position_m, const Eigen::Vector3d& velocity_m_s) const;
+
+  /// The loop's matrix about rest, without clamp and limit: d state = A state + B eps; eps enters v as -eps / m.
+  Eigen::Matrix<double, kSize, kSize> matrix() const;
+
+  double mass_kg() const { return mass_kg_; }
+
+ private:
+  Eigen::Vector3d feedback(const double* x) const;
+
+  Eigen::Matrix3d position_, velocity_, integral_;  ///< f_d = m g - position_ p~ - velocity_ v - integral_ I
+  PerAxis limit_m_s_;
+  double mass_kg_, motor_s_, attitude_s_, largest_N_;
+};
+
+}  // namespace swarmcert::stability

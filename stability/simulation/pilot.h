@@ -1,0 +1,70 @@
+/// @file The flight code of controller/ bound to one vehicle's gains and model, for simulation.
+#pragma once
+
+#include <variant>
+
+#include "controller/flight_controller.h"
+#include "stability/bodies/lanes.h"
+#include "stability/gains.h"
+#include "stability/model.h"
+#include "stability/simulation/lanes_mixing.h"
+
+namespace swarmcert::stability {
+
+/// Scalar is float, as it flies, Lanes, for eight such vehicles at once, or double, for integrators.
+template <typename Scalar>
+class Pilot {
+ public:
+  /// Attitude gains are those of public Crazyflie firmware, scaled with the model's inertia: the Lee controller's
+  /// (k_R 7e-3 N m, k_omega 1.15e-3 N m s; 8e-3 and 2e-3 in yaw), and the flown gains of the robust law (Lambda 10 1/s,
+  /// 4 in yaw; K_omega 2e-3, 1e-3; K_I 2e-3, 4e-3 N m, limit 2 rad). The largest rotor force is the thrust map's.
+  /// @param attitude_step_s period of step(). 0: the integrals are the caller's, and step() is a function of its
+  ///                        inputs alone, which is what continuous integrators need.
+  Pilot(const Gains& gains, const Model& model, double attitude_step_s);
+
+  /// controller::flight_step().
+  controller::FlightCommand<Scalar> step(controller::FlightMemory<Scalar>& memory,
+                                         const controller::Measured<Scalar>& measured,
+                                         const controller::FlightReference<Scalar>& reference,
+                                         Scalar prediction_N, std::uint32_t now_ms, bool position_is_due,
+                                         const controller::Vector3<Scalar>& torque_prediction_Nm = {}) const;
+
+  /// What step() asks of the rotors.
+  struct Push {
+    std::uint8_t faults;
+    bool motors_off;
+    controller::Wrench<Scalar> wanted;
+    controller::RotorForces<Scalar> forces;
+  };
+  /// step() without PWM and without the memory of it: simulation calls this a million times.
+  Push push(controller::FlightMemory<Scalar>& memory, const controller::Measured<Scalar>& measured,
+            const controller::FlightReference<Scalar>& reference, Scalar prediction_N,
+            std::uint32_t now_ms = 0, bool position_is_due = true,
+            const controller::Vector3<Scalar>& torque_prediction_Nm = {}) const;
+  /// The collective thrust that push() asks for.
+  Scalar wanted_thrust_N(controller::FlightMemory<Scalar> memory,
+                         const controller::Measured<Scalar>& measured,
+                         const controller::FlightReference<Scalar>& reference, Scalar prediction_N) const;
+
+  /// omega - omega_r, which the robust law integrates, after a step() or push() with the same `measured`; 0 for the other law.
+  controller::Vector3<Scalar> rate_error(const controller::FlightMemory<Scalar>& memory,
+                                         const controller::Measured<Scalar>& measured) const;
+
+  /// f(settings), with those of controller::flight_step().
+  template <typename F>
+  auto with_settings(F&& f) const {
+    return std::visit(std::forward<F>(f), settings_);
+  }
+
+ private:
+  template <typename Position>
+  using Settings = controller::FlightSettings<Scalar, Position>;
+  std::variant<Settings<controller::PidGains<Scalar>>, Settings<controller::CompositeGains<Scalar>>>
+      settings_;
+};
+
+extern template class Pilot<float>;
+extern template class Pilot<double>;
+extern template class Pilot<Lanes>;
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,50 @@
+/// @file What vehicles know of each other in flight: positions by radio, late and sometimes lost, and nothing else.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "controller/neighbours.h"
+#include "nn/base/random.h"
+#include "stability/effects/effect.h"
+
+namespace swarmcert::stability {
+
+struct RadioOptions {
+  double latency_s = 0;  ///< from measuring a position to its arrival
+  double loss = 0;       ///< share of positions that never arrive, each on its own
+};
+
+/// Broadcast positions as the flight code keeps them (controller/neighbours.h): velocities are filtered differences,
+/// neighbours that are stale or leave the box of positions fade out. In double.
+class Radio {
+ public:
+  /// @param period_s between broadcasts.
+  Radio(int vehicles, double period_s, const RadioOptions& options);
+
+  /// One broadcast of every vehicle, and the arrival of what was sent `latency_s` ago.
+  void broadcast(const std::vector<Eigen::Vector3d>& positions_W_m, std::uint32_t now_ms,
+                 files::Random& random);
+
+  /// Replaces what `now` says of its neighbours by what vehicle `own` knows of them.
+  /// @param now all other vehicles in their order.
+  /// @param neighbours, weights overwritten; weights in [0, 1] as controller::weight() has them.
+  void look(int own, std::uint32_t now_ms, Instant* now, std::vector<Neighbour>& neighbours,
+            std::vector<double>& weights) const;
+
+ private:
+  struct Sent {
+    std::uint32_t stamp_ms;
+    std::vector<Eigen::Vector3d> positions_W_m;
+  };
+
+  const RadioOptions options_;
+  std::size_t late_;  ///< broadcasts on their way at once
+  std::vector<Sent> on_their_way_;
+  std::size_t next_ = 0;
+  std::vector<controller::NeighbourTrack<double>> tracks_;
+  controller::VelocityFilter<double> filter_;
+  controller::CutOffs<double> cut_offs_;
+};
+
+}  // namespace swarmcert::stability

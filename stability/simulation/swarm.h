@@ -1,0 +1,154 @@
+/// @file Equations of motion of a swarm of vehicles, of one kind or several, with their effects on each other.
+///
+///   p' = v,  m v' = m g + R f_u + f_a,  R' = R S(omega),  J omega' = J omega x omega + tau_u + tau_a
+/// (paper, equations (1) to (3)); f_u and tau_u come from four rotors behind the motor lag, f_a and tau_a from the
+/// models' effects. Nothing is saturated here.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "stability/bodies/rigid_bodies.h"
+#include "stability/bodies/vehicle_state.h"
+#include "stability/effects/effect.h"
+#include "stability/effects/signal_path.h"
+#include "stability/model.h"
+
+namespace swarmcert::stability {
+
+/// What acts on one vehicle from outside its state.
+struct VehicleInput {
+  double rotor_command_N[kNumRotors] = {0, 0, 0, 0};  ///< behind the command delay
+  double battery_V = kFullBattery_V;
+  Eigen::Vector3d disturbance_W_N = Eigen::Vector3d::Zero();  ///< added to f_a
+  bool resting = false;  ///< stands on the ground: nothing moves but the rotors
+};
+
+/// The plant. Keeps scratch memory: one per thread.
+class Swarm {
+ public:
+  /// @param models  of the kinds of vehicles.
+  /// @param kind_of index into `models` for each vehicle.
+  /// @throws files::InputError if an effect cannot be made.
+  Swarm(std::vector<Model> models, std::vector<int> kind_of);
+  /// One model for all.
+  Swarm(Model model, int vehicles);
+  ~Swarm();
+
+  int size() const { return static_cast<int>(kind_of_.size()); }
+  int state_size() const { return size() * kVehicleStateSize; }
+  const Model& model(int vehicle) const { return models_[static_cast<std::size_t>(kind_of_[vehicle])]; }
+  int kind_of(int vehicle) const { return kind_of_[static_cast<std::size_t>(vehicle)]; }
+  const std::vector<Model>& models() const { return models_; }
+  /// Delays and lags that the model's effects put into the vehicle's signals.
+  const SignalPath& path(int vehicle) const;
+  /// Replaces a vehicle kind's motor lag and delay, where its model names none.
+  void assume_lag(double motor_lag_s, double delay_s);
+
+  /// d state / dt.
+  /// @param state      [state_size()], see StateIndex.
+  /// @param inputs     [size()].
+  /// @param derivative [state_size()], overwritten.
+  /// @param stabilise  rate in 1/s at which |q| is drawn to 1, for integrators that never normalise; else 0.
+  void derivative(double time_s, const double* state, const VehicleInput* inputs, double* derivative,
+                  double stabilise = 0);
+
+  /// derivative() of a state in rows (rigid_bodies.h), in rows.
+  void derivative_in_rows(double time_s, const double* rows, const VehicleInput* inputs,
+                          double* derivative_rows, double stabilise = 0);
+
+  /// A state in rows (rigid_bodies.h), and back.
+  void to_rows(const double* state, double* rows) const;
+  void from_rows(const double* rows, double* state) const;
+  /// Rows for a state, in which lanes without a vehicle are at rest.
+  Rows make_rows() const;
+
+  /// Classical Runge-Kutta steps of `step_s` each, under inputs that are held.
+  /// @param rows the state in rows, from `time_s` on; overwritten. Quaternions are not normalised.
+  void runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* rows);
+  /// Quaternions of length 1.
+  void normalise(double* rows) const { bodies_.normalise(rows); }
+
+  /// f_a and tau_a of one vehicle at `state`.
+  Wrench effects_on(int vehicle, double time_s, const double* state, const VehicleInput& input);
+
+  /// Everything effects know of one vehicle; its neighbours are all others. Valid until the next call on this object.
+  const Instant& instant(int vehicle, double time_s, const double* state, const VehicleInput& input);
+
+  /// Remembers who can reach whom within `horizon_s`, so that derivative() looks at few pairs. Without a call, and
+  /// after forget_neighbours(), it looks at all of them. Assumes accelerations below 50 m/s^2.
+  /// @param rows the state in rows.
+  void find_neighbours(const double* rows, double horizon_s);
+  void forget_neighbours();
+
+  /// Whether a vehicle may come, before find_neighbours() is called again, to a height below another at which an effect
+  /// bends (Effect::bends_m()).
+  bool may_meet_bends() const { return !meetings_.empty(); }
+  /// The share of a step after which the first such height is met; 1 where none is, or only at its very ends.
+  /// @param before, after the state in rows, `step_s` apart.
+  double first_bend(const double* before, const double* after, double step_s) const;
+  /// Vehicles that no other reaches get their numbers of `from`. Both are states in rows.
+  void copy_unreached(const double* from, double* rows) const;
+
+ private:
+  struct Kind;
+  struct PairBatch;
+  /// States of all vehicles, one after the other, or in rows.
+  struct States {
+    const double* x;
+    bool in_rows;
+
+    double operator()(int i, int c) const {
+      return in_rows ? x[row_index(i, kVehicleStateSize) + static_cast<std::size_t>(c * kRowLength)]
+                     : x[i * kVehicleStateSize + c];
+    }
+    Eigen::Vector3d three(int i, int c) const {
+      return {(*this)(i, c), (*this)(i, c + 1), (*this)(i, c + 2)};
+    }
+  };
+
+  void find_meetings(const double* rows, double horizon_s);
+  static void set_lag(Kind* kind);
+  const Kind& kind(int vehicle) const;
+  States by_vehicle(const double* state) const { return {state, false}; }
+  void fill(int vehicle, const States& states, const VehicleInput& input);
+  void add_neighbour(int vehicle, int other, const States& states);
+  void gather(int vehicle, const States& states, bool all);
+  Wrench sum_of_effects(int vehicle, const VehicleInput& input) const;
+  void hold(const VehicleInput* inputs);
+  void pair_up(const VehicleInput* inputs);
+  void act(double time_s, const double* rows, const VehicleInput* inputs);
+  void act_on_pairs(const double* const* rows, int num_rows);
+  void set_bodies();
+
+  std::vector<Model> models_;
+  std::vector<int> kind_of_;
+  std::vector<Kind> kinds_;
+  bool interacts_ = false;  ///< some effect looks at neighbours
+  bool listed_ = false;
+  std::vector<std::vector<int>> near_;  ///< by vehicle, if listed_
+  std::vector<int> found_;              ///< scratch
+  /// `upper` may come to be higher than `lower` by bend_m, where the force on `lower` bends.
+  struct Meeting {
+    int lower, upper;
+    double bend_m;
+  };
+  std::vector<Meeting> meetings_;
+  std::vector<int> acted_on_;  ///< vehicles on which effects act, but for those in batches_; since hold()
+  std::vector<PairBatch> batches_;  ///< by kind
+  /// Nothing acts but what pairs' positions tell. Two stages of a Runge-Kutta step, the first and the second or the other
+  /// two, then have forces that do not depend on each other.
+  bool sees_ahead_ = false;
+  bool pairs_hold_ = false;   ///< acted_on_ and batches_ are those of near_ and of the vehicles that rest
+  std::vector<char> rested_;  ///< by vehicle, when they were made
+  Instant instant_;
+  std::vector<Neighbour> neighbours_;
+  RigidBodies bodies_;
+  Rows rows_, sum_, ahead_;
+};
+
+/// Initial state: at `p_W_m`, with velocity `v_W_m_s`, level, heading +x, rotors at hover force.
+void set_hover(const Model& model, const Eigen::Vector3d& p_W_m, const Eigen::Vector3d& v_W_m_s,
+               double* state);
+
+}  // namespace swarmcert::stability
