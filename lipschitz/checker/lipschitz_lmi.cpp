@@ -1,6 +1,9 @@
 #include "lipschitz/checker/lipschitz_lmi.h"
 
 #include <algorithm>
+#include <limits>
+
+#include "lipschitz/checker/integer_rows.h"
 
 namespace swarmcert::check {
 namespace {
@@ -13,15 +16,53 @@ Matrix transposed(const Matrix& a) {
   return result;
 }
 
+/// Row i of a matrix is (row i of `rows`) 2^exponents[i], exactly.
+struct ScaledRows {
+  std::vector<long> exponents;
+  IntegerRows rows;
+};
+
+ScaledRows scaled_rows(const Matrix& a) {
+  std::vector<long> exponents;
+  std::vector<std::vector<mpz_class>> rows;
+  for (int i = 0; i < a.rows; ++i) {
+    long least = std::numeric_limits<long>::max();
+    for (int k = 0; k < a.cols; ++k)
+      if (a(i, k).sign() != 0) least = std::min(least, a(i, k).exponent);
+    exponents.push_back(least == std::numeric_limits<long>::max() ? 0 : least);
+    rows.emplace_back(a.cols);
+    for (int k = 0; k < a.cols; ++k) {
+      const Dyadic& entry = a(i, k);
+      if (entry.sign() != 0)
+        rows.back()[k] = entry.mantissa << static_cast<mp_bitcnt_t>(entry.exponent - exponents.back());
+    }
+  }
+  return {std::move(exponents), IntegerRows(std::move(rows))};
+}
+
+/// A A'.
+Matrix row_gram(const Matrix& a) {
+  const ScaledRows scaled = scaled_rows(a);
+  Matrix result(a.rows, a.rows);
+  for (int i = 0; i < a.rows; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      result(i, j) = Dyadic(scaled.rows.inner(i, 0, scaled.rows, j, 0, a.cols),
+                            scaled.exponents[i] + scaled.exponents[j]);
+      result(j, i) = result(i, j);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 Matrix product(const Matrix& a, const Matrix& b) {
+  const ScaledRows rows = scaled_rows(a), columns = scaled_rows(transposed(b));
   Matrix c(a.rows, b.cols);
   for (int i = 0; i < a.rows; ++i) {
-    for (int k = 0; k < a.cols; ++k) {
-      if (a(i, k).sign() == 0) continue;
-      for (int j = 0; j < b.cols; ++j) c(i, j) += a(i, k) * b(k, j);
-    }
+    for (int j = 0; j < b.cols; ++j)
+      c(i, j) =
+          Dyadic(rows.rows.inner(i, 0, columns.rows, j, 0, a.cols), rows.exponents[i] + columns.exponents[j]);
   }
   return c;
 }
@@ -37,8 +78,7 @@ Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const
   const Matrix& first = stages.front();
   const Matrix& last = stages.back();
   if (hidden == 0) {
-    Matrix p =
-        first.rows <= first.cols ? product(first, transposed(first)) : product(transposed(first), first);
+    Matrix p = row_gram(first.rows <= first.cols ? first : transposed(first));
     for (Dyadic& entry : p.entries) entry = -entry;
     for (int i = 0; i < p.rows; ++i) p(i, i) += rho;
     return p;
@@ -46,7 +86,7 @@ Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const
   Matrix p(static_cast<int>(t.size()), static_cast<int>(t.size()));
   for (int i = 0; i < p.rows; ++i) p(i, i) = Dyadic(2.0) * rho * t[i];
 
-  const Matrix first_gram = product(first, transposed(first));
+  const Matrix first_gram = row_gram(first);
   for (int i = 0; i < first.rows; ++i) {
     for (int j = 0; j < first.rows; ++j) p(i, j) += -(t[i] * first_gram(i, j) * t[j]);
   }
@@ -62,7 +102,7 @@ Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const
     }
     before = begin;
   }
-  const Matrix last_gram = product(transposed(last), last);
+  const Matrix last_gram = row_gram(transposed(last));
   for (int i = 0; i < last.cols; ++i) {
     for (int j = 0; j < last.cols; ++j) p(before + i, before + j) += -(rho * last_gram(i, j));
   }
@@ -89,7 +129,7 @@ Matrix quadratic_lmi(const std::vector<Matrix>& stages, const Matrix& q, const s
     before = begin;
     begin += m.rows;
   }
-  const Matrix last_gram = product(transposed(stages.back()), stages.back());
+  const Matrix last_gram = row_gram(transposed(stages.back()));
   for (int i = 0; i < last_gram.rows; ++i) {
     for (int j = 0; j < last_gram.cols; ++j) p(before + i, before + j) += -last_gram(i, j);
   }
@@ -102,15 +142,15 @@ bool shows_positive_semidefinite(const Matrix& p, const Factor& factor) {
   std::vector<int> first;  // column of the first entry of each row
   for (int i = 0; i < p.rows; ++i) first.push_back(i + 1 - static_cast<int>(factor.rows[i].size()));
   if (!std::all_of(first.begin(), first.end(), [](int column) { return column >= 0; })) return false;
+  const IntegerRows r(factor.rows);
   std::vector<Dyadic> slack(size);  // E_ii - sum_{j != i} |E_ij|
   for (int i = 0; i < p.rows; ++i) {
     for (int j = 0; j <= i; ++j) {
-      mpz_class gram = 0;
-      for (int k = std::max(first[i], first[j]); k <= j; ++k) {
-        gram += factor.rows[i][k - first[i]] * factor.rows[j][k - first[j]];
-      }
+      const int from = std::max(first[i], first[j]);
+      if (from > j && p(i, j).sign() == 0) continue;
       Dyadic e = p(i, j);
       e.exponent += factor.scale[i] + factor.scale[j];
+      const mpz_class gram = r.inner(i, from - first[i], r, j, from - first[j], j - from + 1);
       e += Dyadic(-gram, 2 * factor.unit_exponent);
       if (i != j) e.mantissa = -abs(e.mantissa);
       slack[i] += e;
