@@ -5,6 +5,7 @@
 #include <random>
 
 #include "analysis/log_writer.h"
+#include "logs/ulog_writer.h"
 #include "nn/onnx_writer.h"
 #include "nn/pth_writer.h"
 #include "nn/weights/safetensors.h"
@@ -122,6 +123,11 @@ void add_logs(Corpus& corpus, const std::string& data) {
   corpus.add(bytes);
 }
 
+void add_log_formats(Corpus& corpus) {
+  corpus.add(small_ulog());
+  corpus.add(ulog_head() + ulog_flags(1, 1, {150}) + ulog_count_definitions() + ulog_counts(0, 5));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -136,6 +142,8 @@ int main(int argc, char** argv) {
   add_networks(networks);
   Corpus logs(out / "log");
   add_logs(logs, argc > 2 ? argv[2] : "");
+  Corpus log_formats(out / "log_formats");
+  add_log_formats(log_formats);
   Corpus json(out / "json");
   add_json(json);
   return 0;

@@ -1,0 +1,101 @@
+#include "analysis/logs/formats/bytes.h"
+
+#include <algorithm>
+#include <cstring>
+#include <istream>
+
+#include "nn/base/input_error.h"
+
+namespace swarmcert::logs {
+namespace {
+
+template <typename Number>
+double number_at(const char* bytes, bool is_big_endian) {
+  unsigned char ordered[sizeof(Number)];
+  std::memcpy(ordered, bytes, sizeof(Number));
+  constexpr bool kHostIsBigEndian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
+  if (is_big_endian != kHostIsBigEndian) std::reverse(ordered, ordered + sizeof(Number));
+  Number number;
+  std::memcpy(&number, ordered, sizeof(Number));
+  return static_cast<double>(number);
+}
+
+}  // namespace
+
+std::string read_all(std::istream& in, const std::string& path) {
+  constexpr std::size_t kChunk_bytes = std::size_t{1} << 20;
+  std::string bytes;
+  while (in) {
+    const std::size_t before = bytes.size();
+    if (before > kLargestLog_bytes)
+      refuse_at(path, before, "", "", "the log is larger than 2 GiB", "cut it, or log fewer topics");
+    bytes.resize(before + kChunk_bytes);
+    in.read(bytes.data() + before, static_cast<std::streamsize>(kChunk_bytes));
+    bytes.resize(before + static_cast<std::size_t>(in.gcount()));
+  }
+  if (in.bad()) refuse_at(path, bytes.size(), "", "", "cannot be read", "check its permissions and the disk");
+  if (bytes.empty()) refuse_at(path, 0, "", "", "the file is empty", "the recording failed; leave it out");
+  return bytes;
+}
+
+void refuse_at(const std::string& path, std::size_t offset, const std::string& field,
+               const std::string& value, const std::string& what, const std::string& mend) {
+  throw files::InputError({path, "offset " + std::to_string(offset), field, value, what, mend});
+}
+
+std::size_t size_of(Scalar type) {
+  switch (type) {
+    case Scalar::kInt8:
+    case Scalar::kUint8:
+      return 1;
+    case Scalar::kInt16:
+    case Scalar::kUint16:
+      return 2;
+    case Scalar::kInt32:
+    case Scalar::kUint32:
+    case Scalar::kFloat:
+      return 4;
+    case Scalar::kInt64:
+    case Scalar::kUint64:
+    case Scalar::kDouble:
+      break;
+  }
+  return 8;
+}
+
+double value_of(Scalar type, const char* bytes, bool is_big_endian) {
+  switch (type) {
+    case Scalar::kInt8:
+      return number_at<std::int8_t>(bytes, is_big_endian);
+    case Scalar::kUint8:
+      return number_at<std::uint8_t>(bytes, is_big_endian);
+    case Scalar::kInt16:
+      return number_at<std::int16_t>(bytes, is_big_endian);
+    case Scalar::kUint16:
+      return number_at<std::uint16_t>(bytes, is_big_endian);
+    case Scalar::kInt32:
+      return number_at<std::int32_t>(bytes, is_big_endian);
+    case Scalar::kUint32:
+      return number_at<std::uint32_t>(bytes, is_big_endian);
+    case Scalar::kInt64:
+      return number_at<std::int64_t>(bytes, is_big_endian);
+    case Scalar::kUint64:
+      return number_at<std::uint64_t>(bytes, is_big_endian);
+    case Scalar::kFloat:
+      return number_at<float>(bytes, is_big_endian);
+    case Scalar::kDouble:
+      break;
+  }
+  return number_at<double>(bytes, is_big_endian);
+}
+
+std::string until_nul(std::string_view text) { return std::string(text.substr(0, text.find('\0'))); }
+
+bool is_identifier(std::string_view text, std::size_t longest) {
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
+  const auto is_part = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); };
+  return !text.empty() && text.size() <= longest && is_letter(text[0]) &&
+         std::all_of(text.begin(), text.end(), is_part);
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,64 @@
+#include "analysis/logs/formats/formats.h"
+
+#include <fstream>
+
+#include "analysis/logs/formats/ulog.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::logs {
+namespace {
+
+/// The first bytes; the stream stands at its start again.
+std::string head_of(std::istream& in) {
+  std::string head(kFormatHead_bytes, '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  in.clear();
+  in.seekg(0);
+  return head;
+}
+
+[[noreturn]] void refuse_unknown(const std::string& path, bool is_empty) {
+  if (is_empty)
+    throw files::InputError(
+        {path, "offset 0", "", "", "the file is empty", "the recording failed; leave it out"});
+  std::string known;
+  for (const LogFormat& format : log_formats())
+    known += (known.empty() ? "" : ", ") + std::string(format.name);
+  throw files::InputError({path, "offset 0", "", "", "is not a flight log", "known are " + known});
+}
+
+}  // namespace
+
+const std::vector<LogFormat>& log_formats() {
+  static const std::vector<LogFormat> formats = {
+      {"PX4 ULog", looks_like_ulog, read_ulog},
+  };
+  return formats;
+}
+
+const LogFormat* format_of(std::string_view head) {
+  for (const LogFormat& format : log_formats())
+    if (format.looks_like(head)) return &format;
+  return nullptr;
+}
+
+const LogFormat* format_of_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return in ? format_of(head_of(in)) : nullptr;
+}
+
+RawLog parse_raw(std::istream& in, const std::string& path) {
+  const std::string head = head_of(in);
+  const LogFormat* const format = format_of(head);
+  if (format == nullptr) refuse_unknown(path, head.empty());
+  return format->read(in, path);
+}
+
+RawLog read_raw(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
+  return parse_raw(in, path);
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,480 @@
+#include "analysis/logs/formats/ulog.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "analysis/logs/formats/bytes.h"
+#include "analysis/logs/formats/ulog_formats.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr std::string_view kUlogMagic = "ULog\x01\x12\x35";
+constexpr std::string_view kSyncMagic = "\x2F\x73\x13\x20\x25\x0C\xBB\x12";
+constexpr std::string_view kUlogTypes = "ABCDFILMOPQRS";
+constexpr std::size_t kFileHead_bytes = 16;
+constexpr std::size_t kMessageHead_bytes = 3;
+constexpr std::size_t kMostAppended = 3;
+constexpr std::size_t kLongestName = 256;
+constexpr std::size_t kParameter_bytes = 4;
+constexpr std::size_t kMostLooks = 64;
+
+/// A message: type and body, wherever it stands.
+struct UlogMessage {
+  char type;
+  std::string_view body;
+};
+
+/// "type name" and the bytes behind, as information and parameters have them.
+struct KeyedValue {
+  std::string type, name;
+  std::string_view value;
+};
+
+std::optional<KeyedValue> keyed_value(std::string_view body) {
+  if (body.empty()) return std::nullopt;
+  const std::size_t length = static_cast<unsigned char>(body[0]);
+  if (length == 0 || length > body.size() - 1) return std::nullopt;
+  const std::string_view key = body.substr(1, length);
+  const std::size_t blank = key.find(' ');
+  if (blank == std::string_view::npos) return std::nullopt;
+  return KeyedValue{std::string(key.substr(0, blank)), std::string(key.substr(blank + 1)),
+                    body.substr(1 + length)};
+}
+
+/// Types of information, by their names.
+const std::map<std::string, Scalar>& number_types() {
+  static const std::map<std::string, Scalar> types = {
+      {"int8_t", Scalar::kInt8},     {"uint8_t", Scalar::kUint8},   {"bool", Scalar::kUint8},
+      {"int16_t", Scalar::kInt16},   {"uint16_t", Scalar::kUint16}, {"int32_t", Scalar::kInt32},
+      {"uint32_t", Scalar::kUint32}, {"int64_t", Scalar::kInt64},   {"uint64_t", Scalar::kUint64},
+      {"float", Scalar::kFloat},     {"double", Scalar::kDouble}};
+  return types;
+}
+
+/// True if the value has as many bytes as its type says; true also for types that are not known here.
+bool value_size_fits(const KeyedValue& entry) {
+  const auto number = number_types().find(entry.type);
+  if (number != number_types().end()) return entry.value.size() == size_of(number->second);
+  if (entry.type.compare(0, 5, "char[") != 0) return true;
+  return entry.type == "char[" + std::to_string(entry.value.size()) + "]";
+}
+
+std::optional<double> parameter_of(const KeyedValue& entry) {
+  if (entry.value.size() != kParameter_bytes) return std::nullopt;
+  if (entry.type == "int32_t") return value_of(Scalar::kInt32, entry.value.data());
+  if (entry.type == "float") return value_of(Scalar::kFloat, entry.value.data());
+  return std::nullopt;
+}
+
+/// Information as text: characters as they are, numbers in decimal.
+std::string text_of(const KeyedValue& entry) {
+  if (entry.type == "uint64_t" && entry.value.size() == 8)
+    return std::to_string(*integer_at<std::uint64_t>(entry.value, 0));
+  if (entry.type == "int64_t" && entry.value.size() == 8)
+    return std::to_string(*integer_at<std::int64_t>(entry.value, 0));
+  const auto number = number_types().find(entry.type);
+  if (number != number_types().end() && entry.value.size() == size_of(number->second))
+    return fmt::format("{}", value_of(number->second, entry.value.data()));
+  return until_nul(entry.value);
+}
+
+class UlogReader {
+ public:
+  UlogReader(std::string_view bytes, const std::string& path) : bytes_(bytes), path_(path) {
+    log_.path = path;
+    log_.format = "ulog";
+  }
+
+  RawLog read() {
+    read_file_head();
+    std::vector<std::size_t> ends = read_flags();
+    ends.push_back(bytes_.size());
+    std::size_t begin = kFileHead_bytes;
+    for (const std::size_t end : ends) {
+      read_section(begin, end, end == bytes_.size());
+      begin = end;
+    }
+    report_skipped();
+    return std::move(log_);
+  }
+
+ private:
+  struct Subscription {
+    std::string name;
+    int instance = 0;
+    std::optional<UlogSize> size;      ///< of a record, once its format is known
+    std::optional<std::size_t> topic;  ///< in topics_, from its first record on
+  };
+  struct Topic {
+    UlogLayout layout;
+    std::size_t index;  ///< in log_.topics
+  };
+
+  void read_file_head() {
+    if (!looks_like_ulog(bytes_))
+      refuse_at(path_, 0, "magic number", "", "is not that of a ULog file", "is this a PX4 log?");
+    if (bytes_.size() < kFileHead_bytes)
+      refuse_at(path_, bytes_.size(), "file head", "", "the file ends inside it", files::kCopyAgain);
+    const int version = static_cast<unsigned char>(bytes_[7]);
+    if (version > 1)
+      refuse_at(path_, 7, "version", std::to_string(version), "is not known", "known are 0 and 1");
+    log_.texts["file_timestamp_us"] = std::to_string(*integer_at<std::uint64_t>(bytes_, 8));
+  }
+
+  /// Where appended sections start, in rising order.
+  /// @throws files::InputError if the file has features that change how it must be read.
+  std::vector<std::size_t> read_flags() {
+    std::vector<std::size_t> offsets;
+    const std::optional<UlogMessage> flags = message_at(kFileHead_bytes, bytes_.size());
+    if (!flags || flags->type != 'B' || flags->body.size() < 40) return offsets;
+    for (std::size_t i = 0; i < 8; ++i) {
+      const int unknown = static_cast<unsigned char>(flags->body[8 + i]) & (i == 0 ? 0xFE : 0xFF);
+      if (unknown != 0) {
+        refuse_at(path_, kFileHead_bytes + kMessageHead_bytes + 8 + i, "incompatible flags",
+                  fmt::format("{:#04x}", unknown), "announce a feature that this reader does not know",
+                  "convert the log with the tools of the firmware that wrote it");
+      }
+    }
+    if ((flags->body[8] & 1) == 0) return offsets;
+    for (std::size_t i = 0; i < kMostAppended; ++i) {
+      const std::uint64_t offset = *integer_at<std::uint64_t>(flags->body, 16 + 8 * i);
+      if (offset == 0) continue;
+      const std::size_t last = offsets.empty() ? kFileHead_bytes : offsets.back();
+      if (offset >= bytes_.size())
+        log_.health.truncated = true;
+      else if (offset <= last)
+        ++log_.health.damaged_blocks;
+      else
+        offsets.push_back(offset);
+    }
+    return offsets;
+  }
+
+  /// The message that starts at `at` and ends before `end`, sound or not.
+  std::optional<UlogMessage> message_at(std::size_t at, std::size_t end) const {
+    if (at > end || end - at < kMessageHead_bytes) return std::nullopt;
+    const std::size_t size = *integer_at<std::uint16_t>(bytes_, at);
+    if (size > end - at - kMessageHead_bytes) return std::nullopt;
+    return UlogMessage{bytes_[at + 2], bytes_.substr(at + kMessageHead_bytes, size)};
+  }
+  static std::size_t size_of(const UlogMessage& message) { return kMessageHead_bytes + message.body.size(); }
+
+  /// True if the body has the form of its type; for data, if it is a record of a known topic. Looks at a few bytes only.
+  bool is_sound(const UlogMessage& message) {
+    const std::string_view body = message.body;
+    const auto has_key = [&](std::size_t at) {
+      return body.size() > at + 1 && is_identifier(body.substr(at + 1, 1)) && keyed_value(body.substr(at));
+    };
+    switch (message.type) {
+      case 'B':
+        return body.size() >= 40;
+      case 'F':
+        return is_identifier(body.substr(0, 1)) &&
+               body.substr(0, kLongestName).find(':') != std::string_view::npos;
+      case 'I':
+        return has_key(0);
+      case 'P':
+        return has_key(0) && body.size() == 1 + kParameter_bytes + static_cast<unsigned char>(body[0]);
+      case 'M':
+        return !body.empty() && (body[0] == 0 || body[0] == 1) && has_key(1);
+      case 'Q':
+        return has_key(1) && body.size() == 2 + kParameter_bytes + static_cast<unsigned char>(body[1]);
+      case 'A':
+        return body.size() >= 4 && is_identifier(body.substr(3), kLongestName);
+      case 'R':
+      case 'O':
+        return body.size() == 2;
+      case 'D':
+        return record_size_fits(body);
+      case 'L':
+        return body.size() >= 9;
+      case 'C':
+        return body.size() >= 11;
+      case 'S':
+        return body == kSyncMagic;
+      default:
+        return false;
+    }
+  }
+
+  /// False where a message that holds text goes over what cannot be text: its size is damaged and would swallow what
+  /// follows. Precondition: is_sound(message).
+  bool ends_where_it_says(const UlogMessage& message) {
+    std::string_view text;
+    if (message.type == 'F') text = message.body;
+    if (message.type == 'L') text = message.body.substr(9);
+    if (message.type == 'C') text = message.body.substr(11);
+    if (message.type == 'I') return value_size_fits(*keyed_value(message.body));
+    if (message.type == 'M') return value_size_fits(*keyed_value(message.body.substr(1)));
+    // A file made to be hard could ask for long looks from each of its bytes.
+    if (looked_at_bytes_ > kMostLooks * bytes_.size()) return true;
+    looked_at_bytes_ += text.size();
+    while (!text.empty() && text.back() == '\0') text.remove_suffix(1);
+    const auto is_binary = [](char c) {
+      return static_cast<unsigned char>(c) < ' ' && (c < '\t' || c > '\r') && c != '\x1b';
+    };
+    return std::none_of(text.begin(), text.end(), is_binary);
+  }
+
+  bool record_size_fits(std::string_view body) {
+    if (body.size() < 2) return false;
+    const auto found = subscriptions_.find(*integer_at<std::uint16_t>(body, 0));
+    if (found == subscriptions_.end()) return false;
+    std::optional<UlogSize>& size = found->second.size;
+    if (!size) size = formats_.size(found->second.name);
+    return size && body.size() - 2 >= size->smallest && body.size() - 2 <= size->largest;
+  }
+
+  /// True if a sound message starts at `at`, and it is a synchronisation message or leads to two more.
+  bool is_resynchronised(std::size_t at, std::size_t end) {
+    const std::optional<UlogMessage> message = message_at(at, end);
+    if (!message || !is_sound(*message)) return false;
+    const std::size_t next = at + size_of(*message);
+    return message->type == 'S' || (next < end && leads_on(next, end, 2));
+  }
+
+  /// True if messages, be they of unknown types or topics, lead from `at` to `sound` sound ones, or end where the section
+  /// ends.
+  bool leads_on(std::size_t at, std::size_t end, int sound) {
+    constexpr int kMostMessages = 64;
+    for (int i = 0; i < kMostMessages && at < end && sound > 0; ++i) {
+      const std::optional<UlogMessage> message = message_at(at, end);
+      if (!message || message->body.empty()) return false;
+      if (is_sound(*message)) --sound;
+      at += size_of(*message);
+    }
+    return at == end || sound == 0;
+  }
+
+  void read_section(std::size_t at, std::size_t end, bool is_last) {
+    while (at < end) {
+      const std::optional<UlogMessage> message = message_at(at, end);
+      if (message && is_sound(*message) && ends_where_it_says(*message)) {
+        take(*message);
+        at += size_of(*message);
+        continue;
+      }
+      if (message && is_unknown(*message) && leads_on(at + size_of(*message), end, 3)) {
+        leave_out(*message);
+        at += size_of(*message);
+        continue;
+      }
+      std::size_t next = at + 1;
+      while (next < end && !is_resynchronised(next, end)) ++next;
+      log_.health.skipped_bytes += next - at;
+      // The last message before an appended section, or of a file, was being written when the vehicle stopped.
+      if (next < end || message) ++log_.health.damaged_blocks;
+      if (next == end && is_last) log_.health.truncated = true;
+      at = next;
+    }
+  }
+
+  /// True for what a sound file may have and this reader cannot use: messages of later versions, and records whose topic or
+  /// format the file does not define.
+  bool is_unknown(const UlogMessage& message) const {
+    if (message.body.empty()) return false;
+    if (message.type != 'D') return kUlogTypes.find(message.type) == std::string_view::npos;
+    const std::optional<std::uint16_t> id = integer_at<std::uint16_t>(message.body, 0);
+    const auto found = id ? subscriptions_.find(*id) : subscriptions_.end();
+    return id && (found == subscriptions_.end() || !found->second.size);
+  }
+
+  /// Precondition: is_unknown(message).
+  void leave_out(const UlogMessage& message) {
+    if (message.type != 'D') {
+      ++unknown_types_[message.type];
+      return;
+    }
+    const std::uint16_t id = *integer_at<std::uint16_t>(message.body, 0);
+    const auto found = subscriptions_.find(id);
+    if (found == subscriptions_.end())
+      ++unknown_ids_[id];
+    else
+      ++without_format_[found->second.name];
+  }
+
+  void take(const UlogMessage& message) {
+    const std::string_view body = message.body;
+    switch (message.type) {
+      case 'F':
+        if (!formats_.add(body)) ++log_.health.damaged_blocks;
+        break;
+      case 'I':
+        take_information(body, false);
+        break;
+      case 'M':
+        take_information(body.substr(1), body[0] == 1, true);
+        break;
+      case 'P':
+        take_parameter(body);
+        break;
+      case 'Q':
+        take_default(body);
+        break;
+      case 'A':
+        subscribe(body);
+        break;
+      case 'R':
+        subscriptions_.erase(*integer_at<std::uint16_t>(body, 0));
+        break;
+      case 'D':
+        take_record(body);
+        break;
+      case 'L':
+        take_line(body[0], body.substr(1));
+        break;
+      case 'C':
+        take_line(body[0], body.substr(3));
+        break;
+      case 'O':
+        log_.dropouts.push_back({last_time_s_, *integer_at<std::uint16_t>(body, 0) / 1e3});
+        break;
+      default:  // flags and synchronisation
+        break;
+    }
+  }
+
+  /// @param continues the text of the last message with this key
+  void take_information(std::string_view body, bool continues, bool is_one_of_several = false) {
+    const std::optional<KeyedValue> entry = keyed_value(body);
+    if (!entry) {
+      ++log_.health.damaged_blocks;
+      return;
+    }
+    if (!is_one_of_several) {
+      log_.texts.emplace(entry->name, text_of(*entry));
+      return;
+    }
+    std::size_t& count = num_texts_[entry->name];
+    if (!continues || count == 0) ++count;
+    log_.texts[fmt::format("{}[{}]", entry->name, count - 1)] += text_of(*entry);
+  }
+
+  void take_parameter(std::string_view body) {
+    const std::optional<KeyedValue> entry = keyed_value(body);
+    const std::optional<double> value = entry ? parameter_of(*entry) : std::nullopt;
+    if (!value)
+      ++log_.health.damaged_blocks;
+    else if (log_.health.records == 0)
+      log_.parameters[entry->name] = *value;
+    else
+      log_.parameter_changes.push_back({last_time_s_, entry->name, *value});
+  }
+
+  /// Of the defaults of the firmware (bit 0) and of the airframe (bit 1) the latter counts.
+  void take_default(std::string_view body) {
+    const std::optional<KeyedValue> entry = keyed_value(body.substr(1));
+    const std::optional<double> value = entry ? parameter_of(*entry) : std::nullopt;
+    if (!value)
+      ++log_.health.damaged_blocks;
+    else if ((body[0] & 2) != 0)
+      log_.default_parameters[entry->name] = *value;
+    else
+      log_.default_parameters.emplace(entry->name, *value);
+  }
+
+  void subscribe(std::string_view body) {
+    Subscription subscription;
+    subscription.instance = static_cast<unsigned char>(body[0]);
+    subscription.name = until_nul(body.substr(3));
+    subscriptions_[*integer_at<std::uint16_t>(body, 1)] = subscription;
+  }
+
+  /// @param body time stamp and text
+  void take_line(char level, std::string_view body) {
+    // The level is an ASCII digit in the firmware's logs.
+    const int number = level >= '0' && level <= '9' ? level - '0' : static_cast<unsigned char>(level);
+    const double time_s = static_cast<double>(*integer_at<std::uint64_t>(body, 0)) / 1e6;
+    log_.messages.push_back({time_s, number, until_nul(body.substr(8))});
+  }
+
+  Topic& topic_of(Subscription& subscription) {
+    if (!subscription.topic) {
+      const auto [found, is_new] =
+          topics_of_.emplace(std::pair{subscription.name, subscription.instance}, topics_.size());
+      if (is_new) begin_topic(subscription);
+      subscription.topic = found->second;
+    }
+    return topics_[*subscription.topic];
+  }
+
+  void begin_topic(const Subscription& subscription) {
+    Topic topic{formats_.layout(subscription.name), log_.topics.size()};
+    const UlogLayout& layout = topic.layout;
+    for (const std::string& name : layout.large_arrays)
+      log_.skipped.push_back(
+          {subscription.name + "." + name, fmt::format("it has more than {} elements", kMostElements), 0});
+    if (layout.has_too_many_columns)
+      log_.skipped.push_back(
+          {subscription.name, fmt::format("only its first {} numbers are kept", kMostColumns), 0});
+    if (!layout.timestamp) log_.skipped.push_back({subscription.name, "it has no field \"timestamp\"", 0});
+    RawTopic raw;
+    raw.name = raw.type = subscription.name;
+    raw.instance = subscription.instance;
+    for (const UlogNumber& number : layout.numbers) raw.columns.push_back({number.name, "", {}});
+    if (layout.timestamp) log_.topics.push_back(std::move(raw));
+    topics_.push_back(std::move(topic));
+  }
+
+  /// Precondition: record_size_fits(body).
+  void take_record(std::string_view body) {
+    const Topic& topic = topic_of(subscriptions_.at(*integer_at<std::uint16_t>(body, 0)));
+    const UlogLayout& layout = topic.layout;
+    if (!layout.timestamp) return;
+    const char* const record = body.data() + 2;
+    const std::size_t size = body.size() - 2;
+    RawTopic& raw = log_.topics[topic.index];
+    last_time_s_ = value_of(layout.timestamp->type, record + layout.timestamp->offset) / 1e6;
+    raw.time_s.push_back(last_time_s_);
+    for (std::size_t i = 0; i < layout.numbers.size(); ++i) {
+      const UlogNumber& number = layout.numbers[i];
+      raw.columns[i].values.push_back(value_of(number.type, record + number.offset));
+    }
+    for (const UlogText& text : layout.texts) {
+      if (text.offset + text.size > size) continue;
+      std::string& stored = raw.texts[text.name];
+      if (stored.empty()) stored = until_nul({record + text.offset, text.size});
+    }
+    ++log_.health.records;
+  }
+
+  void report_skipped() {
+    for (const auto& [id, records] : unknown_ids_)
+      log_.skipped.push_back(
+          {fmt::format("message id {}", id), "the file lost the message that names its topic", records});
+    for (const auto& [name, records] : without_format_)
+      log_.skipped.push_back({name, "its format, or one that it uses, is not defined in the file", records});
+    for (const auto& [type, records] : unknown_types_)
+      log_.skipped.push_back(
+          {fmt::format("message type {:#04x}", static_cast<unsigned char>(type)), "is not known", records});
+  }
+
+  const std::string_view bytes_;
+  const std::string path_;
+  RawLog log_;
+  UlogFormats formats_;
+  std::map<std::uint16_t, Subscription> subscriptions_;
+  std::vector<Topic> topics_;
+  std::map<std::pair<std::string, int>, std::size_t> topics_of_;  ///< in topics_
+  std::map<std::string, std::size_t> num_texts_;
+  std::map<std::uint16_t, std::size_t> unknown_ids_;
+  std::map<std::string, std::size_t> without_format_;
+  std::map<char, std::size_t> unknown_types_;
+  std::size_t looked_at_bytes_ = 0;
+  double last_time_s_ = std::numeric_limits<double>::quiet_NaN();
+};
+
+}  // namespace
+
+bool looks_like_ulog(std::string_view head) { return head.substr(0, kUlogMagic.size()) == kUlogMagic; }
+
+RawLog read_ulog(std::istream& in, const std::string& path) {
+  const std::string bytes = read_all(in, path);
+  return UlogReader(bytes, path).read();
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,32 @@
+/// @file What holds for every RawLog, whatever the file was.
+#pragma once
+
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "analysis/logs/raw_log.h"
+
+namespace swarmcert::tests {
+
+/// The first rule that `log` breaks, in words; empty if it keeps them all.
+inline std::string broken_rule(const logs::RawLog& log) {
+  if (log.format.empty()) return "the format has no name";
+  std::set<std::pair<std::string, int>> names;
+  for (const logs::RawTopic& topic : log.topics) {
+    if (!names.emplace(topic.name, topic.instance).second) return "two topics of one name: " + topic.name;
+    if (topic.time_s.empty()) return "a topic without a record: " + topic.name;
+    std::set<std::string> columns;
+    for (const logs::RawColumn& column : topic.columns) {
+      if (column.values.size() != topic.time_s.size()) return "not a value per time: " + column.name;
+      if (!columns.insert(column.name).second) return "two columns of one name: " + column.name;
+    }
+  }
+  for (const logs::RawDropout& dropout : log.dropouts)
+    if (!(dropout.duration_s >= 0)) return "a dropout of negative duration";
+  for (const logs::RawSkip& skip : log.skipped)
+    if (skip.name.empty() || skip.why.empty()) return "something skipped without name or reason";
+  return "";
+}
+
+}  // namespace swarmcert::tests
