@@ -3,6 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
 #include <nlopt.hpp>
 
 #include "nn/base/parallel.h"
@@ -203,6 +206,30 @@ Eigen::Vector3d RateDisturbance::at(double time_s) const {
   return eps;
 }
 
+std::vector<std::string> IssCheck::why_inconclusive() const {
+  std::vector<std::string> why;
+  if (is_refuted()) return why;
+  if (cancelled) why.emplace_back("the check was interrupted");
+  if (!theorem_applies) why.emplace_back("no theorem supports the ball for these gains");
+  std::map<std::string, std::pair<int, double>> by_hypothesis;  // runs, earliest time
+  for (const IssRun& run : runs) {
+    if (run.left.empty()) continue;
+    auto& [count, earliest_s] = by_hypothesis.try_emplace(run.left, 0, run.left_at_s).first->second;
+    ++count;
+    earliest_s = std::min(earliest_s, run.left_at_s);
+  }
+  const std::string total = std::to_string(runs.size());
+  for (const auto& [hypothesis, found] : by_hypothesis) {
+    char time[32];
+    std::snprintf(time, sizeof time, "%.4g", found.second);
+    why.push_back("in " + std::to_string(found.first) + " of " + total + " runs " + hypothesis +
+                  ", first after " + time + " s");
+  }
+  if (failed > 0)
+    why.push_back("the integration failed in " + std::to_string(failed) + " of " + total + " runs");
+  return why;
+}
+
 IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& options) {
   IssCheck check;
   const Theorem theorem = check_theorem(gains, model.mass_kg, std::nullopt);
@@ -216,10 +243,9 @@ IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& opt
   // After 14 time constants even a triple pole has settled to 1e-4.
   check.duration_s = check.unstable ? 20 : std::clamp(14 / decay_1_s, 0.1, 200.0);
   check.rate_N_s = options.rate_N_s > 0 ? options.rate_N_s : 0.2 * model.weight_N() / check.duration_s;
-  check.ball_m =
-      check.rate_N_s * (check.has_ball ? theorem.ball_per_rate() : naive_ball(gains, model.mass_kg));
-  if (!(check.ball_m > 0 && std::isfinite(check.ball_m)))
-    check.ball_m = check.rate_N_s;  // Ki = 0: no ball at all
+  double ball_m_per_N_s = check.has_ball ? theorem.ball_per_rate() : naive_ball(gains, model.mass_kg);
+  if (!(ball_m_per_N_s > 0 && std::isfinite(ball_m_per_N_s))) ball_m_per_N_s = 1;  // Ki = 0: no ball at all
+  check.ball_m = std::min(check.rate_N_s * ball_m_per_N_s, std::numeric_limits<double>::max());
 
   const IssJudge judge(gains, model, check, theorem);
   // A fifth of the runs goes to optimisers, each with so many evaluations.
@@ -249,6 +275,8 @@ IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& opt
     check.runs.push_back(std::move(runs[i]));
     const IssRun& run = check.runs.back();
     check.violations += run.is_violation ? 1 : 0;
+    check.left += run.left.empty() ? 0 : 1;
+    check.failed += run.failure.empty() ? 0 : 1;
     check.worst_transient_ratio = std::max(check.worst_transient_ratio, run.transient_ratio);
     if (check.worst < 0 || run.ratio > check.worst_ratio) {
       check.worst_ratio = run.ratio;

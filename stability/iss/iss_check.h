@@ -5,6 +5,8 @@
 ///   m v' = f - m g - (eps0 + eps(t)),  |eps'| <= d_m.
 /// With the theorem's hypotheses this is the system that the theorem speaks of; lags, clamps and gains outside the
 /// theorem's form take it away from that, and then violations are to be expected. No violation is no proof.
+/// A run is judged only as long as it keeps the hypotheses on the flight: no saturation, no clamp that acts, a commanded
+/// force that is not near zero and points upwards. What happens later says nothing about the theorem.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,6 +41,12 @@ struct IssRun {
       0;  ///< largest |p~(t)| / transient bound(t), where that is more than a thousandth of the ball
   double largest_m = 0, at_s = 0;
   bool is_violation = false;  ///< one of the ratios is above 1
+  /// The hypothesis that the run left, in words, and when. It is not judged from then on. Empty: kept to the end.
+  std::string left;
+  double left_at_s = 0;
+  std::string failure;  ///< why the integration failed; the run is judged up to there. Empty: it did not
+
+  bool is_complete() const { return left.empty() && failure.empty(); }
 };
 
 struct IssOptions {
@@ -58,18 +66,25 @@ struct IssCheck {
   double ball_m = 0;      ///< the theorem's, or where !has_ball d_m / (m Ki), which no theorem supports
   double duration_s = 0;  ///< of every run
   std::vector<IssRun> runs;
-  int violations = 0;
+  int violations = 0;  ///< runs that exceed a bound while they keep every hypothesis that is monitored
+  int left = 0;        ///< runs that leave a hypothesis
+  int failed = 0;      ///< runs whose integration failed
   double worst_ratio = 0, worst_transient_ratio = 0;
   int worst = -1;  ///< index of the run with the worst ratio
   /// Of gains.toml: a differential equation without memory has none, so the runs say nothing about it.
   double delay_left_out_s = 0;
   bool unstable = false;  ///< the linear loop has no decaying response at all
   bool cancelled = false;
+
+  /// Whether the ball is refuted: a run exceeds a bound of the theorem while every hypothesis holds, those on the gains
+  /// and, up to then, those on the flight.
+  bool is_refuted() const { return theorem_applies && violations > 0; }
+  /// Why the campaign shows nothing although it does not refute; empty: it found no violation.
+  std::vector<std::string> why_inconclusive() const;
 };
 
 /// Runs the campaign. The same for every number of jobs. A violation is a ratio above 1 + 1e-6, well above the
-/// integrator's tolerance of 1e-9.
-/// @throws IntegrationError if an integration fails.
+/// integrator's tolerance of 1e-9. A run whose integration fails is reported, and the campaign goes on.
 IssCheck check_iss(const Gains& gains, const Model& model, const IssOptions& options);
 
 }  // namespace swarmcert::stability

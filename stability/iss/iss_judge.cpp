@@ -38,6 +38,15 @@ IssJudge::IssJudge(const Gains& gains, const Model& model, const IssCheck& check
 }
 
 void IssJudge::judge(IssRun* run) const {
+  try {
+    integrate(run);
+  } catch (const IntegrationError& error) {
+    // A run that has left the hypotheses need not be integrable.
+    if (run->left.empty()) run->failure = error.what();
+  }
+}
+
+void IssJudge::integrate(IssRun* run) const {
   const RateDisturbance& disturbance = run->disturbance;
   // The learning error within the present piece: eps + (t - from) rate. Runge-Kutta starts anew at every switch at
   // no cost, which multistep methods do not.
@@ -45,7 +54,20 @@ void IssJudge::judge(IssRun* run) const {
   double from_s = 0;
   OdeIntegrator integrator(
       OdeMethod::kRungeKutta,
-      [&](double t, const double* x, double* dx) { loop_.derivative(x, eps + (t - from_s) * rate, dx); },
+      [&](double t, const double* x, double* dx) {
+        // Every evaluation counts, so that nothing is missed between samples; the last step may be a trial.
+        if (run->left.empty()) {
+          if (const char* const left = loop_.left_hypothesis(x)) {
+            run->left = left;
+            run->left_at_s = t;
+          }
+        }
+        if (!run->left.empty()) {  // the run is over: rest, so that the integrator gets to its end at once
+          std::fill(dx, dx + PositionLoop::kSize, 0.0);
+          return;
+        }
+        loop_.derivative(x, eps + (t - from_s) * rate, dx);
+      },
       1e-9, std::vector<double>(PositionLoop::kSize, 1e-10 * check_.ball_m));
   PositionLoop::State state = loop_.start(run->position_m, run->velocity_m_s);
   const bool from_rest =
@@ -63,6 +85,7 @@ void IssJudge::judge(IssRun* run) const {
     while (piece < disturbance.until_s.size() && disturbance.until_s[piece] < target_s) {
       const double until_s = disturbance.until_s[piece];
       integrator.advance(until_s, until_s);
+      if (!run->left.empty()) return;
       eps += (until_s - from_s) * rate;
       from_s = until_s;
       rate = rate_of(++piece);
@@ -71,6 +94,8 @@ void IssJudge::judge(IssRun* run) const {
     }
     const double limit_s = piece < disturbance.until_s.size() ? disturbance.until_s[piece] : 1e300;
     integrator.advance(target_s, std::max(limit_s, target_s));
+    // Judged up to the last sample before: what made the run leave came in between.
+    if (!run->left.empty()) return;
     const Eigen::Map<const Eigen::Vector3d> error(integrator.state());
     if (!weigh(error.norm(), k, from_rest, sizes, run)) return;
   }

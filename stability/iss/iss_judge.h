@@ -31,7 +31,7 @@ class IssJudge {
   /// @param check its d_m, ball and duration are those of the campaign; must outlive this.
   IssJudge(const Gains& gains, const Model& model, const IssCheck& check, const Theorem& theorem);
 
-  /// Fills in the run's ratios. @throws IntegrationError.
+  /// Fills in the run's ratios, as far as the run keeps the hypotheses and its integration succeeds.
   void judge(IssRun* run) const;
 
   const PositionLoop& loop() const { return loop_; }
@@ -39,6 +39,7 @@ class IssJudge {
   double duration_s() const { return check_.duration_s; }
 
  private:
+  void integrate(IssRun* run) const;
   /// What the transient bound starts from: |p~|, |p~'|, |s'| at t = 0, and d_m; s'(0) contains the learning error.
   std::array<double, 4> start_sizes(const IssRun& run, const PositionLoop::State& state) const;
   /// Takes one sample of |p~| into account; false where the run has left all bounds and need not go on.

@@ -47,9 +47,28 @@ Eigen::Vector3d PositionLoop::feedback(const double* x) const {
   return -(position_ * Map(x + kP) + velocity_ * Map(x + kV) + integral_ * clamped);
 }
 
-void PositionLoop::derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const {
+Eigen::Vector3d PositionLoop::commanded_N(const double* x) const {
   Eigen::Vector3d force = feedback(x);
   force.z() += mass_kg_ * kGravity_m_s2;
+  return force;
+}
+
+const char* PositionLoop::left_hypothesis(const double* x) const {
+  /// Below this share of the weight the direction of the commanded force says nothing.
+  constexpr double kLeastShare = 0.01;
+  for (int i = 0; i < 3; ++i) {
+    if (!(std::abs(x[kI + i]) < limit_m_s_[static_cast<std::size_t>(i)]))
+      return "the integral reaches its clamp";
+  }
+  const Eigen::Vector3d force = commanded_N(x);
+  const double size_N = force.stableNorm();
+  if (!(size_N <= largest_N_)) return "the thrust saturates";
+  if (size_N < kLeastShare * mass_kg_ * kGravity_m_s2) return "the commanded force is near zero";
+  return force.z() > 0 ? nullptr : "the commanded force tilts by 90 degrees";
+}
+
+void PositionLoop::derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const {
+  Eigen::Vector3d force = commanded_N(x);
   if (const double size = force.norm(); size > largest_N_) force *= largest_N_ / size;
   Eigen::Vector3d motor = force, applied = force;
   if (motor_s_ > 0) motor = Map(x + kMotor);

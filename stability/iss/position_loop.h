@@ -20,6 +20,11 @@ class PositionLoop {
   /// dx/dt of the state x under the learning error `eps` (f_a_hat - f_a, in newton).
   void derivative(const double* x, const Eigen::Vector3d& eps_W_N, double* dx) const;
 
+  /// The hypothesis of the tracking theorem that does not hold in the state x, in words; null where all hold: the
+  /// commanded force is at most what the rotors give, not near zero, points above the horizon (an attitude law turns
+  /// the vehicle towards it), and no integral has reached its clamp.
+  const char* left_hypothesis(const double* x) const;
+
   /// At rest with these errors: integral 0, forces those that hold the weight.
   State start(const Eigen::Vector3d& position_m, const Eigen::Vector3d& velocity_m_s) const;
 
@@ -30,6 +35,7 @@ class PositionLoop {
 
  private:
   Eigen::Vector3d feedback(const double* x) const;
+  Eigen::Vector3d commanded_N(const double* x) const;
 
   Eigen::Matrix3d position_, velocity_, integral_;  ///< f_d = m g - position_ p~ - velocity_ v - integral_ I
   PerAxis limit_m_s_;

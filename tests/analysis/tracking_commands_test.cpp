@@ -346,6 +346,25 @@ TEST(IssCheckCommand, WithoutAViolationAndWithoutTheTheoremItIsInconclusive) {
   EXPECT_EQ(result["delay_left_out_s"], 0.01);
 }
 
+TEST(IssCheckCommand, ARunOutsideTheHypothesesEndsTheCampaignInconclusiveAndNotInAFault) {
+  // 0.1 N/s drives the commanded force through zero in one run, where the full loop cannot be integrated; at 0.3 N/s
+  // the thrust saturates or the vehicle tips over after about a second.
+  const ScratchFolder folder;
+  const std::string gains = " --gains " + kSourceFolder + "/controller/gains/composite.toml" + kModel;
+  for (const char* const rate : {"0.1", "0.3", "1e308"}) {
+    const Outcome outcome = run_shell(
+        "swarmcert iss-check" + gains + " --runs 20 --force --json out.json --rate " + rate, folder.path());
+    EXPECT_EQ(outcome.exit_code, 4) << rate << outcome.output;
+    const Json result = files::parse_json(read_text(folder / "out.json"), "out.json");
+    EXPECT_EQ(result["verdict"], "inconclusive");
+    EXPECT_TRUE(result["theorem"]["applies"].get<bool>());
+    EXPECT_EQ(result["violations"], 0);
+    EXPECT_GT(result["left_hypotheses"].get<int>(), 0);
+    ASSERT_FALSE(result["why_inconclusive"].empty());
+    EXPECT_NE(result["why_inconclusive"][0].get<std::string>().find(", first after "), std::string::npos);
+  }
+}
+
 TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");

@@ -3,7 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "data.h"
 #include "stability/iss/iss_full_loop.h"
@@ -78,7 +82,6 @@ TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
   } broken[] = {
       // Reference 2.1: at tau = 0.0625 the command channel's rate norm is 0.4596536, above the ball of 0.4595588.
       {"motor lag", composite("4", "0.136", "[lag]\nmotor_s = 0.0625\n")},
-      {"clamped integral", composite("4", "0.136", "integrator_limit = 0.01\n")},
       {"Lambda not symmetric", composite("[[2, 12, 0], [0, 2, 0], [0, 0, 2]]", "0.2")},
       {"complex poles",
        parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nKp = 5\nKd = 8\nKi = 25\n", "g.toml")},
@@ -90,7 +93,103 @@ TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
     EXPECT_FALSE(check.why_not.empty());
     EXPECT_GT(check.violations, 0);
     EXPECT_GT(check.worst_ratio, 1 + 1e-6);
+    EXPECT_FALSE(check.is_refuted()) << "the theorem claims nothing about such gains";
+    EXPECT_FALSE(check.why_inconclusive().empty());
   }
+}
+
+TEST(IssCheck, RunsThatLeaveAHypothesisAreLabelledAndRefuteNothing) {
+  const Gains plain = composite("4", "0.136");
+  const struct {
+    const char* expected;
+    Gains gains;
+    double rate_N_s;
+  } cases[] = {{"the integral reaches its clamp", composite("4", "0.136", "integrator_limit = 0.01\n"), 0},
+               {"the commanded force is near zero", plain, 0.3},
+               {"the commanded force tilts by 90 degrees", plain, 0.3},
+               {"the thrust saturates", plain, 0.3},
+               {"the thrust saturates", plain, 1e308}};
+  for (const auto& [expected, gains, rate_N_s] : cases) {
+    SCOPED_TRACE(std::string(expected) + ", " + std::to_string(rate_N_s));
+    IssOptions options = with_runs(60);
+    options.rate_N_s = rate_N_s;
+    const IssCheck check = check_iss(gains, tests::small_vehicle(), options);
+    int labelled = 0;
+    for (const IssRun& run : check.runs) {
+      labelled += run.left == expected;
+      if (run.left.empty()) continue;
+      EXPECT_GE(run.left_at_s, 0);
+      EXPECT_LT(run.left_at_s, check.duration_s);
+      EXPECT_LE(run.at_s, run.left_at_s) << "nothing counts after the hypothesis is left";
+    }
+    EXPECT_GT(labelled, 0);
+    EXPECT_EQ(check.violations, 0);
+    EXPECT_FALSE(check.is_refuted());
+    ASSERT_FALSE(check.why_inconclusive().empty());
+    std::string reasons;
+    for (const std::string& why : check.why_inconclusive()) reasons += why + "\n";
+    EXPECT_NE(reasons.find(expected), std::string::npos) << reasons;
+    EXPECT_EQ(reasons.find("failed"), std::string::npos) << reasons;
+  }
+}
+
+TEST(IssCheck, AViolationWithEveryHypothesisKeptRefutes) {
+  // No loop of the theorem exceeds its ball, so the verdict is held against a campaign that says one does.
+  IssCheck check;
+  check.theorem_applies = true;
+  check.violations = 1;
+  EXPECT_TRUE(check.is_refuted());
+  EXPECT_TRUE(check.why_inconclusive().empty());
+  check.theorem_applies = false;
+  EXPECT_FALSE(check.is_refuted());
+  check = {};
+  check.theorem_applies = true;
+  EXPECT_TRUE(check.why_inconclusive().empty());
+  check.failed = 1;
+  EXPECT_FALSE(check.why_inconclusive().empty()) << "a run that could not be integrated shows nothing";
+}
+
+/// Every shipped set of gains on both vehicles: an answer at any rate, and no refutation of gains that satisfy the
+/// theorem.
+void check_shipped_gains(const std::vector<double>& rates_N_s, const std::vector<std::string>& models,
+                         int runs) {
+  const std::filesystem::path source = SWARMCERT_SOURCE_DIR;
+  int campaigns = 0, left = 0, complete = 0;
+  for (const auto& file : std::filesystem::directory_iterator(source / "controller/gains")) {
+    if (file.path().extension() != ".toml") continue;
+    const Gains gains = load_gains(file.path().string());
+    for (const std::string& name : models) {
+      const Model model = read_model((source / "stability/models" / name).string());
+      for (const double rate_N_s : rates_N_s) {
+        SCOPED_TRACE(file.path().filename().string() + ", " + name + ", " + std::to_string(rate_N_s));
+        IssOptions options = with_runs(runs);
+        options.rate_N_s = rate_N_s;
+        const IssCheck check = check_iss(gains, model, options);
+        const std::vector<FullLoopRun> flown = fly_full_loop(gains, model, check);
+        ++campaigns;
+        left += check.left > 0;
+        complete += check.left == 0 && check.failed == 0;
+        EXPECT_FALSE(check.is_refuted());
+        EXPECT_EQ(check.violations > 0 || check.failed > 0 || check.left > 0 || !check.theorem_applies,
+                  check.violations > 0 || !check.why_inconclusive().empty());
+        EXPECT_TRUE(std::isfinite(check.worst_ratio) && std::isfinite(check.worst_transient_ratio));
+        for (const FullLoopRun& run : flown) EXPECT_TRUE(std::isfinite(run.ratio)) << run.failure;
+      }
+    }
+  }
+  EXPECT_GE(campaigns, 5 * static_cast<int>(rates_N_s.size()));
+  EXPECT_GT(left, 0);
+  EXPECT_GT(complete, 0);
+}
+
+TEST(IssCheck, ShippedGainsGetAnAnswerAtEveryRate) {
+  check_shipped_gains({0.01, 0.1, 0.25, 0.38, 3, 1e308}, {"crazyflie-small.toml"}, 10);
+}
+
+TEST(IssCheck, ShippedGainsGetAnAnswerOnAGridOfRates_slow) {
+  std::vector<double> rates_N_s = {1e-300, 1e-3, 10, 1e6, 1e308};
+  for (double rate_N_s = 0.01; rate_N_s < 3.1; rate_N_s *= 1.1) rates_N_s.push_back(rate_N_s);
+  check_shipped_gains(rates_N_s, {"crazyflie-small.toml", "crazyflie-large.toml"}, 20);
 }
 
 TEST(IssCheck, EveryViolationShowsInARatioAboveOne) {

@@ -1,4 +1,5 @@
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <map>
 #include <memory>
@@ -25,12 +26,12 @@ constexpr double kDegrees = 57.29577951308232;
 Json vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 const char* verdict(const IssCheck& check) {
-  if (check.violations > 0) return "refuted";
-  return check.cancelled || !check.theorem_applies ? "inconclusive" : "none_found";
+  if (check.is_refuted()) return "refuted";
+  return check.why_inconclusive().empty() ? "none_found" : "inconclusive";
 }
 
 struct KindSummary {
-  int runs = 0, violations = 0;
+  int runs = 0, violations = 0, left = 0, failed = 0;
   double worst_ratio = 0, worst_transient_ratio = 0;
 };
 
@@ -40,6 +41,8 @@ std::map<std::string, KindSummary> by_kind(const IssCheck& check) {
     KindSummary& kind = kinds[run.kind];
     ++kind.runs;
     kind.violations += run.is_violation ? 1 : 0;
+    kind.left += run.left.empty() ? 0 : 1;
+    kind.failed += run.failure.empty() ? 0 : 1;
     kind.worst_ratio = std::max(kind.worst_ratio, run.ratio);
     kind.worst_transient_ratio = std::max(kind.worst_transient_ratio, run.transient_ratio);
   }
@@ -77,6 +80,9 @@ Json run_json(const IssRun& run) {
           {"transient_ratio", run.transient_ratio},
           {"largest_error_m", run.largest_m},
           {"at_s", run.at_s},
+          {"left_hypothesis", run.left.empty() ? Json() : Json(run.left)},
+          {"left_at_s", run.left.empty() ? Json() : Json(run.left_at_s)},
+          {"failure", run.failure.empty() ? Json() : Json(run.failure)},
           {"initial_position_error_m", vector(run.position_m)},
           {"initial_velocity_error_m_s", vector(run.velocity_m_s)},
           {"bias_N", vector(run.disturbance.bias_W_N)},
@@ -102,12 +108,16 @@ Json result_json(const IssCheckOptions& options, const IssCheck& check,
     kinds.push_back({{"disturbance", name},
                      {"runs", kind.runs},
                      {"violations", kind.violations},
+                     {"left_hypotheses", kind.left},
+                     {"failed", kind.failed},
                      {"worst_ratio", kind.worst_ratio},
                      {"worst_transient_ratio", kind.worst_transient_ratio}});
   }
   result["runs"] = options.check.runs;
   result["reported_runs"] = runs;
   result["violations"] = check.violations;
+  result["left_hypotheses"] = check.left;
+  result["failed"] = check.failed;
   result["worst_ratio"] = check.worst_ratio;
   result["worst_transient_ratio"] = check.worst_transient_ratio;
   result["kinds"] = std::move(kinds);
@@ -119,15 +129,47 @@ Json result_json(const IssCheckOptions& options, const IssCheck& check,
     const IssRun& of = check.runs[static_cast<std::size_t>(run.run)];
     worst_full = std::max(worst_full, run.ratio);
     full.push_back({{"disturbance", of.kind},
-                    {"direction", vector(of.disturbance.rate_W_N_s.back().normalized())},
+                    {"direction", vector(of.disturbance.rate_W_N_s.back().stableNormalized())},
                     {"ratio", run.ratio},
                     {"ratio_without_attitude", of.ratio},
                     {"at_s", run.at_s},
-                    {"largest_tilt_deg", kDegrees * run.largest_tilt_rad}});
+                    {"largest_tilt_deg", kDegrees * run.largest_tilt_rad},
+                    {"left_hypothesis", run.left.empty() ? Json() : Json(run.left)},
+                    {"left_at_s", run.left.empty() ? Json() : Json(run.left_at_s)},
+                    {"failure", run.failure.empty() ? Json() : Json(run.failure)}});
   }
   result["full_loop"] = {{"worst_ratio", worst_full}, {"runs", std::move(full)}};
   result["verdict"] = verdict(check);
+  result["why_inconclusive"] = check.why_inconclusive();
   return result;
+}
+
+/// What was not judged of the runs of a kind.
+std::string unjudged_text(const KindSummary& kind) {
+  std::string text;
+  if (kind.left > 0) text += fmt::format("  {} left a hypothesis", kind.left);
+  if (kind.failed > 0) text += fmt::format("  {} could not be integrated", kind.failed);
+  return text;
+}
+
+std::string end_text(const stability::FullLoopRun& run) {
+  if (!run.left.empty()) return fmt::format("; ended after {:.4g} s, when {}", run.left_at_s, run.left);
+  return run.failure.empty() ? "" : "; ended early: " + run.failure;
+}
+
+void print_verdict(const IssCheckOptions& options, const IssCheck& check) {
+  if (check.violations > 0) {
+    const IssRun& run = *witness(check);
+    fmt::print("{} in {} runs. The worst: {}, largest |error| {:.6g} m at {:.3f} s, up to {:.6f} of the {}\n",
+               check.is_refuted() ? "VIOLATED" : "Exceeded", check.violations, run.kind, run.largest_m,
+               run.at_s, shown_ratio(run), is_about_ball(run) ? "ball" : "transient bound");
+  } else {
+    fmt::print("No violation found in {} runs{}.{}\n", options.check.runs,
+               check.cancelled ? ", which were interrupted" : "",
+               check.why_inconclusive().empty() ? " That is no proof." : "");
+  }
+  const std::vector<std::string> why = check.why_inconclusive();
+  if (!why.empty()) fmt::print("Inconclusive: {}\n", fmt::join(why, "; "));
 }
 
 void print(const IssCheckOptions& options, const IssCheck& check,
@@ -153,29 +195,18 @@ void print(const IssCheckOptions& options, const IssCheck& check,
   fmt::print("  {:<14} {:>6} {:>11} {:>12} {:>16}\n", "disturbance", "runs", "violations", "worst ratio",
              "over transient");
   for (const auto& [name, kind] : by_kind(check)) {
-    fmt::print("  {:<14} {:>6} {:>11} {:>12.6f} {:>16.6f}\n", name, kind.runs, kind.violations,
-               kind.worst_ratio, kind.worst_transient_ratio);
+    fmt::print("  {:<14} {:>6} {:>11} {:>12.6f} {:>16.6f}{}\n", name, kind.runs, kind.violations,
+               kind.worst_ratio, kind.worst_transient_ratio, unjudged_text(kind));
   }
   if (!flown.empty())
     fmt::print("The same disturbances with attitude and rotors (SE(3)), outside the hypotheses:\n");
   for (const stability::FullLoopRun& run : flown) {
     const IssRun& of = check.runs[static_cast<std::size_t>(run.run)];
-    const Eigen::Vector3d u = of.disturbance.rate_W_N_s.back().normalized();
-    fmt::print("  {:<14} along ({:+.0f} {:+.0f} {:+.0f}): ratio {:.4f}, tilt up to {:.1f} degrees\n", of.kind,
-               u.x(), u.y(), u.z(), run.ratio, kDegrees * run.largest_tilt_rad);
+    const Eigen::Vector3d u = of.disturbance.rate_W_N_s.back().stableNormalized();
+    fmt::print("  {:<14} along ({:+.0f} {:+.0f} {:+.0f}): ratio {:.4f}, tilt up to {:.1f} degrees{}\n",
+               of.kind, u.x(), u.y(), u.z(), run.ratio, kDegrees * run.largest_tilt_rad, end_text(run));
   }
-  if (check.violations > 0) {
-    const IssRun& run = *witness(check);
-    fmt::print(
-        "VIOLATED in {} runs. The worst: {}, largest |error| {:.6g} m at {:.3f} s, up to {:.6f} of the {}\n",
-        check.violations, run.kind, run.largest_m, run.at_s, shown_ratio(run),
-        is_about_ball(run) ? "ball" : "transient bound");
-  } else {
-    fmt::print("No violation found in {} runs{}. {}\n", options.check.runs,
-               check.cancelled ? ", which were interrupted" : "",
-               check.theorem_applies ? "That is no proof."
-                                     : "Inconclusive: no theorem supports the ball for these gains.");
-  }
+  print_verdict(options, check);
 }
 
 int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
@@ -198,39 +229,42 @@ int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
     const std::string path = write_iss_check_report(check, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
-  if (check.violations > 0) return kViolated;
-  return check.cancelled || !check.theorem_applies ? kInconclusive : kDone;
+  if (check.is_refuted()) return kViolated;
+  return check.why_inconclusive().empty() ? kDone : kInconclusive;
 }
 
 }  // namespace
 
 Command iss_check_command() {
-  return {"iss-check", "Try to break the tracking theorem's ball by integrating the loop under disturbances",
-          "Integrates the continuous loop (SUNDIALS) under learning errors that change by at most d_m: "
-          "ramps, the worst\n"
-          "input of the linear loop, switching and random ones, random starts, and ones optimised with "
-          "NLopt. Errors are\n"
-          "held against the ball d_m / (lambda_min(Lambda)^2 lambda_min(K)) and the transient bound. Exit "
-          "code 1 with\n"
-          "the disturbance if one is exceeded; 4 if none is, but the theorem does not apply. No violation is "
-          "no proof:\n"
-          "`bound` has the proved numbers.\n"
-          "Example\n"
-          "  swarmcert iss-check --gains controller/gains/composite.toml \\\n"
-          "      --model stability/models/crazyflie-small.toml",
-          [](CLI::App& app) {
-            auto options = std::make_shared<IssCheckOptions>();
-            app.add_option("--gains", options->gains, "gains.toml")->required();
-            app.add_option("--model", options->model, "model.toml")->required();
-            app.add_option("--runs", options->check.runs, "Integrations (default 200)")
-                ->check(CLI::Range(5, 1000000));
-            app.add_option("--rate", options->check.rate_N_s,
-                           "d_m in N/s (default: a fifth of the weight over the settling time)")
-                ->check(CLI::PositiveNumber);
-            app.add_option("--seed", options->check.seed, "Of the random disturbances (default 0)");
-            app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
-            return [options](const CommonOptions& common) { return run_iss_check(*options, common); };
-          }};
+  return {
+      "iss-check", "Try to break the tracking theorem's ball by integrating the loop under disturbances",
+      "Integrates the continuous loop (SUNDIALS) under learning errors that change by at most d_m: "
+      "ramps, the worst\n"
+      "input of the linear loop, switching and random ones, random starts, and ones optimised with "
+      "NLopt. Errors are\n"
+      "held against the ball d_m / (lambda_min(Lambda)^2 lambda_min(K)) and the transient bound. Exit "
+      "code 1 with\n"
+      "the disturbance if one is exceeded while every hypothesis holds; 4 if the theorem does not apply to "
+      "the gains,\n"
+      "or runs leave its hypotheses (saturation, clamp, tilt) or cannot be integrated: those refute "
+      "nothing. No\n"
+      "violation is no proof: `bound` has the proved numbers.\n"
+      "Example\n"
+      "  swarmcert iss-check --gains controller/gains/composite.toml \\\n"
+      "      --model stability/models/crazyflie-small.toml",
+      [](CLI::App& app) {
+        auto options = std::make_shared<IssCheckOptions>();
+        app.add_option("--gains", options->gains, "gains.toml")->required();
+        app.add_option("--model", options->model, "model.toml")->required();
+        app.add_option("--runs", options->check.runs, "Integrations (default 200)")
+            ->check(CLI::Range(5, 1000000));
+        app.add_option("--rate", options->check.rate_N_s,
+                       "d_m in N/s (default: a fifth of the weight over the settling time)")
+            ->check(CLI::PositiveNumber);
+        app.add_option("--seed", options->check.seed, "Of the random disturbances (default 0)");
+        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+        return [options](const CommonOptions& common) { return run_iss_check(*options, common); };
+      }};
 }
 
 }  // namespace swarmcert::analysis

@@ -23,6 +23,7 @@ std::string write_iss_check_report(const stability::IssCheck& check, const files
                   check.ball_m, check.rate_N_s,
                   check.has_ball ? "" : " (these gains lack the theorem's form: what one might take for it)",
                   check.violations, check.runs.size(), check.cancelled ? "; the check was interrupted" : ""));
+  for (const std::string& why : check.why_inconclusive()) report.paragraph("Inconclusive: " + why + ".");
   struct Kind {
     int row = 0, runs = 0, violations = 0;
     double ratio = 0, transient_ratio = 0;
