@@ -183,7 +183,7 @@ void verify_claims(const Policy& policy, const GateSettings& settings, BundleVer
     if (path.empty()) return;
     const Check check = match_row(evidence, "match", 0, path, is_elf);
     if (check.verdict != Verdict::kPass) reject(check.reason + ": " + check.witness);
-    verdict.verified.push_back(std::string(is_elf ? "the ELF" : "the source") + " holds " + check.witness);
+    verdict.verified.push_back(std::string(is_elf ? "the ELF: " : "the source: ") + check.witness);
   };
   match(release.source, false);
   match(release.elf, true);

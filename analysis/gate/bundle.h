@@ -30,7 +30,7 @@ struct BundleVerdict {
 
 /// Verifies: the manifest is canonical and has the hash that it states; the folder holds exactly its files, regular ones,
 /// with these sizes and hashes; the gate found that the release passes; the policy's files are the bundle's; the checker
-/// accepts the certificate for the bundled weights; source and ELF hold them.
+/// accepts the certificate for the bundled weights; source and ELF match them, as the check [match] has it.
 /// @param rerun also runs every check of the policy again, on the bundle's files alone.
 BundleVerdict verify_bundle(const std::string& folder, bool rerun, const GateSettings& settings);
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "analysis/firmware/match_export.h"
 #include "analysis/gate/evidence.h"
 #include "analysis/residuals/flight_set.h"
 #include "nn/base/input_error.h"
@@ -45,6 +46,14 @@ class FileList {
     }
   }
 
+  /// The whole export that `path` is or belongs to, so that a bundle can be compared again.
+  void add_source(const std::string& path) {
+    if (path.empty()) return;
+    std::error_code ignored;
+    if (!std::filesystem::is_directory(path, ignored)) add("source", path);
+    for (const std::string& file : firmware::files_of_export(path)) add("source", file);
+  }
+
   std::vector<EvidenceFile> take() { return std::move(files_); }
 
  private:
@@ -62,7 +71,7 @@ std::vector<EvidenceFile> evidence_files(const Policy& policy, const std::string
   list.add("box", release.box);
   list.add("gains", release.gains);
   if (!release.model.empty()) list.add_model(release.model);
-  list.add("source", release.source);
+  list.add_source(release.source);
   list.add("elf", release.elf);
   list.add("facts", release.facts);
   list.add("swarm", release.swarm);

@@ -21,9 +21,9 @@ std::string resolve(const std::string& policy, const std::string& path) {
 }
 
 Release read_release(const TomlTable& table, const std::string& policy) {
-  table.allow_only({"network", "phi", "rho", "key", "precision", "certificate", "box", "gains", "model",
-                    "source", "elf", "facts", "swarm", "vehicles", "columns", "flights", "logs", "battery_V",
-                    "feed_forward"});
+  table.allow_only({"network", "phi",     "rho",    "key",       "precision",    "certificate",    "box",
+                    "gains",   "model",   "source", "elf",       "facts",        "swarm",          "vehicles",
+                    "columns", "flights", "logs",   "battery_V", "feed_forward", "most_neighbours"});
   Release release;
   const auto file = [&](const char* key) {
     if (!table.has(key)) return std::string();
@@ -64,6 +64,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   }
   if (table.has("battery_V")) release.battery_V = table.number("battery_V");
   if (!(release.battery_V > 0)) table.refuse("battery_V", "", "must be positive");
+  if (table.has("most_neighbours")) release.most_neighbours = whole_number(table, "most_neighbours", 0);
   if (table.has("feed_forward")) release.feed_forward = table.flag("feed_forward");
   if (release.feed_forward && release.network.file.empty())
     table.refuse("feed_forward", "true", "needs a network");

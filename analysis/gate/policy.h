@@ -25,6 +25,7 @@ struct Release {
   std::string vehicles, columns;     ///< flights.toml and columns.toml
   std::vector<std::string> flights;  ///< reference flights
   int logs = 0;                      ///< how many logs they are: a folder does not show that one is missing
+  int most_neighbours = 0;           ///< of the export in `elf`; 0: as export has it by default
   double battery_V = 4.2;
   bool feed_forward = false;  ///< the network's force is part of the model that flights are held against
 

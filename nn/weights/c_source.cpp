@@ -134,6 +134,19 @@ class SourceReader {
   SourceReader(const std::string& bytes, const std::string& path) : scanner_(bytes, path), path_(path) {}
 
   Weights run(const std::string& key) {
+    read();
+    return weights(chosen(key));
+  }
+
+  std::map<std::string, Weights> run_all() {
+    read();
+    std::map<std::string, Weights> all;
+    for (const auto& [name, members] : objects_) all.emplace(name, weights(members));
+    return all;
+  }
+
+ private:
+  void read() {
     while (!scanner_.at_end()) {
       while (scanner_.accept_word("static") || scanner_.accept_word("const")) continue;
       if (!scanner_.accept_word("struct"))
@@ -146,10 +159,8 @@ class SourceReader {
         read_object(tag);
       }
     }
-    return weights(chosen(key));
   }
 
- private:
   void read_type(const std::string& tag) {
     std::vector<Member> members;
     while (!scanner_.accept('}')) {
@@ -282,6 +293,27 @@ bool looks_like_c_source(const std::string& bytes) {
 
 Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key) {
   return SourceReader(bytes, path).run(key);
+}
+
+std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, const std::string& path) {
+  std::size_t line = 1;
+  for (std::size_t at = 0; at < bytes.size(); ++line) {
+    const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
+    std::string_view text = std::string_view(bytes).substr(at, end - at);
+    const auto refuse = [&](const std::string& what) {
+      throw InputError({path, "line " + std::to_string(line), "", "", what, ""});
+    };
+    while (!text.empty() && (text.back() == '\r' || text.back() == ' ' || text.back() == '\t'))
+      text.remove_suffix(1);
+    while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+    // A comment before the directive, "/* */ #if", leaves it a directive.
+    const bool is_plain = text.find('#') == std::string_view::npos || text.substr(0, 8) == "#include" ||
+                          text.substr(0, 7) == "#pragma";
+    if (!is_plain) refuse("a preprocessor line, after which a compiler may read another text");
+    if (!text.empty() && text.back() == '\\') refuse("a line that is continued on the next one");
+    at = end + 1;
+  }
+  return SourceReader(bytes, path).run_all();
 }
 
 }  // namespace swarmcert::files

@@ -1,6 +1,7 @@
 /// @file Networks as C source: the layout that the networks' authors generate for the firmware.
 #pragma once
 
+#include <map>
 #include <string>
 
 #include "nn/weights/weights.h"
@@ -20,5 +21,10 @@ bool looks_like_c_source(const std::string& bytes);
 /// @param key NAME; may be empty where the file holds one network.
 /// @throws InputError with the line if the text is anything else, `key` is not in it, or as assemble().
 Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key);
+
+/// Every network of C source of that layout that holds nothing else, by NAME.
+/// @throws InputError as parse_c_source(); also for preprocessor lines other than #include and #pragma, and for
+///   continued lines, after which a compiler may read another text.
+std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, const std::string& path);
 
 }  // namespace swarmcert::files

@@ -4,6 +4,7 @@
 
 #include "analysis/gate/outputs.h"
 #include "data.h"
+#include "firmware/cortex_m_build.h"
 #include "nn/base/file_io.h"
 #include "nn/base/json.h"
 #include "nn/base/random.h"
@@ -74,11 +75,21 @@ void ReleaseFolder::certify_again() const {
     const Outcome exported = run("swarmcert export network/network.toml --force -q -o firmware");
     EXPECT_EQ(exported.exit_code, 0) << exported.output;
   }
-  const Outcome compiled =
-      run(std::string(SWARMCERT_CXX) +
-          " -std=c++17 -Ifirmware -c firmware/swarmcert_network.cpp -o firmware/network.elf");
-  const_cast<ReleaseFolder*>(this)->has_elf_ = compiled.exit_code == 0;
+  build_elf();
   write_facts(21000);
+}
+
+void ReleaseFolder::build_elf() const {
+  if (has_cortex_m_tools()) {
+    write_text(
+        folder_ / "program.cpp",
+        "#include \"swarmcert_network.h\"\n"
+        "extern \"C\" int program() { return static_cast<int>(swarmcert_network::self_test(nullptr)); }\n");
+    const Outcome built =
+        run(cortex_m_build("-Ifirmware firmware/swarmcert_network.cpp program.cpp", "firmware/network.elf"));
+    EXPECT_EQ(built.exit_code, 0) << built.output;
+    const_cast<ReleaseFolder*>(this)->has_elf_ = true;
+  }
 }
 
 void ReleaseFolder::write_facts(double flash_bytes) const {

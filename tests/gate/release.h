@@ -1,6 +1,7 @@
 /// @file A release that passes every check, made from bundled inputs and simulated flights.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,8 @@ class ReleaseFolder {
 
   /// Network, certificate, source, ELF and facts of these weights, after a weight file was changed.
   void certify_again() const;
+  /// Builds the ELF from the exported source as it lies there, where the tools are installed.
+  void build_elf() const;
   void write_facts(double flash_bytes) const;
 
   /// Files that the release rests on, relative to the folder.

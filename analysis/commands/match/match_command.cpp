@@ -5,10 +5,10 @@
 
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flown_network.h"
-#include "analysis/firmware/match.h"
+#include "analysis/firmware/match_artefact.h"
+#include "nn/base/content_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
-#include "nn/weights/functions.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -16,41 +16,80 @@ namespace {
 struct MatchOptions {
   files::NetworkArguments network;
   std::vector<std::string> words;  ///< NET FILE, or FILE with --phi and --rho
-  std::string file, as;
+  std::string file, as, certificate;
+  int most_neighbours = firmware::ExportOptions().most_neighbours;
 };
 
-files::Json json_of(const firmware::Difference& difference) {
-  files::Json json = {{"network", difference.part},
-                      {"layer", difference.layer},
-                      {"entry", difference.entry},
-                      {"expected", difference.expected},
-                      {"expected_hex", files::hex_float(static_cast<double>(difference.expected))},
-                      {"found", nullptr},
-                      {"name", difference.name},
-                      {"place", difference.place}};
-  if (difference.found) {
-    json["found"] = *difference.found;
-    json["found_hex"] = files::hex_float(static_cast<double>(*difference.found));
+/// Keys of a changed number and of a changed file; null where the difference is neither of the kind.
+files::Json first_difference_of(const firmware::ArtefactMatch& match) {
+  if (!match.first_difference) return {};
+  files::Json json = {{"what", *match.first_difference}};
+  if (const auto& file = match.file_difference) {
+    json["file"] = file->file;
+    json["line"] = file->line > 0 ? files::Json(file->line) : files::Json();
+    json["expected"] = file->expected;
+    json["found"] = file->found;
+  }
+  if (const auto& number = match.number_difference) {
+    json["network"] = number->part;
+    json["layer"] = number->layer;
+    json["entry"] = number->entry;
+    json["expected"] = number->expected;
+    json["expected_hex"] = files::hex_float(static_cast<double>(number->expected));
+    json["found"] = number->found ? files::Json(*number->found) : files::Json();
+    if (number->found) json["found_hex"] = files::hex_float(static_cast<double>(*number->found));
+    json["name"] = number->name;
+    json["place"] = number->place;
   }
   return json;
 }
 
-void print(const firmware::MatchResult& result, const std::string& file) {
-  if (result.equal) {
-    fmt::print("equal: {} holds all {} weights and biases, in {} arrays, bit for bit\n", file, result.numbers,
-               result.arrays);
-    return;
-  }
-  const firmware::Difference& difference = *result.first_difference;
-  if (difference.found) {
-    fmt::print("different: {} {} {} is {} in the network, {} in {} ({}, {})\n", difference.part,
-               difference.layer, difference.entry, files::hex_float(static_cast<double>(difference.expected)),
-               files::hex_float(static_cast<double>(*difference.found)), file, difference.name,
-               difference.place);
+void add_json(const firmware::ArtefactMatch& match, files::Json& json) {
+  const bool is_open = match.verdict == firmware::ArtefactVerdict::kInconclusive;
+  json["verdict"] = firmware::name(match.verdict);
+  json["equal"] = is_open ? files::Json() : files::Json(match.verdict == firmware::ArtefactVerdict::kEqual);
+  json["arrays"] = match.arrays;
+  json["numbers"] = match.numbers;
+  json["files"] = match.files;
+  json["compared"] = match.compared;
+  json["not_checked"] = match.not_checked;
+  json["not_covered"] = match.not_covered;
+  json["parameters"] = nullptr;
+  if (match.parameters)
+    json["parameters"] = {{"most_neighbours", match.parameters->most_neighbours},
+                          {"seed", match.parameters->seed},
+                          {"certificate", match.parameters->certificate_sha256}};
+  json["first_difference"] = first_difference_of(match);
+}
+
+void print(const firmware::ArtefactMatch& match, const std::string& file) {
+  if (match.first_difference) {
+    fmt::print("different: {}\n", *match.first_difference);
+  } else if (match.arrays == 0) {
+    fmt::print("equal: {} is byte for byte as exported\n", file);
+  } else if (match.not_checked.empty()) {
+    fmt::print("equal: {} holds all {} weights and biases, in {} arrays, bit for bit\n", file, match.numbers,
+               match.arrays);
   } else {
-    fmt::print("different: nothing in {} resembles {} {} {}\n", file, difference.part, difference.layer,
-               difference.entry);
+    fmt::print(
+        "inconclusive: {} holds all {} weights and biases, bit for bit, and not all of it was checked\n",
+        file, match.numbers);
   }
+  for (const std::string& what : match.compared) fmt::print("  compared: {}\n", what);
+  for (const std::string& what : match.not_checked) fmt::print("  not checked: {}\n", what);
+  for (const std::string& what : match.not_covered) fmt::print("  not covered: {}\n", what);
+}
+
+int exit_code(firmware::ArtefactVerdict verdict) {
+  switch (verdict) {
+    case firmware::ArtefactVerdict::kEqual:
+      return kDone;
+    case firmware::ArtefactVerdict::kDifferent:
+      return kViolated;
+    case firmware::ArtefactVerdict::kInconclusive:
+      break;
+  }
+  return kInconclusive;
 }
 
 int run_match(MatchOptions options, const CommonOptions& common) {
@@ -61,37 +100,41 @@ int run_match(MatchOptions options, const CommonOptions& common) {
   if (options.words.size() == 2) options.network.file = options.words.front();
   bool is_rounded = false;
   const files::Network network = load_flown_net(options.network, options.as, is_rounded);
-  const std::string bytes = files::read_file(options.file);
-  const firmware::MatchResult result =
-      match(network, firmware::is_elf(bytes) ? firmware::blocks_in_elf(bytes, options.file)
-                                             : firmware::blocks_in_source(bytes, options.file));
   std::vector<std::string> inputs = input_files(network);
-  inputs.push_back(options.file);
+  firmware::ArtefactOptions artefact;
+  artefact.most_neighbours = options.most_neighbours;
+  if (!options.certificate.empty()) {
+    inputs.push_back(options.certificate);
+    artefact.source.certificate_sha256 =
+        files::content_sha256(files::parse_json(files::read_file(options.certificate), options.certificate));
+  }
+  const firmware::ArtefactMatch match = match_artefact(network, options.file, artefact);
+  inputs.insert(inputs.end(), match.files.begin(), match.files.end());
   files::Json json = result_head("match", inputs);
   json["as"] = is_rounded ? files::Json("float32") : files::Json();
-  json["equal"] = result.equal;
-  json["arrays"] = result.arrays;
-  json["numbers"] = result.numbers;
-  json["first_difference"] = result.first_difference ? json_of(*result.first_difference) : files::Json();
+  add_json(match, json);
   write_result(common, json);
-  if (common.prints_text()) print(result, options.file);
-  return result.equal ? kDone : kViolated;
+  if (common.prints_text()) print(match, options.file);
+  return exit_code(match.verdict);
 }
 
 }  // namespace
 
 Command match_command() {
-  return {"match", "Whether a source file or an ELF holds exactly these weights",
-          "Every weight matrix, in the layout of an export, row by row or transposed, and every bias must "
-          "stand in FILE bit for bit: C "
-          "or C++ source "
-          "of\nours or of the networks' authors, or a little-endian ELF with or without symbols. Exit code 1 "
-          "and the first\n"
-          "difference otherwise. With --phi and --rho, NET is those two files.\n\n"
-          "Example: swarmcert match nn/networks/demo/network.toml firmware/swarmcert_network.cpp",
+  return {"match", "Whether firmware source or an ELF is exactly this network",
+          "FILE is the folder of an export, or one of its files: the export is regenerated and every file "
+          "compared byte for byte,\n"
+          "with CR LF at line ends read as LF. In other C or C++ source and in a little-endian ELF, with or "
+          "without symbols,\n"
+          "every weight and bias must stand bit for bit; the evaluator in a linked ELF for Cortex-M is run "
+          "with golden vectors\n"
+          "where qemu-system-arm is installed. Exit code 0 if all is equal; 1 and the first difference; 4 if "
+          "something\n"
+          "could not be checked. With --phi and --rho, NET is those two files.\n\n"
+          "Example: swarmcert match nn/networks/demo/network.toml firmware",
           [](CLI::App& app) {
             const auto options = std::make_shared<MatchOptions>();
-            app.add_option("NET FILE", options->words, "The network, then the source file or ELF")
+            app.add_option("NET FILE", options->words, "The network, then a folder, source file or ELF")
                 ->required()
                 ->expected(1, 2);
             auto* phi = app.add_option("--phi", options->network.phi, "Weight file of phi, instead of NET");
@@ -101,6 +144,12 @@ Command match_command() {
             app.add_option("--key", options->network.key,
                            "Where the state dict lies inside a nested checkpoint");
             declare_as(app, options->as);
+            app.add_option("--certificate", options->certificate,
+                           "Certificate that an export was made with, if it names one");
+            app.add_option("--most-neighbours", options->most_neighbours,
+                           "Neighbours of one evaluation in an ELF, as at its export")
+                ->check(CLI::Range(1, 64))
+                ->capture_default_str();
             return [options](const CommonOptions& common) { return run_match(*options, common); };
           }};
 }

@@ -1,8 +1,7 @@
-#include "analysis/firmware/match.h"
-
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "analysis/firmware/float_blocks.h"
+#include "analysis/firmware/match_artefact.h"
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "nn/base/file_io.h"
@@ -10,27 +9,36 @@
 #include "nn/base/toml.h"
 
 namespace swarmcert::gate {
+
 Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf) {
   Check check = row(name, line);
-  const std::string bytes = files::read_file(path);
-  if (is_elf && !firmware::is_elf(bytes)) {
+  if (is_elf && !firmware::is_elf(files::read_file(path))) {
     fail(check, path + " is no ELF");
     return check;
   }
-  const firmware::MatchResult result =
-      match(evidence.flown(), firmware::is_elf(bytes) ? firmware::blocks_in_elf(bytes, path)
-                                                      : firmware::blocks_in_source(bytes, path));
-  if (result.equal) {
-    pass(check);
-    check.witness =
-        fmt::format("{} weights and biases in {} arrays, bit for bit", result.numbers, result.arrays);
-  } else {
-    fail(check, path + " does not hold these weights");
-    const firmware::Difference& d = *result.first_difference;
-    check.witness = d.found ? fmt::format("{} {} {} is {} in the network, {} in {} ({})", d.part, d.layer,
-                                          d.entry, files::hex_float(static_cast<double>(d.expected)),
-                                          files::hex_float(static_cast<double>(*d.found)), d.name, d.place)
-                            : fmt::format("nothing resembles {} {} {}", d.part, d.layer, d.entry);
+  const Release& release = evidence.release();
+  firmware::ArtefactOptions options;
+  options.source.needs_all = true;
+  for (const EvidenceFile& file : evidence_files(evidence.policy(), ""))
+    options.source.other_contents.push_back(file.path);
+  if (!release.certificate.empty())
+    // The hash that it states: whether the certificate has that content is the business of [certificate].
+    options.source.certificate_sha256 = evidence.certificate().value("content_sha256", "");
+  if (release.most_neighbours > 0) options.most_neighbours = release.most_neighbours;
+  const firmware::ArtefactMatch match = match_artefact(evidence.flown(), path, options);
+  switch (match.verdict) {
+    case firmware::ArtefactVerdict::kEqual:
+      pass(check);
+      check.witness = fmt::format("compared {}", fmt::join(match.compared, "; "));
+      break;
+    case firmware::ArtefactVerdict::kDifferent:
+      fail(check, path + " is not this network");
+      check.witness = *match.first_difference;
+      break;
+    case firmware::ArtefactVerdict::kInconclusive:
+      check.reason = fmt::format("not checked: {}", fmt::join(match.not_checked, "; "));
+      check.witness = fmt::format("compared {}", fmt::join(match.compared, "; "));
+      break;
   }
   return check;
 }

@@ -13,7 +13,7 @@ const std::vector<CheckKind>& check_kinds() {
       {"theorem", "hypotheses of the tracking theorem", read_theorem},
       {"tracking", "bound on the tracking error", read_tracking},
       {"small_gain", "margin of the swarm's small gain", read_small_gain},
-      {"match", "source and ELF hold these weights", read_match},
+      {"match", "the exported source and the ELF are this network", read_match},
       {"firmware_facts", "flash, RAM, stack and times", read_firmware_facts},
       {"residual", "the model on reference flights", read_residual},
       {"regression", "against the baseline", read_regression},

@@ -1,0 +1,245 @@
+#include "analysis/firmware/match_export.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+
+#include "analysis/firmware/flight_headers.h"
+#include "nn/base/file_io.h"
+
+namespace swarmcert::firmware {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> generated_names() {
+  std::vector<std::string> names = {kExportedHeader, kExportedSource};
+  for (const FlightHeader& header : kFlightHeaders) names.emplace_back(header.name);
+  return names;
+}
+
+std::string normal(const std::string& path) { return fs::absolute(path).lexically_normal().string(); }
+
+std::string with_line_feeds(const std::string& text) {
+  std::string result;
+  result.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '\r' || i + 1 == text.size() || text[i + 1] != '\n') result += text[i];
+  }
+  return result;
+}
+
+/// The line that holds the byte at `at`, shortened.
+std::string line_at(const std::string& text, std::size_t at) {
+  if (at >= text.size()) return "";
+  const std::size_t before = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
+  const std::size_t first = before == std::string::npos ? 0 : before + 1;
+  std::string line = text.substr(first, std::min(text.find('\n', at), text.size()) - first).substr(0, 160);
+  for (char& c : line) c = c < ' ' || c > '~' ? '?' : c;
+  return line;
+}
+
+std::optional<FileDifference> difference_of(const std::string& file, const std::string& expected,
+                                            const std::string& found) {
+  const auto [mine, other] = std::mismatch(expected.begin(), expected.end(), found.begin(), found.end());
+  if (mine == expected.end() && other == found.end()) return std::nullopt;
+  const auto at = static_cast<std::size_t>(mine - expected.begin());
+  FileDifference difference;
+  difference.file = file;
+  difference.line = 1 + static_cast<std::size_t>(std::count(expected.begin(), mine, '\n'));
+  difference.expected = line_at(expected, at);
+  difference.found = line_at(found, at);
+  difference.what = at == found.size() ? "the file ends here, the export goes on"
+                    : at == expected.size()
+                        ? "the file goes on where the export ends"
+                        : fmt::format("is '{}', exported is '{}'", difference.found, difference.expected);
+  return difference;
+}
+
+/// The number or word behind `name` in the line of parameters; empty if there is none.
+std::string parameter(const std::string& text, const std::string& name) {
+  const std::size_t line = text.find(kParameterLine);
+  if (line == std::string::npos) return "";
+  const std::size_t end = std::min(text.find_first_of("\r\n", line), text.size());
+  const std::size_t at = text.find(" " + name + " ", line);
+  if (at == std::string::npos || at >= end) return "";
+  const std::size_t first = at + name.size() + 2;
+  return text.substr(first, std::min(text.find_first_of(",\r\n", first), text.size()) - first);
+}
+
+template <typename Number>
+void read_number(const std::string& word, Number least, Number most, Number& value) {
+  Number read = 0;
+  const char* const last = word.data() + word.size();
+  const auto [end, error] = std::from_chars(word.data(), last, read);
+  if (error == std::errc() && end == last && read >= least && read <= most) value = read;
+}
+
+/// The parameters that a file states; what it does not state in a possible form stays as by default, and differs then.
+ExportOptions stated_parameters(const std::string& text) {
+  ExportOptions options;
+  read_number(parameter(text, "most_neighbours"), 1, 64, options.most_neighbours);
+  read_number<std::uint64_t>(parameter(text, "seed"), 0, ~std::uint64_t{0}, options.seed);
+  const std::string hash = parameter(text, "certificate");
+  if (hash.size() == 64 && hash.find_first_not_of("0123456789abcdef") == std::string::npos)
+    options.certificate_sha256 = hash;
+  return options;
+}
+
+/// Which file of an export `path` is: by its name, else by what its first line says.
+std::string generated_name(const std::string& path, const std::string& bytes) {
+  const std::string whole = normal(path);
+  for (const std::string& name : generated_names()) {
+    const std::string ending = "/" + name;
+    if (whole.size() > ending.size() &&
+        whole.compare(whole.size() - ending.size(), ending.size(), ending) == 0)
+      return name;
+  }
+  const std::string first_line = bytes.substr(0, bytes.find('\n'));
+  if (first_line.find(kGeneratedMark) == std::string::npos) return "";
+  return first_line.find("@file") == std::string::npos ? kExportedSource : kExportedHeader;
+}
+
+std::string folder_of(const std::string& path, const std::string& name) {
+  std::string folder = path.substr(0, path.size() - name.size());
+  while (folder.size() > 1 && folder.back() == '/') folder.pop_back();
+  return folder.empty() ? "." : folder;
+}
+
+bool has_name(const std::string& path, const std::string& name) {
+  return path.size() >= name.size() && path.compare(path.size() - name.size(), name.size(), name) == 0;
+}
+
+std::optional<FileDifference> additional_file(const std::string& folder,
+                                              const std::vector<std::string>& others) {
+  std::vector<std::string> known;
+  for (const std::string& name : generated_names()) known.push_back(normal(folder + "/" + name));
+  for (const std::string& other : others) known.push_back(normal(other));
+  std::vector<std::string> additional;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_directory() && !entry.is_symlink()) continue;
+    if (std::find(known.begin(), known.end(), normal(entry.path().string())) == known.end())
+      additional.push_back(entry.path().lexically_normal().string());
+  }
+  if (additional.empty()) return std::nullopt;
+  const std::string& first = *std::min_element(additional.begin(), additional.end());
+  return FileDifference{first, 0, "", "",
+                        "is no file of the export: a compiler may take it in place of a header"};
+}
+
+/// Compares the files of one export.
+class ExportComparison {
+ public:
+  ExportComparison(const files::Network& network, const ExportMatchOptions& options)
+      : network_(network), options_(options) {}
+
+  void add(const std::string& name, const std::string& path, const std::string& bytes) {
+    read_.push_back({name, path, with_line_feeds(bytes)});
+  }
+  void note(FileDifference difference) {
+    if (!result_.first_difference) result_.first_difference = std::move(difference);
+  }
+  void absent(const std::string& path) { result_.absent.push_back(path); }
+
+  ExportMatch run() {
+    result_.parameters = parameters();
+    const std::optional<std::string>& certificate = options_.certificate_sha256;
+    const std::string& stated = result_.parameters.certificate_sha256;
+    const std::vector<SourceFile> expected = export_source(network_, result_.parameters);
+    for (const Read& read : read_) {
+      result_.compared.push_back(read.path);
+      const auto same = [&read](const SourceFile& file) { return file.name == read.name; };
+      const SourceFile& file = *std::find_if(expected.begin(), expected.end(), same);
+      if (auto difference = difference_of(read.path, with_line_feeds(file.contents), read.text))
+        note(std::move(*difference));
+    }
+    if (certificate && !stated.empty() && stated != *certificate && !read_.empty())
+      note({read_.front().path, 0, "", "",
+            "was exported with the certificate " + stated + ", not with " + *certificate});
+    return std::move(result_);
+  }
+
+ private:
+  struct Read {
+    std::string name, path, text;
+  };
+
+  /// Of the first file that states any; the evaluator's headers have none.
+  ExportOptions parameters() const {
+    for (const Read& read : read_) {
+      if (read.text.find(kParameterLine) != std::string::npos) return stated_parameters(read.text);
+    }
+    return {};
+  }
+
+  const files::Network& network_;
+  const ExportMatchOptions& options_;
+  std::vector<Read> read_;
+  ExportMatch result_;
+};
+
+}  // namespace
+
+bool is_exported_file(const std::string& path, const std::string& bytes) {
+  return !generated_name(path, bytes).empty();
+}
+
+bool holds_export(const std::string& folder) {
+  for (const std::string& name : generated_names()) {
+    if (fs::exists(fs::path(folder) / name)) return true;
+  }
+  return false;
+}
+
+std::vector<std::string> files_of_export(const std::string& path) {
+  std::string folder = path;
+  if (!fs::is_directory(path)) {
+    const std::string name = generated_name(path, "");
+    if (name.empty() || !has_name(path, name)) return {};
+    folder = folder_of(path, name);
+  }
+  std::vector<std::string> paths;
+  for (const std::string& name : generated_names())
+    paths.push_back((fs::path(folder) / name).lexically_normal().string());
+  return paths;
+}
+
+ExportMatch match_export(const files::Network& network, const std::string& path,
+                         const ExportMatchOptions& options) {
+  ExportComparison comparison(network, options);
+  const bool is_folder = fs::is_directory(path);
+  const bool needs_all = is_folder || options.needs_all;
+  std::string named, folder = path;
+  if (!is_folder) {
+    const std::string bytes = files::read_file(path);
+    named = generated_name(path, bytes);
+    comparison.add(named, path, bytes);
+    if (!has_name(path, named)) {  // a copy under another name: nothing lies beside it
+      for (const std::string& name : generated_names())
+        if (name != named) comparison.absent(name);
+      if (options.needs_all)
+        comparison.note({path, 0, "", "", "does not have its name in the export, " + named});
+      return comparison.run();
+    }
+    folder = folder_of(path, named);
+  }
+  for (const std::string& name : generated_names()) {
+    if (name == named) continue;
+    const std::string file = (fs::path(folder) / name).lexically_normal().string();
+    if (fs::exists(file)) {
+      comparison.add(name, file, files::read_file(file));
+    } else {
+      comparison.absent(file);
+      if (needs_all) comparison.note({file, 0, "", "", "is missing"});
+    }
+  }
+  if (needs_all) {
+    if (auto additional = additional_file(folder, options.other_contents))
+      comparison.note(std::move(*additional));
+  }
+  return comparison.run();
+}
+
+}  // namespace swarmcert::firmware
