@@ -12,7 +12,6 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <map>
 #include <regex>
 #include <system_error>
 
@@ -81,11 +80,14 @@ std::string explain(const CLI::App& app, const CLI::ParseError& error, int argc,
 }
 
 void declare_common(CLI::App& app, CommonOptions& common) {
-  app.add_option("--json", common.json, "Write the result as JSON to this file; - for standard output");
-  app.add_option("-j,--jobs", common.jobs, "Threads; results do not depend on it (default: all)")
+  using swarmcert::analysis::leave_out_of_record;
+  swarmcert::analysis::add_output(app, "--json", common.json,
+                                  "Write the result as JSON to this file; - for standard output");
+  leave_out_of_record(
+      app.add_option("-j,--jobs", common.jobs, "Threads; results do not depend on it (default: all)"))
       ->check(CLI::NonNegativeNumber);
-  app.add_flag("--force", common.force, "Replace files that exist");
-  app.add_flag("-q,--quiet", common.quiet, "No progress on standard error");
+  leave_out_of_record(app.add_flag("--force", common.force, "Replace files that exist"));
+  leave_out_of_record(app.add_flag("-q,--quiet", common.quiet, "No progress on standard error"));
 }
 
 /// Range checks let NaN pass, and no option means anything by it; where no number may be negative, the parser makes a
@@ -104,24 +106,6 @@ void refuse_nan_and_wrapped(const CLI::App& command) {
       if (value.substr(value.find_first_not_of("+-") == std::string::npos ? 0 : value.find_first_not_of("+-"),
                        3) == "nan")
         throw swarmcert::analysis::UsageError(option->get_name() + " " + value + ": give a number");
-    }
-  }
-}
-
-/// Two results in one file: one of them would be lost.
-void refuse_shared_output(const CLI::App& command) {
-  std::map<std::string, std::string> written_by;
-  for (const CLI::Option* option : command.get_options()) {
-    for (const char* name :
-         {"--json", "-o", "--report", "--csv", "--fitted", "--junit", "--sarif", "--markdown", "--bundle"}) {
-      if (!option->check_name(name) || option->count() == 0) continue;
-      const std::string& path = option->results().back();
-      const std::string target =
-          path == "-" ? path : std::filesystem::weakly_canonical(std::filesystem::absolute(path)).string();
-      const auto [other, is_new] = written_by.emplace(target, name);
-      if (!is_new)
-        throw swarmcert::analysis::UsageError(
-            fmt::format("{} and {} both write {}: name two files", other->second, name, path));
     }
   }
 }
@@ -161,9 +145,9 @@ int run(int argc, char** argv) {
   }
   for (const CLI::App* sub : app.get_subcommands()) {
     refuse_nan_and_wrapped(*sub);
-    refuse_shared_output(*sub);
+    swarmcert::analysis::refuse_shared_output(*sub);
+    swarmcert::analysis::remember_command_line(argc, argv, *sub);
   }
-  swarmcert::analysis::remember_command_line(argc, argv);
   return action(common);
 }
 

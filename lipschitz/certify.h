@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "lipschitz/bounds.h"
 #include "lipschitz/branch/local_bound.h"
+#include "lipschitz/checker/bounds.h"
 #include "lipschitz/claims.h"
 #include "lipschitz/lower_bound.h"
 #include "lipschitz/sdp_bound.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "lipschitz/bounds.h"
+#include "lipschitz/checker/bounds.h"
 #include "lipschitz/checker/dyadic.h"
 #include "lipschitz/lmi_proof.h"
 #include "nn/weights/network.h"

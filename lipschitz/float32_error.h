@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "lipschitz/bounds.h"
 #include "lipschitz/box.h"
+#include "lipschitz/checker/bounds.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {

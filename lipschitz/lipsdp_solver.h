@@ -5,7 +5,7 @@
 #include <atomic>
 #include <vector>
 
-#include "lipschitz/bounds.h"
+#include "lipschitz/checker/bounds.h"
 #include "lipschitz/interior_point.h"
 
 namespace swarmcert::lipschitz {

@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "lipschitz/bounds.h"
 #include "lipschitz/box.h"
+#include "lipschitz/checker/bounds.h"
 #include "lipschitz/checker/witness.h"
 
 namespace swarmcert::lipschitz {

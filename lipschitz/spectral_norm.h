@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "lipschitz/bounds.h"
+#include "lipschitz/checker/bounds.h"
 #include "lipschitz/lmi_proof.h"
 #include "nn/weights/weights.h"
 

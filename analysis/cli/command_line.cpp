@@ -1,11 +1,20 @@
 #include "analysis/cli/command_line.h"
 
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
 #include <set>
 
+#include "analysis/cli/command.h"
 #include "analysis/report/report_text.h"
 
 namespace swarmcert::analysis {
 namespace {
+
+/// The type name by which --help shows outputs, and by which they are recognised.
+constexpr const char* kOutput = "OUTPUT";
 
 struct Remembered {
   std::vector<std::string> words;
@@ -17,44 +26,79 @@ Remembered& remembered() {
   return line;
 }
 
-}  // namespace
+/// Names of the options that are not recorded, with their dashes.
+struct Unrecorded {
+  std::set<std::string> flags, with_value;
 
-void remember_command_line(int argc, const char* const* argv) {
-  static const std::set<std::string> with_value = {
-      "--jobs",   "-j",       "--json",  "-o",      "--output",   "--report", "--csv",
-      "--fitted", "--inject", "--junit", "--sarif", "--markdown", "--bundle"};
-  const auto note = [](const std::string& word) {
-    if (word == "-o" || word == "--output") remembered().has_output = true;
-    if (word == "--report") remembered().has_report = true;
-  };
-  // An interrupted run that went on has the result of an unbroken one.
-  static const std::set<std::string> flags = {"-q", "--quiet", "--force", "--github", "--resume"};
-  // "-j2", "-qj2", "-qj 2", "-ofile": one dash, then flags, then perhaps an option with its value.
-  const auto short_options = [](const std::string& word) {
+  explicit Unrecorded(const CLI::App& command) {
+    for (const CLI::Option* option : command.get_options()) {
+      if (option->get_configurable()) continue;
+      std::set<std::string>& names = option->get_expected_max() == 0 ? flags : with_value;
+      for (const std::string& name : option->get_lnames()) names.insert("--" + name);
+      for (const std::string& name : option->get_snames()) names.insert("-" + name);
+    }
+  }
+
+  /// Where in a cluster such as "-j2", "-qj2" or "-qofile" the option with a value stands; its size if there are only
+  /// flags in it; npos if `word` is no cluster of unrecorded options.
+  std::size_t value_in_cluster(const std::string& word) const {
     if (word.size() < 3 || word[0] != '-' || word[1] == '-') return std::string::npos;
     std::size_t at = 1;
-    while (at < word.size() && word[at] == 'q') ++at;
-    return at == word.size() || word[at] == 'j' || word[at] == 'o' ? at : std::string::npos;
-  };
+    while (at < word.size() && flags.count({'-', word[at]}) == 1) ++at;
+    return at == word.size() || with_value.count({'-', word[at]}) == 1 ? at : std::string::npos;
+  }
+};
+
+void note_output(const std::string& name) {
+  if (name == "-o" || name == "--output") remembered().has_output = true;
+  if (name == "--report") remembered().has_report = true;
+}
+
+}  // namespace
+
+CLI::Option* add_output(CLI::App& app, const std::string& names, std::string& path,
+                        const std::string& description) {
+  return leave_out_of_record(app.add_option(names, path, description))->type_name(kOutput);
+}
+
+CLI::Option* leave_out_of_record(CLI::Option* option) { return option->configurable(false); }
+
+void refuse_shared_output(const CLI::App& command) {
+  std::map<std::string, std::string> written_by;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_type_name() != kOutput || option->count() == 0) continue;
+    const std::string& path = option->results().back();
+    const std::string name =
+        option->get_lnames().empty() ? option->get_name() : "--" + option->get_lnames()[0];
+    const std::string target =
+        path == "-" ? path : std::filesystem::weakly_canonical(std::filesystem::absolute(path)).string();
+    const auto [other, is_new] = written_by.emplace(target, name);
+    if (!is_new)
+      throw UsageError(fmt::format("{} and {} both write {}: name two files", other->second, name, path));
+  }
+}
+
+void remember_command_line(int argc, const char* const* argv, const CLI::App& command) {
+  const Unrecorded unrecorded(command);
+  remembered() = {};
   std::vector<std::string>& words = remembered().words;
-  remembered().has_output = remembered().has_report = false;
   words = {"swarmcert"};
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
-    if (flags.count(word) == 1) continue;
-    if (with_value.count(word) == 1) {
-      note(word);
+    if (unrecorded.flags.count(word) == 1) continue;
+    if (unrecorded.with_value.count(word) == 1) {
+      note_output(word);
       ++i;
       continue;
     }
-    if (const std::size_t at = short_options(word); at != std::string::npos) {
-      if (at < word.size() && word[at] == 'o') remembered().has_output = true;
+    if (const std::size_t at = unrecorded.value_in_cluster(word); at != std::string::npos) {
+      if (at < word.size()) note_output({'-', word[at]});
       if (at + 1 == word.size()) ++i;  // its value is the next word
       continue;
     }
     const std::string before_equals = word.substr(0, word.find('='));
-    if (before_equals != word && with_value.count(before_equals) == 1) {
-      note(before_equals);
+    if (before_equals != word && unrecorded.with_value.count(before_equals) == 1) {
+      note_output(before_equals);
       continue;
     }
     words.push_back(word);

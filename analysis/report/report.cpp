@@ -7,7 +7,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "analysis/cli/command_line.h"
 #include "analysis/report/report_drawing.h"
 #include "analysis/report/report_scripts.h"
 #include "analysis/report/report_svg.h"
@@ -165,8 +164,8 @@ std::string Report::write(const std::string& folder, bool overwrite) const {
   std::size_t next_figure = 0;
   for (const std::string& part : body_) html += part.empty() ? drawn(figures_[next_figure++], folder) : part;
   html += "<h2>How it was made</h2>\n";
-  if (const std::string command = command_.empty() ? command_to_copy() : command_; !command.empty()) {
-    html += "<pre id=\"command\">" + html_text(command) +
+  if (!command_.empty()) {
+    html += "<pre id=\"command\">" + html_text(command_) +
             "</pre>\n<button type=\"button\" data-copies=\"command\" hidden>Copy the command</button>\n";
   }
   if (!result_json_.empty()) {

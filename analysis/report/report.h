@@ -37,7 +37,7 @@ class Report {
   /// The result as JSON goes into the page.
   void result(const nlohmann::ordered_json& result);
 
-  /// The command that made it, for a shell; without: command_to_copy().
+  /// The command that made it, as a line for a shell; the page shows it.
   void made_by(const std::string& command);
 
   void heading(const std::string& text);

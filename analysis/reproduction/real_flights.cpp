@@ -222,7 +222,7 @@ void deep_set_alone(const Setting& setting, Finding& finding) {
 }  // namespace
 
 Finding real_flights(const Setting& setting) {
-  if (!fs::exists(fs::path(setting.recorded) / "flights")) {
+  if (setting.recorded.empty() || !fs::exists(fs::path(setting.recorded) / "flights")) {
     throw files::InputError({setting.recorded, "", "--recorded", "",
                              "no folder with flights and weights of the published data",
                              "see the README on where to get it, and name its folder"});

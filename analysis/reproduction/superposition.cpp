@@ -106,8 +106,8 @@ void add_simulated(const Setting& setting, const Truth& truth, Table& table, Fin
 
 /// Recorded flights of three small vehicles: the measured force, less what two-vehicle flights say of each neighbour.
 void add_recorded(const Setting& setting, const Truth& truth, Table& table, Finding& finding) {
-  if (!fs::exists(fs::path(setting.recorded) / "flights")) {
-    finding.notes.push_back("No recorded flights: " + setting.recorded + " is not there.");
+  if (setting.recorded.empty() || !fs::exists(fs::path(setting.recorded) / "flights")) {
+    finding.notes.push_back("Recorded flights are left out: --recorded names no folder that has them.");
     return;
   }
   residuals::InputArguments arguments;

@@ -4,10 +4,10 @@
 #include <map>
 #include <optional>
 
-#include "lipschitz/bounds.h"
 #include "lipschitz/branch/branch.h"
 #include "lipschitz/branch/rho_form.h"
 #include "lipschitz/branch/sum_range.h"
+#include "lipschitz/checker/bounds.h"
 #include "lipschitz/checker/tree_proof.h"
 #include "lipschitz/claims.h"
 #include "nn/weights/network.h"

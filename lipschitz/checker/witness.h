@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "lipschitz/bounds.h"
+#include "lipschitz/checker/bounds.h"
 #include "nn/weights/network.h"
 #include "nn/weights/weights.h"
 

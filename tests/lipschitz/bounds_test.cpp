@@ -1,4 +1,4 @@
-#include "lipschitz/bounds.h"
+#include "lipschitz/checker/bounds.h"
 
 #include <gtest/gtest.h>
 

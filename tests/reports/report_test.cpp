@@ -156,19 +156,26 @@ TEST(Report, CommandsAreReadBackByTheShellAsTheSameWords) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "pwned"));
 }
 
+/// What command_to_copy() gives after `words` were parsed by a command with the usual options.
+std::string copied(const std::vector<const char*>& words) {
+  CLI::App command;
+  std::string path;
+  int jobs = 0;
+  add_output(command, "-o,--output", path, "");
+  add_output(command, "--report", path, "");
+  leave_out_of_record(command.add_option("-j,--jobs", jobs, ""));
+  leave_out_of_record(command.add_flag("-q,--quiet", ""));
+  remember_command_line(static_cast<int>(words.size()), words.data(), command);
+  return command_to_copy();
+}
+
 TEST(Report, CommandToCopyNamesOutputsButNotWhereTheyWent) {
-  const char* const words[] = {"swarmcert", "add",    "ground", "a b.toml", "-o",
-                               "x.toml",    "--jobs", "2",      "--report", "r"};
-  remember_command_line(10, words);
-  EXPECT_EQ(command_to_copy(), "swarmcert add ground 'a b.toml' -o OUTPUT --report REPORT");
-  const char* const others[] = {"swarmcert", "bound", "--report=r", "-q"};
-  remember_command_line(4, others);
-  EXPECT_EQ(command_to_copy(), "swarmcert bound --report REPORT");
-  const char* const demo[] = {"swarmcert", "demo"};
-  remember_command_line(2, demo);
-  EXPECT_EQ(command_to_copy(), "swarmcert demo");
-  const char* const none[] = {"swarmcert"};
-  remember_command_line(1, none);
+  EXPECT_EQ(
+      copied({"swarmcert", "add", "ground", "a b.toml", "-o", "x.toml", "--jobs", "2", "--report", "r"}),
+      "swarmcert add ground 'a b.toml' -o OUTPUT --report REPORT");
+  EXPECT_EQ(copied({"swarmcert", "bound", "--report=r", "-q"}), "swarmcert bound --report REPORT");
+  EXPECT_EQ(copied({"swarmcert", "add", "-qj2", "-ox", "-qj", "3"}), "swarmcert add -o OUTPUT");
+  EXPECT_EQ(copied({"swarmcert", "demo"}), "swarmcert demo");
 }
 
 TEST(Report, DrawingsKeepShapesAndTextOnly) {

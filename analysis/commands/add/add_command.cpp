@@ -3,6 +3,7 @@
 #include <memory>
 #include <sstream>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/add/add_report.h"
 #include "analysis/commands/commands.h"
@@ -241,10 +242,10 @@ Command add_command() {
         app.add_option("EFFECT", options->effects, "Names of effects with commas between, auto, undo or show")
             ->required();
         declare_flights(app, options->flights, false);
-        app.add_option("-o,--output", options->output, "The new model.toml");
+        add_output(app, "-o,--output", options->output, "The new model.toml");
         app.add_flag("--keep-anyway", options->keep_anyway, "Add also what does not help");
-        app.add_option("--report", options->report,
-                       "Write an HTML report with the error ladder into this folder");
+        add_output(app, "--report", options->report,
+                   "Write an HTML report with the error ladder into this folder");
         return [options](const CommonOptions& common) { return run_add(*options, common); };
       }};
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 
@@ -41,6 +42,7 @@ void add_ladder(Report& report, const std::vector<stability::LadderRow>& rows, s
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const files::Json& result,
                                 const std::string& folder, bool overwrite) {
   Report report("Error ladder");
+  report.made_by(command_to_copy());
   report.result(result);
   std::size_t number = 0;
   for (const LadderOfModel& ladder : ladders) {

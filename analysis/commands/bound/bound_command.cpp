@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/bound/bound_extras.h"
 #include "analysis/commands/bound/bound_output.h"
@@ -170,7 +171,7 @@ Command bound_command() {
                      "trajectories that the network and the truth prove");
         declare_tube(app, options->task);
         app.add_option("--swarm", options->swarm, "swarm.toml: do the vehicles' mutual forces stay bounded?");
-        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+        add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options, uncertain](const CommonOptions& common) {
           options->is_uncertain = uncertain->count() > 0;
           return run_bound(*options, common);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/commands/bound/tube_output.h"
 #include "analysis/report/report.h"
 
@@ -106,6 +107,7 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
                                const TrackingReport& tracking, const std::optional<LocalTube>& local_tube,
                                const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Tracking bounds");
+  report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(fmt::format("Gains {} on model {}, {} kg. Disturbance: {}.", input.gains.path,
                                input.model.path, input.plant.mass_kg, disturbance.source.kind));

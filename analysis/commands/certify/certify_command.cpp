@@ -7,6 +7,7 @@
 #include <memory>
 #include <sstream>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/certify/certify_output.h"
 #include "analysis/commands/certify/certify_report.h"
@@ -344,8 +345,8 @@ Command certify_command() {
             ->check(CLI::PositiveNumber);
         app.add_option("--seed", options->certify.lower.seed, "Of the search for lower bounds")
             ->capture_default_str();
-        app.add_option("-o,--output", options->output, "Where the certificate goes");
-        app.add_option("--report", options->report, "Folder for an HTML report with its plots");
+        add_output(app, "-o,--output", options->output, "Where the certificate goes");
+        add_output(app, "--report", options->report, "Folder for an HTML report with its plots");
         return [options](const CommonOptions& common) { return run_certify(*options, common); };
       }};
 }

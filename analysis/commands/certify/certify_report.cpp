@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 #include "nn/weights/functions.h"
@@ -133,6 +134,7 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
 std::string write_certify_report(const files::Network& network, const CertifyOutput& output,
                                  const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Lipschitz certificate");
+  report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(fmt::format(
       "Verdict: {}. Every upper bound is proved in exact arithmetic for the weights as stored, in "

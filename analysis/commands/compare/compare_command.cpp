@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/compare/budget_output.h"
@@ -177,7 +178,7 @@ Command compare_command() {
       [](CLI::App& app) {
         const auto options = std::make_shared<CompareOptions>();
         declare_flights(app, options->flights, true);
-        app.add_option("--report", options->report, "Write an HTML report into this folder");
+        add_output(app, "--report", options->report, "Write an HTML report into this folder");
         app.add_option(
                "--gains", options->gains,
                "gains.toml, or KIND=gains.toml for each kind: also simulates the closed loop from the "
@@ -190,12 +191,11 @@ Command compare_command() {
                "Flights to fit: how the error of FLIGHTS falls from the nominal model by motor lag, offset "
                "per vehicle, ground, downwash and the rest; --network adds a row")
             ->allow_extra_args(false);
-        app.add_option("--fitted", options->fitted,
-                       "Folder for what --budget fitted: a model per vehicle and their flights.toml");
-        app.add_option(
-            "--inject", options->inject,
-            "Write FLIGHTS into this folder as if the model's effects had acted on them besides what "
-            "did: their force is added to the accelerometer, open loop, nothing else changes");
+        add_output(app, "--fitted", options->fitted,
+                   "Folder for what --budget fitted: a model per vehicle and their flights.toml");
+        add_output(app, "--inject", options->inject,
+                   "Write FLIGHTS into this folder as if the model's effects had acted on them besides what "
+                   "did: their force is added to the accelerometer, open loop, nothing else changes");
         app.add_flag(
             "--published-filter", options->flights.published_filter,
             "Cut and filter as the networks' authors did: 32 g (small) and 67 g (large), thrust lag 0.16 "

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -205,6 +206,7 @@ void add_learning_error(Report& report, const residuals::LearningError& learning
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
                                  const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Model against flights");
+  report.made_by(command_to_copy());
   report.result(result);
   for (const stability::Model& model : inputs.models) {
     std::string effects;

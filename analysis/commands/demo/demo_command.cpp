@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "analysis/cli/bundled.h"
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/certify/certify_output.h"
 #include "analysis/commands/certify/certify_report.h"
@@ -19,18 +21,9 @@ struct DemoOptions {
   std::string output = "swarmcert-demo";
 };
 
-/// The folder of the bundled networks: beside an installed tool, else in the source tree it was built from.
-std::filesystem::path bundled_networks() {
-  std::error_code none;
-  const std::filesystem::path tool = std::filesystem::read_symlink("/proc/self/exe", none);
-  const std::filesystem::path installed = tool.parent_path().parent_path() / "share/swarmcert/networks";
-  if (std::filesystem::exists(installed, none)) return installed;
-  return std::filesystem::path(SWARMCERT_SOURCE_DIR) / "nn/networks";
-}
-
 int run_demo(const DemoOptions& options, const CommonOptions& common) {
   files::NetworkArguments arguments;
-  arguments.file = (bundled_networks() / "demo/network.toml").string();
+  arguments.file = bundled_folder("networks", "nn/networks") + "/demo/network.toml";
   const std::filesystem::path folder = options.output;
   const std::string certificate_path = (folder / "cert.json").string();
   refuse_to_replace(common, certificate_path);
@@ -83,7 +76,7 @@ Command demo_command() {
       "Certifies a network that ships with the tool and checks the certificate.\n\nExample: swarmcert demo",
       [](CLI::App& app) {
         const auto options = std::make_shared<DemoOptions>();
-        app.add_option("-o,--output", options->output, "Folder for the results")->capture_default_str();
+        add_output(app, "-o,--output", options->output, "Folder for the results")->capture_default_str();
         return [options](const CommonOptions& common) { return run_demo(*options, common); };
       }};
 }

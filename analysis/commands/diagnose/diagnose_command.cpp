@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
@@ -228,7 +229,7 @@ Command diagnose_command() {
           [](CLI::App& app) {
             const auto options = std::make_shared<DiagnoseOptions>();
             declare_flights(app, options->flights, true);
-            app.add_option("--report", options->report, "Write an HTML report into this folder");
+            add_output(app, "--report", options->report, "Write an HTML report into this folder");
             return [options](const CommonOptions& common) { return run_diagnose(*options, common); };
           }};
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -99,6 +100,7 @@ void add_left(Report& report, const Diagnosis& diagnosis) {
 std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses, const files::Json& result,
                                   const std::string& folder, bool overwrite) {
   Report report("Which physical effect is missing");
+  report.made_by(command_to_copy());
   report.result(result);
   for (std::size_t i = 0; i < diagnoses.size(); ++i) {
     const Diagnosis& diagnosis = diagnoses[i];

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flown_network.h"
 #include "analysis/firmware/export_source.h"
@@ -97,7 +98,7 @@ Command export_command() {
       [](CLI::App& app) {
         const auto options = std::make_shared<ExportOptions>();
         declare_network(app, options->network);
-        app.add_option("-o,--output", options->output, "Folder for the source")->required();
+        add_output(app, "-o,--output", options->output, "Folder for the source")->required();
         declare_as(app, options->as);
         app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source");
         app.add_option("--most-neighbours", options->source.most_neighbours, "Neighbours of one evaluation")

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/gate/gate_report.h"
@@ -177,15 +178,15 @@ Command gate_command() {
                      "Replace the file of --baseline by this release's numbers, if all else passes");
         app.add_flag("--allow-inconclusive", options->allow_inconclusive,
                      "Checks that are inconclusive do not fail");
-        app.add_option("--junit", options->junit, "Write JUnit XML to this file");
-        app.add_option("--sarif", options->sarif, "Write SARIF 2.1.0 to this file");
-        app.add_option("--markdown", options->markdown, "Write a Markdown table to this file");
-        app.add_option("--report", options->report, "Write an HTML report into this folder");
-        app.add_flag("--github", options->github,
-                     "Print GitHub annotations, and append to the step summary ($GITHUB_STEP_SUMMARY)");
-        app.add_option(
-            "--bundle", options->bundle,
-            "Copy all evidence of a release that passes into this folder, with a manifest of hashes");
+        add_output(app, "--junit", options->junit, "Write JUnit XML to this file");
+        add_output(app, "--sarif", options->sarif, "Write SARIF 2.1.0 to this file");
+        add_output(app, "--markdown", options->markdown, "Write a Markdown table to this file");
+        add_output(app, "--report", options->report, "Write an HTML report into this folder");
+        leave_out_of_record(
+            app.add_flag("--github", options->github,
+                         "Print GitHub annotations, and append to the step summary ($GITHUB_STEP_SUMMARY)"));
+        add_output(app, "--bundle", options->bundle,
+                   "Copy all evidence of a release that passes into this folder, with a manifest of hashes");
         app.add_flag("--hashes", options->hashes,
                      "Print a table [hashes] of the release's files for the policy, and check nothing");
         return [options](const CommonOptions& common) { return run_gate(*options, common); };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/gate/text.h"
 #include "analysis/report/report.h"
 #include "nn/base/file_io.h"
@@ -49,6 +50,7 @@ void add_checks(Report& report, const gate::GateResult& result) {
 std::string write_gate_report(const gate::GateResult& result, const files::Json& json,
                               const std::string& folder, bool overwrite) {
   Report report("May this release ship?");
+  report.made_by(command_to_copy());
   report.result(json);
   std::string not_run;
   for (const std::string& name : result.not_run) not_run += (not_run.empty() ? "" : ", ") + name;

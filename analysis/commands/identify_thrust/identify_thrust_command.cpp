@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/identify_thrust/identify_thrust_report.h"
 #include "analysis/identification/thrust/thrust_identification.h"
@@ -113,7 +114,7 @@ Command identify_thrust_command() {
             ->check(CLI::Range(1, controller::kMostRotors));
         app.add_option("--confidence", options->confidence, "Of the coefficients' intervals (default: 0.95)")
             ->check(CLI::Range(0.5, 0.9999));
-        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+        add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_identify_thrust(*options, common); };
       }};
 }

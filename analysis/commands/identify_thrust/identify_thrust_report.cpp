@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -45,6 +46,7 @@ void add_polynomial(Report& report, const std::string& title, const PolynomialFi
 std::string write_thrust_report(const ThrustData& data, const ThrustIdentification& found,
                                 const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Thrust calibration");
+  report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(fmt::format("{}: {} rows; intervals of {:.6g} %. p = PWM / 65536, v = V / 4.2.", data.path,
                                data.samples.size(), 100 * found.confidence));

@@ -4,6 +4,7 @@
 #include <memory>
 #include <sstream>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/commands/commands.h"
 #include "analysis/logs/read_log.h"
 #include "nn/base/file_io.h"
@@ -262,7 +263,7 @@ Command inspect_command() {
             app.add_option("FILE", options->files,
                            "Weight files, network.toml and model.toml files, certificates, flight logs")
                 ->required();
-            app.add_option("--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
+            add_output(app, "--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
             app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
             app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
             app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/iss_check/iss_check_report.h"
@@ -262,7 +263,7 @@ Command iss_check_command() {
                        "d_m in N/s (default: a fifth of the weight over the settling time)")
             ->check(CLI::PositiveNumber);
         app.add_option("--seed", options->check.seed, "Of the random disturbances (default 0)");
-        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+        add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_iss_check(*options, common); };
       }};
 }

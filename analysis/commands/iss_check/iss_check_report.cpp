@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 
@@ -12,6 +13,7 @@ namespace swarmcert::analysis {
 std::string write_iss_check_report(const stability::IssCheck& check, const files::Json& result,
                                    const std::string& folder, bool overwrite) {
   Report report("The tracking theorem's ball under disturbances");
+  report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(check.theorem_applies ? "The theorem's hypotheses hold for these gains."
                                          : "The theorem does not apply:");

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "analysis/cli/bundled.h"
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
@@ -69,6 +71,7 @@ void print(const Finding& finding) {
 
 std::string write_report(const ReproduceOptions& options, const Finding& finding) {
   Report report("Reproduction: " + experiment(options.name).summary);
+  report.made_by(command_to_copy());
   for (const std::string& note : finding.notes) report.paragraph(note);
   for (const reproduction::Table& table : finding.tables) {
     report.heading(table.title);
@@ -95,7 +98,6 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   setting.models = bundled_folder("models", "stability/models");
   setting.gains = bundled_folder("gains", "controller/gains") + "/crazyflie-small.toml";
   setting.fleet = bundled_folder("analysis/flights", "analysis/flights") + "/flights.toml";
-  if (setting.recorded.empty()) setting.recorded = std::string(SWARMCERT_SOURCE_DIR) + "/../shared/data";
   std::unique_ptr<Progress> progress;
   std::string part;
   double share = 0;
@@ -159,16 +161,15 @@ Command reproduce_command() {
             app.add_option("EXPERIMENT", options->name, "What to do, see above")
                 ->type_name(fmt::format("{{{}}}", fmt::join(words, ",")))
                 ->required();
-            app.add_option("-o,--output", options->output, "Folder for everything")->required();
+            add_output(app, "-o,--output", options->output, "Folder for everything")->required();
             app.add_flag("--full", options->setting.full, "Full size: a minute per task, more seeds");
             app.add_option("--shard", options->shard, "i/N: only this part, for several machines");
             app.add_option("--seed", options->setting.seed, "Of flights, noise and networks")
                 ->capture_default_str();
             app.add_flag("--updraft", options->setting.updraft,
                          "The simulated truth has an updraft around downwash");
-            app.add_option(
-                "--recorded", options->setting.recorded,
-                "Folder of the published data, with flights/ and weights/ (default: ../shared/data)");
+            app.add_option("--recorded", options->setting.recorded,
+                           "Folder of the published data, with flights/ and weights/");
             return [options](const CommonOptions& common) { return run_reproduce(*options, common); };
           }};
 }

@@ -2,18 +2,10 @@
 
 #include <filesystem>
 
+#include "analysis/cli/bundled.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::analysis {
-
-std::string bundled_folder(const std::string& name, const std::string& source) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::path tool = fs::read_symlink("/proc/self/exe", error);
-  const fs::path installed = tool.parent_path().parent_path() / "share/swarmcert" / name;
-  if (!error && fs::exists(installed)) return installed.string();
-  return (fs::path(SWARMCERT_SOURCE_DIR) / source).string();
-}
 
 void declare_flights(CLI::App& app, FlightOptions& options, bool positional_models) {
   if (positional_models) {

@@ -25,9 +25,6 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
 /// @throws files::InputError as residuals::read_inputs(), and where they have but may not.
 residuals::Inputs read_flights(const FlightOptions& options, bool own_models = false);
 
-/// Folder of files that ship with the tool: `name` beside an installed tool, else `source` in the source tree.
-std::string bundled_folder(const std::string& name, const std::string& source);
-
 files::Json json_of(const residuals::Axes& axes);
 
 }  // namespace swarmcert::analysis

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/report/report.h"
@@ -88,6 +89,7 @@ void print(const SimulateOptions& options, const stability::Simulation& flown, c
 void write_report(const SimulateOptions& options, const CommonOptions& common,
                   const stability::Simulation& flown, const Json& result) {
   Report report(fmt::format("{} with {} vehicles", options.task, flown.vehicles.size()));
+  report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(
       "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per "
@@ -233,8 +235,8 @@ Command simulate_command() {
                 app.add_option("--rho", options->network.rho, "Weight file of rho, in place of --network");
             phi->needs(rho);
             rho->needs(phi);
-            app.add_option("-o,--output", options->output, "Folder for the logs")->required();
-            app.add_option("--report", options->report, "Folder for an HTML report with plots");
+            add_output(app, "-o,--output", options->output, "Folder for the logs")->required();
+            add_output(app, "--report", options->report, "Folder for an HTML report with plots");
             app.add_option("--duration", options->duration_s, "Seconds (default: the task's own)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--seed", options->seed, "Of noise, clocks and random goals (default 0)");

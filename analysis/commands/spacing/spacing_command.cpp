@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/commands/bound/bound_output.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/tracking_input.h"
@@ -164,7 +165,7 @@ Command spacing_command() {
             app.add_option("--to", question.to_m, "Largest height gap, m (default 0.8)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--steps", question.steps, "Rows (default 27)")->check(CLI::Range(1, 10000));
-            app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+            add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
             return [options](const CommonOptions& common) { return run_spacing(*options, common); };
           }};
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -18,6 +19,7 @@ std::string gap(double x) { return std::isfinite(x) ? fmt::format("{:.3f} m", x)
 std::string write_spacing_report(const stability::SpacingQuestion& question, const stability::Spacing& found,
                                  const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("How close vehicles may fly");
+  report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(
       fmt::format("Below {} vehicle(s), the vertical error is to stay within {:.6g} m without feed-forward; "

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/sweep/sweep_report.h"
@@ -106,13 +107,14 @@ Command sweep_command() {
           [](CLI::App& app) {
             const auto options = std::make_shared<SweepOptions>();
             app.add_option("GRID", options->grid, "grid.toml: axes and what to compute")->required();
-            app.add_option("-o,--output", options->folder, "Folder for the results")->required();
-            app.add_option("--report", options->report,
-                           "Folder for the report (default: report in that folder)");
+            add_output(app, "-o,--output", options->folder, "Folder for the results")->required();
+            add_output(app, "--report", options->report,
+                       "Folder for the report (default: report in that folder)");
             app.add_option(
                 "--shard", options->shard,
                 "I/N: compute only the I-th of N parts; I counts 0 .. N-1 or 1 .. N, N being the same as 0");
-            app.add_flag("--resume", options->resume, "Keep the cells that the shard's file already has");
+            leave_out_of_record(app.add_flag("--resume", options->resume,
+                                             "Keep the cells that the shard's file already has"));
             return [options](const CommonOptions& common) { return run_sweep(*options, common); };
           }};
 }
@@ -126,7 +128,8 @@ Command merge_command() {
       [](CLI::App& app) {
         const auto options = std::make_shared<SweepOptions>();
         app.add_option("DIR", options->folder, "Folder with the shard files")->required();
-        app.add_option("--report", options->report, "Folder for the report (default: report in that folder)");
+        add_output(app, "--report", options->report,
+                   "Folder for the report (default: report in that folder)");
         return [options](const CommonOptions& common) {
           refuse_to_replace(common, common.json);
           refuse_folder(common, options->report);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
@@ -323,7 +324,7 @@ Command train_command() {
         training::TrainerOptions& trainer = options->run.trainer;
         trainer.gamma.value = 3;
         declare_flights(app, options->flights, true);
-        app.add_option("-o,--output", options->output, "Folder for networks, certificate and models")
+        add_output(app, "-o,--output", options->output, "Folder for networks, certificate and models")
             ->required();
         app.add_option("--quantity", options->quantity,
                        "force_z, force (x, y, z) or torque (x, y, z; needs logs of at least 400 Hz)")
@@ -397,12 +398,13 @@ Command train_command() {
                "they say; of all of them, the one is written that the selecting flights prefer")
             ->check(CLI::Range(0, 1000))
             ->capture_default_str();
-        app.add_flag("--resume", options->run.resumes, "Go on with an interrupted run in the same folder");
+        leave_out_of_record(app.add_flag("--resume", options->run.resumes,
+                                         "Go on with an interrupted run in the same folder"));
         app.add_flag("--published-filter", options->flights.published_filter,
                      "Cut and filter as the networks' authors did, see compare");
         app.add_flag("--published-signals", options->flights.published_signals,
                      "Of that, only their thrust lag, their masses and the accelerometer as it is");
-        app.add_option("--report", options->report, "Write an HTML report into this folder");
+        add_output(app, "--report", options->report, "Write an HTML report into this folder");
         return [options](const CommonOptions& common) { return run_train(*options, common); };
       }};
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -119,6 +120,7 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
 std::string write_train_report(const LearningData& data, const learning::Run& run, const files::Json& result,
                                const std::string& folder, bool overwrite) {
   Report report("Training of a deep set");
+  report.made_by(command_to_copy());
   report.result(result);
   report.heading("Learning curve");
   const bool was_taught = result["kept_seed"] == result["seed"];

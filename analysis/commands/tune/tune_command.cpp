@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/bound/bound_output.h"
 #include "analysis/commands/commands.h"
@@ -237,7 +238,7 @@ Command tune_command() {
         app.add_option("--nodes", options->tune.global_evaluations, "Evaluations of the global search")
             ->check(CLI::PositiveNumber);
         app.add_option("--seed", options->tune.seed, "Seed of the global search (default 1)");
-        app.add_option("--report", options->report, "Write an HTML report with plots into this folder");
+        add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_tune(*options, common); };
       }};
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -12,6 +13,7 @@ namespace swarmcert::analysis {
 std::string write_tune_report(const std::string& verdict, const std::vector<TunedQuantity>& quantities,
                               const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Tuned gains");
+  report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(verdict);
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();

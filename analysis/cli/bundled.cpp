@@ -1,0 +1,24 @@
+#include "analysis/cli/bundled.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include "nn/base/input_error.h"
+
+namespace swarmcert::analysis {
+
+std::string bundled_folder(const std::string& installed, const std::string& source) {
+  namespace fs = std::filesystem;
+  const fs::path tool = fs::read_symlink("/proc/self/exe");
+  std::error_code none;
+  const fs::path shared = tool.parent_path().parent_path() / "share/swarmcert" / installed;
+  if (fs::exists(shared, none)) return shared.string();
+  std::ifstream named(tool.parent_path() / "source_folder.txt");
+  std::string root;
+  if (std::getline(named, root) && fs::exists(fs::path(root) / source, none))
+    return (fs::path(root) / source).string();
+  throw files::InputError({shared.string(), "", "", "", "the files that ship with the tool are not there",
+                           "install the whole package, or name your own files"});
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,202 @@
+// The layout of the source tree: which folder may include which, and that every folder explains itself.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace swarmcert {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One library, or several folders that form one: what they may include besides themselves. A folder that is not listed
+/// belongs to its nearest listed parent.
+struct Layer {
+  std::string folder;
+  std::vector<std::string> may_include;
+};
+
+const std::vector<Layer>& layers() {
+  static const std::vector<Layer> all = {
+      // From the bottom up. A layer may include layers above it in this list only; the first test checks that.
+      {"nn", {}},
+      {"nn/base", {"nn"}},
+      {"nn/weights", {"nn", "nn/base"}},
+      {"nn/networks", {"nn/base", "nn/weights"}},
+      {"nn/training", {"nn", "nn/base", "nn/weights"}},
+      {"controller", {"nn"}},
+      {"controller/rounding", {"controller", "nn"}},
+      {"controller/crazyflie", {"controller", "nn"}},
+      {"lipschitz/checker", {"nn/base", "nn/weights"}},
+      {"lipschitz", {"lipschitz/checker", "nn", "nn/base", "nn/weights"}},
+      {"stability", {"controller", "nn", "nn/base", "nn/weights"}},  // with bodies and effects
+      {"stability/bounds", {"controller", "nn/base", "stability"}},
+      {"stability/tasks", {"nn/base", "stability/bounds"}},
+      {"stability/simulation",
+       {"controller", "controller/rounding", "nn", "nn/base", "nn/weights", "stability", "stability/bounds",
+        "stability/tasks"}},
+      {"stability/iss", {"nn/base", "stability", "stability/bounds", "stability/simulation"}},
+      {"stability/sweep", {"nn/base", "stability", "stability/bounds"}},
+      {"analysis/report", {"nn/base"}},
+      {"analysis/cli", {"analysis/report", "nn/base", "nn/weights"}},
+      {"analysis/logs", {"nn/base"}},
+      {"analysis/residuals",
+       {"analysis/logs", "nn/base", "nn/weights", "stability", "stability/bounds", "stability/simulation",
+        "stability/tasks"}},
+      {"analysis/identification/thrust", {"controller", "nn/base"}},
+      {"analysis/identification", {"analysis/logs", "analysis/residuals", "nn/base", "stability"}},
+      {"analysis/firmware", {"nn", "nn/base", "nn/weights"}},
+      {"analysis/tracking/tube",
+       {"lipschitz", "lipschitz/checker", "nn/base", "nn/weights", "stability", "stability/bounds",
+        "stability/tasks"}},
+      {"analysis/tracking",
+       {"analysis/residuals", "analysis/tracking/tube", "lipschitz", "lipschitz/checker", "nn/base",
+        "nn/weights", "stability", "stability/bounds"}},
+      {"analysis/learning",
+       {"analysis/residuals", "lipschitz", "lipschitz/checker", "nn/base", "nn/training", "nn/weights"}},
+      {"analysis/reproduction",
+       {"analysis/identification", "analysis/learning", "analysis/residuals", "nn/base", "nn/weights",
+        "stability", "stability/bounds", "stability/simulation", "stability/tasks"}},
+      {"analysis/gate",
+       {"analysis/firmware", "analysis/residuals", "analysis/tracking", "lipschitz", "lipschitz/checker",
+        "nn/base", "nn/weights", "stability", "stability/bounds", "stability/simulation"}},
+      {"analysis/commands",
+       {"analysis/cli",
+        "analysis/firmware",
+        "analysis/gate",
+        "analysis/identification",
+        "analysis/identification/thrust",
+        "analysis/learning",
+        "analysis/logs",
+        "analysis/report",
+        "analysis/reproduction",
+        "analysis/residuals",
+        "analysis/tracking",
+        "analysis/tracking/tube",
+        "controller",
+        "lipschitz",
+        "lipschitz/checker",
+        "nn/base",
+        "nn/weights",
+        "stability",
+        "stability/bounds",
+        "stability/simulation",
+        "stability/iss",
+        "stability/sweep"}},
+      {"analysis", {"analysis/cli", "analysis/commands", "nn/base"}},
+  };
+  return all;
+}
+
+/// The layer of a folder: the longest listed path that it is or lies in; "" if none.
+std::string layer_of(const std::string& folder) {
+  std::string found;
+  for (const Layer& layer : layers()) {
+    const bool inside = folder == layer.folder || folder.rfind(layer.folder + "/", 0) == 0;
+    if (inside && layer.folder.size() > found.size()) found = layer.folder;
+  }
+  return found;
+}
+
+bool is_source(const fs::path& path) {
+  return path.extension() == ".h" || path.extension() == ".cpp" || path.extension() == ".inc";
+}
+
+/// Paths of the product's sources, relative to the source tree, in order.
+std::vector<std::string> product_sources() {
+  std::vector<std::string> found;
+  for (const char* top : {"nn", "controller", "lipschitz", "stability", "analysis"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(SWARMCERT_SOURCE_DIR) / top)) {
+      if (entry.is_regular_file() && is_source(entry.path()))
+        found.push_back(fs::relative(entry.path(), SWARMCERT_SOURCE_DIR).generic_string());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+/// What `source` includes with quotation marks, by path from the source tree.
+std::vector<std::string> includes(const std::string& source) {
+  std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / source);
+  std::vector<std::string> found;
+  const std::string start = "#include \"";
+  for (std::string line; std::getline(in, line);) {
+    if (line.rfind(start, 0) != 0) continue;
+    const std::string path = line.substr(start.size(), line.find('"', start.size()) - start.size());
+    if (path.find('/') != std::string::npos) found.push_back(path);
+  }
+  return found;
+}
+
+TEST(Layout, TheListedLayersFormNoCycle) {
+  std::set<std::string> below;
+  for (const Layer& layer : layers()) {
+    for (const std::string& folder : layer.may_include)
+      EXPECT_EQ(below.count(folder), 1U) << layer.folder << " is listed below " << folder;
+    below.insert(layer.folder);
+  }
+}
+
+TEST(Layout, EveryIncludePointsToAListedLowerLayer) {
+  std::map<std::string, std::set<std::string>> allowed;
+  for (const Layer& layer : layers())
+    allowed[layer.folder] = {layer.may_include.begin(), layer.may_include.end()};
+  std::size_t seen = 0;
+  for (const std::string& source : product_sources()) {
+    const std::string from = layer_of(fs::path(source).parent_path().generic_string());
+    ASSERT_NE(from, "") << source << " lies in a folder that no layer covers";
+    for (const std::string& path : includes(source)) {
+      if (!fs::exists(fs::path(SWARMCERT_SOURCE_DIR) / path)) continue;  // generated
+      const std::string to = layer_of(fs::path(path).parent_path().generic_string());
+      ++seen;
+      EXPECT_TRUE(from == to || allowed[from].count(to) == 1) << source << " includes " << path;
+    }
+  }
+  EXPECT_GT(seen, 1000U);
+}
+
+TEST(Layout, ACommandIncludesNoOtherCommandButThoseListed) {
+  const std::set<std::pair<std::string, std::string>> listed = {
+      {"demo", "certify"}, {"spacing", "bound"}, {"tune", "bound"}};
+  const std::string root = "analysis/commands/";
+  const auto command = [&root](const std::string& path) {
+    const std::string rest = path.rfind(root, 0) == 0 ? path.substr(root.size()) : "";
+    return rest.find('/') == std::string::npos ? "" : rest.substr(0, rest.find('/'));
+  };
+  for (const std::string& source : product_sources()) {
+    const std::string from = command(source);
+    if (from.empty()) continue;
+    for (const std::string& path : includes(source)) {
+      const std::string to = command(path);
+      EXPECT_TRUE(to.empty() || to == from || to == "shared" || listed.count({from, to}) == 1)
+          << source << " includes " << path;
+      EXPECT_FALSE(from == "shared" && !to.empty() && to != from) << source << " includes " << path;
+    }
+  }
+}
+
+TEST(Layout, EveryFolderOfSourcesHasAReadmeOfAtMostAPage) {
+  std::set<std::string> folders;
+  for (const std::string& source : product_sources())
+    folders.insert(fs::path(source).parent_path().generic_string());
+  for (const std::string& folder : folders) {
+    if (folder.rfind("analysis/commands/", 0) == 0 || folder == "controller/crazyflie/src" ||
+        folder == "analysis/gate/checks")
+      continue;  // the README of the folder above explains them
+    const fs::path readme = fs::path(SWARMCERT_SOURCE_DIR) / folder / "README.md";
+    std::ifstream in(readme);
+    ASSERT_TRUE(in) << readme << " is missing";
+    const auto lines = std::count(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>(), '\n');
+    EXPECT_LT(lines, 80) << readme << " is longer than a page";
+  }
+  EXPECT_GT(folders.size(), 30U);
+}
+
+}  // namespace
+}  // namespace swarmcert
