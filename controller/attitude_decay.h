@@ -1,4 +1,4 @@
-/// @file How fast the attitude laws decay, as their proofs say it. For analysis and tests, not for flight.
+/// @file Proved decay rates of the attitude laws. For analysis and tests, not for flight.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-/// @file From thrust and torque to rotor forces: the actuation matrix, its pseudo-inverse, and mixing that knows what
-/// to give up when rotors saturate. Body frame: x forward, y left, z up.
+/// @file From thrust and torque to rotor forces: actuation
+/// matrix, pseudo-inverse, and prioritized mixing under saturation. Body frame: x forward, y left, z up.
 #pragma once
 
 #include <cstdint>

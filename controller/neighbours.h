@@ -1,4 +1,4 @@
-/// @file From neighbours' radio positions to the predicted effect f_a_hat: tracks, cut-offs that fade, the deep set.
+/// @file From neighbours' radio positions to the predicted force f_a_hat: tracks, fading cut-offs, the deep set.
 ///
 /// Every result is a function of the set of neighbours: their order changes no bit.
 #pragma once

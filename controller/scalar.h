@@ -1,4 +1,4 @@
-/// @file What the control laws ask of a number type, so that one text serves flight, integration and error analysis.
+/// @file Requirements on the scalar type of the control laws, which serve flight, integration and error analysis.
 ///
 /// float flies; double serves the integrator; a third type (controller/rounding/bounded.h, host only) carries bounds on
 /// their difference through the same operations. The laws use +, -, /, comparisons, and the functions below; a type

@@ -1,4 +1,4 @@
-/// @file Sine and cosine with the same bits everywhere; those of C libraries differ from each other by an ulp.
+/// @file Sine and cosine with the same bits on every platform; C libraries differ by an ulp.
 #pragma once
 
 #include <limits>

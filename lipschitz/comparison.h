@@ -1,4 +1,4 @@
-/// @file Other upper bounds of a chain, the floor below all of them, and where the bound is lost.
+/// @file Other upper bounds of a chain, a lower limit for all of them, and which layers make the bound loose.
 #pragma once
 
 #include <cstdint>

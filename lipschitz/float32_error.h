@@ -1,4 +1,4 @@
-/// @file How far the float32 evaluation that flies can be from the exact function.
+/// @file Bound on the distance between the float32 evaluation that flies and the exact function.
 #pragma once
 
 #include <map>

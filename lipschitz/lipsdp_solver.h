@@ -1,4 +1,4 @@
-/// @file A structured primal-dual interior point method for LipSDP-Neuron. It proposes; the checker disposes.
+/// @file A structured primal-dual interior point method for LipSDP-Neuron. Its answer is not trusted: the checker verifies it.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file Which values NET takes over a box, for up to so many neighbours; and how far it jumps where one comes or goes.
+/// @file Range of NET over a box for a given number of neighbours, and its jump when a neighbour enters or leaves.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-/// @file What values a ReLU network takes over a box: linear bounds that hold in exact arithmetic.
+/// @file Linear bounds on a ReLU network over a box that hold in exact arithmetic.
 #pragma once
 
 #include <Eigen/Core>

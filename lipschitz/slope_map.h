@@ -1,4 +1,4 @@
-/// @file Where a network is steep: its slope cell by cell over two input coordinates, from both sides.
+/// @file Slope of a network cell by cell over two input coordinates, enclosed from both sides.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-/// @file model.toml: what the project believes of one kind of vehicle.
+/// @file model.toml: the parameters of one kind of vehicle.
 #pragma once
 
 #include <array>

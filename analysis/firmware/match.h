@@ -1,4 +1,4 @@
-/// @file Whether a firmware file holds exactly the weights of a network.
+/// @file Comparison of firmware files with the export of a network.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// @file What one check of a release found, and the limit that it was held against.
+/// @file Result of one check of a release with its limit.
 #pragma once
 
 #include <limits>

@@ -1,4 +1,4 @@
-/// @file The tracking bound over what is uncertain about the vehicle.
+/// @file The tracking bound over intervals of the vehicle's parameters.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// @file Text of unknown origin made safe for one format each, and numbers as all formats show them.
+/// @file Escaping of untrusted text per format, and numbers as all formats show them.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// @file Flights condensed to small matrices, so that any set of effects can be fitted and cross-validated in no time.
+/// @file Flights condensed to Gram matrices, from which any set of effects is fitted and cross-validated quickly.
 ///
 /// Over each block of 2 s, with columns X of all candidates and thetas behind the accelerometer's filter, and the
 /// residual r of the model at hand (three axes stacked, newton): G = X'X, b = X'r, y = r'r. A coefficient vector c
@@ -44,7 +44,7 @@ struct Grams {
   }
 };
 
-/// How many blocks tell of a candidate's coefficients, if all told as much: (sum h)^2 / sum h^2 with h the energy of its
+/// Effective number of blocks for a candidate's coefficients (Kish): (sum h)^2 / sum h^2 with h the energy of its
 /// columns in each block.
 double telling_blocks(const Grams& grams, std::size_t candidate, std::size_t theta);
 

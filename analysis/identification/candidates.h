@@ -1,4 +1,4 @@
-/// @file Which effects may be missing, with the thetas to try.
+/// @file Candidate effects with the shape parameters to try.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-/// @file Selection where a controller answers disturbances: what only looks like an effect is taken out, and what set
-/// points cannot tell apart is said to be alike.
+/// @file Selection under closed-loop bias: removes effects that only the feedback
+/// explains, and groups effects that set points cannot distinguish.
 #pragma once
 
 #include <set>
@@ -44,7 +44,7 @@ bool is_scale(const std::string& effect);
 /// True where `effects` have a constant vertical force.
 bool has_vertical_push(const std::vector<Refined>& effects);
 
-/// Names of selected effects that are no match for a loud remainder, see Diagnosis::suspected.
+/// Names of selected effects that are no match for a large unexplained residual, see Diagnosis::suspected.
 std::set<std::string> suspects(const Selected& selected);
 
 /// `names` with those that would only take the place of one that is too doubtful: for a scale one that follows the

@@ -1,4 +1,4 @@
-/// @file How far coefficients may be off, where errors within a block and between neighbouring blocks are alike.
+/// @file Covariance of coefficients under errors correlated within a block and between neighbouring blocks.
 #pragma once
 
 #include <Eigen/Core>

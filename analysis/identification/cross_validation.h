@@ -1,4 +1,4 @@
-/// @file Fits of any set of effects, and how well they predict blocks that they have not seen.
+/// @file Fits of any set of effects, and their prediction of held-out blocks.
 #pragma once
 
 #include <array>

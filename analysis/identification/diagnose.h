@@ -1,4 +1,4 @@
-/// @file Which effect is missing: selection, refinement of thetas, the check against closed-loop bias, what is left.
+/// @file Which effect is missing: selection, refinement of shape parameters, check against closed-loop bias, remainder.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-/// @file What is known of each selected effect, and which others could stand in its place.
+/// @file Findings about each selected effect, and its rivals.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// @file How small an effect these flights would still have shown: known effects injected into them.
+/// @file Detection limits: the smallest injected effects that these flights show.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-/// @file Is an effect real, or does the controller make it up? A check against closed-loop bias.
+/// @file Instrumental-variable check of an effect against closed-loop bias; the set points are the instruments.
 ///
 /// Thrust answers disturbances, so that least squares mistakes the answer for a cause. Set points do not answer: the
 /// columns along the set points, as if vehicles followed them exactly, are instruments Z. With as many instruments as

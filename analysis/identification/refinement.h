@@ -1,4 +1,4 @@
-/// @file Thetas off the grid, with intervals for them: Gauss-Newton steps on coefficients and shapes together.
+/// @file Shape parameters off the grid with intervals: Gauss-Newton steps on coefficients and shapes jointly.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-/// @file What no effect of the library explains.
+/// @file The residual that no effect of the library explains.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// @file The last step of training: weights that keep gamma in exact arithmetic.
+/// @file Last step of training: projection to weights that satisfy gamma in exact arithmetic.
 #pragma once
 
 #include "nn/training/layout.h"

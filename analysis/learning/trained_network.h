@@ -1,4 +1,4 @@
-/// @file What a training run leaves behind: weights, network.toml, certificate, models that fly it.
+/// @file Output of a training run: weights, network.toml, certificate, models that fly it.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// @file How much each group of tracks (TrackSamples::group()) counts in training, and what is left of its force.
+/// @file Weight of each group of tracks (TrackSamples::group()) in training, and its remaining error.
 #pragma once
 
 #include <map>

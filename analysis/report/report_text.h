@@ -1,4 +1,4 @@
-/// @file Text of users (names in logs, networks, files) in the languages that a report is written in.
+/// @file Escaping of users' text (names in logs, networks, files) for the languages of a report.
 #pragma once
 
 #include <string>

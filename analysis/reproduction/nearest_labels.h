@@ -1,5 +1,5 @@
-/// @file What other flights measured at the same relative states: how much of a flight's error no function of them
-/// can explain.
+/// @file Error that no function of the relative states can explain,
+/// estimated from other flights at the same states.
 #pragma once
 
 #include <map>

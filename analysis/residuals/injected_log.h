@@ -1,4 +1,4 @@
-/// @file A known effect in recorded flights: what an accelerometer would have shown besides.
+/// @file Injection of a known effect into recorded flights, as the accelerometer would have measured it.
 #pragma once
 
 #include <vector>

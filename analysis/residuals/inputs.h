@@ -1,4 +1,4 @@
-/// @file What compare, diagnose and add work on: models, flights and who is who.
+/// @file Inputs of compare, diagnose and add: models, flights and vehicles.
 #pragma once
 
 #include <map>

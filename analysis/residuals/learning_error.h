@@ -1,4 +1,4 @@
-/// @file How large, fast and lasting the residual of single passes is: what `bound --from` and the gate read.
+/// @file Amplitude, rate and duration of the residual in single passes, read by `bound --from` and the gate.
 #pragma once
 
 #include <Eigen/Core>

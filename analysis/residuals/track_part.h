@@ -1,4 +1,4 @@
-/// @file One track's part of a comparison: what groups of tracks are summed from.
+/// @file One track's contribution to a comparison; groups of tracks are sums of these.
 #pragma once
 
 #include <vector>

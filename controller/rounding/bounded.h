@@ -1,4 +1,4 @@
-/// @file A number type that bounds, for a whole set of inputs, how far float and double can part. Host only.
+/// @file A number type that bounds the difference between float and double over a set of inputs. Host only.
 ///
 /// One Bounded stands for two numbers, the one that the float instance of a formula computes and the one that the
 /// double instance computes, over a set of inputs. It knows an interval that holds both, and a bound on the distance

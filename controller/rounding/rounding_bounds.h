@@ -1,4 +1,4 @@
-/// @file How far the float control law that flies can part from the double one that is analysed. Host only.
+/// @file Bounds on the difference between the float control law that flies and the double one that is analysed. Host only.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// @file Pairs of neurons that a box keeps from being in certain states at once: what a program may use besides.
+/// @file Pairs of activation states that a box excludes, as additional constraints of the program.
 #pragma once
 
 #include <Eigen/Core>

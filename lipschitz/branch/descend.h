@@ -1,4 +1,4 @@
-/// @file A few Newton steps on the multipliers of a part, from those of the box around it.
+/// @file Newton steps on the multipliers of a part, starting from those of its parent box.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file What rho does to a moving sum, as a quadratic form: it separates a deep set's bound into rho and each phi.
+/// @file A quadratic form that bounds rho; it separates a deep set's bound into rho and each phi.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file Where a search's multipliers begin.
+/// @file Initial multipliers of a search.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file The boxes of a search, and what is written down of them.
+/// @file The boxes of a search, and what is recorded of them.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-/// @file What the neighbours that do not move add to a sum: the range of a term over its box, with its proof.
+/// @file Contribution of neighbours that do not move: the range of a term over its box, with its proof.
 #pragma once
 
 #include <string>

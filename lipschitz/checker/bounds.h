@@ -1,4 +1,4 @@
-/// @file Numbers that say what they guarantee. The types do not convert into one another.
+/// @file Number types that state their guarantee. They do not convert into one another.
 #pragma once
 
 namespace swarmcert::lipschitz {

@@ -1,4 +1,4 @@
-/// @file The checker of check.h: what it knows, and its steps, which fill several files.
+/// @file Internal state of the checker of check.h; its steps fill several files.
 #pragma once
 
 #include <map>

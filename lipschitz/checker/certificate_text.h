@@ -1,4 +1,4 @@
-/// @file How numbers, proofs and faults stand in a certificate.
+/// @file Encoding of numbers, proofs and errors in a certificate.
 #pragma once
 
 #include <string>

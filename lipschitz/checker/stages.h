@@ -1,4 +1,4 @@
-/// @file What the functions of NET are to a bound: chains of exact matrices with ReLU between them.
+/// @file The functions of NET as chains of exact matrices with ReLU in between.
 #pragma once
 
 #include <string>

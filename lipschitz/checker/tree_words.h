@@ -1,4 +1,4 @@
-/// @file The words of a tree: how a proof by parts is written down.
+/// @file Text encoding of a proof by parts.
 #pragma once
 
 #include <string>

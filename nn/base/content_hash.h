@@ -1,4 +1,4 @@
-/// @file A hash of what a JSON document says, not of how it is written.
+/// @file Hash of a JSON document's content, independent of its formatting.
 #pragma once
 
 #include <string>

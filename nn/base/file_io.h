@@ -1,4 +1,4 @@
-/// @file Reading with a limit, writing atomically, hashing.
+/// @file Reading with a size limit, atomic writing, hashing.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-/// @file The one error that a user's file can cause. The command line turns it into exit code 3.
+/// @file The only error that a user's file can cause. The command line turns it into exit code 3.
 #pragma once
 
 #include <stdexcept>

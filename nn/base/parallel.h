@@ -1,4 +1,4 @@
-/// @file Independent pieces of work on several threads.
+/// @file Independent work items on several threads.
 #pragma once
 
 #include <functional>

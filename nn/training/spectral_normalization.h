@@ -1,4 +1,4 @@
-/// @file Keeps the spectral norms of a deep set's layers where training wants them.
+/// @file Keeps the spectral norm of each layer at its limit during training.
 #pragma once
 
 #include <vector>

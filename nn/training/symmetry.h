@@ -1,4 +1,4 @@
-/// @file The air does not know north: samples turned about the vertical are samples as well.
+/// @file Augmentation: forces are equivariant under rotation about the vertical, so rotated samples are samples.
 #pragma once
 
 #include "nn/base/random.h"

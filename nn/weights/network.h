@@ -1,4 +1,4 @@
-/// @file What the command line calls NET: one plain network, or a deep set with its kinds, units and clamp.
+/// @file NET of the command line: one plain network, or a deep set with its kinds of vehicles, units and input clamp.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-/// @file Pickled state dicts as plain data. Nothing is ever called: a pickle is read as a list of declarations.
+/// @file Pickled state dicts as plain data. Nothing in a pickle is executed: it is read as a list of declarations.
 ///
 /// Python's unpickler runs whatever a file names. This one knows a few opcodes and a handful of names; anything else
 /// is refused at its offset. It has no recursion, and its memory is bounded by kMostPickleOperations.

@@ -1,4 +1,4 @@
-/// @file The wire format of protocol buffers, as far as a reader of ONNX needs it.
+/// @file The subset of the protocol buffer wire format that ONNX files use.
 ///
 /// libprotobuf would parse the file as well, but it would bring a code generator and a library whose version must fit
 /// the compiler's to every user, for a dozen fields; and it allocates what a file declares before anybody can look.

@@ -1,4 +1,4 @@
-/// @file How wide the vector registers are that kernels of several widths use.
+/// @file Width of the vector registers that the SIMD kernels use.
 #pragma once
 
 namespace swarmcert::stability {

@@ -1,4 +1,4 @@
-/// @file Eight floats that take one path through the flight code: the speed of simulated swarms.
+/// @file Eight floats in one SIMD value, with which the flight code runs for eight vehicles at once.
 ///
 /// A Lanes is a Scalar of the control laws (controller/scalar.h) that stands for the same variable of eight vehicles.
 /// Each operation does in every lane what it does to a float alone, so the lanes hold the bits that fly. Only

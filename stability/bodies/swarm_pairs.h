@@ -1,4 +1,4 @@
-/// @file Pairs of vehicles that meet, in lines of eight: what effects between vehicles need to treat many at once.
+/// @file Pairs of vehicles that are close, in groups of eight, for effects between vehicles.
 #pragma once
 
 #include <cstddef>

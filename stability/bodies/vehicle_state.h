@@ -1,4 +1,4 @@
-/// @file How a vehicle's state lies in a vector of doubles, for every integrator alike.
+/// @file Layout of a vehicle's state in a vector of doubles, shared by all integrators.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file How far a force bounded in amplitude and in rate can drive an output, given the output's step response.
+/// @file Largest output under a force bounded in amplitude and in rate, given the output's step response.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-/// @file Bounds on the tracking error of one axis from what is known of a force error, and the smallest of them.
+/// @file Bounds on the tracking error of one axis for the declared class of disturbances, and the smallest of them.
 #pragma once
 
 #include <cmath>

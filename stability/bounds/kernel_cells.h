@@ -1,4 +1,4 @@
-/// @file Where in time a response acts: integrals of its absolute value cell by cell, enclosed from above.
+/// @file Upper bounds on the integral of a response's absolute value, cell by cell in time.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// @file What the kernel of a sampled loop adds up to. Not for users.
+/// @file Sums over the kernel of a sampled loop. Not for users.
 #pragma once
 
 #include <Eigen/Core>

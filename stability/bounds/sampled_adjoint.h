@@ -1,5 +1,5 @@
-/// @file What a sampled loop's error at one moment owes to every earlier moment: its kernel, period by period, backwards.
-/// Not for users.
+/// @file Kernel of a sampled loop by backward (adjoint)
+/// recursion, period by period. Not for users.
 #pragma once
 
 #include <cmath>

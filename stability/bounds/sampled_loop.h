@@ -1,4 +1,4 @@
-/// @file The position loop as firmware runs it: sampled, its force held, its integrator stepped by any amount.
+/// @file The position loop as firmware runs it: sampled, zero-order hold, any integrator step.
 #pragma once
 
 #include "stability/bounds/axis_loop.h"

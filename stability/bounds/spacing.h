@@ -1,4 +1,4 @@
-/// @file How close a vehicle may fly below others: the shape to keep out of, from a downwash field and error bounds.
+/// @file Keep-out shape below other vehicles from a downwash field and bounds on the tracking error.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-/// @file The tracking theorem: when it applies, the ball it gives, and the way there.
+/// @file The tracking theorem: its hypotheses, its error ball and its transient bound.
 ///
 /// With s' = e'' + 2 Lambda e' + Lambda^2 e and force -K s, learning error eps0 + eps(t), |eps'| <= d_m:
 ///   limsup |e| <= d_m / (lambda_min(Lambda)^2 lambda_min(K)).

@@ -1,4 +1,4 @@
-/// @file What a declared truth can do to a vehicle: bounds on the force of physical effects over a set of motions.
+/// @file Bounds on the force of declared physical effects over a set of motions.
 ///
 /// A network's certificate bounds the rate of f_hat. The learning error f_hat - f_a also needs f_a, which nobody
 /// measures exactly: here it is declared as effects of a model file, and their constants are enclosed.

@@ -1,4 +1,4 @@
-/// @file Whether some force of a swarm's class makes its errors grow without end: what refutes a small-gain claim.
+/// @file Searches a disturbance under which a swarm's errors diverge, which refutes a small-gain claim.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// @file The command reaches the rotors late: f = c (T(t - d) - T) b3, and torque likewise.
+/// @file Delayed command: f = c (T(t - d) - T) b3, and torque likewise.
 #pragma once
 
 #include "stability/effects/memory_effect.h"

@@ -1,4 +1,4 @@
-/// @file The accelerometer tells of the past: the log shows c ((T b3)(t - d) - T b3) as a force.
+/// @file Delayed accelerometer: the log shows c ((T b3)(t - d) - T b3) as a force.
 #pragma once
 
 #include "stability/effects/memory_effect.h"

@@ -1,4 +1,4 @@
-/// @file What lies between a command and the force, and between the truth and the log.
+/// @file Signal path from command to force, and from truth to log.
 #pragma once
 
 namespace swarmcert::stability {

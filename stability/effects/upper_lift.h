@@ -1,4 +1,4 @@
-/// @file Lift on a vehicle that flies over others: the flow that they draw in from above.
+/// @file Lift on a vehicle that flies over others, caused by the inflow of their rotors.
 #pragma once
 
 #include "stability/effects/effect.h"

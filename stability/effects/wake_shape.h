@@ -1,4 +1,4 @@
-/// @file Where forms of wakes begin and end: for the effects, and for what encloses them, which must not differ.
+/// @file Shape limits of wakes, shared by the effects and by their enclosures.
 #pragma once
 
 namespace swarmcert::stability {

@@ -1,5 +1,5 @@
-/// @file The flight code of all vehicles of a swarm, with what it remembers; several vehicles at once where that
-/// changes no bit.
+/// @file The flight code of all vehicles of a swarm with its
+/// memory; several vehicles at once, with the same bits.
 #pragma once
 
 #include <array>

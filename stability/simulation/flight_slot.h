@@ -1,4 +1,4 @@
-/// @file What the flight code reads and writes of one vehicle, or of eight side by side in the lanes of registers.
+/// @file Inputs and memory of the flight code for one vehicle, or for eight in SIMD lanes.
 #pragma once
 
 #include <Eigen/Core>

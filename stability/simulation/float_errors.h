@@ -1,4 +1,4 @@
-/// @file What float32 on the vehicle costs against the double that is analysed, as a tracking error.
+/// @file Tracking error caused by float32 on the vehicle compared with the analysed double.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// @file Thrust mixing of eight vehicles at once where no rotor reaches a limit, as mostly: one decision for all of it.
+/// @file Thrust mixing of eight vehicles at once while no rotor saturates.
 #pragma once
 
 #include "controller/mixing.h"

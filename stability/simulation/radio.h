@@ -1,4 +1,4 @@
-/// @file What vehicles know of each other in flight: positions by radio, late and sometimes lost, and nothing else.
+/// @file Radio: positions of the other vehicles, delayed and sometimes lost.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-/// @file How far to the side a neighbour must be to do nothing, by its height.
+/// @file Lateral reach of a neighbour's effects by relative height.
 #pragma once
 
 #include <algorithm>

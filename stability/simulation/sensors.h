@@ -1,4 +1,4 @@
-/// @file What the sensors and the logger of the published vehicles make of the truth.
+/// @file Sensors and logger of the published vehicles.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file What a Swarm keeps per kind of vehicle: for its own sources.
+/// @file Data that a Swarm keeps per kind of vehicle. Internal.
 #pragma once
 
 #include <vector>

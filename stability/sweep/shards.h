@@ -1,4 +1,4 @@
-/// @file A sweep in pieces: each piece writes one file, a merge puts them together and misses nothing.
+/// @file Sharded sweeps: each shard writes one file; the merge checks completeness.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,4 @@
-/// @file How `bound` tells its result: as JSON and as text.
+/// @file Result of `bound` as JSON and as text.
 #pragma once
 
 #include "analysis/commands/shared/tracking_input.h"

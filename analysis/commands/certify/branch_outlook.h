@@ -1,4 +1,4 @@
-/// @file What would bring a bound of branch and bound closer to the slope that is attained.
+/// @file Estimate of the work that would bring a branch-and-bound bound within 1 % of the attained slope.
 #pragma once
 
 #include <optional>

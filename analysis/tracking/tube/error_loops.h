@@ -1,4 +1,4 @@
-/// @file From forces over time to tracking errors: the kernels of the position loops, cell by cell.
+/// @file From forces over time to tracking errors, by the kernels of the position loops.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// @file What a proved tube says of the force error, and which of its hypotheses it shows itself.
+/// @file Force errors inside a proved tube, and the hypotheses that the tube itself proves.
 #pragma once
 
 #include "analysis/tracking/tube/local_tube.h"
