@@ -7,6 +7,7 @@
 #include "analysis/logs/formats/formats.h"
 #include "data.h"
 #include "logs/raw_log_invariant.h"
+#include "logs/topics.h"
 #include "logs/ulog_writer.h"
 #include "nn/refusal.h"
 
@@ -18,57 +19,28 @@ logs::RawLog read(const std::string& bytes) {
   return logs::read_ulog(in, "flight.ulg");
 }
 
-const logs::RawTopic& topic(const logs::RawLog& log, const std::string& name, int instance = 0) {
-  for (const logs::RawTopic& candidate : log.topics)
-    if (candidate.name == name && candidate.instance == instance) return candidate;
-  static const logs::RawTopic none;
-  ADD_FAILURE() << "no topic " << name << " " << instance;
-  return none;
-}
-
-std::vector<double> values(const logs::RawTopic& topic, const std::string& column) {
-  const logs::RawColumn* const found = topic.find(column);
-  return found == nullptr ? std::vector<double>{} : found->values;
-}
-
 /// The numbers of the topic "count" that arrived.
-std::vector<double> counts(const logs::RawLog& log) {
-  for (const logs::RawTopic& topic : log.topics)
-    if (topic.name == "count") return values(topic, "number");
-  return {};
-}
-
-std::vector<double> range(int first, int last) {
-  std::vector<double> numbers;
-  for (int k = first; k < last; ++k) numbers.push_back(k);
-  return numbers;
-}
-
-std::vector<double> joined(std::vector<double> a, const std::vector<double>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
+std::vector<double> counts(const logs::RawLog& log) { return values_in(log, "count", "number"); }
 
 std::string count_log(const std::string& data) { return ulog_head() + ulog_count_definitions() + data; }
 
 TEST(Ulog, GivesRecordsWithTheirTimesInSeconds) {
   const logs::RawLog log = read(count_log(ulog_counts(0, 3)));
   EXPECT_EQ(log.format, "ulog");
-  EXPECT_EQ(topic(log, "count").time_s, (std::vector<double>{1.0, 1.01, 1.02}));
+  EXPECT_EQ(topic_of(log, "count").time_s, (std::vector<double>{1.0, 1.01, 1.02}));
   EXPECT_EQ(counts(log), range(0, 3));
   EXPECT_EQ(log.health.records, 3u);
 }
 
 TEST(Ulog, FlattensNestedTypesAndArraysAndLeavesOutPadding) {
   const logs::RawLog log = read(small_ulog());
-  const logs::RawTopic& whole = topic(log, "whole", 1);
-  std::vector<std::string> names;
-  for (const logs::RawColumn& column : whole.columns) names.push_back(column.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"parts[0].pair[0]", "parts[0].pair[1]", "parts[1].pair[0]",
-                                             "parts[1].pair[1]", "large", "flag"}));
-  EXPECT_EQ(values(whole, "parts[1].pair[1]"), std::vector<double>{-4});
-  EXPECT_EQ(values(whole, "large"), std::vector<double>{1e300});
-  EXPECT_EQ(values(whole, "flag"), std::vector<double>{1});
+  const logs::RawTopic& whole = topic_of(log, "whole", 1);
+  EXPECT_EQ(column_names(whole),
+            (std::vector<std::string>{"parts[0].pair[0]", "parts[0].pair[1]", "parts[1].pair[0]",
+                                      "parts[1].pair[1]", "large", "flag"}));
+  EXPECT_EQ(values_of(whole, "parts[1].pair[1]"), std::vector<double>{-4});
+  EXPECT_EQ(values_of(whole, "large"), std::vector<double>{1e300});
+  EXPECT_EQ(values_of(whole, "flag"), std::vector<double>{1});
   EXPECT_EQ(whole.texts.at("parts[0].word"), "ab");
   EXPECT_EQ(whole.texts.at("parts[1].word"), "cdef");
 }
@@ -85,7 +57,7 @@ TEST(Ulog, ReadsEveryTypeOfNumber) {
                        "uint32_t f;int64_t g;uint64_t h;float i;double j;bool k;") +
            ulog_subscription(1, "all") + ulog_record(1, 0, fields));
   std::vector<double> found;
-  for (const logs::RawColumn& column : topic(log, "all").columns) found.push_back(column.values.at(0));
+  for (const logs::RawColumn& column : topic_of(log, "all").columns) found.push_back(column.values.at(0));
   EXPECT_EQ(found, (std::vector<double>{-1, 255, -300, 65535, -70000, 4294967295, -5e9, 5e9, 1.5, -2.5, 1}));
 }
 
@@ -101,7 +73,7 @@ TEST(Ulog, KeepsInstancesOfATopicApart) {
   const logs::RawLog log = read(bytes);
   ASSERT_EQ(log.topics.size(), 3u);
   for (const int instance : {0, 1, 3})
-    EXPECT_EQ(values(topic(log, "count", instance), "number"), std::vector<double>{1.0 * instance});
+    EXPECT_EQ(values_of(topic_of(log, "count", instance), "number"), std::vector<double>{1.0 * instance});
 }
 
 TEST(Ulog, ReadsInformationParametersLinesAndDropouts) {
@@ -167,7 +139,7 @@ TEST(Ulog, AFormatMayComeAfterTheOneThatUsesIt) {
   const logs::RawLog log =
       read(ulog_head() + ulog_format("outer:uint64_t timestamp;inner part;") + ulog_format("inner:float x;") +
            ulog_subscription(1, "outer") + ulog_record(1, 1, bytes_of(2.5f)));
-  EXPECT_EQ(values(topic(log, "outer"), "part.x"), std::vector<double>{2.5});
+  EXPECT_EQ(values_of(topic_of(log, "outer"), "part.x"), std::vector<double>{2.5});
 }
 
 TEST(Ulog, FindsItsWayAfterDamageAndCountsIt) {
@@ -255,6 +227,7 @@ TEST(Ulog, FormatsThatCannotBeAreNotBelieved) {
         ulog_format("f0:uint64_t timestamp;float[60000] x;"),
         ulog_format("f0:uint64_t timestamp;float[-1] x;"),
         ulog_format("f0:uint64_t timestamp;float[99999999999999999999] x;"), ulog_format("f0:uint64_t;"),
+        ulog_format("f0:uint64_t timestamp;float x;float x;"),
         ulog_format("f0:uint64_t timestamp;float[4 x;")}) {
     const logs::RawLog log = read(ulog_head() + formats + ulog_subscription(1, "f0") + record + record +
                                   ulog_count_definitions() + ulog_counts(0, 4));
@@ -269,8 +242,8 @@ TEST(Ulog, LargeArraysAreNamedAndEmptyElementsCostNothing) {
       read(ulog_head() + ulog_format("e:float[0] a;float[0] b;") + ulog_format("d:e[60000] x;") +
            ulog_format("f:uint64_t timestamp;uint8_t[1000] dump;d[60000] nothing;float x;") +
            ulog_subscription(1, "f") + ulog_record(1, 1, std::string(1000, 'x') + bytes_of(2.5f)));
-  ASSERT_EQ(topic(log, "f").columns.size(), 1u);
-  EXPECT_EQ(values(topic(log, "f"), "x"), std::vector<double>{2.5});
+  ASSERT_EQ(topic_of(log, "f").columns.size(), 1u);
+  EXPECT_EQ(values_of(topic_of(log, "f"), "x"), std::vector<double>{2.5});
   ASSERT_EQ(log.skipped.size(), 1u);
   EXPECT_EQ(log.skipped[0].name, "f.dump");
 }

@@ -23,15 +23,17 @@ double number_at(const char* bytes, bool is_big_endian) {
 }  // namespace
 
 std::string read_all(std::istream& in, const std::string& path) {
-  constexpr std::size_t kChunk_bytes = std::size_t{1} << 20;
+  constexpr std::size_t kLargestChunk_bytes = std::size_t{4} << 20;
+  std::size_t chunk_bytes = std::size_t{1} << 14;
   std::string bytes;
   while (in) {
     const std::size_t before = bytes.size();
     if (before > kLargestLog_bytes)
       refuse_at(path, before, "", "", "the log is larger than 2 GiB", "cut it, or log fewer topics");
-    bytes.resize(before + kChunk_bytes);
-    in.read(bytes.data() + before, static_cast<std::streamsize>(kChunk_bytes));
+    bytes.resize(before + chunk_bytes);
+    in.read(bytes.data() + before, static_cast<std::streamsize>(chunk_bytes));
     bytes.resize(before + static_cast<std::size_t>(in.gcount()));
+    chunk_bytes = std::min(2 * chunk_bytes, kLargestChunk_bytes);
   }
   if (in.bad()) refuse_at(path, bytes.size(), "", "", "cannot be read", "check its permissions and the disk");
   if (bytes.empty()) refuse_at(path, 0, "", "", "the file is empty", "the recording failed; leave it out");

@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "analysis/logs/formats/mcap.h"
 #include "analysis/logs/formats/ulog.h"
 #include "nn/base/input_error.h"
 
@@ -33,6 +34,7 @@ std::string head_of(std::istream& in) {
 const std::vector<LogFormat>& log_formats() {
   static const std::vector<LogFormat> formats = {
       {"PX4 ULog", looks_like_ulog, read_ulog},
+      {"rosbag2 in MCAP", looks_like_mcap, read_mcap},
   };
   return formats;
 }

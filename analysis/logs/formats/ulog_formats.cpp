@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <set>
 
 namespace swarmcert::logs {
 namespace {
@@ -53,11 +54,12 @@ bool UlogFormats::add(std::string_view definition) {
   if (known != formats_.end()) return known->second.definition == definition;
   Format format;
   format.definition = definition;
+  std::set<std::string> names;
   std::string_view rest = definition.substr(colon + 1);
   while (!rest.empty() && rest[0] != '\0') {
     const std::size_t end = std::min(rest.find(';'), rest.size());
     const std::optional<Field> field = parse_field(rest.substr(0, end));
-    if (!field) return false;
+    if (!field || !names.insert(field->name).second) return false;
     format.fields.push_back(*field);
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }

@@ -1,0 +1,455 @@
+#include "analysis/logs/formats/mcap.h"
+
+#include <fmt/core.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <memory>
+
+#include "analysis/logs/formats/bytes.h"
+#include "analysis/logs/formats/decompress.h"
+#include "analysis/logs/formats/ros_topic.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr std::string_view kMcapMagic = "\x89MCAP0\r\n";
+constexpr std::size_t kMcapHead_bytes = 9;  ///< of a record: operation code and length
+constexpr std::size_t kLongestMcapText_bytes = std::size_t{1} << 16;
+constexpr std::size_t kLongestMcapName = 1024;
+
+enum McapCode : unsigned char {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kMetadata = 0x0C,
+  kDataEnd = 0x0F
+};
+
+struct McapRecord {
+  unsigned char code = 0;
+  std::string_view content;
+};
+
+/// Takes fields off the front of a record; once something is missing, all that follows is empty.
+class McapFields {
+ public:
+  explicit McapFields(std::string_view content) : rest_(content) {}
+
+  template <typename Integer>
+  Integer number() {
+    const std::optional<Integer> value = integer_at<Integer>(rest_, 0);
+    take(sizeof(Integer));
+    return value.value_or(0);
+  }
+  /// A text behind its length, or bytes behind theirs of type Length.
+  template <typename Length = std::uint32_t>
+  std::string_view bytes() {
+    return take(number<Length>());
+  }
+  std::string_view rest() const { return rest_; }
+  bool is_sound() const { return is_sound_; }
+  bool is_at_end() const { return is_sound_ && rest_.empty(); }
+
+ private:
+  std::string_view take(std::uint64_t size) {
+    if (size > rest_.size()) {
+      is_sound_ = false;
+      rest_ = {};
+      return {};
+    }
+    const std::string_view taken = rest_.substr(0, size);
+    rest_.remove_prefix(size);
+    return taken;
+  }
+
+  std::string_view rest_;
+  bool is_sound_ = true;
+};
+
+struct McapSchema {
+  std::string name, encoding;
+  std::string_view text;
+  bool is_parsed = false;
+  std::shared_ptr<const RosLayout> layout;  ///< once it is parsed
+  std::string fault;                        ///< why there is no layout then
+};
+struct McapChannel {
+  std::uint16_t schema = 0;
+  std::string topic, encoding;
+};
+struct McapChunk {
+  std::uint64_t uncompressed_bytes = 0;
+  std::uint32_t checksum = 0;  ///< 0: none
+  std::string_view compression, records;
+  std::uint64_t stated_bytes = 0;  ///< of `records`
+  bool is_whole = true;            ///< false where the file ends within it
+};
+
+std::optional<McapRecord> mcap_record_at(std::string_view bytes, std::size_t at) {
+  if (at > bytes.size() || bytes.size() - at < kMcapHead_bytes) return std::nullopt;
+  const std::uint64_t size = *integer_at<std::uint64_t>(bytes, at + 1);
+  if (size > bytes.size() - at - kMcapHead_bytes) return std::nullopt;
+  return McapRecord{static_cast<unsigned char>(bytes[at]), bytes.substr(at + kMcapHead_bytes, size)};
+}
+
+std::size_t size_of(const McapRecord& record) { return kMcapHead_bytes + record.content.size(); }
+
+/// True if the content has the form of its code. Codes of later versions and of programs of their own pass.
+bool is_sound(const McapRecord& record) {
+  McapFields fields(record.content);
+  switch (record.code) {
+    case 0:
+      return false;
+    case kHeader:
+      fields.bytes();
+      fields.bytes();
+      return fields.is_sound();
+    case kFooter:
+      return record.content.size() == 20;
+    case kSchema:
+      fields.number<std::uint16_t>();
+      fields.bytes();
+      fields.bytes();
+      fields.bytes();
+      return fields.is_at_end();
+    case kChannel:
+      fields.number<std::uint16_t>();
+      fields.number<std::uint16_t>();
+      fields.bytes();
+      fields.bytes();
+      fields.bytes();
+      return fields.is_at_end();
+    case kMessage:
+      return record.content.size() >= 22;
+    case kChunk:
+      fields.number<std::uint64_t>();
+      fields.number<std::uint64_t>();
+      fields.number<std::uint64_t>();
+      fields.number<std::uint32_t>();
+      fields.bytes();
+      fields.bytes<std::uint64_t>();
+      return fields.is_at_end();
+    case kMessageIndex:
+      fields.number<std::uint16_t>();
+      fields.bytes();
+      return fields.is_at_end();
+    case kMetadata:
+      fields.bytes();
+      fields.bytes();
+      return fields.is_at_end();
+    case kDataEnd:
+      return record.content.size() == 4;
+    default:
+      return true;
+  }
+}
+
+McapChunk chunk_of(std::string_view content) {
+  McapFields fields(content);
+  McapChunk chunk;
+  fields.number<std::uint64_t>();
+  fields.number<std::uint64_t>();
+  chunk.uncompressed_bytes = fields.number<std::uint64_t>();
+  chunk.checksum = fields.number<std::uint32_t>();
+  chunk.compression = fields.bytes();
+  chunk.stated_bytes = fields.number<std::uint64_t>();
+  chunk.is_whole = fields.is_sound() && chunk.stated_bytes <= fields.rest().size();
+  chunk.records = fields.rest().substr(0, chunk.stated_bytes);
+  return chunk;
+}
+
+std::uint32_t mcap_checksum(std::string_view bytes) {
+  uLong sum = 0;
+  constexpr std::size_t kPart_bytes = std::size_t{1} << 30;  // zlib counts in 32 bits
+  for (std::size_t at = 0; at < bytes.size(); at += kPart_bytes) {
+    const std::string_view part = bytes.substr(at, kPart_bytes);
+    sum = crc32(sum, reinterpret_cast<const Bytef*>(part.data()), static_cast<uInt>(part.size()));
+  }
+  return static_cast<std::uint32_t>(sum);
+}
+
+class McapReader {
+ public:
+  McapReader(std::string_view bytes, const std::string& path) : bytes_(bytes), path_(path) {
+    log_.path = path;
+    log_.format = "mcap";
+    decompression_left_ = decompression_limit(bytes.size());
+  }
+
+  RawLog read() {
+    if (!looks_like_mcap(bytes_))
+      refuse_at(path_, 0, "magic number", "", "is not that of an MCAP file", "is this a rosbag?");
+    const std::vector<std::size_t> records = find_records();
+    // Definitions first: where the chunk that has them is damaged, the summary at the end of the file repeats them.
+    for (const std::size_t at : records) take_definition(*mcap_record_at(bytes_, at));
+    for (const std::size_t at : records) take_top(at);
+    if (cut_chunk_) take_chunk(*cut_chunk_, *cut_offset_);
+    finish();
+    return std::move(log_);
+  }
+
+ private:
+  struct Topic {
+    std::optional<RosTopic> topic;  ///< nothing where its messages cannot be read
+    std::string name, fault;
+    std::size_t lost = 0;
+  };
+
+  /// Offsets of the sound records outside chunks; counts damage.
+  std::vector<std::size_t> find_records() {
+    std::vector<std::size_t> found;
+    std::size_t at = kMcapMagic.size();
+    while (at < bytes_.size()) {
+      if (bytes_.substr(at) == kMcapMagic) return found;
+      const std::optional<McapRecord> record = mcap_record_at(bytes_, at);
+      if (record && is_sound(*record)) {
+        found.push_back(at);
+        at += size_of(*record);
+        continue;
+      }
+      if (!record && keep_cut_chunk(at)) break;
+      const std::size_t next = next_sound(at);
+      log_.health.skipped_bytes += next - at;
+      if (next < bytes_.size()) ++log_.health.damaged_blocks;
+      at = next;
+    }
+    log_.health.truncated = true;  // a whole file ends with the magic number
+    return found;
+  }
+
+  /// The next byte from which two sound records follow each other; the end of the file if there is none.
+  std::size_t next_sound(std::size_t at) const {
+    for (++at; at < bytes_.size(); ++at) {
+      if (bytes_.substr(at) == kMcapMagic) return at;
+      const std::optional<McapRecord> first = mcap_record_at(bytes_, at);
+      if (!first || first->code > kDataEnd || !is_sound(*first)) continue;
+      const std::size_t behind = at + size_of(*first);
+      const std::optional<McapRecord> second = mcap_record_at(bytes_, behind);
+      if (second && second->code <= kDataEnd && is_sound(*second)) return at;
+      if (bytes_.substr(behind) == kMcapMagic) return at;
+    }
+    return bytes_.size();
+  }
+
+  /// True if the file ends within the chunk at `at`: two sizes of it agree, and are more than there is.
+  bool keep_cut_chunk(std::size_t at) {
+    if (bytes_.size() - at < kMcapHead_bytes || static_cast<unsigned char>(bytes_[at]) != kChunk)
+      return false;
+    const std::string_view content = bytes_.substr(at + kMcapHead_bytes);
+    const McapChunk chunk = chunk_of(content);
+    const std::size_t fields_bytes = content.size() - chunk.records.size();
+    const auto size = *integer_at<std::uint64_t>(bytes_, at + 1);
+    if (chunk.is_whole || size < fields_bytes || size - fields_bytes != chunk.stated_bytes) return false;
+    cut_chunk_ = chunk;
+    cut_offset_ = at;
+    return true;
+  }
+
+  void take_definition(const McapRecord& record) {
+    if (record.code == kSchema) take_schema(record.content);
+    if (record.code == kChannel) take_channel(record.content);
+  }
+
+  void take_schema(std::string_view content) {
+    McapFields fields(content);
+    const auto id = fields.number<std::uint16_t>();
+    McapSchema schema;
+    schema.name = fields.bytes();
+    schema.encoding = fields.bytes();
+    schema.text = fields.bytes();
+    if (!fields.is_sound() || id == 0) return;
+    // The text must outlive its chunk; of what is repeated in every chunk, one copy is kept.
+    if (schemas_.count(id) > 0 || schema.text.size() > kLongestDefinition_bytes ||
+        schema.name.size() > kLongestMcapName)
+      return;
+    texts_.emplace_back(schema.text);
+    schema.text = texts_.back();
+    schemas_.emplace(id, std::move(schema));
+  }
+
+  void take_channel(std::string_view content) {
+    McapFields fields(content);
+    const auto id = fields.number<std::uint16_t>();
+    McapChannel channel;
+    channel.schema = fields.number<std::uint16_t>();
+    channel.topic = fields.bytes();
+    channel.encoding = fields.bytes();
+    if (fields.is_sound() && channel.topic.size() <= kLongestMcapName)
+      channels_.emplace(id, std::move(channel));
+  }
+
+  void take_top(std::size_t at) {
+    const McapRecord record = *mcap_record_at(bytes_, at);
+    switch (record.code) {
+      case kHeader: {
+        McapFields fields(record.content);
+        log_.texts.emplace("profile", fields.bytes().substr(0, kLongestMcapText_bytes));
+        log_.texts.emplace("library", fields.bytes().substr(0, kLongestMcapText_bytes));
+        break;
+      }
+      case kMessage:
+        take_message(record.content);
+        break;
+      case kChunk:
+        take_chunk(chunk_of(record.content), at);
+        break;
+      case kMetadata:
+        take_metadata(record.content);
+        break;
+      case kDataEnd: {
+        // The first counts: a file made to be hard could have many.
+        const std::uint32_t stored = is_past_data_end_ ? 0 : *integer_at<std::uint32_t>(record.content, 0);
+        is_past_data_end_ = true;
+        if (stored != 0 && stored != mcap_checksum(bytes_.substr(0, at))) log_.health.checksum_failed = true;
+        break;
+      }
+      default:
+        break;
+    }
+  }
+
+  void take_metadata(std::string_view content) {
+    McapFields fields(content);
+    const std::string name(fields.bytes().substr(0, 256));
+    McapFields entries(fields.bytes());
+    while (!entries.rest().empty() && log_.texts.size() < kMostElements) {
+      const std::string key(entries.bytes().substr(0, 256));
+      const std::string_view value = entries.bytes();
+      if (!entries.is_sound()) return;
+      log_.texts[name + "." + key] = value.substr(0, kLongestMcapText_bytes);
+    }
+  }
+
+  void take_chunk(const McapChunk& chunk, std::size_t at) {
+    const std::map<std::string_view, Compression> known = {
+        {"", Compression::kNone}, {"zstd", Compression::kZstd}, {"lz4", Compression::kLz4}};
+    const auto compression = known.find(chunk.compression);
+    if (compression == known.end()) {
+      ++unknown_compressions_[std::string(chunk.compression.substr(0, 64))];
+      return;
+    }
+    const std::size_t limit = std::min<std::uint64_t>(decompression_left_, chunk.uncompressed_bytes);
+    const Decompressed content = decompress(compression->second, chunk.records, limit);
+    decompression_left_ -= std::min(decompression_left_, content.bytes.size());
+    bool is_sound_chunk = content.is_whole && content.bytes.size() == chunk.uncompressed_bytes;
+    if (is_sound_chunk && chunk.checksum != 0)
+      is_sound_chunk = mcap_checksum(content.bytes) == chunk.checksum;
+    if (chunk.is_whole && !is_sound_chunk) {
+      ++log_.health.damaged_blocks;
+      log_.health.skipped_bytes += chunk.records.size();
+      log_.skipped.push_back({fmt::format("chunk at offset {}", at),
+                              content.is_too_large ? "it is larger than it says, or than a flight can be"
+                                                   : "its checksum is wrong, or it cannot be decompressed",
+                              0});
+      return;
+    }
+    take_records(content.bytes, chunk.is_whole);
+  }
+
+  /// The records within a chunk.
+  void take_records(std::string_view content, bool is_whole) {
+    std::size_t at = 0;
+    while (at < content.size()) {
+      const std::optional<McapRecord> record = mcap_record_at(content, at);
+      if (!record || !is_sound(*record)) {
+        if (is_whole) ++log_.health.damaged_blocks;
+        log_.health.skipped_bytes += content.size() - at;
+        return;
+      }
+      take_definition(*record);
+      if (record->code == kMessage) take_message(record->content);
+      at += size_of(*record);
+    }
+  }
+
+  void take_message(std::string_view content) {
+    McapFields fields(content);
+    const auto id = fields.number<std::uint16_t>();
+    fields.number<std::uint32_t>();
+    const auto time_ns = fields.number<std::uint64_t>();
+    fields.number<std::uint64_t>();
+    auto found = topics_.find(id);
+    if (found == topics_.end()) {
+      if (channels_.count(id) == 0) {
+        ++unknown_channels_[id];
+        return;
+      }
+      found = topics_.emplace(id, begin_topic(channels_.at(id))).first;
+    }
+    if (found->second.topic)
+      found->second.topic->add(static_cast<double>(time_ns) / 1e9, fields.rest());
+    else
+      ++found->second.lost;
+  }
+
+  Topic begin_topic(const McapChannel& channel) {
+    Topic topic;
+    topic.name = channel.topic;
+    auto schema = schemas_.find(channel.schema);
+    if (channel.encoding != "cdr") {
+      topic.fault =
+          "its messages have the encoding \"" + channel.encoding.substr(0, 64) + "\", known is \"cdr\"";
+    } else if (schema == schemas_.end()) {
+      topic.fault = "the file lost the definition of its messages";
+    } else {
+      McapSchema& used = schema->second;
+      if (!used.is_parsed) {
+        used.layout = ros_layout(used.name, used.encoding == "ros2msg" ? used.text : "", used.fault);
+        used.is_parsed = true;
+      }
+      topic.fault = used.fault;
+      if (used.layout) topic.topic.emplace(channel.topic, used.layout, budget_);
+    }
+    return topic;
+  }
+
+  void finish() {
+    for (auto& [id, topic] : topics_) {
+      if (topic.topic)
+        topic.topic->move_to(log_);
+      else
+        log_.skipped.push_back(
+            {topic.name.empty() ? fmt::format("channel {}", id) : topic.name, topic.fault, topic.lost});
+    }
+    number_instances(log_);
+    for (const auto& [id, lost] : unknown_channels_)
+      log_.skipped.push_back(
+          {fmt::format("channel {}", id), "the file lost the record that names its topic", lost});
+    for (const auto& [name, chunks] : unknown_compressions_)
+      log_.skipped.push_back({fmt::format("{} chunks", chunks),
+                              "compression \"" + name + "\" is not known; known are zstd and lz4", 0});
+  }
+
+  const std::string_view bytes_;
+  const std::string path_;
+  RawLog log_;
+  RosBudget budget_;
+  bool is_past_data_end_ = false;
+  std::size_t decompression_left_ = 0;
+  std::deque<std::string> texts_;  ///< of schemas; views of them stay valid
+  std::map<std::uint16_t, McapSchema> schemas_;
+  std::map<std::uint16_t, McapChannel> channels_;
+  std::map<std::uint16_t, Topic> topics_;
+  std::map<std::uint16_t, std::size_t> unknown_channels_;
+  std::map<std::string, std::size_t> unknown_compressions_;
+  std::optional<McapChunk> cut_chunk_;
+  std::optional<std::size_t> cut_offset_;
+};
+
+}  // namespace
+
+bool looks_like_mcap(std::string_view head) { return head.substr(0, kMcapMagic.size()) == kMcapMagic; }
+
+RawLog read_mcap(std::istream& in, const std::string& path) {
+  const std::string bytes = read_all(in, path);
+  return McapReader(bytes, path).read();
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,237 @@
+#include "analysis/logs/formats/ros_types.h"
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <set>
+
+#include "analysis/logs/formats/ros_messages.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr std::size_t kMostTypes = 512;
+constexpr std::size_t kMostFields = 2048;
+constexpr std::size_t kLargestFixedArray = std::size_t{1} << 20;
+constexpr int kDeepestNesting = 12;
+
+std::optional<Scalar> ros_number(std::string_view name) {
+  static const std::map<std::string_view, Scalar> types = {
+      {"bool", Scalar::kUint8},    {"byte", Scalar::kUint8},    {"char", Scalar::kUint8},
+      {"int8", Scalar::kInt8},     {"uint8", Scalar::kUint8},   {"int16", Scalar::kInt16},
+      {"uint16", Scalar::kUint16}, {"int32", Scalar::kInt32},   {"uint32", Scalar::kUint32},
+      {"int64", Scalar::kInt64},   {"uint64", Scalar::kUint64}, {"float32", Scalar::kFloat},
+      {"float64", Scalar::kDouble}};
+  const auto found = types.find(name);
+  return found == types.end() ? std::nullopt : std::optional<Scalar>(found->second);
+}
+
+std::string_view next_line(std::string_view& text) {
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(std::min(end + 1, text.size()));
+  return line;
+}
+
+/// The next word and what follows it.
+std::string_view next_word(std::string_view& line) {
+  const std::string_view kBlank = " \t\r";
+  line.remove_prefix(std::min(line.find_first_not_of(kBlank), line.size()));
+  const std::size_t end = std::min(line.find_first_of(kBlank), line.size());
+  const std::string_view word = line.substr(0, end);
+  line.remove_prefix(end);
+  line.remove_prefix(std::min(line.find_first_not_of(kBlank), line.size()));
+  return word;
+}
+
+/// A field as it is written: its type still by name.
+struct WrittenField {
+  RosField field;
+  std::string type;  ///< of kMessage
+};
+using WrittenType = std::vector<WrittenField>;
+
+/// "[3]", "[]", "[<=3]" behind a type. False if it is none of them.
+bool parse_array(std::string_view brackets, RosField& field) {
+  if (brackets.empty()) return true;
+  if (brackets.size() < 2 || brackets.front() != '[' || brackets.back() != ']') return false;
+  const std::string_view inside = brackets.substr(1, brackets.size() - 2);
+  field.array = RosArray::kSequence;
+  if (inside.empty() || inside.substr(0, 2) == "<=") return true;
+  field.array = RosArray::kFixed;
+  const auto [end, error] = std::from_chars(inside.data(), inside.data() + inside.size(), field.count);
+  return error == std::errc() && end == inside.data() + inside.size() && field.count >= 1 &&
+         field.count <= kLargestFixedArray;
+}
+
+bool is_type_name(std::string_view name) {
+  while (true) {
+    const std::size_t slash = name.find('/');
+    if (!is_identifier(name.substr(0, slash))) return false;
+    if (slash == std::string_view::npos) return true;
+    name.remove_prefix(slash + 1);
+  }
+}
+
+/// @param package of the definition, for types that are named without one
+bool parse_type(std::string_view text, const std::string& package, WrittenField& written) {
+  const std::size_t bracket = std::min(text.find('['), text.size());
+  if (!parse_array(text.substr(bracket), written.field)) return false;
+  std::string_view name = text.substr(0, bracket);
+  const std::size_t bound = name.find("<=");  // string<=10
+  if (bound != std::string_view::npos) name = name.substr(0, bound);
+  if (name == "string") {
+    written.field.kind = RosKind::kText;
+    return true;
+  }
+  if (bound != std::string_view::npos || name == "wstring") return false;
+  if (const std::optional<Scalar> number = ros_number(name)) {
+    written.field.number = *number;
+    return true;
+  }
+  // ROS 1 had these as words of the language.
+  if (name == "time") name = "builtin_interfaces/Time";
+  if (name == "duration") name = "builtin_interfaces/Duration";
+  if (name == "Header") name = "std_msgs/Header";
+  if (!is_type_name(name)) return false;
+  written.type =
+      name.find('/') == std::string_view::npos ? package + "/" + std::string(name) : short_type_name(name);
+  const bool is_stamp =
+      written.type == "builtin_interfaces/Time" || written.type == "builtin_interfaces/Duration";
+  written.field.kind = is_stamp ? RosKind::kStamp : RosKind::kMessage;
+  return true;
+}
+
+std::string_view without_comment(std::string_view line) {
+  // A "#" within a default text cuts the default only, which is not needed.
+  return line.substr(0, line.find('#'));
+}
+
+/// One line of a definition. Constants give nothing. Returns false if it is no line of a definition.
+bool parse_line(std::string_view line, const std::string& package, WrittenType& type) {
+  std::string_view rest = without_comment(line);
+  const std::string_view type_word = next_word(rest);
+  if (type_word.empty()) return true;
+  const std::string_view name = next_word(rest);
+  const bool is_constant = name.find('=') != std::string_view::npos || (!rest.empty() && rest[0] == '=');
+  if (is_constant) return is_identifier(name.substr(0, name.find('=')));
+  WrittenField written;
+  written.field.name = name;
+  if (!is_identifier(name) || !parse_type(type_word, package, written)) return false;
+  type.push_back(std::move(written));
+  return true;
+}
+
+/// Gathers the types of a definition and puts them in order.
+class SchemaBuilder {
+ public:
+  RosDefinition build(const std::string& name, std::string_view text) {
+    RosDefinition result;
+    const std::string root = short_type_name(name);
+    if (text.size() > kLongestDefinition_bytes) {
+      result.fault = "its definition is over 1 MiB long";
+    } else if (parse(root, text) && add(root, 0)) {
+      result.schema = RosSchema{std::move(types_)};
+    } else {
+      result.fault = fault_;
+    }
+    return result;
+  }
+
+ private:
+  bool fail(const std::string& fault) {
+    if (fault_.empty()) fault_ = fault;
+    return false;
+  }
+
+  /// All definitions of `text` into written_; the first is `name`.
+  bool parse(std::string name, std::string_view text) {
+    WrittenType type;
+    while (!text.empty()) {
+      std::string_view line = next_line(text);
+      if (line.substr(0, 3) == "===") {
+        written_.emplace(name, std::move(type));
+        type.clear();
+        std::string_view head = next_line(text);
+        if (next_word(head) != "MSG:") return fail("its definition has no \"MSG:\" after a line of \"=\"");
+        name = short_type_name(next_word(head));
+        if (written_.size() > kMostTypes) return fail("its definition has over 512 types");
+        continue;
+      }
+      if (!parse_line(line, name.substr(0, name.find('/')), type))
+        return fail("its definition has a line that cannot be used: \"" + std::string(line.substr(0, 60)) +
+                    "\"");
+      if (type.size() > kMostFields) return fail("its definition has over 2048 fields in one type");
+    }
+    written_.emplace(std::move(name), std::move(type));
+    return true;
+  }
+
+  const WrittenType* find(const std::string& name) {
+    const auto found = written_.find(name);
+    if (found != written_.end()) return &found->second;
+    const std::vector<RosMessageText> builtin = builtin_ros_definitions(name);
+    if (builtin.empty() || !parse(name, builtin[0].text)) return nullptr;
+    return &written_.at(name);
+  }
+
+  /// Puts `name` and what it uses into types_; false, with the reason, if that cannot be.
+  bool add(const std::string& name, int depth) {
+    if (depth > kDeepestNesting) return fail("its definition is nested too deeply, or contains itself");
+    const WrittenType* const written = find(name);
+    if (written == nullptr) return fail("the file does not define " + name);
+    const std::size_t index = types_.size();
+    index_of_.emplace(name, index);
+    types_.push_back({name, {}});
+    std::vector<RosField> fields;
+    std::set<std::string> names;
+    for (const WrittenField& each : *written) {
+      RosField field = each.field;
+      if (!names.insert(field.name).second) return fail(name + " has two fields \"" + field.name + "\"");
+      if (field.kind == RosKind::kMessage) {
+        const auto known = index_of_.find(each.type);
+        if (known == index_of_.end() && !add(each.type, depth + 1)) return false;
+        field.message = index_of_.at(each.type);
+        if (heights_.count(field.message) == 0) return fail(name + " contains itself");
+      }
+      fields.push_back(std::move(field));
+    }
+    if (fields.empty())
+      fields.push_back(
+          {"structure_needs_at_least_one_member", RosKind::kNumber, Scalar::kUint8, 0, RosArray::kNone, 1});
+    int height = 0;
+    for (const RosField& field : fields)
+      if (field.kind == RosKind::kMessage) height = std::max(height, 1 + heights_.at(field.message));
+    if (height > kDeepestNesting) return fail("its definition is nested too deeply");
+    heights_[index] = height;
+    types_[index].fields = std::move(fields);
+    return true;
+  }
+
+  std::map<std::string, WrittenType> written_;
+  std::vector<RosType> types_;
+  std::map<std::string, std::size_t> index_of_;
+  std::map<std::size_t, int> heights_;  ///< of the types that are complete
+  std::string fault_;
+};
+
+}  // namespace
+
+std::string short_type_name(std::string_view name) {
+  const std::size_t first = name.find('/');
+  const std::size_t last = name.rfind('/');
+  if (first == last) return std::string(name);
+  return std::string(name.substr(0, first)) + std::string(name.substr(last));
+}
+
+std::string long_type_name(std::string_view name) {
+  const std::string brief = short_type_name(name);
+  const std::size_t slash = brief.find('/');
+  return slash == std::string::npos ? brief : brief.substr(0, slash) + "/msg" + brief.substr(slash);
+}
+
+RosDefinition parse_ros_definition(const std::string& name, std::string_view text) {
+  return SchemaBuilder().build(name, text);
+}
+
+}  // namespace swarmcert::logs
