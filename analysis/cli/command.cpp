@@ -20,7 +20,7 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
       app.add_option("--rho", arguments.rho, "Weight file of rho, evaluated on the sum (kind: default)");
   phi->needs(rho)->excludes(file);
   rho->needs(phi)->excludes(file);
-  app.add_option("--key", arguments.key, "Where the state dict lies inside a nested checkpoint, e.g. model");
+  app.add_option("--key", arguments.key, "Key of the state dict inside a nested checkpoint, e.g. model");
 }
 
 files::Network load_net(const files::NetworkArguments& arguments) {

@@ -24,8 +24,8 @@ KernelWidth asked_for() {
   if (text == "narrow") return KernelWidth::kNarrow;
   if (text == "avx2") return KernelWidth::kAvx2;
   if (text == "avx512") return KernelWidth::kAvx512;
-  throw files::InputError({"environment", "", "SWARMCERT_KERNELS", text, "is no width of registers",
-                           "say narrow, avx2 or avx512"});
+  throw files::InputError(
+      {"environment", "", "SWARMCERT_KERNELS", text, "unknown SIMD width", "say narrow, avx2 or avx512"});
 }
 
 }  // namespace

@@ -243,7 +243,7 @@ Command add_command() {
             ->required();
         declare_flights(app, options->flights, false);
         add_output(app, "-o,--output", options->output, "The new model.toml");
-        app.add_flag("--keep-anyway", options->keep_anyway, "Add also what does not help");
+        app.add_flag("--keep-anyway", options->keep_anyway, "Also add effects that do not reduce the error");
         add_output(app, "--report", options->report,
                    "Write an HTML report with the error ladder into this folder");
         return [options](const CommonOptions& common) { return run_add(*options, common); };

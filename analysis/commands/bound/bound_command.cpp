@@ -55,7 +55,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
   const bool has_task = !options.task.task.empty();
-  if (has_task && !options.tube) throw UsageError("--task is that of a tube: add --tube");
+  if (has_task && !options.tube) throw UsageError("--task requires --tube");
   DisturbanceArguments told = options.disturbance;
   // The tube makes its own bounds of how vehicles move; without --speed there are no others.
   if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
@@ -160,9 +160,9 @@ Command bound_command() {
                                          "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")
                               ->expected(0, -1)
                               ->default_str("default");
-        app.add_option(
-               "--loops", options->most_loops,
-               "Loops that --uncertain may look at, for each of its rows; bounds hold wherever it ends")
+        app.add_option("--loops", options->most_loops,
+                       "Maximum number of loops evaluated per row of --uncertain; results remain valid "
+                       "bounds if the limit is reached")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");

@@ -208,23 +208,23 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
       ->check(CLI::PositiveNumber);
   auto* truth = app.add_option("--truth", arguments.truth,
                                "model.toml whose effects are declared to be the true force");
-  app.add_option("--gap", arguments.gap, "Of --truth: height differences between vehicles, FROM:TO in m")
+  app.add_option("--gap", arguments.gap, "Height differences between vehicles, FROM:TO in m (with --truth)")
       ->needs(truth);
   app.add_option("--own-speed", arguments.own_speed, "Largest speed of any vehicle, m/s")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--own-accel", arguments.own_accel, "Largest acceleration of any vehicle, m/s^2")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--thrust-rate", arguments.thrust_rate, "Of --truth: sup |d/dt (thrust vector)|, N/s")
+  app.add_option("--thrust-rate", arguments.thrust_rate, "sup |d/dt (thrust vector)|, N/s (with --truth)")
       ->check(CLI::NonNegativeNumber)
       ->needs(truth);
-  app.add_option("--least-height", arguments.least_height, "Of --truth: lowest height, m (default 0)")
+  app.add_option("--least-height", arguments.least_height, "Lowest height, m (with --truth; default 0)")
       ->check(CLI::NonNegativeNumber)
       ->needs(truth);
-  app.add_option("--largest-height", arguments.largest_height, "Of --truth: largest height, m")
+  app.add_option("--largest-height", arguments.largest_height, "Largest height, m (with --truth)")
       ->check(CLI::NonNegativeNumber)
       ->needs(truth);
   app.add_option("--neighbour-mass", arguments.neighbour_mass,
-                 "Of --truth: mass of the heaviest neighbour, kg (default: that of the truth's vehicle)")
+                 "Mass of the heaviest neighbour, kg (with --truth; default: that of the truth's vehicle)")
       ->check(CLI::PositiveNumber)
       ->needs(truth);
 }

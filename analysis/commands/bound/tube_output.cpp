@@ -73,12 +73,12 @@ std::string radius_text(const Json& value) {
 
 void declare_tube(CLI::App& app, TubeArguments& arguments) {
   auto* task = app.add_option("--task", arguments.task,
-                              "Of --tube: the task that is flown (swap, hover); needs --network and --truth");
-  app.add_option("--vehicles", arguments.vehicles, "Of --task: how many fly it (default 2)")
+                              "Task for --tube (swap, hover); requires --network and --truth");
+  app.add_option("--vehicles", arguments.vehicles, "Number of vehicles that fly --task (default 2)")
       ->check(CLI::Range(2, 10))
       ->needs(task);
   app.add_option("--duration", arguments.duration_s,
-                 "Of --task: seconds, at most 60 (default: the task's own)")
+                 "Duration of --task, s, at most 60 (default: the task's own)")
       ->check(CLI::Range(0.1, 60.0))
       ->needs(task);
 }

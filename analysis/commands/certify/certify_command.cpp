@@ -208,7 +208,7 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
                                                          : lipschitz::UpperMethod::kAuto;
   options.certify.jobs = common.jobs;
   if (options.method == "branch") {
-    if (options.nodes == 0) throw UsageError("--nodes 0: branch and bound looks at one box at least");
+    if (options.nodes == 0) throw UsageError("--nodes must be at least 1 with --method branch");
     if (options.nodes) options.certify.branch.nodes = *options.nodes;
     if (!options.nodes && options.seconds > 0) options.certify.branch.nodes = std::numeric_limits<int>::max();
     options.certify.branch.seconds = options.seconds;
@@ -281,34 +281,34 @@ Command certify_command() {
         declare_network(app, options->network);
         app.add_option(
                "--method", options->method,
-               "Upper bound: product of spectral norms, sdp (LipSDP-Neuron), auto, the smaller one, "
-               "or branch: branch "
-               "and bound over the box of --domain, for bounds that hold there only, or over all inputs")
+               "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron), auto (the smaller of both), "
+               "or branch (branch and bound over the box of --domain; without --domain over all inputs)")
             ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
             ->capture_default_str();
         app.add_option("--as", options->as,
-                       "Certify the weights rounded to this precision, as a C compiler flashes them")
+                       "Certify the weights rounded to this precision, as they are stored in flash")
             ->check(CLI::IsMember({"float32"}));
         app.add_flag(
             "--blocks{every}", options->blocks,
             "Bounds per block of inputs as well: --blocks for all, or --blocks=position,velocity,x2");
         app.add_option("--scale", options->certify.scale,
-                       "Bounds in the norm sqrt(sum (dx_k / scale_k)^2) as well: one number per input")
+                       "Also bounds in the norm sqrt(sum (dx_k / scale_k)^2): one number per input")
             ->delimiter(',');
-        app.add_option(
-            "--neighbours", options->neighbours,
-            "Laws for several neighbours: a number of each kind, or a group such as small=1,large=2. With "
-            "--method branch also the bound for one that moves among at most so many, all in the box");
+        app.add_option("--neighbours", options->neighbours,
+                       "Bounds for several moving neighbours: a number of each kind, or a group such as "
+                       "small=1,large=2. With --method branch also the bound for one neighbour that moves "
+                       "among at most this many, all in the box");
         app.add_option("--domain", options->domain,
                        "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
         app.add_option("--cuts", options->certify.branch.pairs,
-                       "With --method branch: pairs of neurons that exclude each other, at most so many per "
-                       "box. Fewer boxes and a shorter certificate for the same bound, but more time")
+                       "With --method branch: maximum number of constraints per box from pairs of "
+                       "incompatible activations. Gives fewer boxes and a shorter certificate for the same "
+                       "bound, but takes more time")
             ->check(CLI::Range(0, 1000))
             ->capture_default_str();
         app.add_flag_callback(
             "--default-slopes", [options] { options->certify.branch.better_slopes = false; },
-            "With --method branch: no better lower slopes for neurons that are nearly decided (to compare)");
+            "With --method branch: disable the adaptive lower ReLU slopes (for comparison)");
         auto* map = app.add_option("--map", options->map,
                                    "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
                                    "by cell; the slope in a "
@@ -317,7 +317,7 @@ Command certify_command() {
         app.add_option("--cells", options->cells, "Cells of --map along each input (default: 12), e.g. 12,8")
             ->needs(map);
         app.add_option("--cell-nodes", options->slope_map.nodes,
-                       "Boxes that branch and bound looks at, per cell of --map")
+                       "Maximum number of boxes of branch and bound per cell of --map")
             ->needs(map)
             ->check(CLI::Range(1, 1000000))
             ->capture_default_str();
@@ -327,8 +327,8 @@ Command certify_command() {
                        "Inputs are quantised to multiples of this (float32 error)")
             ->check(CLI::NonNegativeNumber);
         app.add_flag("--explain", options->explain,
-                     "Other bounds for comparison, and where the bound is lost");
-        app.add_option("--gamma", options->gamma, "Limit that every layer's spectral norm must keep")
+                     "Other bounds for comparison, and which layers make the bound loose");
+        app.add_option("--gamma", options->gamma, "Limit on the spectral norm of every layer")
             ->check(CLI::PositiveNumber);
         app.add_option("--max-lipschitz", options->max_lipschitz,
                        "Limit on the Lipschitz constant of the network, or of every set function")
@@ -343,9 +343,9 @@ Command certify_command() {
                "End the search for a lower bound after the round in which this many seconds pass; with "
                "--method branch: the search for an upper bound, per bound")
             ->check(CLI::PositiveNumber);
-        app.add_option("--seed", options->certify.lower.seed, "Of the search for lower bounds")
+        app.add_option("--seed", options->certify.lower.seed, "Seed of the lower-bound search")
             ->capture_default_str();
-        add_output(app, "-o,--output", options->output, "Where the certificate goes");
+        add_output(app, "-o,--output", options->output, "File for the certificate");
         add_output(app, "--report", options->report, "Folder for an HTML report with its plots");
         return [options](const CommonOptions& common) { return run_certify(*options, common); };
       }};

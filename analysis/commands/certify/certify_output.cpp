@@ -292,7 +292,7 @@ void print_bounds(const files::Network& network, const Certification& found) {
     if (!outlook.empty()) fmt::print("    {}\n", outlook);
   }
   if (!network.rho.empty()) {
-    fmt::print("  set: per neighbour that moves, whatever the number and the places of the others\n");
+    fmt::print("  set: one neighbour moves; any number of other neighbours, anywhere\n");
     const auto is_counted = [](const CertifiedBound& bound) { return !bound.neighbours.empty(); };
     if (std::any_of(found.bounds.begin(), found.bounds.end(), is_counted))
       fmt::print("  at most: while all neighbours are in the box, and no more than these\n");

@@ -166,7 +166,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
 
 Command compare_command() {
   return {
-      "compare", "A model against flights: force residuals, and where the model fails",
+      "compare", "Compare a model with flights: force residuals, and where the model fails",
       "Records on the ground, after a crash, with rotors off, after gaps and without a known neighbour are "
       "cut;\n"
       "the result counts them. Forces are in newton in the JSON, in gram-force on the terminal.\n\n"
@@ -192,10 +192,10 @@ Command compare_command() {
                "per vehicle, ground, downwash and the rest; --network adds a row")
             ->allow_extra_args(false);
         add_output(app, "--fitted", options->fitted,
-                   "Folder for what --budget fitted: a model per vehicle and their flights.toml");
+                   "Folder for the models fitted by --budget, one per vehicle, and their flights.toml");
         add_output(app, "--inject", options->inject,
-                   "Write FLIGHTS into this folder as if the model's effects had acted on them besides what "
-                   "did: their force is added to the accelerometer, open loop, nothing else changes");
+                   "Write FLIGHTS into this folder with the force of the model's effects added to the "
+                   "accelerometer (open loop: nothing else changes)");
         app.add_flag(
             "--published-filter", options->flights.published_filter,
             "Cut and filter as the networks' authors did: 32 g (small) and 67 g (large), thrust lag 0.16 "

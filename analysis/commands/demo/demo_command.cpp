@@ -72,7 +72,7 @@ int run_demo(const DemoOptions& options, const CommonOptions& common) {
 
 Command demo_command() {
   return {
-      "demo", "The main job end to end on bundled data",
+      "demo", "Certify and check a bundled network",
       "Certifies a network that ships with the tool and checks the certificate.\n\nExample: swarmcert demo",
       [](CLI::App& app) {
         const auto options = std::make_shared<DemoOptions>();

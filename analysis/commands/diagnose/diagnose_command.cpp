@@ -219,12 +219,11 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
 }  // namespace
 
 Command diagnose_command() {
-  return {"diagnose", "Which physical effect is missing in a model, judged by flights",
+  return {"diagnose", "Find the physical effect that a model lacks, from flights",
           "Every known effect is a candidate; one counts as found if it lowers the cross-validated error by "
           "2 %,\n"
-          "stands out from the scatter between blocks of 2 s, and set points do not contradict it. What "
-          "remains is "
-          "tested separately.\n\n"
+          "is significant across blocks of 2 s, and is not contradicted by the set points. The remainder is "
+          "analysed separately.\n\n"
           "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out",
           [](CLI::App& app) {
             const auto options = std::make_shared<DiagnoseOptions>();

@@ -104,7 +104,7 @@ Command export_command() {
         app.add_option("--most-neighbours", options->source.most_neighbours, "Neighbours of one evaluation")
             ->check(CLI::Range(1, 64))
             ->capture_default_str();
-        app.add_option("--seed", options->source.seed, "Of the golden vectors")->capture_default_str();
+        app.add_option("--seed", options->source.seed, "Seed of the golden vectors")->capture_default_str();
         return [options](const CommonOptions& common) { return run_export(*options, common); };
       }};
 }

@@ -161,7 +161,7 @@ int verify(const VerifyOptions& options, const CommonOptions& common) {
 
 Command gate_command() {
   return {
-      "gate", "May this release ship? Limits on everything that it rests on",
+      "gate", "Check a release against a policy: may it ship?",
       "POLICY.toml names the files of the release and has one table per check with its limits. Every check "
       "passes, fails\n"
       "with a witness, or is inconclusive; checks that the policy does not ask for are listed. Exit code 0 "
@@ -206,7 +206,7 @@ Command verify_bundle_command() {
             app.add_option("DIR", options->folder, "The bundle")->required();
             app.add_flag("--rerun", options->rerun, "Also run every check of the policy again");
             app.add_option("--sha256", options->sha256,
-                           "Of the manifest, as gate printed it: whether it is that release");
+                           "Expected SHA-256 of the manifest, as printed by gate");
             return [options](const CommonOptions& common) { return verify(*options, common); };
           }};
 }

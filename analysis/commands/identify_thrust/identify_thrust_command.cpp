@@ -101,7 +101,7 @@ int run_identify_thrust(const IdentifyThrustOptions& options, const CommonOption
 
 Command identify_thrust_command() {
   return {
-      "identify-thrust", "The calibration polynomials of motors and battery, from load-cell data",
+      "identify-thrust", "Fit the calibration polynomials of motors and battery to load-cell data",
       "The CSV names its columns in the first line: pwm, vbat, thrust_gf (of one rotor), and optionally run, "
       "which\n"
       "numbers the ramps. Units: pwm[counts], pwm[ratio], vbat[V], vbat[mV], thrust[gf], thrust[N].\n"
@@ -112,7 +112,8 @@ Command identify_thrust_command() {
         app.add_option("CSV", options->file, "Load-cell recording")->required();
         app.add_option("--rotors", options->rotors, "Rotors that push on the load cell together (default: 1)")
             ->check(CLI::Range(1, controller::kMostRotors));
-        app.add_option("--confidence", options->confidence, "Of the coefficients' intervals (default: 0.95)")
+        app.add_option("--confidence", options->confidence,
+                       "Confidence level of the coefficients' intervals (default: 0.95)")
             ->check(CLI::Range(0.5, 0.9999));
         add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_identify_thrust(*options, common); };

@@ -251,8 +251,7 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
 }  // namespace
 
 Command inspect_command() {
-  return {"inspect",
-          "What is in a weight file, network.toml, model, certificate or flight log, and is it sound",
+  return {"inspect", "Show and validate weight files, network.toml, models, certificates and flight logs",
           "Exit 0 if every file can be read, else 3 with what is wrong and where. Damage inside a flight log "
           "is skipped,\n"
           "counted and shown.\n\n"
@@ -268,7 +267,7 @@ Command inspect_command() {
             app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
             app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
             app.add_option("--key", options->key,
-                           "Where the state dict lies inside a nested checkpoint, e.g. model");
+                           "Key of the state dict inside a nested checkpoint, e.g. model");
             return [options](const CommonOptions& common) { return run_inspect(*options, common); };
           }};
 }

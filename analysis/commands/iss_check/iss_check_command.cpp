@@ -238,7 +238,8 @@ int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
 
 Command iss_check_command() {
   return {
-      "iss-check", "Try to break the tracking theorem's ball by integrating the loop under disturbances",
+      "iss-check",
+      "Attempt to falsify the tracking theorem's ball by integrating the loop under disturbances",
       "Integrates the continuous loop (SUNDIALS) under learning errors that change by at most d_m: "
       "ramps, the worst\n"
       "input of the linear loop, switching and random ones, random starts, and ones optimised with "
@@ -262,7 +263,7 @@ Command iss_check_command() {
         app.add_option("--rate", options->check.rate_N_s,
                        "d_m in N/s (default: a fifth of the weight over the settling time)")
             ->check(CLI::PositiveNumber);
-        app.add_option("--seed", options->check.seed, "Of the random disturbances (default 0)");
+        app.add_option("--seed", options->check.seed, "Seed of the random disturbances (default 0)");
         add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options](const CommonOptions& common) { return run_iss_check(*options, common); };
       }};

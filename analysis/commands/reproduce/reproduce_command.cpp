@@ -164,7 +164,7 @@ Command reproduce_command() {
             add_output(app, "-o,--output", options->output, "Folder for everything")->required();
             app.add_flag("--full", options->setting.full, "Full size: a minute per task, more seeds");
             app.add_option("--shard", options->shard, "i/N: only this part, for several machines");
-            app.add_option("--seed", options->setting.seed, "Of flights, noise and networks")
+            app.add_option("--seed", options->setting.seed, "Seed of flights, noise and networks")
                 ->capture_default_str();
             app.add_flag("--updraft", options->setting.updraft,
                          "The simulated truth has an updraft around downwash");

@@ -22,7 +22,7 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
                  "flights.toml: vehicles with their models (default: the published ones)");
   app.add_option(
       "--columns", options.columns,
-      "columns.toml: what the columns of CSV logs mean, per signal column, unit and frame, as in position_x "
+      "columns.toml: meaning of the columns of CSV logs; per signal column, unit and frame, as in position_x "
       "= { "
       "column = \"px\", unit = \"mm\" }: time, position_x .. z, velocity_x .. z, specific_force_x .. z, "
       "attitude_x .. z and _w, duty_1 .. 4, battery; if there, rate_x .. z, target_position_x .. z, "

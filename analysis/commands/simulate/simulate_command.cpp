@@ -239,7 +239,7 @@ Command simulate_command() {
             add_output(app, "--report", options->report, "Folder for an HTML report with plots");
             app.add_option("--duration", options->duration_s, "Seconds (default: the task's own)")
                 ->check(CLI::PositiveNumber);
-            app.add_option("--seed", options->seed, "Of noise, clocks and random goals (default 0)");
+            app.add_option("--seed", options->seed, "Seed of noise, clocks and random goals (default 0)");
             app.add_option("--run", options->run, "Number of the run in the logs' names (default 0)")
                 ->check(CLI::NonNegativeNumber);
             app.add_option("--radio-latency", options->radio.latency_s,

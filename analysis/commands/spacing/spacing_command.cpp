@@ -142,7 +142,7 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
 }  // namespace
 
 Command spacing_command() {
-  return {"spacing", "How close, and how fast, vehicles may pass below one another",
+  return {"spacing", "Least distance and crossing speed for vehicles that pass below one another",
           "For every height gap: may the lower vehicle stay there, how far to the side must it keep "
           "otherwise, and\n"
           "how fast must it cross for its error bound to stay below the limit with thrust to spare.\n\n"

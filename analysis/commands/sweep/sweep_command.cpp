@@ -114,14 +114,14 @@ Command sweep_command() {
                 "--shard", options->shard,
                 "I/N: compute only the I-th of N parts; I counts 0 .. N-1 or 1 .. N, N being the same as 0");
             leave_out_of_record(app.add_flag("--resume", options->resume,
-                                             "Keep the cells that the shard's file already has"));
+                                             "Keep the cells that the shard's file already contains"));
             return [options](const CommonOptions& common) { return run_sweep(*options, common); };
           }};
 }
 
 Command merge_command() {
   return {
-      "merge", "Put the shards of a sweep together",
+      "merge", "Merge the shards of a sweep",
       "Checks that no cell is missing or there twice, then writes what an undivided sweep writes, byte for "
       "byte.\n\n"
       "Example: swarmcert merge sweep",

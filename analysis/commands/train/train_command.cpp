@@ -378,24 +378,25 @@ Command train_command() {
             ->check(CLI::Range(1, 4096))
             ->capture_default_str();
         app.add_flag("--no-ground", options->no_ground, "Leave out the phi of the own state");
-        app.add_option("--epochs", options->run.epochs, "Passes over the flights")
+        app.add_option("--epochs", options->run.epochs, "Maximum number of epochs")
             ->check(CLI::Range(1, 100000))
             ->capture_default_str();
-        app.add_option("--patience", options->run.patience, "Epochs without a better score before it ends")
+        app.add_option("--patience", options->run.patience,
+                       "Epochs without improvement after which training stops")
             ->check(CLI::Range(1, 100000))
             ->capture_default_str();
-        app.add_option("--rate", trainer.learning_rate, "Learning rate at the start")
+        app.add_option("--rate", trainer.learning_rate, "Initial learning rate")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
         app.add_option("--batch", trainer.batch, "Samples per step")
             ->check(CLI::Range(1, 1 << 20))
             ->capture_default_str();
-        app.add_option("--seed", trainer.seed, "Of initial weights and order of samples")
+        app.add_option("--seed", trainer.seed, "Seed of the initial weights and of the sample order")
             ->capture_default_str();
-        app.add_option(
-               "--teachers", options->teachers,
-               "Train so many networks first, with the seeds after --seed, and fit one to the mean of what "
-               "they say; of all of them, the one is written that the selecting flights prefer")
+        app.add_option("--teachers", options->teachers,
+                       "First train this many networks, with the seeds after --seed, then train one network "
+                       "on their averaged predictions (distillation); the one with the smallest error on the "
+                       "selecting flights is written")
             ->check(CLI::Range(0, 1000))
             ->capture_default_str();
         leave_out_of_record(app.add_flag("--resume", options->run.resumes,
@@ -403,7 +404,7 @@ Command train_command() {
         app.add_flag("--published-filter", options->flights.published_filter,
                      "Cut and filter as the networks' authors did, see compare");
         app.add_flag("--published-signals", options->flights.published_signals,
-                     "Of that, only their thrust lag, their masses and the accelerometer as it is");
+                     "Only the thrust lag, masses and unfiltered accelerometer of --published-filter");
         add_output(app, "--report", options->report, "Write an HTML report into this folder");
         return [options](const CommonOptions& common) { return run_train(*options, common); };
       }};

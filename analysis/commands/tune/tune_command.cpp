@@ -218,15 +218,15 @@ Command tune_command() {
         declare_tracking(app, options->tracking);
         app.add_option("--axis", options->axis, "x, y or z (default z)")
             ->check(CLI::IsMember({"x", "y", "z"}));
-        app.add_option("--objective", options->objective, "Gain to make least (default impulse)")
+        app.add_option("--objective", options->objective, "Gain to minimize (default impulse)")
             ->check(CLI::IsMember({"rate", "amplitude", "edge", "impulse"}));
         auto& limits = options->tune.constraints;
         app.add_option(
                "--max-noise", limits.most_noise_m_s2,
-               "Most noise of the command, m/s^2, for 1 mm and 0.05 m/s of sensor noise (default: as now)")
+               "Largest noise of the command, m/s^2, for 1 mm and 0.05 m/s of sensor noise (default: as now)")
             ->check(CLI::PositiveNumber);
         app.add_option("--min-lag", limits.least_lag_limit_s,
-                       "Further lag that the loop must bear, s (default: half of what it bears now)")
+                       "Additional lag that the loop must tolerate, s (default: half of the present margin)")
             ->check(CLI::PositiveNumber);
         app.add_option("--max-rate", limits.most_rate,
                        "Largest rate gain, m per N/s (default: as now; keeps Ki up)")
