@@ -3,6 +3,8 @@
 #include <fstream>
 
 #include "analysis/logs/formats/mcap.h"
+#include "analysis/logs/formats/rosbag_folder.h"
+#include "analysis/logs/formats/rosbag_sqlite.h"
 #include "analysis/logs/formats/ulog.h"
 #include "nn/base/input_error.h"
 
@@ -35,6 +37,7 @@ const std::vector<LogFormat>& log_formats() {
   static const std::vector<LogFormat> formats = {
       {"PX4 ULog", looks_like_ulog, read_ulog},
       {"rosbag2 in MCAP", looks_like_mcap, read_mcap},
+      {"rosbag2 in SQLite", looks_like_rosbag_sqlite, read_rosbag_sqlite},
   };
   return formats;
 }
@@ -58,6 +61,7 @@ RawLog parse_raw(std::istream& in, const std::string& path) {
 }
 
 RawLog read_raw(const std::string& path) {
+  if (looks_like_rosbag_folder(path)) return read_rosbag_folder(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
   return parse_raw(in, path);

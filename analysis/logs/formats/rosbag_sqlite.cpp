@@ -1,0 +1,317 @@
+#include "analysis/logs/formats/rosbag_sqlite.h"
+
+#include <fmt/core.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "analysis/logs/formats/bytes.h"
+#include "analysis/logs/formats/decompress.h"
+#include "analysis/logs/formats/ros_topic.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr std::string_view kSqliteMagic("SQLite format 3\0", 16);
+constexpr std::size_t kMostTopics = std::size_t{1} << 16;
+
+/// A database in memory whose schema nobody trusts.
+class Database {
+ public:
+  /// @param bytes must outlive this; its two bytes that announce a write-ahead log are changed
+  Database(std::string& bytes, const std::string& path) : path_(path) {
+    // A database that was written with a write-ahead log cannot be opened without one unless it says otherwise.
+    if (bytes.size() > 19) bytes[18] = bytes[19] = 1;
+    sqlite3* raw = nullptr;
+    const int opened =
+        sqlite3_open_v2(":memory:", &raw, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr);
+    handle_.reset(raw);
+    if (opened != SQLITE_OK) refuse("cannot be opened");
+    for (const int option :
+         {SQLITE_DBCONFIG_ENABLE_TRIGGER, SQLITE_DBCONFIG_ENABLE_VIEW, SQLITE_DBCONFIG_TRUSTED_SCHEMA})
+      sqlite3_db_config(raw, option, 0, nullptr);
+    sqlite3_db_config(raw, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+    constexpr int kLargestValue_bytes = 1 << 26;
+    sqlite3_limit(raw, SQLITE_LIMIT_LENGTH, kLargestValue_bytes);
+    const auto size = static_cast<sqlite3_int64>(bytes.size());
+    auto* const data = reinterpret_cast<unsigned char*>(bytes.data());
+    if (sqlite3_deserialize(raw, "main", data, size, size, SQLITE_DESERIALIZE_READONLY) != SQLITE_OK)
+      refuse("cannot be opened");
+    instructions_left_ = kLeastInstructions + kInstructionsPerByte * bytes.size();
+    sqlite3_progress_handler(raw, kStep_instructions, &Database::stops, this);
+  }
+
+  sqlite3* handle() const { return handle_.get(); }
+
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw files::InputError({path_, "", "", "", what, files::kCopyAgain});
+  }
+
+ private:
+  struct Close {
+    void operator()(sqlite3* handle) const { sqlite3_close(handle); }
+  };
+  static constexpr int kStep_instructions = 10000;
+  static constexpr std::size_t kLeastInstructions = 10'000'000, kInstructionsPerByte = 100;
+
+  /// Damaged pages can form a tree that takes forever to walk.
+  static int stops(void* self) {
+    std::size_t& left = static_cast<Database*>(self)->instructions_left_;
+    left -= std::min<std::size_t>(left, kStep_instructions);
+    return left == 0 ? 1 : 0;
+  }
+
+  const std::string path_;
+  std::unique_ptr<sqlite3, Close> handle_;
+  std::size_t instructions_left_ = 0;
+};
+
+/// A query of ours, row by row.
+class Rows {
+ public:
+  Rows(const Database& database, const std::string& query) {
+    sqlite3_stmt* raw = nullptr;
+    if (sqlite3_prepare_v2(database.handle(), query.c_str(), -1, &raw, nullptr) == SQLITE_OK)
+      statement_.reset(raw);
+  }
+
+  bool is_prepared() const { return statement_ != nullptr; }
+  /// False at the end, and where a row cannot be read.
+  bool next() {
+    if (!statement_) return false;
+    const int result = sqlite3_step(statement_.get());
+    is_damaged_ = result != SQLITE_ROW && result != SQLITE_DONE;
+    return result == SQLITE_ROW;
+  }
+  bool is_damaged() const { return is_damaged_; }
+  std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+  /// Valid until the next row.
+  std::string_view bytes(int column) const {
+    const void* const data = sqlite3_column_blob(statement_.get(), column);
+    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+    return data == nullptr ? std::string_view() : std::string_view(static_cast<const char*>(data), size);
+  }
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  };
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  bool is_damaged_ = false;
+};
+
+/// Makes a file that was cut short one of whole pages: SQLite would complete the last with zeros. True if it was cut.
+bool cut_to_whole_pages(std::string& bytes) {
+  constexpr std::size_t kHead_bytes = 100;
+  if (bytes.size() < kHead_bytes) return true;
+  const auto page_bytes = static_cast<std::size_t>(value_of(Scalar::kUint16, bytes.data() + 16, true));
+  const std::size_t size = page_bytes == 1 ? 65536 : page_bytes;  // as the format writes 65536
+  const auto pages = static_cast<std::size_t>(value_of(Scalar::kUint32, bytes.data() + 28, true));
+  if (size < 512) return false;  // damaged; SQLite refuses it
+  const std::size_t whole = bytes.size() / size;
+  const bool is_cut = bytes.size() % size != 0 || whole < pages;
+  if (!is_cut || whole == 0) return is_cut;
+  bytes.resize(whole * size);
+  // SQLite reads nothing of a file with fewer pages than its head says.
+  for (std::size_t i = 0; i < 4; ++i) bytes[28 + i] = static_cast<char>(whole >> (24 - 8 * i));
+  return is_cut;
+}
+
+class RosbagReader {
+ public:
+  /// @param bytes must outlive this
+  RosbagReader(std::string& bytes, const std::string& path)
+      : is_cut_(cut_to_whole_pages(bytes)), database_(bytes, path), path_(path) {
+    log_.path = path;
+    log_.format = "rosbag2 sqlite";
+    log_.health.truncated = is_cut_;
+    bytes_left_ = bytes.size();
+    decompression_left_ = decompression_limit(bytes.size());
+  }
+
+  RawLog read() {
+    demand_table("topics");
+    demand_table("messages");
+    if (is_plain_table("message_definitions")) read_definitions();
+    read_topics();
+    read_messages();
+    finish();
+    return std::move(log_);
+  }
+
+ private:
+  struct Definition {
+    std::string encoding, text;
+  };
+  struct Topic {
+    std::optional<RosTopic> topic;  ///< nothing where its messages cannot be read
+    std::string name, fault;
+    std::size_t lost = 0;
+  };
+
+  /// True for a table whose rows are stored as they are; views, virtual tables and computed columns could do anything.
+  bool is_plain_table(const std::string& name) {
+    Rows table(database_, "SELECT rootpage FROM sqlite_schema WHERE type='table' AND name='" + name + "'");
+    if (!table.next() || table.integer(0) <= 0) return false;
+    Rows columns(database_, "PRAGMA main.table_xinfo(" + name + ")");
+    int count = 0;
+    for (; columns.next(); ++count)
+      if (columns.integer(6) != 0) return false;  // hidden: computed
+    return count > 0;
+  }
+
+  void demand_table(const std::string& name) {
+    if (is_plain_table(name)) return;
+    throw files::InputError({path_, "", "table", files::in_quotes(name), "is missing or cannot be read",
+                             "this SQLite database is no rosbag2, or it is damaged"});
+  }
+
+  void read_definitions() {
+    Rows rows(database_,
+              "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions NOT INDEXED");
+    while (rows.next() && definitions_.size() < kMostTopics) {
+      const std::string_view text = rows.bytes(2);
+      if (text.size() <= kLongestDefinition_bytes && take_bytes(text.size() + 1))
+        definitions_.emplace(rows.bytes(0), Definition{std::string(rows.bytes(1)), std::string(text)});
+    }
+    if (rows.is_damaged()) ++log_.health.damaged_blocks;
+  }
+
+  /// False once more was read than the file has: its pages refer to each other in circles.
+  bool take_bytes(std::size_t count) {
+    if (count > bytes_left_) return false;
+    bytes_left_ -= count;
+    return true;
+  }
+
+  void read_topics() {
+    Rows rows(database_, "SELECT id, name, type, serialization_format FROM topics NOT INDEXED");
+    if (!rows.is_prepared()) refuse_columns("topics");
+    while (rows.next() && topics_.size() < kMostTopics) {
+      const std::string type(rows.bytes(2).substr(0, 256));
+      const std::string encoding(rows.bytes(3).substr(0, 64));
+      Topic topic;
+      topic.name = rows.bytes(1).substr(0, 1024);
+      if (encoding != "cdr") {
+        topic.fault = "its messages have the encoding \"" + encoding + "\", known is \"cdr\"";
+      } else if (const auto layout = layout_of(type, topic.fault)) {
+        topic.topic.emplace(topic.name, layout, budget_);
+      }
+      topics_.emplace(rows.integer(0), std::move(topic));
+    }
+    if (rows.is_damaged()) ++log_.health.damaged_blocks;
+  }
+
+  std::shared_ptr<const RosLayout> layout_of(const std::string& type, std::string& fault) {
+    auto known = layouts_.find(type);
+    if (known == layouts_.end()) {
+      const auto definition = definitions_.find(type);
+      const bool has_text = definition != definitions_.end() && definition->second.encoding == "ros2msg";
+      std::string why;
+      const auto layout = ros_layout(type, has_text ? std::string_view(definition->second.text) : "", why);
+      known = layouts_.emplace(type, std::pair{layout, why}).first;
+    }
+    fault = known->second.second;
+    return known->second.first;
+  }
+
+  [[noreturn]] void refuse_columns(const std::string& table) const {
+    throw files::InputError({path_, "", "table", files::in_quotes(table),
+                             "does not have the columns of a rosbag2",
+                             "this SQLite database is no rosbag2, or it is damaged"});
+  }
+
+  void read_messages() {
+    // In the order of the file: sorting would need as much memory again.
+    Rows rows(database_, "SELECT topic_id, timestamp, data FROM messages NOT INDEXED");
+    if (!rows.is_prepared()) refuse_columns("messages");
+    while (rows.next()) {
+      const std::string_view data = rows.bytes(2);
+      if (!take_bytes(data.size() + 1)) {
+        ++log_.health.damaged_blocks;
+        return;
+      }
+      take_message(rows.integer(0), rows.integer(1), data);
+    }
+    if (rows.is_damaged()) {
+      ++log_.health.damaged_blocks;
+      log_.health.truncated = true;
+    }
+  }
+
+  void take_message(std::int64_t id, std::int64_t time_ns, std::string_view data) {
+    const auto found = topics_.find(id);
+    if (found == topics_.end()) {
+      ++without_topic_;
+      return;
+    }
+    Topic& topic = found->second;
+    if (!topic.topic) {
+      ++topic.lost;
+      return;
+    }
+    const double time_s = static_cast<double>(time_ns) / 1e9;
+    if (!looks_like_zstd(data)) {
+      topic.topic->add(time_s, data);
+      return;
+    }
+    const Decompressed message = decompress(Compression::kZstd, data, decompression_left_);
+    decompression_left_ -= message.bytes.size();
+    if (message.is_whole)
+      topic.topic->add(time_s, message.bytes);
+    else
+      ++log_.health.damaged_blocks;
+  }
+
+  void finish() {
+    for (auto& [id, topic] : topics_) {
+      if (topic.topic)
+        topic.topic->move_to(log_);
+      else
+        log_.skipped.push_back(
+            {topic.name.empty() ? fmt::format("topic {}", id) : topic.name, topic.fault, topic.lost});
+    }
+    number_instances(log_);
+    if (without_topic_ > 0)
+      log_.skipped.push_back(
+          {"messages without topic", "the file lost the rows that name their topics", without_topic_});
+    std::error_code error;
+    const auto journal_bytes = std::filesystem::file_size(path_ + "-wal", error);
+    if (error || journal_bytes == 0) return;
+    log_.health.truncated = true;
+    log_.skipped.push_back({path_ + "-wal",
+                            "the recorder did not finish; `sqlite3 FILE 'pragma wal_checkpoint'` moves "
+                            "the messages of this journal into the bag",
+                            0});
+  }
+
+  const bool is_cut_;
+  Database database_;
+  const std::string path_;
+  RawLog log_;
+  RosBudget budget_;
+  std::size_t bytes_left_ = 0, decompression_left_ = 0, without_topic_ = 0;
+  std::map<std::string, Definition> definitions_;
+  std::map<std::string, std::pair<std::shared_ptr<const RosLayout>, std::string>> layouts_;
+  std::map<std::int64_t, Topic> topics_;
+};
+
+}  // namespace
+
+bool looks_like_rosbag_sqlite(std::string_view head) {
+  return head.substr(0, kSqliteMagic.size()) == kSqliteMagic;
+}
+
+RawLog read_rosbag_sqlite(std::istream& in, const std::string& path) {
+  std::string bytes = read_all(in, path);
+  if (!looks_like_rosbag_sqlite(bytes))
+    refuse_at(path, 0, "magic number", "", "is not that of an SQLite database", "is this a rosbag?");
+  return RosbagReader(bytes, path).read();
+}
+
+}  // namespace swarmcert::logs
