@@ -5,6 +5,7 @@
 #include <random>
 
 #include "analysis/log_writer.h"
+#include "logs/dataflash_writer.h"
 #include "logs/mcap_writer.h"
 #include "logs/rosbag_writer.h"
 #include "logs/ulog_writer.h"
@@ -130,6 +131,7 @@ void add_log_formats(Corpus& corpus) {
   corpus.add(ulog_head() + ulog_flags(1, 1, {150}) + ulog_count_definitions() + ulog_counts(0, 5));
   corpus.add(small_mcap());
   corpus.add(small_rosbag());
+  corpus.add(small_dataflash());
   for (const char* const name : {"reference_zstd.mcap", "reference_lz4.mcap"}) {
     std::ifstream file(std::string(SWARMCERT_SOURCE_DIR "/tests/logs/data/") + name, std::ios::binary);
     corpus.add(std::string(std::istreambuf_iterator<char>(file), {}));

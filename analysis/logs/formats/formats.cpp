@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "analysis/logs/formats/dataflash.h"
 #include "analysis/logs/formats/mcap.h"
 #include "analysis/logs/formats/rosbag_folder.h"
 #include "analysis/logs/formats/rosbag_sqlite.h"
@@ -38,6 +39,7 @@ const std::vector<LogFormat>& log_formats() {
       {"PX4 ULog", looks_like_ulog, read_ulog},
       {"rosbag2 in MCAP", looks_like_mcap, read_mcap},
       {"rosbag2 in SQLite", looks_like_rosbag_sqlite, read_rosbag_sqlite},
+      {"ArduPilot dataflash", looks_like_dataflash, read_dataflash},
   };
   return formats;
 }

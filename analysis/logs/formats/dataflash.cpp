@@ -1,0 +1,407 @@
+#include "analysis/logs/formats/dataflash.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "analysis/logs/formats/bytes.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr std::string_view kDataflashStart = "\xA3\x95";
+constexpr std::size_t kDataflashHead_bytes = 3;
+constexpr std::uint8_t kFormatId = 128;
+constexpr std::size_t kFormatMessage_bytes = 89;
+
+/// How a field's type is stored; the types are single letters.
+struct FieldType {
+  std::optional<Scalar> number;  ///< else text, or a float of 16 bits
+  std::size_t bytes = 0;
+  std::size_t count = 1;
+  double scale = 1;  ///< of what is stored
+  bool is_text = false;
+};
+
+std::optional<FieldType> field_type(char letter) {
+  const auto number = [](Scalar type, double scale = 1, std::size_t count = 1) {
+    return FieldType{type, count * size_of(type), count, scale, false};
+  };
+  const auto text = [](std::size_t bytes) { return FieldType{std::nullopt, bytes, 1, 1, true}; };
+  switch (letter) {
+    case 'a':
+      return number(Scalar::kInt16, 1, 32);
+    case 'b':
+      return number(Scalar::kInt8);
+    case 'B':
+    case 'M':
+      return number(Scalar::kUint8);
+    case 'h':
+      return number(Scalar::kInt16);
+    case 'H':
+      return number(Scalar::kUint16);
+    case 'i':
+      return number(Scalar::kInt32);
+    case 'I':
+      return number(Scalar::kUint32);
+    case 'q':
+      return number(Scalar::kInt64);
+    case 'Q':
+      return number(Scalar::kUint64);
+    case 'f':
+      return number(Scalar::kFloat);
+    case 'd':
+      return number(Scalar::kDouble);
+    case 'g':
+      return FieldType{std::nullopt, 2, 1, 1, false};
+    case 'c':
+      return number(Scalar::kInt16, 0.01);
+    case 'C':
+      return number(Scalar::kUint16, 0.01);
+    case 'e':
+      return number(Scalar::kInt32, 0.01);
+    case 'E':
+      return number(Scalar::kUint32, 0.01);
+    case 'L':
+      return number(Scalar::kInt32, 1e-7);
+    case 'n':
+      return text(4);
+    case 'N':
+      return text(16);
+    case 'Z':
+      return text(64);
+    default:
+      return std::nullopt;
+  }
+}
+
+/// IEEE 754 binary16.
+double half_float(const char* bytes) {
+  const auto bits = static_cast<unsigned>(value_of(Scalar::kUint16, bytes));
+  const int exponent = static_cast<int>(bits >> 10 & 31);
+  const double fraction = bits & 1023;
+  const double sign = (bits & 0x8000) != 0 ? -1 : 1;
+  if (exponent == 31) return fraction == 0 ? sign * INFINITY : NAN;
+  return sign * (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024 + fraction, exponent - 25));
+}
+
+struct DataflashField {
+  std::string name;
+  char letter;
+  FieldType type;
+  std::size_t offset;  ///< in the message, behind its head
+  std::string unit;
+  bool is_instance = false;
+};
+struct DataflashFormat {
+  std::string name, definition;
+  std::size_t bytes = 0;               ///< of a message with its head
+  std::vector<DataflashField> fields;  ///< empty if the definition contradicts itself
+
+  const DataflashField* find(const std::string& field) const {
+    for (const DataflashField& candidate : fields)
+      if (candidate.name == field) return &candidate;
+    return nullptr;
+  }
+};
+
+/// Fields from letters ("QBff") and names ("TimeUS,I,AccX,AccY"); empty if they do not fit each other and `bytes`.
+std::vector<DataflashField> parse_fields(const std::string& letters, const std::string& names,
+                                         std::size_t bytes) {
+  std::vector<DataflashField> fields;
+  std::set<std::string> seen;
+  std::size_t offset = 0, begin = 0;
+  for (const char letter : letters) {
+    const std::size_t end = std::min(names.find(',', begin), names.size());
+    const std::string name = begin < names.size() ? names.substr(begin, end - begin) : "";
+    const std::optional<FieldType> type = field_type(letter);
+    if (!type || !is_identifier(name) || !seen.insert(name).second) return {};
+    fields.push_back({name, letter, *type, offset, "", false});
+    offset += type->bytes;
+    begin = end + 1;
+  }
+  const bool fits = begin > names.size() && offset + kDataflashHead_bytes == bytes;
+  return fits ? fields : std::vector<DataflashField>();
+}
+
+class DataflashReader {
+ public:
+  DataflashReader(std::string_view bytes, const std::string& path) : bytes_(bytes), path_(path) {
+    log_.path = path;
+    log_.format = "ardupilot";
+  }
+
+  RawLog read() {
+    if (!looks_like_dataflash(bytes_)) {
+      refuse_at(path_, 0, "message", "", "is not the definition of a format with which these logs start",
+                "is this an ArduPilot log? Text logs (.log) can be converted to .bin");
+    }
+    // Definitions, units and multipliers may stand behind messages that need them.
+    walk([this](std::uint8_t id, std::string_view body) { take_definition(id, body); });
+    apply_units();
+    log_.health = {};
+    unknown_ids_.clear();
+    walk([this](std::uint8_t id, std::string_view body) { take_message(id, body); });
+    finish();
+    return std::move(log_);
+  }
+
+ private:
+  /// Bytes of the message at `at`; 0 if none of a known format stands there.
+  std::size_t message_size(std::size_t at) const {
+    if (bytes_.substr(at, 2) != kDataflashStart || bytes_.size() - at < kDataflashHead_bytes) return 0;
+    const auto id = static_cast<std::uint8_t>(bytes_[at + 2]);
+    const std::size_t size = id == kFormatId ? kFormatMessage_bytes : formats_[id].bytes;
+    return size <= bytes_.size() - at ? size : 0;
+  }
+  bool starts_message(std::size_t at) const {
+    return at == bytes_.size() || bytes_.substr(at, 2) == kDataflashStart;
+  }
+
+  template <typename Visit>
+  void walk(const Visit& visit) {
+    std::size_t at = 0;
+    while (at < bytes_.size()) {
+      const std::size_t size = message_size(at);
+      // A message that another follows, or that ends the file within the next one's head.
+      if (size > 0 && (starts_message(at + size) || bytes_.size() - at - size < kDataflashHead_bytes)) {
+        visit(static_cast<std::uint8_t>(bytes_[at + 2]),
+              bytes_.substr(at + kDataflashHead_bytes, size - kDataflashHead_bytes));
+        at += size;
+        continue;
+      }
+      at = leave_out(at, size);
+    }
+  }
+
+  /// Goes to the next byte where a message starts that another follows. @param size of a message at `at` behind which no other starts
+  std::size_t leave_out(std::size_t at, std::size_t size) {
+    const bool is_unknown = size == 0 && bytes_.substr(at, 2) == kDataflashStart &&
+                            bytes_.size() - at >= kDataflashHead_bytes &&
+                            static_cast<std::uint8_t>(bytes_[at + 2]) != kFormatId &&
+                            formats_[static_cast<std::uint8_t>(bytes_[at + 2])].bytes == 0;
+    std::size_t next = at + 1;
+    while (next < bytes_.size() && !is_found(next, is_unknown)) ++next;
+    if (next == bytes_.size()) {
+      log_.health.truncated = true;
+      log_.health.skipped_bytes += next - at;
+    } else if (is_unknown) {
+      ++unknown_ids_[static_cast<std::uint8_t>(bytes_[at + 2])];
+    } else {
+      ++log_.health.damaged_blocks;
+      log_.health.skipped_bytes += next - at;
+    }
+    return next;
+  }
+  /// @param counts_unknown behind a message of an unknown format any message counts: several may follow each other
+  bool is_found(std::size_t at, bool counts_unknown) const {
+    if (bytes_.substr(at, 2) != kDataflashStart) return false;
+    const std::size_t size = message_size(at);
+    return size > 0 ? starts_message(at + size)
+                    : counts_unknown && bytes_.size() - at >= kDataflashHead_bytes;
+  }
+
+  void take_definition(std::uint8_t id, std::string_view body) {
+    if (id == kFormatId) return take_format(body);
+    const DataflashFormat& format = formats_[id];
+    if (format.name == "FMTU")
+      take_unit_ids(format, body);
+    else if (format.name == "UNIT")
+      units_.emplace(letter_in(format, body, "Id"), text_in(format, body, "Label"));
+    else if (format.name == "MULT")
+      multipliers_.emplace(letter_in(format, body, "Id"), number_in(format, body, "Mult"));
+  }
+
+  void take_format(std::string_view body) {
+    const auto id = static_cast<std::uint8_t>(body[0]);
+    DataflashFormat format;
+    format.bytes = static_cast<unsigned char>(body[1]);
+    format.name = until_nul(body.substr(2, 4));
+    format.definition = std::string(body.substr(1));
+    const bool is_known = formats_[id].bytes > 0;
+    const bool is_sound = format.bytes > kDataflashHead_bytes && is_identifier(format.name);
+    if (!is_sound || (is_known && formats_[id].definition != format.definition)) {
+      ++damaged_formats_;
+      return;
+    }
+    if (is_known) return;
+    format.fields = parse_fields(until_nul(body.substr(6, 16)), until_nul(body.substr(22, 64)), format.bytes);
+    formats_[id] = std::move(format);
+  }
+
+  double number_in(const DataflashFormat& format, std::string_view body, const std::string& name) const {
+    const DataflashField* const field = format.find(name);
+    if (field == nullptr || !field->type.number) return NAN;
+    return value_of(*field->type.number, body.data() + field->offset);
+  }
+  char letter_in(const DataflashFormat& format, std::string_view body, const std::string& name) const {
+    const double number = number_in(format, body, name);
+    return number >= 0 && number < 128 ? static_cast<char>(number) : '\0';
+  }
+  std::string text_in(const DataflashFormat& format, std::string_view body, const std::string& name) const {
+    const DataflashField* const field = format.find(name);
+    return field == nullptr || !field->type.is_text
+               ? ""
+               : until_nul(body.substr(field->offset, field->type.bytes));
+  }
+
+  void take_unit_ids(const DataflashFormat& format, std::string_view body) {
+    const double id = number_in(format, body, "FmtType");
+    if (id >= 0 && id < 256)
+      unit_ids_[static_cast<std::size_t>(id)] = {text_in(format, body, "UnitIds"),
+                                                 text_in(format, body, "MultIds")};
+  }
+
+  /// Writes units and multipliers into the fields.
+  void apply_units() {
+    for (std::size_t id = 0; id < formats_.size(); ++id) {
+      const auto& [units, multipliers] = unit_ids_[id];
+      for (std::size_t i = 0; i < formats_[id].fields.size(); ++i) {
+        DataflashField& field = formats_[id].fields[i];
+        const char unit = i < units.size() ? units[i] : '-';
+        const char multiplier = i < multipliers.size() ? multipliers[i] : '-';
+        const auto found_unit = units_.find(unit);
+        field.is_instance = unit == '#' && field.type.number;
+        // "-": none, "?": not known.
+        if (found_unit != units_.end() && unit != '-' && unit != '?' && !field.is_instance)
+          field.unit = found_unit->second;
+        const auto found = multipliers_.find(multiplier);
+        const bool has_own_scale = field.type.scale != 1;
+        if (found != multipliers_.end() && !has_own_scale && found->second > 0 &&
+            std::isfinite(found->second))
+          field.type.scale = found->second;
+      }
+    }
+  }
+
+  static std::optional<double> time_of(const DataflashFormat& format, std::string_view body) {
+    for (const auto& [name, per_second] : {std::pair{"TimeUS", 1e6}, std::pair{"TimeMS", 1e3}}) {
+      const DataflashField* const field = format.find(name);
+      if (field != nullptr && field->type.number)
+        return value_of(*field->type.number, body.data() + field->offset) / per_second;
+    }
+    return std::nullopt;
+  }
+
+  void take_message(std::uint8_t id, std::string_view body) {
+    const DataflashFormat& format = formats_[id];
+    if (id == kFormatId || format.name == "FMTU" || format.name == "UNIT" || format.name == "MULT") return;
+    const std::optional<double> time_s = time_of(format, body);
+    if (time_s) last_time_s_ = *time_s;
+    if (format.name == "PARM") return take_parameter(format, body);
+    if (format.name == "MSG") {
+      log_.messages.push_back({last_time_s_, 0, text_in(format, body, "Message")});
+      return;
+    }
+    if (format.fields.empty() || !time_s) {
+      ++(format.fields.empty() ? contradictory_ : without_time_)[format.name];
+      return;
+    }
+    RawTopic& topic = topic_of(id, body);
+    topic.time_s.push_back(*time_s);
+    std::size_t column = 0;
+    for (const DataflashField& field : format.fields) {
+      const char* const data = body.data() + field.offset;
+      if (field.type.is_text) {
+        std::string& text = topic.texts[field.name];
+        if (text.empty()) text = until_nul({data, field.type.bytes});
+        continue;
+      }
+      if (is_time(field)) continue;
+      for (std::size_t i = 0; i < field.type.count; ++i)
+        topic.columns[column++].values.push_back(number_of(field, data, i));
+    }
+    ++log_.health.records;
+  }
+
+  static bool is_time(const DataflashField& field) {
+    return field.name == "TimeUS" || field.name == "TimeMS";
+  }
+
+  static double number_of(const DataflashField& field, const char* data, std::size_t index) {
+    if (!field.type.number) return half_float(data) * field.type.scale;
+    return value_of(*field.type.number, data + index * size_of(*field.type.number)) * field.type.scale;
+  }
+
+  RawTopic& topic_of(std::uint8_t id, std::string_view body) {
+    const DataflashFormat& format = formats_[id];
+    int instance = 0;
+    for (const DataflashField& field : format.fields) {
+      if (!field.is_instance) continue;
+      const double number = value_of(*field.type.number, body.data() + field.offset);
+      if (number >= 0 && number < 256) instance = static_cast<int>(number);
+    }
+    // Two ids of one name are one topic only if they have the same fields.
+    const auto [found, is_new] = topics_.emplace(std::pair{id, instance}, log_.topics.size());
+    if (!is_new) return log_.topics[found->second];
+    RawTopic topic;
+    topic.name = names_.emplace(format.name, id).first->second == id ? format.name
+                                                                     : fmt::format("{}#{}", format.name, id);
+    topic.type = format.name;
+    topic.instance = instance;
+    for (const DataflashField& field : format.fields) {
+      if (field.type.is_text || is_time(field)) continue;
+      for (std::size_t i = 0; i < field.type.count; ++i) {
+        const std::string suffix = field.type.count > 1 ? "[" + std::to_string(i) + "]" : "";
+        topic.columns.push_back({field.name + suffix, field.unit, {}});
+      }
+    }
+    log_.topics.push_back(std::move(topic));
+    return log_.topics.back();
+  }
+
+  void take_parameter(const DataflashFormat& format, std::string_view body) {
+    const std::string name = text_in(format, body, "Name");
+    const double value = number_in(format, body, "Value");
+    const double standard = number_in(format, body, "Default");
+    if (name.empty()) return;
+    const auto [known, is_new] = log_.parameters.emplace(name, value);
+    if (!is_new && known->second != value) log_.parameter_changes.push_back({last_time_s_, name, value});
+    if (!std::isnan(standard)) log_.default_parameters.emplace(name, standard);
+  }
+
+  void finish() {
+    log_.health.damaged_blocks += damaged_formats_;
+    for (const auto& [id, count] : unknown_ids_)
+      log_.skipped.push_back(
+          {fmt::format("message id {}", id), "the file lost the definition of its format", count});
+    for (const auto& [name, count] : contradictory_)
+      log_.skipped.push_back({name, "the definition of its format contradicts itself", count});
+    for (const auto& [name, count] : without_time_)
+      log_.skipped.push_back({name, "it has no field \"TimeUS\" or \"TimeMS\"", count});
+  }
+
+  const std::string_view bytes_;
+  const std::string path_;
+  RawLog log_;
+  std::array<DataflashFormat, 256> formats_;
+  std::array<std::pair<std::string, std::string>, 256>
+      unit_ids_;  ///< units and multipliers of a format's fields
+  std::map<char, std::string> units_;
+  std::map<char, double> multipliers_;
+  std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< in log_.topics
+  std::map<std::string, std::uint8_t> names_;
+  std::map<std::uint8_t, std::size_t> unknown_ids_;
+  std::map<std::string, std::size_t> contradictory_, without_time_;
+  std::size_t damaged_formats_ = 0;
+  double last_time_s_ = NAN;
+};
+
+}  // namespace
+
+bool looks_like_dataflash(std::string_view head) {
+  return head.substr(0, 2) == kDataflashStart && head.size() > 2 &&
+         static_cast<std::uint8_t>(head[2]) == kFormatId;
+}
+
+RawLog read_dataflash(std::istream& in, const std::string& path) {
+  const std::string bytes = read_all(in, path);
+  return DataflashReader(bytes, path).read();
+}
+
+}  // namespace swarmcert::logs
