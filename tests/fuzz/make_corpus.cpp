@@ -132,6 +132,7 @@ void add_log_formats(Corpus& corpus) {
   corpus.add(small_mcap());
   corpus.add(small_rosbag());
   corpus.add(small_dataflash());
+  corpus.add("Timestamp,stabilizer.roll,pm.vbat[V]\n10,0.5,3.7\n20,text,\n30,1e-3,nan\n");
   for (const char* const name : {"reference_zstd.mcap", "reference_lz4.mcap"}) {
     std::ifstream file(std::string(SWARMCERT_SOURCE_DIR "/tests/logs/data/") + name, std::ios::binary);
     corpus.add(std::string(std::istreambuf_iterator<char>(file), {}));

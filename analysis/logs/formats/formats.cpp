@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "analysis/logs/formats/crazyflie_csv.h"
 #include "analysis/logs/formats/dataflash.h"
 #include "analysis/logs/formats/mcap.h"
 #include "analysis/logs/formats/rosbag_folder.h"
@@ -40,6 +41,7 @@ const std::vector<LogFormat>& log_formats() {
       {"rosbag2 in MCAP", looks_like_mcap, read_mcap},
       {"rosbag2 in SQLite", looks_like_rosbag_sqlite, read_rosbag_sqlite},
       {"ArduPilot dataflash", looks_like_dataflash, read_dataflash},
+      {"CSV of Crazyflie log variables", looks_like_crazyflie_csv, read_crazyflie_csv},
   };
   return formats;
 }
@@ -64,6 +66,7 @@ RawLog parse_raw(std::istream& in, const std::string& path) {
 
 RawLog read_raw(const std::string& path) {
   if (looks_like_rosbag_folder(path)) return read_rosbag_folder(path);
+  if (looks_like_cfclient_folder(path)) return read_cfclient_folder(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
   return parse_raw(in, path);

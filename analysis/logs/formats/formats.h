@@ -27,7 +27,8 @@ const LogFormat* format_of(std::string_view head);
 /// As format_of(), of the file's first bytes; nullptr also where it cannot be read.
 const LogFormat* format_of_file(const std::string& path);
 
-/// Reads a log whose format is recognised by its content, or a folder that rosbag2 wrote (looks_like_rosbag_folder()).
+/// Reads a log whose format is recognised by its content, or a folder that is one log: a bag of rosbag2,
+/// a session of cfclient.
 /// @throws files::InputError if no format fits, or the file cannot be read at all, with offset or line. Damage inside a
 ///   file is no error: it is skipped and counted in RawLog::health.
 RawLog read_raw(const std::string& path);

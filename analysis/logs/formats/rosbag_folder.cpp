@@ -1,9 +1,7 @@
 #include "analysis/logs/formats/rosbag_folder.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <optional>
 #include <sstream>
 #include <vector>
@@ -11,6 +9,7 @@
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
 #include "analysis/logs/formats/formats.h"
+#include "analysis/logs/formats/merge.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
@@ -62,48 +61,6 @@ RawLog read_part(const fs::path& path) {
   return log;
 }
 
-/// Puts the records of `more` behind those of `topic`; columns that only one of them has are NaN in the other.
-void append(RawTopic& topic, RawTopic& more) {
-  constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-  const std::size_t before = topic.time_s.size();
-  topic.time_s.insert(topic.time_s.end(), more.time_s.begin(), more.time_s.end());
-  for (RawColumn& column : more.columns) {
-    const auto same = std::find_if(topic.columns.begin(), topic.columns.end(),
-                                   [&](const RawColumn& candidate) { return candidate.name == column.name; });
-    if (same == topic.columns.end()) {
-      column.values.insert(column.values.begin(), before, kMissing);
-      topic.columns.push_back(std::move(column));
-    } else {
-      same->values.insert(same->values.end(), column.values.begin(), column.values.end());
-    }
-  }
-  for (RawColumn& column : topic.columns) column.values.resize(topic.time_s.size(), kMissing);
-  topic.texts.insert(more.texts.begin(), more.texts.end());
-}
-
-void append(LogHealth& health, const LogHealth& more) {
-  health.records += more.records;
-  health.damaged_blocks += more.damaged_blocks;
-  health.skipped_bytes += more.skipped_bytes;
-  health.truncated |= more.truncated;
-  health.checksum_failed |= more.checksum_failed;
-}
-
-void append(RawLog& log, RawLog& more) {
-  for (RawTopic& topic : more.topics) {
-    const auto same = std::find_if(log.topics.begin(), log.topics.end(), [&](const RawTopic& candidate) {
-      return candidate.name == topic.name && candidate.instance == topic.instance;
-    });
-    if (same == log.topics.end())
-      log.topics.push_back(std::move(topic));
-    else
-      append(*same, topic);
-  }
-  log.texts.insert(more.texts.begin(), more.texts.end());
-  log.skipped.insert(log.skipped.end(), more.skipped.begin(), more.skipped.end());
-  append(log.health, more.health);
-}
-
 }  // namespace
 
 bool looks_like_rosbag_folder(const std::string& path) {
@@ -124,7 +81,7 @@ RawLog read_rosbag_folder(const std::string& path) {
     try {
       RawLog part = read_part(fs::path(path) / name);
       if (log)
-        append(*log, part);
+        append(*log, std::move(part));
       else
         log = std::move(part);
     } catch (const files::InputError& error) {
