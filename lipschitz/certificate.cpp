@@ -1,6 +1,7 @@
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/statement.h"
 #include "nn/base/content_hash.h"
+#include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -120,6 +121,18 @@ Json bound_json(const files::Network& network, const CertifiedBound& bound) {
   return json;
 }
 
+Json samples_entry(const Certification& certification, const std::string& part) {
+  const auto found = certification.samples.find(part);
+  if (found == certification.samples.end()) return nullptr;
+  const files::SampleAgreement& agreement = found->second;
+  return {{"sha256", agreement.sha256},
+          {"count", agreement.count},
+          {"tolerance", agreement.tolerance},
+          {"tolerance_hex", hex_float(agreement.tolerance)},
+          {"largest_deviation", agreement.largest_deviation},
+          {"largest_deviation_hex", hex_float(agreement.largest_deviation)}};
+}
+
 Json law_json(const CertifiedLaw& law) {
   return {{"rho", law.rho},
           {"neighbours", law.neighbours},
@@ -166,7 +179,10 @@ Json summary(const files::Network& network, const CertifiedLaw& law) {
 Json certificate(const files::Network& network, const Certification& certification) {
   Json weights = Json::object();
   for (const auto& [name, part] : files::parts(network)) {
-    weights[name] = {{"sha256", part->sha256}, {"precision", files::name(part->precision)}};
+    weights[name] = {{"sha256", part->sha256},
+                     {"precision", files::name(part->precision)},
+                     {"chain", files::chain_json(files::chain(network, name))},
+                     {"samples", samples_entry(certification, name)}};
   }
   Json layers = Json::array();
   for (const CertifiedLayer& layer : certification.layers) layers.push_back(layer_json(layer));

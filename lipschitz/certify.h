@@ -17,6 +17,7 @@
 #include "lipschitz/spectral_norm.h"
 #include "nn/base/json.h"
 #include "nn/weights/network.h"
+#include "nn/weights/samples.h"
 
 namespace swarmcert::lipschitz {
 
@@ -66,6 +67,8 @@ struct Certification {
   std::optional<files::GammaStatement> gamma;
   bool as_float32 = false;  ///< the network was rounded to float32 before; for the certificate
   std::map<std::string, Box> domain;
+  std::map<std::string, files::SampleAgreement>
+      samples;  ///< by part: what it was held against; for the certificate
   std::vector<CertifiedLayer> layers;
   std::vector<CertifiedBound> bounds;
   std::vector<CertifiedLaw> laws;

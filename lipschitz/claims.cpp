@@ -77,6 +77,7 @@ const char* name(LawKind law) {
 std::vector<Claim> claims(const files::Network& network, const ClaimOptions& options) {
   std::vector<Claim> result;
   std::vector<std::string> unused = options.blocks;
+  unused.erase(std::remove(unused.begin(), unused.end(), "every"), unused.end());  // which may be none
   bool scale_fits = options.scale.empty();
   for (const double scale : options.scale) {
     if (!(scale > 0) || std::isinf(scale)) throw std::invalid_argument("a scale must be positive");
@@ -89,9 +90,7 @@ std::vector<Claim> claims(const files::Network& network, const ClaimOptions& opt
     for (const std::string& block : files::blocks(network, function)) {
       const bool is_named = contains(options.blocks, block);
       if (!is_named && !contains(options.blocks, "every")) continue;
-      unused.erase(std::remove_if(unused.begin(), unused.end(),
-                                  [&](const auto& text) { return text == block || text == "every"; }),
-                   unused.end());
+      unused.erase(std::remove(unused.begin(), unused.end(), block), unused.end());
       claim.block = block;
       result.push_back(claim);
     }

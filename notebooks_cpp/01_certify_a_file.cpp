@@ -9,6 +9,16 @@
 //     L >= |f(x) - f(y)| / |x - y|                    any two points
 //
 // Upper bounds are proved in exact arithmetic, lower bounds are slopes between two float32 points.
+//
+// A state dict holds weights: neither the order of its layers nor what stands between them. Record what the trained network
+// gives, and `certify net.pth --samples samples.npz` refuses a file of any other function, be it another order, activation or
+// skip connection:
+//
+//     import numpy, torch
+//     model.eval()
+//     with torch.no_grad():
+//         x = 4 * torch.rand(1000, 6) - 2
+//         numpy.savez("samples.npz", inputs=x.numpy(), outputs=model(x).numpy())
 
 // %%
 #include <fmt/format.h>

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <filesystem>
+#include <sstream>
 
 #include "analysis/cli/command_line.h"
 #include "nn/base/file_io.h"
@@ -10,6 +11,36 @@
 #include "nn/weights/functions.h"
 
 namespace swarmcert::analysis {
+
+namespace {
+
+/// "fc1,fc2" or, with --phi and --rho, "phi=fc1,fc2".
+void add_order(files::NetworkArguments& arguments, const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const std::string part = equals == std::string::npos ? "" : text.substr(0, equals);
+  const bool names_part = part == "phi" || part == "rho";
+  std::vector<std::string>& order = part == "phi"   ? arguments.phi_order
+                                    : part == "rho" ? arguments.rho_order
+                                                    : arguments.order;
+  if (!order.empty()) throw UsageError("--order " + text + ": an order of these layers was given before");
+  std::istringstream list(names_part ? text.substr(equals + 1) : text);
+  for (std::string layer; std::getline(list, layer, ',');) order.push_back(layer);
+  if (order.empty()) throw UsageError("--order names no layer: give them as in fc1,fc2,fc3");
+}
+
+}  // namespace
+
+void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
+  app.add_option_function<std::vector<std::string>>(
+         "--order",
+         [&arguments](const std::vector<std::string>& orders) {
+           for (const std::string& order : orders) add_order(arguments, order);
+         },
+         "Layers in the order of evaluation, where a weight file does not tell it: fc1,fc2,fc3; with --phi "
+         "and "
+         "--rho phi=fc1,fc2 and rho=fc1,fc2")
+      ->allow_extra_args(false);
+}
 
 void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   auto* file =
@@ -21,12 +52,17 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   phi->needs(rho)->excludes(file);
   rho->needs(phi)->excludes(file);
   app.add_option("--key", arguments.key, "Key of the state dict inside a nested checkpoint, e.g. model");
+  declare_order(app, arguments);
 }
 
 files::Network load_net(const files::NetworkArguments& arguments) {
   if (arguments.file.empty() && arguments.phi.empty()) {
     throw UsageError("no network: name a network.toml, one weight file, or --phi F --rho F");
   }
+  const bool has_pair = !arguments.phi.empty();
+  if (has_pair ? !arguments.order.empty() : !arguments.phi_order.empty() || !arguments.rho_order.empty())
+    throw UsageError(has_pair ? "--order: say of which file: --order phi=fc1,fc2 or rho=fc1,fc2"
+                              : "--order phi=... and rho=... go with --phi and --rho");
   return files::load_network(arguments);
 }
 

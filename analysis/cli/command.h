@@ -47,10 +47,13 @@ struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Declares NET: a positional FILE, or --phi with --rho, and --key.
+/// Declares --order, for weight files that do not tell the order of their layers; part of declare_network().
+void declare_order(CLI::App& app, files::NetworkArguments& arguments);
+
+/// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Loads NET. @throws UsageError if nothing was named; files::InputError as files::load_network() does.
+/// Loads NET. @throws UsageError if nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
 files::Network load_net(const files::NetworkArguments& arguments);
 
 /// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line

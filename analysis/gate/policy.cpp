@@ -21,9 +21,11 @@ std::string resolve(const std::string& policy, const std::string& path) {
 }
 
 Release read_release(const TomlTable& table, const std::string& policy) {
-  table.allow_only({"network", "phi",     "rho",    "key",       "precision",    "certificate",    "box",
-                    "gains",   "model",   "source", "elf",       "facts",        "swarm",          "vehicles",
-                    "columns", "flights", "logs",   "battery_V", "feed_forward", "most_neighbours"});
+  table.allow_only({"network",     "phi",       "rho",       "key",          "precision",
+                    "certificate", "box",       "gains",     "model",        "source",
+                    "elf",         "facts",     "swarm",     "vehicles",     "columns",
+                    "flights",     "logs",      "battery_V", "feed_forward", "most_neighbours",
+                    "order",       "phi_order", "rho_order"});
   Release release;
   const auto file = [&](const char* key) {
     if (!table.has(key)) return std::string();
@@ -34,6 +36,16 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   release.network.phi = file("phi");
   release.network.rho = file("rho");
   if (table.has("key")) release.network.key = table.text("key");
+  const auto order = [&](const char* key, bool has_file) {
+    if (!table.has(key)) return std::vector<std::string>();
+    if (!has_file) table.refuse(key, "", "is of a file that is not named here");
+    std::vector<std::string> layers = table.texts(key);
+    if (layers.empty()) table.refuse(key, "[]", "names no layer");
+    return layers;
+  };
+  release.network.order = order("order", !release.network.file.empty());
+  release.network.phi_order = order("phi_order", !release.network.phi.empty());
+  release.network.rho_order = order("rho_order", !release.network.rho.empty());
   if (release.network.phi.empty() != release.network.rho.empty())
     table.refuse(release.network.phi.empty() ? "rho" : "phi", "", "needs both phi and rho");
   if (!release.network.phi.empty() && !release.network.file.empty())

@@ -6,11 +6,16 @@
 #include <filesystem>
 
 #include "nn/base/file_io.h"
+#include "nn/training/deep_set_loss.h"
+#include "nn/weights/record_samples.h"
 
 namespace swarmcert::learning {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int kRecordedSamples = 64;  ///< of each part
+constexpr char kSamplesFile[] = "samples.json";
 
 std::string file_of(const std::string& part) {
   std::string name = part;
@@ -34,6 +39,18 @@ std::string network_toml(const LearningData& data, const files::GammaStatement& 
   return text;
 }
 
+/// What the trainer's own arithmetic gives, so that a reader can show that the files hold the network that was trained.
+void write_samples(const training::Layout& layout, const training::Vector& theta,
+                   const files::Network& network, const std::string& path) {
+  const files::PartOutput output = [&](const std::string& part, const std::vector<float>& input) {
+    const Eigen::Map<const training::Vector> x(input.data(), static_cast<Eigen::Index>(input.size()));
+    const training::Matrix y = part_output(layout, theta, layout.find(part), x);
+    return std::vector<double>(y.data(), y.data() + y.size());
+  };
+  const auto samples = files::record_samples(network, output, kRecordedSamples, 1);
+  files::write_file(path, files::to_text(files::samples_json(samples)), true);
+}
+
 }  // namespace
 
 files::Network write_network(const LearningData& data, const training::Vector& theta,
@@ -45,7 +62,9 @@ files::Network write_network(const LearningData& data, const training::Vector& t
   }
   const std::string path = (fs::path(folder) / "network.toml").string();
   files::write_file(path, network_toml(data, gamma), true);
-  return files::load_network({path, "", "", ""});
+  files::Network network = files::load_network({path, "", "", ""});
+  write_samples(layout, theta, network, (fs::path(folder) / kSamplesFile).string());
+  return network;
 }
 
 void write_models(const residuals::Inputs& inputs, const training::Layout& layout,
@@ -71,6 +90,11 @@ Certified write_certificate(const files::Network& network, const std::string& fo
                             const lipschitz::CertifyOptions& options) {
   Certified certified;
   certified.found = lipschitz::certify(network, options);
+  const std::string samples = (fs::path(folder) / kSamplesFile).string();
+  if (fs::exists(samples)) {
+    for (const auto& [part, recorded] : files::read_samples(samples, network))
+      certified.found.samples.emplace(part, files::hold_against(network, part, recorded));
+  }
   files::write_file((fs::path(folder) / "certificate.json").string(),
                     files::to_text(lipschitz::certificate(network, certified.found)), true);
   for (const lipschitz::CertifiedLayer& layer : certified.found.layers) {

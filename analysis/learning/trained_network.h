@@ -10,8 +10,8 @@
 
 namespace swarmcert::learning {
 
-/// Writes `phi_<kind>.safetensors`, `rho_<kind>.safetensors` and network.toml into `folder`, which exists; files of these
-/// names are replaced.
+/// Writes `phi_<kind>.safetensors`, `rho_<kind>.safetensors`, network.toml and samples.json, outputs that the trainer's own
+/// arithmetic gives, into `folder`, which exists; files of these names are replaced.
 /// @returns the network as read back.
 files::Network write_network(const LearningData& data, const training::Vector& theta,
                              const files::GammaStatement& gamma, const std::string& folder);
@@ -30,7 +30,8 @@ struct Certified {
   double largest() const;  ///< of the set bounds; 0 without any
 };
 
-/// Certifies what write_network() returned, and writes certificate.json beside it.
+/// Certifies what write_network() returned, held against samples.json where that is there, and writes certificate.json
+/// beside it.
 Certified write_certificate(const files::Network& network, const std::string& folder,
                             const lipschitz::CertifyOptions& options);
 

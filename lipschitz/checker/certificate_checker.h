@@ -30,6 +30,10 @@ class CertificateChecker {
 
   // check.cpp
   void check_weights(const Json& named);
+  /// The operations that part `name` of NET consists of, in order.
+  void check_chain(const Json& stated, const std::string& name) const;
+  /// What was recorded of the comparison with samples: its form only, because the samples are not here.
+  static void check_samples(const Json& samples, const std::string& where);
   void check_layer(const Json& entry, const std::string& network, const files::Layer& layer);
   void check_bound(const Json& bound);
   /// Of a set function, at most how many of each kind there are; empty: any number.

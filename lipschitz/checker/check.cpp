@@ -3,6 +3,7 @@
 
 #include "lipschitz/checker/certificate_checker.h"
 #include "nn/base/content_hash.h"
+#include "nn/weights/chain.h"
 
 namespace swarmcert::check {
 namespace {
@@ -62,10 +63,47 @@ void CertificateChecker::check_weights(const Json& named) {
   require(named["weights"].size() == parts_.size(), "network.weights lists another number of networks");
   for (const auto& [name, weights] : parts_) {
     const Json& entry = named["weights"].at(name);
-    files::require_keys(entry, {"sha256", "precision"}, "network.weights." + name);
+    const std::string where = "network.weights." + name;
+    files::require_keys(entry, {"sha256", "precision", "chain", "samples"}, where);
     require(entry["sha256"] == weights->sha256 && entry["precision"] == files::name(weights->precision),
-            "network.weights." + name + " is of another file than " + weights->path);
+            where + " is of another file than " + weights->path);
+    check_chain(entry["chain"], name);
+    check_samples(entry["samples"], where + ".samples");
   }
+}
+
+void CertificateChecker::check_chain(const Json& stated, const std::string& name) const {
+  const std::vector<files::ChainStep> chain = files::chain(network_, name);
+  const std::string where = "network.weights." + name + ".chain";
+  const auto fits = [&](std::size_t k) {
+    const Json& step = stated[k];
+    files::require_keys(step, {"op", "layer", "inputs", "outputs"}, where);
+    const Json layer = chain[k].op == "linear" ? Json(chain[k].layer) : Json();
+    return step["op"] == chain[k].op && step["layer"] == layer && step["inputs"].is_number_integer() &&
+           step["inputs"] == chain[k].inputs && step["outputs"].is_number_integer() &&
+           step["outputs"] == chain[k].outputs;
+  };
+  bool is_equal = stated.is_array() && stated.size() == chain.size();
+  for (std::size_t k = 0; is_equal && k < chain.size(); ++k) is_equal = fits(k);
+  require(is_equal, where + " is not the one of this network: " + files::chain_words(chain));
+}
+
+void CertificateChecker::check_samples(const Json& samples, const std::string& where) {
+  if (samples.is_null()) return;
+  files::require_keys(
+      samples,
+      {"sha256", "count", "tolerance", "tolerance_hex", "largest_deviation", "largest_deviation_hex"}, where);
+  const auto is_hash = [](const Json& json) {
+    if (!json.is_string()) return false;
+    const std::string text = json.get<std::string>();
+    return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  };
+  require(is_hash(samples["sha256"]), where + ".sha256 is no hash");
+  require(samples["count"].is_number_integer() && samples["count"] >= 1, where + ".count is not positive");
+  const double tolerance = number(samples["tolerance"], samples["tolerance_hex"], where + ".tolerance");
+  require(number(samples["largest_deviation"], samples["largest_deviation_hex"],
+                 where + ".largest_deviation") <= tolerance,
+          where + ": the largest deviation is above the tolerance");
 }
 
 void CertificateChecker::check_layer(const Json& entry, const std::string& network,

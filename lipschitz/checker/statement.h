@@ -6,8 +6,11 @@ namespace swarmcert::check {
 inline constexpr const char* kCertificateSchema = "swarmcert/certificate/1";
 
 inline constexpr const char* kStatement =
-    "ReLU networks with the weights stored in the files named by sha256, rounded to float32 where "
-    "`as` says so, and the input clamp of network.toml. Every bound holds in exact arithmetic: "
+    "The functions are the operations listed under chain, in that order, with the weights stored in the "
+    "files named by sha256, rounded to float32 where `as` says so: linear is W x + b, relu takes the "
+    "positive part, clamp is the input clamp of network.toml. Where samples are named, they were "
+    "reproduced up to largest_deviation when this was written; checking does not repeat that. Every bound "
+    "holds in exact arithmetic: "
     "|f(x) - f(y)| <= upper |x - y| for all x and y that differ in the block only, and "
     "|f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x and y in the box. "
     "So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "

@@ -142,4 +142,10 @@ Matrix predict(const Layout& layout, const Vector& theta, const Dataset& data, c
   return run(layout, theta, data, samples, count).output;
 }
 
+Matrix part_output(const Layout& layout, const Vector& theta, int part, const Matrix& x) {
+  Activations all = {x};
+  forward(layout, theta, part, all);
+  return all.back();
+}
+
 }  // namespace swarmcert::training

@@ -44,4 +44,7 @@ double deep_set_loss(const Layout& layout, const Vector& theta, const Dataset& d
 Matrix predict(const Layout& layout, const Vector& theta, const Dataset& data, const Eigen::Index* samples,
                Eigen::Index count);
 
+/// Outputs [outputs x columns of x] of one part alone.
+Matrix part_output(const Layout& layout, const Vector& theta, int part, const Matrix& x);
+
 }  // namespace swarmcert::training

@@ -131,7 +131,8 @@ struct Member {
 
 class SourceReader {
  public:
-  SourceReader(const std::string& bytes, const std::string& path) : scanner_(bytes, path), path_(path) {}
+  SourceReader(const std::string& bytes, const std::string& path, const std::vector<std::string>& order)
+      : scanner_(bytes, path), path_(path), order_(order) {}
 
   Weights run(const std::string& key) {
     read();
@@ -272,11 +273,12 @@ class SourceReader {
       }
       return transposed;
     };
-    return assemble(declared, read, path_);
+    return assemble(declared, read, path_, Listing::kRegistration, order_);
   }
 
   Scanner scanner_;
   const std::string& path_;
+  const std::vector<std::string>& order_;
   std::map<std::string, std::vector<Member>> types_;
   std::map<std::string, std::vector<Member>> objects_;
 };
@@ -291,8 +293,9 @@ bool looks_like_c_source(const std::string& bytes) {
   return first == "struct" || first == "static" || first == "const";
 }
 
-Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key) {
-  return SourceReader(bytes, path).run(key);
+Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key,
+                       const std::vector<std::string>& order) {
+  return SourceReader(bytes, path, order).run(key);
 }
 
 std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, const std::string& path) {

@@ -20,7 +20,8 @@ bool looks_like_c_source(const std::string& bytes);
 /// without the suffix f is rounded to double first and then to float.
 /// @param key NAME; may be empty where the file holds one network.
 /// @throws InputError with the line if the text is anything else, `key` is not in it, or as assemble().
-Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key);
+Weights parse_c_source(const std::string& bytes, const std::string& path, const std::string& key,
+                       const std::vector<std::string>& order);
 
 /// Every network of C source of that layout that holds nothing else, by NAME.
 /// @throws InputError as parse_c_source(); also for preprocessor lines other than #include and #pragma, and for

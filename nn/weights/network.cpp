@@ -99,13 +99,17 @@ class NetworkReader {
     if (kinds.keys().empty()) kinds.refuse("", "", "names no kind of vehicle", "add [" + role + ".<kind>]");
     for (const std::string& kind : kinds.keys()) {
       const TomlTable entry = kinds.table(kind);
-      entry.allow_only({"weights"});
+      entry.allow_only({"weights", "order"});
       const std::string file = entry.text("weights");
       if (file.empty() || file.find('\0') != std::string::npos) {
         entry.refuse("weights", in_quotes(file), "is not the name of a file");
       }
       const std::filesystem::path folder = std::filesystem::path(path_).parent_path();
-      weights.emplace(kind, load_((folder / file).string()));
+      std::vector<std::string> order;
+      if (entry.has("order")) order = entry.texts("order");
+      if (entry.has("order") && order.empty())
+        entry.refuse("order", "[]", "names no layer", "leave it out, or name every layer once");
+      weights.emplace(kind, load_((folder / file).string(), order));
     }
   }
 
@@ -176,9 +180,11 @@ bool is_network_toml(const std::string& path, const std::string& bytes) {
 Network load_pair(const NetworkArguments& arguments) {
   Network network;
   const Weights& phi =
-      network.phi.emplace("default", load_weights(arguments.phi, arguments.key)).first->second;
+      network.phi.emplace("default", load_weights(arguments.phi, arguments.key, arguments.phi_order))
+          .first->second;
   const Weights& rho =
-      network.rho.emplace("default", load_weights(arguments.rho, arguments.key)).first->second;
+      network.rho.emplace("default", load_weights(arguments.rho, arguments.key, arguments.rho_order))
+          .first->second;
   if (phi.outputs() != rho.inputs()) {
     throw InputError(
         {arguments.rho, "", rho.layers.front().name + ".weight", std::to_string(rho.inputs()) + " inputs",
@@ -230,16 +236,21 @@ Network load_network(const NetworkArguments& arguments) {
       arguments.file.find('#') != std::string::npos && !std::filesystem::exists(arguments.file);
   if (names_a_key) {
     Network network;
-    network.plain = load_weights(arguments.file, arguments.key);
+    network.plain = load_weights(arguments.file, arguments.key, arguments.order);
     return network;
   }
   const std::string bytes = read_file(arguments.file);
   if (is_network_toml(arguments.file, bytes)) {
-    const WeightsLoader load = [&](const std::string& path) { return load_weights(path, arguments.key); };
+    if (!arguments.order.empty())
+      throw InputError({arguments.file, "", "--order", "", "is of one weight file, and this names several",
+                        "write order = [...] beside weights"});
+    const WeightsLoader load = [&](const std::string& path, const std::vector<std::string>& order) {
+      return load_weights(path, arguments.key, order);
+    };
     return parse_network(bytes, arguments.file, load);
   }
   Network network;
-  network.plain = parse_weights(bytes, arguments.file, arguments.key);
+  network.plain = parse_weights(bytes, arguments.file, arguments.key, arguments.order);
   return network;
 }
 

@@ -66,18 +66,20 @@ struct NetworkArguments {
   std::string file;      ///< network.toml or one plain weight file
   std::string phi, rho;  ///< weight files; their kind is "default"
   std::string key;       ///< see load_weights(); holds for every weight file
+  /// Orders of layers as load_weights() takes them: of `file`, where that is one plain weight file, of `phi` and `rho`.
+  std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
 };
 
 /// Loads NET. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files
-/// named in a network.toml are relative to its folder.
+/// named in a network.toml are relative to its folder; the orders of their layers stand there as well.
 /// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean.
 Network load_network(const NetworkArguments& arguments);
 
 /// as_float32() of every part.
 Network as_float32(Network network);
 
-/// Reads the weight file at a path.
-using WeightsLoader = std::function<Weights(const std::string& path)>;
+/// Reads the weight file at a path; `order` as in load_weights().
+using WeightsLoader = std::function<Weights(const std::string& path, const std::vector<std::string>& order)>;
 
 /// A network.toml from memory: `path` gives its folder and the name in messages, `load` reads the weight files.
 /// @throws InputError as load_network().

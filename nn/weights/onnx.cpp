@@ -53,7 +53,8 @@ struct Affine {
 
 class OnnxReader {
  public:
-  OnnxReader(const std::string& bytes, const std::string& path) : bytes_(bytes), path_(path) {}
+  OnnxReader(const std::string& bytes, const std::string& path, const std::vector<std::string>& order)
+      : bytes_(bytes), path_(path), order_(order) {}
 
   Weights run() {
     read_model();
@@ -336,11 +337,12 @@ class OnnxReader {
                        numbers);
       return numbers;
     };
-    return assemble(declared, read, path_);
+    return assemble(declared, read, path_, Listing::kEvaluation, order_);
   }
 
   const std::string& bytes_;
   const std::string& path_;
+  const std::vector<std::string>& order_;
   std::vector<Node> nodes_;
   std::map<std::string, Stored> stored_;
   std::vector<std::string> inputs_;
@@ -359,8 +361,8 @@ bool looks_like_onnx(const std::string& bytes) {
   return tags.find(bytes[2]) != std::string::npos;
 }
 
-Weights parse_onnx(const std::string& bytes, const std::string& path) {
-  return OnnxReader(bytes, path).run();
+Weights parse_onnx(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
+  return OnnxReader(bytes, path, order).run();
 }
 
 }  // namespace swarmcert::files

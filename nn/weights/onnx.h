@@ -16,6 +16,6 @@ bool looks_like_onnx(const std::string& bytes);
 /// transposed), MatMul with Add, Relu, Identity; Constant and Identity for weights. Weights lie in the file itself, in
 /// float32 or float64. A layer is called as its weight without ".weight".
 /// @throws InputError for anything else, naming node, tensor or attribute, or as assemble().
-Weights parse_onnx(const std::string& bytes, const std::string& path);
+Weights parse_onnx(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
 
 }  // namespace swarmcert::files

@@ -56,7 +56,7 @@ std::vector<double> numbers_of(const PickledTensor& tensor, std::string_view sto
 }
 
 Weights assemble_state_dict(const Pickle& pickle, const StorageBytes& bytes_of, const std::string& path,
-                            const std::string& key) {
+                            const std::string& key, const std::vector<std::string>& order) {
   const StateDict entries = select_state_dict(pickle, key, path);
   std::vector<DeclaredTensor> declared;
   for (const auto& [name, index] : entries) {
@@ -78,7 +78,7 @@ Weights assemble_state_dict(const Pickle& pickle, const StorageBytes& bytes_of, 
     const Precision precision = *precision_of(storage.type);
     return numbers_of(tensor, bytes_of(storage, precision), precision);
   };
-  return assemble(declared, read, path);
+  return assemble(declared, read, path, Listing::kRegistration, order);
 }
 
 [[noreturn]] void refuse_storage_size(const std::string& path, const PickledStorage& storage,
@@ -211,7 +211,8 @@ bool looks_like_pth_legacy(const std::string& bytes) {
   return bytes.size() > 2 && bytes[0] == '\x80' && bytes.compare(2, kLegacyMagic.size(), kLegacyMagic) == 0;
 }
 
-Weights parse_pth_zip(const std::string& bytes, const std::string& path, const std::string& key) {
+Weights parse_pth_zip(const std::string& bytes, const std::string& path, const std::string& key,
+                      const std::vector<std::string>& order) {
   const ZipArchive archive(bytes, path);
   const std::string folder = top_folder(archive, path);
   refuse_other_archives(archive, folder, path);
@@ -233,10 +234,11 @@ Weights parse_pth_zip(const std::string& bytes, const std::string& path, const s
     }
     return contents;
   };
-  return assemble_state_dict(pickle, bytes_of, path, key);
+  return assemble_state_dict(pickle, bytes_of, path, key, order);
 }
 
-Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key) {
+Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key,
+                         const std::vector<std::string>& order) {
   const Legacy container(bytes, path);
   std::optional<std::map<std::string_view, std::string_view>> storages;  // after the names have been checked
   const StorageBytes bytes_of = [&](const PickledStorage& storage, Precision) {
@@ -245,7 +247,7 @@ Weights parse_pth_legacy(const std::string& bytes, const std::string& path, cons
     if (found == storages->end()) refuse_storage_size(path, storage, 0);
     return found->second;
   };
-  return assemble_state_dict(container.state, bytes_of, path, key);
+  return assemble_state_dict(container.state, bytes_of, path, key, order);
 }
 
 }  // namespace swarmcert::files

@@ -13,9 +13,11 @@ bool looks_like_pth_zip(const std::string& bytes);
 /// True if `bytes` begin with the magic number of PyTorch's container before 1.6.
 bool looks_like_pth_legacy(const std::string& bytes);
 
-/// Both: `key` and errors as in load_weights(); `path` for messages. Memory: the file, its opcodes
+/// Both: `key`, `order` and errors as in load_weights(); `path` for messages. Memory: the file, its opcodes
 /// (kMostPickleOperations) and its numbers (kMostElements), whatever sizes it declares.
-Weights parse_pth_zip(const std::string& bytes, const std::string& path, const std::string& key);
-Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key);
+Weights parse_pth_zip(const std::string& bytes, const std::string& path, const std::string& key,
+                      const std::vector<std::string>& order);
+Weights parse_pth_legacy(const std::string& bytes, const std::string& path, const std::string& key,
+                         const std::vector<std::string>& order);
 
 }  // namespace swarmcert::files

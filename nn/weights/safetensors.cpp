@@ -7,6 +7,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
+#include "nn/weights/layer_order.h"
 #include "nn/weights/tensors.h"
 
 namespace swarmcert::files {
@@ -22,31 +23,6 @@ std::uint64_t header_length(const std::string& bytes) {
   return length;
 }
 
-/// Compares runs of digits by value, so that fc2 comes before fc10.
-bool naturally_before(const std::string& a, const std::string& b) {
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::size_t i = 0;
-  std::size_t j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!is_digit(a[i]) || !is_digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i, ++j;
-      continue;
-    }
-    const auto number = [&is_digit](const std::string& text, std::size_t& at) {
-      while (at < text.size() && text[at] == '0') ++at;
-      const std::size_t first = at;
-      while (at < text.size() && is_digit(text[at])) ++at;
-      return text.substr(first, at - first);
-    };
-    const std::string m = number(a, i);
-    const std::string n = number(b, j);
-    if (m.size() != n.size()) return m.size() < n.size();
-    if (m != n) return m < n;
-  }
-  return a.size() - i < b.size() - j;
-}
-
 struct Entry {
   DeclaredTensor tensor;
   std::uint64_t begin = 0, end = 0;  ///< in the data behind the header
@@ -54,7 +30,8 @@ struct Entry {
 
 class Reader {
  public:
-  Reader(const std::string& bytes, const std::string& path) : path_(path) {
+  Reader(const std::string& bytes, const std::string& path, const std::vector<std::string>& order)
+      : path_(path), order_(order) {
     if (bytes.size() < 8) refuse("", "", "is shorter than a safetensors header", kCopyAgain);
     const std::uint64_t length = header_length(bytes);
     if (length > bytes.size() - 8 || length > kLargestHeader_bytes) {
@@ -70,7 +47,7 @@ class Reader {
       if (name != "__metadata__") entries_.push_back(entry(name, value));
     }
     check_layout();
-    sort_by_layer();
+    const Listing listing = sort_by_layer();
     std::vector<DeclaredTensor> tensors;
     for (const Entry& entry : entries_) tensors.push_back(entry.tensor);
     const TensorReader read = [this](std::size_t i) {
@@ -82,7 +59,7 @@ class Reader {
       append_numbers(data_.data() + entry.begin, count, 1, precision, numbers);
       return numbers;
     };
-    return assemble(tensors, read, path_);
+    return assemble(tensors, read, path_, listing, order_);
   }
 
  private:
@@ -155,7 +132,8 @@ class Reader {
       refuse("", std::to_string(data_.size() - covered) + " bytes", "belong to no tensor");
   }
 
-  void sort_by_layer() {
+  /// Ours list their layers in the order of evaluation; those of others are sorted by name.
+  Listing sort_by_layer() {
     const std::vector<std::string> order = layer_order();
     const auto layer_of = [](const std::string& tensor) {
       const std::size_t dot = tensor.rfind('.');
@@ -176,6 +154,10 @@ class Reader {
     sorted.reserve(entries_.size());
     for (const std::size_t i : indices) sorted.push_back(entries_[i]);
     entries_ = std::move(sorted);
+    const bool is_stated = std::none_of(ranks.begin(), ranks.end(), [&order](std::ptrdiff_t rank_in_order) {
+      return rank_in_order == static_cast<std::ptrdiff_t>(order.size());
+    });
+    return is_stated ? Listing::kEvaluation : Listing::kUnordered;
   }
 
   /// Empty where the file does not say.
@@ -197,6 +179,7 @@ class Reader {
   }
 
   const std::string& path_;
+  const std::vector<std::string>& order_;
   Json header_;
   std::string_view data_;
   std::vector<Entry> entries_;
@@ -208,8 +191,9 @@ bool looks_like_safetensors(const std::string& bytes) {
   return bytes.size() >= 10 && header_length(bytes) <= kLargestHeader_bytes && bytes[8] == '{';
 }
 
-Weights parse_safetensors(const std::string& bytes, const std::string& path) {
-  return Reader(bytes, path).run();
+Weights parse_safetensors(const std::string& bytes, const std::string& path,
+                          const std::vector<std::string>& order) {
+  return Reader(bytes, path, order).run();
 }
 
 std::string safetensors_bytes(const Weights& weights) {

@@ -13,6 +13,9 @@
 namespace swarmcert::files {
 namespace {
 
+constexpr char kOnlyLinear[] = "only networks of linear layers with ReLU between them can be read";
+constexpr char kFold[] =
+    "fold it into the layer before it: torch.nn.utils.fusion.fuse_linear_bn_eval(linear, bn)";
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 constexpr std::size_t kMostTensors = 4096;
 
@@ -25,8 +28,9 @@ struct LayerParts {
 
 class Assembler {
  public:
-  Assembler(const std::vector<DeclaredTensor>& tensors, const TensorReader& read, const std::string& path)
-      : tensors_(tensors), read_(read), path_(path) {}
+  Assembler(const std::vector<DeclaredTensor>& tensors, const TensorReader& read, const std::string& path,
+            Listing listing, const std::vector<std::string>& order)
+      : tensors_(tensors), read_(read), path_(path), listing_(listing), order_(order) {}
 
   Weights run() {
     if (tensors_.size() > kMostTensors) {
@@ -34,6 +38,7 @@ class Assembler {
           {path_, "", "", "", "holds more than " + std::to_string(kMostTensors) + " tensors", ""});
     }
     refuse_parametrised();
+    refuse_other_structures();
     for (std::size_t i = 0; i < tensors_.size(); ++i) find_weight(i);
     for (std::size_t i = 0; i < tensors_.size(); ++i) find_bias(i);
     if (parts_.empty()) {
@@ -41,8 +46,8 @@ class Assembler {
                         "save a state dict of a "
                         "network of linear layers"});
     }
-    check_chain();
     Weights weights;
+    weights.order_source = sort_parts();
     weights.path = path_;
     weights.precision = *tensors_[parts_.front().weight].precision;
     for (const LayerParts& parts : parts_) weights.layers.push_back(layer(parts));
@@ -77,6 +82,33 @@ class Assembler {
         refuse(i, "",
                "the weight is parametrised by spectral_norm, so the file does not hold the weight itself",
                "call torch.nn.utils.remove_spectral_norm(layer) before saving");
+      }
+    }
+  }
+
+  /// Tensors that only layers of other kinds have, with the kind's name and what to do.
+  void refuse_other_structures() const {
+    struct Hint {
+      const char* ending;
+      const char* kind;
+      const char* mend;
+    };
+    constexpr Hint kHints[] = {
+        {"running_mean", "batch normalisation", kFold},
+        {"running_var", "batch normalisation", kFold},
+        {"num_batches_tracked", "batch normalisation", kFold},
+        {"in_proj_weight", "attention", kOnlyLinear},
+        {"weight_ih_l0", "a recurrent layer", kOnlyLinear},
+        {"weight_hh_l0", "a recurrent layer", kOnlyLinear},
+    };
+    for (std::size_t i = 0; i < tensors_.size(); ++i) {
+      for (const Hint& hint : kHints) {
+        std::string layer;
+        if (is_part(i, hint.ending, layer))
+          refuse(i, "",
+                 std::string("belongs to ") + hint.kind +
+                     ", so the network is no chain of linear layers and ReLU",
+                 hint.mend);
       }
     }
   }
@@ -125,8 +157,7 @@ class Assembler {
     if (!is_part(i, "weight", parts.name)) return;
     if (tensors_[i].shape.size() != 2) {
       refuse(i, shape_text(tensors_[i].shape),
-             "a linear layer's weight has two dimensions, [outputs, inputs]",
-             "only networks of linear layers with ReLU between them can be read");
+             "a linear layer's weight has two dimensions, [outputs, inputs]", kOnlyLinear);
     }
     if (!names_.insert(parts.name).second) refuse(i, "", "appears twice");
     check_type(i);
@@ -145,7 +176,7 @@ class Assembler {
     }
     if (owner == nullptr) {
       refuse(i, shape_text(tensors_[i].shape), "is neither the weight nor the bias of a linear layer",
-             "only networks of linear layers with ReLU between them can be read");
+             kOnlyLinear);
     }
     if (owner->bias != kNone) refuse(i, "", "appears twice");
     const DeclaredTensor& weight = tensors_[owner->weight];
@@ -157,17 +188,17 @@ class Assembler {
     owner->bias = i;
   }
 
-  void check_chain() const {
-    for (std::size_t k = 1; k < parts_.size(); ++k) {
-      const DeclaredTensor& before = tensors_[parts_[k - 1].weight];
-      const DeclaredTensor& weight = tensors_[parts_[k].weight];
-      if (weight.shape[1] != before.shape[0]) {
-        refuse(parts_[k].weight, shape_text(weight.shape),
-               "takes " + std::to_string(weight.shape[1]) + " inputs, but " + before.name +
-                   " before it gives " + std::to_string(before.shape[0]) + " outputs",
-               "the layers must follow one another in the file in the order of evaluation");
-      }
+  OrderSource sort_parts() {
+    std::vector<LayerShape> shapes;
+    for (const LayerParts& parts : parts_) {
+      const std::vector<std::uint64_t>& shape = tensors_[parts.weight].shape;
+      shapes.push_back({parts.name, shape[1], shape[0]});
     }
+    const LayerOrder order = decide_layer_order(shapes, listing_, order_, path_);
+    std::vector<LayerParts> sorted;
+    for (const std::size_t k : order.indices) sorted.push_back(parts_[k]);
+    parts_ = std::move(sorted);
+    return order.source;
   }
 
   Layer layer(const LayerParts& parts) const {
@@ -207,6 +238,8 @@ class Assembler {
   const std::vector<DeclaredTensor>& tensors_;
   const TensorReader& read_;
   const std::string& path_;
+  const Listing listing_;
+  const std::vector<std::string>& order_;
   std::vector<LayerParts> parts_;
   std::set<std::string> names_;
 };
@@ -223,8 +256,8 @@ void append_as(const char* bytes, std::uint64_t count, std::uint64_t stride, std
 }  // namespace
 
 Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
-                 const std::string& path) {
-  return Assembler(tensors, read, path).run();
+                 const std::string& path, Listing listing, const std::vector<std::string>& order) {
+  return Assembler(tensors, read, path, listing, order).run();
 }
 
 std::string tensor_name(const Layer& layer, const char* part) {

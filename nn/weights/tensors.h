@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/weights/layer_order.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert::files {
@@ -25,11 +26,11 @@ struct DeclaredTensor {
 /// Reads the numbers of the i-th declared tensor in row-major order. Called only for tensors whose shape fits.
 using TensorReader = std::function<std::vector<double>(std::size_t)>;
 
-/// Groups `tensors` into layers, in the order in which their weights come.
-/// @throws InputError if a tensor is not a layer's weight or bias, the layers do not follow one another, the
-///         precisions differ or are neither float32 nor float64, or a number is not finite.
+/// Groups `tensors` into layers, in the order of evaluation: see decide_layer_order(), to which `listing` and `order`
+/// go.
+/// @throws InputError if a tensor is not a layer's weight or bias, as decide_layer_order(), or if the precisions differ or are neither float32 nor float64, or a number is not finite.
 Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
-                 const std::string& path);
+                 const std::string& path, Listing listing, const std::vector<std::string>& order);
 
 /// "fc1.weight", or "weight" where the layer has no name.
 std::string tensor_name(const Layer& layer, const char* part);

@@ -36,20 +36,35 @@ void refuse_key(const std::string& key, const std::string& path, const std::stri
 
 const char* name(Precision precision) { return precision == Precision::kFloat32 ? "float32" : "float64"; }
 
-Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key) {
+const char* name(OrderSource source) {
+  switch (source) {
+    case OrderSource::kFile:
+      return "file";
+    case OrderSource::kNames:
+      return "names";
+    case OrderSource::kShapes:
+      return "shapes";
+    case OrderSource::kUser:
+      break;
+  }
+  return "user";
+}
+
+Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key,
+                      const std::vector<std::string>& order) {
   Weights weights;
   if (looks_like_pth_zip(bytes)) {
-    weights = parse_pth_zip(bytes, path, key);
+    weights = parse_pth_zip(bytes, path, key, order);
   } else if (looks_like_pth_legacy(bytes)) {
-    weights = parse_pth_legacy(bytes, path, key);
+    weights = parse_pth_legacy(bytes, path, key, order);
   } else if (looks_like_safetensors(bytes)) {
     refuse_key(key, path, "safetensors");
-    weights = parse_safetensors(bytes, path);
+    weights = parse_safetensors(bytes, path, order);
   } else if (looks_like_onnx(bytes)) {
     refuse_key(key, path, "ONNX");
-    weights = parse_onnx(bytes, path);
+    weights = parse_onnx(bytes, path, order);
   } else if (looks_like_c_source(bytes)) {
-    weights = parse_c_source(bytes, path, key);
+    weights = parse_c_source(bytes, path, key, order);
   } else {
     refuse_format(bytes, path);
   }
@@ -57,15 +72,15 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
   return weights;
 }
 
-Weights load_weights(const std::string& path, const std::string& key) {
+Weights load_weights(const std::string& path, const std::string& key, const std::vector<std::string>& order) {
   const std::size_t mark = path.rfind('#');
   if (mark == std::string::npos || mark + 1 == path.size() || std::filesystem::exists(path))
-    return parse_weights(read_file(path), path, key);
+    return parse_weights(read_file(path), path, key, order);
   const std::string file = path.substr(0, mark);
   if (!key.empty())
     throw InputError(
         {file, "", "--key", in_quotes(key), "the name of the file already names a key", "name one key"});
-  return parse_weights(read_file(file), file, path.substr(mark + 1));
+  return parse_weights(read_file(file), file, path.substr(mark + 1), order);
 }
 
 }  // namespace swarmcert::files

@@ -15,6 +15,18 @@ enum class Precision { kFloat32, kFloat64 };
 /// "float32" or "float64".
 const char* name(Precision precision);
 
+/// What the order of the layers rests on. A file that states it states ReLU between the layers as well; in every other
+/// case the activation is assumed.
+enum class OrderSource {
+  kFile,    ///< the file states it: ONNX, our safetensors
+  kNames,   ///< numbers in the names, which agree with the order of registration where there is one
+  kShapes,  ///< no other order fits the shapes
+  kUser,    ///< --order, or `order` in network.toml
+};
+
+/// "file", "names", "shapes", "user".
+const char* name(OrderSource source);
+
 /// One affine layer y = W x + b.
 struct Layer {
   std::string name;  ///< as in the file, without ".weight": "fc1"
@@ -32,6 +44,7 @@ struct Weights {
   std::string sha256;  ///< of the file's bytes, lower-case hex
   Precision precision = Precision::kFloat32;
   std::vector<Layer> layers;
+  OrderSource order_source = OrderSource::kFile;
 
   int inputs() const { return layers.front().inputs; }
   int outputs() const { return layers.back().outputs; }
@@ -40,16 +53,19 @@ struct Weights {
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
 /// and legacy pickle, float32 and float64, strided views), safetensors, ONNX models that are a chain of linear layers,
 /// and the C source that the networks' authors generate.
-/// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`; layers follow one another in the
-/// file's own order. Safetensors has none: ours state it, those of others are taken by natural order of names.
+/// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. Which layer follows which, ONNX models and
+/// our safetensors state; for other files see decide_layer_order().
 /// @param path where no such file exists, "FILE#KEY" is FILE with the key KEY.
 /// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top. For C
 ///   source: the name of one of its networks.
+/// @param order every layer of the file once, first evaluated first; empty: not stated.
 /// @throws InputError for anything that is not such a network: it names offset, field, value and mend.
-Weights load_weights(const std::string& path, const std::string& key = "");
+Weights load_weights(const std::string& path, const std::string& key = "",
+                     const std::vector<std::string>& order = {});
 
 /// As load_weights(), from memory. `path` is used in messages only.
-Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key = "");
+Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key = "",
+                      const std::vector<std::string>& order = {});
 
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
 /// @throws InputError if the file exists and `overwrite` is false, or if the name of a layer is not UTF-8.

@@ -93,7 +93,8 @@ std::string ZipArchive::read(const std::string& name, std::uint64_t limit_bytes)
     refuse("the entry cannot be read", kCopyAgain);
   }
   if (status.comp_method != ZIP_CM_STORE || status.encryption_method != ZIP_EM_NONE) {
-    refuse("the entry is compressed or encrypted", "save again with torch.save, which does neither");
+    refuse("the entry is compressed or encrypted",
+           "save again with torch.save or numpy.savez, which do neither");
   }
   if (status.size > limit_bytes || status.size > size_bytes_) {
     refuse("the entry declares " + std::to_string(status.size) + " bytes, more than fit here", kCopyAgain);

@@ -50,6 +50,20 @@ class Corpus {
   int count_ = 0;
 };
 
+void add_samples(Corpus& corpus) {
+  corpus.add("x0,x1,y\n1,2,3\n4,5,-0.5\n");
+  corpus.add("# numpy.savetxt\n1.0e+00 2 3\n");
+  corpus.add(R"({"schema": "swarmcert/samples/1", "inputs": [[1, 2]], "outputs": [3]})");
+  const auto npy = [](const std::string& shape, const std::vector<double>& numbers) {
+    const std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': " + shape + ", }\n";
+    return "\x93NUMPY\x01" + std::string(1, '\0') + little_endian(header.size(), 2) + header +
+           raw_numbers(numbers);
+  };
+  const std::string inputs = npy("(2, 2)", {1, 2, 4, 5}), outputs = npy("(2, 1)", {3, -0.5});
+  corpus.add(inputs);
+  corpus.add(zip({{"inputs.npy", inputs}, {"outputs.npy", outputs}}));
+}
+
 /// The first byte is the fuzz target's choice of key.
 std::string with_key(char choice, const std::string& bytes) { return choice + bytes; }
 
@@ -155,6 +169,8 @@ int main(int argc, char** argv) {
   add_logs(logs, argc > 2 ? argv[2] : "");
   Corpus log_formats(out / "log_formats");
   add_log_formats(log_formats);
+  Corpus samples(out / "samples");
+  add_samples(samples);
   Corpus json(out / "json");
   add_json(json);
   return 0;

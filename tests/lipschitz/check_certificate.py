@@ -3,7 +3,7 @@
 library only. It shares no line with the C++ checker, reads the weight files itself, and must accept and reject the
 same certificates.
 
-    check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY]
+    check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C]
 
 Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a weight file or network.toml that cannot be read.
 
@@ -22,12 +22,15 @@ import zipfile
 from collections import OrderedDict
 from fractions import Fraction
 from io import BytesIO
+from itertools import islice
 from operator import mul
 from pathlib import Path
 
 STATEMENT = (
-    "ReLU networks with the weights stored in the files named by sha256, rounded to float32 where `as` says so, and the "
-    "input clamp of network.toml. Every bound holds in exact arithmetic: |f(x) - f(y)| <= upper |x - y| for all x and y "
+    "The functions are the operations listed under chain, in that order, with the weights stored in the files named by "
+    "sha256, rounded to float32 where `as` says so: linear is W x + b, relu takes the positive part, clamp is the input "
+    "clamp of network.toml. Where samples are named, they were reproduced up to largest_deviation when this was written; "
+    "checking does not repeat that. Every bound holds in exact arithmetic: |f(x) - f(y)| <= upper |x - y| for all x and y "
     "that differ in the block only, and |f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x "
     "and y in the box. So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
     "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x to y, whatever the "
@@ -174,9 +177,54 @@ class Layer:
         return Layer(self.name, self.outputs, self.inputs, list(map(f32, self.weights)), list(map(f32, self.biases)))
 
 
+def numbered_before(a, b):
+    """Whether the names first differ in a number, and that of `a` is smaller."""
+    for x, y in zip(natural(a), natural(b)):
+        if x != y:
+            return isinstance(x, int) and isinstance(y, int) and x < y
+    return False
+
+
+def orders_of(layers, by_number, used=()):
+    """Every order in which each layer takes what the one before gives; `by_number`: and the names' numbers allow."""
+    if len(used) == len(layers):
+        yield [layers[i] for i in used]
+    for i, layer in enumerate(layers):
+        if i in used or used and layer.inputs != layers[used[-1]].outputs:
+            continue
+        if by_number and any(j not in used and numbered_before(layers[j].name, layer.name) for j in range(len(layers))):
+            continue
+        yield from orders_of(layers, by_number, used + (i,))
+
+
+def in_order(layers, listing, stated):
+    """The layers in the order of evaluation. `listing`: what their order in the file means, "evaluation",
+    "registration" or "none"."""
+    if stated:
+        by_name = {layer.name: layer for layer in layers}
+        assert sorted(stated) == sorted(by_name), "the order does not name every layer once"
+        result = [by_name[name] for name in stated]
+        assert listing != "evaluation" or result == layers, "the file states another order"
+        return result
+    if listing == "evaluation":
+        return layers
+    result = sorted(layers, key=lambda layer: natural(layer.name))
+    is_total = all(numbered_before(a.name, b.name) for a, b in zip(result, result[1:]))
+    is_listed = listing == "none" or result == layers
+    if is_total and is_listed and all(a.outputs == b.inputs for a, b in zip(result, result[1:])):
+        return result
+    fitting = list(islice(orders_of(layers, False), 2))
+    assert fitting, "no order of the layers fits"
+    if len(fitting) == 1:
+        return fitting[0]
+    by_number = list(islice(orders_of(layers, True), 2))
+    assert len(by_number) == 1 and (listing == "none" or by_number[0] == layers), "the order of the layers is not stated"
+    return by_number[0]
+
+
 class Weights:
-    def __init__(self, tensors, precision, data):
-        """tensors: (name, shape, numbers) in order, W as [outputs x inputs]."""
+    def __init__(self, tensors, precision, data, listing, order):
+        """tensors: (name, shape, numbers), W as [outputs x inputs]."""
         biases = {name[:-5].rstrip("."): numbers for name, shape, numbers in tensors if name.split(".")[-1] == "bias"}
         self.layers = []
         for name, shape, numbers in tensors:
@@ -184,6 +232,7 @@ class Weights:
                 layer = name[:-7] if "." in name else ""
                 self.layers.append(Layer(layer, shape[0], shape[1], numbers, biases.get(layer, [0.0] * shape[0])))
         assert self.layers and all(math.isfinite(x) for layer in self.layers for x in layer.weights + layer.biases)
+        self.layers = in_order(self.layers, listing, order)
         assert all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:]))
         self.precision, self.sha256 = precision, hashlib.sha256(data).hexdigest()
 
@@ -233,21 +282,21 @@ class TorchUnpickler(pickle.Unpickler):
         return pid[1], str(pid[2])
 
 
-def from_state_dict(state, key, storages, data):
+def from_state_dict(state, key, storages, data, order):
     for part in filter(None, key.split(".")):
         state = state[part]
     tensors = [(name, tensor.shape, tensor.numbers(storages(tensor.storage))) for name, tensor in state.items()]
-    return Weights(tensors, next(iter(state.values())).storage[0].precision, data)
+    return Weights(tensors, next(iter(state.values())).storage[0].precision, data, "registration", order)
 
 
-def read_zip(data, key):
+def read_zip(data, key, order):
     archive = zipfile.ZipFile(BytesIO(data))
     root = next(n for n in archive.namelist() if n.endswith("/data.pkl"))[:-8]
     state = TorchUnpickler(BytesIO(archive.read(root + "data.pkl"))).load()
-    return from_state_dict(state, key, lambda storage: archive.read(f"{root}data/{storage[1]}"), data)
+    return from_state_dict(state, key, lambda storage: archive.read(f"{root}data/{storage[1]}"), data, order)
 
 
-def read_legacy(data, key):
+def read_legacy(data, key, order):
     file = BytesIO(data)
     for _ in range(3):  # magic number, protocol, system
         pickle.load(file)
@@ -266,14 +315,14 @@ def read_legacy(data, key):
     for name in names:
         count = struct.unpack("<q", file.read(8))[0]
         storages[str(name)] = file.read(count * widths[str(name)])
-    return from_state_dict(state, key, lambda storage: storages[storage[1]], data)
+    return from_state_dict(state, key, lambda storage: storages[storage[1]], data, order)
 
 
 def natural(text):
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", text)]
 
 
-def read_safetensors(data):
+def read_safetensors(data, stated):
     length = struct.unpack("<Q", data[:8])[0]
     header = json.loads(data[8:8 + length])
     order = json.loads(header.get("__metadata__", {}).get("swarmcert.layers", "null"))
@@ -285,7 +334,7 @@ def read_safetensors(data):
         begin, end = header[name]["data_offsets"]
         precision = {"F32": "float32", "F64": "float64"}[header[name]["dtype"]]
         tensors.append((name, header[name]["shape"], unpack(precision, data[8 + length + begin:8 + length + end])))
-    return Weights(tensors, precision, data)
+    return Weights(tensors, precision, data, "none" if order is None else "evaluation", stated)
 
 
 def varint(data, at):
@@ -324,7 +373,7 @@ def integers_of(value):
     return result
 
 
-def read_onnx(data):
+def read_onnx(data, order):
     def tensor(message):
         fields = list(protobuf(message))
         shape = [d for n, v in fields if n == 1 for d in integers_of(v)]
@@ -381,10 +430,10 @@ def read_onnx(data):
                 add(current, "bias", stored[inputs[2]], False)
         elif kind == "Add":
             add(current, "bias", stored[inputs[0] if inputs[0] in stored else inputs[1]], False)
-    return Weights(tensors, precision, data)
+    return Weights(tensors, precision, data, "evaluation", order)
 
 
-def read_c_source(data, key):
+def read_c_source(data, key, order):
     text = re.sub(r"/\*.*?\*/|//[^\n]*|^\s*#[^\n]*", " ", data.decode("latin-1"), flags=re.S | re.M)
     types = {m[1]: re.findall(r"(float|double)\s+(\w+)((?:\s*\[\s*\d+\s*\])+)\s*;", m[2])
              for m in re.finditer(r"struct\s+(\w+)\s*\{([^{}]*)\}\s*;", text)}
@@ -404,32 +453,35 @@ def read_c_source(data, key):
             numbers = [numbers[i * shape[1] + j] for j in range(shape[1]) for i in range(shape[0])]
             shape.reverse()
         tensors.append((re.sub(r"_(weight|bias)$", r".\1", member), shape, numbers))
-    return Weights(tensors, precision, data)
+    return Weights(tensors, precision, data, "registration", order)
 
 
-def read_weights(path, key=""):
+def read_weights(path, key="", order=None):
     path = str(path)
     if "#" in path and not Path(path).exists():
         path, key = path.rsplit("#", 1)
     data = Path(path).read_bytes()
     if data[:2] == b"PK":
-        return read_zip(data, key)
+        return read_zip(data, key, order)
     if data[:1] == b"\x80":
-        return read_legacy(data, key)
+        return read_legacy(data, key, order)
     if data[8:9] == b"{":
-        return read_safetensors(data)
+        return read_safetensors(data, order)
     if data[:1] == b"\x08":
-        return read_onnx(data)
-    return read_c_source(data, key)
+        return read_onnx(data, order)
+    return read_c_source(data, key, order)
 
 
 class Network:
     """parts by name ("network", "phi:<kind>", "rho:<kind>"), and what network.toml states."""
 
-    def __init__(self, net="", phi="", rho="", key=""):
+    def __init__(self, net="", phi="", rho="", key="", orders=None):
+        """orders: of layers, by "network", "phi" and "rho"; those of a network.toml stand there."""
+        orders = orders or {}
         self.sha256, self.unit, self.order, self.clamp = "", "", [], None
         if phi:
-            self.parts = {"phi:default": read_weights(phi, key), "rho:default": read_weights(rho, key)}
+            self.parts = {f"{role}:default": read_weights(file, key, orders.get(role))
+                          for role, file in (("phi", phi), ("rho", rho))}
         elif net.endswith(".toml"):
             data = Path(net).read_bytes()
             document = tomllib.loads(data.decode())
@@ -438,10 +490,20 @@ class Network:
             self.order = document.get("input", {}).get("order", [])
             clamp = document.get("input", {}).get("clamp")
             self.clamp = clamp and (clamp["lower"], clamp["upper"])
-            self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key)
+            self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key, entry.get("order"))
                           for role in ("phi", "rho") for kind, entry in sorted(document[role].items())}
         else:
-            self.parts = {"network": read_weights(net, key)}
+            self.parts = {"network": read_weights(net, key, orders.get("network"))}
+
+    def chain(self, part):
+        """(op, layer, inputs, outputs) of each operation."""
+        layers = self.parts[part].layers
+        clamps = self.clamp and part != "phi:ground" and not part.startswith("rho:")
+        result = [("clamp", None, layers[0].inputs, layers[0].inputs)] if clamps else []
+        for k, layer in enumerate(layers):
+            result += [("relu", None, layer.inputs, layer.inputs)] * (k > 0)
+            result.append(("linear", layer.name, layer.inputs, layer.outputs))
+        return result
 
     def input_names(self, part):
         if part == "phi:ground":
@@ -956,8 +1018,32 @@ class Checker:
         require(named["description_sha256"] == self.network.sha256, "another network.toml")
         require(set(named["weights"]) == set(self.network.parts), "other networks")
         for name, weights in self.network.parts.items():
-            require(named["weights"][name] == {"sha256": weights.sha256, "precision": weights.precision},
-                    f"network.weights.{name} is of another file")
+            entry, where = named["weights"][name], f"network.weights.{name}"
+            require_keys(entry, ["sha256", "precision", "chain", "samples"], where)
+            require((entry["sha256"], entry["precision"]) == (weights.sha256, weights.precision),
+                    f"{where} is of another file")
+            self.check_chain(entry["chain"], name, where)
+            self.check_samples(entry["samples"], where)
+
+    def check_chain(self, stated, name, where):
+        chain = self.network.chain(name)
+        require(isinstance(stated, list) and len(stated) == len(chain), f"{where}: another chain")
+        for step, (op, layer, inputs, outputs) in zip(stated, chain):
+            require_keys(step, ["op", "layer", "inputs", "outputs"], where)
+            require(type(step["inputs"]) is type(step["outputs"]) is int, f"{where}: a size is no integer")
+            require(step == {"op": op, "layer": layer, "inputs": inputs, "outputs": outputs}, f"{where}: another chain")
+
+    def check_samples(self, samples, where):
+        if samples is None:
+            return
+        require_keys(samples, ["sha256", "count", "tolerance", "tolerance_hex", "largest_deviation",
+                               "largest_deviation_hex"], where)
+        require(isinstance(samples["sha256"], str) and re.fullmatch("[0-9a-f]{64}", samples["sha256"]) is not None,
+                f"{where}: no hash of samples")
+        require(type(samples["count"]) is int and samples["count"] >= 1, f"{where}: no number of samples")
+        deviation, tolerance = (number(samples[key], samples[key + "_hex"], where)
+                                for key in ("largest_deviation", "tolerance"))
+        require(deviation <= tolerance, f"{where}: the largest deviation is above the tolerance")
 
     def check_layer(self, entry, name, layer):
         where = f"layer {name} {layer.name}"
@@ -1282,6 +1368,9 @@ def main(arguments):
         word = arguments.pop(0)
         if word in ("--phi", "--rho", "--key") and arguments:
             options[word[2:]] = arguments.pop(0)
+        elif word == "--order" and arguments:
+            part, _, order = arguments.pop(0).rpartition("=")
+            options.setdefault("orders", {})[part or "network"] = order.split(",")
         else:
             positional.append(word)
     if len(positional) != (1 if "phi" in options else 2):

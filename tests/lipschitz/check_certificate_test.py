@@ -19,14 +19,14 @@ SWARMCERT, SOURCE = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
 MUTATIONS = int(sys.argv[3]) if len(sys.argv) > 3 else 100
 
 
-def safetensors(sizes, generator):
+def safetensors(sizes, generator, names=()):
     """A network with random weights in float64, as safetensors."""
     header, data = {}, b""
     for k, (inputs, outputs) in enumerate(zip(sizes, sizes[1:])):
         for part, shape in ("weight", [outputs, inputs]), ("bias", [outputs]):
             count = outputs * inputs if part == "weight" else outputs
             numbers = pack(f"<{count}d", *(generator.uniform(-1, 1) for _ in range(count)))
-            header[f"fc{k + 1}.{part}"] = {"dtype": "F64", "shape": shape,
+            header[f"{names[k] if names else f'fc{k + 1}'}.{part}"] = {"dtype": "F64", "shape": shape,
                                            "data_offsets": [len(data), len(data) + len(numbers)]}
             data += numbers
     text = json.dumps(header).encode()
@@ -56,6 +56,20 @@ weights = "ground.safetensors"
 weights = "rho.safetensors"
 """)
     return net
+
+
+def recorded(network, generator):
+    """Samples of a plain network as JSON, evaluated here in double."""
+    inputs = [[generator.uniform(-1, 1) for _ in range(network.layers[0].inputs)] for _ in range(30)]
+    outputs = []
+    for x in inputs:
+        for layer in network.layers:
+            rows = [layer.weights[i:i + layer.inputs] for i in range(0, len(layer.weights), layer.inputs)]
+            x = [sum(map(float.__mul__, row, x)) + b for row, b in zip(rows, layer.biases)]
+            if layer is not network.layers[-1]:
+                x = [max(0.0, value) for value in x]
+        outputs.append(x)
+    return json.dumps({"inputs": inputs, "outputs": outputs})
 
 
 def without_decisions(tree):
@@ -160,7 +174,22 @@ def first_checker(certificate, net, folder, number):
 
 
 def arguments(net):
-    return dict(zip((a[2:] for a in net[::2]), net[1::2])) if net[0].startswith("--") else {"net": net[0]}
+    """Those of second.Network()."""
+    if net[0].startswith("--"):
+        return dict(zip((a[2:] for a in net[::2]), net[1::2]))
+    return {"net": net[0], "orders": {"network": net[2].split(",")} if "--order" in net else {}}
+
+
+def check_orders(folder, square, order):
+    """A certificate of one order of the layers is none of another, and a file that has several is refused."""
+    certificate = folder / "certificate0.json"
+    assert second.parse(certificate.read_text())["network"]["weights"]["network"]["samples"]["count"] == 30
+    other = [str(square), "--order", "after,first,last"]
+    for net, code, words in ([str(square), *order], 0, "accepted"), (other, 1, "chain"), ([str(square)], 3, "--order"):
+        done = subprocess.run([SWARMCERT, "check", certificate, *net, "-q"], capture_output=True, text=True)
+        assert done.returncode == code and words in done.stdout + done.stderr, done
+        checker = [sys.executable, SOURCE / "tests/lipschitz/check_certificate.py", certificate, *net]
+        assert subprocess.run(checker, capture_output=True).returncode == code
 
 
 def run():
@@ -171,7 +200,13 @@ def run():
         hetero = str(heterogeneous(folder, generator))
         tiny = folder / "tiny.safetensors"
         tiny.write_bytes(safetensors([2, 5, 4, 1], generator))
-        nets = [([hetero], ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2", "--domain",
+        square = folder / "square.safetensors"
+        square.write_bytes(safetensors([3, 3, 3, 2], generator, ["first", "after", "last"]))
+        order = ["--order", "first,after,last"]
+        (folder / "square.json").write_text(recorded(second.Network(**arguments([str(square), *order])).parts["network"],
+                                                     generator))
+        nets = [([str(square), *order], ["--samples", str(folder / "square.json")]),
+                ([hetero], ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2", "--domain",
                             str(folder / "box.toml")]),
                 ([hetero], ["--neighbours", "2", "--domain", str(folder / "part.toml"), "--method", "branch", "--cuts", "20"]),
                 ([str(tiny)], ["--method", "branch", "--cuts", "20"]),
@@ -189,7 +224,7 @@ def run():
             reason = second.check(certificate, second.Network(**arguments(net)))
             assert not reason, f"the second checker rejects a sound certificate: {reason}"
             paths = list(leaves(certificate))
-            chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 0 else MUTATIONS // 5)]
+            chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]
             changed, longer = zip(*(forged(certificate, p, generator) for p in chosen))
             with ThreadPoolExecutor(2) as pool:
                 first = list(pool.map(lambda i: first_checker(changed[i], net, folder, i), range(len(changed))))
@@ -201,10 +236,11 @@ def run():
                 # Another corner may decide a neuron as well, and the part may hold without.
                 harmless = mutation == certificate or is_longer or decided_otherwise(certificate, mutation, where) or where[0] in ("tool", "box") or \
                     any(key in where for key in ("factor", "t", "q", "multipliers", "conflicts", "least", "most", "radius", "law",
-                                             "neighbours"))
+                                             "neighbours", "samples"))
                 assert harmless or not accepted, f"{where} was changed and both accept"
                 tried += 1
                 rejected += not accepted
+        check_orders(folder, square, order)
         print(f"{tried} mutated certificates: the checkers agree on each and reject {rejected}")
         assert rejected > 0.9 * tried
 

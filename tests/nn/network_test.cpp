@@ -33,12 +33,13 @@ weights = "20x1"
 )";
 
 /// A network of the size that its file name states.
-Weights sized(const std::string& path) {
+Weights sized(const std::string& path, const std::vector<std::string>& order) {
   std::mt19937 generator(1);
   const std::string name = std::filesystem::path(path).filename().string();
   const std::size_t cross = name.find('x');
   Weights weights = tests::random_network({std::stoi(name), std::stoi(name.substr(cross + 1))}, generator);
   weights.path = path;
+  if (!order.empty()) weights.layers.front().name = order.front();
   return weights;
 }
 Network parse(const std::string& text) { return parse_network(text, "nets/network.toml", sized); }
@@ -72,6 +73,19 @@ TEST(NetworkToml, EveryKeyIsRead) {
   EXPECT_EQ(network.gamma->value, 3.0);
   EXPECT_EQ(network.gamma->scope, GammaStatement::Scope::kLayer);
   EXPECT_EQ(network.gamma->mode, GammaStatement::Mode::kClip);
+}
+
+TEST(NetworkToml, TheOrderOfAPartsLayersReachesItsReader) {
+  const std::string text =
+      "schema = \"swarmcert/network/1\"\n[phi.a]\nweights = \"3x5\"\norder = [\"first\"]\n"
+      "[rho.b]\nweights = \"5x2\"\n";
+  const Network network = parse(text);
+  EXPECT_EQ(network.phi.at("a").layers.front().name, "first");
+  EXPECT_EQ(network.rho.at("b").layers.front().name, "fc1");
+  EXPECT_TRUE(
+      network_is_refused("schema = \"swarmcert/network/1\"\n[phi.a]\nweights = \"3x5\"\norder = []\n"
+                         "[rho.b]\nweights = \"5x2\"\n",
+                         {"line 4", "phi.a.order", "names no layer"}));
 }
 
 TEST(NetworkToml, OnlySchemaPhiAndRhoAreNeeded) {

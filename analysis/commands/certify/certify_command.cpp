@@ -14,8 +14,11 @@
 #include "analysis/commands/commands.h"
 #include "lipschitz/certify.h"
 #include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
+#include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/samples.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -29,6 +32,9 @@ struct CertifyOptions {
   files::NetworkArguments network;
   std::string method = "auto";
   std::string as;
+  std::string activation = "relu";
+  std::vector<std::string> samples;
+  double sample_tolerance = files::kSampleTolerance;
   std::string blocks;
   std::string neighbours;
   std::string domain;
@@ -102,9 +108,37 @@ void parse_neighbours(const std::string& text, lipschitz::ClaimOptions& claims) 
   }
 }
 
-void parse_blocks(const std::string& text, lipschitz::ClaimOptions& claims) {
-  std::istringstream list(text);
-  for (std::string item; std::getline(list, item, ',');) claims.blocks.push_back(item);
+bool is_block(const std::string& word) {
+  if (word == "every" || word == "position" || word == "velocity") return true;
+  return word.size() > 1 && word[0] == 'x' && word.find_first_not_of("0123456789", 1) == std::string::npos;
+}
+
+/// --blocks takes a value or none, and NET may follow it: what is no list of blocks, where NET is missing, is NET.
+void parse_blocks(CertifyOptions& options) {
+  std::istringstream list(options.blocks);
+  std::vector<std::string> blocks;
+  for (std::string item; std::getline(list, item, ',');) blocks.push_back(item);
+  if (!std::all_of(blocks.begin(), blocks.end(), is_block)) {
+    if (!options.network.file.empty() || !options.network.phi.empty())
+      throw UsageError("--blocks " + options.blocks +
+                       ": name blocks (position, velocity, x0, x1, ...), or none for every block");
+    options.network.file = options.blocks;
+    blocks = {"every"};
+  }
+  options.certify.blocks = std::move(blocks);
+}
+
+/// Holds NET against what was recorded from it. @throws InputError where it differs.
+std::map<std::string, files::SampleAgreement> compare_samples(const files::Network& network,
+                                                              const CertifyOptions& options) {
+  std::map<std::string, files::SampleAgreement> result;
+  for (const std::string& argument : options.samples) {
+    for (const auto& [part, samples] : files::read_samples(argument, network)) {
+      if (!result.emplace(part, files::hold_against(network, part, samples, options.sample_tolerance)).second)
+        throw UsageError("--samples " + argument + ": there are samples of " + part + " already");
+    }
+  }
+  return result;
 }
 
 /// certify(); what the options ask for and NET has not is a matter of usage.
@@ -188,13 +222,17 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
-  parse_blocks(options.blocks, options.certify);
+  if (options.activation != "relu")
+    throw UsageError("--activation " + options.activation +
+                     ": only networks with ReLU between their layers can be certified");
+  parse_blocks(options);
   files::Network network = load_net(options.network);
   if (!options.neighbours.empty() && network.plain)
     throw UsageError(
         "--neighbours " + options.neighbours +
         ": the file holds one plain network, which has none; give a network.toml or --phi and --rho");
   if (options.as == "float32") network = files::as_float32(std::move(network));
+  const std::map<std::string, files::SampleAgreement> samples = compare_samples(network, options);
   if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
   lipschitz::SlopeMapOptions map = options.slope_map;
   if (!options.map.empty()) {
@@ -228,6 +266,7 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   CertifyOutput output;
   output.found = certify_or_refuse(network, options.certify);
   output.found.as_float32 = options.as == "float32";
+  output.found.samples = samples;
   output.seed = options.certify.lower.seed;
   output.max_lipschitz = options.max_lipschitz;
   output.domain_file = options.domain;
@@ -254,7 +293,7 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
     if (options.max_lipschitz > 0)
       fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
     if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
-    fmt::print("verdict: {}\n", name(verdict));
+    fmt::print("verdict: {} for {}\n", name(verdict), files::chain_words(network));
   }
   if (!options.report.empty()) {
     const std::string path = write_certify_report(network, output, result, options.report, common.force);
@@ -285,12 +324,29 @@ Command certify_command() {
                "or branch (branch and bound over the box of --domain; without --domain over all inputs)")
             ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
             ->capture_default_str();
+        app.add_option("--activation", options->activation,
+                       "Between the layers, which a state dict does not tell: only relu can be certified")
+            ->capture_default_str();
+        app.add_option("--samples", options->samples,
+                       "Inputs and outputs recorded from the trained network (CSV, .npz or JSON), which the "
+                       "certified "
+                       "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. "
+                       "phi:small=FILE")
+            ->allow_extra_args(false);
+        app.add_option("--samples-tolerance", options->sample_tolerance,
+                       "How far samples may be off, times what their outputs range over")
+            ->check(CLI::Range(0.0, 0.1))
+            ->capture_default_str();
         app.add_option("--as", options->as,
                        "Certify the weights rounded to this precision, as they are stored in flash")
             ->check(CLI::IsMember({"float32"}));
-        app.add_flag(
-            "--blocks{every}", options->blocks,
-            "Bounds per block of inputs as well: --blocks for all, or --blocks=position,velocity,x2");
+        auto* blocks =
+            app.add_option("--blocks", options->blocks,
+                           "Bounds per block of inputs as well: of every block, or of those named, "
+                           "e.g. position,velocity,x2")
+                ->expected(0, 1)
+                ->type_name("[LIST]")
+                ->default_str("every");
         app.add_option("--scale", options->certify.scale,
                        "Also bounds in the norm sqrt(sum (dx_k / scale_k)^2): one number per input")
             ->delimiter(',');
@@ -347,7 +403,10 @@ Command certify_command() {
             ->capture_default_str();
         add_output(app, "-o,--output", options->output, "File for the certificate");
         add_output(app, "--report", options->report, "Folder for an HTML report with its plots");
-        return [options](const CommonOptions& common) { return run_certify(*options, common); };
+        return [options, blocks](const CommonOptions& common) {
+          if (blocks->count() > 0 && options->blocks.empty()) options->blocks = "every";
+          return run_certify(*options, common);
+        };
       }};
 }
 

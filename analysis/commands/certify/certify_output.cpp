@@ -6,6 +6,7 @@
 
 #include "analysis/cli/command.h"
 #include "analysis/commands/certify/branch_outlook.h"
+#include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::analysis {
@@ -83,6 +84,42 @@ Json witness_json(const lipschitz::FoundSlope& found) {
     others.push_back({{"network", found.other_networks[j]}, {"x", found.witness->others[j]}});
   }
   return {{"x", found.witness->x}, {"y", found.witness->y}, {"others", std::move(others)}};
+}
+
+/// The operations of all parts, one after the other.
+Json chains_json(const files::Network& network) {
+  Json list = Json::array();
+  for (const auto& [name, weights] : files::parts(network)) {
+    for (Json& step : files::chain_json(files::chain(network, name))) {
+      step["network"] = name;
+      list.push_back(std::move(step));
+    }
+  }
+  return list;
+}
+
+/// What is known of where each part's chain comes from.
+Json chain_sources_json(const files::Network& network) {
+  Json sources = Json::object();
+  for (const auto& [name, weights] : files::parts(network)) {
+    const bool is_stated = weights->order_source == files::OrderSource::kFile;
+    sources[name] = {{"order", files::name(weights->order_source)},
+                     {"activation", is_stated ? "file" : "assumed"}};
+  }
+  return sources;
+}
+
+Json samples_result(const Certification& found) {
+  Json list = Json::array();
+  for (const auto& [part, agreement] : found.samples) {
+    list.push_back({{"network", part},
+                    {"file", agreement.path},
+                    {"sha256", agreement.sha256},
+                    {"count", agreement.count},
+                    {"tolerance", agreement.tolerance},
+                    {"largest_deviation", agreement.largest_deviation}});
+  }
+  return list;
 }
 
 std::string group_label(const lipschitz::Neighbours& neighbours) {
@@ -206,11 +243,18 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
   for (const lipschitz::CertifiedLaw& law : found.laws) bounds.push_back(summary(network, law));
   std::vector<std::string> inputs = input_files(network);
   if (!output.domain_file.empty()) inputs.push_back(output.domain_file);
+  for (const auto& [part, agreement] : found.samples) {
+    if (std::find(inputs.begin(), inputs.end(), agreement.path) == inputs.end())
+      inputs.push_back(agreement.path);
+  }
   Json result = result_head("certify", inputs);
   result["seed"] = output.seed;
   result["as"] = found.as_float32 ? Json("float32") : Json();
   result["gamma"] = found.gamma ? Json(found.gamma->value) : Json();
   result["max_lipschitz"] = output.max_lipschitz > 0 ? Json(output.max_lipschitz) : Json();
+  result["chain"] = chains_json(network);
+  result["chain_source"] = chain_sources_json(network);
+  result["samples"] = samples_result(found);
   result["layers"] = std::move(layers);
   result["bounds"] = std::move(bounds);
   if (!output.maps.empty()) {
@@ -240,6 +284,37 @@ std::string sizes(const files::Weights& weights) {
   std::string text = std::to_string(weights.inputs());
   for (const files::Layer& layer : weights.layers) text += "-" + std::to_string(layer.outputs);
   return text;
+}
+
+void print_chains(const files::Network& network, const Certification& found) {
+  fmt::print("Functions that are certified\n");
+  for (const auto& [name, weights] : files::parts(network)) {
+    std::string remark;
+    switch (weights->order_source) {
+      case files::OrderSource::kFile:
+        remark = "as the file states";
+        break;
+      case files::OrderSource::kNames:
+        remark = "order by the names of the layers";
+        break;
+      case files::OrderSource::kShapes:
+        remark = "the only order that fits the shapes";
+        break;
+      case files::OrderSource::kUser:
+        remark = "order as given";
+        break;
+    }
+    const auto samples = found.samples.find(name);
+    const bool is_assumed = weights->order_source != files::OrderSource::kFile &&
+                            weights->layers.size() > 1 && samples == found.samples.end();
+    if (is_assumed) remark += "; ReLU is assumed, --samples compares";
+    fmt::print("  {}  {}  ({})\n", name, files::chain_words(files::chain(network, name)), remark);
+    if (samples == found.samples.end()) continue;
+    const files::SampleAgreement& agreement = samples->second;
+    fmt::print("    reproduces {} samples of {}: largest deviation {:.3g}, tolerance {:.3g}\n",
+               agreement.count, agreement.path, agreement.largest_deviation, agreement.tolerance);
+  }
+  fmt::print("\n");
 }
 
 void print_layers(const files::Network& network, const Certification& found) {
@@ -364,6 +439,7 @@ void print_laws(const files::Network& network, const Certification& found) {
 }  // namespace
 
 void print_certification(const files::Network& network, const CertifyOutput& output) {
+  print_chains(network, output.found);
   print_layers(network, output.found);
   print_bounds(network, output.found);
   print_laws(network, output.found);

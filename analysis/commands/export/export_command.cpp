@@ -10,7 +10,9 @@
 #include "nn/base/content_hash.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/record_samples.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -42,12 +44,23 @@ std::string certificate_of(const files::Network& network, const std::string& pat
     if (weights[part].value("sha256", "") != one->sha256)
       refuse("network.weights." + part + ".sha256", weights[part].value("sha256", ""),
              "is not the hash of " + one->path);
+    const files::Json chain = files::chain_json(files::chain(network, part));
+    if (weights[part].value("chain", files::Json()) != chain)
+      refuse("network.weights." + part + ".chain", "",
+             "is not the chain that is exported: " + files::chain_words(files::chain(network, part)));
   }
   const bool certified_as_float32 = certificate["network"].value("as", files::Json()) == "float32";
   if (as_float32 && !certified_as_float32)
     refuse("network.as", "null",
            "is about float64 weights, and float32 ones are exported: certify with --as float32");
   return hash;
+}
+
+/// What flight code computes for every part, for certify --samples.
+firmware::SourceFile samples_file(const files::Network& network, std::uint64_t seed) {
+  constexpr int kCount = 64;
+  const auto samples = files::record_samples(network, files::float32_output(network), kCount, seed);
+  return {"samples.json", files::to_text(files::samples_json(samples))};
 }
 
 int run_export(ExportOptions options, const CommonOptions& common) {
@@ -59,7 +72,8 @@ int run_export(ExportOptions options, const CommonOptions& common) {
     inputs.push_back(options.certificate);
     options.source.certificate_sha256 = certificate_of(network, options.certificate, is_rounded);
   }
-  const std::vector<firmware::SourceFile> sources = firmware::export_source(network, options.source);
+  std::vector<firmware::SourceFile> sources = firmware::export_source(network, options.source);
+  sources.push_back(samples_file(network, options.source.seed));
   for (const firmware::SourceFile& source : sources) {
     if (fs::exists(fs::path(options.output) / source.name))
       refuse_to_replace(common, (fs::path(options.output) / source.name).string());

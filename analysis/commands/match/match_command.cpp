@@ -143,6 +143,7 @@ Command match_command() {
             rho->needs(phi);
             app.add_option("--key", options->network.key,
                            "Where the state dict lies inside a nested checkpoint");
+            declare_order(app, options->network);
             declare_as(app, options->as);
             app.add_option("--certificate", options->certificate,
                            "Certificate that an export was made with, if it names one");

@@ -155,7 +155,7 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
   inputs.push_back(options.gains);
   std::unique_ptr<files::Network> network;
   if (has_force_network(options)) {
-    network = std::make_unique<files::Network>(files::load_network(options.network));
+    network = std::make_unique<files::Network>(load_net(options.network));
     for (const std::string& path : input_files(*network)) inputs.push_back(path);
   }
   std::unique_ptr<files::Network> torque_network;
@@ -235,6 +235,7 @@ Command simulate_command() {
                 app.add_option("--rho", options->network.rho, "Weight file of rho, in place of --network");
             phi->needs(rho);
             rho->needs(phi);
+            declare_order(app, options->network);
             add_output(app, "-o,--output", options->output, "Folder for the logs")->required();
             add_output(app, "--report", options->report, "Folder for an HTML report with plots");
             app.add_option("--duration", options->duration_s, "Seconds (default: the task's own)")

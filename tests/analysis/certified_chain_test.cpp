@@ -1,0 +1,163 @@
+/// Which function a certificate is about: the order of layers, blocks, and samples of the trained network.
+#include <gtest/gtest.h>
+
+#include "analysis/run.h"
+#include "nn/base/json.h"
+#include "nn/pth_writer.h"
+#include "nn/weights/weights.h"
+
+namespace swarmcert {
+namespace {
+
+using files::Json;
+using tests::Outcome;
+using tests::read_text;
+using tests::ScratchFolder;
+using tests::write_text;
+
+class CertifiedChain : public testing::Test {
+ protected:
+  Outcome run(const std::string& arguments) {
+    return tests::run_shell("swarmcert " + arguments, folder_.path());
+  }
+
+  void expect(const std::string& arguments, int exit_code, const std::vector<std::string>& words) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << "swarmcert " << arguments << "\n" << outcome.output;
+    for (const std::string& word : words) {
+      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no \"" << word << "\" in\n"
+                                                              << outcome.output;
+    }
+  }
+
+  /// A state dict of layers without biases, registered in this order. "shrink", then "grow", has slope 0: what passes
+  /// the first ReLU is multiplied by 0. The other way round it is steep.
+  void write_square(const std::string& first, const std::string& second) {
+    const std::vector<tests::TensorSpec> tensors = {{"head.weight", "0", 2, {2, 1}, {1, 1}},
+                                                    {first + ".weight", "1", 4, {2, 2}, {2, 1}},
+                                                    {second + ".weight", "2", 4, {2, 2}, {2, 1}},
+                                                    {"tail.weight", "3", 2, {1, 2}, {2, 1}}};
+    const std::string steep = tests::raw_numbers<float>({0, 10, 0, 0}),
+                      zero = tests::raw_numbers<float>({0, 0, 10, 0});
+    write_text(folder_ / "net.pth", tests::zip_file(tensors, {{"0", tests::raw_numbers<float>({0, 10})},
+                                                              {"1", first == "steep" ? steep : zero},
+                                                              {"2", second == "steep" ? steep : zero},
+                                                              {"3", tests::raw_numbers<float>({0, 10})}}));
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(CertifiedChain, AFileWithSeveralOrdersIsRefusedAndTheGivenOrderIsCertified) {
+  write_square("turn", "steep");
+  expect("certify net.pth", 3,
+         {"net.pth", "more than one fits", "head,turn,steep,tail (as registered)", "head,steep,turn,tail",
+          "--order"});
+  expect("certify net.pth --order head,steep,turn,tail --json steep.json", 0,
+         {"verdict: proved for head - ReLU - steep - ReLU - turn - ReLU - tail", "order as given"});
+  expect("certify net.pth --order=head,turn,steep,tail --json turned.json", 0,
+         {"verdict: proved for head - ReLU - turn - ReLU - steep - ReLU - tail"});
+  const auto upper = [&](const std::string& file) {
+    return Json::parse(read_text(folder_ / file))["bounds"][0]["upper"].get<double>();
+  };
+  // |x| -> 10 relu(x) -> steep keeps the second, 10 times, in the first place -> turn puts it back -> tail: 10^4.
+  EXPECT_GE(upper("steep.json"), 1e4);
+  EXPECT_LT(upper("turned.json"), 1);  // the other order is constant
+}
+
+TEST_F(CertifiedChain, JsonAndCertificateListTheOperationsAndCheckInsistsOnThem) {
+  write_square("turn", "steep");
+  ASSERT_EQ(
+      run("certify net.pth --order head,steep,turn,tail --nodes 1 --json out.json -o cert.json").exit_code,
+      0);
+  const Json result = Json::parse(read_text(folder_ / "out.json"));
+  ASSERT_EQ(result["chain"].size(), 7u);
+  EXPECT_EQ(result["chain"][0],
+            Json::parse(R"({"op":"linear","layer":"head","inputs":1,"outputs":2,"network":"network"})"));
+  EXPECT_EQ(result["chain"][1],
+            Json::parse(R"({"op":"relu","layer":null,"inputs":2,"outputs":2,"network":"network"})"));
+  EXPECT_EQ(result["chain"][2]["layer"], "steep");
+  EXPECT_EQ(result["chain_source"]["network"]["order"], "user");
+  EXPECT_EQ(result["chain_source"]["network"]["activation"], "assumed");
+  const Json stated = Json::parse(read_text(folder_ / "cert.json"))["network"]["weights"]["network"];
+  EXPECT_EQ(stated["chain"].size(), 7u);
+  EXPECT_TRUE(stated["samples"].is_null());
+  expect("check cert.json net.pth --order head,steep,turn,tail", 0, {"accepted"});
+  expect("check cert.json net.pth --order head,turn,steep,tail", 1,
+         {"rejected", "chain", "head - ReLU - turn"});
+  expect("check cert.json net.pth", 3, {"more than one fits"});
+}
+
+TEST_F(CertifiedChain, OrdersThatDoNotFitTheCommandAreUsageErrors) {
+  write_square("turn", "steep");
+  expect("certify net.pth --order phi=head,steep", 2, {"--phi"});
+  expect("certify --phi net.pth --rho net.pth --order head,steep", 2, {"phi=fc1,fc2"});
+  expect("certify net.pth --order ''", 2, {"--order"});
+  expect("certify net.pth --order head,tail", 3, {"left out"});
+  expect("certify net.pth --activation gelu", 2, {"--activation gelu", "ReLU"});
+}
+
+TEST_F(CertifiedChain, SamplesMustBeReproducedAndTheCertificateNamesThem) {
+  write_square("turn", "steep");
+  // head: (0, 10 x); steep: (100 relu(x), 0); turn: (0, 1000 relu(x)); tail: 10^4 relu(x).
+  write_text(folder_ / "good.csv", "x,y\n-1,0\n0.5,5000\n2,20000\n");
+  const std::string certify = "certify net.pth --nodes 1 ";
+  expect(certify + "--order head,steep,turn,tail --samples good.csv -o cert.json --json out.json", 0,
+         {"reproduces 3 samples of good.csv"});
+  const Json samples =
+      Json::parse(read_text(folder_ / "cert.json"))["network"]["weights"]["network"]["samples"];
+  EXPECT_EQ(samples["count"], 3);
+  EXPECT_EQ(samples["largest_deviation"], 0.0);
+  EXPECT_EQ(samples["sha256"].get<std::string>().size(), 64u);
+  EXPECT_EQ(Json::parse(read_text(folder_ / "out.json"))["samples"][0]["sha256"], samples["sha256"]);
+  expect("check cert.json net.pth --order head,steep,turn,tail", 0, {"accepted"});
+  expect(certify + "--order head,turn,steep,tail --samples good.csv", 3,
+         {"good.csv: line 4", "output 0 = 20000", "gives 0", "at the inputs (2)", "--order"});
+  write_text(folder_ / "gelu.csv", "-1,-1586.6\n0.5,3457.3\n2,19545\n");  // 10^4 GELU(x)
+  expect(certify + "--order head,steep,turn,tail --samples gelu.csv", 3, {"gelu.csv: line 1", "activation"});
+  expect(certify + "--order head,steep,turn,tail --samples gelu.csv --samples-tolerance 0.1", 0,
+         {"tolerance"});
+  write_text(folder_ / "ragged.csv", "1,2\n3\n");
+  expect(certify + "--order head,steep,turn,tail --samples ragged.csv", 3,
+         {"ragged.csv: line 2", "1 columns"});
+}
+
+TEST_F(CertifiedChain, SamplesOfAnExportAreReproduced) {
+  const std::string net = std::string(SWARMCERT_SOURCE_DIR) + "/nn/networks/demo/network.toml";
+  ASSERT_EQ(run("export " + net + " -o firmware").exit_code, 0);
+  expect("certify " + net + " --samples firmware/samples.json --nodes 0 --method product", 0,
+         {"reproduces 64 samples of firmware/samples.json"});
+}
+
+TEST_F(CertifiedChain, BlocksTakeTheirValueWithAndWithoutAnEqualsSign) {
+  const std::string net = std::string(SWARMCERT_SOURCE_DIR) + "/nn/networks/demo/network.toml";
+  const std::string tail = " --nodes 0 --method product -q --force --json out.json";
+  const auto blocks = [&](const std::string& arguments) {
+    const Outcome outcome = run("certify " + arguments + tail);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    std::set<std::string> found;
+    for (const Json& bound : Json::parse(read_text(folder_ / "out.json"))["bounds"])
+      found.insert(bound["block"]);
+    return found;
+  };
+  const std::set<std::string> position = {"all", "position"};
+  EXPECT_EQ(blocks(net + " --blocks position"), position);
+  EXPECT_EQ(blocks(net + " --blocks=position"), position);
+  EXPECT_EQ(blocks("--blocks position " + net), position);
+  const std::set<std::string> every = blocks(net + " --blocks");
+  EXPECT_GT(every.size(), 8u);
+  EXPECT_EQ(blocks("--blocks " + net), every);
+  EXPECT_EQ(blocks(net), (std::set<std::string>{"all"}));
+  expect("certify " + net + " --blocks postion", 2, {"--blocks postion"});
+  expect("certify " + net + " --blocks x9", 2, {"x9"});
+}
+
+TEST_F(CertifiedChain, BlocksOfANetworkWithOneInputAreNone) {
+  files::Weights weights;
+  weights.layers = {{"fc1", 2, 1, {1, -1}, {0, 0}}, {"fc2", 1, 2, {1, 1}, {0}}};
+  files::save_safetensors(weights, folder_ / "net.safetensors", true);
+  expect("certify net.safetensors --blocks", 0, {"verdict: proved for fc1 - ReLU - fc2"});
+}
+
+}  // namespace
+}  // namespace swarmcert
