@@ -316,7 +316,7 @@ std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, con
     if (!text.empty() && text.back() == '\\') refuse("a line that is continued on the next one");
     at = end + 1;
   }
-  return SourceReader(bytes, path).run_all();
+  return SourceReader(bytes, path, {}).run_all();
 }
 
 }  // namespace swarmcert::files

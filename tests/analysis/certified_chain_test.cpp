@@ -82,7 +82,8 @@ TEST_F(CertifiedChain, JsonAndCertificateListTheOperationsAndCheckInsistsOnThem)
   const Json stated = Json::parse(read_text(folder_ / "cert.json"))["network"]["weights"]["network"];
   EXPECT_EQ(stated["chain"].size(), 7u);
   EXPECT_TRUE(stated["samples"].is_null());
-  expect("check cert.json net.pth --order head,steep,turn,tail", 0, {"accepted"});
+  expect("check cert.json net.pth --order head,steep,turn,tail", 0,
+         {"accepted", "for head - ReLU - steep - ReLU - turn - ReLU - tail"});
   expect("check cert.json net.pth --order head,turn,steep,tail", 1,
          {"rejected", "chain", "head - ReLU - turn"});
   expect("check cert.json net.pth", 3, {"more than one fits"});

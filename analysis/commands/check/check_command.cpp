@@ -4,6 +4,7 @@
 
 #include "analysis/commands/commands.h"
 #include "lipschitz/checker/check.h"
+#include "nn/weights/chain.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -23,6 +24,7 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
   files::Json result = result_head("check", inputs);
   result["accepted"] = verdict.accepted;
   result["reason"] = verdict.reason;
+  result["chain"] = files::chain_words(network);
   result["spectral_norms"] = verdict.spectral_norms;
   result["upper_bounds"] = verdict.upper_bounds;
   result["lower_bounds"] = verdict.lower_bounds;
@@ -31,6 +33,7 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
     if (verdict.accepted) {
       fmt::print("accepted: {}: {} spectral norms, {} upper bounds, {} lower bounds\n", verdict.reason,
                  verdict.spectral_norms, verdict.upper_bounds, verdict.lower_bounds);
+      fmt::print("for {}\n", files::chain_words(network));
     } else {
       fmt::print("rejected: {}\n", verdict.reason);
     }
