@@ -105,7 +105,7 @@ class Assembler {
       for (const Hint& hint : kHints) {
         std::string layer;
         if (is_part(i, hint.ending, layer))
-          refuse(i, "",
+          refuse(i, shape_text(tensors_[i].shape),
                  std::string("belongs to ") + hint.kind +
                      ", so the network is no chain of linear layers and ReLU",
                  hint.mend);

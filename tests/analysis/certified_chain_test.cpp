@@ -1,6 +1,8 @@
 /// Which function a certificate is about: the order of layers, blocks, and samples of the trained network.
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "analysis/run.h"
 #include "nn/base/json.h"
 #include "nn/pth_writer.h"
@@ -136,9 +138,9 @@ TEST_F(CertifiedChain, BlocksTakeTheirValueWithAndWithoutAnEqualsSign) {
   const auto blocks = [&](const std::string& arguments) {
     const Outcome outcome = run("certify " + arguments + tail);
     EXPECT_EQ(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    const Json result = Json::parse(read_text(folder_ / "out.json"));
     std::set<std::string> found;
-    for (const Json& bound : Json::parse(read_text(folder_ / "out.json"))["bounds"])
-      found.insert(bound["block"]);
+    for (const Json& bound : result["bounds"]) found.insert(bound["block"]);
     return found;
   };
   const std::set<std::string> position = {"all", "position"};

@@ -33,7 +33,7 @@ weights = "20x1"
 )";
 
 /// A network of the size that its file name states.
-Weights sized(const std::string& path, const std::vector<std::string>& order) {
+Weights sized(const std::string& path, const std::vector<std::string>& order = {}) {
   std::mt19937 generator(1);
   const std::string name = std::filesystem::path(path).filename().string();
   const std::size_t cross = name.find('x');

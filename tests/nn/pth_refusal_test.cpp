@@ -82,7 +82,7 @@ TEST(PthRefusal, WeightsThatAreNotMatrices) {
 TEST(PthRefusal, NamesTensorsThatAreNotPartOfALayer) {
   std::vector<TensorSpec> tensors = small_tensors();
   tensors.push_back({"bn.running_mean", "1", 3, {3}, {1}});
-  EXPECT_TRUE(pth_is_refused(tensors, {"bn.running_mean = [3]", "neither the weight nor the bias"}));
+  EXPECT_TRUE(pth_is_refused(tensors, {"bn.running_mean = [3]", "batch normalisation"}));
   tensors.back().name = "fc3.bias";
   EXPECT_TRUE(pth_is_refused(tensors, {"fc3.bias = [3]", "neither the weight nor the bias"}));
 }

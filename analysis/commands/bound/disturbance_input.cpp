@@ -200,6 +200,7 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--network", arguments.network.file, "network.toml or weight file of f_hat");
   app.add_option("--phi", arguments.network.phi, "Weight file of phi, with --rho");
   app.add_option("--rho", arguments.network.rho, "Weight file of rho, with --phi");
+  declare_order(app, arguments.network);
   app.add_option("--speed", arguments.speed, "Largest relative speed of a neighbour, m/s")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--accel", arguments.acceleration, "Largest relative acceleration of a neighbour, m/s^2")

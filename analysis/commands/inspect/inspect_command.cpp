@@ -18,7 +18,7 @@ namespace {
 
 struct InspectOptions {
   std::vector<std::string> files;
-  std::string key;
+  files::NetworkArguments network;  ///< key and order, of every weight file
   std::string csv;
   std::string columns;
   double t0_s = -std::numeric_limits<double>::infinity();
@@ -117,10 +117,8 @@ void print_description(const files::Network& network) {
   }
 }
 
-files::Json inspect_network(const std::string& path, const std::string& key, bool print) {
-  files::NetworkArguments arguments;
+files::Json inspect_network(const std::string& path, files::NetworkArguments arguments, bool print) {
   arguments.file = path;
-  arguments.key = key;
   const files::Network network = files::load_network(arguments);
   if (print) print_description(network);
   files::Json parts = files::Json::object();
@@ -220,7 +218,7 @@ files::Json inspect(const std::string& path, const InspectOptions& options, cons
   if (logs::looks_like_log(path)) return inspect_log(path, options, common);
   if (is_model(path)) return inspect_model(path, common.prints_text());
   return is_json(path) ? inspect_certificate(path, common.prints_text())
-                       : inspect_network(path, options.key, common.prints_text());
+                       : inspect_network(path, options.network, common.prints_text());
 }
 
 int run_inspect(const InspectOptions& options, const CommonOptions& common) {
@@ -266,8 +264,9 @@ Command inspect_command() {
             app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
             app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
             app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
-            app.add_option("--key", options->key,
+            app.add_option("--key", options->network.key,
                            "Key of the state dict inside a nested checkpoint, e.g. model");
+            declare_order(app, options->network);
             return [options](const CommonOptions& common) { return run_inspect(*options, common); };
           }};
 }
