@@ -1,5 +1,8 @@
 #include "stability/gains.h"
 
+#include <cmath>
+#include <sstream>
+
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
@@ -11,7 +14,19 @@ using files::TomlTable;
 
 constexpr char kSchema[] = "swarmcert/gains/1";
 
+/// Bounds of numbers that a loop of a multirotor can have, far beyond any that flies. A position loop whose poles lie
+/// at 1000 1/s has Kp = 3e6, Kd = 3e3 and Ki = 1e9; rates beyond 100 kHz and below 1 Hz are periods or other units.
+constexpr double kLargestKp_1_s2 = 1e7, kLargestKd_1_s = 1e5, kLargestKi_1_s3 = 1e10;
+constexpr double kLargestLambda_1_s = 1e3, kLargestK_kg_s = 1e5;
+constexpr double kLeastRate_hz = 1, kLargestRate_hz = 1e5;
+constexpr double kLongestIntegral_m_s = 1e6;
+
 std::string text_of(double value) {
+  if (std::abs(value) >= 1e6 || (value != 0 && std::abs(value) < 1e-4)) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+  }
   std::string text = std::to_string(value);
   text.erase(text.find_last_not_of('0') + 1);
   if (text.back() == '.') text.pop_back();
@@ -30,6 +45,32 @@ double positive(const TomlTable& table, const std::string& key) {
   return value;
 }
 
+/// Refuses a size that no loop has: overflow, or a number in another unit.
+void check_size(const TomlTable& table, const std::string& key, double value, double largest,
+                const std::string& unit) {
+  if (std::abs(value) > largest) {
+    table.refuse(key, text_of(value),
+                 "is beyond " + text_of(largest) + " " + unit + ", which no vehicle follows",
+                 "it is in " + unit);
+  }
+}
+
+/// A rate of a loop, in hertz.
+double loop_rate_hz(const TomlTable& table) {
+  const double value = positive(table, "rate_hz");
+  if (value > kLargestRate_hz) {
+    table.refuse("rate_hz", text_of(value),
+                 "is beyond " + text_of(kLargestRate_hz) + " Hz, which no controller runs at",
+                 "it is in hertz");
+  }
+  if (value < kLeastRate_hz) {
+    table.refuse("rate_hz", text_of(value),
+                 "is below " + text_of(kLeastRate_hz) + " Hz; a period was probably meant",
+                 "it is in hertz: a period of " + text_of(value) + " s is " + text_of(1 / value));
+  }
+  return value;
+}
+
 /// A time of the loop. None that flies is longer than a second: longer ones were written in milliseconds.
 double seconds(const TomlTable& table, const std::string& key, double value) {
   constexpr double kLongest_s = 1;
@@ -41,7 +82,8 @@ double seconds(const TomlTable& table, const std::string& key, double value) {
 }
 
 /// Three numbers, or one that stands for all axes; none negative.
-PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zero) {
+PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zero, double largest,
+                 const std::string& unit) {
   PerAxis result{};
   if (!table.is_list(key)) {
     result.fill(table.number(key));
@@ -57,12 +99,13 @@ PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zer
     if (value < 0)
       table.refuse(key, text_of(value), "must not be negative", "the loop has its signs built in");
     if (value == 0 && !may_be_zero) table.refuse(key, text_of(value), "must be positive");
+    check_size(table, key, value, largest, unit);
   }
   return result;
 }
 
 /// A matrix of three rows, three numbers for the diagonal, or one number for a multiple of the identity.
-Matrix3 matrix(const TomlTable& table, const std::string& key) {
+Matrix3 read_matrix(const TomlTable& table, const std::string& key) {
   Matrix3 result{};
   if (!table.is_list(key)) {
     for (std::size_t i = 0; i < 3; ++i) result[4 * i] = table.number(key);
@@ -89,6 +132,12 @@ Matrix3 matrix(const TomlTable& table, const std::string& key) {
   return result;
 }
 
+Matrix3 matrix(const TomlTable& table, const std::string& key, double largest, const std::string& unit) {
+  const Matrix3 result = read_matrix(table, key);
+  for (const double value : result) check_size(table, key, value, largest, unit);
+  return result;
+}
+
 void read_position(const TomlTable& position, Gains& gains) {
   position.allow_only({"Kp", "Kd", "Ki", "Lambda", "K", "integrator_limit", "rate_hz", "integrator_step_s"});
   const bool is_pid = position.has("Kp") || position.has("Kd") || position.has("Ki");
@@ -99,16 +148,18 @@ void read_position(const TomlTable& position, Gains& gains) {
   }
   if (!is_pid && !is_composite) position.refuse("", "", "has no gains", "give Kp, Kd, Ki or Lambda, K");
   if (is_pid) {
-    gains.pid = PidGains{per_axis(position, "Kp", false), per_axis(position, "Kd", false),
-                         per_axis(position, "Ki", true)};
+    gains.pid = PidGains{per_axis(position, "Kp", false, kLargestKp_1_s2, "1/s^2"),
+                         per_axis(position, "Kd", false, kLargestKd_1_s, "1/s"),
+                         per_axis(position, "Ki", true, kLargestKi_1_s3, "1/s^3")};
   } else {
-    gains.composite = CompositeGains{matrix(position, "Lambda"), matrix(position, "K")};
+    gains.composite = CompositeGains{matrix(position, "Lambda", kLargestLambda_1_s, "1/s"),
+                                     matrix(position, "K", kLargestK_kg_s, "kg/s")};
   }
   if (position.has("integrator_limit")) {
-    gains.integrator_limit_m_s = per_axis(position, "integrator_limit", true);
+    gains.integrator_limit_m_s = per_axis(position, "integrator_limit", true, kLongestIntegral_m_s, "m s");
   }
   if (position.has("rate_hz")) {
-    gains.rate_hz = positive(position, "rate_hz");
+    gains.rate_hz = loop_rate_hz(position);
     gains.integrator_step_s = 1 / gains.rate_hz;
   }
   if (position.has("integrator_step_s")) {
@@ -153,7 +204,7 @@ Gains parse_gains(const std::string& text, const std::string& path) {
   if (top.has("network")) {
     const TomlTable network = top.table("network");
     network.allow_only({"rate_hz", "latency_s"});
-    if (network.has("rate_hz")) gains.network_rate_hz = positive(network, "rate_hz");
+    if (network.has("rate_hz")) gains.network_rate_hz = loop_rate_hz(network);
     if (network.has("latency_s"))
       gains.network_latency_s = seconds(network, "latency_s", non_negative(network, "latency_s"));
   }

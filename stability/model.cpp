@@ -11,6 +11,7 @@
 #include "nn/base/suggest.h"
 #include "nn/base/toml.h"
 #include "stability/effects/registry.h"
+#include "stability/vehicle_units.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -22,6 +23,17 @@ constexpr char kSchema[] = "swarmcert/model/1";
 double positive(const TomlTable& table, const std::string& key) {
   const double value = table.number(key);
   if (!(value > 0)) table.refuse(key, std::to_string(value), "must be positive");
+  return value;
+}
+
+/// A rate of a sensor. None of a multirotor is above 100 kHz.
+double rate_hz(const TomlTable& table, const std::string& key) {
+  constexpr double kHighest_hz = 1e5;
+  const double value = positive(table, key);
+  if (value > kHighest_hz) {
+    table.refuse(key, fmt::format("{:g}", value), fmt::format("is above {:g} Hz", kHighest_hz),
+                 "it is in hertz: 100 Hz are 100, whatever the period in us");
+  }
   return value;
 }
 
@@ -40,25 +52,24 @@ std::pair<double, double> interval(const TomlTable& table, const std::string& ke
   return {numbers[0], numbers[1]};
 }
 
-/// Refuses numbers that no rigid body has, or that put its mass far from where its rotors are: they are in other units.
-void check_inertia(const TomlTable& vehicle, const Model& model) {
-  std::array<double, 3> J = model.inertia_kg_m2;
-  std::sort(J.begin(), J.end());
-  const auto refuse = [&vehicle](double value, const std::string& problem) {
-    vehicle.refuse("inertia_kg_m2", fmt::format("{:g}", value), problem,
-                   "inertia is in kg m^2 and arm_m, from the centre to a rotor, in m: 1 g cm^2 is 1e-7");
-  };
-  // A rigid body's largest is at most the sum of the others; measured ones may miss that by their errors.
-  if (J[2] > 2 * (J[0] + J[1])) refuse(J[2], "is more than twice the other two together");
-  const double from_axis_m = std::sqrt(J[2] / model.mass_kg);
-  if (from_axis_m > 10 * model.arm_m || from_axis_m < 1e-3 * model.arm_m) {
-    refuse(J[2], fmt::format("means that the mass lies {:.3g} m from the axis, and the rotors are at {:g} m",
-                             from_axis_m, model.arm_m));
+/// The range of the battery that the file states, else that of one cell.
+std::pair<double, double> battery_range(const TomlTable& vehicle) {
+  constexpr double kHighest_V = 1000;
+  if (!vehicle.has("battery_range_V")) return kOneCell_V;
+  const std::pair<double, double> range = interval(vehicle, "battery_range_V");
+  if (!(range.first > 0))
+    vehicle.refuse("battery_range_V", fmt::format("{:g}", range.first), "must be positive");
+  if (range.second > kHighest_V) {
+    vehicle.refuse("battery_range_V", fmt::format("{:g}", range.second),
+                   fmt::format("is above {:g} V; millivolt were probably meant", kHighest_V),
+                   fmt::format("it is in V: {:g} mV are {:g}", range.second, range.second / 1000));
   }
+  return range;
 }
 
 void read_vehicle(const TomlTable& vehicle, Model* model) {
-  vehicle.allow_only({"kind", "mass_kg", "inertia_kg_m2", "arm_m", "torque_per_thrust_m", "thrust"});
+  vehicle.allow_only(
+      {"kind", "mass_kg", "inertia_kg_m2", "arm_m", "torque_per_thrust_m", "thrust", "battery_range_V"});
   model->kind = vehicle.text("kind");
   if (model->kind.empty()) vehicle.refuse("kind", "", "is empty", "name it, e.g. \"small\"");
   model->mass_kg = positive(vehicle, "mass_kg");
@@ -68,36 +79,22 @@ void read_vehicle(const TomlTable& vehicle, Model* model) {
   }
   std::copy(inertia.begin(), inertia.end(), model->inertia_kg_m2.begin());
   model->arm_m = positive(vehicle, "arm_m");
-  check_inertia(vehicle, *model);
   model->torque_per_thrust_m = positive(vehicle, "torque_per_thrust_m");
-  if (model->torque_per_thrust_m > model->arm_m) {
-    vehicle.refuse(
-        "torque_per_thrust_m", fmt::format("{:g}", model->torque_per_thrust_m),
-        fmt::format("is more than arm_m, {:g} m: rotors turn a vehicle about its thrust less than about "
-                    "the other axes",
-                    model->arm_m),
-        "it is torque in N m per newton of thrust");
-  }
+  model->battery_range_V = battery_range(vehicle);
   const TomlTable thrust = vehicle.table("thrust");
   thrust.allow_only({"c00", "c10", "c01", "c20", "c11"});
   model->thrust = {thrust.number("c00"), thrust.number("c10"), thrust.number("c01"), thrust.number("c20"),
                    thrust.number("c11")};
-  const double largest_N = model->thrust.largest_N(kFullBattery_V);
-  if (4 * largest_N <= model->weight_N()) {
-    thrust.refuse("", "",
-                  "four rotors give " + std::to_string(4 * largest_N) +
-                      " N at 4.2 V, and the vehicle weighs " + std::to_string(model->weight_N()) + " N",
-                  "the polynomial is in gram-force of p = PWM / 65536 and v = V / 4.2");
-  }
+  check_vehicle_units(vehicle, *model);
 }
 
 void read_sensor(const TomlTable& sensor, SensorModel* model) {
   sensor.allow_only({"accelerometer_cutoff_hz", "accelerometer_noise_m_s2", "position_noise_m",
                      "velocity_noise_m_s", "attitude_noise_rad", "log_rate_hz"});
   if (sensor.has("accelerometer_cutoff_hz")) {
-    model->accelerometer_cutoff_hz = positive(sensor, "accelerometer_cutoff_hz");
+    model->accelerometer_cutoff_hz = rate_hz(sensor, "accelerometer_cutoff_hz");
   }
-  if (sensor.has("log_rate_hz")) model->log_rate_hz = positive(sensor, "log_rate_hz");
+  if (sensor.has("log_rate_hz")) model->log_rate_hz = rate_hz(sensor, "log_rate_hz");
   model->accelerometer_noise_m_s2 =
       not_negative(sensor, "accelerometer_noise_m_s2", model->accelerometer_noise_m_s2);
   model->position_noise_m = not_negative(sensor, "position_noise_m", model->position_noise_m);
@@ -261,6 +258,18 @@ Model parse_model(const std::string& text, const std::string& path) {
     model.effects.push_back(std::move(spec));
   }
   return model;
+}
+
+std::string battery_problem(const Model& model, double battery_V) {
+  const auto& [lower_V, upper_V] = model.battery_range_V;
+  if (battery_V >= lower_V && battery_V <= upper_V) return "";
+  std::string problem =
+      fmt::format("{:g} V lies outside the battery range of {}, {:g} .. {:g} V{}", battery_V,
+                  model.path.empty() ? "the model" : model.path, lower_V, upper_V,
+                  model.battery_range_V == kOneCell_V ? " (one cell, unless battery_range_V says more)" : "");
+  if (battery_V / 1000 >= lower_V && battery_V / 1000 <= upper_V)
+    problem += fmt::format("; it is in V: {:g} mV are {:g}", battery_V, battery_V / 1000);
+  return problem;
 }
 
 Model read_model(const std::string& path) { return parse_model(files::read_file(path), path); }

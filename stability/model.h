@@ -14,6 +14,8 @@ inline constexpr double kGravity_m_s2 = 9.81;
 inline constexpr double kGramForce_N = 1e-3 * kGravity_m_s2;
 /// The battery voltage to which the thrust map and the effect `battery` refer.
 inline constexpr double kFullBattery_V = 4.2;
+/// Voltages of one lithium-polymer cell: empty under load, and full of the high-voltage kind with a reading's error.
+inline constexpr std::pair<double, double> kOneCell_V = {2.5, 4.5};
 
 /// Force of one rotor: g = c00 + c10 p + c01 v + c20 p^2 + c11 p v in gram-force, with p = PWM / 65536 in [0, 1]
 /// and v = battery voltage / 4.2 V. Increasing in p where the calibration holds; read_model() checks that at full
@@ -101,6 +103,7 @@ struct Model {
   std::array<double, 3> inertia_kg_m2 = {0, 0, 0};  ///< diagonal, body axes x forward, y left, z up
   double arm_m = 0;                                 ///< from the centre to each of the four rotors, in X
   double torque_per_thrust_m = 0;                   ///< yaw torque of a rotor per newton of its thrust
+  std::pair<double, double> battery_range_V = kOneCell_V;  ///< voltages at which the vehicle can be
   ThrustMap thrust;
   SensorModel sensor;
   std::vector<EffectSpec> effects;
@@ -112,6 +115,9 @@ struct Model {
 /// Reads a model file.
 /// @throws files::InputError with line, key, value and mend; unknown keys, effects and parameters get a did-you-mean.
 Model read_model(const std::string& path);
+
+/// Why the vehicle cannot be at `battery_V`, with range and probable unit; empty if it can.
+std::string battery_problem(const Model& model, double battery_V);
 
 /// As read_model(), from memory; `path` gives the folder for networks, and the name in messages.
 Model parse_model(const std::string& text, const std::string& path);

@@ -122,6 +122,10 @@ std::string to_toml(const Model& model, const std::vector<std::string>& comments
   text += "inertia_kg_m2 = [" + joined(model.inertia_kg_m2, number) + "]\n";
   text += "arm_m = " + number(model.arm_m) + "\n";
   text += "torque_per_thrust_m = " + number(model.torque_per_thrust_m) + "\n";
+  if (model.battery_range_V != kOneCell_V) {
+    text += "battery_range_V = [" + number(model.battery_range_V.first) + ", " +
+            number(model.battery_range_V.second) + "]\n";
+  }
   const ThrustMap& map = model.thrust;
   text += "\n[vehicle.thrust]\n";
   text += "c00 = " + number(map.c00) + "\nc10 = " + number(map.c10) + "\nc01 = " + number(map.c01) +

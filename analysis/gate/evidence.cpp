@@ -137,6 +137,11 @@ const stability::TrackingSetup& Evidence::tracking() {
   if (!tracking_) {
     tracking_ = std::make_unique<stability::TrackingSetup>(
         stability::load_tracking_setup(release().gains, release().model, release().battery_V));
+    const std::string problem = stability::battery_problem(tracking_->model, release().battery_V);
+    if (!problem.empty()) {
+      tracking_.reset();
+      throw files::InputError({policy_.path, "", "release.battery_V", "", problem, "correct battery_V"});
+    }
   }
   return *tracking_;
 }

@@ -133,6 +133,19 @@ const std::vector<Quantity>& grid_quantities() {
   return all;
 }
 
+/// Why no vehicle of the grid has `value` of the parameter `name`; empty if one can.
+std::string parameter_problem(const Grid& grid, const std::string& name, double value) {
+  constexpr double kLeast_hz = 1, kLargest_hz = 1e5;
+  if (name == "battery_V") return battery_problem(grid.model, value);
+  if (name == "rate_hz" && (value < kLeast_hz || value > kLargest_hz))
+    return fmt::format("{:g} Hz is no rate of a loop; it is in hertz: 100 Hz are 100", value);
+  const double lifted_kg = 4 * grid.model.thrust.largest_N(kFullBattery_V) / kGravity_m_s2;
+  if (name == "mass_kg" && value > 100 * lifted_kg)
+    return fmt::format("{:g} kg, and the rotors lift {:.3g} kg; it is in kg: {:g} g are {:g}", value,
+                       lifted_kg, value, value / 1000);
+  return "";
+}
+
 Grid load_grid(const std::string& path) {
   const std::string text = files::read_file(path);
   const toml::table document = files::parse_toml(text, path);
@@ -156,6 +169,10 @@ Grid load_grid(const std::string& path) {
   double cells = 1;
   for (const std::string& name : axes.keys()) {
     grid.axes.push_back(read_axis(axes, name));
+    for (const double value : grid.axes.back().values) {
+      const std::string problem = parameter_problem(grid, name, value);
+      if (!problem.empty()) axes.refuse(name, "", problem);
+    }
     cells *= static_cast<double>(grid.axes.back().values.size());
   }
   if (grid.axes.empty()) axes.refuse("", "", "has no axis", "e.g. [axes.Kp] from = 5, to = 20, steps = 50");

@@ -93,5 +93,23 @@ TEST(Gains, RefusalsNameLineKeyValueAndMend) {
   EXPECT_TRUE(refuses([] { parse_gains("schema = \"swarmcert/model/1\"\n", "g"); }, {"schema", "gains/1"}));
 }
 
+TEST(Gains, RefusesSizesThatNoLoopHas) {
+  const std::string pid = "[position]\nKp = 20\nKd = 10\nKi = 3\n";
+  EXPECT_TRUE(
+      refused("[position]\nKp = 1e308\nKd = 10\nKi = 3\n", {"line 3", "position.Kp = 1e+308", "1/s^2"}));
+  EXPECT_TRUE(
+      refused("[position]\nKp = 20\nKd = [10, 1e9, 10]\nKi = 3\n", {"position.Kd = 1e+09", "in 1/s"}));
+  EXPECT_TRUE(refused("[position]\nKp = 20\nKd = 10\nKi = 1e200\n", {"position.Ki = 1e+200", "1/s^3"}));
+  EXPECT_TRUE(refused("[position]\nLambda = 1e200\nK = 1\n", {"position.Lambda = 1e+200", "in 1/s"}));
+  EXPECT_TRUE(
+      refused("[position]\nLambda = [[4,0,0],[0,4,-1e99],[0,0,4]]\nK = 1\n", {"position.Lambda = -1e+99"}));
+  EXPECT_TRUE(refused("[position]\nLambda = 4\nK = 1e300\n", {"position.K = 1e+300", "kg/s"}));
+  EXPECT_TRUE(refused(pid + "integrator_limit = 1e300\n", {"position.integrator_limit = 1e+300", "m s"}));
+  EXPECT_TRUE(refused(pid + "rate_hz = 1e9\n", {"position.rate_hz = 1e+09", "in hertz"}));
+  EXPECT_TRUE(refused(pid + "rate_hz = 0.01\n",
+                      {"position.rate_hz = 0.01", "a period was probably meant", "is 100"}));
+  EXPECT_TRUE(refused(pid + "[network]\nrate_hz = 1e9\n", {"network.rate_hz = 1e+09"}));
+}
+
 }  // namespace
 }  // namespace swarmcert::stability

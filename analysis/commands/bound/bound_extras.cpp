@@ -36,6 +36,21 @@ Range range_of(const std::string& word, const std::string& text) {
 
 Range about(double value, double share) { return {value * (1 - share), value * (1 + share)}; }
 
+/// Refuses an interval in another unit: battery in mV, times in ms, the thrust's scale in percent.
+void check_range(const std::string& word, const std::string& name, const Range& range, const Model& model) {
+  constexpr double kLongest_s = 1, kLargestScale = 10;
+  std::string problem;
+  if (name == "battery") {
+    problem = battery_problem(model, range.from);
+    if (problem.empty()) problem = battery_problem(model, range.to);
+  } else if ((name == "lag" || name == "delay") && range.to > kLongest_s) {
+    problem = fmt::format("{:g} is longer than 1 s; {} is in seconds: 20 ms are 0.02", range.to, name);
+  } else if (name == "thrust" && range.to > kLargestScale) {
+    problem = fmt::format("{:g} times the modelled thrust; thrust is a factor: 90 % are 0.9", range.to);
+  }
+  if (!problem.empty()) throw UsageError("--uncertain " + word + ": " + problem);
+}
+
 /// The vehicle's intervals; those of the battery act on the thrust.
 UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string>& words) {
   UncertainPlant plant = {about(input.plant.mass_kg, 0.05), about(input.plant.thrust_scale, 0.1),
@@ -45,6 +60,7 @@ UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string
     const std::size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
     const Range range = range_of(word, equals == std::string::npos ? "" : word.substr(equals + 1));
+    check_range(word, name, range, input.model);
     if (name == "mass" && range.from > 0) {
       const double lifted_kg = input.plant.largest_thrust_N / kGravity_m_s2;
       if (lifted_kg > 0 && range.from > lifted_kg) {

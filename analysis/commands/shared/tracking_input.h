@@ -19,6 +19,7 @@ void declare_tracking(CLI::App& app, TrackingArguments& arguments);
 using Tracking = stability::TrackingSetup;
 
 /// stability::load_tracking_setup() of what was declared.
+/// @throws UsageError if the battery's voltage is outside of the model's range.
 Tracking load_tracking(const TrackingArguments& arguments);
 
 }  // namespace swarmcert::analysis

@@ -18,6 +18,9 @@ namespace {
 
 using files::Json;
 
+/// A log of so many records still fits into memory; no battery lasts as long.
+constexpr double kLongestFlight_s = 86400;
+
 struct SimulateOptions {
   std::string task;
   std::vector<std::string> models;
@@ -238,8 +241,19 @@ Command simulate_command() {
             declare_order(app, options->network);
             add_output(app, "-o,--output", options->output, "Folder for the logs")->required();
             add_output(app, "--report", options->report, "Folder for an HTML report with plots");
-            app.add_option("--duration", options->duration_s, "Seconds (default: the task's own)")
-                ->check(CLI::PositiveNumber);
+            app.add_option("--duration", options->duration_s,
+                           "Seconds, at most a day (default: the task's own)")
+                ->check(CLI::PositiveNumber)
+                ->check(CLI::Validator(
+                    [](const std::string& text) {
+                      return std::strtod(text.c_str(), nullptr) <= kLongestFlight_s
+                                 ? std::string()
+                                 : fmt::format(
+                                       "{} s is longer than a day ({:g} s); batteries last minutes, and "
+                                       "the duration is in seconds",
+                                       text, kLongestFlight_s);
+                    },
+                    ""));
             app.add_option("--seed", options->seed, "Seed of noise, clocks and random goals (default 0)");
             app.add_option("--run", options->run, "Number of the run in the logs' names (default 0)")
                 ->check(CLI::NonNegativeNumber);

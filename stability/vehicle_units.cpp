@@ -1,0 +1,98 @@
+#include "stability/vehicle_units.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmcert::stability {
+namespace {
+
+/// Largest distance from the centre to a rotor that is taken as metres.
+constexpr double kLongestArm_m = 5;
+/// Largest ratio of thrust to weight; racing multirotors reach about 15.
+constexpr double kLargestThrustToWeight = 30;
+
+double largest_J(const Model& model) {
+  return *std::max_element(model.inertia_kg_m2.begin(), model.inertia_kg_m2.end());
+}
+
+/// Radius of gyration over the arm: 0.6 for the Crazyflie 2.1, never far from 1 where rotors and body are one craft.
+double gyration_to_arm(const Model& model, double mass_kg) {
+  return std::sqrt(largest_J(model) / mass_kg) / model.arm_m;
+}
+
+bool fits_arm(double gyration_to_arm) { return gyration_to_arm > 0.05 && gyration_to_arm < 10; }
+
+/// Where the rotors do not lift the vehicle: the mass if it is one in gram, else the thrust map.
+void check_lift(const files::TomlTable& vehicle, const Model& model) {
+  const double lift_N = 4 * model.thrust.largest_N(kFullBattery_V);
+  const double mass_kg = model.mass_kg;
+  const std::string mass = fmt::format("{:g}", mass_kg);
+  if (lift_N > kLargestThrustToWeight * model.weight_N()) {
+    vehicle.refuse("mass_kg", mass,
+                   fmt::format("weighs {:.3g} N, and four rotors give {:.3g} N, {:.3g} times as much",
+                               model.weight_N(), lift_N, lift_N / model.weight_N()),
+                   "mass is in kg and the thrust polynomial in gram-force: correct the one that is not");
+  }
+  if (lift_N > model.weight_N()) return;
+  const bool lifts_gram = lift_N > model.weight_N() / 1000;
+  if (lifts_gram && !fits_arm(gyration_to_arm(model, mass_kg)) &&
+      fits_arm(gyration_to_arm(model, mass_kg / 1000))) {
+    vehicle.refuse("mass_kg", mass,
+                   fmt::format("weighs {:.4g} N, and four rotors lift {:.3g} N; gram were probably meant",
+                               model.weight_N(), lift_N),
+                   fmt::format("mass is in kg: {:g} g are {:g}", mass_kg, mass_kg / 1000));
+  }
+  vehicle.refuse(
+      "thrust", "",
+      fmt::format("four rotors give {:.4g} N at 4.2 V, and the vehicle weighs {:.4g} N", lift_N,
+                  model.weight_N()),
+      "the polynomial is in gram-force (not newton) of p = PWM / 65536 (not percent or counts) and "
+      "v = V / 4.2");
+}
+
+void check_arm(const files::TomlTable& vehicle, const Model& model) {
+  if (model.arm_m <= kLongestArm_m) return;
+  vehicle.refuse(
+      "arm_m", fmt::format("{:g}", model.arm_m),
+      fmt::format("means that the rotors are at {:g} m from the centre; millimetres were probably meant",
+                  model.arm_m),
+      fmt::format("it is in m, from the centre to a rotor: {:g} mm are {:g}", model.arm_m,
+                  model.arm_m / 1000));
+}
+
+void check_inertia(const files::TomlTable& vehicle, const Model& model) {
+  std::array<double, 3> J = model.inertia_kg_m2;
+  std::sort(J.begin(), J.end());
+  const auto refuse = [&vehicle](double value, const std::string& problem) {
+    vehicle.refuse("inertia_kg_m2", fmt::format("{:g}", value), problem,
+                   "inertia is in kg m^2 and arm_m, from the centre to a rotor, in m: 1 g cm^2 is 1e-7");
+  };
+  // A rigid body's largest is at most the sum of the others; measured ones may miss that by their errors.
+  if (J[2] > 2 * (J[0] + J[1])) refuse(J[2], "is more than twice the other two together");
+  if (fits_arm(gyration_to_arm(model, model.mass_kg))) return;
+  refuse(J[2], fmt::format("means that the mass lies {:.3g} m from the axis, and the rotors are at {:g} m",
+                           std::sqrt(J[2] / model.mass_kg), model.arm_m));
+}
+
+void check_torque(const files::TomlTable& vehicle, const Model& model) {
+  if (model.torque_per_thrust_m <= model.arm_m) return;
+  vehicle.refuse(
+      "torque_per_thrust_m", fmt::format("{:g}", model.torque_per_thrust_m),
+      fmt::format("is more than arm_m, {:g} m: rotors turn a vehicle about its thrust less than about "
+                  "the other axes",
+                  model.arm_m),
+      "it is torque in N m per newton of thrust");
+}
+
+}  // namespace
+
+void check_vehicle_units(const files::TomlTable& vehicle, const Model& model) {
+  check_arm(vehicle, model);
+  check_lift(vehicle, model);
+  check_inertia(vehicle, model);
+  check_torque(vehicle, model);
+}
+
+}  // namespace swarmcert::stability
