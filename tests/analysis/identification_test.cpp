@@ -7,6 +7,7 @@
 #include "analysis/identification/covariance.h"
 #include "analysis/identification/injection.h"
 #include "analysis/identification/selection.h"
+#include "analysis/identification/verdict.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
@@ -231,6 +232,39 @@ TEST(Sandwich, IsTheVarianceOfWhiteNoiseAndGrowsWhereBlocksAreAlike) {
   EXPECT_GT(sandwich(twice, {0}, c)(0, 0), 0.7 * sandwich(grams.blocks, {0}, c)(0, 0));
   for (Block& block : twice) block.follows = false;
   EXPECT_LT(sandwich(twice, {0}, c)(0, 0), 0.6 * sandwich(grams.blocks, {0}, c)(0, 0));
+}
+
+Diagnosis judged(bool names_an_effect, double ratio) {
+  Diagnosis diagnosis;
+  diagnosis.kind = "small";
+  if (names_an_effect) diagnosis.ranking.emplace_back();
+  diagnosis.remainder.ratio = ratio;
+  diagnosis.remainder.flag = ratio > 3;
+  return diagnosis;
+}
+
+TEST(Verdict, IsNothingMissingOnlyWhereEveryKindWasJudgedAndNothingIsLeft) {
+  std::string reason;
+  EXPECT_EQ(verdict_of({judged(false, 1.5)}, reason), Verdict::kNothingMissing);
+  EXPECT_EQ(reason, "");
+  EXPECT_EQ(verdict_of({judged(false, 40)}, reason), Verdict::kUnexplained);
+  EXPECT_EQ(verdict_of({judged(true, 40)}, reason), Verdict::kMissingEffect);
+  EXPECT_EQ(verdict_of({judged(false, 1.5), judged(true, 1.5)}, reason), Verdict::kMissingEffect);
+  EXPECT_EQ(verdict_of({judged(false, 1.5), judged(false, 4)}, reason), Verdict::kUnexplained);
+  Diagnosis poor;
+  poor.kind = "large";
+  poor.too_poor = "12 usable records";
+  EXPECT_EQ(verdict_of({judged(false, 1.5), poor}, reason), Verdict::kInconclusive);
+  EXPECT_EQ(reason, "vehicles of kind large: 12 usable records");
+  EXPECT_EQ(verdict_of({judged(false, 40), poor}, reason), Verdict::kUnexplained);
+  EXPECT_EQ(verdict_of({judged(false, 0)}, reason), Verdict::kInconclusive)
+      << "what is left could not be judged";
+  EXPECT_NE(reason.find("no spectrum"), std::string::npos);
+  EXPECT_EQ(verdict_of({}, reason), Verdict::kInconclusive);
+  EXPECT_STREQ(name(Verdict::kMissingEffect), "missing_effect");
+  EXPECT_STREQ(name(Verdict::kUnexplained), "unexplained");
+  EXPECT_STREQ(name(Verdict::kNothingMissing), "nothing_missing");
+  EXPECT_STREQ(name(Verdict::kInconclusive), "inconclusive");
 }
 
 }  // namespace

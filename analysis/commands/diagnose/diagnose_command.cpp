@@ -11,6 +11,7 @@
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/identification/diagnose.h"
+#include "analysis/identification/verdict.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -28,7 +29,7 @@ constexpr const char* kDetectableMeaning =
     "to the "
     "residual of resampled blocks; the flight does not react); null: not at any size within the physical "
     "bounds; "
-    "nothing_missing means none above these sizes";
+    "nothing_missing means none above these sizes, and nothing left above three times the noise floor";
 
 files::Json json_of(const identification::InstrumentedValue& value) {
   return {{"least_squares", value.least_squares},
@@ -100,7 +101,11 @@ void print(const Diagnosis& diagnosis) {
     fmt::print("  No answer: {}.\n", diagnosis.too_poor);
     return;
   }
-  if (diagnosis.ranking.empty()) fmt::print("  No effect of the library is missing above the sizes below.\n");
+  if (diagnosis.ranking.empty()) {
+    fmt::print("  {}\n", diagnosis.remainder.flag
+                             ? "No effect of the library explains what is left."
+                             : "No effect of the library is missing above the sizes below.");
+  }
   for (const Missing& missing : diagnosis.ranking) print(missing, diagnosis.flights);
   for (const std::string& effect : diagnosis.contradicted) {
     fmt::print(
@@ -166,9 +171,8 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   const residuals::Inputs inputs = read_flights(options.flights);
   files::Json result = result_head("diagnose", inputs.files());
   files::Json ranking = files::Json::array(), detectable = files::Json::array(), kinds = files::Json::array();
-  bool flag = false, inconclusive = true;
+  bool flag = false;
   double ratio = 0;
-  std::string reasons;
   std::vector<std::string> problems;
   files::Json depends_on = files::Json::array();
   std::vector<Diagnosis> diagnoses;
@@ -183,12 +187,6 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
       problems.push_back(problem);
     }
     if (common.prints_text()) print(diagnosis);
-    if (diagnosis.too_poor.empty()) {
-      inconclusive = false;
-    } else {
-      reasons += fmt::format("{}vehicles of kind {}: {}", reasons.empty() ? "" : "; ", model.kind,
-                             diagnosis.too_poor);
-    }
     for (const Missing& missing : diagnosis.ranking) ranking.push_back(json_of(missing));
     for (const identification::Detectable& entry : diagnosis.detectable)
       detectable.push_back(json_of(entry, diagnosis.kind));
@@ -199,20 +197,24 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     kinds.push_back(json_of(diagnosis));
     diagnoses.push_back(diagnosis);
   }
-  result["verdict"] = inconclusive ? "inconclusive" : ranking.empty() ? "nothing_missing" : "missing_effect";
+  std::string reason;
+  const identification::Verdict verdict = identification::verdict_of(diagnoses, reason);
+  const bool inconclusive = verdict == identification::Verdict::kInconclusive;
+  result["verdict"] = name(verdict);
   result["ranking"] = std::move(ranking);
   result["unexplained"] = {{"flag", flag}, {"ratio", ratio}, {"depends_on", std::move(depends_on)}};
   result["detectable"] = std::move(detectable);
   result["detectable_meaning"] = kDetectableMeaning;
   result["kinds"] = std::move(kinds);
   result["problems"] = problems;
-  if (inconclusive) result["reason"] = reasons;
+  if (inconclusive) result["reason"] = reason;
   write_result(common, result);
+  if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {
     const std::string path = write_diagnose_report(diagnoses, result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
-  if (inconclusive) fmt::print(stderr, "inconclusive: {}\n", reasons);
+  if (inconclusive) fmt::print(stderr, "inconclusive: {}\n", reason);
   return inconclusive ? kInconclusive : kDone;
 }
 

@@ -1,0 +1,40 @@
+#include "analysis/identification/verdict.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+namespace swarmcert::identification {
+namespace {
+
+/// Why nothing can be said of one kind; empty where something can.
+std::string not_judged(const Diagnosis& diagnosis) {
+  if (!diagnosis.too_poor.empty()) return diagnosis.too_poor;
+  if (diagnosis.remainder.ratio > 0) return "";
+  return "what is left has no spectrum: no stretch of 64 records without a cut, or fewer than 24 records a "
+         "second";
+}
+
+}  // namespace
+
+const char* name(Verdict verdict) {
+  static const char* const kNames[] = {"missing_effect", "unexplained", "nothing_missing", "inconclusive"};
+  return kNames[static_cast<int>(verdict)];
+}
+
+Verdict verdict_of(const std::vector<Diagnosis>& diagnoses, std::string& reason) {
+  reason.clear();
+  const auto any = [&diagnoses](auto holds) {
+    return std::any_of(diagnoses.begin(), diagnoses.end(), holds);
+  };
+  if (any([](const Diagnosis& d) { return !d.ranking.empty(); })) return Verdict::kMissingEffect;
+  if (any([](const Diagnosis& d) { return d.remainder.flag; })) return Verdict::kUnexplained;
+  for (const Diagnosis& diagnosis : diagnoses) {
+    const std::string why = not_judged(diagnosis);
+    if (why.empty()) continue;
+    reason += fmt::format("{}vehicles of kind {}: {}", reason.empty() ? "" : "; ", diagnosis.kind, why);
+  }
+  return reason.empty() && !diagnoses.empty() ? Verdict::kNothingMissing : Verdict::kInconclusive;
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,25 @@
+/// @file What a diagnosis of all kinds of vehicles comes to in one word.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/identification/diagnose.h"
+
+namespace swarmcert::identification {
+
+enum class Verdict {
+  kMissingEffect,   ///< at least one effect of the library is missing
+  kUnexplained,     ///< none is, and something is left that none explains
+  kNothingMissing,  ///< every kind was judged and nothing is left
+  kInconclusive     ///< neither of these, and a kind has too few records or a remainder that cannot be judged
+};
+
+/// "missing_effect", "unexplained", "nothing_missing", "inconclusive".
+const char* name(Verdict verdict);
+
+/// The first of the enumeration that holds for `diagnoses`.
+/// @param reason receives why the verdict is inconclusive, else nothing.
+Verdict verdict_of(const std::vector<Diagnosis>& diagnoses, std::string& reason);
+
+}  // namespace swarmcert::identification
