@@ -28,7 +28,8 @@ struct Budget {
 };
 
 /// @param fit, test Inputs with the same models. A kind "small" is tried with its model's mass and with 0.032 kg, which
-///                  the networks' authors weighed; the better one on `test` is nominal.
+///                  the networks' authors weighed; the one that is better on `fit` is
+///                  nominal. `test` is judged and chooses nothing.
 /// @param network   a learned force for one more row, with the authors' masses, thrust lag and unfiltered acceleration,
 ///                  on the same records; empty: none.
 Budget error_budget(const residuals::Inputs& fit, const residuals::Inputs& test, const std::string& network,

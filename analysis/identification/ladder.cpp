@@ -73,23 +73,25 @@ std::map<std::string, double> values_of(const stability::Model& model) {
   return values;
 }
 
-/// Why the flights are too few to fit, to select or to test; empty if they are not.
+/// Why the flights are too few to fit or to select; empty if they are not. Flights that test cannot be too few: nothing
+/// depends on them.
 /// @param problems gets those of all flights.
+/// @param is_tested whether the flights to test have a usable record.
 std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, const Split& split, int jobs,
-                     std::vector<std::string>& problems) {
+                     std::vector<std::string>& problems, bool& is_tested) {
   const auto look = [&](const std::vector<int>& which) {
     Coverage covered = coverage(inputs, kind, which, jobs);
     problems.insert(problems.end(), covered.problems.begin(), covered.problems.end());
     return covered;
   };
   const std::string poor = look(split.fit).too_poor();
+  is_tested = poor.empty();
   if (!split.by_flight) return poor.empty() ? "" : "flights for the fit: " + poor;
-  std::string nothing;
-  for (const auto& [name, which] : {std::pair("select", &split.select), std::pair("test", &split.test)}) {
-    if (look(*which).records == 0)
-      nothing = fmt::format("the flights to {} have no usable record of kind {}", name, kind);
-  }
-  return poor.empty() ? nothing : "flights for the fit: " + poor;
+  const bool has_select = look(split.select).records > 0;
+  is_tested = look(split.test).records > 0;
+  if (!is_tested) problems.push_back("nothing is tested: no usable record in the flights to test");
+  if (!poor.empty()) return "flights for the fit: " + poor;
+  return has_select ? "" : "the flights to select have no usable record of kind " + kind;
 }
 
 /// One candidate on top of the model of the last accepted row.
@@ -123,7 +125,7 @@ Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int 
   ladder.split = split_flights(inputs);
   const stability::Model& nominal = inputs.models[0];
   const std::string& kind = nominal.kind;
-  ladder.too_poor = too_poor(inputs, kind, ladder.split, jobs, ladder.problems);
+  ladder.too_poor = too_poor(inputs, kind, ladder.split, jobs, ladder.problems, ladder.is_tested);
   if (!ladder.too_poor.empty()) return ladder;
   ladder.earlier = nominal.ladder;
   ladder.test_looks = looks_so_far(nominal) + 1;

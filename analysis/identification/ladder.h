@@ -25,8 +25,9 @@ struct Ladder {
   stability::Model model;                     ///< with what was accepted, and with all rows
   std::vector<Missing> fitted;                ///< what was fitted and accepted, as of the last row
   bool any_accepted = false;
-  std::string too_poor;  ///< why nothing was fitted; empty if something was. The rest is then empty as well.
-  int test_looks = 0;    ///< including this ladder
+  std::string too_poor;   ///< why nothing was fitted; empty if something was. The rest is then empty as well.
+  bool is_tested = true;  ///< false: the flights to test have no usable record, and test_rmse_N is 0
+  int test_looks = 0;     ///< including this ladder
   std::vector<std::string> problems;  ///< Coverage::problems
 };
 

@@ -237,52 +237,53 @@ LearningData load_learning_data(const LearningFlights& named, const NetworkSizes
     progress(++done, total);
   };
   std::vector<std::vector<RawTrack>> flights = load(inputs, target, jobs, flight_done, data.problems);
-  flights.erase(
-      std::remove_if(flights.begin(), flights.end(), [](const auto& tracks) { return tracks.empty(); }),
-      flights.end());
-
+  // What a flight is for follows from its place among all that were named, never from what is in it: else a damaged
+  // flight that tests would change which others are fitted.
+  const HeldBack held_back = {named.select == nullptr, named.test == nullptr};
+  const std::size_t needed = 1 + (held_back.select ? 1 : 0) + (held_back.test ? 1 : 0);
+  data.split_by_blocks =
+      split == SplitBy::kBlocks || (split == SplitBy::kAuto && flights.size() < needed && needed > 1);
+  const auto use_of = [&](std::size_t flight) { return held_back.of_flight(flight, flights.size()); };
   std::vector<RawTrack> fitted;
-  for (const auto& tracks : flights) fitted.insert(fitted.end(), tracks.begin(), tracks.end());
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    if (data.split_by_blocks || use_of(f) == Use::kFit)
+      fitted.insert(fitted.end(), flights[f].begin(), flights[f].end());
+  }
   const auto refuse = [&](const std::string& what, const std::string& mend) {
     throw files::InputError(
         {inputs.found.flights.empty() ? "" : inputs.found.flights.front().logs.front().second, "", "flights",
          "", what, mend});
   };
   if (fitted.empty()) {
-    refuse("no usable record of a vehicle with a model",
+    refuse("no usable record of a vehicle with a model among the flights to fit",
            data.problems.empty() ? "see 'swarmcert compare' for what was cut" : data.problems.front());
   }
   if (std::all_of(fitted.begin(), fitted.end(), [](const RawTrack& t) { return t.neighbour.empty(); }))
     refuse("no vehicle ever has a neighbour", "name flights of two or more vehicles");
   data.layout = layout_of(fitted, inputs.kinds.names, sizes, target);
 
-  const HeldBack held_back = {named.select == nullptr, named.test == nullptr};
-  const std::size_t needed = 1 + (held_back.select ? 1 : 0) + (held_back.test ? 1 : 0);
-  data.split_by_blocks =
-      split == SplitBy::kBlocks || (split == SplitBy::kAuto && flights.size() < needed && needed > 1);
+  const auto append_if_known = [&](const RawTrack& track, const std::vector<std::string>& kinds, Use use) {
+    const auto has_phi = [&](int kind) { return data.layout.find("phi:" + kinds[kind]) >= 0; };
+    if (data.layout.find("rho:" + track.kind) >= 0 &&
+        std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), has_phi)) {
+      append(data, track, kinds, 0, track.target.size(), use);
+    } else {
+      data.problems.push_back(track.about.flight + " " + track.about.vehicle +
+                              ": a kind of vehicle that is not in the flights to learn from");
+    }
+  };
   for (std::size_t f = 0; f < flights.size(); ++f) {
     for (const RawTrack& track : flights[f]) {
       if (data.split_by_blocks)
         append_blocks(data, track, inputs.kinds.names, held_back);
       else
-        append(data, track, inputs.kinds.names, 0, track.target.size(),
-               held_back.of_flight(f, flights.size()));
+        append_if_known(track, inputs.kinds.names, use_of(f));
     }
   }
   const auto append_all = [&](const residuals::Inputs* others, Use use) {
     if (others == nullptr) return;
     for (const auto& tracks : load(*others, target, jobs, flight_done, data.problems)) {
-      for (const RawTrack& track : tracks) {
-        const std::vector<std::string>& kinds = others->kinds.names;
-        const auto has_phi = [&](int kind) { return data.layout.find("phi:" + kinds[kind]) >= 0; };
-        if (data.layout.find("rho:" + track.kind) >= 0 &&
-            std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), has_phi)) {
-          append(data, track, kinds, 0, track.target.size(), use);
-        } else {
-          data.problems.push_back(track.about.flight + " " + track.about.vehicle +
-                                  ": a kind of vehicle that is not in the flights to learn from");
-        }
-      }
+      for (const RawTrack& track : tracks) append_if_known(track, others->kinds.names, use);
     }
   };
   append_all(named.select, Use::kSelect);

@@ -85,8 +85,8 @@ struct LearningFlights {
 ///
 /// What `select` and `test` do not name is held back from `fit`: of every five flights, in order of names and runs, the
 /// third selects and the fifth tests; of three or four flights the last two do. By blocks: of every five blocks of a
-/// flight, likewise.
-/// @throws files::InputError if no record of a vehicle with a model is left, or none has a neighbour.
+/// flight, likewise. Which networks there are, and what is fitted, does not depend on the records that test.
+/// @throws files::InputError if no record to fit of a vehicle with a model is left, or none has a neighbour.
 LearningData load_learning_data(const LearningFlights& flights, const NetworkSizes& sizes, SplitBy split,
                                 int jobs, const Progress& progress, Target target = Target::kForceZ);
 

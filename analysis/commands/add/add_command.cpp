@@ -61,9 +61,10 @@ files::Json json_of(const LadderRow& row) {
   return {{"effect", row.effect},
           {"fit_rmse", row.fit_rmse_N},
           {"select_rmse", row.select_rmse_N},
-          {"test_rmse", row.test_rmse_N},
-          {"over_noise_floor",
-           row.noise_floor_N > 0 ? files::Json(row.test_rmse_N / row.noise_floor_N) : nullptr},
+          {"test_rmse", row.test_rmse_N > 0 ? files::Json(row.test_rmse_N) : nullptr},
+          {"over_noise_floor", row.noise_floor_N > 0 && row.test_rmse_N > 0
+                                   ? files::Json(row.test_rmse_N / row.noise_floor_N)
+                                   : nullptr},
           {"test_looks", row.test_looks},
           {"accepted", row.accepted},
           {"reason", row.note}};
@@ -89,10 +90,12 @@ files::Json json_of(const std::vector<stability::EffectSpec>& effects) {
 void print(const std::vector<LadderRow>& rows) {
   fmt::print("  {:<18}{:>10}{:>10}{:>10}{:>14}\n", "", "fit", "select", "test", "test / floor");
   for (const LadderRow& row : rows) {
-    fmt::print("  {:<18}{:>10.5f}{:>10.5f}{:>10.5f}{:>14}{}\n",
+    fmt::print("  {:<18}{:>10.5f}{:>10.5f}{:>10}{:>14}{}\n",
                (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N, row.select_rmse_N,
-               row.test_rmse_N,
-               row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
+               row.test_rmse_N > 0 ? fmt::format("{:.5f}", row.test_rmse_N) : "-",
+               row.noise_floor_N > 0 && row.test_rmse_N > 0
+                   ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N)
+                   : "-",
                row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
   }
 }
@@ -184,6 +187,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   result["ladder"] = json_of(ladder.rows);
   result["earlier"] = json_of(ladder.earlier);
   result["test_looks"] = ladder.test_looks;
+  result["is_tested"] = ladder.is_tested;
   result["split"] = {{"by_flight", ladder.split.by_flight},
                      {"fit", names_of(inputs, ladder.split.fit)},
                      {"select", names_of(inputs, ladder.split.select)},
