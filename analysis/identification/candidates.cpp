@@ -91,6 +91,9 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
     part.covered.range = {INFINITY, -INFINITY};
     for (const Track& track :
          inputs.load(static_cast<std::size_t>(which[static_cast<std::size_t>(i)]), part.covered.problems)) {
+      for (const logs::Doubt& doubt : track.doubts) {
+        if (!doubt.refuses_force) part.covered.problems.push_back(track.path + ": " + doubt.words);
+      }
       if (!logs::is_sound(track.health)) {
         std::string text;
         for (const std::string& finding : logs::findings(track.health))

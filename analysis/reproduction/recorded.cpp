@@ -42,7 +42,7 @@ Recorded recorded_flights(const Setting& setting, bool published_signals) {
     residuals::InputArguments arguments;
     arguments.flights = {(fs::path(setting.recorded) / "flights" / folder).string()};
     arguments.fleet = setting.fleet;
-    arguments.rules.published_signals = published_signals;
+    arguments.rules.published_signals = arguments.rules.keep_impacts = published_signals;
     const residuals::Inputs inputs = residuals::read_inputs(arguments);
     return some_flights(inputs, [&](const auto& flight) { return setting.full || is_small(flight); });
   };

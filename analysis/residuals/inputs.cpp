@@ -5,6 +5,7 @@
 #include <set>
 
 #include "analysis/residuals/force_residual.h"
+#include "analysis/residuals/plausibility.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/network.h"
@@ -145,6 +146,8 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
     if (track.position_only) continue;
     apply_model(model_for(track), kinds, rules, track);
     cut_large_forces(model_for(track), rules, track);
+    cut_impacts(model_for(track), rules, track);
+    for (logs::Doubt& doubt : doubts_of(model_for(track), track)) track.doubts.push_back(std::move(doubt));
   }
   return tracks;
 }

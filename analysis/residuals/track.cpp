@@ -164,8 +164,8 @@ void add_neighbours(Track& track, std::size_t own, const std::vector<LoadedLog>&
 }  // namespace
 
 const char* name(Cut cut) {
-  static const char* const kNames[] = {"used",     "crash",     "not flying", "ground contact",
-                                       "settling", "neighbour", "large force"};
+  static const char* const kNames[] = {"used",     "crash",     "not flying",  "ground contact",
+                                       "settling", "neighbour", "large force", "impact"};
   return kNames[static_cast<int>(cut)];
 }
 
@@ -177,7 +177,10 @@ const char* rule(Cut cut) {
       "at or below 0.07 m (large: 0.085 m), where a vehicle stands on the ground",
       "within 0.15 s after the start and after a gap of more than 30 ms: filters have no past",
       "the position of a neighbour is unknown: its log has a gap, has not begun or has ended",
-      "published filter only: |f_a,z| of 50 gf or more"};
+      "published filter only: |f_a,z| of 50 gf or more",
+      "from 0.1 s before to 0.3 s after a record that no flight has: a specific force beyond 1.25 times what "
+      "the rotors "
+      "give at full duty (at least 2 g), or a jump of position or velocity"};
   return kRules[static_cast<int>(cut)];
 }
 
@@ -211,9 +214,16 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     track.position_only = !log.signals.force || (known != fleet.end() && known->second.position_only);
     if (!log.signals.force && !(known != fleet.end() && known->second.position_only))
       problems.push_back(path + ": only a neighbour: no column carries " + log.signals.force_lacks);
+    track.doubts = logs::doubts_of(log);
+    for (const logs::Doubt& doubt : track.doubts) {
+      if (!doubt.refuses_force || track.position_only) continue;
+      track.position_only = true;
+      problems.push_back(path + ": " + doubt.words);
+    }
     track.has_rates = log.signals.rates;
     track.health = log.health;
     onsets.push_back(onsets_s(log));
+    track.has_reference_clock = all.empty();
     if (!rules.published && !all.empty())
       track.clock_offset_s = clock_offset_s(onsets[0], onsets.back(), &track.clock_onsets);
     tracks.push_back(std::move(track));

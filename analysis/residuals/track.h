@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/logs/log.h"
+#include "analysis/logs/plausibility.h"
 #include "analysis/logs/signals.h"
 #include "analysis/residuals/flight_set.h"
 #include "stability/effects/effect.h"
@@ -23,6 +24,7 @@ enum class Cut : unsigned char {
   kSettling,   ///< within 0.15 s after the start or after a gap in the log: filters have no past
   kNeighbour,   ///< a neighbour's position is unknown: its log has a gap, has not begun or has ended
   kLargeForce,  ///< only with CutRules::published
+  kImpact,  ///< about a record that no flight has, see cut_impacts(): collisions, touch-down, wrapped integers
   kCount
 };
 const char* name(Cut cut);
@@ -37,6 +39,8 @@ struct CutRules {
   bool published = false;
   /// Of these, only their thrust lag, their masses and the missing accelerometer filter.
   bool published_signals = false;
+  /// Impacts are not cut. Set with --published-signals: the authors' labels keep them.
+  bool keep_impacts = false;
 
   bool has_published_signals() const { return published || published_signals; }
 };
@@ -46,8 +50,10 @@ struct Track {
   bool position_only = false;
   bool has_rates = false;
   logs::LogHealth health;
-  double clock_offset_s = 0;  ///< of this log's clock against the first vehicle's
-  int clock_onsets = 0;       ///< how many common starts of a trajectory gave it; 0: not estimated
+  std::vector<logs::Doubt> doubts;   ///< those that refuse a force have made the track position only
+  double clock_offset_s = 0;         ///< of this log's clock against the first vehicle's
+  int clock_onsets = 0;              ///< how many common starts of a trajectory gave it; 0: not estimated
+  bool has_reference_clock = false;  ///< the first log of its flight
   std::vector<stability::Instant> instants;  ///< thrust_N and mass_kg are set by apply_model()
   std::vector<stability::Neighbour> neighbours;
   std::vector<std::array<double, 4>> duty;

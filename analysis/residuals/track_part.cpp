@@ -132,7 +132,9 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   errors.position_only = track.position_only;
   errors.clock_offset_s = track.clock_offset_s;
   errors.clock_onsets = track.clock_onsets;
+  errors.has_reference_clock = track.has_reference_clock;
   errors.findings = logs::findings(track.health);
+  errors.doubts = track.doubts;
   errors.is_sound = logs::is_sound(track.health);
   if (track.position_only) {
     errors.trajectory.refused = errors.torque.refused = "position only";

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
@@ -65,11 +66,14 @@ identification::Budget budget_of(const CompareOptions& options, const residuals:
   }
   words.words.insert(words.words.end(), options.budget.begin(), options.budget.end());
   residuals::Inputs fit = read_flights(words, true);
+  std::set<std::filesystem::path> judged;
+  for (const residuals::FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, log] : flight.logs) judged.insert(std::filesystem::weakly_canonical(log));
+  }
   for (const residuals::FlightFiles& flight : fit.found.flights) {
-    for (const residuals::FlightFiles& judged : inputs.found.flights) {
-      if (flight.logs == judged.logs) {
-        throw UsageError("--budget names a flight that is judged as well: " + flight.logs[0].second);
-      }
+    for (const auto& [vehicle, log] : flight.logs) {
+      if (judged.count(std::filesystem::weakly_canonical(log)) > 0)
+        throw UsageError("--budget names a flight that is judged as well: " + log);
     }
   }
   Progress progress(common.quiet);
@@ -159,7 +163,11 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   fmt::print(stderr, "no usable record: nothing was compared{}\n",
              comparison.problems.empty() ? "; 'swarmcert inspect LOG' says what is in a log"
                                          : ": " + comparison.problems[0]);
-  return kInconclusive;
+  const bool refused = std::any_of(comparison.tracks.begin(), comparison.tracks.end(), [](const auto& track) {
+    return std::any_of(track.doubts.begin(), track.doubts.end(),
+                       [](const auto& d) { return d.refuses_force; });
+  });
+  return refused ? kBadInput : kInconclusive;
 }
 
 }  // namespace

@@ -3,10 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "analysis/commands/compare/log_output.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/plausibility_output.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -138,29 +139,6 @@ void print_torque(const Comparison& comparison) {
   }
 }
 
-void print_cuts(const Comparison& comparison) {
-  std::array<std::size_t, static_cast<std::size_t>(residuals::Cut::kCount)> sums{};
-  double largest_s = 0;
-  std::size_t estimated = 0, tracks = 0;
-  for (const residuals::TrackErrors& track : comparison.tracks) {
-    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += track.cut[k];
-    ++tracks;
-    if (track.clock_onsets > 0) ++estimated;
-    largest_s = std::max(largest_s, std::abs(track.clock_offset_s));
-  }
-  fmt::print("Records cut:");
-  bool any = false;
-  for (std::size_t k = 1; k < sums.size(); ++k) {
-    if (sums[k] == 0) continue;
-    fmt::print("{} {} {}", any ? "," : "", sums[k], residuals::name(static_cast<residuals::Cut>(k)));
-    any = true;
-  }
-  fmt::print(
-      "{}. Clocks: {} of {} logs have an offset estimated against the first of their flight, up to {:.1f} "
-      "ms.\n",
-      any ? "" : " none", estimated, tracks, 1000 * largest_s);
-}
-
 files::Json json_of(const residuals::TrackErrors& track) {
   files::Json json = {{"flight", track.flight},
                       {"scenario", track.scenario},
@@ -169,9 +147,13 @@ files::Json json_of(const residuals::TrackErrors& track) {
                       {"composition", track.composition},
                       {"file", track.path},
                       {"position_only", track.position_only},
-                      {"clock_offset_s", track.clock_offset_s},
+                      {"clock", clock_of(track)},
+                      {"clock_offset_s", !track.has_reference_clock && track.clock_onsets == 0
+                                             ? files::Json(nullptr)
+                                             : files::Json(track.clock_offset_s)},
                       {"clock_onsets", track.clock_onsets},
-                      {"findings", track.findings}};
+                      {"findings", track.findings},
+                      {"plausibility", analysis::json_of(track.doubts)}};
   files::Json& records = json["records"] = files::Json::object();
   for (std::size_t k = 0; k < track.cut.size(); ++k)
     records[residuals::name(static_cast<residuals::Cut>(k))] = track.cut[k];
@@ -230,6 +212,7 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
     const auto cut = static_cast<residuals::Cut>(k);
     json["cut_rules"][residuals::name(cut)] = residuals::rule(cut);
   }
+  json["clocks"] = clocks_json(comparison);
   json["torque"] = torque_json(comparison);
   json["problems"] = comparison.problems;
   json["skipped_files"] = inputs.found.skipped;
@@ -282,15 +265,6 @@ void print_compositions(const Comparison& comparison, const Comparison* own) {
   }
 }
 
-void print_damage(const Comparison& comparison) {
-  for (const residuals::TrackErrors& track : comparison.tracks) {
-    if (track.is_sound) continue;
-    std::string text;
-    for (const std::string& finding : track.findings) text += (text.empty() ? "" : "; ") + finding;
-    fmt::print("damaged: {}: {}\n", track.path, text);
-  }
-}
-
 void print_errors(const Comparison& comparison, const Comparison* own) {
   print_torque(comparison);
   fmt::print("\n");
@@ -335,7 +309,7 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
   fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
   print_cuts(comparison);
   if (comparison.overall.statistics.samples > 0) print_errors(comparison, own);
-  print_damage(comparison);
+  print_doubts(comparison);
   for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);
   if (!inputs.found.skipped.empty())
     fmt::print("{} files are no logs and were skipped\n", inputs.found.skipped.size());

@@ -267,9 +267,12 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
                             name(static_cast<residuals::Cut>(k)));
     }
     for (const std::string& finding : track.findings) findings += (findings.empty() ? "" : "; ") + finding;
+    for (const logs::Doubt& doubt : track.doubts) findings += (findings.empty() ? "" : "; ") + doubt.words;
     rows.push_back({track.flight + " " + track.vehicle, track.position_only ? "position only" : cuts,
                     findings,
-                    track.clock_onsets > 0 ? fmt::format("{:.0f} ms", 1000 * track.clock_offset_s) : "-"});
+                    track.has_reference_clock || track.clock_onsets > 0
+                        ? fmt::format("{:.0f} ms", 1000 * track.clock_offset_s)
+                        : "not estimated"});
   }
   report.table({"", "records cut", "the log", "clock offset"}, rows);
   for (const std::string& problem : comparison.problems) report.paragraph("Not judged: " + problem);

@@ -6,6 +6,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/logs/read_log.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -174,6 +175,7 @@ files::Json inspect_log(const std::string& path, const InspectOptions& options, 
   const logs::Log log = options.columns.empty() ? logs::read_log(path)
                                                 : logs::read_log(path, logs::read_columns(options.columns));
   const logs::LogHealth& health = log.health;
+  const std::vector<logs::Doubt> doubts = logs::doubts_of(log);
   const std::vector<logs::Sample>& samples = log.samples;
   const double t0_s = samples.empty() ? 0 : samples.front().time_us * 1e-6;
   const double t1_s = samples.empty() ? 0 : samples.back().time_us * 1e-6;
@@ -186,6 +188,7 @@ files::Json inspect_log(const std::string& path, const InspectOptions& options, 
     fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {} columns\n", path, log.format,
                health.records, t0_s, t1_s, log.channels.size());
     for (const std::string& finding : logs::findings(health)) fmt::print("  {}\n", finding);
+    for (const logs::Doubt& doubt : doubts) fmt::print("  implausible: {}\n", doubt.words);
     if (!log.signals.force) fmt::print("  no force can be computed: position only\n");
   }
   return {{"file", path},
@@ -211,7 +214,8 @@ files::Json inspect_log(const std::string& path, const InspectOptions& options, 
             {"gaps", health.gaps},
             {"longest_gap_s", health.longest_gap_s},
             {"truncated", health.truncated},
-            {"checksum_failed", health.checksum_failed}}}};
+            {"checksum_failed", health.checksum_failed}}},
+          {"plausibility", json_of(doubts)}};
 }
 
 files::Json inspect(const std::string& path, const InspectOptions& options, const CommonOptions& common) {

@@ -44,6 +44,7 @@ residuals::Inputs read_flights(const FlightOptions& options, bool own_models) {
   arguments.network = options.network;
   arguments.rules.published = options.published_filter;
   arguments.rules.published_signals = options.published_signals;
+  arguments.rules.keep_impacts = options.published_filter || options.published_signals;
   residuals::Inputs inputs = residuals::read_inputs(arguments);
   if (!own_models && !inputs.vehicle_models.empty()) {
     throw files::InputError({arguments.fleet, "",

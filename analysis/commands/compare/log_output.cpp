@@ -1,0 +1,95 @@
+#include "analysis/commands/compare/log_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace swarmcert::analysis {
+namespace {
+
+using residuals::Comparison;
+using residuals::TrackErrors;
+
+struct Clocks {
+  int reference = 0, estimated = 0, unknown = 0;
+  double largest_s = 0;
+};
+
+Clocks clocks_of(const Comparison& comparison) {
+  Clocks clocks;
+  for (const TrackErrors& track : comparison.tracks) {
+    if (track.has_reference_clock)
+      ++clocks.reference;
+    else if (track.clock_onsets > 0)
+      ++clocks.estimated;
+    else
+      ++clocks.unknown;
+    clocks.largest_s = std::max(clocks.largest_s, std::abs(track.clock_offset_s));
+  }
+  return clocks;
+}
+
+void print_clocks(const Comparison& comparison) {
+  const Clocks clocks = clocks_of(comparison);
+  const int others = clocks.estimated + clocks.unknown;
+  if (others == 0) {
+    fmt::print("Clocks: one log per flight, none to relate.\n");
+    return;
+  }
+  if (clocks.estimated > 0) {
+    fmt::print(
+        "Clocks: offsets of {} of {} logs estimated against the first of their flight, up to {:.1f} ms.\n",
+        clocks.estimated, others, 1000 * clocks.largest_s);
+  }
+  if (clocks.unknown > 0) {
+    fmt::print(
+        "Clocks: the offset of {} log{} could not be estimated and is taken as 0: no commanded movement "
+        "starts "
+        "within 0.1 s of one in the first log of the flight.\n",
+        clocks.unknown, clocks.unknown == 1 ? "" : "s");
+  }
+}
+
+}  // namespace
+
+files::Json clocks_json(const Comparison& comparison) {
+  const Clocks clocks = clocks_of(comparison);
+  return {{"reference", clocks.reference}, {"estimated", clocks.estimated}, {"unknown", clocks.unknown}};
+}
+
+const char* clock_of(const TrackErrors& track) {
+  return track.has_reference_clock ? "reference" : track.clock_onsets > 0 ? "estimated" : "unknown";
+}
+
+void print_cuts(const Comparison& comparison) {
+  std::array<std::size_t, static_cast<std::size_t>(residuals::Cut::kCount)> sums{};
+  for (const TrackErrors& track : comparison.tracks) {
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += track.cut[k];
+  }
+  fmt::print("Records cut:");
+  bool any = false;
+  for (std::size_t k = 1; k < sums.size(); ++k) {
+    if (sums[k] == 0) continue;
+    fmt::print("{} {} {}", any ? "," : "", sums[k], residuals::name(static_cast<residuals::Cut>(k)));
+    any = true;
+  }
+  fmt::print("{}. ", any ? "" : " none");
+  print_clocks(comparison);
+}
+
+void print_doubts(const Comparison& comparison) {
+  for (const TrackErrors& track : comparison.tracks) {
+    if (!track.is_sound) {
+      std::string text;
+      for (const std::string& finding : track.findings) text += (text.empty() ? "" : "; ") + finding;
+      fmt::print("damaged: {}: {}\n", track.path, text);
+    }
+    for (const logs::Doubt& doubt : track.doubts) {
+      if (!doubt.refuses_force) fmt::print("implausible: {}: {}\n", track.path, doubt.words);
+    }
+  }
+}
+
+}  // namespace swarmcert::analysis
