@@ -1,53 +1,89 @@
+/// The README as its reader uses it: a clone, every block pasted in order, and the numbers that it shows.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <sstream>
 
 #include "analysis/run.h"
 #include "data.h"
 
-namespace swarmcert {
+namespace swarmcert::tests {
 namespace {
 
 /// One command of a ```console block and the output shown below it. "..." at the start of a line skips lines.
 struct Example {
-  std::string command;
+  std::string command;  ///< with its continuation lines, where lines end in a backslash
   std::vector<std::string> output;
 };
 
-std::vector<Example> examples(const std::string& markdown) {
-  std::vector<Example> found;
+using Block = std::vector<Example>;
+
+std::vector<Block> blocks_of(const std::string& markdown) {
+  std::vector<Block> blocks;
   std::istringstream text(markdown);
-  bool inside = false;
+  bool inside = false, continues = false;
   for (std::string line; std::getline(text, line);) {
     if (line.rfind("```", 0) == 0) {
       inside = line == "```console";
-    } else if (inside && line.rfind("$ ", 0) == 0) {
-      found.push_back({line.substr(2), {}});
-    } else if (inside && !found.empty()) {
-      found.back().output.push_back(line);
+      if (inside) blocks.emplace_back();
+      continue;
     }
+    if (!inside) continue;
+    Block& block = blocks.back();
+    if (continues)
+      block.back().command += "\n" + line;
+    else if (line.rfind("$ ", 0) == 0)
+      block.push_back({line.substr(2), {}});
+    else if (!block.empty())
+      block.back().output.push_back(line);
+    const bool is_command = continues || line.rfind("$ ", 0) == 0;
+    continues = is_command && !line.empty() && line.back() == '\\';
   }
-  return found;
+  return blocks;
 }
 
-/// Words of a line; numbers agree if they are equal to seven digits: the last ones may depend on the processor.
-bool same(const std::string& shown, const std::string& printed) {
-  std::istringstream a(shown);
-  std::istringstream b(printed);
-  std::string x;
-  std::string y;
-  while (true) {
-    const bool more_a = static_cast<bool>(a >> x);
-    const bool more_b = static_cast<bool>(b >> y);
-    if (!more_a || !more_b) return more_a == more_b;
-    char* end_x = nullptr;
-    char* end_y = nullptr;
-    const double number_x = std::strtod(x.c_str(), &end_x);
-    const double number_y = std::strtod(y.c_str(), &end_y);
-    const bool numbers = *end_x == '\0' && *end_y == '\0';
-    if (numbers ? std::abs(number_x - number_y) > 1e-7 * std::abs(number_x) : x != y) return false;
+/// Why a command is not run; empty if it is.
+std::string excluded(const std::string& command) {
+  const std::pair<const char*, const char*> kExcluded[] = {
+      {"./bootstrap", "it installs packages and builds the tree that runs this test"},
+      {"git clone", "the blocks run in a clone already"},
+      {"sudo ", "it changes the machine"}};
+  for (const auto& [start, why] : kExcluded) {
+    if (command.rfind(start, 0) == 0) return why;
   }
+  return "";
+}
+
+/// Text and numbers agree; numbers to seven digits, because the last ones may depend on the processor.
+bool same(const std::string& shown, const std::string& printed) {
+  const char *a = shown.c_str(), *b = printed.c_str();
+  const auto skip_blanks = [](const char*& at) {
+    const char* const start = at;
+    while (*at == ' ' || *at == '\t' || *at == '\r') ++at;
+    return at != start;
+  };
+  skip_blanks(a);
+  skip_blanks(b);
+  while (*a != '\0' && *b != '\0') {
+    const bool blank_a = skip_blanks(a), blank_b = skip_blanks(b);
+    if (*a == '\0' || *b == '\0') break;
+    if (blank_a != blank_b) return false;
+    const bool is_number = (*a >= '0' && *a <= '9') && (*b >= '0' && *b <= '9');
+    if (!is_number) {
+      if (*a++ != *b++) return false;
+      continue;
+    }
+    char *end_a = nullptr, *end_b = nullptr;
+    const double x = std::strtod(a, &end_a), y = std::strtod(b, &end_b);
+    if (!(std::abs(x - y) <= 1e-7 * std::abs(x))) return false;
+    a = end_a;
+    b = end_b;
+  }
+  skip_blanks(a);
+  skip_blanks(b);
+  return *a == '\0' && *b == '\0';
 }
 
 bool appears(const std::string& shown, const std::vector<std::string>& printed, std::size_t& from) {
@@ -60,44 +96,118 @@ bool appears(const std::string& shown, const std::vector<std::string>& printed, 
   return false;
 }
 
-TEST(Readme, EveryCommandWorksAndPrintsWhatIsShown) {
-  const tests::ScratchFolder folder;
-  for (const std::string name : {"analysis", "controller", "nn", "stability"})
-    std::filesystem::create_directory_symlink(tests::source_path(name), folder.path() / name);
-  int commands = 0;
-  for (const Example& example : examples(tests::read_text(tests::source_path("README.md")))) {
-    if (example.command.rfind("./bootstrap", 0) ==
-        0) {  // what runs this test; its words are checked, not run again
-      const tests::Outcome help = tests::run_shell("./bootstrap --help", SWARMCERT_SOURCE_DIR);
-      EXPECT_EQ(help.exit_code, 0) << help.output;
-      std::istringstream words(example.command);
-      std::string verb;
-      words >> verb >> verb;
-      EXPECT_NE(help.output.find(verb), std::string::npos) << example.command;
-      ++commands;
+/// What a command printed, line by line, and how it ended.
+struct Printed {
+  std::vector<std::string> lines;
+  int exit_code = -1;
+};
+
+constexpr const char* kEnd = "@@ exit code ";
+
+/// Runs the block in one shell, as if it were pasted.
+std::vector<Printed> run_block(const Block& block, const std::string& script,
+                               const std::filesystem::path& folder) {
+  std::string text;
+  for (const Example& example : block) {
+    const bool runs = excluded(example.command).empty();
+    text += (runs ? example.command : ":") + "\nprintf '\\n" + kEnd + "%d\\n' $?\n";
+  }
+  write_text(script, text);
+  const Outcome outcome = run_shell("bash '" + script + "'", folder);
+  std::vector<Printed> printed(1);
+  std::istringstream lines(outcome.output);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind(kEnd, 0) != 0) {
+      printed.back().lines.push_back(line);
       continue;
     }
-    const tests::Outcome outcome =
-        tests::run_shell(example.command + "; echo \"exit code $?\"", folder.path());
-    std::vector<std::string> printed;
-    std::istringstream lines(outcome.output);
-    for (std::string line; std::getline(lines, line);) printed.push_back(line);
-    ASSERT_FALSE(printed.empty());
-    const bool states_code = !example.output.empty() && example.output.back().rfind("exit code", 0) == 0;
-    if (!states_code) {
-      EXPECT_EQ(printed.back(), "exit code 0") << example.command << "\n" << outcome.output;
-    }
-    std::size_t from = 0;
-    for (const std::string& line : example.output) {
-      if (line.empty() || line.rfind("...", 0) == 0) continue;
-      EXPECT_TRUE(appears(line, printed, from))
-          << example.command << " did not print\n  " << line << "\nbut\n"
-          << outcome.output;
-    }
-    ++commands;
+    printed.back().exit_code = std::atoi(line.c_str() + std::string(kEnd).size());
+    printed.emplace_back();
   }
-  EXPECT_GE(commands, 20) << "the README lost its examples";
+  printed.pop_back();
+  return printed;
+}
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+/// Counts the lines that were compared.
+void check(const Example& example, const Printed& printed, int& compared) {
+  const bool states_code = !example.output.empty() && example.output.back().rfind("exit code ", 0) == 0;
+  const int expected = states_code ? std::atoi(example.output.back().c_str() + 10) : 0;
+  EXPECT_EQ(printed.exit_code, expected) << example.command << "\n" << joined(printed.lines);
+  std::size_t from = 0;
+  for (std::size_t i = 0; i + (states_code ? 1 : 0) < example.output.size(); ++i) {
+    const std::string& line = example.output[i];
+    if (line.empty() || line.rfind("...", 0) == 0) continue;
+    EXPECT_TRUE(appears(line, printed.lines, from))
+        << example.command << " did not print\n  " << line << "\nbut\n"
+        << joined(printed.lines);
+    ++compared;
+  }
+}
+
+/// Its words are checked where it is not run.
+void check_bootstrap(const std::string& command, const std::filesystem::path& clone) {
+  std::istringstream words(command);
+  std::string verb;
+  words >> verb >> verb;
+  const Outcome help = run_shell("./bootstrap --help", clone);
+  EXPECT_EQ(help.exit_code, 0) << help.output;
+  EXPECT_NE(help.output.find(verb), std::string::npos) << command;
+}
+
+TEST(Readme, LinesAgreeOnlyIfTheirNumbersDo) {
+  EXPECT_TRUE(same("  ball: 0.137868 m", "  ball:   0.137868 m"));
+  EXPECT_TRUE(same("(56.5 %, 90 %: 52.1)", "(56.5 %, 90 %: 52.1)"));
+  EXPECT_TRUE(same("upper 476.6906052", "upper 476.69060521"));
+  EXPECT_FALSE(same("upper 476.6906", "upper 476.6916"));
+  EXPECT_FALSE(same("(56.5 %, 90 %: 52.1)", "(56.5 %, 90 %: 52.2)"));
+  EXPECT_FALSE(same("verdict: proved", "verdict: proved, but"));
+  EXPECT_FALSE(same("verdict: proved", "verdict:"));
+}
+
+TEST(Readme, BlocksKeepTheirCommandsInOrderWithContinuationsAndOutput) {
+  const std::vector<Block> blocks = blocks_of(
+      "```console\n$ one \\\n    two\nout\n$ three\n```\ntext\n```toml\n$ no\n```\n```console\n$ "
+      "four\n```\n");
+  ASSERT_EQ(blocks.size(), 2u);
+  ASSERT_EQ(blocks[0].size(), 2u);
+  EXPECT_EQ(blocks[0][0].command, "one \\\n    two");
+  EXPECT_EQ(blocks[0][0].output, (std::vector<std::string>{"out"}));
+  EXPECT_EQ(blocks[1][0].command, "four");
+}
+
+/// In a clone of HEAD: what is not committed is not there, and what is committed by accident is. README.md is that of
+/// the clone as well.
+TEST(Readme, EveryBlockWorksInAFreshCloneAndPrintsWhatIsShown) {
+  const ScratchFolder folder;
+  write_text(folder / "gitconfig", "[safe]\n\tdirectory = *\n");  // the checkout may be another user's
+  const Outcome cloned = run_shell(
+      "GIT_CONFIG_GLOBAL='" + folder / "gitconfig" + "' git clone --quiet '" + source_path("") + "' clone",
+      folder.path());
+  if (!std::filesystem::exists(source_path(".git"))) GTEST_SKIP() << "the sources are no git repository";
+  ASSERT_EQ(cloned.exit_code, 0) << cloned.output;
+  const std::filesystem::path clone = folder.path() / "clone";
+  int number = 0, commands = 0, compared = 0;
+  for (const Block& block : blocks_of(read_text((clone / "README.md").string()))) {
+    const std::vector<Printed> printed =
+        run_block(block, folder / ("block_" + std::to_string(++number) + ".sh"), clone);
+    ASSERT_EQ(printed.size(), block.size()) << "the shell ended within block " << number;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      ++commands;
+      if (excluded(block[i].command).empty())
+        check(block[i], printed[i], compared);
+      else if (block[i].command.rfind("./bootstrap", 0) == 0)
+        check_bootstrap(block[i].command, clone);
+    }
+  }
+  EXPECT_GE(commands, 5) << "the README lost its examples";
+  EXPECT_GE(compared, 10) << "the README shows no output";
 }
 
 }  // namespace
-}  // namespace swarmcert
+}  // namespace swarmcert::tests
