@@ -103,6 +103,10 @@ Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s
   answer.exact = answer.all_found && !answer.claims_falsely;
   answer.flagged = result["unexplained"]["flag"];
   answer.ratio = result["unexplained"]["ratio"];
+  const char* const verdict = !answer.named.empty() ? "missing_effect"
+                              : answer.flagged      ? "unexplained"
+                                                    : "nothing_missing";
+  EXPECT_EQ(result["verdict"], verdict) << answer.label;
   if (hidden.size() == 1 && !hidden[0].parameter.empty() && answer.first_right) {
     const files::Json& fitted = result["ranking"][0]["parameters"][hidden[0].parameter];
     answer.has_value = true;
