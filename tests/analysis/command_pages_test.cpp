@@ -6,6 +6,7 @@
 #include <string>
 
 #include "analysis/cli/command.h"
+#include "analysis/commands/commands.h"
 #include "analysis/run.h"
 
 namespace swarmcert::analysis {
