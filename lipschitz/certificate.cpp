@@ -139,6 +139,7 @@ Json law_json(const CertifiedLaw& law) {
           {"domain", law.domain},
           {"block", law.block},
           {"law", name(law.law)},
+          {"status", status(law.interrupted)},
           {"upper", law.upper.value()},
           {"upper_hex", hex_float(law.upper.value())}};
 }
@@ -155,6 +156,7 @@ Json summary(const files::Network& network, const CertifiedBound& bound) {
                {"unit", files::unit(network, bound.function, bound.block)},
                {"upper", bound.upper.value()},
                {"upper_method", name(bound.method)},
+               {"status", status(bound.is_interrupted())},
                {"lower", nullptr}};
   if (!bound.neighbours.empty()) json["neighbours"] = bound.neighbours;
   if (bound.lower.witness) json["lower"] = bound.lower.witness->slope.value();
@@ -173,6 +175,7 @@ Json summary(const files::Network& network, const CertifiedLaw& law) {
           {"unit", files::unit(network, "set:" + kind + ":" + law.rho, law.block)},
           {"upper", law.upper.value()},
           {"upper_method", "law"},
+          {"status", status(law.interrupted)},
           {"lower", nullptr}};
 }
 

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <mutex>
 #include <stdexcept>
 
-#include "lipschitz/checker/stages.h"
-#include "lipschitz/range.h"
+#include "lipschitz/certify_bounds.h"
+#include "lipschitz/stop.h"
+#include "lipschitz/work_progress.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
 
@@ -25,8 +25,8 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
-/// The law's bound from those of its terms.
-UpperBound bound_of(const Network& network, const LawClaim& law, const std::vector<CertifiedBound>& bounds) {
+/// The law's bound from those of its terms, and whether one of them was cut short.
+void settle(const Network& network, const std::vector<CertifiedBound>& bounds, CertifiedLaw& law) {
   Neighbours neighbours = law.neighbours;
   if (network.phi.count(files::kGroundKind) == 1) neighbours[files::kGroundKind] = 1;
   std::vector<std::pair<UpperBound, int>> terms;
@@ -38,66 +38,13 @@ UpperBound bound_of(const Network& network, const LawClaim& law, const std::vect
                          (bound.neighbours.empty() || bound.neighbours == law.neighbours);
       if (holds && (best == nullptr || bound.upper.value() < best->upper.value())) best = &bound;
     }
-    if (best != nullptr) terms.emplace_back(best->upper, count);
+    if (best == nullptr) continue;
+    terms.emplace_back(best->upper, count);
+    law.interrupted = law.interrupted || best->is_interrupted();
   }
   if (terms.size() != neighbours.size())
     throw std::logic_error("certify: a law lacks the bound of one of its terms");
-  return law_bound(law.law, terms);
-}
-
-/// What is proved for any number of neighbours holds for so many.
-void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedBound& counted) {
-  const auto any = std::find_if(bounds.begin(), bounds.end(), [&](const CertifiedBound& bound) {
-    return bound.function == counted.function && bound.block == counted.block && bound.neighbours.empty() &&
-           bound.scale.empty();
-  });
-  counted.upper = any->upper;
-  counted.method = any->method;
-  counted.proof = any->proof;
-  counted.local = any->local;
-  counted.sdp = any->sdp;
-}
-
-/// Replaces the bound for all inputs by a smaller one for the box, where there is one.
-void branch_further(const Network& network, const std::map<std::string, Box>& domain,
-                    const CertifyOptions& options, CertifiedBound& bound) {
-  BranchOptions branch = options.branch;
-  branch.known = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
-  branch.cancelled = options.cancelled;
-  if (options.progress) {
-    branch.progress = [&options, &bound](double share, double upper) {
-      constexpr int kPermille = 1000;
-      options.progress(static_cast<int>(share * kPermille), kPermille,
-                       bound.function + " " + bound.block +
-                           (bound.neighbours.empty() ? "" : " with so many") + " at most " +
-                           std::to_string(upper));
-    };
-  }
-  const UpperProof* const global = bound.proof       ? &*bound.proof
-                                   : bound.sdp.proof ? &*bound.sdp.proof
-                                                     : nullptr;
-  LocalBound local =
-      local_bound(network, bound, domain, global != nullptr ? global->t : std::vector<double>(), branch);
-  bound.nodes = local.nodes;
-  bound.outlook = local.outlook;
-  LowerBoundOptions lower = options.lower;
-  lower.cancelled = options.cancelled;
-  lower.starts = std::move(local.steep_centres);
-  FoundSlope steeper = lower_bound(network, bound, options.domain, lower);
-  steeper.rounds += bound.lower.rounds;
-  const bool is_steeper = steeper.witness && (!bound.lower.witness || steeper.witness->slope.value() >
-                                                                          bound.lower.witness->slope.value());
-  if (is_steeper) {
-    bound.lower = std::move(steeper);
-  } else {
-    bound.lower.rounds = steeper.rounds;
-  }
-  if (!local.proof || !(local.upper.value() < bound.upper.value())) return;
-  bound.upper = local.upper;
-  bound.method = UpperMethod::kBranch;
-  bound.local = std::move(local.proof);
-  if (bound.proof) bound.sdp.proof = std::move(bound.proof);  // where others may start from
-  bound.proof.reset();
+  law.upper = law_bound(law.law, terms);
 }
 
 }  // namespace
@@ -123,12 +70,21 @@ std::vector<Verdict> respects_gamma(const GammaStatement& gamma, const std::vect
   return result;
 }
 
+bool is_interrupted(const Certification& certification) {
+  return std::any_of(certification.bounds.begin(), certification.bounds.end(),
+                     [](const CertifiedBound& bound) { return bound.is_interrupted(); });
+}
+
+const char* status(bool is_interrupted) { return is_interrupted ? "interrupted" : "finished"; }
+
 const char* name(UpperMethod method) {
   switch (method) {
     case UpperMethod::kAuto:
       return "auto";
     case UpperMethod::kProduct:
       return "product";
+    case UpperMethod::kEclipseFast:
+      return "eclipse_fast";
     case UpperMethod::kSdp:
       return "sdp";
     case UpperMethod::kBranch:
@@ -138,6 +94,7 @@ const char* name(UpperMethod method) {
 }
 
 Certification certify(const Network& network, const CertifyOptions& options) {
+  const Stop stop(options.cancelled, options.seconds);
   Certification result;
   result.gamma = options.gamma ? options.gamma : network.gamma;
   if (result.gamma && !(result.gamma->value > 0)) {
@@ -163,21 +120,15 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     static_cast<LawClaim&>(result.laws.back()) = std::move(claim);
   }
 
-  const int total = static_cast<int>(layers.size() + 2 * result.bounds.size());
-  int done = 0;
-  std::mutex mutex;
-  const auto report = [&](const std::string& what) {
-    const std::lock_guard<std::mutex> lock(mutex);
-    ++done;
-    if (options.progress) options.progress(done, total, what);
-  };
-
+  WorkProgress progress(
+      static_cast<int>(layers.size()) + pieces_of_work(options, static_cast<int>(result.bounds.size())),
+      options.progress);
   files::parallel_for(static_cast<int>(layers.size()), options.jobs, [&](int i) {
     CertifiedLayer& layer = result.layers[static_cast<std::size_t>(i)];
     std::optional<double> limit;
     if (result.gamma && result.gamma->scope == GammaStatement::Scope::kLayer) limit = result.gamma->value;
-    layer.norm = spectral_norm(*layers[static_cast<std::size_t>(i)], limit);
-    report("spectral norm of " + layer.network + " " + layer.name);
+    progress.run("spectral norm of " + layer.network + " " + layer.name,
+                 [&] { layer.norm = spectral_norm(*layers[static_cast<std::size_t>(i)], limit); });
   });
 
   std::size_t next = 0;
@@ -201,45 +152,10 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     bound.product = bound.upper = product_up(norms);
   }
 
-  // Upper bounds and searches are one flat list of independent pieces.
-  const int count = static_cast<int>(result.bounds.size());
-  files::parallel_for(2 * count, options.jobs, [&](int i) {
-    CertifiedBound& bound = result.bounds[static_cast<std::size_t>(i % count)];
-    if (i < count) {
-      if (options.method != UpperMethod::kProduct && bound.neighbours.empty()) {
-        bound.sdp =
-            sdp_bound(check::stages(network, bound.function, bound.block, bound.scale), options.cancelled);
-        const bool smaller = bound.sdp.proof && bound.sdp.proof->upper.value() < bound.product.value();
-        if (bound.sdp.proof && (smaller || options.method == UpperMethod::kSdp)) {
-          bound.upper = bound.sdp.proof->upper;
-          bound.method = UpperMethod::kSdp;
-          bound.proof = std::move(bound.sdp.proof);
-          bound.sdp.proof.reset();
-        }
-      }
-      report("upper bound of " + bound.function + " " + bound.block);
-    } else {
-      LowerBoundOptions lower = options.lower;
-      lower.cancelled = options.cancelled;
-      bound.lower = lower_bound(network, bound, options.domain, lower);
-      report("lower bound of " + bound.function + " " + bound.block);
-    }
-  });
-
-  if (options.method == UpperMethod::kBranch) {
-    const std::map<std::string, Box> domain = clamped(network, options.domain);
-    for (const bool are_counted : {false, true}) {
-      files::parallel_for(count, options.jobs, [&](int i) {
-        CertifiedBound& bound = result.bounds[static_cast<std::size_t>(i)];
-        if (bound.function.rfind("rho:", 0) == 0 || bound.neighbours.empty() == are_counted) return;
-        if (are_counted) start_from_any_number(result.bounds, bound);
-        branch_further(network, domain, options, bound);
-      });
-    }
-  }
+  find_bounds(network, options, stop, progress, result.bounds);
 
   for (CertifiedLaw& law : result.laws) {
-    law.upper = bound_of(network, law, result.bounds);
+    settle(network, result.bounds, law);
     for (const CertifiedBound& bound : result.bounds)
       if (bound.method == UpperMethod::kBranch && bound.domain == "box") law.domain = "box";
   }

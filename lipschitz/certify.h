@@ -22,19 +22,23 @@
 namespace swarmcert::lipschitz {
 
 enum class UpperMethod {
-  kAuto,     ///< the smaller of both
-  kProduct,  ///< product of the layers' spectral norms
-  kSdp,      ///< LipSDP-Neuron
+  kAuto,         ///< the smallest of the three below
+  kProduct,      ///< product of the layers' spectral norms
+  kEclipseFast,  ///< layer by layer in closed form; what the semidefinite program starts from
+  kSdp,          ///< LipSDP-Neuron
   kBranch,  ///< branch and bound on the claim's box, or, for all inputs, on a projective cover; kAuto for rho
 };
 
 struct CertifyOptions : ClaimOptions {
   UpperMethod method = UpperMethod::kAuto;
-  std::optional<files::GammaStatement> gamma;    ///< overrides what network.toml states
-  BranchOptions branch;                          ///< per claim; `known` and `cancelled` are taken from here
-  LowerBoundOptions lower;                       ///< its `cancelled` is taken from here below
-  int jobs = 0;                                  ///< threads; 0: all. Results do not depend on it.
-  const std::atomic<bool>* cancelled = nullptr;  ///< upper bounds found so far are kept
+  std::optional<files::GammaStatement> gamma;  ///< overrides what network.toml states
+  BranchOptions branch;                        ///< per claim; `known` and `cancelled` are taken from here
+  LowerBoundOptions lower;                     ///< its `cancelled` is taken from here below
+  int jobs = 0;  ///< threads; 0: all. Results do not depend on it, unless `seconds` is set.
+  /// Wall clock for all of it, shared out among its parts; 0: no limit. Exceeded by what has to be proved in any case: the
+  /// spectral norms and the layer-wise bounds before, one exact proof per bound after.
+  double seconds = 0;
+  const std::atomic<bool>* cancelled = nullptr;  ///< ends the searches; upper bounds found so far are kept
   std::function<void(int done, int total, const std::string& what)> progress;  ///< called from any thread
 };
 
@@ -52,15 +56,25 @@ struct CertifiedBound : Claim {
   std::optional<UpperProof> proof;  ///< where method is kSdp
   std::optional<LocalProof> local;  ///< where method is kBranch
   int nodes = 0;                    ///< boxes that branch and bound looked at
-  Outlook outlook;                  ///< where nodes > 0
-  UpperBound product{0};            ///< product of spectral norms, for comparison
-  SdpBound sdp;                     ///< how the semidefinite program went; its proof is moved to `proof`
-  FoundSlope lower;                 ///< proves the lower bound
+  BranchStop branch_stop = BranchStop::kNothingRun;
+  Outlook outlook;        ///< where nodes > 0
+  UpperBound product{0};  ///< product of spectral norms, for comparison
+  SdpBound sdp;           ///< how the semidefinite program went; its proof is moved to `proof`
+  FoundSlope lower;       ///< proves the lower bound
+
+  /// Whether more time might have given a smaller upper or a larger lower bound: a search was stopped by a signal or by the
+  /// time. Both bounds are proved all the same.
+  bool is_interrupted() const {
+    const bool above = branch_stop == BranchStop::kNothingRun ? lipschitz::is_interrupted(sdp.stop)
+                                                              : lipschitz::is_interrupted(branch_stop);
+    return above || lower.interrupted;
+  }
 };
 
 struct CertifiedLaw : LawClaim {
   std::string domain = "global";  ///< "box" where a bound that it rests on holds there only
   UpperBound upper{0};
+  bool interrupted = false;  ///< one of the bounds that it rests on is
 };
 
 struct Certification {
@@ -101,7 +115,12 @@ files::Json summary(const files::Network& network, const CertifiedLaw& law);
 /// The certificate of what was found: everything that check::check() needs besides the weights.
 files::Json certificate(const files::Network& network, const Certification& certification);
 
-/// "auto", "product", "sdp", "branch".
+/// Whether a search for any of the bounds was.
+bool is_interrupted(const Certification& certification);
+/// "finished" or "interrupted".
+const char* status(bool is_interrupted);
+
+/// "auto", "product", "eclipse_fast", "sdp", "branch".
 const char* name(UpperMethod method);
 
 }  // namespace swarmcert::lipschitz

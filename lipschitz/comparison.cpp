@@ -1,6 +1,5 @@
 #include "lipschitz/comparison.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -10,7 +9,7 @@
 
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/stages.h"
-#include "lipschitz/dense_kernels.h"
+#include "lipschitz/live_chain.h"
 #include "lipschitz/sdp_bound.h"
 #include "nn/base/random.h"
 #include "nn/weights/functions.h"
@@ -22,19 +21,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-std::vector<MatrixXd> rounded(const std::vector<check::Matrix>& stages) {
-  std::vector<MatrixXd> chain;
-  for (const check::Matrix& stage : stages) {
-    MatrixXd m(stage.rows, stage.cols);
-    for (int i = 0; i < stage.rows; ++i) {
-      for (int j = 0; j < stage.cols; ++j) m(i, j) = to_double(stage(i, j));
-    }
-    chain.push_back(std::move(m));
-  }
-  return chain;
-}
-
 double norm_of(const MatrixXd& m) { return Eigen::JacobiSVD<MatrixXd>(m).singularValues()(0); }
+
+constexpr int kFloorStarts = 24;
 
 using Pattern = std::vector<VectorXd>;
 
@@ -67,9 +56,10 @@ double alternate(const std::vector<MatrixXd>& chain, Pattern& pattern) {
 }
 
 /// Tries every single flip once; true if one of them raised `slope`.
-bool flip(const std::vector<MatrixXd>& chain, Pattern& pattern, double& slope) {
+bool flip(const std::vector<MatrixXd>& chain, Pattern& pattern, double& slope, const Stop& stop) {
   for (std::size_t k = 0; k < pattern.size(); ++k) {
     for (Index i = 0; i < pattern[k].size(); ++i) {
+      if (stop.now()) return false;
       const std::vector<MatrixXd> forward = partial_products(chain, pattern);
       MatrixXd behind = chain[k + 1].col(i);
       for (std::size_t j = k + 1; j < pattern.size(); ++j)
@@ -107,12 +97,13 @@ std::vector<std::string> stage_names(const files::Network& network, const std::s
 
 }  // namespace
 
-std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& stages) {
+std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& stages, const Stop& stop) {
   std::vector<check::Dyadic> c = {1.0};
   for (std::size_t j = 1; j <= stages.size(); ++j) {
     check::Dyadic sum;
     check::Matrix product = stages[j - 1];
     for (std::size_t i = j; i-- > 0;) {  // product is M_j ... M_{i+1}
+      if (stop.now()) return std::nullopt;
       const SdpBound norm = sdp_bound({product});
       if (!norm.proof) return std::nullopt;
       sum += c[i] * check::Dyadic(norm.proof->upper.value());
@@ -128,36 +119,13 @@ std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& st
   return UpperBound(bound);
 }
 
-std::optional<UpperProof> eclipse_fast(const std::vector<check::Matrix>& stages) {
-  const std::vector<MatrixXd> chain = rounded(stages);
-  MatrixXd x = MatrixXd::Identity(chain[0].cols(), chain[0].cols());
-  std::vector<double> tau;
-  std::vector<double> t;
-  for (std::size_t k = 0; k + 1 < chain.size(); ++k) {
-    const MatrixXd through = chain[k] * x.llt().solve(chain[k].transpose());
-    const double largest = largest_eigenvalue(through);
-    if (!(largest > 0)) return std::nullopt;
-    tau.push_back(1 / largest);
-    x = 2 * tau.back() * MatrixXd::Identity(through.rows(), through.rows()) -
-        tau.back() * tau.back() * through;
-  }
-  const double rho = largest_eigenvalue(chain.back() * x.llt().solve(chain.back().transpose()));
-  for (const double slack : {1e-12, 1e-10, 1e-8, 1e-6}) {
-    t.clear();
-    for (std::size_t k = 0; k < tau.size(); ++k)
-      t.insert(t.end(), static_cast<std::size_t>(chain[k].rows()), rho * (1 + slack) * tau[k]);
-    std::optional<UpperProof> proof = prove(stages, rho * (1 + slack), t);
-    if (proof) return proof;
-  }
-  return std::nullopt;
-}
-
-PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts, std::uint64_t seed) {
+PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts, std::uint64_t seed,
+                           const Stop& stop) {
   const std::vector<MatrixXd> chain = rounded(stages);
   files::Random random(seed);
   Pattern best(chain.size() - 1);
   double slope = -1;
-  for (int start = 0; start < std::max(starts, 1); ++start) {
+  for (int start = 0; start < std::max(starts, 1) && (start == 0 || !stop.now()); ++start) {
     Pattern pattern;
     for (std::size_t k = 0; k + 1 < chain.size(); ++k) {
       VectorXd on(chain[k].rows());
@@ -167,7 +135,7 @@ PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts,
     const double found = alternate(chain, pattern);
     if (found > slope) slope = found, best = pattern;
   }
-  for (int flips = 0; flips < 200 && flip(chain, best, slope); ++flips)
+  for (int flips = 0; flips < 200 && flip(chain, best, slope, stop); ++flips)
     slope = std::max(slope, alternate(chain, best));
 
   PatternFloor result;
@@ -186,12 +154,12 @@ PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts,
 }
 
 Comparison compare(const files::Network& network, const std::string& function, const std::string& block,
-                   const std::vector<double>& scale) {
+                   const std::vector<double>& scale, const Stop& stop) {
   const std::vector<check::Matrix> stages = check::stages(network, function, block, scale);
   Comparison result;
-  result.combettes_pesquet = combettes_pesquet(stages);
+  result.combettes_pesquet = combettes_pesquet(stages, stop);
   result.eclipse_fast = eclipse_fast(stages);
-  result.floor = pattern_floor(stages);
+  result.floor = pattern_floor(stages, kFloorStarts, 1, stop);
   const std::vector<std::string> names = stage_names(network, function);
   const std::vector<MatrixXd> chain = rounded(stages);
   for (std::size_t k = 0; k < chain.size(); ++k)

@@ -8,20 +8,18 @@
 
 #include "lipschitz/checker/bounds.h"
 #include "lipschitz/checker/dyadic.h"
+#include "lipschitz/eclipse_fast.h"
 #include "lipschitz/lmi_proof.h"
+#include "lipschitz/stop.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 
 /// Combettes and Pesquet 2020: ReLU is the mean of the identity and a reflection, so with M_ij = M_j ... M_{i+1}
 ///   L <= 2^{1-K} c_K,  c_0 = 1,  c_j = sum_{i<j} c_i |M_ij|_2.
-/// Every norm is proved in exact arithmetic, the sum rounded up. Nothing where a norm could not be proved.
-std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& stages);
-
-/// ECLipsE-Fast, Xu and Sivaranjani 2024: LipSDP with one multiplier per layer in closed form; X_0 = I,
-///   tau_k = 1 / |M_k X_{k-1}^{-1} M_k'|_2,  X_k = 2 tau_k I - tau_k^2 M_k X_{k-1}^{-1} M_k'.
-/// The multipliers are then proved like those of the semidefinite program. Costs a few factorisations.
-std::optional<UpperProof> eclipse_fast(const std::vector<check::Matrix>& stages);
+/// Every norm is proved in exact arithmetic, the sum rounded up. Nothing where a norm could not be proved, or after a
+/// stop.
+std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& stages, const Stop& stop = {});
 
 /// The steepest ReLU pattern that was found, whether or not an input reaches it: |M_K D_{K-1} ... D_1 M_1|_2 with D_k
 /// diagonal of zeros and ones. No bound that ignores which patterns are reachable can lie below the largest such norm;
@@ -34,7 +32,9 @@ struct PatternFloor {
 };
 
 /// Alternating maximisation over layers from `starts` random patterns, then single flips; deterministic.
-PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts = 24, std::uint64_t seed = 1);
+/// @param stop ends it with what was found.
+PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts = 24, std::uint64_t seed = 1,
+                           const Stop& stop = {});
 
 /// What one stage of a function loses: its norm over its gain along the steepest pattern, at least 1.
 struct StageLoss {
@@ -51,8 +51,8 @@ struct Comparison {
   std::vector<StageLoss> stages;
 };
 
-/// All of the above for one function and block of NET.
+/// All of the above for one function and block of NET. What a stop leaves no time for is not there.
 Comparison compare(const files::Network& network, const std::string& function, const std::string& block,
-                   const std::vector<double>& scale);
+                   const std::vector<double>& scale, const Stop& stop = {});
 
 }  // namespace swarmcert::lipschitz

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "lipschitz/checker/stages.h"
+#include "lipschitz/eclipse_fast.h"
 #include "lipschitz/range.h"
 #include "lipschitz/reach.h"
 #include "lipschitz/sdp_bound.h"
@@ -33,13 +34,21 @@ double float_gamma(Index n) {
   return safely(nu / (1 - nu));
 }
 
+/// A proved bound of a chain: that of the semidefinite program, or layer by layer where it was stopped.
+double chain_bound(const std::vector<check::Matrix>& chain, const Stop& stop) {
+  const SdpBound program = sdp_bound(chain, {stop, std::nullopt});
+  double bound = program.proof ? program.proof->upper.value() : kInfinity;
+  if (!is_interrupted(program.stop)) return bound;
+  const std::optional<UpperProof> layers = eclipse_fast(chain);
+  return layers ? std::min(bound, layers->upper.value()) : bound;
+}
+
 /// Proved bounds of what follows each layer of a chain: tails[k] for an error in y_k, the last one 1. A chain that is cut
 /// behind k starts with a ReLU, which is no steeper than 1.
-std::vector<double> tails(const std::vector<check::Matrix>& chain) {
+std::vector<double> tails(const std::vector<check::Matrix>& chain, const Stop& stop) {
   std::vector<double> result;
   for (std::size_t k = 1; k < chain.size(); ++k) {
-    const SdpBound bound = sdp_bound({chain.begin() + static_cast<std::ptrdiff_t>(k), chain.end()});
-    result.push_back(bound.proof ? bound.proof->upper.value() : kInfinity);
+    result.push_back(chain_bound({chain.begin() + static_cast<std::ptrdiff_t>(k), chain.end()}, stop));
   }
   result.push_back(1);
   return result;
@@ -129,25 +138,24 @@ struct TermError {
 class SetError {
  public:
   SetError(const Network& network, const std::string& function, const std::map<std::string, Box>& domain,
-           int nodes)
+           int nodes, const Stop& stop)
       : names_(files::networks_of(function)), parts_(files::parts(network)), domain_(domain), nodes_(nodes) {
     has_ground_ =
         names_.size() == 2 && names_[0] != files::kGroundPhi && parts_.count(files::kGroundPhi) == 1;
     phi_ = reach_network(*parts_.at(names_[0]));
-    const std::vector<double> whole = tails(check::stages(network, function));
+    const std::vector<double> whole = tails(check::stages(network, function), stop);
     phi_tails_ = whole;
     if (names_.size() == 1) return;
     rho_ = reach_network(*parts_.at(names_[1]));
     const std::vector<check::Matrix> rho_stages = check::stages(network, names_[1]);
-    rho_tails_ = tails(rho_stages);
-    const SdpBound rho = sdp_bound(rho_stages);
-    rho_bound_ = rho.proof ? rho.proof->upper.value() : kInfinity;
+    rho_tails_ = tails(rho_stages, stop);
+    rho_bound_ = chain_bound(rho_stages, stop);
     phi_tails_.resize(phi_.size() - 1);
     phi_tails_.push_back(rho_bound_);  // an error in phi's output goes through rho
     neighbour_ = term(phi_, names_[0], phi_tails_);
     if (!has_ground_) return;
-    std::vector<double> ground_tails =
-        tails(check::stages(network, "set:" + std::string(files::kGroundKind) + ":" + names_[1].substr(4)));
+    std::vector<double> ground_tails = tails(
+        check::stages(network, "set:" + std::string(files::kGroundKind) + ":" + names_[1].substr(4)), stop);
     const ReachNetwork ground = reach_network(*parts_.at(files::kGroundPhi));
     ground_tails.resize(ground.size() - 1);
     ground_tails.push_back(rho_bound_);
@@ -276,7 +284,7 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
   files::parallel_for(static_cast<int>(functions.size()), options.jobs, [&](int index) {
     const std::string& function = functions[static_cast<std::size_t>(index)];
     const std::vector<std::string> names = files::networks_of(function);
-    const SetError error(network, function, inflated_domain, options.nodes);
+    const SetError error(network, function, inflated_domain, options.nodes, options.stop);
     double evaluation = 0;
     for (int n = names.size() == 1 ? 1 : 0; n <= (names.size() == 1 ? 1 : options.neighbours); ++n) {
       evaluation = std::max(evaluation, names.size() == 1 ? error.plain() : error.set(n));

@@ -7,6 +7,7 @@
 
 #include "lipschitz/box.h"
 #include "lipschitz/checker/bounds.h"
+#include "lipschitz/stop.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
@@ -27,6 +28,7 @@ struct Float32Options {
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
   int nodes = 200;        ///< parts of the box per function
   int jobs = 0;
+  Stop stop;  ///< ends the semidefinite programs of the tails: bounds layer by layer in their place
 };
 
 /// Bounds that hold in exact arithmetic for any order of summation and with or without fused multiply-adds.

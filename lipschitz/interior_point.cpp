@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "lipschitz/dense_kernels.h"
 #include "nn/base/doubles.h"
@@ -122,6 +123,12 @@ class SchurSolver {
   MatrixXd factor_;
 };
 
+std::optional<LipSdpStop> why_stopped(const Stop& stop) {
+  if (stop.is_out_of_time()) return LipSdpStop::kTimeLimit;
+  if (stop.is_cancelled()) return LipSdpStop::kCancelled;
+  return std::nullopt;
+}
+
 }  // namespace
 
 const char* name(LipSdpStop stop) {
@@ -134,11 +141,28 @@ const char* name(LipSdpStop stop) {
       return "numerical limit";
     case LipSdpStop::kCancelled:
       return "cancelled";
+    case LipSdpStop::kTimeLimit:
+      return "time limit";
     case LipSdpStop::kNothingRun:
       break;
   }
   return "nothing run";
 }
+
+namespace {
+
+/// Columns of a product between two looks at the clock.
+constexpr Index kPanel = 512;
+
+/// C += A B for square matrices, or less than that if it has to stop.
+void add_large_product(MatrixXd& c, const MatrixXd& a, const MatrixXd& b, const Stop& stop) {
+  for (Index column = 0; column < c.cols() && !stop.now(); column += kPanel) {
+    const Index width = std::min(kPanel, c.cols() - column);
+    add_product(c.middleCols(column, width), a, b.middleCols(column, width));
+  }
+}
+
+}  // namespace
 
 InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
                              const InteriorPointOptions& options) {
@@ -147,10 +171,10 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
   const Index m = it.neurons();
   VectorXd y = start;
   MatrixXd s = it.slack(y);
-  MatrixXd s_factor = cholesky(s);
+  MatrixXd s_factor = options.stop.now() ? MatrixXd() : cholesky(s);
   if (s_factor.size() == 0) {
     InteriorPointResult result;
-    result.stop = LipSdpStop::kNumericalLimit;
+    result.stop = why_stopped(options.stop).value_or(LipSdpStop::kNumericalLimit);
     return result;
   }
   // Z = mu S^-1 with trace 1 over the inputs: on the central path but for the constraints of the neurons.
@@ -169,11 +193,15 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
     return result;
   }
   for (; result.iterations < options.max_iterations; ++result.iterations) {
-    if (options.cancelled != nullptr && *options.cancelled) {
-      result.stop = LipSdpStop::kCancelled;
-      break;
-    }
+    // An iteration of a large program takes seconds: it ends between its products, and leaves the last iterate.
+    const auto has_to_stop = [&] {
+      const std::optional<LipSdpStop> why = why_stopped(options.stop);
+      if (why) result.stop = *why;
+      return why.has_value();
+    };
+    if (has_to_stop()) break;
     const MatrixXd s_inverse = inverse_from_cholesky(s_factor);
+    if (has_to_stop()) break;
     const MatrixXd z_a = it.times_a(z);
     const MatrixXd y_a = it.times_a(s_inverse);
     const VectorXd residual = b - functionals(it, z, z_a);
@@ -188,6 +216,7 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
       break;
     }
 
+    if (has_to_stop()) break;
     const SchurSolver schur(schur_complement(it, z, z_a, s_inverse, y_a));
     if (!schur.good()) {
       result.stop = LipSdpStop::kNumericalLimit;
@@ -199,7 +228,8 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
     const VectorXd dy_a = schur.solve(-b);
     const MatrixXd ds_a = it.linear(dy_a);
     MatrixXd dz_a = -z;
-    add_product(dz_a, it.times_patterned(-z, ds_a), s_inverse);
+    add_large_product(dz_a, it.times_patterned(-z, ds_a), s_inverse, options.stop);
+    if (has_to_stop()) break;
     symmetrise(dz_a);
     const double primal_a = step_length(z_factor, dz_a, 1.0, kRough);
     const double dual_a = step_length(s_factor, ds_a, 1.0, kRough);
@@ -217,12 +247,14 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
     const VectorXd dy = schur.solve(rhs);
     const MatrixXd ds = it.linear(dy);
     MatrixXd dz = sigma * mu * s_inverse - z;
-    add_product(dz, it.times_patterned(-z, ds) - q, s_inverse);
+    add_large_product(dz, it.times_patterned(-z, ds) - q, s_inverse, options.stop);
+    if (has_to_stop()) break;
     symmetrise(dz);
     const double fraction = std::min(0.98, 0.9 + 0.09 * std::min(primal_a, dual_a));
     const double primal = step_length(z_factor, dz, fraction, kFine);
     const double dual = step_length(s_factor, ds, fraction, kFine);
 
+    if (has_to_stop()) break;
     const VectorXd y_before = y;
     s_factor = backtrack(dual, [&](double step) {
       y = y_before + step * dy;

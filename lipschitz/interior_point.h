@@ -2,8 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <atomic>
 #include <vector>
+
+#include "lipschitz/stop.h"
 
 namespace swarmcert::lipschitz {
 
@@ -34,14 +35,18 @@ struct InteriorPointOptions {
   double relative_gap = 2e-8;   ///< stop when y_0 is within this of the optimum, as far as mu tells,
   double infeasibility = 1e-7;  ///< and the dual constraints hold this well
   int max_iterations = 80;
-  const std::atomic<bool>* cancelled = nullptr;
+  Stop stop;  ///< looked at several times per iteration
 };
 
 /// Why a search stopped. Every stop leaves usable points; only kGapReached says they are near the optimum.
-enum class LipSdpStop { kNothingRun, kGapReached, kIterationLimit, kNumericalLimit, kCancelled };
+enum class LipSdpStop { kNothingRun, kGapReached, kIterationLimit, kNumericalLimit, kCancelled, kTimeLimit };
 
 /// "gap reached", ...
 const char* name(LipSdpStop stop);
+/// Whether the search would have gone on.
+constexpr bool is_interrupted(LipSdpStop stop) {
+  return stop == LipSdpStop::kCancelled || stop == LipSdpStop::kTimeLimit;
+}
 
 struct InteriorPointResult {
   LipSdpStop stop = LipSdpStop::kNothingRun;

@@ -151,12 +151,12 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
     return y;
   };
   double shrink = 0.5;
-  while (cholesky(inequality.slack(scaled_up(shrink))).size() == 0) shrink *= 0.5;
+  while (!options.stop.now() && cholesky(inequality.slack(scaled_up(shrink))).size() == 0) shrink *= 0.5;
 
   InteriorPointOptions inner;
   inner.relative_gap = options.relative_gap;
   inner.max_iterations = options.max_iterations;
-  inner.cancelled = options.cancelled;
+  inner.stop = options.stop;
   const InteriorPointResult found = minimise(inequality, scaled_up(shrink), inner);
 
   // z_k of the scaled chain is z_k of the chain over 2^(e_1 + ... + e_k), and its output over 2^(sum of all e).
@@ -180,6 +180,7 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
     }
     result.points.push_back(std::move(point));
   }
+  if (result.points.empty()) return result;  // stopped before the first one
   result.optimum_upper = Estimate(std::sqrt(result.points.back().rho));
   result.optimum_lower = Estimate(std::sqrt(std::ldexp(std::max(found.best_dual, 0.0), 2 * total)));
   return result;

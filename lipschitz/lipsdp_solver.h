@@ -2,11 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <atomic>
 #include <vector>
 
 #include "lipschitz/checker/bounds.h"
 #include "lipschitz/interior_point.h"
+#include "lipschitz/stop.h"
 
 namespace swarmcert::lipschitz {
 
@@ -27,13 +27,13 @@ struct LipSdpPoint {
 struct LipSdpOptions {
   double relative_gap = 2e-8;  ///< stop when rho is within this of the optimum
   int max_iterations = 80;
-  const std::atomic<bool>* cancelled = nullptr;
+  Stop stop;  ///< looked at several times per iteration
 };
 
 struct LipSdpResult {
   LipSdpStop stop = LipSdpStop::kNothingRun;
   int iterations = 0;
-  /// Strictly feasible points, best last; never empty after a run on a chain with hidden layers.
+  /// Strictly feasible points, best last; empty only after a stop before the first one.
   std::vector<LipSdpPoint> points;
   /// Optimum of the program lies between these, up to floating point.
   Estimate optimum_lower{0};

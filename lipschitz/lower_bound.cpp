@@ -132,6 +132,7 @@ FoundSlope lower_bound(const Network& network, const Claim& claim, const std::ma
     }
     SlopeWitness found = claim.scale.empty() ? search_slope(f, search) : search_scaled(f, claim, search);
     best.rounds += found.rounds_done;
+    best.interrupted = best.interrupted || found.interrupted;
     if (found.x.empty()) continue;  // the box holds no two points
     if (!best.witness || found.slope.value() > best.witness->slope.value()) {
       best.witness = std::move(found);

@@ -20,7 +20,7 @@ struct LowerBoundOptions {
   /// Per claim; 0: no lower bounds. Nothing: kDefaultSearchRounds, fewer for networks much larger than the paper's,
   /// for which a round takes longer.
   std::optional<int> rounds;
-  double seconds = 0;  ///< per claim; stops at the end of a round; 0: no limit
+  double seconds = 0;  ///< per claim, as SlopeSearchOptions has it; 0: no limit
   const std::atomic<bool>* cancelled = nullptr;
   std::vector<Eigen::VectorXd> starts;  ///< as SlopeSearchOptions has them
 };
@@ -30,6 +30,7 @@ struct FoundSlope {
   std::optional<SlopeWitness> witness;      ///< nothing where no search ran or no two points exist
   std::vector<std::string> other_networks;  ///< of witness->others, "phi:<kind>" each
   int rounds = 0;
+  bool interrupted = false;  ///< stopped before all rounds were done
 };
 
 /// Searches for the steepest pair of points within the claim's block and domain, exactly as steep in the claim's norm

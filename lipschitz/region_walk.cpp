@@ -25,6 +25,12 @@ constexpr double kStepBehind = 0.1;
 /// Distances from the centre at which walks start where the domain is open, and the reach R of their regions, in
 /// units of the median distance of the first stage's kinks.
 constexpr double kNearest = 0.1, kFarthest = 10, kLeastReach = 1, kLargestReach = 1000;
+/// The same for walks on a ladder of scales. Kinks of later layers may lie anywhere.
+constexpr double kLadderNearest = 1e-3, kLadderFarthest = 1e5;
+/// How far out along a ray the slope at infinity is looked for, and in which steps.
+constexpr double kFarOut = 1e12, kFarther = 4;
+/// A slope along a ray counts as that at infinity within this, relatively.
+constexpr double kSameSlope = 1e-9;
 
 /// H = normals diag(1/d^2) normals' + diag(bounds), and H^-1 times something: by Cholesky of H or, where there are
 /// more variables than neurons, of I + S' diag(bounds)^-1 S with S = normals diag(1/d) (Woodbury).
@@ -103,9 +109,14 @@ RegionWalk::RegionWalk(const SearchNetwork& network, std::uint64_t seed, const s
       random_(seed),
       starts_(starts.rbegin(), starts.rend()),
       all_move_(std::all_of(network.stages.begin(), network.stages.end(),
-                            [](const SearchStage& stage) { return stage.moved == stage.weights.rows(); })) {}
+                            [](const SearchStage& stage) { return stage.moved == stage.weights.rows(); })) {
+  const auto is_boxed = [](char boxed) { return boxed != 0; };
+  if (std::any_of(network.boxed.begin(), network.boxed.end(), is_boxed)) return;
+  recession_ = network;
+  for (SearchStage& stage : recession_->stages) stage.biases.setZero();
+}
 
-VectorXd RegionWalk::random_point() {
+VectorXd RegionWalk::random_point(double nearest, double farthest) {
   VectorXd z(network_.variables());
   double square = 0;
   for (int v = 0; v < network_.variables(); ++v) {
@@ -117,7 +128,7 @@ VectorXd RegionWalk::random_point() {
       square += z[v] * z[v];
     }
   }
-  const double radius = random_.log_uniform(kNearest, kFarthest);
+  const double radius = random_.log_uniform(nearest, farthest);
   for (int v = 0; v < network_.variables(); ++v) {
     if (!network_.boxed[v] && square > 0) z[v] *= radius / std::sqrt(square);
   }
@@ -138,24 +149,54 @@ void RegionWalk::start_walk() {
   best_of_walk_ = -1;
   entered_in_vain_ = 0;
   reach_ = random_.log_uniform(kLeastReach, kLargestReach);
+  constexpr int kKinds = 4;
+  const bool at_infinity = starts_.empty() && recession_ && walks_ % kKinds == kKinds - 1;
+  queue_.push(at_infinity ? start_at_infinity() : steepest_start());
+  if (!starts_.empty()) {
+    starts_.pop_back();
+  } else {
+    ++walks_;
+  }
+}
+
+RegionWalk::Candidate RegionWalk::steepest_start() {
+  const bool on_ladder = starts_.empty() && walks_ % 2 == 1;
   Candidate start{-1, VectorXd(), true};
   for (int i = 0; i < kStarts; ++i) {
-    VectorXd z = random_point();
+    VectorXd z =
+        on_ladder ? random_point(kLadderNearest, kLadderFarthest) : random_point(kNearest, kFarthest);
     if (!starts_.empty()) move_to(starts_.back(), z);
     const double slope = local_slope(network_, z).slope;
     if (slope > start.slope) start = {slope, std::move(z), true};
   }
-  if (!starts_.empty()) starts_.pop_back();
-  queue_.push(std::move(start));
+  return start;
 }
 
-void RegionWalk::enter(int regions, const std::atomic<bool>* cancelled) {
+RegionWalk::Candidate RegionWalk::start_at_infinity() {
+  Candidate steepest{-1, VectorXd(), true};
+  for (int i = 0; i < kStarts; ++i) {
+    VectorXd direction = random_point(1, 1);
+    const double slope = local_slope(*recession_, direction).slope;
+    if (slope > steepest.slope) steepest = {slope, std::move(direction), true};
+  }
+  const VectorXd direction = steepest.z;
+  const double slope = steepest.slope;
+  for (double t = 1; t < kFarOut; t *= kFarther) {
+    steepest.z = t * direction;
+    steepest.slope = local_slope(network_, steepest.z).slope;
+    if (steepest.slope >= slope * (1 - kSameSlope)) break;
+  }
+  return steepest;
+}
+
+bool RegionWalk::enter(int regions, const Stop& stop) {
   for (int i = 0; i < regions; ++i) {
-    if (cancelled != nullptr && *cancelled) return;
+    if (stop.now()) return false;
     ++entered_in_vain_;
     VectorXd z;
     if (take_steepest(z)) enter(std::move(z));
   }
+  return true;
 }
 
 bool RegionWalk::take_steepest(VectorXd& z) {

@@ -2,21 +2,25 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <atomic>
 #include <cstdint>
+#include <optional>
 #include <queue>
 #include <unordered_set>
 #include <vector>
 
 #include "lipschitz/linear_region.h"
 #include "lipschitz/search_network.h"
+#include "lipschitz/stop.h"
 #include "nn/base/random.h"
 
 namespace swarmcert::lipschitz {
 
 /// Maximises the local slope by walking from linear region to linear region.
 ///
-/// A walk starts at the steepest of some random points. It keeps what it has seen but not entered in a queue and
+/// A walk starts at the steepest of some random points. Where the domain is open they lie in turn among the kinks of the
+/// first layer, on a ladder of scales around that, and at infinity: along a ray x + t d, t -> inf, f has the slopes of the
+/// chain without its biases, whose linear regions are cones; the walk starts far out along the steepest of some random
+/// directions. It keeps what it has seen but not entered in a queue and
 /// enters the steepest: it moves to the analytic centre of that region (the minimiser of -sum_i log|y_i| minus the
 /// logarithms of the distances to the bounds, or plus |z|^2 / R^2 where there are none), and from there shoots a ray
 /// at every kink, along H^-1 dy_i/dz with the Hessian H of that barrier, which sees narrow regions as round. The
@@ -45,8 +49,9 @@ class RegionWalk {
   RegionWalk(const SearchNetwork& network, std::uint64_t seed,
              const std::vector<Eigen::VectorXd>& starts = {});
 
-  /// Enters up to `regions` regions, continuing the current walk and starting new ones. Stops early if `cancelled`.
-  void enter(int regions, const std::atomic<bool>* cancelled);
+  /// Enters up to `regions` regions, continuing the current walk and starting new ones.
+  /// @returns whether it went through with that, rather than stop.
+  bool enter(int regions, const Stop& stop);
 
   /// The steepest regions so far, steepest first, at most kKept; empty before the first enter().
   const std::vector<Found>& steepest() const { return steepest_; }
@@ -61,9 +66,12 @@ class RegionWalk {
     bool operator<(const Candidate& other) const { return slope < other.slope; }
   };
 
-  Eigen::VectorXd random_point();
+  /// A point of the domain; open variables at a random distance from the centre, between these two.
+  Eigen::VectorXd random_point(double nearest, double farthest);
   void move_to(const Eigen::VectorXd& x, Eigen::VectorXd& z) const;
   void start_walk();
+  Candidate steepest_start();
+  Candidate start_at_infinity();
   /// Takes the steepest candidate from the queue, once evaluated; false where it was entered before.
   bool take_steepest(Eigen::VectorXd& z);
   void enter(Eigen::VectorXd z);
@@ -78,7 +86,9 @@ class RegionWalk {
   const SearchNetwork& network_;
   files::Random random_;
   std::vector<Eigen::VectorXd> starts_;  ///< still to be used, the first one last
-  bool all_move_;     ///< every neuron depends on the moved vector, so that what lies behind a facet is exact
+  bool all_move_;  ///< every neuron depends on the moved vector, so that what lies behind a facet is exact
+  std::optional<SearchNetwork> recession_;  ///< the chain without its biases, where no variable is bounded
+  int walks_ = 0;
   double reach_ = 1;  ///< R of the current walk
   std::priority_queue<Candidate> queue_;
   std::unordered_set<std::uint64_t> queued_;   ///< in the current walk

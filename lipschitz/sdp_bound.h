@@ -1,18 +1,26 @@
 /// @file LipSDP-Neuron bounds that hold in exact arithmetic.
 #pragma once
 
-#include <atomic>
 #include <optional>
 #include <vector>
 
 #include "lipschitz/lipsdp_solver.h"
 #include "lipschitz/lmi_proof.h"
+#include "lipschitz/stop.h"
 
 namespace swarmcert::lipschitz {
 
+struct SdpOptions {
+  Stop stop;  ///< ends the search; the last iterate that can be proved is the bound
+  /// A bound that is proved already. A search that was stopped does not prove iterates above it: the exact proof of a
+  /// large program takes a second.
+  std::optional<UpperBound> known;
+};
+
 /// What a search for an SDP bound came to.
 struct SdpBound {
-  std::optional<UpperProof> proof;  ///< nothing where no iterate could be proved
+  std::optional<UpperProof>
+      proof;            ///< nothing where no iterate could be proved, or none is below what is known
   Estimate optimum{0};  ///< of the semidefinite program, in floating point; 0 where none was solved
   LipSdpStop stop = LipSdpStop::kNothingRun;
   int iterations = 0;
@@ -25,6 +33,6 @@ struct SdpBound {
 /// without inputs or without effect are taken out of the program first. A chain without hidden layers, for which
 /// the bound is the spectral norm, is proved directly.
 /// @param stages M_1 .. M_K as the checker builds them, exactly.
-SdpBound sdp_bound(const std::vector<check::Matrix>& stages, const std::atomic<bool>* cancelled = nullptr);
+SdpBound sdp_bound(const std::vector<check::Matrix>& stages, const SdpOptions& options = {});
 
 }  // namespace swarmcert::lipschitz

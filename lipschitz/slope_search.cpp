@@ -2,7 +2,6 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -11,6 +10,7 @@
 #include "lipschitz/linear_region.h"
 #include "lipschitz/region_walk.h"
 #include "lipschitz/search_network.h"
+#include "lipschitz/stop.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -190,29 +190,30 @@ void try_region(const SearchNetwork& network, const VectorXd& z, Witnesses& witn
 }  // namespace
 
 SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stop stop(options.cancelled, options.seconds);
   const std::vector<std::optional<Box>> boxes = check(f, options);
   const SearchNetwork network = search_network(f, boxes, options.block);
   Witnesses witnesses(f, options, boxes);
   if (!witnesses.box_has_floats()) return {};
 
   int rounds_done = 0;
+  bool interrupted = false;
   if (!network.block.empty() && network.neurons() == 0) {
     try_region(network, VectorXd::Zero(network.variables()), witnesses);  // f is affine: one region
   } else if (!network.block.empty()) {
     RegionWalk walk(network, options.seed, options.starts);
-    while (rounds_done < options.rounds) {
-      walk.enter(kRegionsPerRound, options.cancelled);
-      if (options.cancelled != nullptr && *options.cancelled) break;
+    std::vector<RegionWalk::Found> steepest;
+    while (rounds_done < options.rounds && !interrupted) {
+      interrupted = !walk.enter(kRegionsPerRound, stop);
+      if (!interrupted || rounds_done == 0) steepest = walk.steepest();
+      if (interrupted) break;
       ++rounds_done;
       if (options.progress) {
         options.progress(rounds_done,
                          Estimate(walk.steepest().empty() ? 0.0 : walk.steepest().front().slope));
       }
-      const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-      if (options.seconds > 0 && elapsed.count() >= options.seconds) break;
     }
-    for (const RegionWalk::Found& found : walk.steepest()) try_region(network, found.z, witnesses);
+    for (const RegionWalk::Found& found : steepest) try_region(network, found.z, witnesses);
   }
   SlopeWitness result = witnesses.take();
   if (result.x.empty()) {
@@ -220,6 +221,7 @@ SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& opti
     result = witnesses.take();
   }
   result.rounds_done = rounds_done;
+  result.interrupted = interrupted;
   return result;
 }
 

@@ -23,7 +23,9 @@ inline constexpr int kRegionsPerRound = 100;
 struct SlopeSearchOptions {
   std::uint64_t seed = 1;
   int rounds = kDefaultSearchRounds;  ///< of kRegionsPerRound linear regions each, at least 1
-  double seconds = 0;                 ///< wall clock; the search stops at the end of a round; 0: no limit
+  /// Wall clock; 0: no limit. A round that it cuts short counts for nothing, unless it is the first: what was found is
+  /// what as many rounds find.
+  double seconds = 0;
 
   std::optional<Box> box;  ///< where x and y must lie; nothing: anywhere
   /// Where the other neighbours must lie, one entry per term of SlopeFunction::others. May only be left empty
@@ -34,8 +36,7 @@ struct SlopeSearchOptions {
   /// Points x where the first walks start instead of at random ones, [inputs of the moved network] each.
   std::vector<Eigen::VectorXd> starts;
 
-  const std::atomic<bool>* cancelled =
-      nullptr;  ///< ends the search early, with a valid witness of what was found
+  const std::atomic<bool>* cancelled = nullptr;  ///< ends the search early, as `seconds` does
   /// Called after each round with the steepest slope so far.
   std::function<void(int rounds_done, Estimate steepest)> progress;
 };
@@ -45,6 +46,7 @@ struct SlopeSearchOptions {
 struct SlopeWitness : SlopePoints {
   LowerBound slope{0};  ///< output units per input unit
   int rounds_done = 0;
+  bool interrupted = false;  ///< stopped before all rounds were done
 };
 
 /// Looks for the points x, y in the box (equal outside the block), and the points of the other neighbours in theirs,

@@ -1,8 +1,11 @@
 #include "analysis/cli/progress.h"
 
 #include <fmt/core.h>
+#include <sys/time.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
@@ -13,22 +16,29 @@ namespace {
 /// timeout and other parents send the signal to the process and again to its group: one wish, two deliveries.
 constexpr double kOneWish_s = 1;
 
-std::atomic<bool> interrupted{false};
+/// Beyond this a limit is none, and setitimer() might not take it.
+constexpr double kLongestLimit_s = 1e8;
+
+std::atomic<bool> interrupted{false};  ///< by a signal or by the time
+std::atomic<bool> signalled{false};
 timespec first_interrupt;
 
-void on_interrupt(int) {
+void on_time_limit(int) { interrupted = true; }
+
+void on_interrupt(int signal) {
   timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
-  if (!interrupted) {
+  interrupted = true;
+  if (!signalled) {
     first_interrupt = now;
-    interrupted = true;
+    signalled = true;
     return;
   }
   const double since_s = static_cast<double>(now.tv_sec - first_interrupt.tv_sec) +
                          1e-9 * static_cast<double>(now.tv_nsec - first_interrupt.tv_nsec);
   if (since_s < kOneWish_s) return;
-  std::signal(SIGINT, SIG_DFL);
-  std::raise(SIGINT);
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
 }
 
 }  // namespace
@@ -53,12 +63,34 @@ void Progress::show(int done, int total, const std::string& what) {
   }
 }
 
-CancelOnInterrupt::CancelOnInterrupt() {
-  interrupted = false;
-  std::signal(SIGINT, on_interrupt);
+namespace {
+
+void set_timer(double seconds) {
+  itimerval timer{};
+  timer.it_value.tv_sec = static_cast<time_t>(seconds);
+  timer.it_value.tv_usec = static_cast<suseconds_t>(1e6 * (seconds - std::floor(seconds)));
+  setitimer(ITIMER_REAL, &timer, nullptr);
 }
 
-CancelOnInterrupt::~CancelOnInterrupt() { std::signal(SIGINT, SIG_DFL); }
+}  // namespace
+
+CancelOnInterrupt::CancelOnInterrupt(double seconds) {
+  interrupted = signalled = false;
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  if (!(seconds > 0 && seconds < kLongestLimit_s)) return;
+  std::signal(SIGALRM, on_time_limit);
+  set_timer(std::max(seconds, 1e-6));
+}
+
+CancelOnInterrupt::~CancelOnInterrupt() {
+  set_timer(0);
+  std::signal(SIGALRM, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  std::signal(SIGINT, SIG_DFL);
+}
+
+bool CancelOnInterrupt::was_signalled() const { return signalled; }
 
 const std::atomic<bool>* CancelOnInterrupt::flag() const { return &interrupted; }
 

@@ -28,15 +28,19 @@ class Progress {
   bool drawn_ = false;
 };
 
-/// Set by Ctrl-C while an instance exists; another Ctrl-C a second later ends the process.
+/// Set by Ctrl-C (SIGINT) or SIGTERM while an instance exists, or once a time has passed; another such signal a second later
+/// ends the process.
 class CancelOnInterrupt {
  public:
-  CancelOnInterrupt();
+  /// @param seconds wall clock from now on; 0: no limit.
+  explicit CancelOnInterrupt(double seconds = 0);
   ~CancelOnInterrupt();
   CancelOnInterrupt(const CancelOnInterrupt&) = delete;
   CancelOnInterrupt& operator=(const CancelOnInterrupt&) = delete;
 
   const std::atomic<bool>* flag() const;
+  /// Whether a signal came, rather than the end of the time.
+  bool was_signalled() const;
 };
 
 }  // namespace swarmcert::analysis

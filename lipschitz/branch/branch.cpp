@@ -19,6 +19,9 @@ constexpr double kRhoMargin = 1e-8;
 /// A part gets multipliers of its own once its undecided neurons are fewer than this share of those for which the
 /// inherited ones were computed.
 constexpr double kLazy = 0.9;
+/// Or after so many halvings in a row that decided no neuron. Far from the origin of a projective cover neurons stay
+/// undecided that depend on s alone, since nothing reaches them there; they do no harm once their multipliers are large.
+constexpr int kInVain = 6;
 /// A search that ends with so few parts solves those that dominate, at most kPolished, this well and with kMostPairs.
 constexpr std::size_t kFewParts = 64;
 constexpr int kPolished = 8;
@@ -28,6 +31,24 @@ constexpr std::size_t kMostPairs = 40;
 constexpr int kSamples = 500;
 
 }  // namespace
+
+const char* name(BranchStop stop) {
+  switch (stop) {
+    case BranchStop::kCloseEnough:
+      return "close enough";
+    case BranchStop::kNodes:
+      return "nodes used up";
+    case BranchStop::kTimeLimit:
+      return "time limit";
+    case BranchStop::kCancelled:
+      return "cancelled";
+    case BranchStop::kNothingToHalve:
+      return "nothing to halve";
+    case BranchStop::kNothingRun:
+      break;
+  }
+  return "nothing run";
+}
 
 BranchResult BranchSearch::run() {
   const auto start = std::chrono::steady_clock::now();
@@ -50,9 +71,13 @@ BranchResult BranchSearch::run() {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     return options_.seconds > 0 ? elapsed.count() / options_.seconds : 0;
   };
-  while (result_.nodes + 2 <= options_.nodes && share_of_time() < 1 &&
-         !(options_.cancelled != nullptr && *options_.cancelled)) {
-    if (bound(queue.top()) <= enough()) break;
+  const auto why_stop = [&] {
+    if (bound(queue.top()) <= enough()) return BranchStop::kCloseEnough;
+    if (share_of_time() >= 1) return BranchStop::kTimeLimit;
+    if (options_.cancelled != nullptr && *options_.cancelled) return BranchStop::kCancelled;
+    return result_.nodes + 2 <= options_.nodes ? BranchStop::kNothingRun : BranchStop::kNodes;
+  };
+  while ((result_.stop = why_stop()) == BranchStop::kNothingRun) {
     Part top = queue.top();
     queue.pop();
     if (set_ != nullptr && top.undecided < kFormLazy * top.undecided_form) {
@@ -68,10 +93,16 @@ BranchResult BranchSearch::run() {
       queue.push(std::move(top));
       continue;
     }
-    const Box& whole = top.reach->box();
-    const auto k = static_cast<std::size_t>(top.split);
-    if (top.multipliers < 0 || !(whole.upper[k] > whole.lower[k])) {
+    if (top.multipliers >= 0 && top.in_vain >= kInVain) {
+      top.in_vain = 0;
+      solve(top, fine_descent(), static_cast<std::size_t>(std::max(options_.pairs, 0)));
       queue.push(std::move(top));
+      continue;
+    }
+    const Box& whole = top.reach->box();
+    if (top.multipliers < 0 || !(relative_width(whole, static_cast<std::size_t>(top.split)) > kThin)) {
+      queue.push(std::move(top));
+      result_.stop = BranchStop::kNothingToHalve;
       break;
     }
     const auto [first, second] = halves(whole, top.split);
@@ -120,17 +151,21 @@ void BranchSearch::look_ahead(const Part& top) {
   }
 }
 
-void BranchSearch::polish(std::priority_queue<Part>& queue) {
-  if (queue.size() > kFewParts) return;
+DescentOptions BranchSearch::fine_descent() {
   DescentOptions descent;
   descent.relative_gap = kFineGap;
   descent.steps = kFineSteps;
+  return descent;
+}
+
+void BranchSearch::polish(std::priority_queue<Part>& queue) {
+  if (queue.size() > kFewParts) return;
   for (int i = 0; i < kPolished; ++i) {
     Part top = queue.top();
     if (top.multipliers < 0) return;
     const double before = top.rho;
     queue.pop();
-    solve(top, descent, kMostPairs);
+    solve(top, fine_descent(), kMostPairs);
     const bool is_better = top.rho < before;
     queue.push(std::move(top));
     if (!is_better) return;

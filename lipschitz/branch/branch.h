@@ -50,6 +50,25 @@ struct BranchOptions {
   std::function<void(double share, double bound)> progress;
 };
 
+/// Why a search of boxes stopped.
+enum class BranchStop {
+  kNothingRun,
+  kCloseEnough,  ///< the bound is within the tolerance of a slope that is attained
+  kNodes,        ///< all boxes that it was given
+  kTimeLimit,
+  kCancelled,
+  /// The box that dominates has no side left to halve, or no multipliers were found for it. On a projective cover that is
+  /// where kinks which run side by side to infinity, as those behind one neuron of the first layer do, meet in one point:
+  /// boxes around it decide nothing between them, however small.
+  kNothingToHalve,
+};
+/// "close enough", "nodes used up", ...
+const char* name(BranchStop stop);
+/// Whether the search would have gone on.
+constexpr bool is_interrupted(BranchStop stop) {
+  return stop == BranchStop::kCancelled || stop == BranchStop::kTimeLimit;
+}
+
 /// What a search that has stopped knows of the way that is left: estimates, no bounds.
 struct Outlook {
   double bound_halfway = 0, bound = 0;  ///< Lipschitz constants proved after half of the boxes, and after all
@@ -60,6 +79,7 @@ struct Outlook {
 
 struct BranchResult {
   BranchTree tree;
+  BranchStop stop = BranchStop::kNothingRun;
   int nodes = 0;                 ///< boxes looked at
   double undecided_per_box = 0;  ///< neurons that a box leaves undecided, on average
   Outlook outlook;

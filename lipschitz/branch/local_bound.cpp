@@ -91,6 +91,7 @@ void prove(const check::LocalFunction& f, const std::vector<check::Sides>& boxes
   std::vector<Box> roots;
   for (const check::Sides& box : boxes) roots.push_back({box.lower, box.upper});
   BranchResult found = search(roots);
+  result.stop = found.stop;
   result.nodes = found.nodes;
   result.undecided_per_box = found.undecided_per_box;
   result.outlook = found.outlook;

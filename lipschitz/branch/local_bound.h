@@ -27,8 +27,9 @@ struct LocalProof {
 struct LocalBound {
   std::optional<LocalProof> proof;  ///< nothing where the checker did not accept what the search found
   UpperBound upper{0};              ///< sqrt(rho), rounded up
-  int nodes = 0;                    ///< boxes looked at
-  double undecided_per_box = 0;     ///< as BranchResult has it
+  BranchStop stop = BranchStop::kNothingRun;
+  int nodes = 0;                 ///< boxes looked at
+  double undecided_per_box = 0;  ///< as BranchResult has it
   long leaves = 0;
   Outlook outlook;
   std::vector<Eigen::VectorXd> steep_centres;  ///< as BranchResult has them

@@ -45,6 +45,7 @@ class BranchSearch {
     std::vector<NeuronState> states;
     int undecided = 0;
     int split = 0;           ///< the coordinate to halve
+    int in_vain = 0;         ///< halvings in a row that decided no neuron
     int multipliers = -1;    ///< inherited or own
     int undecided_then = 0;  ///< where these multipliers were computed
     int form = -1;           ///< index in forms_
@@ -97,9 +98,14 @@ class BranchSearch {
   static int undecided_in(const std::vector<NeuronState>& states) {
     return static_cast<int>(std::count(states.begin(), states.end(), NeuronState::kUndecided));
   }
-  /// The coordinate that makes up most of the undecided neurons' ranges.
+  /// The coordinate that makes up most of the undecided neurons' ranges, of those that can be halved; else the widest one.
   int best_split(const Reach& reach, const std::vector<Eigen::MatrixXd>& slopes,
                  const std::vector<NeuronState>& states) const;
+
+  /// A box's width along a coordinate, as a share of the widest box that the search was given.
+  double relative_width(const Box& box, std::size_t k) const;
+  /// Boxes narrower than this share are not halved further along that side.
+  static constexpr double kThin = 0x1p-40;
 
   // search_multipliers.cpp
   /// Of the pairs that come with the part's multipliers, those that hold in it between undecided neurons.
@@ -113,6 +119,8 @@ class BranchSearch {
   /// Multipliers of the part's own.
   void solve(Part& part);
   void solve(Part& part, const DescentOptions& descent, std::size_t most_pairs);
+  /// Steps that take multipliers close to the best ones.
+  static DescentOptions fine_descent();
   /// Makes these the part's multipliers: of the undecided neurons, and of pairs.
   void keep(Part& part, const Eigen::VectorXd& t, std::vector<NeuronPair> pairs,
             const Eigen::VectorXd& of_pairs);

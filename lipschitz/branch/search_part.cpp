@@ -46,6 +46,7 @@ BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent, int in
     part.undecided_then = parent->undecided_then;
     part.form = parent->form;
     part.undecided_form = parent->undecided_form;
+    part.in_vain = part.states == parent->states ? parent->in_vain + 1 : 0;
     std::vector<std::size_t> pairs;
     if (has_pairs) pairs = still_shown(part, NeuronForms(forms, box));
     const bool all_pairs = pairs.size() == multipliers_of(part).pairs.size();
@@ -90,13 +91,26 @@ int BranchSearch::best_split(const Reach& reach, const std::vector<MatrixXd>& sl
   for (std::size_t k = 0; k < slopes.size(); ++k) {
     const VectorXd range = reach.before_relu(k).upper - reach.before_relu(k).lower;
     for (Index i = 0; i < range.size(); ++i, ++neuron) {
-      if (states[neuron] != NeuronState::kUndecided) continue;
+      if (states[neuron] != NeuronState::kUndecided || !(range(i) > 0)) continue;
       score += (slopes[k].row(i).transpose().cwiseProduct(width) / range(i)).cwiseAbs2();
     }
   }
-  Index best = 0;
-  score.maxCoeff(&best);
-  return static_cast<int>(best);
+  Index best = 0, widest = 0;
+  for (Index j = 0; j < score.size(); ++j) {
+    const auto relative = [&](Index coordinate) {
+      return relative_width(box, static_cast<std::size_t>(coordinate));
+    };
+    if (relative(j) <= kThin) score(j) = -1;
+    if (score(j) > score(best)) best = j;
+    if (relative(j) > relative(widest)) widest = j;
+  }
+  return static_cast<int>(score(best) > 0 ? best : widest);
+}
+
+double BranchSearch::relative_width(const Box& box, std::size_t k) const {
+  double whole = 0;
+  for (const Box& root : boxes_) whole = std::max(whole, root.upper[k] - root.lower[k]);
+  return whole > 0 ? (box.upper[k] - box.lower[k]) / whole : 0;
 }
 
 }  // namespace swarmcert::lipschitz

@@ -14,6 +14,11 @@ Dyadic squared_norm(const Matrix& m) {
   return sum;
 }
 
+/// The status says whether a search ended by itself. Nothing rests on it.
+void check_status(const files::Json& entry, const std::string& where) {
+  require(entry["status"] == "finished" || entry["status"] == "interrupted", where + ": unknown status");
+}
+
 /// Shows that sqrt(rho) <= `upper` bounds the chain's Lipschitz constant.
 void check_upper(const std::vector<Matrix>& chain, const files::Json& proof, double upper,
                  const std::string& where) {
@@ -128,7 +133,7 @@ void CertificateChecker::check_layer(const Json& entry, const std::string& netwo
 void CertificateChecker::check_bound(const Json& bound) {
   std::set<std::string> keys = {"function", "domain",    "block",         "law",       "norm",
                                 "scale",    "unit",      "upper",         "upper_hex", "upper_method",
-                                "lower",    "lower_hex", "lower_witness", "proof"};
+                                "lower",    "lower_hex", "lower_witness", "proof",     "status"};
   if (bound.contains("neighbours")) keys.insert("neighbours");
   files::require_keys(bound, keys, "bound");
   const std::string function = bound["function"].get<std::string>();
@@ -146,7 +151,8 @@ void CertificateChecker::check_bound(const Json& bound) {
   for (const auto& [key, text] : meaning) require(bound[key] == text, where + ": " + key + " is not " + text);
   const Neighbours neighbours = neighbours_of(bound, where);
   const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
-  if (bound["upper_method"] == "sdp") {
+  check_status(bound, where);
+  if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(stages(network_, function, block, scale), bound["proof"], upper, where);
   } else if (bound["upper_method"] == "branch") {
     check_local(bound, upper, scale, where);
@@ -192,9 +198,11 @@ std::string CertificateChecker::key(const std::string& function, const std::stri
 }
 
 void CertificateChecker::check_law(const Json& law) {
-  files::require_keys(law, {"rho", "neighbours", "domain", "block", "law", "upper", "upper_hex"}, "law");
+  files::require_keys(law, {"rho", "neighbours", "domain", "block", "law", "status", "upper", "upper_hex"},
+                      "law");
   const std::string rho = law["rho"].get<std::string>(), block = law["block"].get<std::string>();
   const std::string where = "law of " + rho + " " + block;
+  check_status(law, where);
   const double upper = number(law["upper"], law["upper_hex"], where + " upper");
   const Neighbours neighbours = law["neighbours"].get<Neighbours>();
   Neighbours terms = neighbours;

@@ -6,6 +6,7 @@
 #include "analysis/run.h"
 #include "data.h"
 #include "nn/base/json.h"
+#include "nn/random_network.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert {
@@ -78,6 +79,37 @@ TEST_F(CommandLine, InspectGoesOnAfterABadFileAndSaysSoInItsExitCode) {
   expect("certify " + net + " -o cert.json", 0, {"proved"});
   expect("inspect nowhere.toml cert.json " + net, 3,
          {"nowhere.toml: cannot be opened", "cert.json: certificate", "fc2"});
+}
+
+TEST_F(CommandLine, SignalsEndACertificationWithWhatIsProvedAndSaySo) {
+  const std::string net = saved(small_network(), "net.safetensors");
+  for (const std::string signal : {"INT", "TERM"}) {
+    const std::string certify =
+        "swarmcert certify " + net + " --nodes 1000000000 --force -o cert.json --json out.json";
+    const Outcome outcome = tests::run_shell(
+        "timeout -s " + signal + " 2 sh -c 'exec " + certify + " --max-lipschitz 2.5'; echo exit $?",
+        folder_.path());
+    // timeout reports 124; what the command itself ends with is in its result.
+    EXPECT_NE(outcome.output.find("interrupted: the search for steep slopes"), std::string::npos)
+        << outcome.output;
+    const Json result = Json::parse(read_text(folder_ / "out.json"));
+    EXPECT_EQ(result["status"], "interrupted");
+    EXPECT_EQ(result["bounds"][0]["status"], "interrupted");
+    expect("check cert.json " + net, 0, {"accepted"});
+  }
+}
+
+TEST_F(CommandLine, TimeLimitsTheSemidefiniteProgramAndLeavesTheLimitInconclusive) {
+  std::mt19937 generator(1);
+  const std::string net = saved(tests::random_network({6, 60, 60, 60, 1}, generator), "net.safetensors");
+  expect("certify " + net + " --time 0.001 --nodes 1 --max-lipschitz 4 --json out.json -o cert.json", 4,
+         {"eclipse_fast", "interrupted: the semidefinite program after",
+          "verdict: inconclusive, from interrupted"});
+  const Json bound = Json::parse(read_text(folder_ / "out.json"))["bounds"][0];
+  EXPECT_EQ(bound["status"], "interrupted");
+  EXPECT_EQ(bound["upper_method"], "eclipse_fast");
+  EXPECT_GT(bound["upper"].get<double>(), 4);
+  expect("check cert.json " + net, 0, {"accepted"});
 }
 
 TEST_F(CommandLine, NoNetworkIsAUsageErrorThatSaysWhatToGive) {

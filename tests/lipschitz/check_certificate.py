@@ -1071,7 +1071,7 @@ class Checker:
 
     def check_bound(self, bound):
         require_keys(bound, ["function", "domain", "block", "law", "norm", "scale", "unit", "upper", "upper_hex",
-                             "upper_method", "lower", "lower_hex", "lower_witness", "proof"]
+                             "upper_method", "status", "lower", "lower_hex", "lower_witness", "proof"]
                      + ["neighbours"] * ("neighbours" in bound), "bound")
         function, block = bound["function"], bound["block"]
         require(isinstance(function, str) and isinstance(block, str), "bound: a name is not text")
@@ -1085,7 +1085,8 @@ class Checker:
         require(bound["law"] == ("one_neighbour" if len(names) == 2 else "none"), f"{where}: another law")
         neighbours = self.neighbours_of(bound, where)
         upper = number(bound["upper"], bound["upper_hex"], where)
-        if bound["upper_method"] == "sdp":
+        require(bound["status"] in ("finished", "interrupted"), f"{where}: unknown status")
+        if bound["upper_method"] in ("sdp", "eclipse_fast"):
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where)
         elif bound["upper_method"] == "branch":
             self.check_local(bound, upper, scale, where)
@@ -1310,8 +1311,9 @@ class Checker:
         require(lower ** 2 * run <= rise, f"{where}: claims more than the slope between x and y")
 
     def check_law(self, law):
-        require_keys(law, ["rho", "neighbours", "domain", "block", "law", "upper", "upper_hex"], "law")
+        require_keys(law, ["rho", "neighbours", "domain", "block", "law", "status", "upper", "upper_hex"], "law")
         where = f"law of {law['rho']} {law['block']}"
+        require(law["status"] in ("finished", "interrupted"), f"{where}: unknown status")
         upper = Fraction(number(law["upper"], law["upper_hex"], where))
         require(isinstance(law["neighbours"], dict), f"{where}: neighbours is not an object")
         require("ground" not in law["neighbours"], f"{where}: the ground is no neighbour")

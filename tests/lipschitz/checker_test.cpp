@@ -275,6 +275,8 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c["bounds"][0]["function"] = "phi:nobody"; });
   rejects([](Json& c) { c["bounds"][0]["function"] = "nothing"; });
   rejects([](Json& c) { c["bounds"][0]["upper_method"] = "guess"; });
+  rejects([](Json& c) { c["bounds"][0]["status"] = "guessed"; });
+  rejects([](Json& c) { c["laws"][0]["status"] = nullptr; });
   rejects([](Json& c) { c["bounds"][0]["upper_method"] = "product"; });
   rejects([](Json& c) { c["bounds"].back()["proof"]["t"].erase(0); });
   rejects([](Json& c) { c["bounds"].back()["proof"]["factor"]["rows"].erase(0); });
@@ -291,7 +293,7 @@ TEST(Checker, RejectsAnotherShapeOfEveryPart) {
   rejects([](Json& c) { c["bounds"].back()["lower_witness"]["others"][0]["network"] = "rho:small"; });
   rejects([](Json& c) { c["layers"][0]["proof"]["lower_vector"].erase(0); });
   rejects([](Json& c) { c["schema"] = "swarmcert/certificate/2"; });
-  EXPECT_EQ(tried, 43);
+  EXPECT_EQ(tried, 45);
 }
 
 TEST(Checker, RoundsToFloat32WhereTheCertificateSaysSo) {

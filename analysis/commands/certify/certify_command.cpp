@@ -157,8 +157,8 @@ void add_comparisons(const files::Network& network, const lipschitz::CertifyOpti
   files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
     const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
     if (bound.block == "all" && bound.scale.empty() && bound.neighbours.empty())
-      output.comparisons[static_cast<std::size_t>(i)] =
-          lipschitz::compare(network, bound.function, bound.block, bound.scale);
+      output.comparisons[static_cast<std::size_t>(i)] = lipschitz::compare(
+          network, bound.function, bound.block, bound.scale, lipschitz::Stop(options.cancelled));
   });
 }
 
@@ -176,6 +176,9 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Ce
   lipschitz::RangeOptions range;
   range.neighbours = std::max(1, options.certify.neighbours);
   range.jobs = options.certify.jobs;
+  const lipschitz::Stop stop(options.certify.cancelled);
+  output.ranges_cut_short = stop.now();
+  if (output.ranges_cut_short) range.nodes = 1;  // wider, and proved all the same
   output.ranges = lipschitz::ranges(network, domain, rho_bounds, range);
   for (const auto& [name, weights] : files::parts(network))
     if (weights->precision != files::Precision::kFloat32)
@@ -184,6 +187,8 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Ce
   float32.neighbours = range.neighbours;
   float32.input_step = options.input_step;
   float32.jobs = range.jobs;
+  float32.stop = stop;
+  if (output.ranges_cut_short) float32.nodes = 1;
   output.float32_errors = lipschitz::float32_errors(network, domain, bounds, float32);
 }
 
@@ -249,19 +254,20 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
     if (options.nodes == 0) throw UsageError("--nodes must be at least 1 with --method branch");
     if (options.nodes) options.certify.branch.nodes = *options.nodes;
     if (!options.nodes && options.seconds > 0) options.certify.branch.nodes = std::numeric_limits<int>::max();
-    options.certify.branch.seconds = options.seconds;
   } else {
     if (options.certify.branch.pairs > 0 || !options.certify.branch.better_slopes)
       throw UsageError("--cuts and --default-slopes are options of the search: they need --method branch");
     options.certify.lower.rounds = options.nodes;
-    options.certify.lower.seconds = options.seconds;
   }
   Progress progress(common.quiet);
   options.certify.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
   };
-  const CancelOnInterrupt interrupt;
+  // The flag is for what has no clock of its own; what has one says that its time is over, rather than cancelled.
+  constexpr double kLater_s = 0.1;
+  const CancelOnInterrupt interrupt(options.seconds > 0 ? options.seconds + kLater_s : 0);
   options.certify.cancelled = interrupt.flag();
+  options.certify.seconds = options.seconds;
 
   CertifyOutput output;
   output.found = certify_or_refuse(network, options.certify);
@@ -293,7 +299,8 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
     if (options.max_lipschitz > 0)
       fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
     if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
-    fmt::print("verdict: {} for {}\n", name(verdict), files::chain_words(network));
+    fmt::print("verdict: {} for {}{}\n", name(verdict), files::chain_words(network),
+               output.is_interrupted() ? ", from interrupted searches" : "");
   }
   if (!options.report.empty()) {
     const std::string path = write_certify_report(network, output, result, options.report, common.force);
@@ -320,7 +327,9 @@ Command certify_command() {
         declare_network(app, options->network);
         app.add_option(
                "--method", options->method,
-               "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron), auto (the smaller of both), "
+               "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron; the layer-wise eclipse_fast "
+               "where "
+               "its search is interrupted), auto (the smallest of the three), "
                "or branch (branch and bound over the box of --domain; without --domain over all inputs)")
             ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
             ->capture_default_str();
@@ -394,10 +403,10 @@ Command certify_command() {
                "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
                "networks). With --method branch: boxes to look at, per bound (default: 20000)")
             ->check(CLI::NonNegativeNumber);
-        app.add_option(
-               "--time", options->seconds,
-               "End the search for a lower bound after the round in which this many seconds pass; with "
-               "--method branch: the search for an upper bound, per bound")
+        app.add_option("--time", options->seconds,
+                       "Time limit of the whole command in seconds. Bounds are proved all the same; those "
+                       "whose search was "
+                       "cut short have the status interrupted, as after Ctrl-C or SIGTERM")
             ->check(CLI::PositiveNumber);
         app.add_option("--seed", options->certify.lower.seed, "Seed of the lower-bound search")
             ->capture_default_str();

@@ -229,6 +229,8 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
     json["lower_witness"] = witness_json(bound.lower);
     json["product_upper"] = bound.product.value();
     json["search_rounds"] = bound.lower.rounds;
+    if (bound.branch_stop != lipschitz::BranchStop::kNothingRun)
+      json["branch_stop"] = name(bound.branch_stop);
     if (bound.nodes > 0) {
       json["nodes"] = bound.nodes;
       const bool has_lower = bound.lower.witness && bound.lower.witness->slope.value() > 0;
@@ -274,6 +276,7 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
                                        {"evaluation", error.evaluation.value()},
                                        {"inputs", error.inputs.value()}});
   }
+  result["status"] = lipschitz::status(output.is_interrupted());
   result["verdict"] = name(output.verdict);
   return result;
 }
@@ -344,25 +347,51 @@ void print_layers(const files::Network& network, const Certification& found) {
   }
 }
 
+/// Which searches were cut short, and how far they were; empty where none was. A search of boxes that ended because it
+/// could do no more says so as well.
+std::string interruption_words(const CertifiedBound& bound) {
+  std::string words;
+  const auto add = [&words](const std::string& what) { words += (words.empty() ? "" : "; ") + what; };
+  if (bound.branch_stop == lipschitz::BranchStop::kNothingRun && is_interrupted(bound.sdp.stop))
+    add(fmt::format("the semidefinite program after {} iterations ({})", bound.sdp.iterations,
+                    name(bound.sdp.stop)));
+  if (is_interrupted(bound.branch_stop))
+    add(fmt::format("branch and bound after {} boxes ({})", bound.nodes, name(bound.branch_stop)));
+  if (bound.lower.interrupted)
+    add(fmt::format("the search for steep slopes after {} rounds", bound.lower.rounds));
+  if (!words.empty()) return "interrupted: " + words + "; more time may give closer bounds";
+  if (bound.branch_stop == lipschitz::BranchStop::kNothingToHalve)
+    return fmt::format(
+        "branch and bound stopped after {} boxes: no halving of the box that dominates decides another of "
+        "its neurons{}",
+        bound.nodes,
+        bound.domain == "global"
+            ? "; far out, kinks that run side by side to infinity meet in one point of the cover"
+            : "");
+  return {};
+}
+
 void print_bounds(const files::Network& network, const Certification& found) {
   std::size_t width = 8;
   for (const CertifiedBound& bound : found.bounds) width = std::max(width, label(bound).size());
   fmt::print("\nLipschitz constants over {}, Euclidean norms\n",
              found.domain.empty() ? "all inputs" : "the box");
-  fmt::print("  {:<{}}  {:>14}  {:<7}  {:>12}  {:>14}  {:>6}  {}\n", "function", width, "proved upper",
+  fmt::print("  {:<{}}  {:>14}  {:<12}  {:>12}  {:>14}  {:>6}  {}\n", "function", width, "proved upper",
              "method", "product", "witnessed", "ratio", "unit");
   for (const CertifiedBound& bound : found.bounds) {
     const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
-    fmt::print("  {:<{}}  {:>14.10g}  {:<7}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
+    fmt::print("  {:<{}}  {:>14.10g}  {:<12}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
                bound.upper.value(), name(bound.method), bound.product.value(),
                bound.lower.witness ? fmt::format("{:.8g}", lower) : "-",
                lower > 0 ? fmt::format("{:.3f}", bound.upper.value() / lower) : "-",
                files::unit(network, bound.function, bound.block));
     const bool unproved = !bound.proof && !bound.sdp.proof && !bound.local;
-    if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) {
+    if (unproved && bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun && !is_interrupted(bound.sdp.stop)) {
       fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
                  name(bound.sdp.stop));
     }
+    const std::string interruption = interruption_words(bound);
+    if (!interruption.empty()) fmt::print("    {}\n", interruption);
     const std::string outlook = branch_outlook_words(bound);
     if (!outlook.empty()) fmt::print("    {}\n", outlook);
   }
@@ -400,8 +429,9 @@ void print_comparisons(const CertifyOutput& output) {
 
 void print_ranges(const files::Network& network, const CertifyOutput& output) {
   if (!output.ranges.empty())
-    fmt::print("\nRange over the box, proved (attained by points in brackets), in {}\n",
-               output_unit(network));
+    fmt::print("\nRange over the box, proved (attained by points in brackets), in {}{}\n",
+               output_unit(network),
+               output.ranges_cut_short ? "; interrupted: one part of the box, so that it is wide" : "");
   for (const lipschitz::CertifiedRange& range : output.ranges) {
     const std::string many =
         range.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", range.neighbours_at_most) : "";

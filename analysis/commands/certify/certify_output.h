@@ -28,6 +28,9 @@ struct CertifyOutput {
   std::string domain_file;  ///< box.toml; empty: none
   lipschitz::SlopeMapOptions map;
   std::vector<lipschitz::SlopeMap> maps;
+  bool ranges_cut_short = false;  ///< ranges and float32 errors are of one part of the box
+
+  bool is_interrupted() const { return lipschitz::is_interrupted(found) || ranges_cut_short; }
 };
 
 /// "set:small:large", "set:small:large position scaled", "set:small:large, at most 2 small".

@@ -37,7 +37,8 @@ bool has_block(const files::Network& network, const std::string& function, const
 double sdp_constant(const files::Network& network, const std::string& function, const std::string& block,
                     double otherwise, std::vector<double>* t, const std::atomic<bool>* cancelled) {
   if (block != "all" && !has_block(network, function, block)) return kNoConstant;
-  const lipschitz::SdpBound found = lipschitz::sdp_bound(check::stages(network, function, block), cancelled);
+  const lipschitz::SdpBound found =
+      lipschitz::sdp_bound(check::stages(network, function, block), {lipschitz::Stop(cancelled), {}});
   if (!found.proof) return otherwise;
   if (t != nullptr) *t = found.proof->t;
   return std::min(otherwise, found.proof->upper.value());

@@ -1,0 +1,177 @@
+#include "lipschitz/certify_bounds.h"
+
+#include <algorithm>
+
+#include "lipschitz/checker/stages.h"
+#include "lipschitz/eclipse_fast.h"
+#include "lipschitz/range.h"
+#include "nn/base/parallel.h"
+#include "nn/weights/functions.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using files::Network;
+
+/// Of the time of a command, what the bounds for all inputs may take where branch and bound follows; and of the time of one
+/// bound by branch and bound, what the search of boxes may take: its proof is checked afterwards, and lower bounds are
+/// searched once more.
+constexpr double kShareBeforeBranch = 0.3, kShareOfBoxes = 0.6;
+
+std::string called(const CertifiedBound& bound) {
+  return bound.function + " " + bound.block + (bound.neighbours.empty() ? "" : " with so many neighbours");
+}
+
+bool has_program(const CertifyOptions& options, const CertifiedBound& bound) {
+  return options.method != UpperMethod::kProduct && bound.neighbours.empty();
+}
+
+bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
+  return options.method == UpperMethod::kBranch && bound.function.rfind("rho:", 0) != 0;
+}
+
+/// The sooner of a limit of its own, 0: none, and a stop, in seconds; 0: no limit.
+double seconds_until(const Stop& stop, double own) {
+  if (!stop.has_limit()) return own;
+  const double left = std::max(stop.seconds_left(), Stop::kLeast_s);
+  return own > 0 ? std::min(own, left) : left;
+}
+
+void bound_layer_by_layer(const Network& network, CertifiedBound& bound) {
+  const std::vector<check::Matrix> stages = check::stages(network, bound.function, bound.block, bound.scale);
+  if (stages.size() == 1) return;  // the spectral norm is proved as quickly by sdp_bound()
+  std::optional<UpperProof> proof = eclipse_fast(stages);
+  if (!proof || !(proof->upper.value() < bound.upper.value())) return;
+  bound.upper = proof->upper;
+  bound.method = UpperMethod::kEclipseFast;
+  bound.proof = std::move(proof);
+}
+
+void solve_program(const Network& network, const CertifyOptions& options, const Stop& stop,
+                   CertifiedBound& bound) {
+  bound.sdp =
+      sdp_bound(check::stages(network, bound.function, bound.block, bound.scale), {stop, bound.upper});
+  if (!bound.sdp.proof) return;
+  const bool is_wanted = options.method == UpperMethod::kSdp && !is_interrupted(bound.sdp.stop);
+  if (!is_wanted && !(bound.sdp.proof->upper.value() < bound.upper.value())) return;
+  bound.upper = bound.sdp.proof->upper;
+  bound.method = UpperMethod::kSdp;
+  bound.proof = std::move(bound.sdp.proof);
+  bound.sdp.proof.reset();
+}
+
+void search_below(const Network& network, const CertifyOptions& options, const Stop& stop,
+                  std::vector<Eigen::VectorXd> starts, CertifiedBound& bound) {
+  LowerBoundOptions lower = options.lower;
+  lower.cancelled = options.cancelled;
+  lower.seconds = seconds_until(stop, options.lower.seconds);
+  lower.starts = std::move(starts);
+  FoundSlope found = lower_bound(network, bound, options.domain, lower);
+  const int rounds = bound.lower.rounds + found.rounds;
+  const bool interrupted = bound.lower.interrupted || found.interrupted;
+  const bool is_steeper = found.witness && (!bound.lower.witness || found.witness->slope.value() >
+                                                                        bound.lower.witness->slope.value());
+  if (is_steeper) bound.lower = std::move(found);
+  bound.lower.rounds = rounds;
+  bound.lower.interrupted = interrupted;
+}
+
+/// What is proved for any number of neighbours holds for so many.
+void start_from_any_number(const std::vector<CertifiedBound>& bounds, CertifiedBound& counted) {
+  const auto any = std::find_if(bounds.begin(), bounds.end(), [&](const CertifiedBound& bound) {
+    return bound.function == counted.function && bound.block == counted.block && bound.neighbours.empty() &&
+           bound.scale.empty();
+  });
+  counted.upper = any->upper;
+  counted.method = any->method;
+  counted.proof = any->proof;
+  counted.local = any->local;
+  counted.sdp = any->sdp;
+}
+
+/// Replaces the bound for all inputs by a smaller one for the box, where there is one.
+void branch_further(const Network& network, const std::map<std::string, Box>& domain,
+                    const CertifyOptions& options, const Stop& stop, CertifiedBound& bound) {
+  BranchOptions branch = options.branch;
+  branch.known = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
+  branch.cancelled = options.cancelled;
+  branch.seconds = seconds_until(stop.after_share(kShareOfBoxes), options.branch.seconds);
+  if (options.progress) {
+    branch.progress = [&options, &bound](double share, double upper) {
+      constexpr int kPermille = 1000;
+      options.progress(static_cast<int>(share * kPermille), kPermille,
+                       "branch and bound of " + called(bound) + ", at most " + std::to_string(upper));
+    };
+  }
+  const UpperProof* const global = bound.proof       ? &*bound.proof
+                                   : bound.sdp.proof ? &*bound.sdp.proof
+                                                     : nullptr;
+  LocalBound local =
+      local_bound(network, bound, domain, global != nullptr ? global->t : std::vector<double>(), branch);
+  bound.nodes = local.nodes;
+  bound.outlook = local.outlook;
+  bound.branch_stop = local.stop;
+  search_below(network, options, stop, std::move(local.steep_centres), bound);
+  if (!local.proof || !(local.upper.value() < bound.upper.value())) return;
+  bound.upper = local.upper;
+  bound.method = UpperMethod::kBranch;
+  bound.local = std::move(local.proof);
+  if (bound.proof) bound.sdp.proof = std::move(bound.proof);  // where others may start from
+  bound.proof.reset();
+}
+
+/// Branch and bound for those of `bounds` that it is wanted for; those of any number of neighbours first.
+void branch_all(const Network& network, const CertifyOptions& options, const Stop& stop,
+                WorkProgress& progress, std::vector<CertifiedBound>& bounds) {
+  const std::map<std::string, Box> domain = clamped(network, options.domain);
+  const auto is_any = [&](const CertifiedBound& bound) { return is_branched(options, bound); };
+  const auto tasks = static_cast<int>(std::count_if(bounds.begin(), bounds.end(), is_any));
+  TimeShares shares(stop, tasks, options.jobs);
+  for (const bool are_counted : {false, true}) {
+    files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
+      CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
+      if (!is_branched(options, bound) || bound.neighbours.empty() == are_counted) return;
+      const Stop share = shares.next();
+      progress.run("branch and bound of " + called(bound), [&] {
+        if (are_counted) start_from_any_number(bounds, bound);
+        branch_further(network, domain, options, share, bound);
+      });
+    });
+  }
+}
+
+}  // namespace
+
+int pieces_of_work(const CertifyOptions& options, int bounds) {
+  return (options.method == UpperMethod::kBranch ? 4 : 3) * bounds;
+}
+
+void find_bounds(const Network& network, const CertifyOptions& options, const Stop& stop,
+                 WorkProgress& progress, std::vector<CertifiedBound>& bounds) {
+  const auto count = static_cast<int>(bounds.size());
+  files::parallel_for(count, options.jobs, [&](int i) {
+    CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
+    progress.run("layer-wise bound of " + called(bound), [&] {
+      if (has_program(options, bound)) bound_layer_by_layer(network, bound);
+    });
+  });
+
+  // Programs and searches are one flat list of independent pieces.
+  const bool branches = options.method == UpperMethod::kBranch;
+  TimeShares shares(branches ? stop.after_share(kShareBeforeBranch) : stop, 2 * count, options.jobs);
+  files::parallel_for(2 * count, options.jobs, [&](int i) {
+    CertifiedBound& bound = bounds[static_cast<std::size_t>(i % count)];
+    const Stop share = shares.next();
+    if (i < count) {
+      progress.run("search for steep slopes of " + called(bound),
+                   [&] { search_below(network, options, share, options.lower.starts, bound); });
+    } else {
+      progress.run("semidefinite program of " + called(bound), [&] {
+        if (has_program(options, bound)) solve_program(network, options, share, bound);
+      });
+    }
+  });
+  if (branches) branch_all(network, options, stop, progress, bounds);
+}
+
+}  // namespace swarmcert::lipschitz
