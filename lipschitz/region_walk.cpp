@@ -104,14 +104,14 @@ double power_iteration(const MatrixXd& matrix, VectorXd v, int steps) {
 
 }  // namespace
 
-RegionWalk::RegionWalk(const SearchNetwork& network, std::uint64_t seed, const std::vector<VectorXd>& starts)
+RegionWalk::RegionWalk(const SearchNetwork& network, std::uint64_t seed, const std::vector<VectorXd>& starts,
+                       Where where)
     : network_(network),
       random_(seed),
       starts_(starts.rbegin(), starts.rend()),
       all_move_(std::all_of(network.stages.begin(), network.stages.end(),
                             [](const SearchStage& stage) { return stage.moved == stage.weights.rows(); })) {
-  const auto is_boxed = [](char boxed) { return boxed != 0; };
-  if (std::any_of(network.boxed.begin(), network.boxed.end(), is_boxed)) return;
+  if (where == Where::kAmongKinks) return;
   recession_ = network;
   for (SearchStage& stage : recession_->stages) stage.biases.setZero();
 }
@@ -149,22 +149,20 @@ void RegionWalk::start_walk() {
   best_of_walk_ = -1;
   entered_in_vain_ = 0;
   reach_ = random_.log_uniform(kLeastReach, kLargestReach);
-  constexpr int kKinds = 4;
-  const bool at_infinity = starts_.empty() && recession_ && walks_ % kKinds == kKinds - 1;
-  queue_.push(at_infinity ? start_at_infinity() : steepest_start());
-  if (!starts_.empty()) {
-    starts_.pop_back();
+  if (!recession_) {
+    queue_.push(steepest_start(kNearest, kFarthest));
+  } else if (walks_++ % 2 == 0) {
+    queue_.push(start_at_infinity());
   } else {
-    ++walks_;
+    queue_.push(steepest_start(kLadderNearest, kLadderFarthest));
   }
+  if (!starts_.empty()) starts_.pop_back();
 }
 
-RegionWalk::Candidate RegionWalk::steepest_start() {
-  const bool on_ladder = starts_.empty() && walks_ % 2 == 1;
+RegionWalk::Candidate RegionWalk::steepest_start(double nearest, double farthest) {
   Candidate start{-1, VectorXd(), true};
   for (int i = 0; i < kStarts; ++i) {
-    VectorXd z =
-        on_ladder ? random_point(kLadderNearest, kLadderFarthest) : random_point(kNearest, kFarthest);
+    VectorXd z = random_point(nearest, farthest);
     if (!starts_.empty()) move_to(starts_.back(), z);
     const double slope = local_slope(network_, z).slope;
     if (slope > start.slope) start = {slope, std::move(z), true};

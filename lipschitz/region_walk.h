@@ -17,10 +17,7 @@ namespace swarmcert::lipschitz {
 
 /// Maximises the local slope by walking from linear region to linear region.
 ///
-/// A walk starts at the steepest of some random points. Where the domain is open they lie in turn among the kinks of the
-/// first layer, on a ladder of scales around that, and at infinity: along a ray x + t d, t -> inf, f has the slopes of the
-/// chain without its biases, whose linear regions are cones; the walk starts far out along the steepest of some random
-/// directions. It keeps what it has seen but not entered in a queue and
+/// A walk starts at the steepest of some random points. It keeps what it has seen but not entered in a queue and
 /// enters the steepest: it moves to the analytic centre of that region (the minimiser of -sum_i log|y_i| minus the
 /// logarithms of the distances to the bounds, or plus |z|^2 / R^2 where there are none), and from there shoots a ray
 /// at every kink, along H^-1 dy_i/dz with the Hessian H of that barrier, which sees narrow regions as round. The
@@ -31,6 +28,10 @@ namespace swarmcert::lipschitz {
 /// in them alone count as one; otherwise a walk would drown in regions of equal slope. Behind such kinks the estimate
 /// is rough, so every region's slope is evaluated before it is entered, and it goes back into the queue where that
 /// is not the steepest after all.
+///
+/// Where the domain is open, walks start among the kinks of the first layer or, far from them, in turn on a ladder of scales
+/// and at infinity: along a ray x + t d, t -> inf, f has the slopes of the chain without its biases, whose linear regions
+/// are cones; the walk starts far out along the steepest of some random directions.
 ///
 /// A walk ends when kPatience regions in a row were no steeper than its best one; regions once entered are not
 /// entered again.
@@ -44,10 +45,13 @@ class RegionWalk {
     double slope = -1;
   };
 
+  /// Where walks start.
+  enum class Where { kAmongKinks, kFarOut };
+
   /// @param starts moved vectors at which the first walks start; the other neighbours are where the slope is steepest
   ///   among some random places.
   RegionWalk(const SearchNetwork& network, std::uint64_t seed,
-             const std::vector<Eigen::VectorXd>& starts = {});
+             const std::vector<Eigen::VectorXd>& starts = {}, Where where = Where::kAmongKinks);
 
   /// Enters up to `regions` regions, continuing the current walk and starting new ones.
   /// @returns whether it went through with that, rather than stop.
@@ -70,7 +74,8 @@ class RegionWalk {
   Eigen::VectorXd random_point(double nearest, double farthest);
   void move_to(const Eigen::VectorXd& x, Eigen::VectorXd& z) const;
   void start_walk();
-  Candidate steepest_start();
+  /// The steepest of some points of the domain at distances between these two.
+  Candidate steepest_start(double nearest, double farthest);
   Candidate start_at_infinity();
   /// Takes the steepest candidate from the queue, once evaluated; false where it was entered before.
   bool take_steepest(Eigen::VectorXd& z);
@@ -87,7 +92,7 @@ class RegionWalk {
   files::Random random_;
   std::vector<Eigen::VectorXd> starts_;  ///< still to be used, the first one last
   bool all_move_;  ///< every neuron depends on the moved vector, so that what lies behind a facet is exact
-  std::optional<SearchNetwork> recession_;  ///< the chain without its biases, where no variable is bounded
+  std::optional<SearchNetwork> recession_;  ///< of walks far out: the chain without its biases
   int walks_ = 0;
   double reach_ = 1;  ///< R of the current walk
   std::priority_queue<Candidate> queue_;

@@ -187,6 +187,15 @@ void try_region(const SearchNetwork& network, const VectorXd& z, Witnesses& witn
   }
 }
 
+/// The regions of both, steepest first.
+std::vector<RegionWalk::Found> both(std::vector<RegionWalk::Found> regions,
+                                    const std::vector<RegionWalk::Found>& more) {
+  regions.insert(regions.end(), more.begin(), more.end());
+  std::stable_sort(regions.begin(), regions.end(),
+                   [](const auto& a, const auto& b) { return a.slope > b.slope; });
+  return regions;
+}
+
 }  // namespace
 
 SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& options) {
@@ -202,15 +211,17 @@ SlopeWitness search_slope(const SlopeFunction& f, const SlopeSearchOptions& opti
     try_region(network, VectorXd::Zero(network.variables()), witnesses);  // f is affine: one region
   } else if (!network.block.empty()) {
     RegionWalk walk(network, options.seed, options.starts);
+    RegionWalk far_out(network, options.seed + 1, {}, RegionWalk::Where::kFarOut);
+    const bool is_open = std::count(network.boxed.begin(), network.boxed.end(), 0) == network.variables();
     std::vector<RegionWalk::Found> steepest;
-    while (rounds_done < options.rounds && !interrupted) {
-      interrupted = !walk.enter(kRegionsPerRound, stop);
-      if (!interrupted || rounds_done == 0) steepest = walk.steepest();
+    while (rounds_done < options.rounds) {
+      interrupted =
+          !walk.enter(kRegionsPerRound, stop) || (is_open && !far_out.enter(kFarRegionsPerRound, stop));
+      if (!interrupted || rounds_done == 0) steepest = both(walk.steepest(), far_out.steepest());
       if (interrupted) break;
       ++rounds_done;
       if (options.progress) {
-        options.progress(rounds_done,
-                         Estimate(walk.steepest().empty() ? 0.0 : walk.steepest().front().slope));
+        options.progress(rounds_done, Estimate(steepest.empty() ? 0.0 : steepest.front().slope));
       }
     }
     for (const RegionWalk::Found& found : steepest) try_region(network, found.z, witnesses);

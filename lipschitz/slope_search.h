@@ -19,6 +19,8 @@ inline constexpr int kDefaultSearchRounds = 40;
 
 /// Linear regions that one round of search_slope() enters.
 inline constexpr int kRegionsPerRound = 100;
+/// And as many more far from the kinks of the first layer, where the domain is open.
+inline constexpr int kFarRegionsPerRound = 50;
 
 struct SlopeSearchOptions {
   std::uint64_t seed = 1;

@@ -372,16 +372,19 @@ std::string interruption_words(const CertifiedBound& bound) {
 }
 
 void print_bounds(const files::Network& network, const Certification& found) {
-  std::size_t width = 8;
-  for (const CertifiedBound& bound : found.bounds) width = std::max(width, label(bound).size());
+  std::size_t width = 8, method_width = 7;
+  for (const CertifiedBound& bound : found.bounds) {
+    width = std::max(width, label(bound).size());
+    method_width = std::max(method_width, std::string(name(bound.method)).size());
+  }
   fmt::print("\nLipschitz constants over {}, Euclidean norms\n",
              found.domain.empty() ? "all inputs" : "the box");
-  fmt::print("  {:<{}}  {:>14}  {:<12}  {:>12}  {:>14}  {:>6}  {}\n", "function", width, "proved upper",
-             "method", "product", "witnessed", "ratio", "unit");
+  fmt::print("  {:<{}}  {:>14}  {:<{}}  {:>12}  {:>14}  {:>6}  {}\n", "function", width, "proved upper",
+             "method", method_width, "product", "witnessed", "ratio", "unit");
   for (const CertifiedBound& bound : found.bounds) {
     const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
-    fmt::print("  {:<{}}  {:>14.10g}  {:<12}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
-               bound.upper.value(), name(bound.method), bound.product.value(),
+    fmt::print("  {:<{}}  {:>14.10g}  {:<{}}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
+               bound.upper.value(), name(bound.method), method_width, bound.product.value(),
                bound.lower.witness ? fmt::format("{:.8g}", lower) : "-",
                lower > 0 ? fmt::format("{:.3f}", bound.upper.value() / lower) : "-",
                files::unit(network, bound.function, bound.block));
