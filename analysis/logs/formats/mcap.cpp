@@ -1,7 +1,6 @@
 #include "analysis/logs/formats/mcap.h"
 
 #include <fmt/core.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <deque>
@@ -10,68 +9,14 @@
 
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
+#include "analysis/logs/formats/mcap_records.h"
 #include "analysis/logs/formats/ros_topic.h"
 
 namespace swarmcert::logs {
 namespace {
 
-constexpr std::string_view kMcapMagic = "\x89MCAP0\r\n";
-constexpr std::size_t kMcapHead_bytes = 9;  ///< of a record: operation code and length
 constexpr std::size_t kLongestMcapText_bytes = std::size_t{1} << 16;
 constexpr std::size_t kLongestMcapName = 1024;
-
-enum McapCode : unsigned char {
-  kHeader = 0x01,
-  kFooter = 0x02,
-  kSchema = 0x03,
-  kChannel = 0x04,
-  kMessage = 0x05,
-  kChunk = 0x06,
-  kMessageIndex = 0x07,
-  kMetadata = 0x0C,
-  kDataEnd = 0x0F
-};
-
-struct McapRecord {
-  unsigned char code = 0;
-  std::string_view content;
-};
-
-/// Takes fields off the front of a record; once something is missing, all that follows is empty.
-class McapFields {
- public:
-  explicit McapFields(std::string_view content) : rest_(content) {}
-
-  template <typename Integer>
-  Integer number() {
-    const std::optional<Integer> value = integer_at<Integer>(rest_, 0);
-    take(sizeof(Integer));
-    return value.value_or(0);
-  }
-  /// A text behind its length, or bytes behind theirs of type Length.
-  template <typename Length = std::uint32_t>
-  std::string_view bytes() {
-    return take(number<Length>());
-  }
-  std::string_view rest() const { return rest_; }
-  bool is_sound() const { return is_sound_; }
-  bool is_at_end() const { return is_sound_ && rest_.empty(); }
-
- private:
-  std::string_view take(std::uint64_t size) {
-    if (size > rest_.size()) {
-      is_sound_ = false;
-      rest_ = {};
-      return {};
-    }
-    const std::string_view taken = rest_.substr(0, size);
-    rest_.remove_prefix(size);
-    return taken;
-  }
-
-  std::string_view rest_;
-  bool is_sound_ = true;
-};
 
 struct McapSchema {
   std::string name, encoding;
@@ -84,97 +29,6 @@ struct McapChannel {
   std::uint16_t schema = 0;
   std::string topic, encoding;
 };
-struct McapChunk {
-  std::uint64_t uncompressed_bytes = 0;
-  std::uint32_t checksum = 0;  ///< 0: none
-  std::string_view compression, records;
-  std::uint64_t stated_bytes = 0;  ///< of `records`
-  bool is_whole = true;            ///< false where the file ends within it
-};
-
-std::optional<McapRecord> mcap_record_at(std::string_view bytes, std::size_t at) {
-  if (at > bytes.size() || bytes.size() - at < kMcapHead_bytes) return std::nullopt;
-  const std::uint64_t size = *integer_at<std::uint64_t>(bytes, at + 1);
-  if (size > bytes.size() - at - kMcapHead_bytes) return std::nullopt;
-  return McapRecord{static_cast<unsigned char>(bytes[at]), bytes.substr(at + kMcapHead_bytes, size)};
-}
-
-std::size_t size_of(const McapRecord& record) { return kMcapHead_bytes + record.content.size(); }
-
-/// True if the content has the form of its code. Codes of later versions and of programs of their own pass.
-bool is_sound(const McapRecord& record) {
-  McapFields fields(record.content);
-  switch (record.code) {
-    case 0:
-      return false;
-    case kHeader:
-      fields.bytes();
-      fields.bytes();
-      return fields.is_sound();
-    case kFooter:
-      return record.content.size() == 20;
-    case kSchema:
-      fields.number<std::uint16_t>();
-      fields.bytes();
-      fields.bytes();
-      fields.bytes();
-      return fields.is_at_end();
-    case kChannel:
-      fields.number<std::uint16_t>();
-      fields.number<std::uint16_t>();
-      fields.bytes();
-      fields.bytes();
-      fields.bytes();
-      return fields.is_at_end();
-    case kMessage:
-      return record.content.size() >= 22;
-    case kChunk:
-      fields.number<std::uint64_t>();
-      fields.number<std::uint64_t>();
-      fields.number<std::uint64_t>();
-      fields.number<std::uint32_t>();
-      fields.bytes();
-      fields.bytes<std::uint64_t>();
-      return fields.is_at_end();
-    case kMessageIndex:
-      fields.number<std::uint16_t>();
-      fields.bytes();
-      return fields.is_at_end();
-    case kMetadata:
-      fields.bytes();
-      fields.bytes();
-      return fields.is_at_end();
-    case kDataEnd:
-      return record.content.size() == 4;
-    default:
-      return true;
-  }
-}
-
-McapChunk chunk_of(std::string_view content) {
-  McapFields fields(content);
-  McapChunk chunk;
-  fields.number<std::uint64_t>();
-  fields.number<std::uint64_t>();
-  chunk.uncompressed_bytes = fields.number<std::uint64_t>();
-  chunk.checksum = fields.number<std::uint32_t>();
-  chunk.compression = fields.bytes();
-  chunk.stated_bytes = fields.number<std::uint64_t>();
-  chunk.is_whole = fields.is_sound() && chunk.stated_bytes <= fields.rest().size();
-  chunk.records = fields.rest().substr(0, chunk.stated_bytes);
-  return chunk;
-}
-
-std::uint32_t mcap_checksum(std::string_view bytes) {
-  uLong sum = 0;
-  constexpr std::size_t kPart_bytes = std::size_t{1} << 30;  // zlib counts in 32 bits
-  for (std::size_t at = 0; at < bytes.size(); at += kPart_bytes) {
-    const std::string_view part = bytes.substr(at, kPart_bytes);
-    sum = crc32(sum, reinterpret_cast<const Bytef*>(part.data()), static_cast<uInt>(part.size()));
-  }
-  return static_cast<std::uint32_t>(sum);
-}
-
 class McapReader {
  public:
   McapReader(std::string_view bytes, const std::string& path) : bytes_(bytes), path_(path) {
@@ -209,7 +63,7 @@ class McapReader {
     while (at < bytes_.size()) {
       if (bytes_.substr(at) == kMcapMagic) return found;
       const std::optional<McapRecord> record = mcap_record_at(bytes_, at);
-      if (record && is_sound(*record)) {
+      if (record && has_form(*record)) {
         found.push_back(at);
         at += size_of(*record);
         continue;
@@ -229,10 +83,10 @@ class McapReader {
     for (++at; at < bytes_.size(); ++at) {
       if (bytes_.substr(at) == kMcapMagic) return at;
       const std::optional<McapRecord> first = mcap_record_at(bytes_, at);
-      if (!first || first->code > kDataEnd || !is_sound(*first)) continue;
+      if (!first || first->code > kDataEnd || !has_form(*first)) continue;
       const std::size_t behind = at + size_of(*first);
       const std::optional<McapRecord> second = mcap_record_at(bytes_, behind);
-      if (second && second->code <= kDataEnd && is_sound(*second)) return at;
+      if (second && second->code <= kDataEnd && has_form(*second)) return at;
       if (bytes_.substr(behind) == kMcapMagic) return at;
     }
     return bytes_.size();
@@ -358,7 +212,7 @@ class McapReader {
     std::size_t at = 0;
     while (at < content.size()) {
       const std::optional<McapRecord> record = mcap_record_at(content, at);
-      if (!record || !is_sound(*record)) {
+      if (!record || !has_form(*record)) {
         if (is_whole) ++log_.health.damaged_blocks;
         log_.health.skipped_bytes += content.size() - at;
         return;

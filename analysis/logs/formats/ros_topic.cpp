@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "analysis/logs/formats/cdr.h"
 #include "analysis/logs/formats/ros_messages.h"
 
 namespace swarmcert::logs {
@@ -13,68 +14,6 @@ namespace {
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostNames = 1024;
 constexpr std::size_t kLongestText_bytes = 4096;
-
-/// Serialized data: numbers are aligned to their size, counted from behind the four bytes of the head.
-class CdrCursor {
- public:
-  /// False if the head announces no encoding that is known here.
-  bool begin(std::string_view message) {
-    if (message.size() < 4 || message[0] != 0) return false;
-    const auto encoding = static_cast<unsigned char>(message[1]);
-    if (encoding != 0 && encoding != 1 && encoding != 6 && encoding != 7) return false;
-    is_big_endian_ = encoding % 2 == 0;
-    largest_alignment_ = encoding < 2 ? 8 : 4;
-    data_ = message.substr(4);
-    at_ = 0;
-    return true;
-  }
-
-  std::size_t left() const { return data_.size() - at_; }
-
-  bool read(Scalar type, double& value) {
-    const std::size_t size = size_of(type);
-    if (!align(size) || left() < size) return false;
-    value = value_of(type, data_.data() + at_, is_big_endian_);
-    at_ += size;
-    return true;
-  }
-  bool read_count(std::size_t& count) {
-    double value = 0;
-    if (!read(Scalar::kUint32, value)) return false;
-    count = static_cast<std::size_t>(value);
-    return true;
-  }
-  bool read_text(std::string_view& text) {
-    std::size_t size = 0;
-    if (!read_count(size) || left() < size) return false;
-    text = data_.substr(at_, size);
-    while (!text.empty() && text.back() == '\0') text.remove_suffix(1);
-    at_ += size;
-    return true;
-  }
-  /// Over `count` numbers.
-  bool skip(Scalar type, std::size_t count) {
-    if (count == 0) return true;
-    const std::size_t size = size_of(type);
-    if (!align(size) || left() / size < count) return false;
-    at_ += count * size;
-    return true;
-  }
-
- private:
-  bool align(std::size_t size) {
-    const std::size_t alignment = size < largest_alignment_ ? size : largest_alignment_;
-    const std::size_t excess = at_ % alignment;
-    if (excess == 0) return true;
-    if (left() < alignment - excess) return false;
-    at_ += alignment - excess;
-    return true;
-  }
-
-  std::string_view data_;
-  std::size_t at_ = 0, largest_alignment_ = 8;
-  bool is_big_endian_ = false;
-};
 
 /// Place of a value within messages: a field, or an element of an array. Remembers its column, so that names are made once.
 struct RosNode {
