@@ -100,6 +100,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   if (result.gamma && !(result.gamma->value > 0)) {
     throw std::invalid_argument("certify: gamma must be positive");
   }
+  require_moderate(network);
   const std::map<std::string, const Weights*> parts = files::parts(network);
   std::vector<const files::Layer*> layers;
   for (const auto& [name, weights] : parts) {

@@ -52,9 +52,10 @@ struct InteriorPointResult {
   LipSdpStop stop = LipSdpStop::kNothingRun;
   int iterations = 0;
   std::vector<Eigen::VectorXd>
-      points;                ///< strictly feasible in floating point, best last; the first is the start
-  std::vector<double> gaps;  ///< of each point: (y_0 - dual objective) / y_0, or infinity
-  double best_dual = 0;      ///< below the optimum, up to floating point
+      points;  ///< strictly feasible in floating point, best last; the first is the start
+  /// (y_0 - dual objective) / y_0 of the iterate from which each point was reached; infinity for the first
+  std::vector<double> gaps;
+  double best_dual = 0;  ///< below the optimum, up to floating point
 };
 
 /// Minimises y_0 subject to S(y) >= 0.

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 
 #include "lipschitz/checker/witness.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
 namespace {
@@ -39,7 +42,8 @@ SpectralNorm spectral_norm(const files::Layer& layer, std::optional<double> limi
   Eigen::MatrixXd w = Eigen::Map<const RowMajor>(layer.weights.data(), layer.outputs, layer.inputs);
   // Squares of very large or small weights would leave the range of double: work near one.
   const double magnitude = w.cwiseAbs().maxCoeff();
-  const int exponent = magnitude > 0 ? std::ilogb(magnitude) : 0;
+  // Not below -1000, whose inverse is a double.
+  const int exponent = magnitude > 0 ? std::max(std::ilogb(magnitude), -1000) : 0;
   w *= std::ldexp(1.0, -exponent);
 
   const bool wide = w.cols() > w.rows();
@@ -72,6 +76,31 @@ SpectralNorm spectral_norm(const files::Layer& layer, std::optional<double> limi
     return result;
   }
   throw std::runtime_error("spectral_norm: no proof found for layer " + layer.name);
+}
+
+void require_moderate(const files::Network& network) {
+  const auto refuse = [](const files::Weights& weights, const std::string& field, double value) {
+    std::ostringstream text;
+    text << value;
+    throw files::InputError(
+        {weights.path, "", field, text.str(),
+         "is too large: squares of slopes would leave the range of double",
+         "scale the network so that weights, biases and the product of its layers stay below 1e150"});
+  };
+  constexpr double kMost = 1e150;
+  for (const auto& [part, weights] : files::parts(network)) {
+    double product = 1;
+    for (const files::Layer& layer : weights->layers) {
+      double largest = 0, bias = 0;
+      for (const double weight : layer.weights) largest = std::max(largest, std::abs(weight));
+      for (const double one : layer.biases) bias = std::max(bias, std::abs(one));
+      if (!(largest <= kMost)) refuse(*weights, layer.name + ".weight", largest);
+      if (!(bias <= kMost)) refuse(*weights, layer.name + ".bias", bias);
+      // At least the spectral norm; below 1 a layer does not make room for the others.
+      product *= std::max(1.0, largest * std::sqrt(static_cast<double>(layer.outputs) * layer.inputs));
+      if (!(product <= kMost)) refuse(*weights, layer.name + ".weight", largest);
+    }
+  }
 }
 
 UpperBound product_up(const std::vector<UpperBound>& factors) {

@@ -6,7 +6,7 @@
 
 #include "lipschitz/checker/bounds.h"
 #include "lipschitz/lmi_proof.h"
-#include "nn/weights/weights.h"
+#include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
 
@@ -27,6 +27,10 @@ struct SpectralNorm {
 ///   enclosure's width, proofs with exactly this bound are tried first.
 /// @throws std::invalid_argument if an entry is not finite.
 SpectralNorm spectral_norm(const files::Layer& layer, std::optional<double> limit = std::nullopt);
+
+/// @throws files::InputError if weights, biases or a bound on a network's slope exceed 1e150, where no bound can be
+///   computed in double.
+void require_moderate(const files::Network& network);
 
 /// An upper bound on the product of `factors`, rounded up; their own guarantee carries over.
 UpperBound product_up(const std::vector<UpperBound>& factors);

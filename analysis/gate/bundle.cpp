@@ -205,8 +205,8 @@ void verify(const fs::path& folder, bool rerun, GateSettings settings, BundleVer
   verdict.verified.push_back(
       fmt::format("{} files with the hashes of the manifest, none missing, none more", entries.size()));
   const std::string result = (folder / "gate.json").string();
-  if (files::read_json(result, "swarmcert/gate/1").value("verdict", "") != "pass")
-    reject("gate.json says that the release did not pass");
+  const Json gate_json = files::read_json(result, "swarmcert/gate/1");
+  if (gate_json.value("verdict", "") != "pass") reject("gate.json says that the release did not pass");
   const Policy policy = read_policy((folder / policy_path).string());
   verify_roles(folder, entries, policy);
   verify_claims(policy, settings, verdict);
@@ -214,6 +214,7 @@ void verify(const fs::path& folder, bool rerun, GateSettings settings, BundleVer
   for (const Entry& entry : entries)
     if (entry.role == "baseline") settings.baseline = (folder / entry.path).string();
   settings.may_lack_baseline = settings.baseline.empty();
+  settings.updates_baseline = gate_json.value("updates_baseline", false);
   verify_again(policy, settings, verdict);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,9 +33,16 @@ struct Check {
   std::string witness;  ///< what shows the failure, or where the value comes from
   std::string reason;   ///< why it did not pass
   bool is_bad_input = false;
+  bool stands_for_table = false;  ///< the table could not be judged: its other rows are lacking
 };
 
 using Checks = std::vector<Check>;
+
+/// The limits of the policy's table [regression], in percent.
+struct RegressionLimits {
+  std::optional<double> most;         ///< nothing: the policy has no such table
+  std::map<std::string, double> own;  ///< by name of the row that has one of its own
+};
 
 /// A row that judges nothing yet.
 Check row(const std::string& name, int line);

@@ -200,7 +200,7 @@ const residuals::Comparison& Evidence::residual_comparison() {
   return *residual_comparison_;
 }
 
-const std::map<std::string, double>* Evidence::baseline() {
+const Baseline* Evidence::baseline() {
   if (!baseline_ && !settings_.baseline.empty()) {
     baseline_ = read_baseline(settings_.baseline, settings_.may_lack_baseline);
   }

@@ -45,7 +45,10 @@ struct GateSettings {
   std::string baseline;  ///< file; empty: none
   bool may_lack_baseline = false;
   std::function<void(int done, int total, const std::string& what)> progress;
+  bool updates_baseline = false;  ///< limits may be looser than the baseline's, and are named
 };
+
+struct Baseline;
 
 class Evidence {
  public:
@@ -83,8 +86,8 @@ class Evidence {
   /// As comparison(), but without the closed loop where that cannot be flown.
   const residuals::Comparison& residual_comparison();
 
-  /// Values of the last release by name of the check; nothing where there is no baseline and none is needed.
-  const std::map<std::string, double>* baseline();
+  /// Values and limits of the last release; nothing where there is no baseline and none is needed.
+  const Baseline* baseline();
 
  private:
   void load_comparison(bool with_loop);
@@ -98,7 +101,7 @@ class Evidence {
   std::unique_ptr<std::vector<LipschitzBound>> bounds_, computed_;
   std::unique_ptr<stability::TrackingSetup> tracking_;
   std::unique_ptr<residuals::Comparison> comparison_, residual_comparison_;
-  std::unique_ptr<std::map<std::string, double>> baseline_;
+  std::unique_ptr<Baseline> baseline_;
 };
 
 /// A file that a release rests on, and as what.

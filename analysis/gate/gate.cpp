@@ -1,9 +1,12 @@
 #include "analysis/gate/gate.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
+#include "analysis/gate/baseline.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
@@ -18,6 +21,7 @@ void run(const PlannedCheck& check, Evidence& evidence, Checks& checks) {
     Check failed = row(check.name, check.line);
     fail(failed, reason);
     failed.is_bad_input = is_bad_input;
+    failed.stands_for_table = true;
     checks.push_back(std::move(failed));
   };
   try {
@@ -31,6 +35,26 @@ void run(const PlannedCheck& check, Evidence& evidence, Checks& checks) {
   } catch (const Unfounded& error) {
     give_up(error.what(), false);
   }
+}
+
+/// No limit is looser than the baseline's and no check of it is missing, unless this release becomes the baseline.
+void judge_limits(const Policy& policy, const Baseline& baseline, bool updates_baseline, Checks& checks) {
+  Check check = row("regression.limits", policy.release_line);
+  for (const PlannedCheck& planned : policy.checks)
+    if (planned.name == "regression") check.line = planned.line;
+  const std::vector<std::string> all = loosened(baseline, checks, policy.regression);
+  const std::string words = fmt::format("{}", fmt::join(all, "; "));
+  if (all.empty()) {
+    pass(check);
+    check.witness = "no limit is looser than the baseline's, no check was dropped";
+  } else if (updates_baseline) {
+    pass(check);
+    check.witness = "accepted by --update-baseline: " + words;
+  } else {
+    fail(check,
+         "the policy asks for less than the baseline's: " + words + ". --update-baseline accepts that");
+  }
+  checks.push_back(std::move(check));
 }
 
 /// Every file can be read, whether a check needs it or not.
@@ -87,11 +111,12 @@ GateResult run_gate(const Policy& policy, const GateSettings& settings) {
                                     }),
                      result.files.end());
   try {
-    if (const std::map<std::string, double>* const baseline = evidence.baseline()) {
+    if (const Baseline* const baseline = evidence.baseline()) {
       for (Check& check : result.checks) {
-        const auto found = baseline->find(check.name);
-        if (found != baseline->end()) check.baseline = found->second;
+        const auto found = baseline->values.find(check.name);
+        if (found != baseline->values.end()) check.baseline = found->second;
       }
+      judge_limits(policy, *baseline, settings.updates_baseline, result.checks);
     }
   } catch (const files::InputError& error) {
     // A baseline that was given and cannot be read fails the release, whether or not regressions are judged.

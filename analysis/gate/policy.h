@@ -45,6 +45,7 @@ struct Policy {
   int release_line = 0;
   std::vector<PlannedCheck> checks;  ///< in order of the registry
   std::vector<std::string> not_run;  ///< checks that the policy does not ask for
+  RegressionLimits regression;       ///< of the table of this name
   bool judges_certificate = false;
   bool wants_guard_factor = false;  ///< flights are flown again in the closed loop
   std::vector<std::string> blocks;  ///< of inputs that have limits of their own

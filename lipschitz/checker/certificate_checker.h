@@ -30,6 +30,8 @@ class CertificateChecker {
 
   // check.cpp
   void check_weights(const Json& named);
+  /// Null, or of each network named an interval for every input, whether a bound uses it or not.
+  void check_boxes(const Json& boxes) const;
   /// The operations that part `name` of NET consists of, in order.
   void check_chain(const Json& stated, const std::string& name) const;
   /// What was recorded of the comparison with samples: its form only, because the samples are not here.

@@ -45,7 +45,9 @@ CheckResult CertificateChecker::run() {
   require(certificate_["statement"] == kStatement, "statement is not the one that is checked");
   require(certificate_["content_sha256"] == files::content_sha256(certificate_),
           "content_sha256 does not match: the certificate was changed after it was written");
+  require(certificate_["tool"].is_string(), "tool is not text");
   check_weights(certificate_["network"]);
+  check_boxes(certificate_["box"]);
   for (const auto& [name, weights] : parts_)
     for (const files::Layer& layer : weights->layers)
       check_layer(certificate_["layers"].at(spectral_norms_), name, layer);
@@ -74,6 +76,22 @@ void CertificateChecker::check_weights(const Json& named) {
             where + " is of another file than " + weights->path);
     check_chain(entry["chain"], name);
     check_samples(entry["samples"], where + ".samples");
+  }
+}
+
+void CertificateChecker::check_boxes(const Json& boxes) const {
+  if (boxes.is_null()) return;
+  require(boxes.is_object() && !boxes.empty(), "box is neither null nor an object with boxes");
+  for (const auto& [part, box] : boxes.items()) {
+    const auto found = parts_.find(part);
+    require(found != parts_.end() && part.rfind("rho:", 0) != 0,
+            "box." + part + " is of no network with a box");
+    files::require_keys(box, {"lower", "upper"}, "box." + part);
+    const auto inputs = static_cast<std::size_t>(found->second->inputs());
+    const std::vector<double> lower = files::parse_hex_floats(box["lower"]);
+    const std::vector<double> upper = files::parse_hex_floats(box["upper"]);
+    require(lower.size() == inputs && upper.size() == inputs, "box." + part + " has another size");
+    for (std::size_t k = 0; k < inputs; ++k) require(lower[k] <= upper[k], "box." + part + " is empty");
   }
 }
 
@@ -159,7 +177,10 @@ void CertificateChecker::check_bound(const Json& bound) {
   } else {
     require(bound["upper_method"] == "product" && bound["proof"].is_null(), where + ": unknown upper_method");
     Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
-    for (const std::string& name : names) total = total * norms_.at(name);
+    for (const std::string& name : names) {
+      require(norms_.count(name) == 1, where + ": there is no network " + name);
+      total = total * norms_.at(name);
+    }
     require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
   }
   if (scale.empty()) {
@@ -214,6 +235,8 @@ void CertificateChecker::check_law(const Json& law) {
     require(1 <= count && count <= kMostNeighbours, where + ": impossible number of neighbours");
     const Dyadic n = static_cast<double>(count);
     const std::string function = "set:" + kind + ":" + rho, any_number = key(function, block, {});
+    require(proved_.count(any_number) == 1,
+            where + ": rests on a bound of " + function + " that is not there");
     Dyadic k = proved_.at(any_number);
     if (law["domain"] == "box") {
       const auto fewer = proved_.find(key(function, block, neighbours));

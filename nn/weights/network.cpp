@@ -100,6 +100,9 @@ class NetworkReader {
     for (const std::string& kind : kinds.keys()) {
       const TomlTable entry = kinds.table(kind);
       entry.allow_only({"weights", "order"});
+      // "set:<kind>:<kind>" names a function.
+      if (kind.find(':') != std::string::npos)
+        kinds.refuse(in_quotes(kind), "", "a kind's name must not contain ':'", "rename the kind");
       const std::string file = entry.text("weights");
       if (file.empty() || file.find('\0') != std::string::npos) {
         entry.refuse("weights", in_quotes(file), "is not the name of a file");

@@ -998,7 +998,9 @@ class Checker:
         require(self.c["schema"] == "swarmcert/certificate/1", "another schema")
         require(self.c["statement"] == STATEMENT, "another statement")
         require(self.c["content_sha256"] == content_sha256(self.c), "content_sha256 does not match")
+        require(isinstance(self.c["tool"], str), "tool is not text")
         self.check_network(self.c["network"])
+        self.check_boxes(self.c["box"])
         expected = [(name, layer) for name in sorted(self.network.parts) for layer in self.network.parts[name].layers]
         require(len(self.c["layers"]) == len(expected), "layers does not list every layer")
         for entry, (name, layer) in zip(self.c["layers"], expected):
@@ -1044,6 +1046,18 @@ class Checker:
         deviation, tolerance = (number(samples[key], samples[key + "_hex"], where)
                                 for key in ("largest_deviation", "tolerance"))
         require(deviation <= tolerance, f"{where}: the largest deviation is above the tolerance")
+
+    def check_boxes(self, boxes):
+        """Whether a bound uses it or not: null, or intervals for the inputs of networks that have a box."""
+        if boxes is None:
+            return
+        require(isinstance(boxes, dict) and boxes, "box is neither null nor an object with boxes")
+        for part, box in boxes.items():
+            require(part in self.network.parts and not part.startswith("rho:"), f"box.{part} is of no network with a box")
+            require_keys(box, ["lower", "upper"], f"box.{part}")
+            low, high = hex_floats(box["lower"]), hex_floats(box["upper"])
+            require(len(low) == len(high) == self.network.parts[part].layers[0].inputs, f"box.{part} has another size")
+            require(all(a <= b for a, b in zip(low, high)), f"box.{part} is empty")
 
     def check_layer(self, entry, name, layer):
         where = f"layer {name} {layer.name}"
@@ -1361,6 +1375,7 @@ def refuse_constant(text):
 
 
 def parse(text):
+    """A byte order mark is refused, as json.loads() does."""
     return json.loads(text, object_pairs_hook=unique, parse_constant=refuse_constant)
 
 
@@ -1380,7 +1395,7 @@ def main(arguments):
         return 2
     try:
         network = Network(*positional[1:], **options)
-        certificate = parse(Path(positional[0]).read_text())
+        certificate = parse(Path(positional[0]).read_bytes().decode())
     except Exception as fault:  # whatever it is: this file cannot be read
         print(f"cannot be read: {type(fault).__name__} {fault}", file=sys.stderr)
         return 3

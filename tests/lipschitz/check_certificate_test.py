@@ -192,6 +192,42 @@ def check_orders(folder, square, order):
         assert subprocess.run(checker, capture_output=True).returncode == code
 
 
+def check_fixed(certificate, net, folder):
+    """What nothing but the check of its form reads is refused by both, with a reason that names it."""
+    def refused(changed, word):
+        changed["content_sha256"] = second.content_sha256(changed)
+        accepted, said = first_checker(changed, net, folder, 0)
+        reason = second.check(changed, second.Network(**arguments(net)))
+        assert not accepted and reason, f"{word}: first says {said!r}, second says {reason!r}"
+        assert word in said and word in reason, f"{word!r} is not in {said!r} and {reason!r}"
+
+    def copy():
+        return json.loads(json.dumps(certificate))
+
+    part = next(iter(certificate["network"]["weights"]))
+    for box in (0, "x", [], {}, {"phi:none": {"lower": [], "upper": []}}, {part: {"lower": ["0x0p+0"], "upper": []}},
+                {part: {}}, {part: 0}, {"rho:small": {"lower": ["0x0p+0"], "upper": ["0x0p+0"]}}):
+        changed = copy()
+        changed["box"] = box
+        refused(changed, "box")
+    changed = copy()
+    changed["tool"] = 1
+    refused(changed, "tool")
+    for law in certificate["laws"][:1]:
+        changed = copy()
+        function = f"set:{next(iter(law['neighbours']))}:{law['rho']}"
+        changed["bounds"] = [bound for bound in changed["bounds"] if bound["function"] != function]
+        refused(changed, function)
+
+    text = b"\xef\xbb\xbf" + json.dumps(certificate).encode()
+    path = folder / "mark.json"
+    path.write_bytes(text)
+    done = subprocess.run([SWARMCERT, "check", path, *net, "-q"], capture_output=True, text=True)
+    assert done.returncode == 3 and "byte order mark" in done.stderr, done.stderr
+    positional = [str(path), *net]
+    assert second.main(positional) == 3
+
+
 def run():
     generator = random.Random(1)
     with tempfile.TemporaryDirectory() as name:
@@ -223,6 +259,7 @@ def run():
             assert first_checker(certificate, net, folder, 0)[0]
             reason = second.check(certificate, second.Network(**arguments(net)))
             assert not reason, f"the second checker rejects a sound certificate: {reason}"
+            check_fixed(certificate, net, folder)
             paths = list(leaves(certificate))
             chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]
             changed, longer = zip(*(forged(certificate, p, generator) for p in chosen))

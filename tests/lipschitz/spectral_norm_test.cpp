@@ -3,7 +3,9 @@
 #include <Eigen/Dense>
 
 #include "data.h"
+#include "lipschitz/certify.h"
 #include "lipschitz/networks.h"
+#include "nn/refusal.h"
 
 namespace swarmcert {
 namespace {
@@ -72,6 +74,35 @@ TEST(SpectralNorm, ProductsAreRoundedUp) {
   const double product = lipschitz::product_up({UpperBound(0.1), UpperBound(0.1)}).value();
   EXPECT_GE(mpq_class(product), mpq_class(0.1) * mpq_class(0.1));
   EXPECT_NEAR(product, 0.01, 1e-17);
+}
+
+TEST(SpectralNorm, EnclosesTheNormOfTheSmallestNumbers) {
+  for (const double tiny : {5e-324, 1e-310, 1e-300}) {
+    const SpectralNorm norm = spectral_norm(tests::layer(1, 2, {tiny, 0}));
+    EXPECT_LE(norm.norm.lower.value(), tiny);
+    EXPECT_GE(norm.norm.upper.value(), tiny);
+  }
+}
+
+TEST(SpectralNorm, WeightsWhoseSlopesLeaveTheRangeOfDoubleAreRefusedByName) {
+  const auto network = [](double first, double bias, double second) {
+    files::Weights weights =
+        tests::weights({tests::layer(2, 2, {first, 0, 0, 1}), tests::layer(1, 2, {second, 1})});
+    weights.layers[1].biases[0] = bias;
+    return tests::plain(weights);
+  };
+  EXPECT_NO_THROW(lipschitz::require_moderate(network(1e70, 1e100, 1e70)));
+  EXPECT_NO_THROW(lipschitz::require_moderate(network(1e-300, 0, 5e-324)));
+  const auto refused = [&](double first, double bias, double second, const std::string& field) {
+    return tests::refuses([&] { lipschitz::require_moderate(network(first, bias, second)); },
+                          {"made by a test", field, "is too large"});
+  };
+  EXPECT_TRUE(refused(1e300, 0, 1, "fc1.weight"));
+  EXPECT_TRUE(refused(1, 0, -1e300, "fc2.weight"));
+  EXPECT_TRUE(refused(1, 1e300, 1, "fc2.bias"));
+  EXPECT_TRUE(refused(1e100, 0, 1e100, "fc2.weight"));
+  EXPECT_TRUE(
+      tests::refuses([&] { lipschitz::certify(network(1e300, 0, 1), {}); }, {"fc1.weight", "1e+300"}));
 }
 
 TEST(SpectralNorm, RefusesNonFiniteWeights) {

@@ -17,6 +17,10 @@ namespace {
 
 using tests::refuses;
 
+TEST(Json, AByteOrderMarkIsRefused) {
+  EXPECT_TRUE(refuses([] { parse_json("\xef\xbb\xbf{}", "x.json"); }, {"x.json", "byte order mark"}));
+}
+
 TEST(HexFloat, IsC99AndHasAPrefix) {
   EXPECT_EQ(hex_float(3.0), "0x1.8p+1");
   EXPECT_EQ(hex_float(-0.15625), "-0x1.4p-3");

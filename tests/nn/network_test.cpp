@@ -120,6 +120,13 @@ TEST(NetworkToml, UnknownKeysAreRefusedWithLineAndSuggestion) {
                                  {"line 10: phi.ground.wieghts", "\"weights\"?"}));
 }
 
+TEST(NetworkToml, AKindWithAColonIsRefusedForItSeparatesKindsInNamesOfFunctions) {
+  for (const std::string kind : {"x:y", ":", "small:"})
+    EXPECT_TRUE(network_is_refused("schema = \"swarmcert/network/1\"\n[phi.\"" + kind +
+                                       "\"]\nweights = \"6x5\"\n[rho.small]\nweights = \"5x1\"\n",
+                                   {kind, "must not contain ':'"}));
+}
+
 TEST(NetworkToml, MissingKeysAreRefused) {
   EXPECT_TRUE(network_is_refused(with("schema = \"swarmcert/network/1\"", ""), {"schema: is missing"}));
   EXPECT_TRUE(network_is_refused(with("network/1", "network/2"),

@@ -70,7 +70,7 @@ void print_hashes(const gate::Policy& policy) {
 /// Every check but `regression` passes: the release may become the next baseline.
 bool may_become_baseline(const gate::GateResult& result) {
   for (const gate::Check& check : result.checks)
-    if (check.name != "regression" && check.verdict != gate::Verdict::kPass) return false;
+    if (check.name.rfind("regression", 0) != 0 && check.verdict != gate::Verdict::kPass) return false;
   return true;
 }
 
@@ -93,13 +93,14 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
   Progress progress(common.quiet);
   gate::GateSettings settings = settings_of(common, progress);
   settings.baseline = options.baseline;
-  settings.may_lack_baseline = options.update_baseline;
+  settings.may_lack_baseline = settings.updates_baseline = options.update_baseline;
   const gate::GateResult result = run_gate(policy, settings);
 
   std::vector<std::string> inputs;
   for (const gate::EvidenceFile& file : result.files) inputs.push_back(file.path);
   files::Json json = result_head("gate", inputs);
   add_json(result, json);
+  json["updates_baseline"] = options.update_baseline;
   const bool allow = options.allow_inconclusive;
   if (!options.junit.empty()) files::write_file(options.junit, to_junit(result), common.force);
   if (!options.sarif.empty()) files::write_file(options.sarif, to_sarif(result, allow), common.force);
@@ -124,7 +125,7 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
   }
   if (options.update_baseline) {
     const bool may = may_become_baseline(result);
-    if (may) gate::write_baseline(options.baseline, result.checks);
+    if (may) gate::write_baseline(options.baseline, result.checks, policy.regression);
     if (common.prints_text())
       fmt::print("baseline {}: {}\n", may ? "replaced" : "kept, for the release does not pass",
                  options.baseline);
@@ -175,7 +176,8 @@ Command gate_command() {
         app.add_option("--baseline", options->baseline,
                        "Numbers of the last release, for the check regression");
         app.add_flag("--update-baseline", options->update_baseline,
-                     "Replace the file of --baseline by this release's numbers, if all else passes");
+                     "Replace the file of --baseline by this release's numbers and limits, if all else "
+                     "passes; limits may be looser and checks fewer");
         app.add_flag("--allow-inconclusive", options->allow_inconclusive,
                      "Checks that are inconclusive do not fail");
         add_output(app, "--junit", options->junit, "Write JUnit XML to this file");

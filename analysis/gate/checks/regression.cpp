@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/gate/baseline.h"
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/evidence.h"
 #include "nn/base/input_error.h"
@@ -20,7 +21,7 @@ double worse_percent(const Check& check, double baseline) {
 
 }  // namespace
 
-Run read_regression(const files::TomlTable& table, Policy&) {
+Run read_regression(const files::TomlTable& table, Policy& policy) {
   table.allow_only({"max_increase_percent", "percent_of"});
   const std::optional<Limit> most = limit(table, "max_increase_percent", "%");
   if (!most) refuse_without_limit(table, "max_increase_percent = 5");
@@ -31,8 +32,10 @@ Run read_regression(const files::TomlTable& table, Policy&) {
     const files::TomlTable inner = table.table("percent_of");
     for (const std::string& name : inner.keys()) own[name] = *limit(inner, name, "%");
   }
+  policy.regression.most = most->value;
+  for (const auto& [name, percent] : own) policy.regression.own[name] = percent.value;
   return [most = *most, own](Evidence& evidence, Checks& checks) {
-    const std::map<std::string, double>* const baseline = evidence.baseline();
+    const Baseline* const baseline = evidence.baseline();
     if (baseline == nullptr) {
       if (evidence.settings().may_lack_baseline) return;  // this release becomes the first baseline
       throw files::InputError({evidence.policy().path, "", "regression", "",
@@ -45,8 +48,8 @@ Run read_regression(const files::TomlTable& table, Policy&) {
     std::string missing;
     for (const Check& now : checks) {
       if (!now.limit || now.is_bad_input) continue;
-      const auto before = baseline->find(now.name);
-      if (before == baseline->end()) continue;
+      const auto before = baseline->values.find(now.name);
+      if (before == baseline->values.end()) continue;
       ++compared;
       if (!now.value || std::isnan(*now.value)) {
         missing += (missing.empty() ? "" : ", ") + now.name;

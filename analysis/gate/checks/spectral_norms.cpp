@@ -25,6 +25,7 @@ void judge_norms(Evidence& evidence, const std::optional<Limit>& own, int line, 
     return;
   }
   check.limit = gamma->value;
+  lipschitz::require_moderate(network);
   pass(check);
   double largest = 0;
   for (const auto& [part, weights] : files::parts(network)) {
