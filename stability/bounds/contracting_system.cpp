@@ -44,7 +44,7 @@ std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
     companion(n - 1, k) = -a[k];
     approximate(size - 1, static_cast<Index>(k)) = -(a[k].lo + a[k].hi) / 2;
   }
-  // Lyapunov: (A + alpha)'P + P(A + alpha) = -I/100, P = R'R.
+  // Lyapunov: (A + alpha)'P + P(A + alpha) = -I, P = R'R.
   const double alpha = 0.8 * slowest / scale;
   const MatrixXd shifted = approximate + alpha * MatrixXd::Identity(size, size);
   MatrixXd kronecker = MatrixXd::Zero(size * size, size * size);

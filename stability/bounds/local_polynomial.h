@@ -21,7 +21,7 @@ struct LocalPolynomial {
 
   /// What the polynomial may miss anywhere up to `s`.
   Interval slack(double s) const {
-    const double r = up(up(std::pow(s, kLocalTerms) * (1 + 1e-14)) * remainder);
+    const double r = up(nth_power(Interval(s), kLocalTerms).hi * remainder);
     const double total = up(r + error);
     return {-total, total};
   }

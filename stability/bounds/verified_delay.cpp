@@ -239,7 +239,7 @@ std::optional<VerifiedNorms> norms_by_steps(const TransferFunction& y, bool inte
   if (!(-std::log(kCut) / slowest / steps.length_s() < static_cast<double>(most_pieces))) return std::nullopt;
   // y = numerator z, where z starts at z^(n-1) = 1/a_n, is so many times the last column.
   const Interval unit = Interval(1) / (Interval(y.denominator[n]) *
-                                       Interval(std::pow(steps.unit_1_s(), static_cast<double>(n - 1))));
+                                       nth_power(Interval(steps.unit_1_s()), static_cast<int>(n) - 1));
   PieceNorms pieces(steps, y, unit, integrates);
   std::vector<double> integral(n);
   std::vector<double> most(n);
@@ -258,7 +258,8 @@ std::optional<VerifiedNorms> norms_by_steps(const TransferFunction& y, bool inte
   // What numerator z^(shift) may be off by.
   const auto error = [&](const std::vector<double>& size, std::size_t shift) {
     double total = 0;
-    double power = std::pow(steps.unit_1_s(), static_cast<double>(shift));
+    double power =
+        std::ldexp(1.0, std::ilogb(steps.unit_1_s()) * static_cast<int>(shift));  // of a power of two
     for (std::size_t k = 0; k < y.numerator.size(); ++k, power *= steps.unit_1_s()) {
       total += std::abs(y.numerator[k]) * power * size[k + shift];
     }

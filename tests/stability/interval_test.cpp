@@ -1,0 +1,73 @@
+// Every operation on intervals contains what the operation gives for numbers of the intervals.
+#include "stability/bounds/interval.h"
+
+#include <gtest/gtest.h>
+
+#include "nn/base/random.h"
+
+namespace swarmcert::stability {
+namespace {
+
+bool contains(Interval a, double x) { return a.lo <= x && x <= a.hi; }
+
+/// Of the kinds that occur: around zero, beside it, touching it, a single number.
+Interval random_interval(files::Random& random) {
+  const double a = 3 * random.symmetric(), b = 3 * random.symmetric();
+  switch (random.below(4)) {
+    case 0:
+      return {-std::abs(a), std::abs(b)};
+    case 1:
+      return {0, std::abs(b)};
+    case 2:
+      return {a, a};
+    default:
+      return {std::min(a, b), std::max(a, b)};
+  }
+}
+
+TEST(Interval, DivisionByAnIntervalWithZeroGivesTheWholeLine) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const Interval divisor :
+       {Interval(-1, 1), Interval(0, 1), Interval(-1, 0), Interval(0), Interval(-0.0)}) {
+    const Interval quotient = Interval(1, 2) / divisor;
+    EXPECT_EQ(quotient.lo, -infinity);
+    EXPECT_EQ(quotient.hi, infinity);
+  }
+  // What is computed with it stays an enclosure.
+  const Interval product = Interval(1, 2) / Interval(-1, 1) * Interval(0, 1);
+  EXPECT_TRUE(contains(product, 1e300) && contains(product, -1e300));
+}
+
+TEST(Interval, OperationsContainTheResultForNumbersOfTheIntervals) {
+  files::Random random(11);
+  int by_zero = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Interval a = random_interval(random), b = random_interval(random);
+    const auto pick = [&](Interval x) {
+      return std::clamp(x.lo + (x.hi - x.lo) * 0.5 * (1 + random.symmetric()), x.lo, x.hi);
+    };
+    const double x = pick(a), y = pick(b);
+    EXPECT_TRUE(contains(a + b, x + y) && contains(a - b, x - y) && contains(a * b, x * y));
+    if (y != 0) {
+      EXPECT_TRUE(contains(a / b, x / y)) << x << " / " << y;
+    }
+    by_zero += contains(b, 0) ? 1 : 0;
+  }
+  EXPECT_GT(by_zero, 5000);
+}
+
+TEST(Interval, PowersAreMultipliedOut) {
+  EXPECT_EQ(nth_power(Interval(2), 0).lo, 1);
+  for (const double x : {0.1, 0.75, 1.0, 1.5}) {
+    long double exact = 1;
+    for (int n = 0; n <= 18; ++n, exact *= static_cast<long double>(x)) {
+      const Interval power = nth_power(Interval(x), n);
+      EXPECT_LE(static_cast<long double>(power.lo), exact);
+      EXPECT_GE(static_cast<long double>(power.hi), exact);
+      EXPECT_LE(power.hi - power.lo, 1e-14 * power.hi);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
