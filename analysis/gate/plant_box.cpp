@@ -50,17 +50,17 @@ std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
 double nominal_bound(const Gains& gains, const Plant& plant, const DisturbanceSource& source, int axis,
                      Channel channel) {
   const Disturbance& d = source.axis[axis];
+  const OtherErrors other = source.other(axis, {});
   const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
-  AxisBounds row;
   if (const std::optional<SampledLoop> sampled = sampled_axis_loop(gains, plant, axis)) {
-    row.bounds = disturbance_bounds(*sampled, channel, sampled_norms(*sampled, channel, Instants::kAll), d);
-    row.clamp = clamp_bounds(*sampled, channel, d, source.bias_N[axis], limit_m_s);
-  } else {
-    const AxisLoop loop = *axis_loop(gains, plant, axis);
-    row.bounds = disturbance_bounds(loop, channel, d);
-    row.clamp = clamp_bounds(loop, channel, d, source.bias_N[axis], limit_m_s);
+    return axis_bounds(*sampled, channel, sampled_norms(*sampled, channel, Instants::kAll), d, other,
+                       source.classes_contain_bias, limit_m_s)
+        .least();
   }
-  return row.least();
+  const AxisLoop loop = *axis_loop(gains, plant, axis);
+  return axis_bounds(loop, channel, continuous_norms(loop, channel), d, other, source.classes_contain_bias,
+                     limit_m_s)
+      .least();
 }
 
 /// Whether an axis has the loop and the force error of the one before it.
@@ -128,22 +128,24 @@ double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPla
   const Disturbance& d = source.axis[axis];
   const double bias = std::abs(source.bias_N[axis]);
   const UncertainNorms norms = norms_over(pid, loop, box, channel);
-  double least = std::min(times(norms.rate.upper, d.rate_N_s), times(norms.amplitude.upper, d.amplitude_N));
-  if (d.passes == 1)
-    least =
-        std::min({least, times(norms.edge.upper, d.variation_N), times(norms.impulse.upper, d.impulse_N_s)});
-  const double Ki = loop.Ki;
-  if (!has_clamp(pid, axis)) return least + (Ki > 0 ? 0 : times(norms.amplitude.upper, bias));
-  // int e answers to f as e does to its integral: |int e| <= |h|_1 sup|f|, and a bias is cancelled by as much as it takes.
+  // The bias is a step; a measured amplitude or impulse contains it.
+  const double step_m = times(norms.edge.upper, bias);
+  double with_bias = times(norms.amplitude.upper, d.amplitude_N);
+  if (d.passes == 1) with_bias = std::min(with_bias, times(norms.impulse.upper, d.impulse_N_s));
+  if (!source.classes_contain_bias) with_bias += step_m;
+  double least = std::min(with_bias, times(norms.rate.upper, d.rate_N_s) + step_m);
+  if (d.passes == 1) least = std::min(least, times(norms.edge.upper, d.variation_N) + step_m);
+  if (!has_clamp(pid, axis)) return least;
+  // int e answers to f as e does to its integral: |int e| <= |h|_1 sup|f|, of a bias as well.
   const double limit_m_s = pid.integrator_limit_m_s[static_cast<std::size_t>(axis)];
-  const double demand_m_s = times(norms.rate.upper, d.amplitude_N) +
-                            bias / (told.mass_kg * Ki * std::min(1.0, box.thrust_scale.from));
-  if (demand_m_s <= limit_m_s) return least;
+  const double bias_beside = source.classes_contain_bias ? 0 : bias;
+  if (times(norms.rate.upper, d.amplitude_N + bias_beside) <= limit_m_s) return least;
+  const double Ki = loop.Ki;
   loop.Ki = 0;
   const UncertainNorms without = norms_over(pid, loop, box, channel);
   const UncertainNorms command =
       channel == Channel::kCommand ? without : norms_over(pid, loop, box, Channel::kCommand);
-  return times(without.amplitude.upper, d.amplitude_N + bias) +
+  return times(without.amplitude.upper, d.amplitude_N) + times(without.edge.upper, bias_beside) +
          times(command.amplitude.upper, told.mass_kg * Ki * limit_m_s);
 }
 

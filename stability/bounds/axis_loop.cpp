@@ -34,6 +34,13 @@ Polynomial channel_numerator(const AxisLoop& loop, Channel channel) {
   return scaled(channel == Channel::kForce ? lag_polynomial(loop) : Polynomial{1}, 1 / loop.mass_kg);
 }
 
+/// -u after an impulse of force, without the delay's shift.
+TransferFunction effort_transfer(const AxisLoop& loop) {
+  const Polynomial feedback =
+      loop.Ki > 0 ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
+  return over_characteristic(loop, product(feedback, lag_polynomial(loop)));
+}
+
 /// (p - p[0]) / s
 Polynomial without_constant(Polynomial p) {
   p.erase(p.begin());
@@ -62,6 +69,28 @@ GainNorms continuous_norms(const AxisLoop& loop, Channel channel) {
   return {kInfinity, impulse.integral_abs, impulse.step_max_abs, impulse.max_abs()};
 }
 
+GainNorms continuous_norms(const AxisLoop& loop, Estimate estimate) {
+  if (estimate == Estimate::kVelocity) {
+    GainNorms norms = continuous_norms(loop, Channel::kCommand);
+    for (const auto gain : {&GainNorms::rate, &GainNorms::amplitude, &GainNorms::edge, &GainNorms::impulse}) {
+      norms.*gain *= loop.mass_kg * loop.Kd;
+    }
+    return norms;
+  }
+  const ResponseNorms impulse = response_norms(position_error_transfer(loop));
+  return {kInfinity, impulse.integral_abs, impulse.step_max_abs, impulse.max_abs()};
+}
+
+TransferFunction position_error_transfer(const AxisLoop& loop) {
+  return over_characteristic(loop, loop.Ki > 0 ? Polynomial{loop.Ki, loop.Kp} : Polynomial{loop.Kp});
+}
+
+TransferFunction initial_position_transfer(const AxisLoop& loop) {
+  Polynomial numerator = times_s(lag_polynomial(loop));
+  numerator[0] += loop.Kd;
+  return over_characteristic(loop, loop.Ki > 0 ? times_s(std::move(numerator)) : std::move(numerator));
+}
+
 double pulse_gain(const AxisLoop& loop, Channel channel) {
   if (loop.Ki == 0) return 2 * continuous_norms(loop, channel).edge;
   const ResponseNorms h = response_norms(step_transfer(loop, channel));
@@ -88,11 +117,9 @@ LagFloor lag_floor(const AxisLoop& loop) {
   return floor;
 }
 
-double effort_gain(const AxisLoop& loop) {
-  const Polynomial feedback =
-      loop.Ki > 0 ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
-  return response_norms(over_characteristic(loop, product(feedback, lag_polynomial(loop)))).integral_abs;
-}
+double effort_gain(const AxisLoop& loop) { return response_norms(effort_transfer(loop)).integral_abs; }
+
+double effort_impulse_gain(const AxisLoop& loop) { return response_norms(effort_transfer(loop)).max_abs(); }
 
 RateGains rate_gains(const AxisLoop& loop) {
   if (loop.Ki == 0) return {kInfinity, kInfinity, kInfinity};

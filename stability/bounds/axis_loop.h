@@ -25,6 +25,12 @@ enum class Channel {
   kCommand,  ///< in the command, through the motors: m D e = -s eps (times the delay, which norms do not see)
 };
 
+/// Which estimate that the law is given is wrong.
+enum class Estimate {
+  kVelocity,  ///< the law sees e' + n: the command errs by -m Kd n
+  kPosition,  ///< the law sees e + n, its integral too: the command errs by -m (Kp n + Ki int n)
+};
+
 /// Worst tracking error per unit of disturbance f: for |f'| <= 1 N/s, |f| <= 1 N, total variation of f 1 N, and
 /// int |f| dt = 1 N s. `rate` is infinite for Ki = 0; all are where the loop is unstable.
 struct GainNorms {
@@ -37,6 +43,10 @@ struct GainNorms {
 /// Exact norms of the continuous loop (to rounding, see response_norms()).
 GainNorms continuous_norms(const AxisLoop& loop, Channel channel);
 
+/// The same for an error n of an estimate in place of f, per m/s or per m: for |n'| <= 1, |n| <= 1, total variation of n
+/// 1, int |n| dt = 1. e is the true error. A constant error of the position is followed, so its `rate` is infinite.
+GainNorms continuous_norms(const AxisLoop& loop, Estimate estimate);
+
 /// sup h - inf h: worst error of one pulse of unit amplitude that rises once and falls once, m/N.
 double pulse_gain(const AxisLoop& loop, Channel channel);
 
@@ -44,6 +54,11 @@ double pulse_gain(const AxisLoop& loop, Channel channel);
 TransferFunction impulse_transfer(const AxisLoop& loop, Channel channel);
 /// h of `channel`, m/N. Needs Ki > 0 to decay.
 TransferFunction step_transfer(const AxisLoop& loop, Channel channel);
+
+/// -e after an impulse of an error of the estimated position, without the delay's shift: (Kp s + Ki)/D.
+TransferFunction position_error_transfer(const AxisLoop& loop);
+/// (s^2 L + s Kd)/D: without a delay e after e(0) = 1, e'(0) = 0 with lags at rest and no integral; starts at 1.
+TransferFunction initial_position_transfer(const AxisLoop& loop);
 
 /// What remains with a perfect feed-forward of f_a, because it passes the lag and the delay:
 /// |e| <= rate sup|f_a' - m p_d'''|, and |e| <= impulse int|f_a| dt. Exact without a delay, bounds with one.
@@ -55,6 +70,9 @@ LagFloor lag_floor(const AxisLoop& loop);
 
 /// |u|_oo per |f|_oo for the feedback part u of the commanded force, N/N (force channel).
 double effort_gain(const AxisLoop& loop);
+
+/// sup |u| after an impulse of force of 1 N s, N per N s.
+double effort_impulse_gain(const AxisLoop& loop);
 
 /// What |eps'| <= 1 N/s in the command does to e, e' and e'': g0, g1, g2 of a small-gain argument.
 struct RateGains {

@@ -71,6 +71,10 @@ class FadingResponse {
 
 }  // namespace
 
+void DisturbanceBounds::add(double error_m) {
+  for (double* const bound : {&by_rate, &by_amplitude, &by_edges, &by_impulse, &by_both}) *bound += error_m;
+}
+
 double DisturbanceBounds::least() const {
   return std::min({by_rate, by_amplitude, by_edges, by_impulse, by_both});
 }
@@ -154,8 +158,8 @@ DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, cons
   return bounds;
 }
 
-ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance, double bias_N,
-                         double limit_m_s, double integral_share) {
+ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
+                         const OtherErrors& other, double limit_m_s, double integral_share) {
   ClampBounds result;
   if (loop.Ki == 0 || std::isinf(limit_m_s)) return result;
   result.exists = true;
@@ -167,14 +171,15 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
                             : felt_passes(disturbance, FadingResponse(step_transfer(loop, channel)));
     demand_m_s = std::min(demand_m_s, disturbance.impulse_N_s * felt);
   }
-  result.set_demand(integral_share * (demand_m_s + std::abs(bias_N) / (loop.mass_kg * loop.Ki)), limit_m_s);
+  result.set_demand(integral_share * (demand_m_s + integral_demand_m_s(loop, channel, other)), limit_m_s);
   AxisLoop without = loop;
   without.Ki = 0;
   const GainNorms pd = continuous_norms(without, channel);
   const double integral_N = loop.mass_kg * loop.Ki / integral_share * limit_m_s;
   const GainNorms pd_command =
       channel == Channel::kCommand ? pd : continuous_norms(without, Channel::kCommand);
-  const double constant_m = pd_command.amplitude * integral_N + pd.amplitude * std::abs(bias_N);
+  const double constant_m =
+      pd_command.amplitude * integral_N + error_parts(without, pd.edge, other).total_m();
   result.by_amplitude = times_known(pd.amplitude, disturbance.amplitude_N) + constant_m;
   if (std::isfinite(disturbance.impulse_N_s) && is_stable(without)) {
     const double felt = disturbance.passes == 1

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stability/bounds/axis_loop.h"
+#include "stability/bounds/error_parts.h"
 
 namespace swarmcert::stability {
 
@@ -45,6 +46,8 @@ struct DisturbanceBounds {
   double by_both = std::numeric_limits<double>::infinity();
 
   double least() const;
+  /// Adds what acts beside the class to the bound of every class.
+  void add(double error_m);
   /// "rate", "amplitude", "edges", "impulse" or "amplitude and rate"; "none" where nothing is known.
   std::string which() const;
 };
@@ -59,13 +62,13 @@ double felt_passes(const Disturbance& disturbance, const std::function<double(do
 /// What a clamp |int e| <= limit does to bounds of the linear loop.
 struct ClampBounds {
   bool exists = false;  ///< whether there is a clamp, and an integrator that it could stop
-  /// The integrator of the linear loop stays below this, m s: the gain from f to int e, plus |bias|/(m Ki).
+  /// The integrator of the linear loop stays below this, m s: the gain from f to int e, plus integral_demand_m_s().
   double demand_m_s = 0;
   /// Whether the demand is within the limit: then the clamp never acts, and bounds of the linear loop hold.
   bool never_acts = true;
   /// Holds whether it acts or not: the integral is a command of at most m Ki limit, which the loop without integral
-  /// sees beside f. |h'_PD|_1 sup|f + bias| + |c'_PD|_1 m Ki limit, c the command channel, or for impulses
-  /// |h'_PD|_oo int|f| + |h'_PD|_1 |bias| + |c'_PD|_1 m Ki limit.
+  /// sees beside f. |h'_PD|_1 sup|f| + |c'_PD|_1 m Ki limit, c the command channel, or for impulses
+  /// |h'_PD|_oo int|f| + |c'_PD|_1 m Ki limit, each with error_parts() of the loop without integral.
   double by_amplitude = std::numeric_limits<double>::infinity();
   double by_impulse = std::numeric_limits<double>::infinity();
 
@@ -75,11 +78,10 @@ struct ClampBounds {
   }
 };
 
-/// @param loop with the integral gain as it acts. @param bias_N constant part of the force error, which a settled
-///   integrator cancels. @param limit_m_s infinite: none. @param integral_share what the firmware adds to its integrator
+/// @param loop with the integral gain as it acts. @param limit_m_s infinite: none. @param integral_share what the firmware adds to its integrator
 ///   per second of error: 1 unless its step differs from its period. For a sampled loop's own clamp see sampled_bounds.h.
-ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance, double bias_N,
-                         double limit_m_s, double integral_share = 1);
+ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
+                         const OtherErrors& other, double limit_m_s, double integral_share = 1);
 
 /// sup |e| over all f with |f| <= amplitude and |f'| <= rate, from rest: split_bound() of h on a grid of `nodes`.
 double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double amplitude_N, double rate_N_s,

@@ -48,6 +48,13 @@ void KernelSum::add_signed(double start, double slope, double length) {
 }
 
 GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_own) {
+  const SampledModel& model = adjoint.model();
+  return input_gains(adjoint, after, Eigen::VectorXd::Unit(model.size() + 1, model.command_index()),
+                     with_own);
+}
+
+GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after,
+                      const Eigen::VectorXd& input, bool with_own) {
   const double period_s = adjoint.period_s();
   GainNorms gains;
   double step = 0;
@@ -63,7 +70,7 @@ GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd&
     gains.edge = std::max(gains.edge, std::abs(step));
     gains.rate += std::abs(step) * period_s;
   };
-  adjoint.command_kernel(after, add, [&](double kernel, double ratio) {
+  adjoint.input_kernel(after, input, add, [&](double kernel, double ratio) {
     // What is left falls in proportion, and so does the way of the step to its limit.
     const double rate = gains.rate;
     const double amplitude = gains.amplitude;

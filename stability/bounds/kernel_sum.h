@@ -73,5 +73,8 @@ void add_force_kernel(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& a
 /// Gains from an error of the command, added once per period, in units of acceleration.
 /// @param with_own whether the error of the output's own period counts.
 GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_own = true);
+/// The same for what adds `input` [size + 1] to the state after control, once per period.
+GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after,
+                      const Eigen::VectorXd& input, bool with_own = true);
 
 }  // namespace swarmcert::stability

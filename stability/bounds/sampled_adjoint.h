@@ -54,14 +54,19 @@ class SampledAdjoint {
   }
   template <class Visit, class Finish>
   void command_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
-    const Eigen::VectorXd from_command = model_.hold().col(model_.command_index());
+    input_kernel(after, Eigen::VectorXd::Unit(model_.size() + 1, model_.command_index()), visit, finish);
+  }
+  /// The same for what adds `input` [size + 1] to the state after control of every period.
+  template <class Visit, class Finish>
+  void input_kernel(const Eigen::RowVectorXd& after, const Eigen::VectorXd& input, const Visit& visit,
+                    const Finish& finish) const {
+    const Eigen::VectorXd held = model_.hold() * input;
     const auto kernel_of = [&](const std::vector<double>& row) {
       double kernel = 0;
-      for (std::size_t i = 0; i < row.size(); ++i)
-        kernel += row[i] * from_command[static_cast<Eigen::Index>(i)];
+      for (std::size_t i = 0; i < row.size(); ++i) kernel += row[i] * held[static_cast<Eigen::Index>(i)];
       return kernel;
     };
-    visit(after[model_.command_index()]);
+    visit(after.dot(input));
     const std::vector<double> rest =
         walk(after * model_.control(), [&](const std::vector<double>& row) { visit(kernel_of(row)); });
     if (ratio_ > 0) finish(kernel_of(rest), ratio_);

@@ -147,7 +147,7 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
 }
 
 ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
-                         double bias_N, double limit_m_s) {
+                         const OtherErrors& other, double limit_m_s) {
   ClampBounds result;
   if (loop.plant.Ki == 0 || std::isinf(limit_m_s)) return result;
   result.exists = true;
@@ -162,7 +162,7 @@ ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturb
           demand_m_s, disturbance.impulse_N_s * felt_passes(disturbance, FadingKernel(kernel, kernel.peak)));
     }
   }
-  result.set_demand(demand_m_s + std::abs(bias_N) / (mass_kg * loop.plant.Ki), limit_m_s);
+  result.set_demand(demand_m_s + integral_demand_m_s(loop, channel, other), limit_m_s);
   SampledLoop without = loop;
   without.plant.Ki = 0;
   const SampledAdjoint pd_adjoint(without);
@@ -170,8 +170,8 @@ ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturb
   const GainNorms pd = sampled_norms(without, channel, Instants::kAll);
   const GainNorms pd_command =
       channel == Channel::kCommand ? pd : sampled_norms(without, Channel::kCommand, Instants::kAll);
-  const double constant_m =
-      pd_command.amplitude * mass_kg * loop.plant.Ki * limit_m_s + pd.amplitude * std::abs(bias_N);
+  const double constant_m = pd_command.amplitude * mass_kg * loop.plant.Ki * limit_m_s +
+                            error_parts(without, pd.edge, other).total_m();
   result.by_amplitude = times_known(pd.amplitude, disturbance.amplitude_N) + constant_m;
   if (std::isfinite(disturbance.impulse_N_s)) {
     result.by_impulse = constant_m + disturbance.impulse_N_s * worst_phase(without, [&](double phase_s) {

@@ -18,6 +18,6 @@ DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, c
 /// acting clamp are those of the loop without integral, to which the integral is an error of its command.
 /// @param limit_m_s on the state I that firmware keeps (it adds integrator_step_s e per period).
 ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
-                         double bias_N, double limit_m_s);
+                         const OtherErrors& other, double limit_m_s);
 
 }  // namespace swarmcert::stability

@@ -20,16 +20,23 @@ using Eigen::RowVectorXd;
 constexpr std::array<double GainNorms::*, 4> kAllGains = {&GainNorms::rate, &GainNorms::amplitude,
                                                           &GainNorms::edge, &GainNorms::impulse};
 
-/// Gains to e at one phase of the period; per unit of acceleration.
+/// Gains to e at one phase of the period; per unit of acceleration or of the estimate's error.
 class PhaseGains {
  public:
-  PhaseGains(const SampledLoop& loop, Channel channel) : channel_(channel), adjoint_(loop) {}
+  PhaseGains(const SampledLoop& loop, Channel channel) : adjoint_(loop) {
+    const SampledModel& model = adjoint_.model();
+    if (channel == Channel::kCommand) input_ = Eigen::VectorXd::Unit(model.size() + 1, model.command_index());
+  }
+  PhaseGains(const SampledLoop& loop, Estimate estimate) : adjoint_(loop) {
+    const SampledModel& model = adjoint_.model();
+    input_ = estimate == Estimate::kPosition ? model.measured_position() : model.measured_velocity();
+  }
 
   bool stable() const { return adjoint_.is_stable(); }
 
   GainNorms at(double phase_s) const {
     const RowVectorXd after = adjoint_.output_after_control(phase_s);
-    if (channel_ == Channel::kCommand) return command_gains(adjoint_, after);
+    if (input_.size() > 0) return input_gains(adjoint_, after, input_);
     KernelSum sum;
     sum.add_linear(0, 1, phase_s);
     add_force_kernel(adjoint_, after, sum);
@@ -37,8 +44,8 @@ class PhaseGains {
   }
 
  private:
-  Channel channel_;
   SampledAdjoint adjoint_;
+  Eigen::VectorXd input_;  ///< added to the state after control, once per period; empty: a force
 };
 
 /// The largest value of one gain over the phases, from its values on a grid: golden section around the best.
@@ -71,6 +78,18 @@ double refine(const PhaseGains& gains, double GainNorms::*which, const std::vect
   return std::max({result, at_a, at_b});
 }
 
+GainNorms norms_over(const PhaseGains& gains, double period_s, Instants instants) {
+  if (!gains.stable()) return {kInfinity, kInfinity, kInfinity, kInfinity};
+  if (instants == Instants::kSampling) return gains.at(0);
+  constexpr int kPhases = 9;
+  const double step_s = period_s / (kPhases - 1);
+  std::vector<GainNorms> grid;
+  for (int i = 0; i < kPhases; ++i) grid.push_back(gains.at(i * step_s));
+  GainNorms result;
+  for (const auto which : kAllGains) result.*which = refine(gains, which, grid, step_s);
+  return result;
+}
+
 }  // namespace
 
 double effective_Ki(const SampledLoop& loop) {
@@ -83,21 +102,15 @@ double spectral_radius(const SampledLoop& loop) {
 }
 
 GainNorms sampled_norms(const SampledLoop& loop, Channel channel, Instants instants) {
-  const PhaseGains gains(loop, channel);
-  if (!gains.stable()) return {kInfinity, kInfinity, kInfinity, kInfinity};
-  if (instants == Instants::kSampling) {
-    GainNorms at_samples = gains.at(0);
-    for (const auto which : kAllGains) at_samples.*which /= loop.plant.mass_kg;
-    if (loop.plant.Ki == 0) at_samples.rate = kInfinity;
-    return at_samples;
-  }
-  constexpr int kPhases = 9;
-  const double step_s = loop.period_s / (kPhases - 1);
-  std::vector<GainNorms> grid;
-  for (int i = 0; i < kPhases; ++i) grid.push_back(gains.at(i * step_s));
-  GainNorms result;
-  for (const auto which : kAllGains) result.*which = refine(gains, which, grid, step_s) / loop.plant.mass_kg;
+  GainNorms result = norms_over(PhaseGains(loop, channel), loop.period_s, instants);
+  for (const auto which : kAllGains) result.*which /= loop.plant.mass_kg;
   if (loop.plant.Ki == 0) result.rate = kInfinity;
+  return result;
+}
+
+GainNorms sampled_norms(const SampledLoop& loop, Estimate estimate, Instants instants) {
+  GainNorms result = norms_over(PhaseGains(loop, estimate), loop.period_s, instants);
+  if (loop.plant.Ki == 0 || estimate == Estimate::kPosition) result.rate = kInfinity;
   return result;
 }
 

@@ -30,6 +30,9 @@ enum class Instants {
 /// All infinite where the spectral radius is not below 1.
 GainNorms sampled_norms(const SampledLoop& loop, Channel channel, Instants instants);
 
+/// The same for an error of an estimate, which the loop reads once per period, per m/s or per m.
+GainNorms sampled_norms(const SampledLoop& loop, Estimate estimate, Instants instants);
+
 /// Largest modulus of an eigenvalue of the map from one sample to the next.
 double spectral_radius(const SampledLoop& loop);
 

@@ -23,6 +23,9 @@ class SampledModel {
   const Eigen::MatrixXd& hold() const { return hold_; }
   /// Row that gives e at `phase_s` into a period from the state after its control.
   Eigen::RowVectorXd error_at(double phase_s) const;
+  /// What an error of 1 of the measured position, or velocity, adds to the state after control, [size + 1].
+  Eigen::VectorXd measured_position() const { return control_.col(0) - Eigen::VectorXd::Unit(size() + 1, 0); }
+  Eigen::VectorXd measured_velocity() const { return control_.col(1) - Eigen::VectorXd::Unit(size() + 1, 1); }
   Eigen::Index integral_index() const { return plant_; }
   /// Where the new command stands after control.
   Eigen::Index command_index() const { return plant_ + 1; }

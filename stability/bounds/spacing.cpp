@@ -63,7 +63,7 @@ Spacing spacing(const AxisLoop& loop, const GainNorms& gains, const SpacingVehic
     Disturbance below;
     below.amplitude_N = row.peak_force_N;
     const auto clamp_of = [&](const Disturbance& d) {
-      return clamp_bounds(loop, Channel::kForce, d, 0, vehicle.integrator_limit_m_s, vehicle.integral_share);
+      return clamp_bounds(loop, Channel::kForce, d, {}, vehicle.integrator_limit_m_s, vehicle.integral_share);
     };
     const ClampBounds staying = clamp_of(below);
     row.stay_error_m = std::min(staying.never_acts ? gains.amplitude * row.peak_force_N : kInfinity,

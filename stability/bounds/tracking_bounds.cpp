@@ -60,9 +60,19 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
       : source.kind == "measured" ? "measured"
                                   : "proved",
       report.thrust_margin_N
-          ? "under the disturbance class, about hover, by the effort gain of the continuous loop"
+          ? "under all that is declared, about hover, by the effort gain of the continuous loop"
           : "");
-  add("exact position and velocity", "assumed", "sensor noise adds to every bound");
+  if (source.has_estimate_errors()) {
+    add("errors of the estimated position and velocity", "assumed", "as declared");
+  } else {
+    add("exact position and velocity", "assumed",
+        "--velocity-error and --position-error bound what errors of the estimates add");
+  }
+  if (source.bounds_learning_error() && !source.f_hat_rate_known &&
+      (gains.network_rate_hz > 0 || gains.network_latency_s > 0)) {
+    add("the learned force follows its inputs at once", "assumed",
+        "it is a staircase or late by [network]; --network NET --speed V bounds what that adds");
+  }
   if (gains.rate_hz > 0) {
     add("continuous position loop", "assumed", "rows named 'sampled' do not need it");
   }
@@ -74,10 +84,182 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
   }
 }
 
+double integrator_limit(const Gains& gains, int axis) {
+  return gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
+}
+
+/// @param of_class what disturbance_bounds() says of the class alone.
+template <class AnyLoop>
+AxisBounds bounds_of(const AnyLoop& loop, const DisturbanceBounds& of_class, Channel channel,
+                     const GainNorms& gains, const Disturbance& known, const OtherErrors& other,
+                     bool classes_contain_bias, double limit_m_s) {
+  AxisBounds row;
+  row.channel = channel;
+  row.bounds = of_class;
+  row.parts = error_parts(loop, gains.edge, other);
+  row.bounds.add(row.parts.total_m());
+  OtherErrors beside_amplitude = other;
+  if (classes_contain_bias) {
+    // A rate says nothing about the force at the start; an amplitude or an impulse that was measured contains it.
+    ErrorParts parts = row.parts;
+    parts.bias_m = 0;
+    row.bounds.by_amplitude = of_class.by_amplitude + parts.total_m();
+    row.bounds.by_impulse = of_class.by_impulse + parts.total_m();
+    // Edges per pass count the first rise by the amplitude.
+    if (known.variation_per_pass) row.bounds.by_edges = of_class.by_edges + parts.total_m();
+    beside_amplitude.bias_N = beside_amplitude.start_N = 0;
+  }
+  row.clamp = clamp_bounds(loop, channel, known, beside_amplitude, limit_m_s);
+  return row;
+}
+
+/// Gains of an axis, copied where its loop is that of the axis before.
+void add_gains(const AxisLoop& loop, const std::optional<SampledLoop>& sampled, int axis, bool is_as_before,
+               TrackingReport& report) {
+  const auto copy = [axis](auto& rows) {
+    const std::size_t count = rows.size();
+    for (std::size_t k = 0; k < count; ++k) {
+      if (rows[k].axis != axis - 1) continue;
+      auto row = rows[k];
+      row.axis = axis;
+      rows.push_back(row);
+    }
+  };
+  if (is_as_before) {
+    copy(report.exact);
+    copy(report.of_estimates);
+    return;
+  }
+  for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+    const GainNorms norms = continuous_norms(loop, channel);
+    report.exact.push_back({axis, channel, Loop::kContinuous, norms, norms});
+    if (!sampled) continue;
+    report.exact.push_back({axis, channel, Loop::kSampled,
+                            sampled_norms(*sampled, channel, Instants::kSampling),
+                            sampled_norms(*sampled, channel, Instants::kAll)});
+  }
+  for (const Estimate estimate : {Estimate::kVelocity, Estimate::kPosition}) {
+    const GainNorms norms = continuous_norms(loop, estimate);
+    report.of_estimates.push_back({axis, estimate, Loop::kContinuous, norms, norms});
+    if (!sampled) continue;
+    report.of_estimates.push_back({axis, estimate, Loop::kSampled,
+                                   sampled_norms(*sampled, estimate, Instants::kSampling),
+                                   sampled_norms(*sampled, estimate, Instants::kAll)});
+  }
+}
+
+/// What the disturbance can ask of the integrator of the loop that flies.
+double integrator_need(const Gains& gains, const AxisLoop& loop, const std::optional<SampledLoop>& sampled,
+                       int axis, const DisturbanceSource& source, const InitialError& initial) {
+  const double limit_m_s = integrator_limit(gains, axis);
+  const Disturbance& known = source.axis[axis];
+  OtherErrors other = source.other(axis, initial);
+  if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
+  const ClampBounds clamp = sampled ? clamp_bounds(*sampled, Channel::kForce, known, other, limit_m_s)
+                                    : clamp_bounds(loop, Channel::kForce, known, other, limit_m_s);
+  return clamp.demand_m_s;
+}
+
+/// Bounds of an axis, one row per row of gains, copied where all is as on the axis before.
+void add_bounds(const Gains& gains, const AxisLoop& loop, const std::optional<SampledLoop>& sampled, int axis,
+                bool is_as_before, const DisturbanceSource& source, const InitialError& initial,
+                TrackingReport& report) {
+  const std::size_t count = report.bounds.size();
+  for (std::size_t k = 0; k < count && is_as_before; ++k) {
+    if (report.bounds[k].axis != axis - 1) continue;
+    AxisBounds row = report.bounds[k];
+    row.axis = axis;
+    report.bounds.push_back(row);
+  }
+  if (is_as_before) return;
+  const Disturbance& known = source.axis[axis];
+  const OtherErrors other = source.other(axis, initial);
+  const double limit_m_s = integrator_limit(gains, axis);
+  for (const ExactGains& of : report.exact) {
+    if (of.axis != axis) continue;
+    AxisBounds row = of.loop == Loop::kSampled ? axis_bounds(*sampled, of.channel, of.all_times, known, other,
+                                                             source.classes_contain_bias, limit_m_s)
+                                               : axis_bounds(loop, of.channel, of.all_times, known, other,
+                                                             source.classes_contain_bias, limit_m_s);
+    row.axis = axis;
+    row.loop = of.loop;
+    if (source.f_hat_rate_known) {
+      row.staircase_m = staircase_error(of.all_times, gains.network_rate_hz, gains.network_latency_s,
+                                        source.f_hat_rate_N_s);
+    }
+    report.bounds.push_back(row);
+  }
+}
+
+/// Neither more thrust than the rotors give nor less than nothing, about hover.
+void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const DisturbanceSource& source,
+                       const InitialError& initial, TrackingReport& report) {
+  const double amplitude_N = source.axis[2].amplitude_N;
+  if (!(plant.largest_thrust_N > 0) || !std::isfinite(amplitude_N)) return;
+  OtherErrors other = source.other(2, initial);
+  if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
+  const double weight_N = plant.mass_kg * kGravity_m_s2;
+  report.thrust_margin_N = std::min(plant.thrust_scale * plant.largest_thrust_N - weight_N, weight_N) -
+                           report.facts.back().effort_gain * amplitude_N - effort_N(loop, other);
+}
+
+/// Largest sum of the absolute values of a row, an upper bound of the 2-norm of a symmetric matrix.
+double row_sum_norm(const Matrix3& matrix) {
+  double norm = 0;
+  for (std::size_t r = 0; r < 3; ++r) {
+    norm =
+        std::max(norm, std::abs(matrix[3 * r]) + std::abs(matrix[3 * r + 1]) + std::abs(matrix[3 * r + 2]));
+  }
+  return norm;
+}
+
+Transient transient_of(const Theorem& theorem, const Plant& plant, const DisturbanceSource& source,
+                       const InitialError& initial) {
+  Transient transient;
+  transient.l = theorem.min_Lambda;
+  transient.k = theorem.min_K;
+  transient.mass_kg = plant.mass_kg;
+  transient.error_m = initial.position_m;
+  transient.speed_m_s = initial.velocity_m_s;
+  // With the integral at zero, m e'' = -(m 2 Lambda + K) e' - (m Lambda^2 + 2 K Lambda) e - K Lambda^2 0 - eps(0), so
+  // m s' = -K (e' + 2 Lambda e) - eps(0).
+  const double bias_N = std::hypot(source.bias_N[0], source.bias_N[1], source.bias_N[2]);
+  transient.s_dot_m_s2 =
+      (row_sum_norm(theorem.composite->K) *
+           (initial.velocity_m_s + 2 * row_sum_norm(theorem.composite->Lambda) * initial.position_m) +
+       std::max(initial.learning_error_N, bias_N)) /
+      plant.mass_kg;
+  transient.rate_N_s =
+      source.bounds_learning_error() && std::isfinite(source.rate_norm_N_s) ? source.rate_norm_N_s : 0;
+  return transient;
+}
+
+/// Hypotheses beyond the gains, then vector gain, transient and ball.
+void add_theorem(const Plant& plant, const DisturbanceSource& source, const InitialError& initial,
+                 TrackingReport& report) {
+  Theorem& theorem = report.theorem;
+  const auto object = [&theorem](std::string why) {
+    theorem.applies = false;
+    theorem.why_not.push_back(std::move(why));
+  };
+  if (plant.thrust_scale != 1) {
+    object("the force that acts is not the force commanded: thrust scale " +
+           std::to_string(plant.thrust_scale));
+  }
+  if (source.has_estimate_errors()) object("the estimated position or velocity errs, as declared");
+  if (!theorem.composite) return;
+  report.vector = vector_peak_gain(theorem.composite->Lambda, theorem.composite->K, plant.mass_kg);
+  report.transient = transient_of(theorem, plant, source, initial);
+  if (theorem.applies && source.bounds_learning_error() && std::isfinite(source.rate_norm_N_s)) {
+    report.ball_m = source.rate_norm_N_s * theorem.ball_per_rate();
+  }
+}
+
 }  // namespace
 
 const char* axis_name(int axis) { return axis == 0 ? "x" : axis == 1 ? "y" : "z"; }
 const char* name(Channel channel) { return channel == Channel::kForce ? "force" : "command"; }
+const char* name(Estimate estimate) { return estimate == Estimate::kVelocity ? "velocity" : "position"; }
 const char* name(Loop loop) { return loop == Loop::kContinuous ? "continuous" : "sampled"; }
 
 std::optional<AxisLoop> axis_loop(const Gains& gains, const Plant& plant, int axis) {
@@ -100,118 +282,77 @@ std::optional<SampledLoop> sampled_axis_loop(const Gains& gains, const Plant& pl
   return SampledLoop{*loop, 1 / gains.rate_hz, gains.integrator_step_s};
 }
 
+bool DisturbanceSource::has_estimate_errors() const {
+  const auto is_given = [](double size) { return size != 0; };
+  return std::any_of(std::begin(velocity_error_m_s), std::end(velocity_error_m_s), is_given) ||
+         std::any_of(std::begin(position_error_m), std::end(position_error_m), is_given);
+}
+
+bool DisturbanceSource::amplitudes_reach_bias() const {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (std::abs(bias_N[i]) > axis[i].amplitude_N) return false;
+  }
+  return true;
+}
+
+OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial) const {
+  OtherErrors errors;
+  errors.bias_N = bias_N[of_axis];
+  errors.start_N = initial.learning_error_N;
+  errors.position_m = initial.position_m;
+  errors.velocity_m_s = initial.velocity_m_s;
+  errors.velocity_error_m_s = velocity_error_m_s[of_axis];
+  errors.position_error_m = position_error_m[of_axis];
+  return errors;
+}
+
+AxisBounds axis_bounds(const AxisLoop& loop, Channel channel, const GainNorms& gains,
+                       const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
+                       double limit_m_s) {
+  return bounds_of(loop, disturbance_bounds(loop, channel, known), channel, gains, known, other,
+                   classes_contain_bias, limit_m_s);
+}
+
+AxisBounds axis_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
+                       const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
+                       double limit_m_s) {
+  return bounds_of(loop, disturbance_bounds(loop, channel, gains, known), channel, gains, known, other,
+                   classes_contain_bias, limit_m_s);
+}
+
 TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const DisturbanceSource& source,
                                const InitialError& initial) {
   TrackingReport report;
   PerAxis integrator_needs{};
   bool needs_known = true;
-  std::vector<AxisLoop> done;  // loops of earlier axes, whose rows are copied where this axis is the same
   for (int axis = 0; axis < 3; ++axis) {
-    const std::optional<AxisLoop> loop = axis_loop(gains, plant, axis);
-    const std::optional<SampledLoop> sampled = sampled_axis_loop(gains, plant, axis);
     const Disturbance& known = source.axis[axis];
+    needs_known = needs_known && (std::isfinite(known.amplitude_N) || std::isfinite(known.impulse_N_s));
+    const std::optional<AxisLoop> loop = axis_loop(gains, plant, axis);
+    if (!loop) {
+      needs_known = false;
+      continue;
+    }
+    const std::optional<SampledLoop> sampled = sampled_axis_loop(gains, plant, axis);
+    report.facts.push_back(facts_of(gains, *loop, sampled, axis, source.bias_N[axis]));
+    const std::optional<AxisLoop> before =
+        axis > 0 ? axis_loop(gains, plant, axis - 1) : std::optional<AxisLoop>();
+    const bool is_same_loop = before && same(*before, *loop);
+    add_gains(*loop, sampled, axis, is_same_loop, report);
+    const bool is_same = is_same_loop && source.other(axis, initial) == source.other(axis - 1, initial) &&
+                         known == source.axis[axis - 1] &&
+                         integrator_limit(gains, axis) == integrator_limit(gains, axis - 1);
     const auto i = static_cast<std::size_t>(axis);
-    needs_known =
-        needs_known && loop && (std::isfinite(known.amplitude_N) || std::isfinite(known.impulse_N_s));
-    if (!loop) continue;
-    report.facts.push_back(facts_of(gains, *loop, sampled, axis, source.bias_N[i]));
-    std::vector<ExactGains> rows;
-    const bool repeats_last_axis = !done.empty() && same(done.back(), *loop);
-    if (repeats_last_axis) {
-      for (const ExactGains& row : report.exact) {
-        if (row.axis == axis - 1) rows.push_back(row);
-      }
-      for (ExactGains& row : rows) row.axis = axis;
-    } else {
-      for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-        const GainNorms norms = continuous_norms(*loop, channel);
-        rows.push_back({axis, channel, Loop::kContinuous, norms, norms});
-        if (!sampled) continue;
-        rows.push_back({axis, channel, Loop::kSampled, sampled_norms(*sampled, channel, Instants::kSampling),
-                        sampled_norms(*sampled, channel, Instants::kAll)});
-      }
-    }
-    done.push_back(*loop);
-    const double limit_m_s = gains.integrator_limit_m_s[i];
-    const bool is_repeated = repeats_last_axis && axis > 0 && known == source.axis[axis - 1] &&
-                             source.bias_N[i] == source.bias_N[i - 1] &&
-                             limit_m_s == gains.integrator_limit_m_s[i - 1];
-    const std::size_t of_last_axis = report.bounds.size() - std::min(report.bounds.size(), rows.size());
     integrator_needs[i] =
-        is_repeated ? integrator_needs[i - 1]
-        : sampled   ? clamp_bounds(*sampled, Channel::kForce, known, source.bias_N[i], limit_m_s).demand_m_s
-                    : clamp_bounds(*loop, Channel::kForce, known, source.bias_N[i], limit_m_s).demand_m_s;
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-      const ExactGains& row = rows[k];
-      report.exact.push_back(row);
-      if (source.kind == "none") continue;
-      AxisBounds bounds;
-      if (is_repeated) bounds = report.bounds[of_last_axis + k];
-      bounds.axis = axis;
-      bounds.channel = row.channel;
-      bounds.loop = row.loop;
-      if (!is_repeated && row.loop == Loop::kSampled) {
-        bounds.bounds = disturbance_bounds(*sampled, row.channel, row.all_times, known);
-        bounds.clamp = clamp_bounds(*sampled, row.channel, known, source.bias_N[i], limit_m_s);
-      } else if (!is_repeated) {
-        bounds.bounds = disturbance_bounds(*loop, row.channel, known);
-        bounds.clamp = clamp_bounds(*loop, row.channel, known, source.bias_N[i], limit_m_s);
-      }
-      if (source.f_hat_rate_known) {
-        bounds.staircase_m = staircase_error(row.all_times, gains.network_rate_hz, gains.network_latency_s,
-                                             source.f_hat_rate_N_s);
-      }
-      report.bounds.push_back(bounds);
+        is_same ? integrator_needs[i - 1] : integrator_need(gains, *loop, sampled, axis, source, initial);
+    if (source.kind != "none") {
+      add_bounds(gains, *loop, sampled, axis, is_same, source, initial, report);
     }
-    if (axis == 2 && plant.largest_thrust_N > 0 && std::isfinite(known.amplitude_N)) {
-      // Neither more than the rotors give nor less than nothing.
-      const double weight_N = plant.mass_kg * kGravity_m_s2;
-      report.thrust_margin_N =
-          std::min(plant.thrust_scale * plant.largest_thrust_N - weight_N, weight_N) -
-          report.facts.back().effort_gain * (known.amplitude_N + std::abs(source.bias_N[2]));
-    }
+    if (axis == 2) add_thrust_margin(plant, *loop, source, initial, report);
   }
   report.theorem = check_theorem(gains, plant.mass_kg,
                                  needs_known ? std::optional<PerAxis>(integrator_needs) : std::nullopt);
-  if (plant.thrust_scale != 1) {
-    report.theorem.applies = false;
-    report.theorem.why_not.push_back("the force that acts is not the force commanded: thrust scale " +
-                                     std::to_string(plant.thrust_scale));
-  }
-  const bool bounds_error = source.bounds_learning_error();
-  if (report.theorem.composite) {
-    const Composite& composite = *report.theorem.composite;
-    report.vector = vector_peak_gain(composite.Lambda, composite.K, plant.mass_kg);
-    Transient transient;
-    transient.l = report.theorem.min_Lambda;
-    transient.k = report.theorem.min_K;
-    transient.mass_kg = plant.mass_kg;
-    transient.error_m = initial.position_m;
-    transient.speed_m_s = initial.velocity_m_s;
-    // s'(0) from its definition; |Lambda| enters through its largest entry sum, an upper bound of its norm.
-    double norm_L = 0;
-    double norm_K = 0;
-    for (std::size_t r = 0; r < 3; ++r) {
-      double row_L = 0;
-      double row_K = 0;
-      for (std::size_t c = 0; c < 3; ++c) {
-        row_L += std::abs(composite.Lambda[3 * r + c]);
-        row_K += std::abs(composite.K[3 * r + c]);
-      }
-      norm_L = std::max(norm_L, row_L);
-      norm_K = std::max(norm_K, row_K);
-    }
-    // With the integral at zero, m e'' = -(m 2 Lambda + K) e' - (m Lambda^2 + 2 K Lambda) e - K Lambda^2 0 - eps(0), so
-    // m s' = -K (e' + 2 Lambda e) - eps(0).
-    transient.s_dot_m_s2 =
-        (norm_K * (initial.velocity_m_s + 2 * norm_L * initial.position_m) + initial.learning_error_N) /
-        plant.mass_kg;
-    transient.rate_N_s = bounds_error && std::isfinite(source.rate_norm_N_s) ? source.rate_norm_N_s : 0;
-    report.transient = transient;
-    if (report.theorem.applies && bounds_error && std::isfinite(source.rate_norm_N_s)) {
-      report.ball_m = source.rate_norm_N_s * report.theorem.ball_per_rate();
-    }
-  }
+  add_theorem(plant, source, initial, report);
   add_assumptions(gains, source, report);
   return report;
 }

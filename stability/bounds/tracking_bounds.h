@@ -28,11 +28,27 @@ std::optional<AxisLoop> axis_loop(const Gains& gains, const Plant& plant, int ax
 /// The same as firmware runs it; nothing without rate_hz.
 std::optional<SampledLoop> sampled_axis_loop(const Gains& gains, const Plant& plant, int axis);
 
+/// Norms at t = 0.
+struct InitialError {
+  double position_m = 0;        ///< |e|
+  double velocity_m_s = 0;      ///< |e'|
+  double learning_error_N = 0;  ///< |force error|, bias included
+};
+
 /// What is known, and from where; per axis.
 struct DisturbanceSource {
   Disturbance axis[3];
   double rate_norm_N_s = std::numeric_limits<double>::infinity();  ///< d_m: sup |eps'| as a vector
   double bias_N[3] = {0, 0, 0};
+  /// Whether amplitude and impulse were measured with the bias in them; else it comes on top of every class.
+  bool classes_contain_bias = false;
+  double velocity_error_m_s[3] = {0, 0, 0};  ///< sup |estimated - true velocity|
+  double position_error_m[3] = {0, 0, 0};    ///< sup |estimated - true position|
+  bool has_estimate_errors() const;
+  /// Whether the amplitude is at least the bias on every axis, as one is that was measured with the bias in it.
+  bool amplitudes_reach_bias() const;
+  /// All that acts on an axis beside its class.
+  OtherErrors other(int of_axis, const InitialError& initial) const;
   /// "declared", "declared truth", "measured" or "rate of f_hat": the last bounds the learned force alone, not its
   /// error, and so gives no ball.
   std::string kind = "none";
@@ -51,11 +67,22 @@ struct ExactGains {
   GainNorms all_times;  ///< sampled: also between them
 };
 
+/// Gains from errors of the estimates: norms per m/s for the velocity, per m for the position.
+struct EstimateGains {
+  int axis = 0;
+  Estimate estimate = Estimate::kVelocity;
+  Loop loop = Loop::kContinuous;
+  GainNorms norms;      ///< sampled: at the sampling instants
+  GainNorms all_times;  ///< sampled: also between them
+};
+
+/// Every bound holds for all that the source declares together, from rest but for the initial error.
 struct AxisBounds {
   int axis = 0;
   Channel channel = Channel::kForce;
   Loop loop = Loop::kContinuous;
-  DisturbanceBounds bounds;  ///< of the linear loop: hold where clamp.never_acts
+  DisturbanceBounds bounds;  ///< of the linear loop, `parts` included: hold where clamp.never_acts
+  ErrorParts parts;          ///< what acts beside the class, of the linear loop
   ClampBounds clamp;
   /// Smallest bound that holds: of `bounds` where the clamp never acts, else of those that hold with it.
   double least() const {
@@ -63,7 +90,18 @@ struct AxisBounds {
     return clamp.never_acts && bounds.least() < clamped ? bounds.least() : clamped;
   }
   double staircase_m = 0;  ///< to be added for a learned force that is a staircase or late
+  double float32_m = 0;    ///< to be added for what float32 costs, where it is known
+  double total_m() const { return least() + staircase_m + float32_m; }
 };
+
+/// Bounds of one axis without staircase and float32.
+/// @param gains of the loop and channel, over all times. @param known, other as the source gives them.
+AxisBounds axis_bounds(const AxisLoop& loop, Channel channel, const GainNorms& gains,
+                       const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
+                       double limit_m_s);
+AxisBounds axis_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
+                       const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
+                       double limit_m_s);
 
 struct AxisFacts {
   int axis = 0;
@@ -91,6 +129,7 @@ struct TrackingReport {
   std::optional<double> ball_m;  ///< where the theorem applies and d_m bounds the learning error
   std::optional<Transient> transient;
   std::vector<ExactGains> exact;
+  std::vector<EstimateGains> of_estimates;
   std::vector<AxisBounds> bounds;
   std::vector<AxisFacts> facts;
   std::optional<VectorGain> vector;
@@ -99,18 +138,13 @@ struct TrackingReport {
   std::vector<Assumption> assumptions;
 };
 
-/// @param initial norms of e, e' and e'' at t = 0, for the transient; e'' contains the initial learning error over the
-///   mass, which the caller adds.
-struct InitialError {
-  double position_m = 0, velocity_m_s = 0, learning_error_N = 0;
-};
-
 TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const DisturbanceSource& source,
                                const InitialError& initial);
 
-/// "x", "y", "z"; "force", "command"; "continuous", "sampled".
+/// "x", "y", "z"; "force", "command"; "velocity", "position"; "continuous", "sampled".
 const char* axis_name(int axis);
 const char* name(Channel channel);
+const char* name(Estimate estimate);
 const char* name(Loop loop);
 
 }  // namespace swarmcert::stability

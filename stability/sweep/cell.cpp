@@ -95,7 +95,7 @@ class Quantities {
     all.variation_N = scaled(d.variation_N);
     const double share = sampled_ ? sampled_->integrator_step_s / sampled_->period_s : 1;
     const ClampBounds clamp =
-        clamp_bounds(acting_, Channel::kForce, all, 0,
+        clamp_bounds(acting_, Channel::kForce, all, {},
                      variant_.gains.integrator_limit_m_s[static_cast<std::size_t>(grid_.axis)], share);
     // Where the integrator may reach its clamp the loop is not linear.
     if (clamp.exists && !clamp.never_acts) return std::min(clamp.by_amplitude, clamp.by_impulse);

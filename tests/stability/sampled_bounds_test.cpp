@@ -185,7 +185,7 @@ TEST(SampledBounds, NoForceDrivesAClampedLoopBeyondItsBounds) {
   const double E = 0.1;
   for (const double limit_m_s : {0.01, 0.05, 0.4}) {
     const SampledLoop loop = loop_of(10, 5, 10, 100, 0.002);
-    const ClampBounds clamp = clamp_bounds(loop, Channel::kForce, of(INFINITY, E, INFINITY), 0, limit_m_s);
+    const ClampBounds clamp = clamp_bounds(loop, Channel::kForce, of(INFINITY, E, INFINITY), {}, limit_m_s);
     const double linear = sampled_norms(loop, Channel::kForce, Instants::kAll).amplitude * E;
     const double bound = clamp.never_acts ? std::min(linear, clamp.by_amplitude) : clamp.by_amplitude;
     std::mt19937 random(8);
@@ -206,7 +206,7 @@ TEST(SampledBounds, NoForceDrivesAClampedLoopBeyondItsBounds) {
 TEST(SampledBounds, AClampedBiasIsCounted) {
   const SampledLoop loop = loop_of(10, 5, 10, 100);
   const double bias_N = 0.0883, limit_m_s = 0.1;
-  const ClampBounds clamp = clamp_bounds(loop, Channel::kForce, of(INFINITY, 0, INFINITY), bias_N, limit_m_s);
+  const ClampBounds clamp = clamp_bounds(loop, Channel::kForce, of(INFINITY, 0, INFINITY), {bias_N}, limit_m_s);
   EXPECT_FALSE(clamp.never_acts);
   EXPECT_NEAR(clamp.demand_m_s, bias_N / (kMass_kg * 10), 1e-9);
   const std::vector<double> force(6000 * kParts, bias_N);

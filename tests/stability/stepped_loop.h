@@ -2,9 +2,11 @@
 /// Runge-Kutta on the equations as they are written down, no transfer function, no matrix exponential.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "stability/bounds/sampled_loop.h"
@@ -32,7 +34,16 @@ class SteppedLoop {
     past_.assign(past_.size(), 0.0);
     count_ = 0;
     command_ = 0;
+    velocity_error_ = position_error_ = 0;
   }
+  /// What the law reads beside e' and e from the next step on: held over each step.
+  void err_estimates(double velocity_m_s, double position_m) {
+    velocity_error_ = velocity_m_s;
+    position_error_ = position_m;
+  }
+  /// A clamp of the integrator's state; of a sampled loop.
+  void clamp_integral(double limit_m_s) { limit_m_s_ = limit_m_s; }
+  double integral_m_s() const { return x_[2]; }
   /// Where it is; after an impulse of force the speed has changed.
   void place(double e_m, double speed_m_s) {
     x_[0] = e_m;
@@ -45,7 +56,8 @@ class SteppedLoop {
     const double f1 = to_N / loop_.mass_kg;
     if (steps_per_period_ > 0) {
       if (count_ % steps_per_period_ == 0) {
-        integral_() += integrator_step_s_ * x_[0];
+        integral_() =
+            std::clamp(integral_() + integrator_step_s_ * (x_[0] + position_error_), -limit_m_s_, limit_m_s_);
         command_ = feedback() + command_error_N / loop_.mass_kg;
       }
       push(command_);
@@ -67,7 +79,9 @@ class SteppedLoop {
   using State = std::array<double, kMost>;  ///< e, e', int e, outputs of the lags from the last to the first
 
   double& integral_() { return x_[2]; }
-  double feedback() const { return -(loop_.Kp * x_[0] + loop_.Kd * x_[1] + loop_.Ki * x_[2]); }
+  double feedback() const {
+    return -(loop_.Kp * (x_[0] + position_error_) + loop_.Kd * (x_[1] + velocity_error_) + loop_.Ki * x_[2]);
+  }
 
   void push(double command) { past_[static_cast<std::size_t>(count_) % past_.size()] = command; }
   /// The command that acts now, or a step later.
@@ -78,41 +92,55 @@ class SteppedLoop {
 
   bool closes_itself() const { return steps_per_period_ == 0 && past_.size() == 1; }
 
-  State rate(const State& x, double force, double command) const {
+  /// Inputs at one time.
+  struct Inputs {
+    double force = 0, command = 0, velocity_error = 0, position_error = 0;
+  };
+
+  State rate(const State& x, const Inputs& in) const {
     State d{};
-    if (closes_itself()) command = -(loop_.Kp * x[0] + loop_.Kd * x[1] + loop_.Ki * x[2]);
-    double input = command;
+    double input = in.command;
+    if (closes_itself()) {
+      input =
+          -(loop_.Kp * (x[0] + in.position_error) + loop_.Kd * (x[1] + in.velocity_error) + loop_.Ki * x[2]);
+    }
     for (std::size_t i = lags_s_.size(); i-- > 0;) {
       d[3 + i] = (input - x[3 + i]) / lags_s_[i];
       input = x[3 + i];
     }
     d[0] = x[1];
-    d[1] = input + force;
-    d[2] = steps_per_period_ == 0 ? x[0] : 0;
+    d[1] = input + in.force;
+    d[2] = steps_per_period_ == 0 ? x[0] + in.position_error : 0;
     return d;
   }
 
-  State runge_kutta(State x, double f0, double f1, double u0, double u1) const {
+  /// Force and command are linear on the step, errors of the estimates constant.
+  State runge_kutta(State x, const Inputs& from, const Inputs& to) const {
     constexpr int kParts = 16;
     const double dt = step_s_ / kParts;
-    const auto moved = [&](const State& from, const State& d, double by) {
-      State result = from;
+    const auto moved = [&](const State& state, const State& d, double by) {
+      State result = state;
       for (std::size_t i = 0; i < size_; ++i) result[i] += by * d[i];
       return result;
     };
     for (int p = 0; p < kParts; ++p) {
-      const auto f = [&](double part) { return f0 + (f1 - f0) * (p + part) / kParts; };
-      const auto u = [&](double part) { return u0 + (u1 - u0) * (p + part) / kParts; };
-      const State a = rate(x, f(0), u(0));
-      const State b = rate(moved(x, a, dt / 2), f(0.5), u(0.5));
-      const State c = rate(moved(x, b, dt / 2), f(0.5), u(0.5));
-      const State d = rate(moved(x, c, dt), f(1), u(1));
+      const auto at = [&](double part) {
+        const double share = (p + part) / kParts;
+        Inputs in = from;
+        in.force += (to.force - from.force) * share;
+        in.command += (to.command - from.command) * share;
+        return in;
+      };
+      const State a = rate(x, at(0));
+      const State b = rate(moved(x, a, dt / 2), at(0.5));
+      const State c = rate(moved(x, b, dt / 2), at(0.5));
+      const State d = rate(moved(x, c, dt), at(1));
       for (std::size_t i = 0; i < size_; ++i) x[i] += dt / 6 * (a[i] + 2 * b[i] + 2 * c[i] + d[i]);
     }
     return x;
   }
 
-  /// A step is linear in the state and its four inputs: one column of each, integrated once.
+  /// A step is linear in the state and its six inputs: one column of each, integrated once.
   void prepare() {
     for (const double tau : loop_.lags_s) {
       if (tau > 0) lags_s_.push_back(tau);
@@ -123,18 +151,20 @@ class SteppedLoop {
     for (std::size_t i = 0; i < size_; ++i) {
       State unit{};
       unit[i] = 1;
-      columns_[i] = runge_kutta(unit, 0, 0, 0, 0);
+      columns_[i] = runge_kutta(unit, {}, {});
     }
-    columns_[size_] = runge_kutta({}, 1, 0, 0, 0);
-    columns_[size_ + 1] = runge_kutta({}, 0, 1, 0, 0);
-    columns_[size_ + 2] = runge_kutta({}, 0, 0, 1, 0);
-    columns_[size_ + 3] = runge_kutta({}, 0, 0, 0, 1);
+    const Inputs unit_inputs[] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+    for (std::size_t i = 0; i < 2; ++i) {
+      columns_[size_ + 2 * i] = runge_kutta({}, unit_inputs[i], {});
+      columns_[size_ + 2 * i + 1] = runge_kutta({}, {}, unit_inputs[i]);
+      columns_[size_ + 4 + i] = runge_kutta({}, unit_inputs[2 + i], unit_inputs[2 + i]);
+    }
   }
 
   void advance(double f0, double f1, double u0, double u1) {
-    const double inputs[] = {f0, f1, u0, u1};
+    const double inputs[kInputs] = {f0, f1, u0, u1, velocity_error_, position_error_};
     State next{};
-    for (std::size_t j = 0; j < size_ + 4; ++j) {
+    for (std::size_t j = 0; j < size_ + kInputs; ++j) {
       const double by = j < size_ ? x_[j] : inputs[j - size_];
       for (std::size_t i = 0; i < size_; ++i) next[i] += columns_[j][i] * by;
     }
@@ -147,10 +177,13 @@ class SteppedLoop {
   int steps_per_period_ = 0;  ///< 0: continuous
   std::vector<double> lags_s_;
   std::size_t size_ = 0;
-  std::array<State, kMost + 4> columns_{};
+  static constexpr std::size_t kInputs = 6;
+  std::array<State, kMost + kInputs> columns_{};
   State x_{};
   std::vector<double> past_;
   double command_ = 0;
+  double velocity_error_ = 0, position_error_ = 0;
+  double limit_m_s_ = std::numeric_limits<double>::infinity();
   long count_ = 0;
 };
 

@@ -47,6 +47,31 @@ void refuse_coupled_axes(const BoundOptions& options, const Tracking& input) {
                    " out, or make Lambda and K diagonal");
 }
 
+bool has_initial(const stability::InitialError& initial) {
+  return initial.position_m != 0 || initial.velocity_m_s != 0 || initial.learning_error_N != 0;
+}
+
+/// The tubes and the swarm bound start from rest and know exact estimates; the tube around a task knows no force but that
+/// of the declared truth. What they would leave out is refused.
+void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
+  const auto refuse = [](const char* what, const char* without) {
+    throw UsageError(fmt::format("{} does not contain {}: leave one of them out", what, without));
+  };
+  const bool has_task = !options.task.task.empty();
+  const char* const asked = has_task ? "--tube --task" : options.tube ? "--tube" : nullptr;
+  if (asked != nullptr && source.has_estimate_errors())
+    refuse(asked, "--velocity-error and --position-error");
+  if (asked != nullptr && has_initial(options.initial)) {
+    refuse(asked, "--initial-error, --initial-speed and --initial-learning-error, as it starts from rest");
+  }
+  if (has_task && (source.kind == "declared" || source.kind == "measured")) {
+    refuse(asked, "the force error of --rate, --amplitude, --edge, --impulse, --bias or --from");
+  }
+  if (!options.swarm.empty() && source.has_estimate_errors()) {
+    refuse("--swarm", "--velocity-error and --position-error");
+  }
+}
+
 int run_bound(const BoundOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -59,7 +84,9 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   DisturbanceArguments told = options.disturbance;
   // The tube makes its own bounds of how vehicles move; without --speed there are no others.
   if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
-  const LoadedDisturbance disturbance = load_disturbance(told, input);
+  LoadedDisturbance disturbance = load_disturbance(told, input);
+  if (has_initial(options.initial) && disturbance.source.kind == "none") declare_no_class(disturbance.source);
+  refuse_what_is_left_out(options, disturbance.source);
   const stability::DisturbanceSource& source = disturbance.source;
   inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
   if (options.tube && !has_task &&
@@ -70,21 +97,13 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   }
   std::optional<LocalTube> local;
   if (has_task) local = load_local_tube(options.task, options.disturbance, input, common, inputs);
-  const stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
+  stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
+  const FloatErrors float32 = float_errors(input, report);
+  for (stability::AxisBounds& row : report.bounds) row.float32_m = float32.tracking_error_m[row.axis];
 
   files::Json result = result_head("bound", inputs);
   add_tracking_json(result, input, source, report);
-  const FloatErrors float32 = float_errors(input, report);
   result["float32"] = float_errors_json(float32);
-  // The error budget of every row: its bound, what the staircase adds, what float32 adds.
-  for (files::Json& row : result["bounds"]) {
-    const std::string& axis = row["axis"].get_ref<const std::string&>();
-    const double of_float = float32.tracking_error_m[axis == "x" ? 0 : axis == "y" ? 1 : 2];
-    row["float32"] = finite(of_float);
-    row["total"] = row["minimum"].is_number()
-                       ? finite(row["minimum"].get<double>() + row["staircase"].get<double>() + of_float)
-                       : files::Json();
-  }
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
   if (options.is_uncertain) {
     const CancelOnInterrupt interrupt;
@@ -113,10 +132,6 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     if (disturbance.truth) print_truth(*disturbance.truth);
     if (options.is_uncertain) print_uncertain(result["uncertain"]);
     if (options.verified) print_verified(result["verified"]);
-    if (!report.transient && (options.initial.position_m != 0 || options.initial.velocity_m_s != 0 ||
-                              options.initial.learning_error_N != 0)) {
-      fmt::print("\nInitial errors enter the theorem's transient bound; these gains have none.\n");
-    }
     if (local) print_local_tube(result["local_tube"]);
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
     if (!options.swarm.empty()) print_swarm(result["swarm"]);
@@ -136,7 +151,8 @@ Command bound_command() {
       "Says whether the tracking theorem applies and why not, its ball, the exact gains of every axis "
       "for the\n"
       "continuous and the sampled loop, and, for a declared or measured force error, the smallest of "
-      "five bounds.\n"
+      "five bounds,\n"
+      "each with the bias, the initial error and the errors of the estimates that are declared.\n"
       "A certificate or a network bounds the rate of f_hat only and gives no ball; --truth declares what the "
       "force\n"
       "really is, and encloses its constants; --from takes measured quantiles.\n\n"
@@ -151,10 +167,13 @@ Command bound_command() {
         const auto options = std::make_shared<BoundOptions>();
         declare_tracking(app, options->tracking);
         declare_disturbance(app, options->disturbance);
-        app.add_option("--initial-error", options->initial.position_m, "|e| at t = 0, m, for the transient");
-        app.add_option("--initial-speed", options->initial.velocity_m_s, "|e'| at t = 0, m/s");
+        app.add_option("--initial-error", options->initial.position_m, "|e| at t = 0, m")
+            ->check(CLI::NonNegativeNumber);
+        app.add_option("--initial-speed", options->initial.velocity_m_s, "|e'| at t = 0, m/s")
+            ->check(CLI::NonNegativeNumber);
         app.add_option("--initial-learning-error", options->initial.learning_error_N,
-                       "|f_hat - f_a| at t = 0, bias included, N");
+                       "|f_hat - f_a| at t = 0, bias included, N")
+            ->check(CLI::NonNegativeNumber);
         auto* uncertain = app.add_option("--uncertain", options->uncertain,
                                          "Worst over intervals: mass=A:B, thrust=A:B, lag=A:B, delay=A:B, "
                                          "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")

@@ -372,16 +372,25 @@ Json tube_json(const Tracking& input, const DisturbanceSource& source, int count
         sampled_response(impulse_transfer(*loop, Channel::kForce), step_s, kSamples);
     double area = 0;
     double peak = 0;
+    double step = 0;  // response to a unit step, and the largest so far
+    double step_peak = 0;
     Json at = Json::array();
     const int every = (kSamples - 1) / (count - 1);
     for (int i = 0; i < kSamples; ++i) {
       const auto k = static_cast<std::size_t>(i);
       if (i > 0) area += (std::abs(kernel[k]) + std::abs(kernel[k - 1])) / 2 * step_s;
+      if (i > 0) step += (kernel[k] + kernel[k - 1]) / 2 * step_s;
       peak = std::max(peak, std::abs(kernel[k]));
+      step_peak = std::max(step_peak, std::abs(step));
       if (i % every != 0) continue;
       double bound = std::numeric_limits<double>::infinity();
       if (std::isfinite(d.amplitude_N)) bound = area * d.amplitude_N;
-      if (std::isfinite(d.impulse_N_s)) bound = std::min(bound, peak * d.impulse_N_s);
+      if (std::isfinite(d.impulse_N_s)) {
+        // Of every pass that has begun by now.
+        const double begun = d.pass_period_s > 0 ? 1 + std::floor(i * step_s / d.pass_period_s) : d.passes;
+        bound = std::min(bound, std::min<double>(d.passes, begun) * peak * d.impulse_N_s);
+      }
+      if (!source.classes_contain_bias) bound += step_peak * std::abs(source.bias_N[axis]);
       at.push_back({{"t_s", i * step_s}, {"error_m", bound}});
     }
     rows.push_back({{"axis", axis_name(axis)},

@@ -74,7 +74,14 @@ Json bounds_json(const AxisBounds& row) {
           {"minimum", finite(row.least())},
           {"guarantee", "bound"},
           {"smallest", smallest(row)},
-          {"staircase", row.staircase_m}};
+          {"parts",
+           {{"bias", finite(row.parts.bias_m)},
+            {"initial", finite(row.parts.initial_m)},
+            {"velocity_error", finite(row.parts.velocity_error_m)},
+            {"position_error", finite(row.parts.position_error_m)}}},
+          {"staircase", finite(row.staircase_m)},
+          {"float32", finite(row.float32_m)},
+          {"total", finite(row.total_m())}};
 }
 
 Json facts_json(const AxisFacts& f) {
@@ -153,6 +160,18 @@ void print_exact(const TrackingReport& report) {
                name(row.loop), cell(row.norms.rate), cell(row.norms.amplitude), cell(row.norms.edge),
                cell(row.norms.impulse));
   }
+  fmt::print("The same per m/s of error of the estimated velocity and per m of the estimated position\n");
+  for (const EstimateGains& row : report.of_estimates) {
+    fmt::print("  {:<4} {:<8} {:<11} {:>13} {:>13} {:>13} {:>13}\n", axis_name(row.axis), name(row.estimate),
+               name(row.loop), cell(row.norms.rate), cell(row.norms.amplitude), cell(row.norms.edge),
+               cell(row.norms.impulse));
+  }
+  const auto is_sampled = [](const ExactGains& row) { return row.loop == Loop::kSampled; };
+  if (std::any_of(report.exact.begin(), report.exact.end(), is_sampled)) {
+    fmt::print(
+        "Rows of the sampled loop are the error at its samples; the bounds below hold between them, too "
+        "(between_samples in --json)\n");
+  }
 }
 
 void print_facts(const TrackingReport& report) {
@@ -176,6 +195,21 @@ void print_facts(const TrackingReport& report) {
   }
 }
 
+/// What every bound of a row contains beside its class, and what the total adds.
+void print_parts(const AxisBounds& row) {
+  std::vector<std::string> parts;
+  const auto add = [&parts](const char* what, double error_m) {
+    if (error_m > 0) parts.push_back(fmt::format("{} {}", what, cell(error_m)));
+  };
+  add("bias", row.parts.bias_m);
+  add("initial error", row.parts.initial_m);
+  add("velocity error", row.parts.velocity_error_m);
+  add("position error", row.parts.position_error_m);
+  if (!parts.empty()) fmt::print("       each contains: {}\n", fmt::join(parts, ", "));
+  if (row.staircase_m > 0)
+    fmt::print("       the total contains {} for the staircase of f_hat\n", cell(row.staircase_m));
+}
+
 void print_bounds(const DisturbanceSource& source, const TrackingReport& report) {
   if (source.kind == "none") {
     fmt::print(
@@ -184,21 +218,22 @@ void print_bounds(const DisturbanceSource& source, const TrackingReport& report)
     return;
   }
   if (report.bounds.empty()) return;
-  fmt::print("\nBounds on the tracking error, m ({})\n", source.kind);
+  fmt::print("\nBounds on the tracking error from rest, all that is declared included, m ({})\n",
+             source.kind);
   fmt::print("  {:<4} {:<8} {:<11} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}  {}\n", "axis", "channel",
-             "loop", "rate", "amplitude", "edge", "impulse", "amp+rate", "smallest", "by");
+             "loop", "rate", "amplitude", "edge", "impulse", "amp+rate", "total", "by");
   for (const AxisBounds& row : report.bounds) {
     const DisturbanceBounds& b = row.bounds;
     fmt::print("  {:<4} {:<8} {:<11} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}  {}\n", axis_name(row.axis),
                name(row.channel), name(row.loop), cell(b.by_rate), cell(b.by_amplitude), cell(b.by_edges),
-               cell(b.by_impulse), cell(b.by_both), cell(row.least()), smallest(row));
+               cell(b.by_impulse), cell(b.by_both), cell(row.total_m()), smallest(row));
+    print_parts(row);
     if (!row.clamp.never_acts) {
       fmt::print(
           "       the integrator's clamp may act (demand {} m s): the first five hold for the linear loop "
           "only\n",
           cell(row.clamp.demand_m_s));
     }
-    if (row.staircase_m > 0) fmt::print("       plus {:.6g} m for the staircase of f_hat\n", row.staircase_m);
   }
 }
 
@@ -210,13 +245,21 @@ void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSou
                        const TrackingReport& report) {
   result["mass_kg"] = input.plant.mass_kg;
   result["thrust_scale"] = input.plant.thrust_scale;
-  result["disturbance"] = {
-      {"source", source.kind},
-      {"f_hat_rate_N_s", source.f_hat_rate_known ? Json(source.f_hat_rate_N_s) : Json()}};
+  result["disturbance"] = {{"source", source.kind},
+                           {"f_hat_rate_N_s", source.f_hat_rate_known ? Json(source.f_hat_rate_N_s) : Json()},
+                           {"bias_N", source.bias_N},
+                           {"velocity_error_m_s", source.velocity_error_m_s},
+                           {"position_error_m", source.position_error_m}};
   result["theorem"] = theorem_json(report);
   result["exact"] = Json::array();
   for (const ExactGains& row : report.exact) {
     Json json = {{"axis", axis_name(row.axis)}, {"channel", name(row.channel)}, {"loop", name(row.loop)}};
+    json.update(norms_json(row.norms));
+    if (row.loop == Loop::kSampled) json["between_samples"] = norms_json(row.all_times);
+    result["exact"].push_back(std::move(json));
+  }
+  for (const EstimateGains& row : report.of_estimates) {
+    Json json = {{"axis", axis_name(row.axis)}, {"channel", name(row.estimate)}, {"loop", name(row.loop)}};
     json.update(norms_json(row.norms));
     if (row.loop == Loop::kSampled) json["between_samples"] = norms_json(row.all_times);
     result["exact"].push_back(std::move(json));

@@ -17,6 +17,29 @@ using files::InputError;
 using files::Json;
 using stability::DisturbanceSource;
 
+/// "0.1" for every axis, or "0.1,0,-0.2".
+void read_axes(const char* option, const std::string& text, bool is_signed, double (&values)[3]) {
+  if (text.empty()) return;
+  const auto refuse = [&](const char* why) {
+    throw UsageError(fmt::format("{} {}: {}; write one number for all axes, or X,Y,Z", option, text, why));
+  };
+  const char* at = text.c_str();
+  int count = 0;
+  while (true) {
+    char* end = nullptr;
+    const double value = std::strtod(at, &end);
+    if (end == at || (*end != ',' && *end != '\0')) refuse("is not a number");
+    if (!std::isfinite(value)) refuse("must be a finite number");
+    if (!is_signed && value < 0) refuse("must not be negative");
+    if (count == 3) refuse("has more than three numbers");
+    values[count++] = value;
+    if (*end == '\0') break;
+    at = end + 1;
+  }
+  if (count == 2) refuse("has two numbers");
+  if (count == 1) values[1] = values[2] = values[0];
+}
+
 /// A number for `axis` in what compare wrote: a number, or an object with axes, with quantiles, or with both.
 double measured_number(const Json& value, const std::string& axis, const std::string& quantile,
                        const std::string& path, const std::string& field) {
@@ -58,6 +81,7 @@ void read_measured(const DisturbanceArguments& arguments, DisturbanceSource& sou
   // Of quantiles per axis: at least the vector's where they coincide.
   source.rate_norm_N_s = std::sqrt(square);
   source.kind = "measured";
+  source.classes_contain_bias = source.amplitudes_reach_bias();
   source.note = arguments.quantile + " over windows of flights, of which one follows the other";
   // Variation and impulse are those of one window: every window of the flight brings as much again.
   if (!error.contains("window_s") || !error["window_s"].is_number()) return;
@@ -183,7 +207,14 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--edge", arguments.edge, "Total variation of eps, N")->check(CLI::NonNegativeNumber);
   app.add_option("--impulse", arguments.impulse, "int |eps| dt of one pass, N s")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--bias", arguments.bias, "Constant part of the force error, N");
+  app.add_option("--bias", arguments.bias,
+                 "Constant part of the force error, N, on top of the rest; for all axes, or X,Y,Z");
+  app.add_option(
+      "--velocity-error", arguments.velocity_error,
+      "sup |estimated - true velocity|, m/s, which the law sees through Kd; for all axes, or X,Y,Z");
+  app.add_option("--position-error", arguments.position_error,
+                 "sup |estimated - true position|, m, which the law sees through Kp and Ki; for all axes, or "
+                 "X,Y,Z");
   auto* passes = app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
                      ->check(CLI::PositiveNumber);
   app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
@@ -291,7 +322,16 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
     result.inputs.push_back(arguments.from);
     read_measured(arguments, source);
   }
-  if (arguments.bias != 0) std::fill(std::begin(source.bias_N), std::end(source.bias_N), arguments.bias);
+  if (!arguments.bias.empty()) {
+    double bias_N[3] = {0, 0, 0};
+    read_axes("--bias", arguments.bias, true, bias_N);
+    // Beside a measured bias, of whatever sign, which the measured amplitude contains but this one not.
+    for (int axis = 0; axis < 3; ++axis)
+      source.bias_N[axis] = std::abs(source.bias_N[axis]) + std::abs(bias_N[axis]);
+    source.classes_contain_bias = false;
+  }
+  read_axes("--velocity-error", arguments.velocity_error, false, source.velocity_error_m_s);
+  read_axes("--position-error", arguments.position_error, false, source.position_error_m);
   const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
   if (!arguments.certificate.empty() || has_network) {
     read_lipschitz(arguments, source, result.inputs, source.further_assumptions);
@@ -301,7 +341,19 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
     result.truth = read_truth(arguments, tracking);
     add_truth(*result.truth, source);
   }
+  const bool has_others =
+      !arguments.bias.empty() || !arguments.velocity_error.empty() || !arguments.position_error.empty();
+  if (has_others && source.kind == "none") declare_no_class(source);
   return result;
+}
+
+void declare_no_class(DisturbanceSource& source) {
+  source.kind = "declared";
+  source.note = "as given; no force error beside a constant one";
+  for (stability::Disturbance& d : source.axis) {
+    d.rate_N_s = d.amplitude_N = d.variation_N = d.impulse_N_s = 0;
+  }
+  source.rate_norm_N_s = 0;
 }
 
 }  // namespace swarmcert::analysis

@@ -11,7 +11,7 @@ namespace swarmcert::analysis {
 
 struct DisturbanceArguments {
   double rate = -1, amplitude = -1, edge = -1, impulse = -1;  ///< negative: not given
-  double bias = 0;
+  std::string bias, velocity_error, position_error;  ///< a number for all axes, or X,Y,Z; empty: not given
   int passes = 1;
   double every_s = 0, pass_s = 0;
   std::string from;  ///< compare.json
@@ -36,8 +36,12 @@ struct LoadedDisturbance {
   std::vector<std::string> inputs;  ///< files that were read
 };
 
+/// Where nothing is known of the force error beside its constant part: it has no other.
+void declare_no_class(stability::DisturbanceSource& source);
+
 /// In order: --rate and the like (declared), --from (measured), --truth (with the network's rate where one is named),
-/// a certificate or a network with --speed (rate of f_hat, which is no learning error).
+/// a certificate or a network with --speed (rate of f_hat, which is no learning error). Bias and errors of the estimates
+/// come on top; alone, they stand beside a force error of zero.
 /// @throws UsageError for combinations that mean nothing; files::InputError for bad files.
 LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const Tracking& tracking);
 

@@ -42,6 +42,7 @@ stability::DisturbanceSource measured(const LearningError& error, const std::str
   }
   source.rate_norm_N_s = std::sqrt(square);  // at least the vector's where the axes' largest rates coincide
   source.kind = "measured";
+  source.classes_contain_bias = source.amplitudes_reach_bias();
   source.note = fmt::format("{} over windows of {} s", quantile, LearningError::kWindow_s);
   return source;
 }
@@ -108,6 +109,7 @@ std::string words(const stability::DisturbanceSource& source, int axis) {
   add("amplitude", d.amplitude_N, "N");
   add("variation", d.variation_N, "N");
   add("impulse", d.impulse_N_s, "N s");
+  if (source.bias_N[axis] != 0) add("bias", source.bias_N[axis], "N");
   return text;
 }
 

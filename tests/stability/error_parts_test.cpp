@@ -1,0 +1,311 @@
+// Everything that a user can declare, acting together: no simulated error exceeds the bound that is printed.
+#include "stability/bounds/error_parts.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "stability/bounds/sampled_bounds.h"
+#include "stability/bounds/tracking_bounds.h"
+#include "stability/vehicle.h"
+#include "stepped_loop.h"
+
+namespace swarmcert::stability {
+namespace {
+
+using tests::kMass_kg;
+
+constexpr double kStep_s = 0.0025;
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+/// The loops under test: with and without integrator, lags, a delay; continuous where `steps` is 0.
+struct Case {
+  const char* name;
+  AxisLoop loop;
+  int steps;  ///< of kStep_s per period
+  double integrator_share = 1;
+
+  SampledLoop sampled() const {
+    const double period_s = steps * kStep_s;
+    return {loop, period_s, integrator_share * period_s};
+  }
+  SteppedLoop stepped() const {
+    return steps == 0 ? SteppedLoop(loop, kStep_s) : SteppedLoop(sampled(), steps);
+  }
+};
+
+std::vector<Case> cases() {
+  return {{"continuous", {kMass_kg, 10, 5, 10, {1 / 17.4}, 0}, 0},
+          {"continuous, two lags", {kMass_kg, 20, 10, 12, {1 / 17.4, 0.03}, 0}, 0},
+          {"continuous, no integrator", {kMass_kg, 30, 9, 0, {1 / 17.4}, 0}, 0},
+          {"continuous, late", {kMass_kg, 10, 5, 10, {1 / 17.4}, 0.015}, 0},
+          {"sampled, late", {kMass_kg, 10, 5, 10, {1 / 17.4}, 0.015}, 4},
+          {"sampled, no integrator", {kMass_kg, 30, 9, 0, {1 / 17.4}, 0}, 4},
+          {"sampled, weak integrator", {kMass_kg, 10, 5, 10, {1 / 17.4}, 0}, 4, 0.2},
+          {"sampled at 400 Hz", {kMass_kg, 20, 10, 12, {1 / 17.4, 0.03}, 0}, 1}};
+}
+
+/// e at the end of every step after what `start` does, and with what `each` sets before a step.
+std::vector<double> response(SteppedLoop loop, int count, const std::function<void(SteppedLoop&)>& start,
+                             const std::function<double(SteppedLoop&, int)>& force_of) {
+  std::vector<double> e;
+  loop.reset();
+  start(loop);
+  for (int i = 0; i < count; ++i) {
+    const double force_N = force_of(loop, i);
+    e.push_back(loop.step(force_N, force_N));
+  }
+  return e;
+}
+
+/// What is declared of one axis, and inputs that are as large as that allows.
+struct Declared {
+  Disturbance known;
+  OtherErrors other;
+};
+
+AxisBounds bounds_of(const Case& c, const Declared& declared, double limit_m_s = kInfinite) {
+  if (c.steps == 0) {
+    return axis_bounds(c.loop, Channel::kForce, continuous_norms(c.loop, Channel::kForce), declared.known,
+                       declared.other, false, limit_m_s);
+  }
+  const SampledLoop loop = c.sampled();
+  return axis_bounds(loop, Channel::kForce, sampled_norms(loop, Channel::kForce, Instants::kAll),
+                     declared.known, declared.other, false, limit_m_s);
+}
+
+/// Signs of every part that add up at the end of the run: those of the responses to each of them, back in time.
+struct Worst {
+  std::vector<double> force, velocity, position;
+  double bias = 0, initial_position = 0, initial_velocity = 0;
+};
+
+Worst worst_of(const Case& c, int count) {
+  const auto nothing = [](SteppedLoop&) {};
+  const auto no_force = [](SteppedLoop&, int) { return 0.0; };
+  const auto errs_at_first = [](double velocity, double position, int steps) {
+    return [=](SteppedLoop& loop, int i) {
+      loop.err_estimates(i < steps ? velocity : 0, i < steps ? position : 0);
+      return 0.0;
+    };
+  };
+  const int period = std::max(c.steps, 1);
+  const SteppedLoop loop = c.stepped();
+  Worst worst;
+  worst.force = response(loop, count, nothing, [](SteppedLoop&, int i) { return i == 0 ? 1.0 : 0.0; });
+  worst.velocity = response(loop, count, nothing, errs_at_first(1, 0, period));
+  worst.position = response(loop, count, nothing, errs_at_first(0, 1, period));
+  worst.bias = response(loop, count, nothing, [](SteppedLoop&, int) { return 1.0; }).back();
+  worst.initial_position = response(
+                               loop, count, [](SteppedLoop& l) { l.place(1, 0); }, no_force)
+                               .back();
+  worst.initial_velocity = response(
+                               loop, count, [](SteppedLoop& l) { l.place(0, 1); }, no_force)
+                               .back();
+  return worst;
+}
+
+double sign(double x) { return x < 0 ? -1 : 1; }
+
+/// Largest |e| with every part as large as declared; a share `mistakes` of all signs is wrong.
+double largest_error(const Case& c, const Declared& declared, const Worst& worst, double mistakes,
+                     std::mt19937& random, double limit_m_s = kInfinite) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  const auto turned = [&](double x) { return unit(random) < mistakes ? -sign(x) : sign(x); };
+  const int count = static_cast<int>(worst.force.size());
+  const auto back = [&](const std::vector<double>& kernel, int i) {
+    return kernel[static_cast<std::size_t>(count - 1 - i)];
+  };
+  SteppedLoop loop = c.stepped();
+  loop.reset();
+  if (c.steps > 0) loop.clamp_integral(limit_m_s);
+  const OtherErrors& other = declared.other;
+  loop.place(other.position_m * turned(worst.initial_position),
+             other.velocity_m_s * turned(worst.initial_velocity));
+  const double bias_N = other.step_N() * turned(worst.bias);
+  const Disturbance& known = declared.known;
+  double most = std::abs(other.position_m), force_N = 0;
+  double impulse_left = known.impulse_N_s;
+  for (int i = 0; i < count; ++i) {
+    if (i % std::max(c.steps, 1) == 0) {
+      loop.err_estimates(other.velocity_error_m_s * turned(back(worst.velocity, i)),
+                         other.position_error_m * turned(back(worst.position, i)));
+    }
+    double to_N = known.amplitude_N * turned(back(worst.force, i));
+    if (std::isinf(known.amplitude_N)) to_N = 0;
+    if (std::isfinite(known.rate_N_s)) {
+      to_N = force_N + known.rate_N_s * kStep_s * turned(back(worst.force, i));
+      if (std::isfinite(known.amplitude_N)) to_N = std::clamp(to_N, -known.amplitude_N, known.amplitude_N);
+    } else {
+      force_N = to_N;
+    }
+    if (std::isfinite(known.variation_N)) to_N = force_N = known.variation_N * sign(worst.bias);
+    if (std::isfinite(known.impulse_N_s)) {
+      // Spread over a tenth of a second about the largest response.
+      const auto peak = std::max_element(worst.force.begin(), worst.force.end(),
+                                         [](double a, double b) { return std::abs(a) < std::abs(b); });
+      const int at = count - 1 - static_cast<int>(peak - worst.force.begin());
+      const double now = std::abs(i - at) <= 20 ? std::min(impulse_left, known.impulse_N_s / 41) : 0;
+      impulse_left -= now;
+      to_N = force_N = now / kStep_s * sign(*peak);
+    }
+    most = std::max(most, std::abs(loop.step(force_N + bias_N, to_N + bias_N)));
+    force_N = to_N;
+  }
+  return most;
+}
+
+/// One class of the force error at a time, with random sizes of all other parts.
+std::vector<Declared> random_declarations(std::mt19937& random, bool has_integrator) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<Declared> all(has_integrator ? 5 : 3);
+  all[0].known.amplitude_N = 0.1 * unit(random);
+  all[1].known.variation_N = 0.1 * unit(random);
+  all[2].known.impulse_N_s = 0.02 * unit(random);
+  if (has_integrator) {
+    all[3].known.rate_N_s = 0.3 * unit(random);
+    all[4].known.rate_N_s = 0.3 * unit(random);
+    all[4].known.amplitude_N = 0.1 * unit(random);
+  }
+  for (Declared& declared : all) {
+    const auto some = [&](double most) { return unit(random) < 0.3 ? 0 : most * unit(random); };
+    declared.other = {some(0.15), some(0.2), some(0.1), some(0.5), some(0.15), some(0.02)};
+    if (unit(random) < 0.5) declared.other.bias_N = -declared.other.bias_N;
+  }
+  return all;
+}
+
+TEST(ErrorParts, EverythingDeclaredTogetherStaysBelowTheBound) {
+  std::mt19937 random(3);
+  int runs = 0;
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(c.name);
+    double closest = 0;
+    for (const double end_s : {0.3, 0.6, 1.2, 2.5, 6.0}) {
+      const Worst worst = worst_of(c, static_cast<int>(end_s / kStep_s));
+      for (int k = 0; k < 12; ++k) {
+        for (const Declared& declared : random_declarations(random, c.loop.Ki > 0)) {
+          const AxisBounds bounds = bounds_of(c, declared);
+          const double mistakes = k % 3 == 0 ? 0.1 : 0;
+          const double ratio = largest_error(c, declared, worst, mistakes, random) / bounds.least();
+          ++runs;
+          closest = std::max(closest, ratio);
+          // The loop is stepped in doubles.
+          ASSERT_LE(ratio, 1 + 1e-7) << "bias " << declared.other.bias_N << ", by " << bounds.bounds.which();
+        }
+      }
+    }
+    EXPECT_GT(closest, 0.75) << "the inputs did not try hard";
+  }
+  EXPECT_GT(runs, 8 * 5 * 12 * 2);
+}
+
+TEST(ErrorParts, EachPartAloneIsReached) {
+  std::mt19937 random(1);
+  const std::pair<const char*, OtherErrors> parts[] = {{"bias", {-0.1}},
+                                                       {"start", {0, 0.1}},
+                                                       {"position", {0, 0, 0.1}},
+                                                       {"velocity", {0, 0, 0, 0.4}},
+                                                       {"velocity error", {0, 0, 0, 0, 0.1}},
+                                                       {"position error", {0, 0, 0, 0, 0, 0.02}}};
+  for (const Case& c : cases()) {
+    for (const auto& [name, other] : parts) {
+      SCOPED_TRACE(std::string(c.name) + ": " + name);
+      Declared declared;
+      declared.known.amplitude_N = 0;
+      declared.other = other;
+      const double bound = bounds_of(c, declared).least();
+      double most = 0;
+      for (double end_s = 0.1; end_s < 8; end_s *= 1.15) {
+        const Worst worst = worst_of(c, static_cast<int>(end_s / kStep_s));
+        most = std::max(most, largest_error(c, declared, worst, 0, random));
+      }
+      EXPECT_LE(most, bound * (1 + 1e-7));
+      // A delay makes the bound of the initial position larger than need be; impulses between samples are worse.
+      EXPECT_GT(most, bound * (c.loop.delay_s > 0 && other.position_m > 0 ? 0.9 : 0.97));
+    }
+  }
+}
+
+TEST(ErrorParts, AnActingClampOfTheIntegratorIsCounted) {
+  std::mt19937 random(7);
+  const Case c = {"sampled", {kMass_kg, 10, 5, 10, {1 / 17.4}, 0}, 4};
+  int acted = 0, never = 0;
+  double closest = 0;
+  for (const double limit_m_s : {0.02, 0.1, 0.4, 2.0}) {
+    for (const double end_s : {0.6, 1.5, 4.0}) {
+      const Worst worst = worst_of(c, static_cast<int>(end_s / kStep_s));
+      for (int k = 0; k < 20; ++k) {
+        Declared declared = random_declarations(random, true)[k % 2 == 0 ? 0 : 2];
+        const AxisBounds bounds = bounds_of(c, declared, limit_m_s);
+        (bounds.clamp.never_acts ? never : acted) += 1;
+        const double error_m = largest_error(c, declared, worst, 0, random, limit_m_s);
+        ASSERT_LE(error_m, bounds.least() * (1 + 1e-7)) << limit_m_s;
+        closest = std::max(closest, error_m / bounds.least());
+      }
+    }
+  }
+  EXPECT_GT(acted, 20);
+  EXPECT_GT(never, 20);
+  EXPECT_GT(closest, 0.7);
+}
+
+TEST(ErrorParts, TheDemandOnTheIntegratorIsNotExceeded) {
+  std::mt19937 random(9);
+  for (const Case& c : cases()) {
+    if (c.loop.Ki == 0) continue;
+    SCOPED_TRACE(c.name);
+    const double share = c.steps > 0 ? c.integrator_share : 1;
+    double closest = 0;
+    for (int k = 0; k < 40; ++k) {
+      Declared declared = random_declarations(random, true)[0];
+      declared.known.amplitude_N = 0;
+      const double demand_m_s = c.steps > 0
+                                    ? integral_demand_m_s(c.sampled(), Channel::kForce, declared.other)
+                                    : integral_demand_m_s(c.loop, Channel::kForce, declared.other);
+      SteppedLoop loop = c.stepped();
+      loop.reset();
+      loop.place(declared.other.position_m, declared.other.velocity_m_s);
+      loop.err_estimates(-declared.other.velocity_error_m_s, declared.other.position_error_m);
+      double most = 0;
+      for (int i = 0; i < 3000; ++i) {
+        loop.step(declared.other.step_N(), declared.other.step_N());
+        most = std::max(most, std::abs(loop.integral_m_s()));
+      }
+      ASSERT_LE(most, demand_m_s * (1 + 1e-7)) << share;
+      closest = std::max(closest, most / demand_m_s);
+    }
+    EXPECT_GT(closest, 0.6);
+  }
+}
+
+TEST(ErrorParts, AMeasuredAmplitudeThatContainsTheBiasIsNotChargedTwice) {
+  DisturbanceSource source;
+  source.kind = "measured";
+  for (int axis = 0; axis < 3; ++axis) {
+    source.axis[axis].amplitude_N = 0.1;
+    source.axis[axis].rate_N_s = 0.05;
+    source.bias_N[axis] = 0.04;
+  }
+  EXPECT_TRUE(source.amplitudes_reach_bias());
+  const AxisLoop loop = {kMass_kg, 10, 5, 10, {}, 0};
+  const GainNorms gains = continuous_norms(loop, Channel::kForce);
+  const AxisBounds once =
+      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}), true, kInfinite);
+  EXPECT_DOUBLE_EQ(once.bounds.by_amplitude, gains.amplitude * 0.1);
+  EXPECT_DOUBLE_EQ(once.bounds.by_rate, gains.rate * 0.05 + gains.edge * 0.04)
+      << "a rate does not contain it";
+  const AxisBounds beside =
+      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}), false, kInfinite);
+  EXPECT_DOUBLE_EQ(beside.bounds.by_amplitude, gains.amplitude * 0.1 + gains.edge * 0.04);
+  source.bias_N[1] = 0.2;
+  EXPECT_FALSE(source.amplitudes_reach_bias()) << "no amplitude contains a larger bias";
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
