@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include "stability/effect_text.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -112,6 +113,8 @@ std::string row_text(const LadderRow& row) {
 }
 
 }  // namespace
+
+std::string to_toml(const EffectSpec& effect) { return effect_text(effect).substr(1); }
 
 std::string to_toml(const Model& model, const std::vector<std::string>& comments) {
   std::string text;

@@ -79,7 +79,8 @@ std::vector<Candidate> candidates_of(const std::vector<Refined>& effects) {
   return candidates;
 }
 
-Selected select(const Passes& passes, std::vector<Candidate> candidates) {
+Selected select(const Passes& passes, std::vector<Candidate> candidates,
+                const std::vector<std::string>& names) {
   constexpr int kMostRounds = 6;
   Selected result;
   std::set<std::string> named;
@@ -88,7 +89,7 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates) {
         block_grams(passes.inputs, passes.kind, candidates, passes.flights, passes.jobs, passes.progress);
     const Selection selection(result.grams);
     if (!selection.is_sound()) return result;
-    result.members = selection.select();
+    result.members = selection.select(names);
     result.refined = refine(passes, result.grams, result.members);
     result.checks = instrument(passes, candidates_of(result.refined));
     if (const int bad = contradicted(result.refined, result.checks); bad >= 0) {

@@ -23,7 +23,9 @@ struct Selected {
 
 /// Selects on the grid, refines, and selects again with the refined thetas among the others, so that what a coarse
 /// theta left does not count as another effect. Effects that the instrument contradicts are taken out.
-Selected select(const Passes& passes, std::vector<Candidate> candidates);
+/// @param names where selection begins
+Selected select(const Passes& passes, std::vector<Candidate> candidates,
+                const std::vector<std::string>& names = {});
 
 /// As select(), with no scale of the thrust beside a constant vertical force.
 ///

@@ -66,13 +66,19 @@ struct Settled {
   std::vector<std::string> suspected;
 };
 
-Settled settle(const Passes& passes, const Coverage& covered) {
+/// @param formulas that compete with the names
+/// @param start effects where selection begins
+Settled settle(const Passes& passes, const Coverage& covered, const std::vector<Formula>& formulas,
+               const std::vector<std::string>& start) {
   constexpr int kMostRounds = 8;
   std::vector<Candidate> candidates = all_candidates(*passes.inputs.model_of(passes.kind), covered);
+  for (const Formula& formula : formulas)
+    candidates.push_back(candidate_of(formula, *passes.inputs.model_of(passes.kind)));
   Settled result;
   bool doubts_slope = false;
   for (int round = 0; round < kMostRounds; ++round) {
-    result.selected = doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates);
+    result.selected =
+        doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
     result.ranking = ranking_of(passes, result.selected);
     result.rest = remainder(passes, specs_of(result.ranking));
     if (result.rest.ratio <= kLoudRatio) break;
@@ -87,6 +93,64 @@ Settled settle(const Passes& passes, const Coverage& covered) {
     result.suspected.insert(result.suspected.end(), names.begin(), names.end());
     erase(candidates, with_substitutes(names, result.selected.refined));
   }
+  return result;
+}
+
+bool is_named(const Missing& missing) { return !is_formula(missing.effect); }
+
+/// Names that stand against formulas, and what is left beside them.
+struct Explained {
+  Settled settled;
+  Scan scan;
+  std::vector<Formula> formulas;
+};
+
+/// Formulas for what the model leaves, and for what it leaves beside the names: those that may take a name's place.
+std::vector<Formula> rivals_of_names(const Passes& passes, const Explained& explained) {
+  constexpr std::size_t kOfEach = 3;
+  std::vector<Formula> rivals;
+  const auto add = [&](const std::vector<Formula>& formulas) {
+    for (std::size_t i = 0; i < std::min(kOfEach, formulas.size()); ++i) {
+      const bool is_known = std::any_of(rivals.begin(), rivals.end(), [&](const Formula& other) {
+        return other.effect.name == formulas[i].effect.name;
+      });
+      if (!is_known) rivals.push_back(formulas[i]);
+    }
+  };
+  const ScanSamples nominal = scan_samples(passes, {});
+  add(find_formulas(nominal, scan(nominal, passes.jobs), kOfEach, passes.jobs));
+  add(explained.formulas);
+  return rivals;
+}
+
+void scan_what_is_left(const Passes& passes, Explained& explained) {
+  const ScanSamples left = scan_samples(passes, specs_of(explained.settled.ranking));
+  explained.scan = scan(left, passes.jobs);
+  explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
+}
+
+/// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
+/// selection is done anew with them among the candidates, and they are what is left.
+Explained explain(const Passes& passes, const Coverage& covered) {
+  constexpr double kClearlyLess = 0.9;  // of the mean square: names are worth a little
+  Explained result;
+  result.settled = settle(passes, covered, {}, {});
+  scan_what_is_left(passes, result);
+  if (result.settled.ranking.empty()) return result;
+  const std::vector<Formula> rivals = rivals_of_names(passes, result);
+  if (rivals.empty()) return result;
+  std::vector<std::string> names;
+  for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);
+  Settled again = settle(passes, covered, rivals, names);
+  if (std::all_of(again.ranking.begin(), again.ranking.end(), is_named)) return result;
+  const double left = Selection(again.selected.grams).mean_square(again.selected.members);
+  const Selection by_names(result.settled.selected.grams);
+  if (!(left < kClearlyLess * by_names.mean_square(result.settled.selected.members))) return result;
+  again.ranking.erase(std::stable_partition(again.ranking.begin(), again.ranking.end(), is_named),
+                      again.ranking.end());
+  again.rest = remainder(passes, specs_of(again.ranking));
+  result.settled = std::move(again);
+  scan_what_is_left(passes, result);
   return result;
 }
 
@@ -159,18 +223,28 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.problems = covered.problems;
   if (!result.too_poor.empty()) return result;
   const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
-  Settled settled = settle(passes, covered);
+  Explained explained = explain(passes, covered);
+  Settled& settled = explained.settled;
   const Selected& selected = settled.selected;
   const Selection selection(selected.grams);
   result.ranking = std::move(settled.ranking);
   result.contradicted = selected.contradicted;
   result.suspected = std::move(settled.suspected);
   result.rmse_before_N = std::sqrt(selection.mean_square({}));
-  result.rmse_after_N = std::sqrt(selection.mean_square(selected.members));
-  result.detectable = detectable(selected.grams, selected.members);
+  Members named;
+  for (const Member& member : selected.members) {
+    if (!is_formula(selection.candidate(member).name)) named.push_back(member);
+  }
+  result.rmse_after_N = std::sqrt(selection.mean_square(named));
+  result.detectable = detectable(selected.grams, named);
+  result.detectable.erase(std::remove_if(result.detectable.begin(), result.detectable.end(),
+                                         [](const Detectable& entry) { return is_formula(entry.effect); }),
+                          result.detectable.end());
   result.thrust_scale = thrust_scale(passes, covered);
   name_hidden_scale(*inputs.model_of(kind), result.thrust_scale, result.ranking);
   result.remainder = std::move(settled.rest);
+  result.scan = std::move(explained.scan);
+  result.formulas = std::move(explained.formulas);
   return result;
 }
 
@@ -178,7 +252,7 @@ std::vector<Missing> missing_effects(const residuals::Inputs& inputs, const std:
                                      const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress) {
   const Coverage covered = coverage(inputs, kind, which, jobs);
-  return settle({inputs, kind, which, covered.records, jobs, progress}, covered).ranking;
+  return explain({inputs, kind, which, covered.records, jobs, progress}, covered).settled.ranking;
 }
 
 std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::string& kind,

@@ -9,6 +9,7 @@
 #include "analysis/identification/injection.h"
 #include "analysis/identification/instrument.h"
 #include "analysis/identification/remainder.h"
+#include "analysis/identification/scan/formulas.h"
 
 namespace swarmcert::identification {
 
@@ -44,6 +45,8 @@ struct Diagnosis {
   std::vector<std::string> suspected;
   std::vector<Detectable> detectable;
   Remainder remainder;
+  Scan scan;                      ///< what the remainder depends on
+  std::vector<Formula> formulas;  ///< for entries of `scan`, best first
   ThrustScale thrust_scale;
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated
   std::size_t records = 0, blocks = 0;

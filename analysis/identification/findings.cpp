@@ -5,6 +5,7 @@
 #include <random>
 
 #include "analysis/identification/covariance.h"
+#include "analysis/identification/scan/formulas.h"
 #include "analysis/residuals/statistics.h"
 #include "nn/base/doubles.h"
 
@@ -65,6 +66,7 @@ void find_rivals(const Selection& selection, const Members& members, Finding& fi
   const Eigen::Index p = selection.candidate(members.back()).columns();
   for (int q = 0; q < static_cast<int>(selection.grams().candidates.size()); ++q) {
     if (selection.is_present(members, q)) continue;
+    if (is_formula(selection.grams().candidates[static_cast<std::size_t>(q)].name)) continue;
     const Member rival = selection.best_theta(rest, q);
     const Members instead = with(rest, rival);
     const bool explains = rest_square - selection.mean_square(instead) > kShare * (rest_square - full_square);

@@ -16,34 +16,6 @@ using residuals::Track;
 
 constexpr double kQuantile90 = 1.6449;  // two-sided 90 % of the normal distribution
 
-/// The track as set points ask for it: position, velocity, and the thrust and attitude that would follow them.
-/// Neighbours stay where they were seen.
-std::vector<stability::Instant> as_commanded(const Track& track, double mass_kg) {
-  constexpr std::ptrdiff_t kHalfWindow = 3;  // of the difference that gives the acceleration
-  constexpr double kMostAcceleration_m_s2 = 5;
-  std::vector<stability::Instant> wanted = track.instants;
-  const auto n = static_cast<std::ptrdiff_t>(wanted.size());
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    stability::Instant& now = wanted[static_cast<std::size_t>(i)];
-    const stability::Setpoint& target = track.targets[static_cast<std::size_t>(i)];
-    now.p_W_m = target.p_W_m;
-    now.v_W_m_s = target.v_W_m_s;
-    const auto a = static_cast<std::size_t>(std::max<std::ptrdiff_t>(i - kHalfWindow, 0));
-    const auto b = static_cast<std::size_t>(std::min(i + kHalfWindow, n - 1));
-    const double span_s = track.instants[b].time_s - track.instants[a].time_s;
-    Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
-    if (span_s > 0) acceleration = (track.targets[b].v_W_m_s - track.targets[a].v_W_m_s) / span_s;
-    if (acceleration.norm() > kMostAcceleration_m_s2)
-      acceleration *= kMostAcceleration_m_s2 / acceleration.norm();
-    const Eigen::Vector3d force_N =
-        mass_kg * (acceleration + Eigen::Vector3d(0, 0, stability::kGravity_m_s2));
-    now.thrust_N = force_N.norm();
-    const Eigen::Matrix3d R = now.R_WB;
-    now.R_WB = Eigen::Quaterniond::FromTwoVectors(R.col(2), force_N).toRotationMatrix() * R;
-  }
-  return wanted;
-}
-
 /// Sums of one block.
 struct Moments {
   Eigen::MatrixXd zx, xx;
@@ -143,6 +115,32 @@ struct FreeShape {
 };
 
 }  // namespace
+
+std::vector<stability::Instant> as_commanded(const Track& track, double mass_kg) {
+  constexpr std::ptrdiff_t kHalfWindow = 3;  // of the difference that gives the acceleration
+  constexpr double kMostAcceleration_m_s2 = 5;
+  std::vector<stability::Instant> wanted = track.instants;
+  const auto n = static_cast<std::ptrdiff_t>(wanted.size());
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    stability::Instant& now = wanted[static_cast<std::size_t>(i)];
+    const stability::Setpoint& target = track.targets[static_cast<std::size_t>(i)];
+    now.p_W_m = target.p_W_m;
+    now.v_W_m_s = target.v_W_m_s;
+    const auto a = static_cast<std::size_t>(std::max<std::ptrdiff_t>(i - kHalfWindow, 0));
+    const auto b = static_cast<std::size_t>(std::min(i + kHalfWindow, n - 1));
+    const double span_s = track.instants[b].time_s - track.instants[a].time_s;
+    Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
+    if (span_s > 0) acceleration = (track.targets[b].v_W_m_s - track.targets[a].v_W_m_s) / span_s;
+    if (acceleration.norm() > kMostAcceleration_m_s2)
+      acceleration *= kMostAcceleration_m_s2 / acceleration.norm();
+    const Eigen::Vector3d force_N =
+        mass_kg * (acceleration + Eigen::Vector3d(0, 0, stability::kGravity_m_s2));
+    now.thrust_N = force_N.norm();
+    const Eigen::Matrix3d R = now.R_WB;
+    now.R_WB = Eigen::Quaterniond::FromTwoVectors(R.col(2), force_N).toRotationMatrix() * R;
+  }
+  return wanted;
+}
 
 bool InstrumentedValue::is_strong() const {
   return interval.second - interval.first < std::abs(least_squares);

@@ -12,6 +12,10 @@
 
 namespace swarmcert::identification {
 
+/// The track as set points ask for it: position, velocity, and the thrust and attitude that would follow them.
+/// Neighbours stay where they were seen. Precondition: as many targets as instants.
+std::vector<stability::Instant> as_commanded(const residuals::Track& track, double mass_kg);
+
 /// One coefficient by both estimators.
 struct InstrumentedValue {
   double least_squares = 0, instrument = 0;

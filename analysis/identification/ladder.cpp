@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/identification/scan/proposal.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/input_error.h"
@@ -94,6 +95,49 @@ std::string too_poor(const residuals::Inputs& inputs, const std::string& kind, c
   return has_select ? "" : "the flights to select have no usable record of kind " + kind;
 }
 
+/// Every model of `inputs`, changed alike.
+template <typename Change>
+void change_models(residuals::Inputs& inputs, const Change& change) {
+  for (stability::Model& model : inputs.models) change(model);
+  for (auto& [vehicle, model] : inputs.vehicle_models) change(model);
+}
+
+/// Formulas that are to be fitted begin anew, with the shape that they have.
+residuals::Inputs with_formulas_off(residuals::Inputs inputs, const std::vector<std::string>& wanted) {
+  change_models(inputs, [&](stability::Model& model) {
+    for (stability::EffectSpec& spec : model.effects) {
+      if (spec.is_expression() && std::find(wanted.begin(), wanted.end(), spec.name) != wanted.end())
+        spec = switched_off(spec);
+    }
+  });
+  return inputs;
+}
+
+/// Puts the proposed effect `name` into the models, switched off, under a name that no other effect has; empty where
+/// the scan proposes none.
+std::string propose(residuals::Inputs& inputs, const Passes& passes, const std::vector<Missing>& accepted,
+                    const std::string& name) {
+  std::optional<stability::EffectSpec> found = proposal(passes, specs_of(accepted), name);
+  if (!found) return "";
+  stability::EffectSpec effect = switched_off(*found);
+  const std::string base = effect.name;
+  const std::vector<stability::EffectSpec>& present = inputs.models[0].effects;
+  for (int k = 2; std::any_of(present.begin(), present.end(),
+                              [&](const stability::EffectSpec& spec) { return spec.name == effect.name; });
+       ++k)
+    effect.name = base + "_" + std::to_string(k);
+  change_models(inputs, [&](stability::Model& model) { model.effects.push_back(effect); });
+  return effect.name;
+}
+
+void withdraw(residuals::Inputs& inputs, const std::string& name) {
+  change_models(inputs, [&](stability::Model& model) {
+    model.effects.erase(std::remove_if(model.effects.begin(), model.effects.end(),
+                                       [&](const stability::EffectSpec& spec) { return spec.name == name; }),
+                        model.effects.end());
+  });
+}
+
 /// One candidate on top of the model of the last accepted row.
 struct Trial {
   LadderRow row;
@@ -147,11 +191,24 @@ Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int 
   std::vector<Trial> trials = {trial("nominal", nominal)};
   std::size_t best = 0;  // the last accepted trial
   std::vector<std::string> accepted;
-  for (const std::string& name : wanted) {
+  residuals::Inputs working = with_formulas_off(inputs, wanted);
+  for (const std::string& asked : wanted) {
+    std::string name = asked;
+    if (is_proposal(asked)) {
+      const Passes passes = {working, kind, ladder.split.fit, 0, jobs, progress};
+      name = propose(working, passes, ladder.fitted, asked);
+      if (name.empty()) {
+        trials.push_back(trials[best]);
+        trials.back().row.effect = asked;
+        trials.back().row.accepted = false;
+        trials.back().row.note = "what is left varies with no variable that a " + asked + " could express";
+        continue;
+      }
+    }
     std::vector<std::string> names = accepted;
     names.push_back(name);
-    std::vector<Missing> fitted = fit_effects(inputs, kind, names, ladder.split.fit, jobs, progress);
-    Trial next = trial(name, with_effects(nominal, specs_of(fitted)));
+    std::vector<Missing> fitted = fit_effects(working, kind, names, ladder.split.fit, jobs, progress);
+    Trial next = trial(name, with_effects(working.models[0], specs_of(fitted)));
     const double before_N = trials[best].row.select_rmse_N, after_N = next.row.select_rmse_N;
     const bool helps = after_N <= (1 - kLeastFall) * before_N;
     if (!helps)
@@ -172,6 +229,7 @@ Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int 
       best = trials.size();
     } else {
       next.row.values = trials[best].row.values;
+      if (name != asked) withdraw(working, name);
     }
     trials.push_back(std::move(next));
   }

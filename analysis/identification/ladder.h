@@ -33,7 +33,8 @@ struct Ladder {
 
 struct LadderOptions {
   bool automatic = true;
-  std::vector<std::string> effects;  ///< in this order, unless automatic
+  std::vector<std::string>
+      effects;  ///< in this order, unless automatic; also formulas and shapes, see is_proposal()
   bool keep_anyway = false;
 };
 

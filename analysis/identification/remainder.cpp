@@ -15,13 +15,18 @@ constexpr double kLeastShare =
 
 }  // namespace
 
-Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {
+residuals::Inputs inputs_with(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {
   residuals::Inputs inputs = passes.inputs;
   inputs.models = {with_effects(*inputs.model_of(passes.kind), specs)};
   for (auto& [vehicle, model] : inputs.vehicle_models) model = with_effects(model, specs);
   std::vector<residuals::FlightFiles> flights;
   for (const int i : passes.flights) flights.push_back(inputs.found.flights[static_cast<std::size_t>(i)]);
   inputs.found.flights = flights;
+  return inputs;
+}
+
+Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {
+  const residuals::Inputs inputs = inputs_with(passes, specs);
   const residuals::Comparison left = residuals::compare(inputs, passes.jobs, [](int, int) {});
   Remainder result;
   for (int axis = 0; axis < 3; ++axis) {

@@ -8,6 +8,9 @@
 
 namespace swarmcert::identification {
 
+/// The flights of `passes` alone, and their models with `specs` as well.
+residuals::Inputs inputs_with(const Passes& passes, const std::vector<stability::EffectSpec>& specs);
+
 struct Remainder {
   bool flag = false;
   double ratio = 0;  ///< largest over the axes of Spectrum::low_band_to_floor(); 0 where there is no spectrum

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "analysis/identification/covariance.h"
+#include "analysis/identification/scan/formulas.h"
 #include "nn/base/doubles.h"
 
 namespace swarmcert::identification {
@@ -30,6 +31,20 @@ bool Selection::is_clearly_better(const Members& after, const Members& before) c
   constexpr double kClearly_z = 2;
   const Folds& folds = folds_for(after);
   return paired_z(block_errors(before, folds), block_errors(after, folds)) >= kClearly_z;
+}
+
+bool Selection::is_formula(const Member& member) const {
+  return identification::is_formula(candidate(member).name);
+}
+
+bool Selection::formula_wins(const Members& rest, const Member& formula, const Member& named) const {
+  constexpr double kMore = 1.125, kLess = 0.8;
+  const Members by_formula = with(rest, formula), by_name = with(rest, named);
+  const Folds& folds = folds_for(with(by_formula, named));
+  const double before = mean_square(rest, folds);
+  const double formula_left = mean_square(by_formula, folds), name_left = mean_square(by_name, folds);
+  const bool is_more = before - formula_left > kMore * std::max(before - name_left, 0.0);
+  return (is_more || formula_left < kLess * name_left) && is_clearly_better(by_formula, by_name);
 }
 
 bool Selection::is_held(const Members& members) const {
@@ -117,6 +132,15 @@ bool Selection::add_one(Members& members) const {
         break;
       }
     }
+    const Choice* name = nullptr;
+    if (is_formula(best->member)) {
+      for (const Choice& choice : choices) {
+        if (is_formula(choice.member) || !accepts(choice)) continue;
+        name = &choice;
+        break;
+      }
+    }
+    if (name != nullptr && !formula_wins(members, best->member, name->member)) best = name;
     members.push_back(best->member);
     return true;
   }
@@ -135,7 +159,10 @@ bool Selection::swap_one(Members& members) const {
       const double now = mean_square(members, folds), then = mean_square(instead, folds);
       const bool retunes = k == members[i].candidate;
       if (plain_form(k) == members[i].candidate && !is_clearly_better(instead, members)) continue;
-      if (then < (retunes ? 1 - 1e-6 : 1 - thresholds_.swap_gain) * now &&
+      if (is_formula(member) && !is_formula(members[i]) && !formula_wins(rest, member, members[i])) continue;
+      const bool names_it =
+          is_formula(members[i]) && !is_formula(member) && !formula_wins(rest, members[i], member);
+      if ((names_it || then < (retunes ? 1 - 1e-6 : 1 - thresholds_.swap_gain) * now) &&
           is_acceptable(rest, member, mean_square(rest, folds), then, folds)) {
         members[i] = member;
         return true;
@@ -168,9 +195,15 @@ void Selection::prune(Members& members) const {
   }
 }
 
-Members Selection::select() const {
+Members Selection::select(const std::vector<std::string>& names) const {
   Members members;
   if (!is_sound()) return members;
+  for (const std::string& name : names) {
+    for (int k = 0; k < static_cast<int>(grams().candidates.size()); ++k) {
+      if (grams().candidates[static_cast<std::size_t>(k)].name != name || is_present(members, k)) continue;
+      members.push_back(best_theta(members, k));
+    }
+  }
   constexpr std::size_t kMostEffects = 10;
   for (int round = 0; round < 20 && members.size() < kMostEffects; ++round) {
     if (!add_one(members)) break;

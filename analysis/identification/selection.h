@@ -33,7 +33,8 @@ class Selection : public CrossValidation {
       : CrossValidation(grams), thresholds_(thresholds) {}
 
   /// Forward, swap and backward passes; the effects ordered().
-  Members select() const;
+  /// @param names where to begin: effects that are known already
+  Members select(const std::vector<std::string>& names = {}) const;
   /// One step forward from `members`. Returns false where nothing is left to add.
   bool add_one(Members& members) const;
   /// Drops effects that have become needless.
@@ -55,6 +56,11 @@ class Selection : public CrossValidation {
   int plain_form(int candidate) const;
   /// Blocks that were left out prefer `after` by two standard errors.
   bool is_clearly_better(const Members& after, const Members& before) const;
+  /// A formula of the scan (scan/formulas.h), which stands for whatever has no name.
+  bool is_formula(const Member& member) const;
+  /// A name stands unless the formula explains more by an eighth, or leaves less by a fifth, and blocks that were left
+  /// out prefer it clearly.
+  bool formula_wins(const Members& rest, const Member& formula, const Member& named) const;
   /// The last member is a lag or delay whose gain is at a bound.
   bool is_held(const Members& members) const;
   bool swap_one(Members& members) const;

@@ -14,12 +14,28 @@
 namespace swarmcert::stability {
 namespace {
 
-const std::vector<std::string> kTargets = {"force_x_N",   "force_y_N",   "force_z_N",  "force_b3_N",
+const std::vector<std::string> kTargets = {"force_x_N",   "force_y_N",   "force_z_N",
+                                           "force_b1_N",  "force_b2_N",  "force_b3_N",
                                            "torque_x_Nm", "torque_y_Nm", "torque_z_Nm"};
-const std::vector<std::string> kVariables = {"x",   "y",  "z",  "vx", "vy",  "vz",  "b3x", "b3y",
-                                             "b3z", "wx", "wy", "wz", "T",   "V",   "m",   "g",
-                                             "t",   "dx", "dy", "dz", "dvx", "dvy", "dvz", "mj"};
-constexpr std::size_t kFirstOfNeighbour = 17;  // "dx"
+const std::vector<std::string> kVariables = {
+    "x",     "y",   "z",   "vx", "vy", "vz", "b3x",  "b3y",     "b3z",     "wx",   "wy",
+    "wz",    "T",   "V",   "m",  "g",  "t",  "time", "battery", "heading", "tilt", "speed",
+    "climb", "vbx", "vby", "dx", "dy", "dz", "dvx",  "dvy",     "dvz",     "mj"};
+constexpr std::size_t kFirstOfNeighbour = 25;  // "dx"
+
+/// Shape parameters without a grid vary as well: by a factor of two to both sides where they are one or two, in small
+/// steps from where they are where they are more. Those at zero have no scale, those with equal bounds are held.
+void add_grids(std::vector<Parameter>& shape) {
+  const auto varies = [](const Parameter& p) { return p.grid.empty() && p.value != 0 && p.lower < p.upper; };
+  const bool few = std::count_if(shape.begin(), shape.end(), varies) <= 2;
+  for (Parameter& parameter : shape) {
+    if (!varies(parameter)) continue;
+    for (const double factor : {0.5, 1.0, 2.0}) {
+      if (few || factor == 1)
+        parameter.grid.push_back(std::clamp(factor * parameter.value, parameter.lower, parameter.upper));
+    }
+  }
+}
 
 EffectInfo describe(const EffectSpec& spec) {
   EffectInfo info;
@@ -52,6 +68,7 @@ EffectInfo describe(const EffectSpec& spec) {
       info.shape.push_back(parameter(name, value));
     }
   }
+  add_grids(info.shape);
   return info;
 }
 
@@ -119,7 +136,15 @@ struct ExpressionEffect::Formulas {
                                            now.battery_V,
                                            now.mass_kg,
                                            kGravity_m_s2,
-                                           now.time_s};
+                                           now.time_s,
+                                           now.time_s,
+                                           now.battery_V,
+                                           std::atan2(now.R_WB(1, 0), now.R_WB(0, 0)),
+                                           std::acos(std::clamp(now.R_WB(2, 2), -1.0, 1.0)),
+                                           now.v_W_m_s.norm(),
+                                           now.v_W_m_s.dot(b3),
+                                           now.v_W_m_s.dot(now.R_WB.col(0)),
+                                           now.v_W_m_s.dot(now.R_WB.col(1))};
     std::copy(std::begin(own), std::end(own), variables.begin());
   }
 
@@ -144,10 +169,10 @@ struct ExpressionEffect::Formulas {
       }
       if (formula.target < 3) {
         sum->force_W_N[static_cast<int>(formula.target)] += value;
-      } else if (formula.target == 3) {
-        sum->force_W_N += value * now.b3_W();
+      } else if (formula.target < 6) {
+        sum->force_W_N += value * now.R_WB.col(static_cast<int>(formula.target) - 3);
       } else {
-        sum->torque_B_Nm[static_cast<int>(formula.target) - 4] += value;
+        sum->torque_B_Nm[static_cast<int>(formula.target) - 6] += value;
       }
     }
   }

@@ -10,6 +10,7 @@
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/identification/ladder.h"
+#include "analysis/identification/scan/proposal.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
 
@@ -38,8 +39,10 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
   if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
   const std::vector<std::string> known = identification::candidate_names(model);
   std::vector<std::string> all = known;
-  all.insert(all.end(), {"auto", "deep_set", "downwash_torque", "show", "torque_bias", "undo"});
+  all.insert(all.end(),
+             {"auto", "deep_set", "downwash_torque", "formula", "shape", "show", "torque_bias", "undo"});
   for (const std::string& name : names) {
+    if (identification::is_proposal(name)) continue;
     if (identification::is_written_by_hand(name))
       throw UsageError("the effect " + name +
                        " cannot be fitted to the force of a flight; write it into the model file");
@@ -235,6 +238,9 @@ Command add_command() {
       "An effect\n"
       "is accepted if the error of flights that the fit has not seen falls; the test flights are only "
       "shown.\n"
+      "formula is the best formula for what the model leaves, as diagnose shows it (formula:2 the second); "
+      "shape\n"
+      "is a smooth or monotone curve where no formula holds. "
       "vehicle_offset is a constant force of each vehicle. undo goes back by one accepted effect; show "
       "prints "
       "the\n"
@@ -243,7 +249,8 @@ Command add_command() {
       "          swarmcert add undo --model fitted.toml -o before.toml",
       [](CLI::App& app) {
         const auto options = std::make_shared<AddOptions>();
-        app.add_option("EFFECT", options->effects, "Names of effects with commas between, auto, undo or show")
+        app.add_option("EFFECT", options->effects,
+                       "Names of effects with commas between, formula, shape, auto, undo or show")
             ->required();
         declare_flights(app, options->flights, false);
         add_output(app, "-o,--output", options->output, "The new model.toml");

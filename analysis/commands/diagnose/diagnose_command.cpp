@@ -8,6 +8,7 @@
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
+#include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/identification/diagnose.h"
@@ -127,7 +128,9 @@ void print(const Diagnosis& diagnosis) {
              rest.ratio, rest.flag ? ": not everything is explained" : "");
   for (std::size_t i = 0; i < rest.depends_on.size(); ++i)
     fmt::print("{}{}", i == 0 ? ", depends on " : ", ", rest.depends_on[i]);
-  fmt::print("\n  Shown in 9 of 10 injections (open loop), if at least as large as:\n");
+  fmt::print("\n");
+  print_remainder(diagnosis);
+  fmt::print("  Shown in 9 of 10 injections (open loop), if at least as large as:\n");
   for (const identification::Detectable& entry : diagnosis.detectable) {
     if (std::isfinite(entry.size))
       fmt::print("    {} {} = {:.3g}\n", entry.effect, entry.parameter, entry.size);
@@ -174,7 +177,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   bool flag = false;
   double ratio = 0;
   std::vector<std::string> problems;
-  files::Json depends_on = files::Json::array();
+  files::Json depends_on = files::Json::array(), left = files::Json::array();
   std::vector<Diagnosis> diagnoses;
   for (const stability::Model& model : inputs.models) {
     Progress progress(common.quiet);
@@ -194,6 +197,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     flag = flag || rest.flag;
     ratio = std::max(ratio, rest.ratio);
     for (const std::string& variable : rest.depends_on) depends_on.push_back(variable);
+    for (files::Json& entry : remainder_json(diagnosis)) left.push_back(std::move(entry));
     kinds.push_back(json_of(diagnosis));
     diagnoses.push_back(diagnosis);
   }
@@ -203,6 +207,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   result["verdict"] = name(verdict);
   result["ranking"] = std::move(ranking);
   result["unexplained"] = {{"flag", flag}, {"ratio", ratio}, {"depends_on", std::move(depends_on)}};
+  result["remainder"] = std::move(left);
   result["detectable"] = std::move(detectable);
   result["detectable_meaning"] = kDetectableMeaning;
   result["kinds"] = std::move(kinds);

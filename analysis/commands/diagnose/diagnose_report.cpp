@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -116,6 +117,7 @@ std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses, const
     else
       add_ranking(report, diagnosis, "ranking_" + std::to_string(i + 1));
     add_left(report, diagnosis);
+    add_remainder(report, diagnosis, i + 1);
   }
   return report.write(folder, overwrite);
 }

@@ -1,0 +1,126 @@
+#include "analysis/identification/scan/form_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "nn/base/doubles.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using Inputs2 = std::array<double, 2>;
+
+Inputs2 inputs_at(const FormData& data, Eigen::Index i) {
+  return {data.inputs(i, 0), data.inputs.cols() > 1 ? data.inputs(i, 1) : 0};
+}
+
+std::vector<std::vector<double>> combinations(const Form& form) {
+  std::vector<std::vector<double>> all = {{}};
+  for (const FormParameter& parameter : form.shape) {
+    std::vector<std::vector<double>> longer;
+    for (const std::vector<double>& theta : all) {
+      for (const double start : parameter.starts) {
+        longer.push_back(theta);
+        longer.back().push_back(start);
+      }
+    }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+double first_step(const FormParameter& parameter, double value) {
+  const std::vector<double>& starts = parameter.starts;
+  if (parameter.lower == parameter.upper) return 0;
+  if (starts.size() < 2) return 0.3 * std::abs(value);
+  // Half of the distance between starts there.
+  double gap = kInfinity;
+  for (std::size_t k = 1; k < starts.size(); ++k) {
+    if (value <= starts[k] || k + 1 == starts.size()) {
+      gap = starts[k] - starts[k - 1];
+      break;
+    }
+  }
+  return gap / 2;
+}
+
+FormFit improved(const Form& form, const FormData& data, FormFit best) {
+  constexpr int kMostRounds = 60, kHalvings = 7;
+  std::vector<double> steps;
+  for (std::size_t k = 0; k < form.shape.size(); ++k)
+    steps.push_back(first_step(form.shape[k], best.theta[k]));
+  int halved = 0;
+  for (int round = 0; round < kMostRounds && halved < kHalvings; ++round) {
+    bool moved = false;
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      for (const double sign : {1.0, -1.0}) {
+        if (steps[k] == 0) continue;
+        std::vector<double> theta = best.theta;
+        theta[k] = std::clamp(theta[k] + sign * steps[k], form.shape[k].lower, form.shape[k].upper);
+        FormFit next = fit_coefficients(form, data, theta);
+        if (!(next.mean_square < best.mean_square * (1 - 1e-9))) continue;
+        best = std::move(next);
+        moved = true;
+        break;
+      }
+    }
+    if (moved) continue;
+    for (double& step : steps) step /= 2;
+    ++halved;
+  }
+  return best;
+}
+
+}  // namespace
+
+FormFit fit_coefficients(const Form& form, const FormData& data, const std::vector<double>& theta) {
+  const auto functions = static_cast<Eigen::Index>(form.texts.size());
+  const Eigen::Index size = functions + (form.has_offset ? 1 : 0);
+  Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero(), row(1, 1, 1);
+  double squares = 0;
+  for (Eigen::Index i = 0; i < data.force_N.size(); ++i) {
+    const Inputs2 v = inputs_at(data, i);
+    form.values(v.data(), theta.data(), row.data());
+    if (data.factor.size() > 0) row.head(functions) *= data.factor[i];
+    row[functions] = 1;
+    gram.topLeftCorner(size, size).noalias() += row.head(size) * row.head(size).transpose();
+    b.head(size) += data.force_N[i] * row.head(size);
+    squares += data.force_N[i] * data.force_N[i];
+  }
+  FormFit fit;
+  fit.theta = theta;
+  const double n = std::max<double>(static_cast<double>(data.force_N.size()), 1);
+  Eigen::MatrixXd held = gram.topLeftCorner(size, size);
+  for (Eigen::Index k = 0; k < size; ++k) held(k, k) += 1e-9 * held(k, k) + 1e-12 * n;
+  fit.coefficients = held.ldlt().solve(b.head(size));
+  const double left = squares - 2 * fit.coefficients.dot(b.head(size)) +
+                      fit.coefficients.dot(gram.topLeftCorner(size, size) * fit.coefficients);
+  fit.mean_square = std::isfinite(left) ? std::max(left, 0.0) / n : kInfinity;
+  return fit;
+}
+
+FormFit fit_form(const Form& form, const FormData& data, const std::vector<double>& start) {
+  FormFit best;
+  best.mean_square = kInfinity;
+  for (const std::vector<double>& theta :
+       start.empty() ? combinations(form) : std::vector<std::vector<double>>{start}) {
+    FormFit fit = fit_coefficients(form, data, theta);
+    if (fit.mean_square < best.mean_square) best = std::move(fit);
+  }
+  if (!std::isfinite(best.mean_square)) return best;
+  return improved(form, data, std::move(best));
+}
+
+double value_of(const Form& form, const FormFit& fit, const double* inputs, double factor) {
+  std::array<double, 2> functions{};
+  form.values(inputs, fit.theta.data(), functions.data());
+  double sum = form.has_offset ? fit.coefficients[fit.coefficients.size() - 1] : 0;
+  for (std::size_t k = 0; k < form.texts.size(); ++k)
+    sum += factor * fit.coefficients[static_cast<Eigen::Index>(k)] * functions[k];
+  return sum;
+}
+
+}  // namespace swarmcert::identification

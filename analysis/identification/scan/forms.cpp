@@ -1,0 +1,184 @@
+#include "analysis/identification/scan/forms.h"
+
+#include <cmath>
+
+namespace swarmcert::identification {
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586;
+
+std::vector<double> along(const FormRange& range, int count) {
+  std::vector<double> places;
+  for (int k = 0; k < count; ++k) places.push_back(range.lower + range.span() * (k + 0.5) / count);
+  return places;
+}
+
+FormParameter place(const std::string& name, const FormRange& range, int count = 8) {
+  return {name, FormUnit::kVariable, range.lower - 0.5 * range.span(), range.upper + 0.5 * range.span(),
+          along(range, count)};
+}
+
+FormParameter width(const std::string& name, double span, std::vector<double> shares) {
+  for (double& share : shares) share *= span;
+  return {name, FormUnit::kVariable, 0.01 * span, 3 * span, shares};
+}
+
+double square(double x) { return x * x; }
+
+Form decay(const FormRange& range, bool upwards) {
+  const double from = upwards ? range.lower : range.upper;
+  // The place where the force is its coefficient only scales it.
+  FormParameter reference = {"from", FormUnit::kVariable, from, from, {from}};
+  Form form;
+  form.name = upwards ? "decay" : "growth";
+  form.shape = {width("length", range.span(), {0.05, 0.1, 0.2, 0.4, 0.8}), reference};
+  const double sign = upwards ? -1 : 1;
+  form.values = [sign](const double* v, const double* t, double* to) {
+    to[0] = std::exp(std::fmin(sign * (v[0] - t[1]) / t[0], 20.0));
+  };
+  form.texts = {upwards ? "exp(min(-({0} - {b}) / {a}, 20))" : "exp(min(({0} - {b}) / {a}, 20))"};
+  return form;
+}
+
+Form hinge(const FormRange& range, bool above) {
+  Form form;
+  form.name = above ? "above" : "below";
+  form.shape = {place("from", range, 12)};
+  form.values = [above](const double* v, const double* t, double* to) {
+    to[0] = std::fmax(0.0, above ? v[0] - t[0] : t[0] - v[0]);
+  };
+  form.texts = {above ? "max(0, {0} - {a})" : "max(0, {a} - {0})"};
+  return form;
+}
+
+/// Units of the coefficients: newton over the variable's unit to these powers.
+std::vector<Form> with_powers(std::vector<Form> forms) {
+  for (Form& form : forms) {
+    const std::string& name = form.name;
+    if (name == "linear" || name == "above" || name == "below" || name == "beyond") form.powers[0] = 1;
+    if (name == "signed_square") form.powers[0] = 2;
+    if (name == "plane") form.powers[0] = form.powers[1] = 1;
+    if (name == "quadratic") {
+      form.powers[0] = 1;
+      form.powers[1] = 2;
+    }
+  }
+  return forms;
+}
+
+}  // namespace
+
+std::vector<Form> forms_over(const FormRange& range, bool is_velocity) {
+  const double span = range.span();
+  std::vector<Form> forms;
+  forms.push_back(
+      {"linear", 1, {}, [](const double* v, const double*, double* to) { to[0] = v[0]; }, {"{0}"}});
+  forms.push_back({"quadratic",
+                   1,
+                   {},
+                   [](const double* v, const double*, double* to) {
+                     to[0] = v[0];
+                     to[1] = v[0] * v[0];
+                   },
+                   {"{0}", "{0}^2"}});
+  if (is_velocity)
+    forms.push_back({"signed_square",
+                     1,
+                     {},
+                     [](const double* v, const double*, double* to) { to[0] = v[0] * std::abs(v[0]); },
+                     {"{0} * abs({0})"}});
+  forms.push_back(decay(range, true));
+  forms.push_back(decay(range, false));
+  forms.push_back({"gaussian",
+                   1,
+                   {place("centre", range, 10), width("width", span, {0.05, 0.1, 0.2, 0.4})},
+                   [](const double* v, const double* t, double* to) {
+                     to[0] = std::exp(-square((v[0] - t[0]) / t[1]) / 2);
+                   },
+                   {"exp(-(({0} - {a}) / {b})^2 / 2)"}});
+  forms.push_back({"step",
+                   1,
+                   {place("at", range, 60)},
+                   [](const double* v, const double* t, double* to) { to[0] = v[0] > t[0] ? 1 : 0; },
+                   {"({0} > {a})"}});
+  forms.push_back({"logistic",
+                   1,
+                   {place("middle", range, 10), width("width", span, {0.02, 0.05, 0.1, 0.2})},
+                   [](const double* v, const double* t, double* to) {
+                     to[0] = 1 / (1 + std::exp(std::fmin(-(v[0] - t[0]) / t[1], 50.0)));
+                   },
+                   {"1 / (1 + exp(min(-({0} - {a}) / {b}, 50)))"}});
+  forms.push_back(hinge(range, true));
+  forms.push_back(hinge(range, false));
+  forms.push_back({"inverse_square",
+                   1,
+                   {place("centre", range, 10), width("core", span, {0.05, 0.1, 0.2})},
+                   [](const double* v, const double* t, double* to) {
+                     to[0] = t[1] * t[1] / (square(v[0] - t[0]) + t[1] * t[1]);
+                   },
+                   {"{b}^2 / (({0} - {a})^2 + {b}^2)"}});
+  if (range.lower >= 0) {
+    forms.push_back({"resonance",
+                     1,
+                     {place("at", {range.lower + 0.1 * span, range.upper}, 12),
+                      {"damping", FormUnit::kNone, 0.02, 1, {0.05, 0.1, 0.2, 0.4}}},
+                     [](const double* v, const double* t, double* to) {
+                       const double u = v[0] / t[0];
+                       to[0] = 1 / std::sqrt(square(1 - u * u) + square(2 * t[1] * u));
+                     },
+                     {"1 / sqrt((1 - ({0} / {a})^2)^2 + (2 * {b} * {0} / {a})^2)"}});
+  }
+  FormParameter wave = {"wave_number", FormUnit::kInverse, 0.2 * kTwoPi / span, 30 * kTwoPi / span, {}};
+  for (int k = 2; k <= 40; ++k) wave.starts.push_back(0.25 * k * kTwoPi / span);
+  forms.push_back({"sinusoid",
+                   1,
+                   {wave},
+                   [](const double* v, const double* t, double* to) {
+                     to[0] = std::sin(t[0] * v[0]);
+                     to[1] = std::cos(t[0] * v[0]);
+                   },
+                   {"sin({a} * {0})", "cos({a} * {0})"}});
+  return with_powers(std::move(forms));
+}
+
+std::vector<Form> forms_over_place(const FormRange& x, const FormRange& y) {
+  const double span = std::fmax(x.span(), y.span());
+  const auto distance2 = [](const double* v, const double* t) {
+    return square(v[0] - t[0]) + square(v[1] - t[1]);
+  };
+  const std::string text = "(({0} - {a})^2 + ({1} - {b})^2)";
+  std::vector<Form> forms;
+  forms.push_back({"plane",
+                   2,
+                   {},
+                   [](const double* v, const double*, double* to) {
+                     to[0] = v[0];
+                     to[1] = v[1];
+                   },
+                   {"{0}", "{1}"}});
+  const FormParameter cx = place("x_centre", x, 7), cy = place("y_centre", y, 7);
+  forms.push_back({"gaussian",
+                   2,
+                   {cx, cy, width("width", span, {0.08, 0.15, 0.3})},
+                   [=](const double* v, const double* t, double* to) {
+                     to[0] = std::exp(-distance2(v, t) / (2 * t[2] * t[2]));
+                   },
+                   {"exp(-" + text + " / (2 * {c}^2))"}});
+  forms.push_back({"inverse_square",
+                   2,
+                   {cx, cy, width("core", span, {0.05, 0.1, 0.2})},
+                   [=](const double* v, const double* t, double* to) {
+                     to[0] = t[2] * t[2] / (distance2(v, t) + t[2] * t[2]);
+                   },
+                   {"{c}^2 / (" + text + " + {c}^2)"}});
+  forms.push_back({"beyond",
+                   2,
+                   {cx, cy, width("radius", span, {0.1, 0.2, 0.3, 0.5})},
+                   [=](const double* v, const double* t, double* to) {
+                     to[0] = std::fmax(0.0, std::sqrt(distance2(v, t)) - t[2]);
+                   },
+                   {"max(0, sqrt(" + text + ") - {c})"}});
+  return with_powers(std::move(forms));
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,47 @@
+/// @file Physical forms that a force may have over one variable, or over a place.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace swarmcert::identification {
+
+/// Where values lie: for starts and bounds of parameters.
+struct FormRange {
+  double lower = 0, upper = 1;
+  double span() const { return upper - lower; }
+};
+
+/// What a parameter of a form is measured in.
+enum class FormUnit { kVariable, kInverse, kNone };  ///< the variable's unit, one over it, or a pure number
+
+struct FormParameter {
+  std::string name;  ///< "width"; the unit is appended
+  FormUnit unit = FormUnit::kVariable;
+  double lower = 0, upper = 0;
+  std::vector<double> starts;
+};
+
+/// g_1(v; theta), ..., g_m(v; theta): a force is sum a_k g_k + c.
+struct Form {
+  std::string name;  ///< "gaussian"
+  int inputs = 1;    ///< 1, or 2 for places
+  std::vector<FormParameter> shape;
+  /// Values of the m functions. @param v [inputs], theta [shape.size()], to [m]
+  std::function<void(const double* v, const double* theta, double* to)> values;
+  /// The functions as text, with {0}, {1} for variables and {a}, {b}, {c} for shape parameters in their order.
+  std::vector<std::string> texts;
+  int powers[2] = {0, 0};  ///< of the variable in each function: units of the coefficients
+  bool has_offset = true;
+};
+
+inline constexpr int kMostFormFunctions = 2;
+
+/// All forms of one variable. @param range of its values; `is_velocity` where zero is a physical origin.
+std::vector<Form> forms_over(const FormRange& range, bool is_velocity);
+/// All forms over a place in the plane.
+std::vector<Form> forms_over_place(const FormRange& x, const FormRange& y);
+
+}  // namespace swarmcert::identification

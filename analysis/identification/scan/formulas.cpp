@@ -1,0 +1,302 @@
+#include "analysis/identification/scan/formulas.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/identification/scan/form_fit.h"
+#include "nn/base/doubles.h"
+#include "nn/base/parallel.h"
+#include "stability/effect_text.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using V = ScanVariable;
+
+constexpr Eigen::Index kSamplesOfFit = 3000;
+constexpr const char* kLetters[] = {"{a}", "{b}", "{c}"};
+/// What a form may be multiplied with.
+constexpr V kFactors[] = {V::kThrust, V::kX, V::kY, V::kZ, V::kVx, V::kVy, V::kVz, V::kSpeed};
+
+/// One form with one factor, fitted.
+struct Trial {
+  Form form;
+  FormFit fit;
+  V factor = V::kCount;  ///< kCount: none
+  double saved_bits = -kInfinity;
+};
+
+/// The samples of an entry: all in order, and those that the search looks at.
+struct EntryData {
+  FormData all, few;
+  std::vector<int> flight;               ///< of `all`
+  std::vector<Eigen::Index> rows, thin;  ///< of ScanSamples, for `all` and `few`
+  double mean_square = 0;                ///< about the mean
+};
+
+bool is_velocity(V v) {
+  return v == V::kVx || v == V::kVy || v == V::kVz || v == V::kBodyVx || v == V::kBodyVy || v == V::kClimb;
+}
+
+FormData rows_of(const ScanSamples& samples, const ScanEntry& entry, const std::vector<Eigen::Index>& rows) {
+  FormData data;
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  data.inputs.resize(n, static_cast<Eigen::Index>(entry.variables.size()));
+  data.force_N.resize(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Index row = rows[static_cast<std::size_t>(i)];
+    for (std::size_t k = 0; k < entry.variables.size(); ++k)
+      data.inputs(i, static_cast<Eigen::Index>(k)) =
+          samples.values(row, static_cast<Eigen::Index>(entry.variables[k]));
+    data.force_N[i] = samples.force_N(row, entry.column);
+  }
+  return data;
+}
+
+EntryData data_of(const ScanSamples& samples, const ScanEntry& entry) {
+  EntryData data;
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    const bool known = std::all_of(entry.variables.begin(), entry.variables.end(), [&](V v) {
+      return std::isfinite(samples.values(i, static_cast<Eigen::Index>(v)));
+    });
+    if (known) data.rows.push_back(i);
+  }
+  const Eigen::Index step =
+      std::max<Eigen::Index>(1, static_cast<Eigen::Index>(data.rows.size()) / kSamplesOfFit);
+  for (std::size_t i = 0; i < data.rows.size(); i += static_cast<std::size_t>(step))
+    data.thin.push_back(data.rows[i]);
+  data.all = rows_of(samples, entry, data.rows);
+  data.few = rows_of(samples, entry, data.thin);
+  for (const Eigen::Index row : data.rows)
+    data.flight.push_back(samples.flight[static_cast<std::size_t>(row)]);
+  const double mean = data.few.force_N.mean();
+  data.mean_square = (data.few.force_N.array() - mean).square().mean();
+  return data;
+}
+
+Eigen::VectorXd factor_of(const ScanSamples& samples, const std::vector<Eigen::Index>& rows, V factor) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    values[static_cast<Eigen::Index>(i)] = samples.values(rows[i], static_cast<Eigen::Index>(factor));
+  return values;
+}
+
+/// How many of the samples are worth one each: n (1 - rho) / (1 + rho), rho the correlation of what `trial` leaves from
+/// one sample to the next.
+double independent_samples(const EntryData& data, const Trial& trial) {
+  double last = 0, products = 0, squares = 0;
+  for (Eigen::Index i = 0; i < data.all.force_N.size(); ++i) {
+    const double inputs[2] = {data.all.inputs(i, 0), data.all.inputs.cols() > 1 ? data.all.inputs(i, 1) : 0};
+    const double left = data.all.force_N[i] - value_of(trial.form, trial.fit, inputs, 1);
+    const auto k = static_cast<std::size_t>(i);
+    if (i > 0 && data.flight[k] == data.flight[k - 1]) products += left * last;
+    squares += left * left;
+    last = left;
+  }
+  const double rho = squares > 0 ? std::clamp(products / squares, 0.0, 0.98) : 0;
+  return std::max(static_cast<double>(data.all.force_N.size()) * (1 - rho) / (1 + rho), 4.0);
+}
+
+int numbers_of(const Trial& trial) {
+  int count = static_cast<int>(trial.form.texts.size()) + (trial.factor == V::kCount ? 0 : 1);
+  for (const FormParameter& parameter : trial.form.shape) count += parameter.lower < parameter.upper ? 1 : 0;
+  return count;
+}
+
+double saved_bits(const EntryData& data, const Trial& trial, double independent) {
+  const double left = std::max(trial.fit.mean_square, 1e-300);
+  return 0.5 * independent * std::log2(data.mean_square / left) -
+         0.5 * numbers_of(trial) * std::log2(independent);
+}
+
+FormRange range_of(const Eigen::VectorXd& values) {
+  std::vector<double> sorted(values.begin(), values.end());
+  std::sort(sorted.begin(), sorted.end());
+  const auto at = [&](double p) {
+    return sorted[static_cast<std::size_t>(p * static_cast<double>(sorted.size() - 1))];
+  };
+  return {at(0.01), at(0.99)};
+}
+
+std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
+  std::vector<Form> forms;
+  if (entry.variables.size() == 2)
+    return forms_over_place(range_of(data.few.inputs.col(0)), range_of(data.few.inputs.col(1)));
+  forms = forms_over(range_of(data.few.inputs.col(0)), is_velocity(entry.variables[0]));
+  for (Form& form : forms) {
+    if (form.name != "sinusoid") continue;
+    constexpr double kTwoPi = 6.283185307179586;
+    if (entry.period_s > 0)
+      form.shape[0].starts = {0.99 * kTwoPi / entry.period_s, kTwoPi / entry.period_s,
+                              1.01 * kTwoPi / entry.period_s};
+    if (entry.variables[0] == V::kHeading) form.shape[0].starts = {1, 2, 3};
+  }
+  return forms;
+}
+
+/// The best form of an entry, with or without a factor.
+Trial best_trial(const ScanSamples& samples, const ScanEntry& entry, EntryData& data) {
+  constexpr double kSurely_bits = 10;  // a factor must be worth it
+  std::vector<Trial> trials;
+  for (Form& form : forms_of(entry, data)) {
+    FormFit fit = fit_form(form, data.few);
+    if (std::isfinite(fit.mean_square)) trials.push_back({std::move(form), std::move(fit)});
+  }
+  const auto least = std::min_element(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) {
+    return a.fit.mean_square < b.fit.mean_square;
+  });
+  if (least == trials.end()) return {};
+  const double independent = independent_samples(data, *least);
+  for (Trial& trial : trials) trial.saved_bits = saved_bits(data, trial, independent);
+  std::stable_sort(trials.begin(), trials.end(),
+                   [](const Trial& a, const Trial& b) { return a.saved_bits > b.saved_bits; });
+  Trial best = trials[0];
+  for (std::size_t t = 0; t < std::min<std::size_t>(2, trials.size()); ++t) {
+    for (const V factor : kFactors) {
+      if (std::find(entry.variables.begin(), entry.variables.end(), factor) != entry.variables.end())
+        continue;
+      data.few.factor = factor_of(samples, data.thin, factor);
+      Trial product = {trials[t].form, fit_form(trials[t].form, data.few, trials[t].fit.theta), factor};
+      product.saved_bits = saved_bits(data, product, independent);
+      if (product.saved_bits > std::max(best.saved_bits, trials[0].saved_bits + kSurely_bits))
+        best = std::move(product);
+    }
+    data.few.factor.resize(0);
+  }
+  return best;
+}
+
+void replace_all(std::string& text, const std::string& from, const std::string& to) {
+  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+}
+
+std::string unit_of_coefficient(const std::string& variable_unit, int power) {
+  if (power == 0 || variable_unit.empty()) return "N";
+  return "N_per_" + variable_unit + (power > 1 ? std::to_string(power) : "");
+}
+
+std::string unit_of(const FormParameter& parameter, const std::string& variable_unit) {
+  if (parameter.unit == FormUnit::kNone || variable_unit.empty()) return "";
+  return (parameter.unit == FormUnit::kInverse ? "_1_" : "_") + variable_unit;
+}
+
+const char* target_of(const ScanEntry& entry) {
+  constexpr const char* kTargets[] = {"force_x_N",  "force_y_N",  "force_z_N",
+                                      "force_b1_N", "force_b2_N", "force_b3_N"};
+  return kTargets[entry.column];
+}
+
+void add_shapes(const Trial& trial, const std::string& unit, stability::EffectSpec& spec,
+                std::vector<std::string>& texts) {
+  for (std::size_t k = 0; k < trial.form.shape.size(); ++k) {
+    const FormParameter& parameter = trial.form.shape[k];
+    const std::string name = parameter.name + unit_of(parameter, unit);
+    const double value = trial.fit.theta[k];
+    spec.parameters[name] = value;
+    spec.expression.bounds[name] = {std::min(parameter.lower, value), std::max(parameter.upper, value)};
+    for (std::string& text : texts) replace_all(text, kLetters[k], name);
+    if (parameter.lower == parameter.upper) continue;
+    // What identification tries around it; the step also says how far it may be off where it is near zero.
+    const double step = std::max(0.2 * std::abs(value), 0.02 * (parameter.upper - parameter.lower));
+    std::vector<double>& grid = spec.expression.grid[name];
+    for (const double tried : {value - step, value, value + step})
+      grid.push_back(std::clamp(tried, parameter.lower, parameter.upper));
+  }
+}
+
+stability::EffectSpec spec_of(const ScanEntry& entry, const Trial& trial) {
+  stability::EffectSpec spec;
+  const std::string unit = scan_variable(entry.variables[0]).unit;
+  std::vector<std::string> texts = trial.form.texts;
+  for (std::string& text : texts) {
+    replace_all(text, "{0}", scan_variable(entry.variables[0]).symbol);
+    if (entry.variables.size() > 1) replace_all(text, "{1}", scan_variable(entry.variables[1]).symbol);
+  }
+  add_shapes(trial, unit, spec, texts);
+  std::string formula;
+  const auto add = [&](const std::string& letter, const std::string& text, double value,
+                       const std::string& of) {
+    const std::string name = letter + "_" + of;
+    spec.parameters[name] = value;
+    spec.expression.linear.push_back(name);
+    const double most = 4 * std::abs(value) + 1e-3;
+    spec.expression.bounds[name] = {-most, most};
+    formula += (formula.empty() ? "" : " + ") + name + (text.empty() ? "" : " * " + text);
+  };
+  const char* const letters[] = {"a", "b"};
+  for (std::size_t k = 0; k < texts.size(); ++k) {
+    std::string text = "(" + texts[k] + ")";
+    if (trial.factor != V::kCount) text += std::string(" * ") + scan_variable(trial.factor).symbol;
+    std::string of = unit_of_coefficient(unit, trial.form.powers[k]);
+    if (trial.factor != V::kCount) of += std::string("_per_") + scan_variable(trial.factor).unit;
+    add(letters[k], text, trial.fit.coefficients[static_cast<Eigen::Index>(k)], of);
+  }
+  if (trial.form.has_offset)
+    add("offset", "", trial.fit.coefficients[trial.fit.coefficients.size() - 1], "N");
+  spec.expression.formulas[target_of(entry)] = formula;
+  spec.name = fmt::format("{}{}_{}{}_of_{}", kFormulaPrefix, trial.form.name,
+                          entry.frame == "body" ? "body_" : "", entry.axis, entry.variable);
+  if (trial.factor != V::kCount) spec.name += std::string("_and_") + scan_variable(trial.factor).name;
+  return spec;
+}
+
+bool has_formula(const ScanEntry& entry) {
+  return !entry.variables.empty() && std::all_of(entry.variables.begin(), entry.variables.end(),
+                                                 [](V v) { return scan_variable(v).symbol[0] != '\0'; });
+}
+
+}  // namespace
+
+bool is_formula(const std::string& effect) { return effect.rfind(kFormulaPrefix, 0) == 0; }
+
+std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan, std::size_t most_entries,
+                                   int jobs) {
+  std::vector<std::size_t> which;
+  for (std::size_t e = 0; e < scan.entries.size() && which.size() < most_entries; ++e) {
+    if (has_formula(scan.entries[e])) which.push_back(e);
+  }
+  double total = 0;
+  if (samples.size() > 0) {
+    const auto world = samples.force_N.leftCols(3).cast<double>().eval();
+    total = (world.rowwise() - world.colwise().mean()).squaredNorm() / static_cast<double>(samples.size());
+  }
+  std::vector<Formula> formulas(which.size());
+  files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
+    const std::size_t e = which[static_cast<std::size_t>(i)];
+    const ScanEntry& entry = scan.entries[e];
+    EntryData data = data_of(samples, entry);
+    const Trial trial = best_trial(samples, entry, data);
+    Formula& formula = formulas[static_cast<std::size_t>(i)];
+    formula.entry = e;
+    formula.variable = entry.variable;
+    formula.form = trial.form.name;
+    formula.saved_bits = trial.saved_bits;
+    if (!(trial.saved_bits > 0)) return;
+    formula.share = (data.mean_square - trial.fit.mean_square) / std::max(total, 1e-300);
+    formula.effect = spec_of(entry, trial);
+  });
+  formulas.erase(
+      std::remove_if(formulas.begin(), formulas.end(), [](const Formula& f) { return !(f.saved_bits > 0); }),
+      formulas.end());
+  std::stable_sort(formulas.begin(), formulas.end(),
+                   [](const Formula& a, const Formula& b) { return a.saved_bits > b.saved_bits; });
+  return formulas;
+}
+
+Candidate candidate_of(const Formula& formula, const stability::Model& model) {
+  Candidate result;
+  result.name = formula.effect.name;
+  result.spec = formula.effect;
+  result.info = stability::make_effect(formula.effect, {"", {}, model.path})->info();
+  result.thetas.emplace_back();
+  for (const stability::Parameter& parameter : result.info.shape) result.thetas[0].push_back(parameter.value);
+  return result;
+}
+
+std::string to_toml(const Formula& formula) { return stability::to_toml(formula.effect); }
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,315 @@
+#include "analysis/identification/scan/samples.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "analysis/identification/column_run.h"
+#include "analysis/identification/instrument.h"
+#include "analysis/identification/remainder.h"
+#include "analysis/residuals/force_residual.h"
+#include "nn/base/parallel.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using residuals::Track;
+using stability::Instant;
+
+constexpr double kMean_s = 0.1;
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr double kHeightOfNeighbours_m = 1.5;
+
+using Values = std::array<double, static_cast<std::size_t>(kNumScanVariables)>;
+
+double& at(Values& values, ScanVariable variable) { return values[static_cast<std::size_t>(variable)]; }
+
+/// Sums over one sample.
+struct Sum {
+  Values values{}, commanded{};
+  Eigen::Vector3d force_W_N = Eigen::Vector3d::Zero(), force_B_N = Eigen::Vector3d::Zero();
+  double cos_heading = 0, sin_heading = 0, cos_commanded = 0, sin_commanded = 0;
+  int count = 0;
+};
+
+struct TrackSamples {
+  std::vector<Values> values, commanded;
+  std::vector<std::array<float, 6>> force_N;
+  std::vector<std::array<float, 9>> axes;
+  std::vector<std::array<float, NeighbourPlaces::kLags>> lateral_m, height_m;
+  std::vector<int> block;
+  int blocks = 0;
+  double squares_N2 = 0;
+  std::size_t records = 0;
+};
+
+double heading_of(const Eigen::Matrix3d& R) { return std::atan2(R(1, 0), R(0, 0)); }
+
+/// Velocity of the air that a constant force beside a linear drag stands for; NaN where there is no such pair.
+Eigen::Vector3d wind_of(const stability::Model& model) {
+  Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
+  double drag_N_s_m = 0;
+  const auto value = [](const stability::EffectSpec& spec, const char* name) {
+    const auto found = spec.parameters.find(name);
+    return found == spec.parameters.end() ? 0.0 : found->second;
+  };
+  for (const stability::EffectSpec& spec : model.effects) {
+    if (spec.name == "constant_force" && spec.vehicle.empty())
+      force_N += Eigen::Vector3d(value(spec, "force_x_N"), value(spec, "force_y_N"), 0);
+    if (spec.name == "drag_linear") drag_N_s_m += value(spec, "drag_N_s_m");
+  }
+  if (force_N.isZero() || !(drag_N_s_m > 0))
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return force_N / drag_N_s_m;
+}
+
+void set_motion(const Instant& now, Values& to) {
+  using V = ScanVariable;
+  const Eigen::Vector3d v_B_m_s = now.R_WB.transpose() * now.v_W_m_s;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto offset = static_cast<std::size_t>(axis);
+    to[static_cast<std::size_t>(V::kX) + offset] = now.p_W_m[axis];
+    to[static_cast<std::size_t>(V::kVx) + offset] = now.v_W_m_s[axis];
+    to[static_cast<std::size_t>(V::kBodyVx) + offset] = v_B_m_s[axis];
+    to[static_cast<std::size_t>(V::kRateX) + offset] = now.omega_B_rad_s[axis];
+  }
+  at(to, V::kSpeed) = now.v_W_m_s.norm();
+  at(to, V::kClimb) = now.v_W_m_s.dot(now.b3_W());
+  at(to, V::kHeading) = heading_of(now.R_WB);
+  at(to, V::kTilt) = std::acos(std::clamp(now.R_WB(2, 2), -1.0, 1.0));
+  at(to, V::kThrust) = now.thrust_N;
+  at(to, V::kBattery) = now.battery_V;
+  at(to, V::kTime) = now.time_s;
+}
+
+class TrackSampler {
+ public:
+  TrackSampler(const residuals::Inputs& inputs, const Track& track)
+      : model_(inputs.model_for(track)),
+        track_(track),
+        residual_N_(residuals::force_residual(model_, inputs.kinds, inputs.rules, track)),
+        cut_(cut_into_blocks(track)),
+        wind_m_s_(wind_of(model_)) {
+    if (track.targets.size() == track.instants.size()) wanted_ = as_commanded(track, model_.mass_kg);
+  }
+
+  TrackSamples run() {
+    result_.blocks = static_cast<int>(cut_.blocks.size());
+    int block = -1;
+    double start_s = 0;
+    for (std::size_t i = 0; i < track_.instants.size(); ++i) {
+      if (cut_.of_record[i] < 0) continue;
+      const double now_s = track_.instants[i].time_s;
+      if (cut_.of_record[i] != block || now_s - start_s >= kMean_s) {
+        close(block, i);
+        block = cut_.of_record[i];
+        start_s = now_s;
+      }
+      add(i);
+    }
+    close(block, track_.instants.size());
+    return std::move(result_);
+  }
+
+ private:
+  void add(std::size_t i) {
+    using V = ScanVariable;
+    const Instant& now = track_.instants[i];
+    Values values{}, commanded;
+    commanded.fill(std::numeric_limits<double>::quiet_NaN());
+    set_motion(now, values);
+    at(values, V::kAirspeed) = (now.v_W_m_s - wind_m_s_).norm();
+    for (std::size_t r = 0; r < 4; ++r) values[static_cast<std::size_t>(V::kDuty1) + r] = track_.duty[i][r];
+    for (const V setpoint : {V::kSetpointX, V::kSetpointY, V::kSetpointZ})
+      at(values, setpoint) = std::numeric_limits<double>::quiet_NaN();
+    if (!wanted_.empty()) {
+      const Instant& wanted = wanted_[i];
+      set_motion(wanted, commanded);
+      at(commanded, V::kAirspeed) = (wanted.v_W_m_s - wind_m_s_).norm();
+      const double duty = model_.thrust.pwm(wanted.thrust_N / 4, now.battery_V);
+      for (const V rotor : {V::kDuty1, V::kDuty2, V::kDuty3, V::kDuty4}) at(commanded, rotor) = duty;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        values[static_cast<std::size_t>(V::kSetpointX) + axis] =
+            track_.targets[i].p_W_m[static_cast<Eigen::Index>(axis)];
+      }
+    }
+    for (const V v : {V::kHeading, V::kTime, V::kBattery, V::kSetpointX, V::kSetpointY, V::kSetpointZ,
+                      V::kRateX, V::kRateY, V::kRateZ})
+      at(commanded, v) = std::numeric_limits<double>::quiet_NaN();
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      sum_.values[v] += values[v];
+      sum_.commanded[v] += commanded[v];
+    }
+    sum_.cos_heading += std::cos(at(values, V::kHeading));
+    sum_.sin_heading += std::sin(at(values, V::kHeading));
+    sum_.force_W_N += residual_N_[i];
+    sum_.force_B_N += now.R_WB.transpose() * residual_N_[i];
+    result_.squares_N2 += residual_N_[i].squaredNorm();
+    ++result_.records;
+    middle_ = sum_.count == 0 ? i : middle_ + (sum_.count % 2 == 0 ? 1 : 0);
+    ++sum_.count;
+  }
+
+  void close(int block, std::size_t) {
+    if (sum_.count == 0) return;
+    const double n = sum_.count;
+    for (double& value : sum_.values) value /= n;
+    for (double& value : sum_.commanded) value /= n;
+    at(sum_.values, ScanVariable::kHeading) = std::atan2(sum_.sin_heading, sum_.cos_heading);
+    result_.values.push_back(sum_.values);
+    result_.commanded.push_back(sum_.commanded);
+    std::array<float, 6> force_N{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      force_N[axis] = static_cast<float>(sum_.force_W_N[static_cast<Eigen::Index>(axis)] / n);
+      force_N[3 + axis] = static_cast<float>(sum_.force_B_N[static_cast<Eigen::Index>(axis)] / n);
+    }
+    result_.force_N.push_back(force_N);
+    const std::size_t middle = std::min(middle_, track_.instants.size() - 1);
+    std::array<float, 9> axes{};
+    for (std::size_t k = 0; k < 9; ++k) axes[k] = static_cast<float>(track_.instants[middle].R_WB.data()[k]);
+    result_.axes.push_back(axes);
+    result_.block.push_back(block);
+    add_neighbours(middle);
+    sum_ = {};
+  }
+
+  /// Relative to where the vehicle is at record `i`: where neighbours were some time ago.
+  void add_neighbours(std::size_t i) {
+    std::array<float, NeighbourPlaces::kLags> lateral_m, height_m;
+    lateral_m.fill(kUnknown);
+    height_m.fill(kUnknown);
+    std::size_t past = i;
+    for (std::size_t lag = 0; lag < NeighbourPlaces::kLags; ++lag) {
+      const double then_s =
+          track_.instants[i].time_s - static_cast<double>(lag) * NeighbourPlaces::kLag_s + 1e-3;
+      while (past > 0 && track_.instants[past].time_s > then_s && track_.restarts[past] == 0) --past;
+      const Instant& then = track_.instants[past];
+      double nearest_m = std::numeric_limits<double>::infinity();
+      for (int j = 0; j < then.num_neighbours; ++j) {
+        const Eigen::Vector3d dp_m = then.p_W_m + then.neighbours[j].dp_W_m - track_.instants[i].p_W_m;
+        const double distance_m = dp_m.head<2>().norm();
+        if (std::abs(dp_m.z()) > kHeightOfNeighbours_m || !(distance_m < nearest_m)) continue;
+        nearest_m = distance_m;
+        lateral_m[lag] = static_cast<float>(distance_m);
+        height_m[lag] = static_cast<float>(dp_m.z());
+      }
+    }
+    result_.lateral_m.push_back(lateral_m);
+    result_.height_m.push_back(height_m);
+  }
+
+  const stability::Model& model_;
+  const Track& track_;
+  const std::vector<Eigen::Vector3d> residual_N_;
+  const TrackBlocks cut_;
+  const Eigen::Vector3d wind_m_s_;
+  std::vector<Instant> wanted_;
+  Sum sum_;
+  std::size_t middle_ = 0;
+  TrackSamples result_;
+};
+
+/// The commanded thrust is of the model's mass: what asks for more or less altogether is no variation.
+void align_means(std::vector<Values>& commanded, const std::vector<Values>& values) {
+  using V = ScanVariable;
+  for (const V v : {V::kThrust, V::kDuty1, V::kDuty2, V::kDuty3, V::kDuty4}) {
+    const auto k = static_cast<std::size_t>(v);
+    double shift = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) shift += values[i][k] - commanded[i][k];
+    shift /= static_cast<double>(std::max<std::size_t>(values.size(), 1));
+    for (Values& c : commanded) c[k] += shift;
+  }
+}
+
+void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& all) {
+  Eigen::Index size = 0;
+  for (const auto& piece : pieces) {
+    for (const TrackSamples& track : piece) size += static_cast<Eigen::Index>(track.values.size());
+  }
+  all.values.resize(size, kNumScanVariables);
+  all.commanded.resize(size, kNumScanVariables);
+  all.force_N.resize(size, 6);
+  all.axes.resize(size, 9);
+  all.neighbours.lateral_m.resize(size, NeighbourPlaces::kLags);
+  all.neighbours.height_m.resize(size, NeighbourPlaces::kLags);
+  Eigen::Index row = 0;
+  for (const auto& piece : pieces) {
+    for (const TrackSamples& track : piece) {
+      for (std::size_t i = 0; i < track.values.size(); ++i, ++row) {
+        for (int v = 0; v < kNumScanVariables; ++v) {
+          all.values(row, v) = static_cast<float>(track.values[i][static_cast<std::size_t>(v)]);
+          all.commanded(row, v) = static_cast<float>(track.commanded[i][static_cast<std::size_t>(v)]);
+        }
+        for (int k = 0; k < 6; ++k) all.force_N(row, k) = track.force_N[i][static_cast<std::size_t>(k)];
+        for (int k = 0; k < 9; ++k) all.axes(row, k) = track.axes[i][static_cast<std::size_t>(k)];
+        for (int k = 0; k < NeighbourPlaces::kLags; ++k) {
+          all.neighbours.lateral_m(row, k) = track.lateral_m[i][static_cast<std::size_t>(k)];
+          all.neighbours.height_m(row, k) = track.height_m[i][static_cast<std::size_t>(k)];
+        }
+        all.flight.push_back(all.flights);
+        all.block.push_back(all.blocks + track.block[i]);
+      }
+      all.blocks += track.blocks;
+    }
+    ++all.flights;
+  }
+}
+
+}  // namespace
+
+const ScanVariableInfo& scan_variable(ScanVariable variable) {
+  static const std::array<ScanVariableInfo, static_cast<std::size_t>(kNumScanVariables)> all = {{
+      {"x", "x", "m", false, true, true},           {"y", "y", "m", false, true, true},
+      {"z", "z", "m", false, true, true},           {"vx", "vx", "m_s", false, true, false},
+      {"vy", "vy", "m_s", false, true, false},      {"vz", "vz", "m_s", false, true, true},
+      {"vx", "vbx", "m_s", false, false, true},     {"vy", "vby", "m_s", false, false, true},
+      {"vz", "vbz", "m_s", false, false, false},  // the same as `climb`
+      {"speed", "speed", "m_s", false, true, true}, {"airspeed", "", "m_s", false, true, true},
+      {"climb", "climb", "m_s", false, true, true}, {"heading", "heading", "rad", false, true, true},
+      {"tilt", "tilt", "rad", true, true, true},    {"thrust", "T", "N", true, true, true},
+      {"duty_1", "", "", true, true, true},         {"duty_2", "", "", true, true, true},
+      {"duty_3", "", "", true, true, true},         {"duty_4", "", "", true, true, true},
+      {"battery", "V", "V", false, true, true},     {"time", "t", "s", false, true, true},
+      {"set_point_x", "", "m", false, true, true},  {"set_point_y", "", "m", false, true, true},
+      {"set_point_z", "", "m", false, true, true},  {"rate_x", "wx", "rad_s", true, true, true},
+      {"rate_y", "wy", "rad_s", true, true, true},  {"rate_z", "wz", "rad_s", true, true, true},
+  }};
+  return all[static_cast<std::size_t>(variable)];
+}
+
+bool ScanSamples::has_neighbours() const {
+  for (Eigen::Index i = 0; i < neighbours.lateral_m.rows(); ++i) {
+    if (!std::isnan(neighbours.lateral_m(i, 0))) return true;
+  }
+  return false;
+}
+
+ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {
+  const residuals::Inputs inputs = inputs_with(passes, specs);
+  std::vector<std::vector<TrackSamples>> pieces(inputs.found.flights.size());
+  files::parallel_for(static_cast<int>(pieces.size()), passes.jobs, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    std::vector<std::string> problems;
+    for (const Track& track : inputs.load(k, problems)) {
+      if (track.position_only || track.kind != passes.kind) continue;
+      pieces[k].push_back(TrackSampler(inputs, track).run());
+      align_means(pieces[k].back().commanded, pieces[k].back().values);
+    }
+  });
+  ScanSamples all;
+  append(pieces, all);
+  double squares_N2 = 0;
+  std::size_t records = 0;
+  for (const auto& piece : pieces) {
+    for (const TrackSamples& track : piece) {
+      squares_N2 += track.squares_N2;
+      records += track.records;
+    }
+  }
+  all.mean_square_N2 = records > 0 ? squares_N2 / static_cast<double>(records) : 0;
+  return all;
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,84 @@
+/// @file What a model leaves of the flights, as means over 0.1 s beside every variable that may explain it.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "analysis/identification/refinement.h"
+
+namespace swarmcert::identification {
+
+/// Variables of the scan, in SI units; angles in radians.
+enum class ScanVariable : int {
+  kX,
+  kY,
+  kZ,
+  kVx,
+  kVy,
+  kVz,
+  kBodyVx,  ///< velocity along the body's axes: offered to forces in the body's axes only
+  kBodyVy,
+  kBodyVz,
+  kSpeed,
+  kAirspeed,  ///< speed against the wind that a constant force beside a linear drag stands for
+  kClimb,     ///< velocity along the thrust axis
+  kHeading,
+  kTilt,
+  kThrust,
+  kDuty1,
+  kDuty2,
+  kDuty3,
+  kDuty4,
+  kBattery,
+  kTime,
+  kSetpointX,
+  kSetpointY,
+  kSetpointZ,
+  kRateX,
+  kRateY,
+  kRateZ,
+  kCount
+};
+inline constexpr int kNumScanVariables = static_cast<int>(ScanVariable::kCount);
+
+/// What is known of a variable without looking at a flight.
+struct ScanVariableInfo {
+  const char* name;    ///< "climb", as results show it
+  const char* symbol;  ///< in [effect.expression]; empty where formulas cannot use it
+  const char* unit;    ///< as in parameter names: "m", "m_s"
+  /// The controller answers disturbances with it: it counts only as far as set points confirm it.
+  bool is_answer;
+  bool in_world, in_body;  ///< offered to forces along these axes
+};
+const ScanVariableInfo& scan_variable(ScanVariable variable);
+
+/// Place of the laterally nearest neighbour among those within 1.5 m in height, now and up to 0.5 s ago.
+struct NeighbourPlaces {
+  static constexpr int kLags = 6;
+  static constexpr double kLag_s = 0.1;  ///< between one and the next
+  /// [samples x kLags]; lateral distance and height above, NaN where there is no such neighbour.
+  Eigen::MatrixXf lateral_m, height_m;
+};
+
+/// One row per 0.1 s of flight that lies in a block of cut_into_blocks().
+struct ScanSamples {
+  Eigen::MatrixXf values;     ///< [samples x kNumScanVariables]; NaN where unknown
+  Eigen::MatrixXf commanded;  ///< the same as set points ask for it; NaN where nothing asks
+  /// [samples x 6]: residual in newton along the world's axes, then along the body's.
+  Eigen::MatrixXf force_N;
+  Eigen::MatrixXf axes;  ///< [samples x 9]: rotation from body to world, column by column
+  NeighbourPlaces neighbours;
+  std::vector<int> flight, block;  ///< block counts through all flights
+  int flights = 0, blocks = 0;
+  double mean_square_N2 = 0;  ///< of the residual vector of the single records
+
+  Eigen::Index size() const { return force_N.rows(); }
+  bool has_neighbours() const;
+};
+
+/// Means over 0.1 s of what the flights' models leave once they have `specs` as well.
+ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs);
+
+}  // namespace swarmcert::identification

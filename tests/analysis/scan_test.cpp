@@ -1,0 +1,239 @@
+/// The scan of what is left, on remainders made by formulas whose truth is known.
+#include "analysis/identification/scan/scan.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "analysis/identification/scan/forms.h"
+#include "analysis/identification/scan/formulas.h"
+#include "analysis/identification/scan/proposal.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using V = ScanVariable;
+
+constexpr int kBlockSamples = 20;
+constexpr double kNoise_N = 0.002;
+
+/// Four flights of 40 s: every variable is a slow sum of two sines of its own and of noise; forces are noise.
+struct Flights {
+  ScanSamples samples;
+  std::mt19937_64 generator;
+  std::normal_distribution<double> bell;
+
+  explicit Flights(std::uint64_t seed, int flights = 4) : generator(seed) {
+    const Eigen::Index each = 400, size = flights * each;
+    samples.values.resize(size, kNumScanVariables);
+    samples.commanded = Eigen::MatrixXf::Constant(size, kNumScanVariables, std::nanf(""));
+    samples.force_N.resize(size, 6);
+    samples.axes = Eigen::MatrixXf::Zero(size, 9);
+    for (const int k : {0, 4, 8}) samples.axes.col(k).setOnes();
+    samples.neighbours.lateral_m = Eigen::MatrixXf::Constant(size, NeighbourPlaces::kLags, std::nanf(""));
+    samples.neighbours.height_m = samples.neighbours.lateral_m;
+    for (int v = 0; v < kNumScanVariables; ++v) {
+      for (int f = 0; f < flights; ++f) {
+        const double a = 0.3 + uniform(), b = 0.8 + uniform(), p = 6 * uniform(), q = 6 * uniform();
+        for (Eigen::Index i = 0; i < each; ++i) {
+          const double t = 0.1 * static_cast<double>(i);
+          samples.values(f * each + i, v) =
+              static_cast<float>(std::sin(a * t + p) + 0.5 * std::sin(b * t + q));
+        }
+      }
+    }
+    for (Eigen::Index i = 0; i < size; ++i) {
+      samples.values(i, static_cast<int>(V::kTime)) = static_cast<float>(0.1 * static_cast<double>(i % each));
+      samples.flight.push_back(static_cast<int>(i / each));
+      samples.block.push_back(static_cast<int>(i / kBlockSamples));
+      for (int k = 0; k < 3; ++k) samples.force_N(i, k) = static_cast<float>(kNoise_N * bell(generator));
+      samples.force_N.row(i).tail(3) = samples.force_N.row(i).head(3);
+    }
+    samples.flights = flights;
+    samples.blocks = static_cast<int>(size) / kBlockSamples;
+    samples.mean_square_N2 = 3 * kNoise_N * kNoise_N;
+  }
+  double uniform() { return std::generate_canonical<double, 53>(generator); }
+  double at(Eigen::Index i, V v) const { return samples.values(i, static_cast<int>(v)); }
+  /// Adds a force along one of the world's axes; the body stands as the world does.
+  template <typename Force>
+  void push(int axis, const Force& force) {
+    for (Eigen::Index i = 0; i < samples.size(); ++i) {
+      samples.force_N(i, axis) += static_cast<float>(force(i));
+      samples.force_N(i, 3 + axis) = samples.force_N(i, axis);
+    }
+  }
+};
+
+TEST(Scan, FindsTheVariableOfEachForm) {
+  struct Case {
+    std::string variable;
+    int axis;
+    std::function<double(const Flights&, Eigen::Index)> force;
+  };
+  const std::vector<Case> cases = {
+      {"z", 0, [](const Flights& f, Eigen::Index i) { return 0.01 * std::exp(-f.at(i, V::kZ) / 0.4); }},
+      {"climb", 2, [](const Flights& f, Eigen::Index i) { return f.at(i, V::kClimb) > 0.5 ? 0.01 : 0; }},
+      {"heading", 1,
+       [](const Flights& f, Eigen::Index i) { return 0.01 * std::cos(2 * f.at(i, V::kHeading)); }},
+      {"speed", 2, [](const Flights& f, Eigen::Index i) { return 0.01 * std::pow(f.at(i, V::kSpeed), 2); }},
+      {"xy", 2,
+       [](const Flights& f, Eigen::Index i) {
+         return 0.02 * std::exp(-(std::pow(f.at(i, V::kX), 2) + std::pow(f.at(i, V::kY) - 0.3, 2)) / 0.3);
+       }},
+      {"time", 2, [](const Flights& f, Eigen::Index i) { return f.at(i, V::kTime) > 17 ? 0.01 : 0; }},
+      {"time", 0, [](const Flights& f, Eigen::Index i) { return 0.01 * std::sin(4 * f.at(i, V::kTime)); }},
+  };
+  for (std::size_t c = 0; c < cases.size(); ++c) {
+    Flights flights(10 + c);
+    flights.push(cases[c].axis, [&](Eigen::Index i) { return cases[c].force(flights, i); });
+    const Scan found = scan(flights.samples, 1);
+    ASSERT_FALSE(found.entries.empty()) << cases[c].variable;
+    const ScanEntry& first = found.entries[0];
+    EXPECT_EQ(first.variable, cases[c].variable);
+    EXPECT_EQ(first.axis, std::string(1, "xyz"[cases[c].axis]));
+    EXPECT_GT(first.share, 0.5);
+    EXPECT_LE(first.share_interval.first, first.share);
+    EXPECT_GE(first.share_interval.second, first.share);
+  }
+}
+
+TEST(Scan, FindsNothingWhereNothingIs) {
+  int claims = 0;
+  for (std::uint64_t seed = 100; seed < 112; ++seed)
+    claims += scan(Flights(seed, seed % 2 == 0 ? 1 : 6).samples, 1).entries.empty() ? 0 : 1;
+  EXPECT_EQ(claims, 0);
+}
+
+/// A gust pushes upwards, the controller takes thrust away: the force falls with the thrust, but not because of it.
+TEST(Scan, CountsNoAnswerOfTheController) {
+  Flights flights(5);
+  flights.push(2, [&](Eigen::Index) { return 0.01 * flights.bell(flights.generator); });
+  const auto thrust = static_cast<Eigen::Index>(V::kThrust);
+  for (Eigen::Index i = 0; i < flights.samples.size(); ++i) {
+    const double wanted = 0.33 + 0.02 * flights.at(i, V::kDuty1);
+    flights.samples.commanded(i, thrust) = static_cast<float>(wanted);
+    flights.samples.values(i, thrust) = static_cast<float>(wanted - flights.samples.force_N(i, 2));
+  }
+  const auto names_thrust = [](const Scan& found) {
+    return std::any_of(found.entries.begin(), found.entries.end(),
+                       [](const ScanEntry& entry) { return entry.variable == "thrust"; });
+  };
+  EXPECT_FALSE(names_thrust(scan(flights.samples, 1)));
+  // A force that the thrust does cause is counted.
+  flights.push(2, [&](Eigen::Index i) { return 0.5 * (flights.samples.commanded(i, thrust) - 0.33); });
+  for (Eigen::Index i = 0; i < flights.samples.size(); ++i)
+    flights.samples.values(i, thrust) = flights.samples.commanded(i, thrust);
+  EXPECT_TRUE(names_thrust(scan(flights.samples, 1)));
+}
+
+TEST(Scan, DoesNotDependOnTheNumberOfThreads) {
+  Flights flights(7);
+  flights.push(2, [&](Eigen::Index i) { return 0.01 * flights.at(i, V::kZ); });
+  const Scan one = scan(flights.samples, 1), two = scan(flights.samples, 2);
+  ASSERT_EQ(one.entries.size(), two.entries.size());
+  for (std::size_t i = 0; i < one.entries.size(); ++i) EXPECT_EQ(one.entries[i].share, two.entries[i].share);
+}
+
+TEST(Formulas, RecoverTheFormAndItsNumbers) {
+  Flights flights(21);
+  flights.push(2, [&](Eigen::Index i) {
+    return 0.03 * std::exp(-std::pow((flights.at(i, V::kZ) - 0.2) / 0.3, 2) / 2);
+  });
+  const Scan found = scan(flights.samples, 1);
+  const std::vector<Formula> formulas = find_formulas(flights.samples, found, 4, 1);
+  ASSERT_FALSE(formulas.empty());
+  EXPECT_EQ(formulas[0].variable, "z");
+  EXPECT_EQ(formulas[0].form, "gaussian");
+  EXPECT_NEAR(formulas[0].effect.parameters.at("centre_m"), 0.2, 0.02);
+  EXPECT_NEAR(std::abs(formulas[0].effect.parameters.at("width_m")), 0.3, 0.03);
+  EXPECT_NEAR(formulas[0].effect.parameters.at("a_N"), 0.03, 0.003);
+}
+
+/// What is written can be read back, and gives the force that was found.
+TEST(Formulas, AreEffectsOfTheModelFile) {
+  Flights flights(22);
+  flights.push(0, [&](Eigen::Index i) { return 0.02 * std::max(0.0, flights.at(i, V::kSpeed) - 0.3); });
+  const std::vector<Formula> formulas = find_formulas(flights.samples, scan(flights.samples, 1), 4, 1);
+  ASSERT_FALSE(formulas.empty());
+  const stability::AppliedEffect effect(formulas[0].effect, {});
+  stability::Instant now;
+  now.v_W_m_s = {1.1, 0, 0};
+  now.p_W_m = {0, 0, 1};
+  const double fast = effect.wrench(now).force_W_N.x();
+  now.v_W_m_s = {0.5, 0, 0};
+  EXPECT_NEAR(fast - effect.wrench(now).force_W_N.x(), 0.02 * 0.6, 0.001);
+  EXPECT_NE(to_toml(formulas[0]).find("[effect.expression]"), std::string::npos);
+}
+
+TEST(Shape, IsMonotoneWhereTheForceIs) {
+  Flights flights(23);
+  flights.push(2, [&](Eigen::Index i) { return 0.02 * std::tanh(3 * flights.at(i, V::kZ)); });
+  const Scan found = scan(flights.samples, 1);
+  ASSERT_FALSE(found.entries.empty());
+  const std::optional<stability::EffectSpec> shape = shape_of(flights.samples, found.entries[0]);
+  ASSERT_TRUE(shape.has_value());
+  const stability::AppliedEffect effect(*shape, {});
+  double last = -1;
+  for (double z = -1.5; z < 1.5; z += 0.05) {
+    stability::Instant now;
+    now.p_W_m = {0, 0, z};
+    const double force_N = effect.wrench(now).force_W_N.z();
+    EXPECT_GE(force_N, last - 1e-12);
+    EXPECT_NEAR(force_N, 0.02 * std::tanh(3 * z), 0.006) << z;
+    last = force_N;
+  }
+}
+
+TEST(Proposals, AreNamedWithTheirPlace) {
+  for (const char* name : {"formula", "formula:1", "formula:12", "shape", "shape:2"})
+    EXPECT_TRUE(is_proposal(name));
+  for (const char* name : {"formulas", "formula:", "formula:0", "formula:x", "formula:1x", "shape:-1"})
+    EXPECT_FALSE(is_proposal(name));
+}
+
+/// Functions and texts of all forms say the same.
+TEST(Forms, TextsGiveTheValues) {
+  const auto check = [](const std::vector<Form>& forms) {
+    for (const Form& form : forms) {
+      std::vector<double> theta;
+      for (const FormParameter& parameter : form.shape)
+        theta.push_back(parameter.starts[parameter.starts.size() / 2]);
+      double values[kMostFormFunctions] = {};
+      const double v[2] = {0.7, 0.35};
+      form.values(v, theta.data(), values);
+      for (std::size_t k = 0; k < form.texts.size(); ++k) {
+        stability::EffectSpec spec;
+        spec.name = "form";
+        spec.parameters["coefficient"] = 1;
+        spec.expression.linear = {"coefficient"};
+        std::string text = form.texts[k];
+        const auto put = [&](const std::string& from, const std::string& to) {
+          for (std::size_t at = text.find(from); at != std::string::npos;
+               at = text.find(from, at + to.size()))
+            text.replace(at, from.size(), to);
+        };
+        put("{0}", "x");
+        put("{1}", "y");
+        const char* const letters[] = {"{a}", "{b}", "{c}"};
+        for (std::size_t s = 0; s < form.shape.size(); ++s) {
+          put(letters[s], form.shape[s].name);
+          spec.parameters[form.shape[s].name] = theta[s];
+        }
+        spec.expression.formulas["force_z_N"] = "coefficient * (" + text + ")";
+        const stability::AppliedEffect effect(spec, {});
+        stability::Instant now;
+        now.p_W_m = {v[0], v[1], 1};
+        EXPECT_NEAR(effect.wrench(now).force_W_N.z(), values[k], 1e-12) << form.name << ": " << text;
+      }
+    }
+  };
+  check(forms_over({0, 1}, false));
+  check(forms_over({-1, 1}, true));
+  check(forms_over_place({-1, 1}, {0, 1}));
+}
+
+}  // namespace
+}  // namespace swarmcert::identification

@@ -1,0 +1,121 @@
+"""Flies hidden effects of foreign form, asks the tool, and judges its answers.
+
+Usage: foreign_campaign.py TOOL MODEL FOLDER [--effects NAME,...] [--seeds FROM:TO] [--nothing N] [--add]
+Prints a line per case and a summary; exits 1 where a share falls short of what is asked for.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from foreign_effects import EFFECTS  # noqa: E402
+from foreign_simulator import ROTOR_LAG_S, fly  # noqa: E402
+
+FLIGHTS = 4
+KEYS = ("force", "torque", "rotor", "discharge_V_s", "yaw_reach", "speed")
+
+
+def model_with_lag(path, folder, extra="", name="model.toml"):
+    with open(path) as file:
+        text = file.read()
+    text += f'\n[[effect]]\nname = "motor_lag"\nparameters = {{ tau_s = {ROTOR_LAG_S} }}\n' + extra
+    to = os.path.join(folder, name)
+    with open(to, "w") as file:
+        file.write(text)
+    return to
+
+
+def asked(tool, words, result):
+    done = subprocess.run([tool] + words + ["-q", "--force", "--json", result], capture_output=True, text=True)
+    if done.returncode == 4:
+        return None
+    if done.returncode != 0:
+        raise RuntimeError(f"{words}: exit {done.returncode}: {done.stderr}")
+    with open(result) as file:
+        return json.load(file)
+
+
+def case(options, name, effect, seed):
+    folder = os.path.join(options.folder, f"{name.replace(' ', '_')}_{seed}")
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    truth = {key: effect[key] for key in KEYS if key in effect}
+    flights = os.path.join(folder, "flights")
+    for run in range(FLIGHTS):
+        fly(truth, seed, flights, run, effect.get("vehicles", 1))
+    model = model_with_lag(options.model, folder)
+    result = asked(options.tool, ["diagnose", model, flights], os.path.join(folder, "diagnose.json"))
+    if result is None:
+        return {"name": name, "seed": seed, "named": [], "wrong": [], "right": False, "first": [], "reason": "too poor"}
+    named = [entry["effect"] for entry in result["ranking"]]
+    remainder = result["remainder"]
+    first = [entry["variable"] for entry in remainder[:2]]
+    wrong = [n for n in named if n not in effect.get("names", set())]
+    right_name = any(n in effect.get("names", set()) for n in named)
+    right = bool(set(first) & effect.get("variables", set())) or right_name
+    answer = {"name": name, "seed": seed, "named": named, "wrong": wrong, "right": right,
+              "first": [f"{e['variable']}/{e['frame']}.{e['axis']} {e['share']:.2f}" for e in remainder[:4]]}
+    if options.add and effect.get("variables"):
+        answer.update(held_out(options, folder, flights, model, effect))
+    if not options.keep:
+        shutil.rmtree(folder)
+    return answer
+
+
+def held_out(options, folder, flights, model, effect):
+    """Errors on the test flight: of the formula that was found, and of the true one with its true numbers."""
+    new = os.path.join(folder, "new.toml")
+    added = asked(options.tool, ["add", "formula", "--model", model, flights, "-o", new],
+                  os.path.join(folder, "add.json"))
+    if added is None:
+        return {}
+    ladder = added["ladder"]
+    answer = {"formula": [effect["effect"] for effect in added["effects"]][1:], "before": ladder[0]["test_rmse"], "after": min(row["test_rmse"] for row in ladder if row["accepted"])}
+    if "formula" in effect:
+        truth = model_with_lag(options.model, folder, effect["formula"], "truth.toml")
+        test = [f for f in sorted(os.listdir(flights)) if f.endswith(f"_{FLIGHTS - 1:02d}")]
+        result = asked(options.tool, ["compare", truth] + [os.path.join(flights, f) for f in test],
+                       os.path.join(folder, "compare.json"))
+        answer["of_truth"] = result["overall"]["rmse"]["total"]
+    return answer
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("tool")
+    parser.add_argument("model")
+    parser.add_argument("folder")
+    parser.add_argument("--effects", default="")
+    parser.add_argument("--seeds", default="1:4")
+    parser.add_argument("--nothing", type=int, default=0, help="cases without any effect, instead of the effects")
+    parser.add_argument("--add", action="store_true", help="also ask `add formula`, and judge its held-out error")
+    parser.add_argument("--keep", action="store_true")
+    options = parser.parse_args()
+    first, last = (int(x) for x in options.seeds.split(":"))
+    chosen = [n for n in options.effects.split(",") if n] or list(EFFECTS)
+    cases = [(n, EFFECTS[n], s) for n in chosen for s in range(first, last)]
+    if options.nothing:
+        cases = [("nothing", {}, first + k) for k in range(options.nothing)]
+    right = wrong = close = judged = claims = 0
+    for name, effect, seed in cases:
+        answer = case(options, name, effect, seed)
+        right += answer["right"]
+        wrong += bool(answer["wrong"])
+        claims += bool(answer["named"] or answer["first"])
+        if "of_truth" in answer:
+            judged += 1
+            close += answer["after"] <= 1.2 * answer["of_truth"]
+        print(("  " if answer["right"] and not answer["wrong"] else "! ") + json.dumps(answer), flush=True)
+    print(f"cases {len(cases)}: right variable or name {right}, wrong names {wrong}, claims {claims}, "
+          f"held-out error within 1.2 of the truth's {close} of {judged}")
+    if options.nothing:
+        return 0 if claims <= 0.02 * len(cases) else 1
+    return 0 if right >= 0.9 * len(cases) and wrong == 0 and close >= 0.8 * judged else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
