@@ -7,6 +7,7 @@ const std::vector<Command>& commands() {
       inspect_command(),          //
       certify_command(),          //
       check_command(),            //
+      study_command(),            //
       compare_command(),          //
       diagnose_command(),         //
       add_command(),              //

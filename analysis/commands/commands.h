@@ -27,6 +27,7 @@ Command merge_command();
 Command reproduce_command();
 Command simulate_command();
 Command spacing_command();
+Command study_command();
 Command sweep_command();
 Command train_command();
 Command tune_command();

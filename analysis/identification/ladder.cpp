@@ -166,7 +166,7 @@ Split split_flights(const residuals::Inputs& inputs) {
 Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress) {
   Ladder ladder;
-  ladder.split = split_flights(inputs);
+  ladder.split = options.split ? *options.split : split_flights(inputs);
   const stability::Model& nominal = inputs.models[0];
   const std::string& kind = nominal.kind;
   ladder.too_poor = too_poor(inputs, kind, ladder.split, jobs, ladder.problems, ladder.is_tested);

@@ -1,6 +1,7 @@
 /// @file Adding effects to a model, one step after the other, with errors on flights that the fit has not seen.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,7 @@ struct LadderOptions {
   std::vector<std::string>
       effects;  ///< in this order, unless automatic; also formulas and shapes, see is_proposal()
   bool keep_anyway = false;
+  std::optional<Split> split;  ///< split_flights() if not given
 };
 
 /// Fits and accepts effects for inputs' only model, where the flights suffice: an effect is accepted if the RMSE of the select flights falls by

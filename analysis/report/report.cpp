@@ -141,7 +141,7 @@ std::string Report::drawn(const Figure& figure, const std::string& folder) const
   return html + "<figcaption>" + html_text(figure.caption) + "</figcaption></figure>\n";
 }
 
-std::string Report::write(const std::string& folder, bool overwrite) const {
+std::string Report::write(const std::string& folder, bool overwrite, const std::string& page) const {
   const std::filesystem::path path(folder);
   if (std::filesystem::exists(path) && !overwrite &&
       (!std::filesystem::is_directory(path) || !std::filesystem::is_empty(path))) {
@@ -175,7 +175,7 @@ std::string Report::write(const std::string& folder, bool overwrite) const {
         script_json(result_json_) + "</script>\n";
   }
   html += "<p>swarmcert " SWARMCERT_VERSION "</p>\n<script>" + script + "</script>\n</body></html>\n";
-  const std::string report = (path / "report.html").string();
+  const std::string report = (path / page).string();
   files::write_file(report, html, true);
   return report;
 }

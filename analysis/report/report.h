@@ -63,10 +63,10 @@ class Report {
   /// report says so.
   void time_series(const std::vector<TimeSeries>& all, const std::string& caption);
 
-  /// Writes FOLDER/report.html and the figures' files; returns the path of report.html. Without gnuplot, or where it
+  /// Writes FOLDER/`page` and the figures' files; returns the page's path. Without gnuplot, or where it
   /// fails, the report says so in the figure's place and the data stay.
   /// @throws files::InputError if the folder exists, is not empty, and `overwrite` is false.
-  std::string write(const std::string& folder, bool overwrite) const;
+  std::string write(const std::string& folder, bool overwrite, const std::string& page = "report.html") const;
 
  private:
   struct Figure {

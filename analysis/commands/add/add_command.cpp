@@ -5,9 +5,9 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
+#include "analysis/commands/add/add_output.h"
 #include "analysis/commands/add/add_report.h"
 #include "analysis/commands/commands.h"
-#include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/scan/proposal.h"
@@ -18,7 +18,6 @@ namespace swarmcert::analysis {
 namespace {
 
 using identification::Ladder;
-using stability::LadderRow;
 
 struct AddOptions {
   FlightOptions flights;
@@ -54,71 +53,6 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
   }
 }
 
-files::Json names_of(const residuals::Inputs& inputs, const std::vector<int>& which) {
-  files::Json names = files::Json::array();
-  for (const int i : which) names.push_back(inputs.found.flights[static_cast<std::size_t>(i)].name);
-  return names;
-}
-
-files::Json json_of(const LadderRow& row) {
-  return {{"effect", row.effect},
-          {"fit_rmse", row.fit_rmse_N},
-          {"select_rmse", row.select_rmse_N},
-          {"test_rmse", row.test_rmse_N > 0 ? files::Json(row.test_rmse_N) : nullptr},
-          {"over_noise_floor", row.noise_floor_N > 0 && row.test_rmse_N > 0
-                                   ? files::Json(row.test_rmse_N / row.noise_floor_N)
-                                   : nullptr},
-          {"test_looks", row.test_looks},
-          {"accepted", row.accepted},
-          {"reason", row.note}};
-}
-
-files::Json json_of(const std::vector<LadderRow>& rows) {
-  files::Json json = files::Json::array();
-  for (const LadderRow& row : rows) json.push_back(json_of(row));
-  return json;
-}
-
-files::Json json_of(const std::vector<stability::EffectSpec>& effects) {
-  files::Json json = files::Json::array();
-  for (const stability::EffectSpec& effect : effects) {
-    files::Json entry = {{"effect", effect.name},
-                         {"parameters", values_json(effect.parameters, effect.fit.interval)}};
-    if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
-    json.push_back(std::move(entry));
-  }
-  return json;
-}
-
-void print(const std::vector<LadderRow>& rows) {
-  fmt::print("  {:<18}{:>10}{:>10}{:>10}{:>14}\n", "", "fit", "select", "test", "test / floor");
-  for (const LadderRow& row : rows) {
-    fmt::print("  {:<18}{:>10.5f}{:>10.5f}{:>10}{:>14}{}\n",
-               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N, row.select_rmse_N,
-               row.test_rmse_N > 0 ? fmt::format("{:.5f}", row.test_rmse_N) : "-",
-               row.noise_floor_N > 0 && row.test_rmse_N > 0
-                   ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N)
-                   : "-",
-               row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
-  }
-}
-
-void print(const Ladder& ladder) {
-  if (!ladder.earlier.empty()) {
-    fmt::print("The model's ladder so far, on the flights of then:\n");
-    print(ladder.earlier);
-  }
-  fmt::print("RMSE of the force residual, in newton; flights for fit / select / test: {} / {} / {}{}\n",
-             ladder.split.fit.size(), ladder.split.select.size(), ladder.split.test.size(),
-             ladder.split.by_flight ? "" : " (too few to split: all for everything)");
-  print(ladder.rows);
-  fmt::print("Test flights looked at: {} time{}\n", ladder.test_looks, ladder.test_looks == 1 ? "" : "s");
-  for (const stability::EffectSpec& effect : ladder.model.effects) {
-    print_values(effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle) + " ",
-                 effect.parameters, effect.fit.interval);
-  }
-}
-
 void report_ladders(const AddOptions& options, const CommonOptions& common, const files::Json& result,
                     const std::vector<LadderOfModel>& ladders) {
   if (options.report.empty()) return;
@@ -135,11 +69,11 @@ int undo(const AddOptions& options, const CommonOptions& common) {
   files::write_file(options.output,
                     stability::to_toml(model, {"Effects fitted to flights by swarmcert add."}), common.force);
   files::Json result = result_head("add", {path});
-  result["ladder"] = json_of(model.ladder);
-  result["effects"] = json_of(model.effects);
+  result["ladder"] = ladder_json(model.ladder);
+  result["effects"] = effects_json(model.effects);
   write_result(common, result);
   if (common.prints_text()) {
-    print(model.ladder);
+    print_ladder(model.ladder);
     fmt::print("Written: {}\n", options.output);
   }
   report_ladders(options, common, result, {{model.path, model.ladder, model.effects}});
@@ -154,11 +88,11 @@ int show(const AddOptions& options, const CommonOptions& common) {
   for (const std::string& path : options.flights.models) {
     const stability::Model model = stability::read_model(path);
     result["ladders"].push_back(
-        {{"model", path}, {"ladder", json_of(model.ladder)}, {"effects", json_of(model.effects)}});
+        {{"model", path}, {"ladder", ladder_json(model.ladder)}, {"effects", effects_json(model.effects)}});
     ladders.push_back({path, model.ladder, model.effects});
     if (!common.prints_text()) continue;
     fmt::print("{}{}\n", path, model.ladder.empty() ? ": no ladder" : "");
-    if (!model.ladder.empty()) print(model.ladder);
+    if (!model.ladder.empty()) print_ladder(model.ladder);
   }
   write_result(common, result);
   report_ladders(options, common, result, ladders);
@@ -187,15 +121,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
                       common.force);
   }
   files::Json result = result_head("add", inputs.files());
-  result["ladder"] = json_of(ladder.rows);
-  result["earlier"] = json_of(ladder.earlier);
-  result["test_looks"] = ladder.test_looks;
-  result["is_tested"] = ladder.is_tested;
-  result["split"] = {{"by_flight", ladder.split.by_flight},
-                     {"fit", names_of(inputs, ladder.split.fit)},
-                     {"select", names_of(inputs, ladder.split.select)},
-                     {"test", names_of(inputs, ladder.split.test)}};
-  result["effects"] = json_of(ladder.model.effects);
+  add_ladder(ladder, inputs, result);
   result["written"] = ladder.any_accepted;
   result["problems"] = ladder.problems;
   if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;
@@ -206,7 +132,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
     return kInconclusive;
   }
   if (common.prints_text()) {
-    print(ladder);
+    print_ladder(ladder);
     if (ladder.any_accepted)
       fmt::print("Written: {}\n", options.output);
     else

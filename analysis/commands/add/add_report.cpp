@@ -13,31 +13,34 @@ std::string step(const stability::LadderRow& row) {
   return (row.effect == "nominal" ? "" : row.accepted ? "+ " : "refused: ") + row.effect;
 }
 
-void add_ladder(Report& report, const std::vector<stability::LadderRow>& rows, std::size_t number) {
-  std::string data = "# fit_N select_N test_N step\n";
+}  // namespace
+
+void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
+                       const std::string& unit, double per_newton) {
+  std::string data = "# fit select test step\n";
   std::vector<std::vector<std::string>> cells;
   for (const stability::LadderRow& row : rows) {
-    data += fmt::format("{:.8g} {:.8g} {:.8g} {}\n", row.fit_rmse_N, row.select_rmse_N, row.test_rmse_N,
-                        plot_field(step(row)));
-    cells.push_back({step(row), fmt::format("{:.5f}", row.fit_rmse_N),
-                     fmt::format("{:.5f}", row.select_rmse_N), fmt::format("{:.5f}", row.test_rmse_N),
+    data += fmt::format("{:.8g} {:.8g} {:.8g} {}\n", per_newton * row.fit_rmse_N,
+                        per_newton * row.select_rmse_N, per_newton * row.test_rmse_N, plot_field(step(row)));
+    cells.push_back({step(row), fmt::format("{:.4g}", per_newton * row.fit_rmse_N),
+                     fmt::format("{:.4g}", per_newton * row.select_rmse_N),
+                     fmt::format("{:.4g}", per_newton * row.test_rmse_N),
                      row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
                      row.note});
   }
-  const std::string name = fmt::format("ladder_{}", number);
   report.figure(
       name, data,
       "set style data histograms\nset style fill solid 0.9 noborder\nset boxwidth 0.9\n"
-      "set ylabel 'RMSE of the force residual [N]'\nset yrange [0:*]\nset xtics rotate by -30\nplot '" +
-          name +
+      "set ylabel 'RMSE of the force residual [" +
+          unit + "]'\nset yrange [0:*]\nset xtics rotate by -30\nplot '" + name +
           ".dat' using 1:xtic(4) title 'flights to fit' linecolor rgb '#999999', "
           "'' using 2 title 'flights to select' linetype 6, '' using 3 title 'test flights' linetype 1\n",
       "Error ladder: how the error falls from the nominal model on, effect by effect, on the flights of "
       "the fit, those that decide, and those that are only shown.");
-  report.table({"", "fit [N]", "select [N]", "test [N]", "test / noise floor", "note"}, cells);
+  report.table({"", "fit [" + unit + "]", "select [" + unit + "]", "test [" + unit + "]",
+                "test / noise floor", "note"},
+               cells);
 }
-
-}  // namespace
 
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const files::Json& result,
                                 const std::string& folder, bool overwrite) {
@@ -50,7 +53,7 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
     if (ladder.rows.empty()) {
       report.paragraph("No ladder is kept.");
     } else {
-      add_ladder(report, ladder.rows, ++number);
+      add_ladder_figure(report, ladder.rows, fmt::format("ladder_{}", ++number), "N", 1);
     }
     std::vector<std::vector<std::string>> rows;
     for (const stability::EffectSpec& effect : ladder.effects) {

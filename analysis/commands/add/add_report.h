@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/report/report.h"
 #include "nn/base/json.h"
 #include "stability/model.h"
 
@@ -20,5 +21,9 @@ struct LadderOfModel {
 /// path. @throws files::InputError as Report::write().
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const files::Json& result,
                                 const std::string& folder, bool overwrite);
+
+/// Bars and a table of the errors after each step. @param unit of what is shown, `per_newton` of it make a newton.
+void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
+                       const std::string& unit, double per_newton);
 
 }  // namespace swarmcert::analysis

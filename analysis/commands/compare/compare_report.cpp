@@ -102,7 +102,55 @@ void add_neighbour_map(Report& report, const residuals::NeighbourMap& map) {
       "records are empty.");
 }
 
-/// Vehicles with the worst moments first, then the others, as far as a page can hold them.
+void add_trajectories(Report& report, const residuals::Comparison& comparison) {
+  const residuals::Trajectories& all = comparison.trajectories;
+  report.heading("Closed loop from the logs' set points");
+  if (!all.refused.empty()) {
+    report.paragraph("Not simulated: " + all.refused + " (--gains).");
+    return;
+  }
+  const auto row = [](const std::string& name, const residuals::Axes& a, double scale) {
+    return std::vector<std::string>{name, fmt::format("{:.2f}", scale * a.x),
+                                    fmt::format("{:.2f}", scale * a.y), fmt::format("{:.2f}", scale * a.z),
+                                    fmt::format("{:.2f}", scale * a.total)};
+  };
+  report.paragraph(fmt::format("{} logs, {:.0f} s, sampled loop; {} diverged and are left out.", all.tracks,
+                               all.seconds, all.diverged));
+  std::vector<std::vector<std::string>> rows = {
+      row("simulated minus measured, RMS [mm]", all.rmse_m, 1000),
+      row("measured minus set point, RMS [mm]", all.measured_rms_m, 1000),
+      row("simulated minus set point, RMS [mm]", all.simulated_rms_m, 1000)};
+  if (all.peak_ratio.tracks > 0) {
+    rows.push_back(row("peaks, measured over replayed: median", all.peak_ratio.p50, 1));
+    rows.push_back(row("95 % of logs below", all.peak_ratio.p95, 1));
+    rows.push_back(row("share of logs that replay covers", all.peak_ratio.coverage, 1));
+  }
+  report.table({"", "x", "y", "z", "vector"}, rows);
+}
+
+void add_learning_error(Report& report, const residuals::LearningError& learning) {
+  report.heading("What bound --from takes from these flights");
+  report.paragraph(fmt::format(
+      "Quantiles over {} windows of {} s of the residual behind a low-pass of {} Hz; bias: "
+      "mean of a flight.",
+      learning.windows, residuals::LearningError::kWindow_s, residuals::LearningError::kBandwidth_hz));
+  std::vector<std::vector<std::string>> rows;
+  const auto add = [&rows](const std::string& name, const residuals::LearningError::Quantiles& q) {
+    const auto cell = [](const residuals::Axes& a) {
+      return fmt::format("{:.4f} {:.4f} {:.4f}", a.x, a.y, a.z);
+    };
+    rows.push_back({name, cell(q.p50), cell(q.p95), cell(q.p99), cell(q.max)});
+  };
+  add("bias [N]", learning.bias_N);
+  add("amplitude [N]", learning.amplitude_N);
+  add("rate [N/s]", learning.rate_N_s);
+  add("variation per pass [N]", learning.variation_N);
+  add("impulse per pass [N s]", learning.impulse_N_s);
+  report.table({"x y z", "median", "95 %", "99 %", "largest"}, rows);
+}
+
+}  // namespace
+
 void add_time_series(Report& report, const residuals::Comparison& comparison) {
   constexpr std::size_t kMost = 12;
   std::vector<const residuals::TrackErrors*> chosen;
@@ -153,55 +201,6 @@ void add_time_series(Report& report, const residuals::Comparison& comparison) {
                        "zoom, double click to zoom out. Flags mark the worst moments.",
                        all.size(), comparison.tracks.size()));
 }
-
-void add_trajectories(Report& report, const residuals::Comparison& comparison) {
-  const residuals::Trajectories& all = comparison.trajectories;
-  report.heading("Closed loop from the logs' set points");
-  if (!all.refused.empty()) {
-    report.paragraph("Not simulated: " + all.refused + " (--gains).");
-    return;
-  }
-  const auto row = [](const std::string& name, const residuals::Axes& a, double scale) {
-    return std::vector<std::string>{name, fmt::format("{:.2f}", scale * a.x),
-                                    fmt::format("{:.2f}", scale * a.y), fmt::format("{:.2f}", scale * a.z),
-                                    fmt::format("{:.2f}", scale * a.total)};
-  };
-  report.paragraph(fmt::format("{} logs, {:.0f} s, sampled loop; {} diverged and are left out.", all.tracks,
-                               all.seconds, all.diverged));
-  std::vector<std::vector<std::string>> rows = {
-      row("simulated minus measured, RMS [mm]", all.rmse_m, 1000),
-      row("measured minus set point, RMS [mm]", all.measured_rms_m, 1000),
-      row("simulated minus set point, RMS [mm]", all.simulated_rms_m, 1000)};
-  if (all.peak_ratio.tracks > 0) {
-    rows.push_back(row("peaks, measured over replayed: median", all.peak_ratio.p50, 1));
-    rows.push_back(row("95 % of logs below", all.peak_ratio.p95, 1));
-    rows.push_back(row("share of logs that replay covers", all.peak_ratio.coverage, 1));
-  }
-  report.table({"", "x", "y", "z", "vector"}, rows);
-}
-
-void add_learning_error(Report& report, const residuals::LearningError& learning) {
-  report.heading("What bound --from takes from these flights");
-  report.paragraph(fmt::format(
-      "Quantiles over {} windows of {} s of the residual behind a low-pass of {} Hz; bias: "
-      "mean of a flight.",
-      learning.windows, residuals::LearningError::kWindow_s, residuals::LearningError::kBandwidth_hz));
-  std::vector<std::vector<std::string>> rows;
-  const auto add = [&rows](const std::string& name, const residuals::LearningError::Quantiles& q) {
-    const auto cell = [](const residuals::Axes& a) {
-      return fmt::format("{:.4f} {:.4f} {:.4f}", a.x, a.y, a.z);
-    };
-    rows.push_back({name, cell(q.p50), cell(q.p95), cell(q.p99), cell(q.max)});
-  };
-  add("bias [N]", learning.bias_N);
-  add("amplitude [N]", learning.amplitude_N);
-  add("rate [N/s]", learning.rate_N_s);
-  add("variation per pass [N]", learning.variation_N);
-  add("impulse per pass [N s]", learning.impulse_N_s);
-  report.table({"x y z", "median", "95 %", "99 %", "largest"}, rows);
-}
-
-}  // namespace
 
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
                                  const files::Json& result, const std::string& folder, bool overwrite) {

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "analysis/report/report.h"
 #include "analysis/residuals/comparison.h"
 #include "nn/base/json.h"
 
@@ -11,5 +12,9 @@ namespace swarmcert::analysis {
 /// Writes FOLDER/report.html with plots and the JSON `result`; returns its path. @throws as Report::write().
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
                                  const files::Json& result, const std::string& folder, bool overwrite);
+
+/// Residuals over time with zoom, in gram-force: vehicles with the worst moments first, then the others, as far as a page
+/// can hold them.
+void add_time_series(Report& report, const residuals::Comparison& comparison);
 
 }  // namespace swarmcert::analysis

@@ -62,6 +62,8 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
               "90 % intervals from resampled blocks.");
 }
 
+}  // namespace
+
 void add_left(Report& report, const Diagnosis& diagnosis) {
   const identification::Remainder& rest = diagnosis.remainder;
   report.paragraph(fmt::format(
@@ -95,8 +97,6 @@ void add_left(Report& report, const Diagnosis& diagnosis) {
   }
   report.table({"effect", "number", "size", "what would show it"}, rows);
 }
-
-}  // namespace
 
 std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses, const files::Json& result,
                                   const std::string& folder, bool overwrite) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/identification/diagnose.h"
+#include "analysis/report/report.h"
 #include "nn/base/json.h"
 
 namespace swarmcert::analysis {
@@ -14,5 +15,8 @@ namespace swarmcert::analysis {
 /// @throws as Report::write().
 std::string write_diagnose_report(const std::vector<identification::Diagnosis>& diagnoses,
                                   const files::Json& result, const std::string& folder, bool overwrite);
+
+/// What is left after the effects that were found, what was not counted and why, and the detection limits.
+void add_left(Report& report, const identification::Diagnosis& diagnosis);
 
 }  // namespace swarmcert::analysis

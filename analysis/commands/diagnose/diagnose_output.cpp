@@ -1,0 +1,194 @@
+#include "analysis/commands/diagnose/diagnose_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/commands/diagnose/remainder_output.h"
+#include "analysis/commands/shared/effect_output.h"
+#include "analysis/identification/verdict.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::Diagnosis;
+using identification::Missing;
+
+constexpr const char* kDetectableMeaning =
+    "the smallest size that these flights show in 90 % of injections (open loop: column times size is added "
+    "to the "
+    "residual of resampled blocks; the flight does not react); null: not at any size within the physical "
+    "bounds; "
+    "nothing_missing means none above these sizes, and nothing left above three times the noise floor";
+
+files::Json json_of(const identification::InstrumentedValue& value) {
+  return {{"least_squares", value.least_squares},
+          {"instrument", value.instrument},
+          {"interval_90", {value.interval.first, value.interval.second}},
+          {"difference_z", value.difference_z},
+          {"verdict", !value.is_strong()    ? "too_weak"
+                      : value.contradicts() ? "contradicts"
+                                            : "agrees"}};
+}
+
+files::Json json_of(const Missing& missing) {
+  const identification::Finding& finding = missing.finding;
+  files::Json model_form = files::Json::object(), instrument = files::Json::object();
+  for (std::size_t c = 0; c < missing.coefficients.size(); ++c) {
+    if (c < finding.model_form.size())
+      model_form[missing.coefficients[c]] = {finding.model_form[c].first, finding.model_form[c].second};
+    if (c < missing.instrument.size()) instrument[missing.coefficients[c]] = json_of(missing.instrument[c]);
+  }
+  files::Json rivals = files::Json::array();
+  for (const identification::Rival& rival : finding.rivals)
+    rivals.push_back({{"effect", rival.effect}, {"fly", rival.excitation}});
+  return {{"effect", missing.effect},
+          {"kind", missing.kind},
+          {"rmse_before", finding.rmse_before_N},
+          {"rmse_after", finding.rmse_after_N},
+          {"drop", 1 - finding.rmse_after_N / finding.rmse_before_N},
+          {"drop_ci", {finding.drop_interval.first, finding.drop_interval.second}},
+          {"parameters", values_json(missing.parameters, missing.intervals)},
+          {"per_vehicle", !missing.specs.empty() && !missing.specs[0].vehicle.empty()},
+          {"model_form", std::move(model_form)},
+          {"instrument", std::move(instrument)},
+          {"class", missing.equivalence_class},
+          {"confounded_with", finding.confounded_with()},
+          {"rivals", std::move(rivals)},
+          {"separated_by", missing.excitation},
+          {"paired_z", finding.paired_z},
+          {"wald_z", finding.wald_z},
+          {"records_in_support", finding.support.records},
+          {"blocks_in_support", finding.support.blocks},
+          {"flights_in_support", finding.support.flights}};
+}
+
+void print(const Missing& missing, int flights) {
+  const identification::Finding& finding = missing.finding;
+  fmt::print("  {:<15} RMSE {:.5f} -> {:.5f} N ({:.1f} %, 90 %: {:.1f} .. {:.1f})\n", missing.effect,
+             finding.rmse_before_N, finding.rmse_after_N,
+             100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.first,
+             100 * finding.drop_interval.second);
+  print_values("    ", missing.parameters, missing.intervals);
+  for (std::size_t c = 0; c < missing.instrument.size(); ++c) {
+    const identification::InstrumentedValue& value = missing.instrument[c];
+    if (!value.is_strong()) continue;
+    fmt::print("    by instrument (set points) {} = {:.4g}, 90 % {:.4g} .. {:.4g}\n", missing.coefficients[c],
+               value.instrument, value.interval.first, value.interval.second);
+  }
+  if (flights > 1 && finding.support.flights == 1) fmt::print("    seen in 1 flight of {}\n", flights);
+  if (missing.equivalence_class != missing.effect)
+    fmt::print("    flights cannot tell apart: {}\n", missing.equivalence_class);
+  for (const identification::Rival& rival : finding.rivals)
+    fmt::print("    these flights cannot tell it from {}; what would: {}; {}\n", rival.effect,
+               missing.excitation, rival.excitation);
+}
+
+files::Json json_of(const Diagnosis& diagnosis) {
+  files::Json kind = {{"kind", diagnosis.kind},
+                      {"records", diagnosis.records},
+                      {"blocks", diagnosis.blocks},
+                      {"flights", diagnosis.flights},
+                      {"rmse_before", diagnosis.rmse_before_N},
+                      {"rmse_after", diagnosis.rmse_after_N},
+                      {"too_poor", diagnosis.too_poor},
+                      {"closed_loop_artefacts", diagnosis.contradicted},
+                      {"suspected", diagnosis.suspected}};
+  if (diagnosis.thrust_scale.is_known) {
+    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
+    kind["thrust_scale"] = {{"least_squares", 1 + scale.least_squares},
+                            {"instrument", 1 + scale.instrument},
+                            {"interval_90", {1 + scale.interval.first, 1 + scale.interval.second}},
+                            {"difference_z", scale.difference_z}};
+  }
+  return kind;
+}
+
+files::Json json_of(const identification::Detectable& entry, const std::string& kind) {
+  return {{"effect", entry.effect},
+          {"kind", kind},
+          {"parameter", entry.parameter},
+          {"size", std::isfinite(entry.size) ? files::Json(entry.size) : files::Json(nullptr)},
+          {"shape", entry.shape},
+          {"excitation", entry.excitation}};
+}
+
+}  // namespace
+
+void print_diagnosis(const Diagnosis& diagnosis) {
+  fmt::print("Vehicles of kind {}: {} records, {} blocks of 2 s.\n", diagnosis.kind, diagnosis.records,
+             diagnosis.blocks);
+  if (!diagnosis.too_poor.empty()) {
+    fmt::print("  No answer: {}.\n", diagnosis.too_poor);
+    return;
+  }
+  if (diagnosis.ranking.empty()) {
+    fmt::print("  {}\n", diagnosis.remainder.flag
+                             ? "No effect of the library explains what is left."
+                             : "No effect of the library is missing above the sizes below.");
+  }
+  for (const Missing& missing : diagnosis.ranking) print(missing, diagnosis.flights);
+  for (const std::string& effect : diagnosis.contradicted) {
+    fmt::print(
+        "  Not counted: {} fits, but not along the set points: the controller's answer to something else\n",
+        effect);
+  }
+  for (const std::string& effect : diagnosis.suspected)
+    fmt::print(
+        "  Not counted: {} fits, but explains little beside what is left, or set points do not confirm it\n",
+        effect);
+  if (diagnosis.thrust_scale.is_known) {
+    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
+    fmt::print("  Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f})\n",
+               1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.first,
+               1 + scale.interval.second);
+  }
+  const identification::Remainder& rest = diagnosis.remainder;
+  fmt::print("  Left: {:.5f} N; low frequencies {:.1f} times the noise floor{}", diagnosis.rmse_after_N,
+             rest.ratio, rest.flag ? ": not everything is explained" : "");
+  for (std::size_t i = 0; i < rest.depends_on.size(); ++i)
+    fmt::print("{}{}", i == 0 ? ", depends on " : ", ", rest.depends_on[i]);
+  fmt::print("\n");
+  print_remainder(diagnosis);
+  fmt::print("  Shown in 9 of 10 injections (open loop), if at least as large as:\n");
+  for (const identification::Detectable& entry : diagnosis.detectable) {
+    if (std::isfinite(entry.size))
+      fmt::print("    {} {} = {:.3g}\n", entry.effect, entry.parameter, entry.size);
+    else
+      fmt::print("    {} {}: not at any size; fly {}\n", entry.effect, entry.parameter, entry.excitation);
+  }
+}
+
+void add_diagnoses(const std::vector<Diagnosis>& diagnoses, files::Json& result) {
+  files::Json ranking = files::Json::array(), detectable = files::Json::array(), kinds = files::Json::array();
+  files::Json depends_on = files::Json::array(), left = files::Json::array();
+  bool flag = false;
+  double ratio = 0;
+  std::vector<std::string> problems;
+  for (const Diagnosis& diagnosis : diagnoses) {
+    for (const std::string& problem : diagnosis.problems)
+      if (std::find(problems.begin(), problems.end(), problem) == problems.end()) problems.push_back(problem);
+    for (const Missing& missing : diagnosis.ranking) ranking.push_back(json_of(missing));
+    for (const identification::Detectable& entry : diagnosis.detectable)
+      detectable.push_back(json_of(entry, diagnosis.kind));
+    const identification::Remainder& rest = diagnosis.remainder;
+    flag = flag || rest.flag;
+    ratio = std::max(ratio, rest.ratio);
+    for (const std::string& variable : rest.depends_on) depends_on.push_back(variable);
+    for (files::Json& entry : remainder_json(diagnosis)) left.push_back(std::move(entry));
+    kinds.push_back(json_of(diagnosis));
+  }
+  std::string reason;
+  result["verdict"] = name(identification::verdict_of(diagnoses, reason));
+  result["ranking"] = std::move(ranking);
+  result["unexplained"] = {{"flag", flag}, {"ratio", ratio}, {"depends_on", std::move(depends_on)}};
+  result["remainder"] = std::move(left);
+  result["detectable"] = std::move(detectable);
+  result["detectable_meaning"] = kDetectableMeaning;
+  result["kinds"] = std::move(kinds);
+  result["problems"] = problems;
+  if (!reason.empty()) result["reason"] = reason;
+}
+
+}  // namespace swarmcert::analysis

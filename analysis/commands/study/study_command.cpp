@@ -1,0 +1,108 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "analysis/cli/command_line.h"
+#include "analysis/cli/progress.h"
+#include "analysis/commands/commands.h"
+#include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/study/study_output.h"
+#include "analysis/commands/study/study_report.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+struct StudyOptions {
+  FlightOptions flights;
+  std::vector<std::string> select, test;
+  std::string output, unit = "N";
+};
+
+bool names(const residuals::FoundFlights& found, const residuals::FlightFiles& flight) {
+  return std::any_of(found.flights.begin(), found.flights.end(),
+                     [&](const residuals::FlightFiles& other) { return other.logs == flight.logs; });
+}
+
+/// What --select and --test name; every other flight is for the fit. Empty where neither is given.
+std::optional<identification::Split> split_of(const StudyOptions& options, const residuals::Inputs& inputs) {
+  if (options.select.empty() && options.test.empty()) return std::nullopt;
+  if (options.select.empty() || options.test.empty())
+    throw UsageError("--select and --test go together: name the flights of both");
+  const residuals::FoundFlights select = residuals::find_flights(options.select),
+                                test = residuals::find_flights(options.test);
+  identification::Split split;
+  for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
+    const residuals::FlightFiles& flight = inputs.found.flights[i];
+    const bool is_select = names(select, flight), is_test = names(test, flight);
+    if (is_select && is_test) throw UsageError("--select and --test both name the flight " + flight.name);
+    (is_test ? split.test : is_select ? split.select : split.fit).push_back(static_cast<int>(i));
+  }
+  if (split.fit.empty()) throw UsageError("--select and --test name every flight: none is left for the fit");
+  return split;
+}
+
+int run_study(const StudyOptions& options, const CommonOptions& common) {
+  namespace fs = std::filesystem;
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.output);
+  FlightOptions words = options.flights;
+  words.words.insert(words.words.end(), options.select.begin(), options.select.end());
+  words.words.insert(words.words.end(), options.test.begin(), options.test.end());
+  const residuals::Inputs inputs = read_flights(words);
+  if (inputs.models.size() != 1)
+    throw UsageError("study takes one MODEL; study each kind of vehicle by itself");
+  Progress progress(common.quiet);
+  const identification::Study study = identification::study(
+      inputs, split_of(options, inputs), common.jobs,
+      [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
+  files::Json result = result_head("study", inputs.files());
+  add_study(study, inputs, result);
+  const ForceUnit unit = force_unit(options.unit, inputs.models[0]);
+  fs::create_directories(options.output);
+  const std::string page = write_study_report(study, unit, result, options.output, true);
+  if (study.ladder.any_accepted)
+    files::write_file(
+        (fs::path(options.output) / "fitted.toml").string(),
+        stability::to_toml(study.ladder.model, {"Effects fitted to flights by swarmcert study."}), true);
+  files::write_file((fs::path(options.output) / "study.json").string(), files::to_text(result), true);
+  write_result(common, result);
+  if (common.prints_text()) {
+    print_study(study, unit);
+    fmt::print("Page: {}\n", page);
+  }
+  if (study.ladder.too_poor.empty()) return kDone;
+  fmt::print(stderr, "inconclusive: {}; 'swarmcert compare' says what was cut\n", study.ladder.too_poor);
+  return kInconclusive;
+}
+
+}  // namespace
+
+Command study_command() {
+  return {"study", "Find out what a model lacks, add it, and show the error fall, on one page",
+          "Compares MODEL with FLIGHTS, finds where it fails and which physical effects are missing, adds "
+          "them, and\n"
+          "compares again, on flights that nothing was fitted to as well. Writes DIR/study.html, "
+          "DIR/study.json,\n"
+          "DIR/fitted.toml (if an effect was added) and the data of every plot.\n\n"
+          "Example: swarmcert study stability/models/crazyflie-small.toml flights/ -o study",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<StudyOptions>();
+            declare_flights(app, options->flights, true);
+            app.add_option("--select", options->select, "Flights that only decide which effects are accepted")
+                ->allow_extra_args(false);
+            app.add_option("--test", options->test, "Flights that only test, and decide nothing")
+                ->allow_extra_args(false);
+            app.add_option("--unit", options->unit, "Unit of forces on the page: N (shown in mN), gf or m_s2")
+                ->check(CLI::IsMember({"N", "gf", "m_s2"}))
+                ->capture_default_str();
+            add_output(app, "-o,--output", options->output, "Folder for page, result and fitted model")
+                ->required();
+            return [options](const CommonOptions& common) { return run_study(*options, common); };
+          }};
+}
+
+}  // namespace swarmcert::analysis

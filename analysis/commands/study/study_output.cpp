@@ -1,0 +1,113 @@
+#include "analysis/commands/study/study_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/commands/add/add_output.h"
+#include "analysis/commands/diagnose/diagnose_output.h"
+#include "analysis/commands/shared/flight_options.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::Study;
+using identification::StudyErrors;
+
+files::Json json_of(const residuals::GroupErrors& errors) {
+  const residuals::ErrorStatistics& s = errors.statistics;
+  return {{"records", s.samples},
+          {"rmse", json_of(s.rmse)},
+          {"bias", json_of(s.bias)},
+          {"p95", json_of(s.p95)},
+          {"max", json_of(s.max)}};
+}
+
+files::Json json_of(const StudyErrors& errors) {
+  return {{"all", json_of(errors.all.overall)}, {"test", json_of(errors.test.overall)}};
+}
+
+std::vector<std::string> accepted_effects(const Study& study) {
+  std::vector<std::string> names;
+  for (const stability::LadderRow& row : study.ladder.rows)
+    if (row.accepted && row.effect != "nominal") names.push_back(row.effect);
+  return names;
+}
+
+/// "a", "a and b", "a, b and c"
+std::string listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == words.size() ? " and " : ", ") + words[i];
+  return text;
+}
+
+double vertical_N(const residuals::Comparison& comparison) { return comparison.overall.statistics.rmse.z; }
+
+}  // namespace
+
+ForceUnit force_unit(const std::string& name, const stability::Model& model) {
+  if (name == "gf") return {"gf", 1 / stability::kGramForce_N};
+  if (name == "m_s2") return {"m/s^2", 1 / model.mass_kg};
+  return {"mN", 1000};
+}
+
+std::string headline(const Study& study, const ForceUnit& unit) {
+  const auto shown = [&unit](double newton) { return fmt::format("{:.3g}", newton * unit.per_newton); };
+  const std::vector<std::string> added = accepted_effects(study);
+  const std::string left =
+      study.diagnosis.remainder.flag ? "part of the error remains unexplained" : "nothing else stands out";
+  if (!study.ladder.too_poor.empty())
+    return fmt::format("Vertical error {} {}; no effect can be fitted: {}.",
+                       shown(vertical_N(study.before.all)), unit.name, study.ladder.too_poor);
+  if (added.empty())
+    return fmt::format("Vertical error {} {}, on test flights {} {}; no effect lowers it, and {}.",
+                       shown(vertical_N(study.before.all)), unit.name, shown(vertical_N(study.before.test)),
+                       unit.name, left);
+  return fmt::format("Vertical error on test flights {} {}, after adding {} {} {}; {}.",
+                     shown(vertical_N(study.before.test)), unit.name, listed(added),
+                     shown(vertical_N(study.after.test)), unit.name, left);
+}
+
+std::vector<std::string> next_flights(const Study& study) {
+  std::vector<std::string> next;
+  const auto add = [&next](const std::string& flight) {
+    if (!flight.empty() && std::find(next.begin(), next.end(), flight) == next.end()) next.push_back(flight);
+  };
+  for (const identification::Missing& missing : study.diagnosis.ranking) {
+    for (const identification::Rival& rival : missing.finding.rivals)
+      add(fmt::format("to separate {} from {}: {}; {}", missing.effect, rival.effect, missing.excitation,
+                      rival.excitation));
+  }
+  for (const identification::Detectable& entry : study.diagnosis.detectable) {
+    if (!std::isfinite(entry.size)) add(fmt::format("to see {} at all: {}", entry.effect, entry.excitation));
+  }
+  return next;
+}
+
+void add_study(const Study& study, const residuals::Inputs& inputs, files::Json& result) {
+  result["before"] = json_of(study.before);
+  result["after"] = json_of(study.after);
+  add_ladder(study.ladder, inputs, result);
+  add_diagnoses({study.diagnosis}, result);
+  files::Json next = files::Json::array();
+  for (const std::string& flight : next_flights(study)) next.push_back(flight);
+  result["next"] = std::move(next);
+}
+
+void print_study(const Study& study, const ForceUnit& unit) {
+  fmt::print("{}\n", headline(study, unit));
+  constexpr std::size_t kMostRows = 6, kMostNext = 2;
+  std::size_t rows = 0;
+  for (const stability::LadderRow& row : study.ladder.rows) {
+    if (!row.accepted || ++rows > kMostRows) continue;
+    fmt::print("  {:<24} fit {:>8.3g}  select {:>8.3g}  test {:>8.3g} {}\n",
+               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N * unit.per_newton,
+               row.select_rmse_N * unit.per_newton, row.test_rmse_N * unit.per_newton, unit.name);
+  }
+  const std::vector<std::string> next = next_flights(study);
+  for (std::size_t i = 0; i < next.size() && i < kMostNext; ++i) fmt::print("  fly {}\n", next[i]);
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,64 @@
+#include "analysis/identification/study/study.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace swarmcert::identification {
+namespace {
+
+residuals::Inputs with_flights(const residuals::Inputs& inputs, const std::vector<int>& which) {
+  residuals::Inputs chosen = inputs;
+  chosen.found.flights.clear();
+  for (const int i : which) chosen.found.flights.push_back(inputs.found.flights[static_cast<std::size_t>(i)]);
+  return chosen;
+}
+
+residuals::Inputs with_model(const residuals::Inputs& inputs, const stability::Model& model) {
+  residuals::Inputs changed = inputs;
+  changed.models[0] = model;
+  return changed;
+}
+
+StudyErrors errors_of(const residuals::Inputs& inputs, const Split& split, int jobs) {
+  const auto silent = [](int, int) {};
+  return {residuals::compare(inputs, jobs, silent),
+          residuals::compare(with_flights(inputs, split.test), jobs, silent)};
+}
+
+std::vector<int> not_for_test(const residuals::Inputs& inputs, const Split& split) {
+  std::vector<int> which;
+  for (const int i : every_flight(inputs)) {
+    const bool is_test = std::find(split.test.begin(), split.test.end(), i) != split.test.end();
+    if (!is_test || !split.by_flight) which.push_back(i);
+  }
+  return which;
+}
+
+}  // namespace
+
+Study study(const residuals::Inputs& inputs, const std::optional<Split>& split, int jobs,
+            const StudyProgress& progress) {
+  if (inputs.models.size() != 1) throw std::invalid_argument("study: exactly one model is studied");
+  constexpr int kSteps = 5;
+  const auto silent = [](int, int) {};
+  const Split chosen = split ? *split : split_flights(inputs);
+  const std::string& kind = inputs.models[0].kind;
+  Study result;
+  progress(0, kSteps, "errors of the given model");
+  result.before = errors_of(inputs, chosen, jobs);
+  progress(1, kSteps, "missing effects");
+  result.diagnosis = diagnose(inputs, kind, not_for_test(inputs, chosen), jobs, silent);
+  progress(2, kSteps, "adding effects");
+  LadderOptions options;
+  options.split = chosen;
+  result.ladder = climb(inputs, options, jobs, silent);
+  const stability::Model& fitted = result.ladder.any_accepted ? result.ladder.model : inputs.models[0];
+  progress(3, kSteps, "errors of the fitted model");
+  result.after = errors_of(with_model(inputs, fitted), chosen, jobs);
+  progress(4, kSteps, "pictures");
+  result.pictures = picture_data(inputs, inputs.models[0], fitted);
+  progress(kSteps, kSteps, "done");
+  return result;
+}
+
+}  // namespace swarmcert::identification
