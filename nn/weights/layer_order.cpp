@@ -16,13 +16,13 @@ constexpr std::size_t kMostSearched = 256;   ///< layers whose orders are enumer
 constexpr std::size_t kMostSteps = 100'000;  ///< of that search: beyond, the order counts as undecided
 constexpr std::size_t kMostShown = 3;
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_decimal(char c) { return c >= '0' && c <= '9'; }
 
 /// The number at `at` without leading zeros, which is passed over.
 std::string number_at(const std::string& text, std::size_t& at) {
   while (at < text.size() && text[at] == '0') ++at;
   const std::size_t first = at;
-  while (at < text.size() && is_digit(text[at])) ++at;
+  while (at < text.size() && is_decimal(text[at])) ++at;
   return text.substr(first, at - first);
 }
 
@@ -34,7 +34,7 @@ struct Comparison {
 Comparison compare(const std::string& a, const std::string& b) {
   std::size_t i = 0, j = 0;
   while (i < a.size() && j < b.size()) {
-    if (!is_digit(a[i]) || !is_digit(b[j])) {
+    if (!is_decimal(a[i]) || !is_decimal(b[j])) {
       if (a[i] != b[j]) return {a[i] < b[j] ? -1 : 1, false};
       ++i, ++j;
       continue;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::string_view kMagic("\x93NUMPY", 6);
 constexpr std::size_t kLongestHeader_bytes = 65'536;
-constexpr std::size_t kMostDimensions = 8;
+constexpr std::size_t kMostArrayDimensions = 8;
 
 /// Reads the header, a Python literal: {'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }.
 /// https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
@@ -106,7 +106,7 @@ class NpyHeader {
       if (error != std::errc()) refuse("shape", "", "is not a list of sizes");
       at_ = static_cast<std::size_t>(next - text_.data());
       shape.push_back(size);
-      if (shape.size() > kMostDimensions) refuse("shape", "", "has more than 8 dimensions");
+      if (shape.size() > kMostArrayDimensions) refuse("shape", "", "has more than 8 dimensions");
       if (!take(',')) {
         expect(')');
         break;

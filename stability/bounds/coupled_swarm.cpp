@@ -11,7 +11,7 @@
 namespace swarmcert::stability {
 namespace {
 
-std::string text_of(double value) {
+std::string number_text(double value) {
   std::ostringstream text;
   text << value;
   return text.str();
@@ -30,7 +30,7 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
   top.allow_only({"schema", "vehicles", "coupling"});
   const double vehicles = top.number("vehicles");
   if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {
-    top.refuse("vehicles", text_of(vehicles), "must be a whole number from 1 to 200");
+    top.refuse("vehicles", number_text(vehicles), "must be a whole number from 1 to 200");
   }
   CoupledSwarm swarm;
   swarm.vehicles = static_cast<int>(vehicles);
@@ -40,13 +40,13 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
     const auto vehicle = [&](const char* key) {
       const double value = table.number(key);
       if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
-        table.refuse(key, text_of(value), "must be a vehicle from 0 to " + text_of(vehicles - 1));
+        table.refuse(key, number_text(value), "must be a vehicle from 0 to " + number_text(vehicles - 1));
       }
       return static_cast<int>(value);
     };
     const auto number = [&](const char* key) {
       const double value = table.has(key) ? table.number(key) : 0;
-      if (value < 0) table.refuse(key, text_of(value), "must not be negative");
+      if (value < 0) table.refuse(key, number_text(value), "must not be negative");
       return value;
     };
     Coupling c{vehicle("on"),           vehicle("by"),

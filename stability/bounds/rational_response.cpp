@@ -18,8 +18,8 @@ using Eigen::VectorXd;
 /// exp(-kGone): modes that have decayed this far are not looked at any more.
 constexpr double kGone = 60;
 /// Longest stretch, in radians of the fastest mode that is left.
-constexpr double kStretch = 0.25;
-constexpr int kTaylorTerms = 20;
+constexpr double kResponseStretch = 0.25;
+constexpr int kResponseTaylorTerms = 20;
 
 /// In time units of 1/rate, rate being the largest modulus of a pole, so that all entries are of moderate size.
 class Chain {
@@ -106,7 +106,7 @@ class Chain {
     companion *= std::ldexp(duration, -kHalvings);
     MatrixXd result = MatrixXd::Identity(n, n);
     MatrixXd term = result;
-    for (int k = 1; k < kTaylorTerms + 6; ++k) {
+    for (int k = 1; k < kResponseTaylorTerms + 6; ++k) {
       term = term * companion / k;
       result += term;
     }
@@ -133,7 +133,7 @@ class Scan {
     for (const std::complex<double>& pole : chain_.sorted_poles()) {
       slowest = std::min(slowest, -pole.real() / chain_.rate());
     }
-    ladder_.push_back(chain_.propagator(kStretch));
+    ladder_.push_back(chain_.propagator(kResponseStretch));
     VectorXd x = chain_.initial();
     double t = 0;
     long events_before_alone = -1;
@@ -143,11 +143,12 @@ class Scan {
         if (zeros_.least_events() > events_before_alone + 3) return zeros_.finish_oscillation(0, ratio);
       }
       std::size_t level = 0;
-      while (std::ldexp(kStretch, static_cast<int>(level) + 1) * active_rate(t) <= kStretch && level < 40)
+      while (std::ldexp(kResponseStretch, static_cast<int>(level) + 1) * active_rate(t) <= kResponseStretch &&
+             level < 40)
         ++level;
       while (ladder_.size() <= level) ladder_.push_back(ladder_.back() * ladder_.back());
       x = stretch(x, level);
-      t += std::ldexp(kStretch, static_cast<int>(level));
+      t += std::ldexp(kResponseStretch, static_cast<int>(level));
     }
     return zeros_.finish(0);
   }
@@ -198,13 +199,13 @@ class Scan {
     chain_.first_four(end, at_end);
     if (!ZeroScan::has_event(at_start, at_end)) return end;
     if (level > 0) return stretch(stretch(x, level - 1), level - 1);
-    zeros_.add(chain_.taylor(x, kTaylorTerms), kStretch, chain_.integral(x));
+    zeros_.add(chain_.taylor(x, kResponseTaylorTerms), kResponseStretch, chain_.integral(x));
     return end;
   }
 
   const Chain& chain_;
   ZeroScan zeros_;
-  std::vector<MatrixXd> ladder_;  ///< exp(companion kStretch 2^i)
+  std::vector<MatrixXd> ladder_;  ///< exp(companion kResponseStretch 2^i)
 };
 
 }  // namespace

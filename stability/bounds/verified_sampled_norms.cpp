@@ -15,7 +15,7 @@ using Eigen::Index;
 
 /// Sums and products of a few positive doubles, computed to nearest, are below their exact value by less than this.
 constexpr double kOver = 1 + 1e-14;
-constexpr int kPhases = 4;
+constexpr int kVerifiedPhases = 4;
 constexpr long kMostPeriods = 1'500'000;
 
 /// A linear function of the row: `mid` in doubles, and how far the exact value may be from its double sum, per length
@@ -359,8 +359,8 @@ std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& lo
   };
   const Interval at_rest = integrates ? Interval(0) : Interval(1) / Interval(loop.plant.Kp);
   VerifiedSampledNorms result;
-  for (int i = 0; i < kPhases; ++i) {
-    const double phase_s = loop.period_s * i / kPhases;
+  for (int i = 0; i < kVerifiedPhases; ++i) {
+    const double phase_s = loop.period_s * i / kVerifiedPhases;
     const VerifiedNorms here = output(model.error_at(phase_s), phase_s, at_rest);
     if (i == 0) result.at_samples = result.all_times = here;
     for (const auto gain : kSampledGains) {
@@ -382,7 +382,7 @@ std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& lo
     bend.rate = bend.rate + Interval(static_cast<double>(model.past() + 2)) * Interval(loop.period_s);
   }
   bend.edge = bend.amplitude;  // a force of variation 1 from rest stays below 1
-  const double step_s = up(loop.period_s / kPhases * (1 + 1e-15));
+  const double step_s = up(loop.period_s / kVerifiedPhases * (1 + 1e-15));
   for (const auto gain : kSampledGains) {
     Interval& all = result.all_times.*gain;
     if (std::isfinite(all.hi))

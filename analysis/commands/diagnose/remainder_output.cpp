@@ -12,7 +12,7 @@ using identification::CurvePoint;
 using identification::Diagnosis;
 using identification::ScanEntry;
 
-constexpr std::size_t kShown = 4;
+constexpr std::size_t kShownCurves = 4;
 
 std::string verdict_of(const ScanEntry& entry) {
   if (!entry.is_checked) return "not_applicable";
@@ -118,7 +118,7 @@ void print_remainder(const Diagnosis& diagnosis) {
   const std::vector<ScanEntry>& entries = diagnosis.scan.entries;
   if (entries.empty()) return;
   fmt::print("  What is left varies with:\n");
-  for (std::size_t i = 0; i < std::min(entries.size(), kShown); ++i) {
+  for (std::size_t i = 0; i < std::min(entries.size(), kShownCurves); ++i) {
     const ScanEntry& entry = entries[i];
     fmt::print("    force {:<28} {:.0f} % of it (90 %: {:.0f} .. {:.0f}), RMSE {:.5f} -> {:.5f} N\n",
                place_of(entry), 100 * entry.share, 100 * entry.share_interval.first,
@@ -148,7 +148,7 @@ void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t numbe
   report.table({"force", "share of what is left, 90 %", "RMSE [N]", "set points"}, rows);
   std::size_t shown = 0;
   for (const ScanEntry& entry : entries) {
-    if (shown == kShown) break;
+    if (shown == kShownCurves) break;
     if (entry.curve.size() < 2) continue;
     ++shown;
     add_curve(report, entry, fmt::format("remainder_{}_{}", number, shown));

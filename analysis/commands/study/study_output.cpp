@@ -15,7 +15,7 @@ namespace {
 using identification::Study;
 using identification::StudyErrors;
 
-files::Json json_of(const residuals::GroupErrors& errors) {
+files::Json group_json(const residuals::GroupErrors& errors) {
   const residuals::ErrorStatistics& s = errors.statistics;
   return {{"records", s.samples},
           {"rmse", json_of(s.rmse)},
@@ -25,7 +25,7 @@ files::Json json_of(const residuals::GroupErrors& errors) {
 }
 
 files::Json json_of(const StudyErrors& errors) {
-  return {{"all", json_of(errors.all.overall)}, {"test", json_of(errors.test.overall)}};
+  return {{"all", group_json(errors.all.overall)}, {"test", group_json(errors.test.overall)}};
 }
 
 std::vector<std::string> accepted_effects(const Study& study) {
@@ -36,7 +36,7 @@ std::vector<std::string> accepted_effects(const Study& study) {
 }
 
 /// "a", "a and b", "a, b and c"
-std::string listed(const std::vector<std::string>& words) {
+std::string in_words(const std::vector<std::string>& words) {
   std::string text;
   for (std::size_t i = 0; i < words.size(); ++i)
     text += (i == 0 ? "" : i + 1 == words.size() ? " and " : ", ") + words[i];
@@ -66,7 +66,7 @@ std::string headline(const Study& study, const ForceUnit& unit) {
                        shown(vertical_N(study.before.all)), unit.name, shown(vertical_N(study.before.test)),
                        unit.name, left);
   return fmt::format("Vertical error on test flights {} {}, after adding {} {} {}; {}.",
-                     shown(vertical_N(study.before.test)), unit.name, listed(added),
+                     shown(vertical_N(study.before.test)), unit.name, in_words(added),
                      shown(vertical_N(study.after.test)), unit.name, left);
 }
 

@@ -22,7 +22,7 @@ constexpr const char* kLetters[] = {"{a}", "{b}", "{c}"};
 constexpr V kFactors[] = {V::kThrust, V::kX, V::kY, V::kZ, V::kVx, V::kVy, V::kVz, V::kSpeed};
 
 /// One form with one factor, fitted.
-struct Trial {
+struct FormulaTrial {
   Form form;
   FormFit fit;
   V factor = V::kCount;  ///< kCount: none
@@ -86,7 +86,7 @@ Eigen::VectorXd factor_of(const ScanSamples& samples, const std::vector<Eigen::I
 
 /// How many of the samples are worth one each: n (1 - rho) / (1 + rho), rho the correlation of what `trial` leaves from
 /// one sample to the next.
-double independent_samples(const EntryData& data, const Trial& trial) {
+double independent_samples(const EntryData& data, const FormulaTrial& trial) {
   double last = 0, products = 0, squares = 0;
   for (Eigen::Index i = 0; i < data.all.force_N.size(); ++i) {
     const double inputs[2] = {data.all.inputs(i, 0), data.all.inputs.cols() > 1 ? data.all.inputs(i, 1) : 0};
@@ -100,13 +100,13 @@ double independent_samples(const EntryData& data, const Trial& trial) {
   return std::max(static_cast<double>(data.all.force_N.size()) * (1 - rho) / (1 + rho), 4.0);
 }
 
-int numbers_of(const Trial& trial) {
+int numbers_of(const FormulaTrial& trial) {
   int count = static_cast<int>(trial.form.texts.size()) + (trial.factor == V::kCount ? 0 : 1);
   for (const FormParameter& parameter : trial.form.shape) count += parameter.lower < parameter.upper ? 1 : 0;
   return count;
 }
 
-double saved_bits(const EntryData& data, const Trial& trial, double independent) {
+double saved_bits(const EntryData& data, const FormulaTrial& trial, double independent) {
   const double left = std::max(trial.fit.mean_square, 1e-300);
   return 0.5 * independent * std::log2(data.mean_square / left) -
          0.5 * numbers_of(trial) * std::log2(independent);
@@ -138,28 +138,29 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
 }
 
 /// The best form of an entry, with or without a factor.
-Trial best_trial(const ScanSamples& samples, const ScanEntry& entry, EntryData& data) {
+FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, EntryData& data) {
   constexpr double kSurely_bits = 10;  // a factor must be worth it
-  std::vector<Trial> trials;
+  std::vector<FormulaTrial> trials;
   for (Form& form : forms_of(entry, data)) {
     FormFit fit = fit_form(form, data.few);
     if (std::isfinite(fit.mean_square)) trials.push_back({std::move(form), std::move(fit)});
   }
-  const auto least = std::min_element(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) {
-    return a.fit.mean_square < b.fit.mean_square;
-  });
+  const auto least = std::min_element(
+      trials.begin(), trials.end(),
+      [](const FormulaTrial& a, const FormulaTrial& b) { return a.fit.mean_square < b.fit.mean_square; });
   if (least == trials.end()) return {};
   const double independent = independent_samples(data, *least);
-  for (Trial& trial : trials) trial.saved_bits = saved_bits(data, trial, independent);
+  for (FormulaTrial& trial : trials) trial.saved_bits = saved_bits(data, trial, independent);
   std::stable_sort(trials.begin(), trials.end(),
-                   [](const Trial& a, const Trial& b) { return a.saved_bits > b.saved_bits; });
-  Trial best = trials[0];
+                   [](const FormulaTrial& a, const FormulaTrial& b) { return a.saved_bits > b.saved_bits; });
+  FormulaTrial best = trials[0];
   for (std::size_t t = 0; t < std::min<std::size_t>(2, trials.size()); ++t) {
     for (const V factor : kFactors) {
       if (std::find(entry.variables.begin(), entry.variables.end(), factor) != entry.variables.end())
         continue;
       data.few.factor = factor_of(samples, data.thin, factor);
-      Trial product = {trials[t].form, fit_form(trials[t].form, data.few, trials[t].fit.theta), factor};
+      FormulaTrial product = {trials[t].form, fit_form(trials[t].form, data.few, trials[t].fit.theta),
+                              factor};
       product.saved_bits = saved_bits(data, product, independent);
       if (product.saved_bits > std::max(best.saved_bits, trials[0].saved_bits + kSurely_bits))
         best = std::move(product);
@@ -190,7 +191,7 @@ const char* target_of(const ScanEntry& entry) {
   return kTargets[entry.column];
 }
 
-void add_shapes(const Trial& trial, const std::string& unit, stability::EffectSpec& spec,
+void add_shapes(const FormulaTrial& trial, const std::string& unit, stability::EffectSpec& spec,
                 std::vector<std::string>& texts) {
   for (std::size_t k = 0; k < trial.form.shape.size(); ++k) {
     const FormParameter& parameter = trial.form.shape[k];
@@ -208,7 +209,7 @@ void add_shapes(const Trial& trial, const std::string& unit, stability::EffectSp
   }
 }
 
-stability::EffectSpec spec_of(const ScanEntry& entry, const Trial& trial) {
+stability::EffectSpec spec_of(const ScanEntry& entry, const FormulaTrial& trial) {
   stability::EffectSpec spec;
   const std::string unit = scan_variable(entry.variables[0]).unit;
   std::vector<std::string> texts = trial.form.texts;
@@ -269,7 +270,7 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
     const std::size_t e = which[static_cast<std::size_t>(i)];
     const ScanEntry& entry = scan.entries[e];
     EntryData data = data_of(samples, entry);
-    const Trial trial = best_trial(samples, entry, data);
+    const FormulaTrial trial = best_trial(samples, entry, data);
     Formula& formula = formulas[static_cast<std::size_t>(i)];
     formula.entry = e;
     formula.variable = entry.variable;

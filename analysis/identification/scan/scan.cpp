@@ -14,9 +14,9 @@ namespace {
 
 using V = ScanVariable;
 
-constexpr double kQuantile90 = 1.6449;  // two-sided 90 % of the normal distribution
-constexpr double kLeastShare = 0.02;    // smaller ones are of no use, accident or not
-constexpr int kFlips = 20;              // draws of the chunks' signs
+constexpr double kScanQuantile90 = 1.6449;  // two-sided 90 % of the normal distribution
+constexpr double kLeastShare = 0.02;        // smaller ones are of no use, accident or not
+constexpr int kFlips = 20;                  // draws of the chunks' signs
 constexpr Eigen::Index kManySamples = 40'000;
 constexpr const char* kAxes[] = {"x", "y", "z"};
 
@@ -268,9 +268,9 @@ InstrumentedValue slope_of(const Judged& judged, int column, const Columns& curv
   }
   slope.instrument = qr.sum() / information;
   const Eigen::VectorXd influence = (qr - slope.instrument * qp) / information;
-  const double half = kQuantile90 * influence.norm();
+  const double half = kScanQuantile90 * influence.norm();
   slope.interval = {slope.instrument - half, slope.instrument + half};
-  slope.difference_z = half > 0 ? (slope.instrument - 1) * kQuantile90 / half : 0;
+  slope.difference_z = half > 0 ? (slope.instrument - 1) * kScanQuantile90 / half : 0;
   return slope;
 }
 
@@ -302,7 +302,7 @@ void set_curve(const CurveFit& fit, const Curve& curve, int component, ScanEntry
       const double gap = c(k, component) + c(c.rows() - 1, component) - point.force_N;
       squares += gap * gap;
     }
-    const double half = kQuantile90 * std::sqrt(squares * (Chunks::kFolds - 1) / Chunks::kFolds);
+    const double half = kScanQuantile90 * std::sqrt(squares * (Chunks::kFolds - 1) / Chunks::kFolds);
     point.interval = {point.force_N - half, point.force_N + half};
     entry.curve.push_back(std::move(point));
   }

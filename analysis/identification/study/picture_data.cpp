@@ -11,7 +11,7 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr double kBlock_s = 2;
+constexpr double kPictureBlock_s = 2;
 
 /// Residuals of one track that were not cut, under several models.
 struct Records {
@@ -34,7 +34,7 @@ void add_track(const residuals::Track& track, const std::vector<stability::Model
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     if (track.cut[i] != residuals::Cut::kNone) continue;
     const stability::Instant& now = track.instants[i];
-    if (now.time_s - block_start_s >= kBlock_s) {
+    if (now.time_s - block_start_s >= kPictureBlock_s) {
       block_start_s = now.time_s;
       ++next_block;
     }

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kMostTypes = 512;
 constexpr std::size_t kMostFields = 2048;
 constexpr std::size_t kLargestFixedArray = std::size_t{1} << 20;
-constexpr int kDeepestNesting = 12;
+constexpr int kDeepestMessage = 12;
 
 std::optional<Scalar> ros_number(std::string_view name) {
   static const std::map<std::string_view, Scalar> types = {
@@ -177,7 +177,7 @@ class SchemaBuilder {
 
   /// Puts `name` and what it uses into types_; false, with the reason, if that cannot be.
   bool add(const std::string& name, int depth) {
-    if (depth > kDeepestNesting) return fail("its definition is nested too deeply, or contains itself");
+    if (depth > kDeepestMessage) return fail("its definition is nested too deeply, or contains itself");
     const WrittenType* const written = find(name);
     if (written == nullptr) return fail("the file does not define " + name);
     const std::size_t index = types_.size();
@@ -202,7 +202,7 @@ class SchemaBuilder {
     int height = 0;
     for (const RosField& field : fields)
       if (field.kind == RosKind::kMessage) height = std::max(height, 1 + heights_.at(field.message));
-    if (height > kDeepestNesting) return fail("its definition is nested too deeply");
+    if (height > kDeepestMessage) return fail("its definition is nested too deeply");
     heights_[index] = height;
     types_[index].fields = std::move(fields);
     return true;
