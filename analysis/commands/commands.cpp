@@ -11,6 +11,7 @@ const std::vector<Command>& commands() {
       compare_command(),          //
       diagnose_command(),         //
       add_command(),              //
+      model_command(),            //
       train_command(),            //
       simulate_command(),         //
       reproduce_command(),        //

@@ -24,6 +24,7 @@ Command inspect_command();
 Command iss_check_command();
 Command match_command();
 Command merge_command();
+Command model_command();
 Command reproduce_command();
 Command simulate_command();
 Command spacing_command();

@@ -35,10 +35,10 @@ Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows) {
 
 void add_track(const residuals::Inputs& inputs, const Track& track, const Grams& grams, int flight,
                Piece& piece) {
-  const stability::Model& model = inputs.model_for(track);
+  const stability::Model model = inputs.model_for(track);
   const std::vector<Eigen::Vector3d> r = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
   const TrackBlocks cut = cut_into_blocks(track);
-  ColumnRun run(grams, inputs, model, track.vehicle);
+  ColumnRun run(grams, inputs, model, track);
   Eigen::MatrixXd rows;
   std::vector<int> in_support(piece.support.size());
   int current = -1, count = 0;

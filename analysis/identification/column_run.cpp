@@ -22,9 +22,9 @@ struct ColumnRun::Stream {
 };
 
 ColumnRun::ColumnRun(const Grams& grams, const residuals::Inputs& inputs, const stability::Model& model,
-                     const std::string& vehicle)
+                     const residuals::Track& track)
     : filtered_(!inputs.rules.has_published_signals()),
-      filter_(model.sensor.accelerometer_cutoff_hz, grams.columns),
+      measured_(track, model, grams.columns),
       values_(Eigen::Matrix3Xd::Zero(3, grams.columns)) {
   stability::EffectContext context;
   context.kind = model.kind;
@@ -33,7 +33,7 @@ ColumnRun::ColumnRun(const Grams& grams, const residuals::Inputs& inputs, const 
   std::size_t index = 0;
   for (std::size_t k = 0; k < grams.candidates.size(); ++k) {
     const Candidate& candidate = grams.candidates[k];
-    const auto own = std::find(candidate.vehicles.begin(), candidate.vehicles.end(), vehicle);
+    const auto own = std::find(candidate.vehicles.begin(), candidate.vehicles.end(), track.vehicle);
     if (!candidate.vehicles.empty() && own == candidate.vehicles.end()) {
       index += candidate.thetas.size();
       continue;
@@ -53,7 +53,7 @@ ColumnRun::~ColumnRun() = default;
 
 const Eigen::Matrix3Xd& ColumnRun::advance(const stability::Instant& now, bool restart) {
   if (restart) {
-    filter_.restart();
+    measured_.restart();
     for (const Stream& s : streams_) s.stream->restart();
     values_.setZero();
   }
@@ -63,7 +63,7 @@ const Eigen::Matrix3Xd& ColumnRun::advance(const stability::Instant& now, bool r
     for (int c = 0; c < s.columns; ++c) values_.col(s.first + c) = columns[c].force_W_N;
   }
   // Columns of other vehicles' candidates are zero, and stay zero behind the filter.
-  if (filtered_) residuals::as_measured(now, filter_, values_);
+  if (filtered_) measured_.apply(now, values_);
   return values_;
 }
 

@@ -14,12 +14,12 @@ namespace swarmcert::identification {
 class ColumnRun {
  public:
   /// @param grams names the candidates and their columns; must outlive this.
-  /// @param vehicle whose track it is: candidates of other vehicles have zero columns.
+  /// @param track  candidates of other vehicles than its own have zero columns.
   ColumnRun(const Grams& grams, const residuals::Inputs& inputs, const stability::Model& model,
-            const std::string& vehicle);
+            const residuals::Track& track);
   ~ColumnRun();
 
-  /// Columns at `now` as the accelerometer's filter would show them, in W [3 x grams.columns].
+  /// Columns at `now` as the log would show them, in W [3 x grams.columns].
   /// @param restart filters and memories forget the past.
   const Eigen::Matrix3Xd& advance(const stability::Instant& now, bool restart);
 
@@ -29,7 +29,7 @@ class ColumnRun {
  private:
   struct Stream;
   const bool filtered_;
-  residuals::AccelerometerFilter filter_;
+  residuals::MeasuredForce measured_;
   Eigen::Matrix3Xd values_;
   std::vector<std::unique_ptr<stability::Effect>> effects_;
   std::vector<Stream> streams_;

@@ -27,11 +27,11 @@ struct Moments {
 bool add_track(const residuals::Inputs& inputs, const Track& track, const Grams& columns,
                const Eigen::MatrixXd& mix, std::vector<Moments>& blocks) {
   if (track.targets.size() != track.instants.size()) return false;
-  const stability::Model& model = inputs.model_for(track);
+  const stability::Model model = inputs.model_for(track);
   const std::vector<Eigen::Vector3d> r = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
   const std::vector<stability::Instant> wanted = as_commanded(track, model.mass_kg);
   const TrackBlocks cut = cut_into_blocks(track);
-  ColumnRun actual(columns, inputs, model, track.vehicle), commanded(columns, inputs, model, track.vehicle);
+  ColumnRun actual(columns, inputs, model, track), commanded(columns, inputs, model, track);
   const std::size_t first = blocks.size();
   const Eigen::Index n = mix.cols();
   for (const TrackBlock& block : cut.blocks)

@@ -28,7 +28,7 @@ double rmse(residuals::Inputs inputs, const stability::Model& model, const std::
     std::vector<std::string> problems;
     for (const residuals::Track& track : inputs.load(static_cast<std::size_t>(which[k]), problems)) {
       if (track.position_only) continue;
-      const auto r = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
+      const auto r = residuals::force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
       for (std::size_t s = 0; s < r.size(); ++s) {
         if (track.cut[s] != residuals::Cut::kNone) continue;
         squares[k] += r[s].squaredNorm();

@@ -37,7 +37,7 @@ struct RawTrack {
 /// none.
 std::vector<Eigen::Vector3d> left_by_model(const Track& track, const residuals::Inputs& inputs, Target target,
                                            std::vector<std::string>& problems) {
-  const stability::Model& model = inputs.model_for(track);
+  const stability::Model model = inputs.model_for(track);
   if (target != Target::kTorque) return residuals::force_residual(model, inputs.kinds, inputs.rules, track);
   residuals::TorqueResidual residual = residuals::torque_residual(model, inputs.kinds, track);
   if (!residual.refused.empty())

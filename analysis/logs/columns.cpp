@@ -12,60 +12,6 @@ namespace {
 
 constexpr double kDegree_rad = 3.14159265358979323846 / 180;
 
-/// Columns "<prefix>x<suffix>", "...y...", "...z...".
-void add_axes(SignalMap& map, int signal, const std::string& prefix, const std::string& suffix,
-              double multiply, double divide) {
-  const char* const kAxes[] = {"x", "y", "z"};
-  for (int k = 0; k < 3; ++k) map.push_back({signal + k, prefix + kAxes[k] + suffix, multiply, divide});
-}
-
-SignalMap make_known_columns() {
-  SignalMap map = {{kTime, "tick"}, {kTime, "time_us"}, {kTime, "time[ms]"}};
-  // the firmware's compressed estimate: mm, mm/s, mm/s^2, mrad/s
-  add_axes(map, kPosition, "stateEstimateZ.", "", 1, 1000);
-  add_axes(map, kVelocity, "stateEstimateZ.v", "", 1, 1000);
-  add_axes(map, kForceWorld, "stateEstimateZ.a", "", 1, 1000);
-  map.push_back({kPackedAttitude, "stateEstimateZ.quat"});
-  map.push_back({kRates, "stateEstimateZ.rateRoll", 1, 1000});
-  map.push_back({kRates + 1, "stateEstimateZ.ratePitch", 1, 1000});
-  map.push_back({kRates + 2, "stateEstimateZ.rateYaw", 1, 1000});
-  add_axes(map, kTargetPosition, "ctrltargetZ.", "", 1, 1000);
-  add_axes(map, kTargetVelocity, "ctrltargetZ.v", "", 1, 1000);
-  // the full estimate of newer firmware: m, m/s; accelerations in g, without gravity
-  add_axes(map, kPosition, "stateEstimate.", "", 1, 1);
-  add_axes(map, kVelocity, "stateEstimate.v", "", 1, 1);
-  add_axes(map, kForceBody, "acc.", "", kGravity_m_s2, 1);
-  add_axes(map, kAccelerationWorld, "stateEstimate.a", "", kGravity_m_s2, 1);
-  add_axes(map, kAttitude, "stateEstimate.q", "", 1, 1);
-  map.push_back({kAttitude + 3, "stateEstimate.qw"});
-  add_axes(map, kRates, "gyro.", "", kDegree_rad, 1);
-  add_axes(map, kTargetPosition, "ctrltarget.", "", 1, 1);
-  add_axes(map, kTargetVelocity, "ctrltarget.v", "", 1, 1);
-  map.push_back({kBattery, "pm.vbatMV", 1, 1000});
-  map.push_back({kBattery, "pm.vbat"});
-  map.push_back({kThrust, "motor.thrust"});
-  add_axes(map, kTorque, "motor.torque", "", 1, 1);
-  for (int k = 0; k < 4; ++k) {
-    const std::string number = std::to_string(k + 1);
-    map.push_back({kDuty + k, "pwm.m" + number + "_pwm", 1, 65536});
-    map.push_back({kDuty + k, "motor.m" + number, 1, 65536});
-    map.push_back({kMotorForce + k, "motor.f" + number});
-    map.push_back({kDuty + k, "u" + number + "[PWM]"});
-    map.push_back({kMotorForce + k, "u" + number + "[N]"});
-  }
-  // the authors' CSV
-  add_axes(map, kPosition, "", "[m]", 1, 1);
-  add_axes(map, kVelocity, "v", "[m/s]", 1, 1);
-  add_axes(map, kForceWorld, "a", "[m/s^2]", 1, 1);
-  add_axes(map, kAttitude, "q", "", 1, 1);
-  map.push_back({kAttitude + 3, "qw"});
-  add_axes(map, kRates, "w", "[rad/s]", 1, 1);
-  map.push_back({kBattery, "Vbat[V]"});
-  map.push_back({kThrust, "thrust_des[g]", kGravity_m_s2, 1000});
-  add_axes(map, kTorque, "torque", "[Nm]", 1, 1);
-  return map;
-}
-
 struct Unit {
   const char* name;
   double multiply, divide;
@@ -109,7 +55,7 @@ std::map<std::string, NamedSignal> named_signals() {
 }  // namespace
 
 const SignalMap& known_columns() {
-  static const SignalMap map = make_known_columns();
+  static const SignalMap map;
   return map;
 }
 
@@ -144,7 +90,7 @@ SignalMap parse_columns(const std::string& text, const std::string& path) {
         table.refuse("frame", "", "differs from the frame of another axis", "all three axes need one frame");
     }
     map.push_back({in_body ? signal.signal - kForceWorld + kForceBody : signal.signal, table.text("column"),
-                   unit.multiply, unit.divide, true});
+                   unit.multiply, unit.divide, unit.name});
   }
   return map;
 }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,8 @@ using Vector = std::array<double, 3>;
 inline constexpr double kGravity_m_s2 = 9.81;
 inline constexpr double kNewtonPerGramForce = kGravity_m_s2 / 1000;
 
-/// Two records further apart than this are not neighbours in time: filters restart, nothing is interpolated between.
+/// Two records further apart than this are not neighbours in time: filters restart, nothing is interpolated between. In logs
+/// slower than 50 Hz it is two and a half steps instead.
 inline constexpr double kLongestGap_s = 0.030;
 
 /// One record. Frames: W world, z up; B body, x forward, y left, z up.
@@ -31,15 +33,49 @@ struct Sample {
   std::array<double, 4> motor_force_N{};  ///< what the controller asked of each motor; unsaturated
   double thrust_command_N = 0;
   Vector torque_command_Nm{};  ///< B
-  bool restarts = false;       ///< first record, or more than kLongestGap_s after the one before
+  /// Total thrust where it does not come from the duties: Signals::thrust says in what unit.
+  double given_thrust = 0;
+  bool restarts = false;  ///< first record, or more than kLongestGap_s after the one before
+};
+
+/// Where the total thrust of a log comes from.
+enum class ThrustSource {
+  kNone,
+  kDuty,          ///< Sample::duty and battery_V, through the model's thrust map
+  kForce,         ///< Sample::given_thrust is a force in newton that the controller asked for
+  kHoverMultiple  ///< Sample::given_thrust is in multiples of the thrust at which this log hovers
+};
+
+/// Where the specific force of a log comes from.
+enum class ForceSource {
+  kNone,
+  kAccelerometer,  ///< measured
+  kVelocity,       ///< slope of the velocity over a window
+  kPosition        ///< curvature of the position over a window
+};
+
+/// Whether the vehicle says that it was armed.
+enum class Armed { kUnknown, kNever, kYes };
+
+/// What can be said of the torques of a log.
+enum class TorqueUse {
+  kNone,
+  kMean,    ///< their mean in slow flight, where it should vanish
+  kDynamic  ///< at every moment
 };
 
 /// Which optional groups of signals a log has.
 struct Signals {
-  bool force = false;       ///< specific force, attitude, duty and battery: a force residual can be formed
-  std::string force_lacks;  ///< which of these no column carries, in words; empty where `force`
-  bool targets = false;     ///< target position and velocity
-  bool commands = false;    ///< motor forces, thrust and torque commands
+  bool force = false;                ///< a force residual can be formed along at least one axis
+  std::string force_lacks;           ///< which signals are missing for that, in words; empty where `force`
+  std::array<bool, 3> force_axes{};  ///< axes of W along which a force can be judged
+  ThrustSource thrust = ThrustSource::kNone;
+  ForceSource specific_force = ForceSource::kNone;
+  TorqueUse torque = TorqueUse::kNone;
+  bool position = false;  ///< all three axes
+  bool attitude = false;  ///< measured; otherwise the thrust axis follows from the acceleration
+  bool targets = false;   ///< target position and velocity
+  bool commands = false;  ///< motor forces, thrust and torque commands
   bool rates = false;
 };
 
@@ -58,10 +94,46 @@ struct LogHealth {
   double longest_gap_s = 0;
 };
 
+/// What a log says of one signal.
+struct SignalInfo {
+  enum class Source { kMeasured, kDerived, kMissing };
+  std::string name;  ///< "velocity", "specific_force", ...
+  Source source = Source::kMissing;
+  std::string from;    ///< columns, or what it is derived from and how
+  std::string unit;    ///< of the columns as stored; of the derived signal
+  double rate_hz = 0;  ///< of the records that carry it
+  double noise =
+      std::numeric_limits<double>::quiet_NaN();  ///< standard deviation, in SI units; NaN: not estimated
+};
+
+/// Something that happened in a log.
+struct LogEvent {
+  std::string kind;  ///< impact, dropout, wrap, saturation, limit cycle
+  double time_s = 0, duration_s = 0;
+  std::string what;
+};
+
+/// How much earlier one signal shows a movement than another.
+struct SignalDelay {
+  std::string signal, against;
+  double delay_s = 0;  ///< positive: `signal` is late
+  double correlation = 0;
+};
+
 struct Log {
   std::string path;
-  std::string format;  ///< "usd", "usd version 1", "usd version 2", "csv"
+  std::string format;  ///< "usd", "usd version 1", "usd version 2", "csv", "ulog", ...
   Signals signals;
+  std::vector<SignalInfo> sources;  ///< of every signal that is known, also of those that are missing
+  std::vector<SignalDelay> delays;
+  std::vector<LogEvent> events;  ///< of single columns: wraps and saturation of integers
+  std::vector<std::string>
+      interpretation;  ///< what was decided from the data rather than from names, and why
+  /// Mean command of a motor that carries the weight, where Signals::thrust is kHoverMultiple; else NaN.
+  double hover_command = std::numeric_limits<double>::quiet_NaN();
+  double window_s = 0;  ///< of the derivative behind a derived specific force
+  Armed armed = Armed::kUnknown;
+  double epoch_s = 0;  ///< add to Sample::time_us to get the file's own clock, where that is absolute
   LogHealth health;
   std::vector<std::string> channels;  ///< as the file names them
   std::vector<Sample> samples;

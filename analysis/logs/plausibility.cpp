@@ -230,9 +230,11 @@ std::vector<Doubt> doubts_of(const Log& log) {
   if (has_time) check_velocity(log, doubts);
   if (log.signals.force) {
     check_specific_force(log, doubts);
-    check_duty(log, doubts);
-    check_battery(log, doubts);
-    if (has_time && log.signals.rates) check_rates(log, doubts);
+    if (log.signals.thrust == ThrustSource::kDuty) {
+      check_duty(log, doubts);
+      check_battery(log, doubts);
+    }
+    if (has_time && log.signals.rates && log.signals.attitude) check_rates(log, doubts);
     const bool has_force =
         std::none_of(doubts.begin(), doubts.end(), [](const Doubt& d) { return d.refuses_force; });
     if (has_force) check_leaps(log, doubts);

@@ -5,8 +5,12 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
+#include <sstream>
 
 #include "analysis/logs/byte_window.h"
+#include "analysis/logs/collector.h"
+#include "analysis/logs/formats/formats.h"
+#include "analysis/logs/interpretation.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
@@ -16,7 +20,7 @@ enum class Format { kUsd, kUsdEvents, kCsv, kUnknown };
 
 /// By the first bytes. An old binary log starts with a number of variables and "name(type),", which may look like
 /// text: its header has no line end before its checksum.
-Format format_of(std::istream& in) {
+Format kind_of(std::istream& in) {
   char head[80] = {};
   in.read(head, sizeof head);
   const auto size = static_cast<std::size_t>(in.gcount());
@@ -41,33 +45,52 @@ std::ifstream open(const std::string& path) {
   return in;
 }
 
-}  // namespace
+std::string other_formats() {
+  std::string names;
+  for (const LogFormat& format : log_formats()) names += std::string(", ") + format.name;
+  return names;
+}
 
-Log parse_log(std::istream& in, const std::string& path, const SignalMap& map) {
-  Log log;
+/// Micro-SD logs and CSV are streams of records; formats/formats.h knows the others.
+RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
+  std::string head(kFormatHead_bytes, '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  in.clear();
+  in.seekg(0);
+  // What a columns.toml says counts, whoever wrote the CSV.
+  if (format_of(head) != nullptr && (map.empty() || kind_of(in) != Format::kCsv)) return parse_raw(in, path);
+  RawLog log;
   log.path = path;
-  SampleBuilder builder(log, map);
-  switch (format_of(in)) {
+  Collector collector(log, map);
+  switch (kind_of(in)) {
     case Format::kUsd:
       log.format = "usd";
-      read_usd(in, path, builder, log.health);
+      read_usd(in, path, collector, log.health);
+      collector.end();
       break;
     case Format::kUsdEvents:
-      log.format = fmt::format("usd version {}", read_usd_events(in, path, builder, log.health));
+      log.format = fmt::format("usd version {}", read_usd_events(in, path, log));
       break;
     case Format::kCsv:
       log.format = "csv";
-      read_csv(in, path, builder, log.health);
+      read_csv(in, path, collector, log.health);
+      collector.end();
       break;
     case Format::kUnknown: {
       const bool empty = in.peek() == std::char_traits<char>::eof();
-      throw files::InputError({path, "offset 0", "", "", empty ? "the file is empty" : "is not a flight log",
-                               empty ? "the recording failed; leave it out"
-                                     : "known are micro-SD logs (old, version 1, version 2) and CSV"});
+      throw files::InputError(
+          {path, "offset 0", "", "", empty ? "the file is empty" : "is not a flight log",
+           empty ? "the recording failed; leave it out" : "known are micro-SD logs, CSV" + other_formats()});
     }
   }
-  builder.end();
   return log;
+}
+
+}  // namespace
+
+Log parse_log(std::istream& in, const std::string& path, const SignalMap& map) {
+  return interpret(raw_of(in, path, map), map);
 }
 
 Log read_log(const std::string& path, const SignalMap& map) {
@@ -78,10 +101,68 @@ Log read_log(const std::string& path, const SignalMap& map) {
 bool looks_like_log(const std::string& path) {
   if (is_log_name(std::filesystem::path(path).filename().string())) return true;
   if (std::filesystem::path(path).extension() == ".csv") return true;
+  if (format_of_file(path) != nullptr) return true;
   std::ifstream in(path, std::ios::binary);
   if (!in) return false;
-  const Format format = format_of(in);
+  const Format format = kind_of(in);
   return format == Format::kUsd || format == Format::kUsdEvents;
+}
+
+namespace {
+
+/// The first `bytes` of a file, and as many of its end, each without a line that is cut.
+std::pair<std::string, std::string> ends_of(const std::string& path, std::streamoff bytes) {
+  std::ifstream in(path, std::ios::binary);
+  in.seekg(0, std::ios::end);
+  const std::streamoff size = in.tellg();
+  if (!in || size <= 0) return {};
+  const auto part = [&](std::streamoff from, std::streamoff count) {
+    std::string text(static_cast<std::size_t>(count), '\0');
+    in.seekg(from);
+    in.read(text.data(), count);
+    return text;
+  };
+  std::string head = part(0, std::min(bytes, size)),
+              tail = part(std::max<std::streamoff>(0, size - bytes), std::min(bytes, size));
+  if (size > bytes) {
+    head.erase(std::min(head.size(), head.rfind('\n') + 1));
+    tail.erase(0, tail.find('\n') + 1);
+  }
+  return {head, tail};
+}
+
+}  // namespace
+
+bool is_flight_table(const std::string& path) {
+  constexpr std::streamoff kHead_bytes = 16384;
+  try {
+    std::istringstream in(ends_of(path, kHead_bytes).first);
+    if (kind_of(in) != Format::kCsv) return false;
+    RawLog log;
+    Collector collector(log, known_columns());
+    read_csv(in, path, collector, log.health);
+    const Recognition found = recognise(log, known_columns());
+    return found.find(kPosition) != nullptr || found.find(kVelocity) != nullptr ||
+           found.find(kForceBody) != nullptr;
+  } catch (const files::InputError&) {
+    return false;
+  }
+}
+
+std::pair<double, double> time_span_s(const std::string& path) {
+  constexpr std::streamoff kEnd_bytes = 16384;
+  try {
+    const auto [head, tail] = ends_of(path, kEnd_bytes);
+    std::istringstream in(head.substr(0, head.rfind('\n') + 1) + tail);
+    RawLog log;
+    Collector collector(log, known_columns());
+    read_csv(in, path, collector, log.health);
+    collector.end();
+    const std::vector<double>& times = log.topics.back().time_s;
+    return times.empty() ? std::pair(0.0, 0.0) : std::pair(times.front(), times.back());
+  } catch (const files::InputError&) {
+    return {0, 0};
+  }
 }
 
 bool is_log_name(const std::string& name) {

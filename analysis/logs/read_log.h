@@ -3,14 +3,16 @@
 
 #include <iosfwd>
 #include <string>
+#include <utility>
 
-#include "analysis/logs/log.h"
+#include "analysis/logs/raw_log.h"
 #include "analysis/logs/signals.h"
 
 namespace swarmcert::logs {
 
-/// Reads a log; the format is recognised by content: micro-SD binary (old, versions 1 and 2), else CSV.
-/// @param map for CSV files with columns of their own; known_columns() otherwise.
+/// Reads a log; the format is recognised by content: micro-SD binary (old, versions 1 and 2), those of
+/// formats/formats.h, else CSV.
+/// @param map for CSV files with columns of their own; known_columns() otherwise: columns are recognised.
 /// @throws files::InputError if the file cannot be read at all, with offset or line. Damage inside a file is no error:
 ///   it is skipped and counted in Log::health.
 Log read_log(const std::string& path, const SignalMap& map = known_columns());
@@ -20,6 +22,12 @@ Log parse_log(std::istream& in, const std::string& path, const SignalMap& map = 
 
 /// True if the file is named like a log or as CSV, or starts like a micro-SD log.
 bool looks_like_log(const std::string& path);
+
+/// True if the header of a CSV names a time and a position, velocity or acceleration. False where it cannot be read.
+bool is_flight_table(const std::string& path);
+
+/// First and last time of a CSV on its own clock, in seconds, from its first lines and its end; {0, 0} where it has none.
+std::pair<double, double> time_span_s(const std::string& path);
 
 /// True for `[<prefix>_]cf<id>_<run>`, with or without ".csv".
 bool is_log_name(const std::string& name);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/logs/log.h"
+#include "analysis/logs/raw_log.h"
 
 namespace swarmcert::logs {
 
@@ -18,7 +18,7 @@ class RecordSink {
   virtual void begin(const std::vector<std::string>& names) = 0;
   /// @param values one per name; NaN where the file says nothing; valid during the call only.
   virtual void record(const std::vector<double>& values) = 0;
-  /// After begin(): false where text in place of the number of `column` does no harm.
+  /// After begin(): false where text in place of the number of `column` does no harm. Then record() gets NaN.
   virtual bool needs(std::size_t column) const = 0;
 };
 
@@ -30,12 +30,11 @@ class RecordSink {
 void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
 
 /// Micro-SD formats with magic 0xBC, versions 1 (times in ms) and 2 (times in us); CRC-32 of all before ends the
-/// file. Every record carries an event; records of the event with the position estimate are passed on, together with
-/// the latest values of the others. Where no known event follows, the reader looks for the next byte from which three
-/// records with increasing times follow each other.
+/// file. Every record carries an event, and every event becomes a topic with its own times. Where no known event
+/// follows, the reader looks for the next byte from which three records with increasing times follow each other.
 /// @throws files::InputError as read_usd().
 /// @return the version
-int read_usd_events(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
+int read_usd_events(std::istream& in, const std::string& path, RawLog& log);
 
 /// Text: a header line, which may start with "#", and lines of as many cells, separated by the first of comma, semicolon
 /// and tab that the header has. Cells are numbers, or empty; in columns that the sink does not need, anything.

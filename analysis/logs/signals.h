@@ -1,11 +1,10 @@
 /// @file Which columns of a file carry which signal, in which unit and frame.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "analysis/logs/record_source.h"
+#include "analysis/logs/log.h"
 
 namespace swarmcert::logs {
 
@@ -27,7 +26,12 @@ enum Signal : int {
   kMotorForce = 35,  ///< N
   kThrust = 39,      ///< N
   kTorque = 40,      ///< N m
-  kNumSignals = 43
+  kEuler = 43,  ///< roll, pitch, yaw in rad: R = Rz(yaw) Ry(pitch) Rx(roll); any of the three may be missing
+  kRequested = 46,      ///< thrust asked of each motor before the battery is compensated, over its full scale
+  kRotorSpeed = 50,     ///< of each rotor, in any unit
+  kMotorCommand = 54,   ///< normalised command of each of up to eight motors, 0 .. 1
+  kThrustCommand = 62,  ///< collective thrust in a unit of the controller's own
+  kNumSignals = 63
 };
 
 /// `signal` = value of `column` * multiply / divide.
@@ -35,40 +39,18 @@ struct SignalSource {
   int signal;
   std::string column;
   double multiply = 1, divide = 1;
-  bool is_certain = false;  ///< a user says that it is there
+  std::string unit;  ///< of the column
 };
 
-/// A map of columns; where two sources give one signal, the first that the file has is taken.
+/// What a user says of columns. Empty: columns are recognised by their names (column_names.h).
 using SignalMap = std::vector<SignalSource>;
 
-/// The names that the firmware's logs and the authors' CSV use. A value in this CSV's "time[ms]" is microseconds.
+/// The empty map.
 const SignalMap& known_columns();
 
 /// columns.toml: one table per signal, `[position_x] column = "x_mm", unit = "mm", frame = "world"`.
 /// @throws files::InputError with line, key and mend; signals, units and frames get a did-you-mean.
 SignalMap read_columns(const std::string& path);
 SignalMap parse_columns(const std::string& text, const std::string& path);
-
-/// Turns records into samples: maps columns, drops what is not finite or not in time, and counts that.
-/// A time must be later than the last one; one that is over ten seconds later counts only if the next record follows
-/// it. The 32-bit tick may wrap.
-class SampleBuilder : public RecordSink {
- public:
-  /// @param log receives samples, signals and counts. @param map and `log` must outlive this.
-  SampleBuilder(Log& log, const SignalMap& map);
-  ~SampleBuilder() override;
-
-  /// @throws files::InputError if a signal that every log needs (time, position, velocity) has no column, or a column
-  /// that a columns.toml names is missing.
-  void begin(const std::vector<std::string>& names) override;
-  void record(const std::vector<double>& raw) override;
-  bool needs(std::size_t column) const override;
-  /// Call once after the last record.
-  void end();
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
 
 }  // namespace swarmcert::logs

@@ -1,7 +1,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <set>
 
 #include "analysis/logs/byte_window.h"
 #include "analysis/logs/record_source.h"
@@ -153,7 +152,7 @@ namespace {
 
 struct Event {
   Header header;
-  std::size_t first_column = 0;  ///< of its values within a record
+  std::string name;
 };
 
 class EventReader {
@@ -170,18 +169,18 @@ class EventReader {
     sum(head, 5);
     for (std::size_t i = 0; i < num_events; ++i) read_event();
     if (events_.empty()) refuse(path_, 3, "number of events", "0", "nothing was logged", "");
-    for (auto& [id, event] : events_) {
-      event.first_column = names_.size();
-      names_.insert(names_.end(), event.header.names.begin(), event.header.names.end());
-    }
-    if (std::set<std::string>(names_.begin(), names_.end()).size() != names_.size())
-      refuse(path_, 0, "", "", "a variable is logged twice", "log each variable once");
     return version_;
   }
 
-  void read_records(RecordSink& sink, LogHealth& health) {
-    sink.begin(names_);
-    std::vector<double> values(names_.size(), 0.0);
+  void read_records(RawLog& log) {
+    LogHealth& health = log.health;
+    for (const auto& [id, event] : events_) {
+      RawTopic topic;
+      topic.name = event.name;
+      for (const std::string& name : event.header.names) topic.columns.push_back({name, "", {}});
+      log.topics.push_back(std::move(topic));
+    }
+    std::vector<double> values;
     bool searching = false;
     double last_time = -1;
     while (window_.left(kChecksum_bytes + 1) > kChecksum_bytes) {
@@ -195,11 +194,14 @@ class EventReader {
       }
       searching = false;
       const unsigned char* const record = window_.peek(size);
-      const Event& event = *event_of(little_endian<std::uint16_t>(record));
+      const std::size_t index = event_of(little_endian<std::uint16_t>(record));
+      const Header& header = events_[index].second.header;
+      RawTopic& topic = log.topics[index];
       last_time = time_of(record);
-      values[0] = last_time;
-      decode(event.header, record + head_bytes(), values.data() + event.first_column);
-      if (&event == main_event()) sink.record(values);
+      values.resize(header.variables.size());
+      decode(header, record + head_bytes(), values.data());
+      topic.time_s.push_back(last_time / 1e6);
+      for (std::size_t k = 0; k < values.size(); ++k) topic.columns[k].values.push_back(values[k]);
       sum(window_.peek(size), size);
     }
     health.truncated = searching;
@@ -228,10 +230,11 @@ class EventReader {
     const unsigned char* const name = peek(size, "event");
     const auto* const end = static_cast<const unsigned char*>(std::memchr(name, 0, size));
     if (end == nullptr) refuse(path_, window_.offset(), "event", "", "its name has no end", "");
+    Event event;
+    event.name.assign(name, end);
     sum(name, static_cast<std::size_t>(end - name) + 1);
     const std::size_t num_variables = little_endian<std::uint16_t>(peek(2, "event"));
     sum(peek(2, "event"), 2);
-    Event event;
     for (std::size_t i = 0; i < num_variables; ++i) {
       const std::size_t before = window_.offset();
       read_token(window_, path_, '\0', &checksum_, event.header);
@@ -245,20 +248,11 @@ class EventReader {
     events_.emplace_back(id, std::move(event));
   }
 
-  const Event* event_of(std::size_t id) const {
-    for (const auto& [known, event] : events_) {
-      if (known == id) return &event;
-    }
-    return nullptr;
-  }
-  const Event* main_event() const {
-    for (const auto& [id, event] : events_) {
-      const auto& names = event.header.names;
-      for (const char* name : {"stateEstimateZ.x", "stateEstimate.x"}) {
-        if (std::find(names.begin(), names.end(), name) != names.end()) return &event;
-      }
-    }
-    return &events_[0].second;
+  /// Index into events_; their number if it is none of them.
+  std::size_t event_of(std::size_t id) const {
+    std::size_t index = 0;
+    while (index < events_.size() && events_[index].first != id) ++index;
+    return index;
   }
 
   std::size_t head_bytes() const { return version_ == 1 ? 2 + 4 : 2 + 8; }
@@ -272,12 +266,12 @@ class EventReader {
   std::size_t record_size(std::size_t ahead, double last_time) {
     const unsigned char* const head = window_.peek(ahead + head_bytes());
     if (head == nullptr) return 0;
-    const Event* const event = event_of(little_endian<std::uint16_t>(head + ahead));
-    if (event == nullptr) return 0;
+    const std::size_t index = event_of(little_endian<std::uint16_t>(head + ahead));
+    if (index == events_.size()) return 0;
     constexpr double kLater_us = 600e6;
     const double time = time_of(head + ahead);
     if (last_time >= 0 && !(time >= last_time && time < last_time + kLater_us)) return 0;
-    const std::size_t size = head_bytes() + event->header.record_bytes;
+    const std::size_t size = head_bytes() + events_[index].second.header.record_bytes;
     return window_.peek(ahead + size + kChecksum_bytes) == nullptr ? 0 : size;
   }
 
@@ -300,15 +294,14 @@ class EventReader {
   int version_ = 0;
   std::uint32_t checksum_ = 0;
   std::vector<std::pair<std::size_t, Event>> events_;
-  std::vector<std::string> names_{"time_us"};
 };
 
 }  // namespace
 
-int read_usd_events(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health) {
+int read_usd_events(std::istream& in, const std::string& path, RawLog& log) {
   EventReader reader(in, path);
   const int version = reader.read_header();
-  reader.read_records(sink, health);
+  reader.read_records(log);
   return version;
 }
 

@@ -146,6 +146,7 @@ Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, con
   for (const TrackPart& part : parts) {
     if (part.part.points.empty()) continue;
     all.push_back(&part.part);
+    result.judged = result.judged.cwiseProduct(part.errors.judged);
     scenarios[part.errors.scenario].push_back(&part.part);
     vehicles[part.errors.vehicle].push_back(&part.part);
     kinds[part.errors.kind].push_back(&part.part);

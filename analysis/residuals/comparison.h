@@ -36,6 +36,9 @@ struct TrackErrors {
   std::string flight, scenario, vehicle, kind, path;
   std::string composition;  ///< see Comparison::compositions
   bool position_only = false;
+  Eigen::Vector3d judged = Eigen::Vector3d::Ones();  ///< Track::judged
+  logs::ThrustSource thrust_source = logs::ThrustSource::kNone;
+  logs::ForceSource force_source = logs::ForceSource::kNone;
   std::array<std::size_t, static_cast<std::size_t>(Cut::kCount)> cut{};  ///< records by what became of them
   double clock_offset_s = 0;
   int clock_onsets = 0;  ///< 0: the offset is not estimated, unless the clock is the reference
@@ -84,6 +87,8 @@ struct Trajectories {
 };
 
 struct Comparison {
+  /// 1 for the axes along which every compared track lets a force be judged, 0 for the others: their errors are zero.
+  Eigen::Vector3d judged = Eigen::Vector3d::Ones();
   GroupErrors overall;
   std::vector<TrackErrors> tracks;  ///< in order of flights and vehicles
   std::map<std::string, GroupErrors> scenarios, vehicles, kinds;

@@ -1,8 +1,11 @@
 #include "analysis/residuals/flight_set.h"
 
+#include <fnmatch.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <regex>
+#include <set>
 #include <tuple>
 
 #include "analysis/logs/read_log.h"
@@ -29,66 +32,218 @@ LogName parse_name(const std::string& name) {
   return {match[1], match[2], std::stoi(match[3]), match[4].matched};
 }
 
-std::vector<std::string> files_below(const std::string& path) {
+/// A file that stands for a flight, and what names it.
+struct FoundLog {
+  std::string path, vehicle, flight, scenario, why;
+  int run = 0;
+  bool csv = false, position_only = false;
+};
+
+bool is_table(const fs::path& path) {
+  const std::string extension = path.extension().string();
+  return extension == ".csv" || extension == ".CSV";
+}
+
+/// A CSV in a folder may be a trajectory or a table of results: it is a log if its header names a motion and a time.
+bool is_log(const std::string& file) {
+  if (parse_name(fs::path(file).filename().string()).run >= 0) return true;
+  return is_table(file) ? logs::is_flight_table(file) : logs::looks_like_log(file);
+}
+
+struct Candidates {
+  std::vector<std::string> logs, skipped;
+};
+
+Candidates candidates_below(const std::string& path) {
   if (!fs::exists(path))
     throw files::InputError({path, "", "", "", "does not exist", "name files or folders of flights"});
   if (!fs::is_directory(path)) {
-    if (parse_name(fs::path(path).filename().string()).run < 0) {
-      throw files::InputError({path, "", "", "", "is not named like a log",
-                               "rename it to [<prefix>_]cf<id>_<run> or the same with .csv"});
+    if (!is_table(path) && !is_log(path)) {
+      throw files::InputError(
+          {path, "", "", "", "is not a flight log",
+           "'swarmcert inspect' says what is in it; known are micro-SD logs, PX4 ULog, MCAP, "
+           "rosbag2, ArduPilot and CSV"});
     }
-    return {path};
+    return {{path}, {}};
   }
-  std::vector<std::string> found;
+  std::vector<std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(path)) {
-    if (entry.is_regular_file()) found.push_back(entry.path().string());
+    if (entry.is_regular_file()) files.push_back(entry.path().string());
   }
-  std::sort(found.begin(), found.end());
+  std::sort(files.begin(), files.end());
+  Candidates found;
+  for (const std::string& file : files) (is_log(file) ? found.logs : found.skipped).push_back(file);
   return found;
+}
+
+std::string folder_of(const std::string& file) {
+  const fs::path folder = fs::absolute(file).lexically_normal().parent_path();
+  return folder.filename().string();
+}
+
+/// "E8" of "E8_log07"; the folder where the name starts with no vehicle.
+std::string vehicle_of(const std::string& file) {
+  static const std::regex kPattern("([A-Za-z][A-Za-z0-9]*[0-9])[_-](?:log|flight|run|rep|trial)?[_-]?[0-9]+");
+  std::smatch match;
+  const std::string stem = fs::path(file).stem().string();
+  return std::regex_match(stem, match, kPattern) ? match[1].str() : folder_of(file);
+}
+
+void fill_in(std::string& text, const std::string& file) {
+  for (const auto& [word, value] : {std::pair<std::string, std::string>{"{folder}", folder_of(file)},
+                                    {"{file}", fs::path(file).stem().string()}}) {
+    for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + value.size()))
+      text.replace(at, word.size(), value);
+  }
+}
+
+FoundLog named(const std::string& file, const LogRule& rule) {
+  FoundLog log;
+  log.path = file;
+  const LogName name = parse_name(fs::path(file).filename().string());
+  log.scenario = folder_of(file);
+  if (name.run >= 0) {
+    if (!name.prefix.empty()) log.scenario += "/" + name.prefix;
+    log.run = name.run;
+    log.flight = log.scenario + "/" + (name.run < 10 ? "0" : "") + std::to_string(name.run);
+    log.vehicle = name.vehicle;
+    log.why = "named [<prefix>_]cf<id>_<run>";
+  } else {
+    log.flight = log.scenario + "/" + fs::path(file).stem().string();
+    log.vehicle = vehicle_of(file);
+    log.why = "one file";
+  }
+  log.csv = is_table(file);
+  log.position_only = rule.use == LogRule::Use::kPosition;
+  if (!rule.vehicle.empty()) log.vehicle = rule.vehicle;
+  if (!rule.flight.empty()) {
+    log.flight = rule.flight;
+    log.why = "flights.toml";
+  }
+  return log;
+}
+
+/// Overlap of two spans of time over the shorter of them.
+double overlap(const std::pair<double, double>& a, const std::pair<double, double>& b) {
+  const double common = std::min(a.second, b.second) - std::max(a.first, b.first);
+  return common / std::min(a.second - a.first, b.second - b.first);
+}
+
+/// CSV files of one folder that were recorded at the same time on a common clock are one flight.
+void group_by_clock(std::vector<FoundLog>& logs) {
+  constexpr double kAbsolute_s = 1e8;
+  struct Timed {
+    std::size_t index;
+    std::pair<double, double> span_s;
+  };
+  std::vector<Timed> timed;
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    if (logs[i].why != "one file" || !logs[i].csv) continue;
+    const auto span_s = logs::time_span_s(logs[i].path);
+    if (!(span_s.first > kAbsolute_s) || !(span_s.second > span_s.first)) continue;
+    for (const Timed& other : timed) {
+      FoundLog& first = logs[other.index];
+      if (fs::path(first.path).parent_path() != fs::path(logs[i].path).parent_path()) continue;
+      if (!(overlap(other.span_s, span_s) > 0.5)) continue;
+      for (FoundLog* const log : {&first, &logs[i]}) {
+        log->vehicle = fs::path(log->path).stem().string();
+        log->why = "absolute times overlap";
+      }
+      logs[i].flight = first.flight;
+      break;
+    }
+    timed.push_back({i, span_s});
+  }
 }
 
 }  // namespace
 
-FoundFlights find_flights(const std::vector<std::string>& paths) {
+LogRule rule_for(const LogRules& rules, const std::string& path) {
+  std::vector<const LogRule*> matching;
+  for (const LogRule& rule : rules) {
+    const auto depth = std::count(rule.pattern.begin(), rule.pattern.end(), '/');
+    fs::path tail;
+    const fs::path full = fs::absolute(path).lexically_normal();
+    auto part = full.end();
+    for (std::ptrdiff_t k = 0; k <= depth && part != full.begin(); ++k)
+      tail = tail.empty() ? *--part : *--part / tail;
+    const std::string with = tail.string(), without = fs::path(tail).replace_extension().string();
+    if (fnmatch(rule.pattern.c_str(), with.c_str(), 0) == 0 ||
+        fnmatch(rule.pattern.c_str(), without.c_str(), 0) == 0)
+      matching.push_back(&rule);
+  }
+  const auto is_plain = [](const LogRule* rule) {
+    return rule->pattern.find_first_of("*?[") == std::string::npos;
+  };
+  std::stable_sort(matching.begin(), matching.end(), [&](const LogRule* a, const LogRule* b) {
+    if (is_plain(a) != is_plain(b)) return is_plain(a);
+    return a->pattern.size() > b->pattern.size();
+  });
+  LogRule all;
+  for (const LogRule* rule : matching) {
+    if (all.vehicle.empty()) all.vehicle = rule->vehicle;
+    if (all.flight.empty()) all.flight = rule->flight;
+    if (all.model.empty()) all.model = rule->model;
+    if (all.gains.empty()) all.gains = rule->gains;
+    if (all.mass_kg == 0) all.mass_kg = rule->mass_kg;
+    if (all.use == LogRule::Use::kUnsaid) all.use = rule->use;
+  }
+  fill_in(all.vehicle, path);
+  fill_in(all.flight, path);
+  return all;
+}
+
+FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules& rules) {
   FoundFlights result;
-  // folder, prefix, run -> vehicle -> path; a CSV only where there is no binary log
-  std::map<std::tuple<std::string, std::string, int>, std::map<std::string, std::string>> flights;
+  std::vector<FoundLog> logs;
+  std::set<std::string> seen;
   for (const std::string& path : paths) {
-    for (const std::string& file : files_below(path)) {
-      const LogName name = parse_name(fs::path(file).filename().string());
-      if (name.run < 0) {
-        result.skipped.push_back(file);
-        continue;
-      }
-      fs::path folder_path = fs::path(file).parent_path();
-      if (folder_path.empty()) folder_path = ".";
-      const std::string folder = folder_path.string();
-      std::string& chosen = flights[{folder, name.prefix, name.run}][name.vehicle];
-      if (chosen == file) continue;
-      if (chosen.empty()) {
-        chosen = file;
-      } else if (name.csv) {
-        result.skipped.push_back(file);
-      } else {
-        result.skipped.push_back(chosen);
-        chosen = file;
-      }
+    const Candidates found = candidates_below(path);
+    result.skipped.insert(result.skipped.end(), found.skipped.begin(), found.skipped.end());
+    for (const std::string& file : found.logs) {
+      if (!seen.insert(file).second) continue;
+      const LogRule rule = rule_for(rules, file);
+      if (rule.use == LogRule::Use::kNone)
+        result.left_out.push_back(file + ": flights.toml leaves it out");
+      else
+        logs.push_back(named(file, rule));
+    }
+  }
+  group_by_clock(logs);
+  // folder, scenario, run, name -> vehicle -> log; a CSV only where there is no binary log
+  std::map<std::tuple<std::string, std::string, int, std::string>, std::map<std::string, FoundLog>> flights;
+  for (FoundLog& log : logs) {
+    const std::string folder = log.why == "flights.toml" ? "" : fs::path(log.path).parent_path().string();
+    FoundLog& chosen = flights[{folder, log.scenario, log.run, log.flight}][log.vehicle];
+    if (chosen.path.empty()) {
+      chosen = log;
+    } else if (log.csv == chosen.csv && log.why != "flights.toml") {
+      result.skipped.push_back(log.path);
+    } else if (log.why == "flights.toml") {
+      throw files::InputError({log.path, "", "log.vehicle", log.vehicle,
+                               "is the vehicle of " + chosen.path + " in the same flight as well",
+                               "give the two logs different vehicles in flights.toml"});
+    } else {
+      result.skipped.push_back(log.csv ? log.path : chosen.path);
+      if (!log.csv) chosen = log;
     }
   }
   for (const auto& [key, vehicles] : flights) {
-    const auto& [folder, prefix, run] = key;
     FlightFiles flight;
-    const fs::path place = fs::absolute(folder).lexically_normal();
-    flight.scenario = (place.has_filename() ? place : place.parent_path()).filename().string();
-    if (!prefix.empty()) flight.scenario += "/" + prefix;
-    flight.run = run;
-    flight.name = flight.scenario + "/" + (run < 10 ? "0" : "") + std::to_string(run);
-    flight.logs.assign(vehicles.begin(), vehicles.end());
+    const FoundLog& first = vehicles.begin()->second;
+    flight.scenario = first.scenario;
+    flight.run = first.run;
+    flight.name = first.flight;
+    flight.why = first.why;
+    for (const auto& [vehicle, log] : vehicles) {
+      flight.logs.emplace_back(vehicle, log.path);
+      if (log.position_only) flight.position_only.insert(log.path);
+    }
     result.flights.push_back(std::move(flight));
   }
   if (result.flights.empty()) {
     throw files::InputError({paths.empty() ? "" : paths[0], "", "", "", "there is no flight log here",
-                             "logs are named [<prefix>_]cf<id>_<run>, with or without .csv"});
+                             "'swarmcert inspect FILE' says what a file is"});
   }
   return result;
 }
@@ -97,8 +252,9 @@ Fleet read_fleet(const std::string& path) {
   const toml::table document = files::parse_toml(files::read_file(path), path);
   const files::TomlTable root(document, path);
   root.choice("schema", {"swarmcert/flights/1"});
-  root.allow_only({"schema", "vehicle"});
+  root.allow_only({"schema", "vehicle", "log"});
   Fleet fleet;
+  if (!root.has("vehicle")) return fleet;
   const files::TomlTable vehicles = root.table("vehicle");
   for (const std::string& name : vehicles.keys()) {
     const files::TomlTable table = vehicles.table(name);
@@ -110,6 +266,36 @@ Fleet read_fleet(const std::string& path) {
     fleet[name] = use;
   }
   return fleet;
+}
+
+LogRules read_log_rules(const std::string& path) {
+  const toml::table document = files::parse_toml(files::read_file(path), path);
+  const files::TomlTable root(document, path);
+  root.choice("schema", {"swarmcert/flights/1"});
+  LogRules rules;
+  if (!root.has("log")) return rules;
+  const files::TomlTable logs = root.table("log");
+  for (const std::string& pattern : logs.keys()) {
+    const files::TomlTable table = logs.table(pattern);
+    table.allow_only({"vehicle", "flight", "model", "gains", "mass_kg", "use"});
+    LogRule rule;
+    rule.pattern = pattern;
+    const auto file = [&](const char* key) {
+      return table.has(key) ? (fs::path(path).parent_path() / table.text(key)).string() : std::string();
+    };
+    if (table.has("vehicle")) rule.vehicle = table.text("vehicle");
+    if (table.has("flight")) rule.flight = table.text("flight");
+    rule.model = file("model");
+    rule.gains = file("gains");
+    if (table.has("mass_kg")) {
+      rule.mass_kg = table.number("mass_kg");
+      if (!(rule.mass_kg > 0)) table.refuse("mass_kg", std::to_string(rule.mass_kg), "must be positive");
+    }
+    if (table.has("use"))
+      rule.use = static_cast<LogRule::Use>(1 + table.choice("use", {"all", "position", "none"}));
+    rules.push_back(std::move(rule));
+  }
+  return rules;
 }
 
 }  // namespace swarmcert::residuals

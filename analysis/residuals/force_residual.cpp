@@ -35,6 +35,22 @@ void pass_stage(const stability::AppliedEffect& stage, Track& track) {
 
 bool is_stage(const std::string& effect) { return effect == "delay" || effect == "motor_lag"; }
 
+/// Before the model's lags: duties through the thrust map, or what the log says of the thrust.
+double commanded_thrust_N(const stability::Model& model, const Track& track, std::size_t record) {
+  switch (track.thrust_source) {
+    case logs::ThrustSource::kForce:
+      return track.given_thrust[record];
+    case logs::ThrustSource::kHoverMultiple:
+      return track.given_thrust[record] * model.weight_N();
+    default:
+      break;
+  }
+  double thrust_N = 0;
+  for (const double duty : track.duty[record])
+    thrust_N += model.thrust.force_N(duty, track.instants[record].battery_V);
+  return thrust_N;
+}
+
 void pass_published_lag(Track& track) {
   double lagged_N = 0;
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
@@ -74,18 +90,35 @@ void AccelerometerFilter::advance(double time_s, Eigen::Ref<Eigen::Matrix3Xd> va
   values = output_;
 }
 
-void as_measured(const stability::Instant& now, AccelerometerFilter& filter, Eigen::Matrix3Xd& forces) {
-  forces = (now.R_WB.transpose() * forces).eval();
-  filter.advance(now.time_s, forces);
-  forces = (now.R_WB * forces).eval();
+MeasuredForce::MeasuredForce(const Track& track, const stability::Model& model, int channels)
+    : has_accelerometer_(track.force_source == logs::ForceSource::kAccelerometer),
+      judged_(track.judged),
+      filter_(model.sensor.accelerometer_cutoff_hz, channels),
+      window_(track.force_source, track.window_s, channels) {}
+
+void MeasuredForce::restart() {
+  filter_.restart();
+  window_.restart();
+}
+
+void MeasuredForce::apply(const stability::Instant& now, Eigen::Matrix3Xd& forces) {
+  if (has_accelerometer_) {
+    forces = (now.R_WB.transpose() * forces).eval();
+    filter_.advance(now.time_s, forces);
+    forces = (now.R_WB * forces).eval();
+  } else {
+    window_.average(now.time_s, forces);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (judged_[axis] == 0) forces.row(axis).setZero();
+  }
 }
 
 void apply_model(const stability::Model& model, const Kinds& kinds, const CutRules& rules, Track& track) {
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     stability::Instant& now = track.instants[i];
     now.mass_kg = model.mass_kg;
-    now.thrust_N = 0;
-    for (const double duty : track.duty[i]) now.thrust_N += model.thrust.force_N(duty, now.battery_V);
+    now.thrust_N = commanded_thrust_N(model, track, i);
   }
   if (rules.has_published_signals()) {
     pass_published_lag(track);
@@ -107,13 +140,13 @@ std::vector<Eigen::Vector3d> force_residual(const stability::Model& model, const
     effects.push_back(std::make_unique<stability::AppliedEffect>(spec, context_of(model, kinds)));
     streams.push_back(effects.back()->effect().stream(effects.back()->shape().data()));
   }
-  AccelerometerFilter filter(model.sensor.accelerometer_cutoff_hz, 1);
+  MeasuredForce measured(track, model, 1);
   std::vector<Eigen::Vector3d> residual(track.instants.size());
   stability::Wrench columns[stability::kMostColumns];
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     const stability::Instant& now = track.instants[i];
     if (track.restarts[i] != 0) {
-      filter.restart();
+      measured.restart();
       for (const auto& stream : streams) stream->restart();
     }
     Eigen::Matrix3Xd force = now.thrust_N * now.b3_W();
@@ -122,8 +155,8 @@ std::vector<Eigen::Vector3d> force_residual(const stability::Model& model, const
       for (int c = 0; c < effects[k]->effect().num_columns(); ++c)
         force.col(0) += effects[k]->coefficients()[static_cast<std::size_t>(c)] * columns[c].force_W_N;
     }
-    if (!rules.has_published_signals()) as_measured(now, filter, force);
-    residual[i] = model.mass_kg * track.specific_force_m_s2[i] - force.col(0);
+    if (!rules.has_published_signals()) measured.apply(now, force);
+    residual[i] = (model.mass_kg * track.specific_force_m_s2[i] - force.col(0)).cwiseProduct(track.judged);
   }
   return residual;
 }

@@ -1,6 +1,7 @@
 /// @file What a model says about a flight, and what it leaves: r = m a_sf - R (h * R' (T b3 + f_a)), per record, in W.
 ///
-/// T is the thrust map's command behind the model's delay and motor lag; f_a the sum of its effects; h the two-pole
+/// Where the specific force is a derivative of the velocity or the position, h is the same weighted mean over the same
+/// window as that derivative, in W. T is the thrust map's command behind the model's delay and motor lag; f_a the sum of its effects; h the two-pole
 /// low-pass of the accelerometer. It acts in the body, as in the sensor; the firmware then turns the result into W by
 /// the attitude of the moment, so that forces are delayed but the thrust axis is not. Filters restart after gaps.
 #pragma once
@@ -8,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "analysis/residuals/smoothing_window.h"
 #include "analysis/residuals/track.h"
 #include "stability/model.h"
 
@@ -30,8 +32,22 @@ class AccelerometerFilter {
   Eigen::Matrix3Xd input_, output_, slope_, start_, start_slope_, ramp_;
 };
 
-/// Turns forces in W [3 x channels] into what the log would show of them.
-void as_measured(const stability::Instant& now, AccelerometerFilter& filter, Eigen::Matrix3Xd& forces);
+/// Turns forces in W into what the log of a track would show of them.
+class MeasuredForce {
+ public:
+  /// @param channels signals that pass together, each of three axes.
+  MeasuredForce(const Track& track, const stability::Model& model, int channels);
+  /// The next record has no past.
+  void restart();
+  /// @param forces [3 x channels], in W; zero afterwards along axes that cannot be judged.
+  void apply(const stability::Instant& now, Eigen::Matrix3Xd& forces);
+
+ private:
+  const bool has_accelerometer_;
+  const Eigen::Vector3d judged_;
+  AccelerometerFilter filter_;
+  SmoothingWindow window_;
+};
 
 /// Sets mass, command and thrust of every instant as `model` sees them.
 void apply_model(const stability::Model& model, const Kinds& kinds, const CutRules& rules, Track& track);

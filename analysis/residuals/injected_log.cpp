@@ -18,7 +18,7 @@ std::int16_t nearest_milli(double value) {
 }  // namespace
 
 std::vector<stability::LogRecord> injected_log(const Inputs& inputs, const Track& track) {
-  const stability::Model& model = inputs.model_for(track);
+  const stability::Model model = inputs.model_for(track);
   stability::Model nominal = model;
   nominal.effects.clear();
   Track scratch = track;

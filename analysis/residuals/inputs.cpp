@@ -55,6 +55,27 @@ void use_fleet_models(Inputs& inputs, const std::map<std::string, std::string>& 
   }
 }
 
+/// 1 kg, and rotors that are never asked for a force: the log's thrust is in multiples of the weight.
+stability::Model unit_model() {
+  stability::Model model;
+  model.kind = "unknown";
+  model.mass_kg = 1;
+  model.inertia_kg_m2 = {1, 1, 1};
+  model.arm_m = model.torque_per_thrust_m = 1;
+  return model;
+}
+
+void use_log_rules(Inputs& inputs) {
+  for (const FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) {
+      const LogRule rule = rule_for(inputs.log_rules, path);
+      if (!rule.gains.empty()) inputs.log_gains[path] = stability::load_gains(rule.gains);
+      if (rule.mass_kg > 0) inputs.log_masses_kg[path] = rule.mass_kg;
+      if (!rule.model.empty()) inputs.log_models[path] = stability::read_model(rule.model);
+    }
+  }
+}
+
 }  // namespace
 
 Inputs read_inputs(const InputArguments& arguments) {
@@ -62,11 +83,12 @@ Inputs read_inputs(const InputArguments& arguments) {
   inputs.rules = arguments.rules;
   inputs.map = arguments.columns.empty() ? logs::known_columns() : logs::read_columns(arguments.columns);
   if (!arguments.columns.empty()) inputs.named_files.push_back(arguments.columns);
-  inputs.found = find_flights(arguments.flights);
   if (!arguments.fleet.empty()) {
     inputs.fleet = read_fleet(arguments.fleet);
+    inputs.log_rules = read_log_rules(arguments.fleet);
     inputs.named_files.push_back(arguments.fleet);
   }
+  inputs.found = find_flights(arguments.flights, inputs.log_rules);
   for (const std::string& path : arguments.models) {
     inputs.models.push_back(stability::read_model(path));
     inputs.named_files.push_back(path);
@@ -94,19 +116,26 @@ Inputs read_inputs(const InputArguments& arguments) {
   }
   if (inputs.models.empty()) {
     use_fleet_models(inputs, flown_models);
+    if (inputs.models.empty() && !arguments.may_lack_model) {
+      throw files::InputError({arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
+                               "no model is named and no vehicle is known",
+                               "give a model.toml ('swarmcert model draft' writes one), or a flights.toml "
+                               "(--flights) that names one per "
+                               "vehicle"});
+    }
     if (inputs.models.empty()) {
-      throw files::InputError(
-          {arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
-           "no model is named and no vehicle is known",
-           "give a model.toml, or a flights.toml (--flights) that names one per vehicle"});
+      inputs.rules.per_mass = true;
+      inputs.models.push_back(unit_model());
     }
   }
+  use_log_rules(inputs);
   const auto complete = [&](stability::Model& model) {
     if (!arguments.network.empty()) set_network(model, arguments.network);
     if (arguments.rules.has_published_signals()) set_published_mass(model);
   };
   for (stability::Model& model : inputs.models) complete(model);
   for (auto& [vehicle, model] : inputs.vehicle_models) complete(model);
+  for (auto& [path, model] : inputs.log_models) complete(model);
   if (!arguments.network.empty()) {
     inputs.named_files.push_back(arguments.network);
     files::NetworkArguments network;
@@ -116,6 +145,7 @@ Inputs read_inputs(const InputArguments& arguments) {
   }
   for (const stability::Model& model : inputs.models) add_kind(inputs.kinds, model.kind, model.mass_kg);
   inputs.fallback_kind = inputs.models[0].kind;
+  inputs.cache = std::make_shared<LogCache>(inputs.rules.per_mass);
   if (inputs.models.size() == 1 && !flown.empty() && flown.count(inputs.fallback_kind) == 0) {
     for (auto& [vehicle, use] : inputs.fleet) use.kind = inputs.fallback_kind;
   }
@@ -129,9 +159,15 @@ const stability::Model* Inputs::model_of(const std::string& kind) const {
   return nullptr;
 }
 
-const stability::Model& Inputs::model_for(const Track& track) const {
+stability::Model Inputs::model_for(const Track& track) const {
+  const auto of_log = log_models.find(track.path);
   const auto own = vehicle_models.find(track.vehicle);
-  return own == vehicle_models.end() ? *model_of(track.kind) : own->second;
+  stability::Model model = of_log != log_models.end()    ? of_log->second
+                           : own != vehicle_models.end() ? own->second
+                                                         : *model_of(track.kind);
+  const auto mass = log_masses_kg.find(track.path);
+  if (mass != log_masses_kg.end() && !rules.per_mass) model.mass_kg = mass->second;
+  return model;
 }
 
 std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& problems) const {
@@ -141,13 +177,15 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
     if (model_of(use.kind) == nullptr) use.position_only = true;
   }
   std::vector<Track> tracks =
-      load_flight(found.flights[index], uses, fallback_kind, kinds, map, rules, problems);
+      load_flight(found.flights[index], uses, fallback_kind, kinds, map, rules, *cache, problems);
   for (Track& track : tracks) {
     if (track.position_only) continue;
-    apply_model(model_for(track), kinds, rules, track);
-    cut_large_forces(model_for(track), rules, track);
-    cut_impacts(model_for(track), rules, track);
-    for (logs::Doubt& doubt : doubts_of(model_for(track), track)) track.doubts.push_back(std::move(doubt));
+    const stability::Model model = model_for(track);
+    apply_model(model, kinds, rules, track);
+    cut_large_forces(model, rules, track);
+    cut_impacts(model, rules, track);
+    if (rules.per_mass) continue;
+    for (logs::Doubt& doubt : doubts_of(model, track)) track.doubts.push_back(std::move(doubt));
   }
   return tracks;
 }

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "analysis/logs/signals.h"
+#include "analysis/residuals/log_cache.h"
 #include "analysis/residuals/track.h"
+#include "stability/gains.h"
 #include "stability/model.h"
 
 namespace swarmcert::residuals {
@@ -19,6 +21,8 @@ struct InputArguments {
   std::string columns;               ///< columns.toml; empty: the known columns
   std::string network;  ///< a learned force that every model gets, in place of its own; empty: none
   CutRules rules;
+  /// Without a model and a known vehicle: CutRules::per_mass and a model of 1 kg, so that newtons are m/s^2.
+  bool may_lack_model = false;
 };
 
 /// Everything but the flights' data. Vehicles fly the given model of their kind; without models, the fleet's; a
@@ -30,12 +34,18 @@ struct Inputs {
   Kinds kinds;
   Fleet fleet;
   FoundFlights found;
+  LogRules log_rules;
+  /// What `[log]` rules give single logs, by path: a model, a mass, gains.
+  std::map<std::string, stability::Model> log_models;
+  std::map<std::string, double> log_masses_kg;
+  std::map<std::string, stability::Gains> log_gains;
   logs::SignalMap map;
   CutRules rules;
 
   const stability::Model* model_of(const std::string& kind) const;  ///< nullptr: only a neighbour
-  /// The vehicle's own model, else that of its kind. Precondition: the track is not position only.
-  const stability::Model& model_for(const Track& track) const;
+  /// The log's own model, else the vehicle's, else that of its kind; with the log's own mass where it has one.
+  /// Precondition: the track is not position only.
+  stability::Model model_for(const Track& track) const;
   /// Loads flight `index`; tracks without a model are position only; applies the models.
   std::vector<Track> load(std::size_t index, std::vector<std::string>& problems) const;
   /// model.toml, flights.toml and logs, for the list of inputs of a result.
@@ -43,6 +53,7 @@ struct Inputs {
 
   std::string fallback_kind;
   std::vector<std::string> named_files;
+  std::shared_ptr<LogCache> cache;  ///< shared by copies
 };
 
 /// @throws files::InputError as the readers of these files do, and where two models have one kind.

@@ -55,6 +55,10 @@ std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model,
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track) {
   TorqueResidual residual;
   const std::size_t n = track.instants.size();
+  if (track.thrust_source != logs::ThrustSource::kDuty) {
+    residual.refused = "the log has no duty of each motor";
+    return residual;
+  }
   if (!track.has_rates || n < 3) {
     residual.refused = n < 3 ? "the log is empty" : "the log has no angular rates";
     return residual;
@@ -83,6 +87,25 @@ TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds
   return residual;
 }
 
+namespace {
+
+/// Means over slow flight, where the torques of the rotors should cancel.
+void add_mean(const stability::Model& model, const Track& track, TorqueErrors& errors) {
+  if (track.thrust_source != logs::ThrustSource::kDuty) return;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    const stability::Instant& now = track.instants[i];
+    if (track.cut[i] != Cut::kNone || now.v_W_m_s.norm() > TorqueErrors::kSlow_m_s) continue;
+    sum -= rotor_torque_Nm(model, track.duty[i], now.battery_V);
+    ++errors.slow_records;
+  }
+  if (errors.slow_records == 0) return;
+  const Eigen::Vector3d mean = sum / static_cast<double>(errors.slow_records);
+  errors.slow_mean_Nm = {mean[0], mean[1], mean[2], mean.norm()};
+}
+
+}  // namespace
+
 TorqueErrors torque_errors(const stability::Model& model, const Kinds& kinds, const Track& track) {
   const TorqueResidual residual = torque_residual(model, kinds, track);
   TorqueErrors errors;
@@ -99,6 +122,7 @@ TorqueErrors torque_errors(const stability::Model& model, const Kinds& kinds, co
     sum += torque;
     ++errors.records;
   }
+  add_mean(model, track, errors);
   if (!errors.refused.empty()) return errors;
   if (errors.records == 0) {
     errors.refused = "no usable record";

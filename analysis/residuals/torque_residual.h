@@ -33,6 +33,11 @@ struct TorqueErrors {
   double rate_hz = 0;   ///< of the log
   std::size_t records = 0;
   Axes rmse_Nm, bias_Nm, max_Nm;
+  /// Also of slower logs and of logs without rates: minus the mean torque of the rotors in flight slower than this, which
+  /// something else must balance.
+  static constexpr double kSlow_m_s = 0.1;
+  std::size_t slow_records = 0;
+  Axes slow_mean_Nm;
 };
 
 /// Of torque_residual().

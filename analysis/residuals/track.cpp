@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
+#include "analysis/logs/flight_story.h"
 #include "analysis/logs/read_log.h"
+#include "analysis/residuals/smoothing_window.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::residuals {
@@ -14,6 +17,8 @@ constexpr double kCrashTiltCosine = 0.5;  // 60 degrees
 constexpr double kBeforeCrash_s = 0.3;
 constexpr double kLeastDuty = 0.8;
 constexpr double kSettle_s = 0.15;
+constexpr double kLeastShare = 0.3;  // of the thrust that is common in a log
+constexpr double kAboveStanding_m = 0.02, kUsualWithin_m = 0.03;
 
 double contact_height_m(const std::string& kind) { return kind == "large" ? 0.085 : 0.07; }
 
@@ -96,42 +101,95 @@ void fill_instants(Track& track, const logs::Log& log) {
     for (int row = 0; row < 3; ++row)
       now.R_WB.row(row) = vector(R[static_cast<std::size_t>(row)]).transpose();
     if (log.signals.rates) now.omega_B_rad_s = vector(s.rates_rad_s);
-    now.battery_V = log.signals.force ? s.battery_V : stability::kFullBattery_V;
+    now.battery_V = log.signals.force && s.battery_V > 0 ? s.battery_V : stability::kFullBattery_V;
     track.duty[i] = s.duty;
     track.specific_force_m_s2[i] = vector(s.specific_force_m_s2);
     track.restarts[i] = s.restarts ? 1 : 0;
+    if (track.thrust_source != logs::ThrustSource::kDuty) track.given_thrust.push_back(s.given_thrust);
     if (log.signals.targets)
       track.targets.push_back(
           {vector(s.target_position_m), vector(s.target_velocity_m_s), Eigen::Vector3d::Zero()});
   }
 }
 
+/// The specific force of logs without an accelerometer, over the window through which the model's force goes as well.
+void derive_specific_force(Track& track) {
+  if (track.force_source == logs::ForceSource::kAccelerometer) return;
+  SmoothingWindow window(track.force_source, track.window_s, 1);
+  const bool is_velocity = track.force_source == logs::ForceSource::kVelocity;
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    const stability::Instant& now = track.instants[i];
+    if (track.restarts[i] != 0) window.restart();
+    Eigen::Matrix3Xd value = is_velocity ? now.v_W_m_s : now.p_W_m;
+    window.differentiate(now.time_s, value);
+    track.specific_force_m_s2[i] = value.col(0) + logs::kGravity_m_s2 * Eigen::Vector3d::UnitZ();
+  }
+}
+
+/// Whether the rotors carry next to nothing, per record.
+std::vector<char> rotors_idle(const Track& track) {
+  std::vector<char> idle(track.instants.size(), 0);
+  if (track.thrust_source == logs::ThrustSource::kDuty) {
+    for (std::size_t i = 0; i < idle.size(); ++i) {
+      const auto& d = track.duty[i];
+      idle[i] = d[0] + d[1] + d[2] + d[3] < kLeastDuty ? 1 : 0;
+    }
+    return idle;
+  }
+  std::vector<double> sorted = track.given_thrust;
+  if (sorted.empty()) return idle;
+  const auto high = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 3 / 4);
+  std::nth_element(sorted.begin(), high, sorted.end());
+  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = track.given_thrust[i] < kLeastShare * *high ? 1 : 0;
+  return idle;
+}
+
+std::vector<double> standing_height_m(const Track& track, const std::vector<char>& idle) {
+  std::vector<double> time_s, height_m, speed_m_s;
+  for (const stability::Instant& now : track.instants) {
+    time_s.push_back(now.time_s);
+    height_m.push_back(now.p_W_m.z());
+    speed_m_s.push_back(now.v_W_m_s.norm());
+  }
+  return logs::standing_heights_m(time_s, height_m, speed_m_s, idle);
+}
+
 void cut_phases(Track& track, const CutRules& rules) {
   const std::size_t n = track.instants.size();
+  const std::vector<char> idle = rotors_idle(track);
+  const std::vector<double> standing_m = standing_height_m(track, idle);
+  const bool derived = track.force_source != logs::ForceSource::kAccelerometer;
   track.cut.assign(n, Cut::kNone);
   double crash_s = INFINITY;
   for (std::size_t i = 0; i < n && std::isinf(crash_s); ++i) {
-    if (track.instants[i].R_WB(2, 2) < kCrashTiltCosine) crash_s = track.instants[i].time_s - kBeforeCrash_s;
+    if (track.judged.x() > 0 && track.instants[i].R_WB(2, 2) < kCrashTiltCosine)
+      crash_s = track.instants[i].time_s - kBeforeCrash_s;
   }
   double settled_s = -INFINITY;
   for (std::size_t i = 0; i < n; ++i) {
     const stability::Instant& now = track.instants[i];
-    const auto& d = track.duty[i];
-    if (track.restarts[i] != 0) settled_s = now.time_s + kSettle_s;
+    if (track.restarts[i] != 0) settled_s = now.time_s + (derived ? std::max(kSettle_s, 1.5 * track.window_s) : kSettle_s);
+    // A height at which the vehicle stood counts where it is not the usual one within a few centimetres.
+    const double usual_m = contact_height_m(track.kind);
+    const bool stood_elsewhere = std::abs(standing_m[i] + kAboveStanding_m - usual_m) > kUsualWithin_m;
+    const double contact_m = stood_elsewhere ? standing_m[i] + kAboveStanding_m : usual_m;
     Cut& cut = track.cut[i];
     if (now.time_s >= crash_s)
       cut = Cut::kCrash;
-    else if (d[0] + d[1] + d[2] + d[3] < kLeastDuty)
+    else if (idle[i] != 0)
       cut = Cut::kNotFlying;
-    else if (!rules.published && now.p_W_m.z() <= contact_height_m(track.kind))
+    else if (!rules.published && track.has_height && now.p_W_m.z() <= contact_m)
       cut = Cut::kContact;
     else if (!rules.published && now.time_s < settled_s)
       cut = Cut::kSettling;
+    // The window of a derivative must not reach back to the ground.
+    if (derived && (cut == Cut::kNotFlying || cut == Cut::kContact))
+      settled_s = std::max(settled_s, now.time_s + track.window_s);
   }
 }
 
 struct LoadedLog {
-  logs::Log log;
+  std::shared_ptr<const logs::Log> log;
   std::size_t track;
 };
 
@@ -148,7 +206,7 @@ void add_neighbours(Track& track, std::size_t own, const std::vector<LoadedLog>&
       if (j == own) continue;
       const Track& other = tracks[all[j].track];
       const double time_s = now.time_s + (rules.published ? 0 : other.clock_offset_s);
-      const std::optional<State> state = state_at(all[j].log, time_s, rules.published, from[j]);
+      const std::optional<State> state = state_at(*all[j].log, time_s, rules.published, from[j]);
       if (!state) {
         if (track.cut[i] == Cut::kNone) track.cut[i] = Cut::kNeighbour;
         continue;
@@ -191,19 +249,20 @@ int Kinds::index(const std::string& kind) const {
 
 std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
                                const std::string& fallback_kind, const Kinds& kinds,
-                               const logs::SignalMap& map, const CutRules& rules,
+                               const logs::SignalMap& map, const CutRules& rules, LogCache& cache,
                                std::vector<std::string>& problems) {
   std::vector<Track> tracks;
   std::vector<LoadedLog> all;
   std::vector<std::vector<double>> onsets;
   for (const auto& [vehicle, path] : flight.logs) {
-    logs::Log log;
+    std::shared_ptr<const logs::Log> read;
     try {
-      log = logs::read_log(path, map);
+      read = cache.log(path, map);
     } catch (const files::InputError& error) {
       problems.emplace_back(error.what());
       continue;
     }
+    const logs::Log& log = *read;
     Track track;
     track.flight = flight.name;
     track.scenario = flight.scenario;
@@ -211,9 +270,13 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     track.path = path;
     const auto known = fleet.find(vehicle);
     track.kind = known == fleet.end() ? fallback_kind : known->second.kind;
-    track.position_only = !log.signals.force || (known != fleet.end() && known->second.position_only);
-    if (!log.signals.force && !(known != fleet.end() && known->second.position_only))
-      problems.push_back(path + ": only a neighbour: no column carries " + log.signals.force_lacks);
+    const bool only_neighbour =
+        (known != fleet.end() && known->second.position_only) || flight.position_only.count(path) != 0;
+    track.position_only = !log.signals.force || only_neighbour;
+    if (log.armed == logs::Armed::kNever)
+      problems.push_back(path + ": no flight: never armed");
+    else if (!log.signals.force && !only_neighbour)
+      problems.push_back(path + ": only a neighbour: the log lacks " + log.signals.force_lacks);
     track.doubts = logs::doubts_of(log);
     for (const logs::Doubt& doubt : track.doubts) {
       if (!doubt.refuses_force || track.position_only) continue;
@@ -221,18 +284,26 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
       problems.push_back(path + ": " + doubt.words);
     }
     track.has_rates = log.signals.rates;
+    track.has_height = log.signals.position;
+    track.thrust_source = log.signals.thrust;
+    track.force_source = log.signals.specific_force;
+    track.window_s = log.window_s;
+    track.torque_use = log.signals.torque;
+    for (int axis = 0; axis < 3; ++axis)
+      track.judged[axis] = log.signals.force_axes[static_cast<std::size_t>(axis)] ? 1 : 0;
     track.health = log.health;
     onsets.push_back(onsets_s(log));
     track.has_reference_clock = all.empty();
     if (!rules.published && !all.empty())
       track.clock_offset_s = clock_offset_s(onsets[0], onsets.back(), &track.clock_onsets);
     tracks.push_back(std::move(track));
-    all.push_back({std::move(log), tracks.size() - 1});
+    all.push_back({std::move(read), tracks.size() - 1});
   }
   for (std::size_t k = 0; k < all.size(); ++k) {
     Track& track = tracks[k];
     if (track.position_only) continue;
-    fill_instants(track, all[k].log);
+    fill_instants(track, *all[k].log);
+    derive_specific_force(track);
     cut_phases(track, rules);
   }
   for (std::size_t k = 0; k < all.size(); ++k) {

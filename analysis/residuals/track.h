@@ -10,6 +10,7 @@
 #include "analysis/logs/plausibility.h"
 #include "analysis/logs/signals.h"
 #include "analysis/residuals/flight_set.h"
+#include "analysis/residuals/log_cache.h"
 #include "stability/effects/effect.h"
 #include "stability/tasks/task.h"
 
@@ -42,6 +43,9 @@ struct CutRules {
   /// Impacts are not cut. Set with --published-signals: the authors' labels keep them.
   bool keep_impacts = false;
 
+  /// No model is known: the thrust of every log is taken in multiples of its hover thrust.
+  bool per_mass = false;
+
   bool has_published_signals() const { return published || published_signals; }
 };
 
@@ -49,6 +53,13 @@ struct Track {
   std::string flight, scenario, vehicle, kind, path;
   bool position_only = false;
   bool has_rates = false;
+  bool has_height = true;  ///< the log has a position: contact with the ground can be seen
+  logs::ThrustSource thrust_source = logs::ThrustSource::kDuty;
+  logs::ForceSource force_source = logs::ForceSource::kAccelerometer;
+  double window_s = 0;  ///< of the derivative where force_source is no accelerometer
+  logs::TorqueUse torque_use = logs::TorqueUse::kDynamic;
+  /// 1 for the axes of W along which the log lets a force be judged, 0 for the others, whose residual is zero.
+  Eigen::Vector3d judged = Eigen::Vector3d::Ones();
   logs::LogHealth health;
   std::vector<logs::Doubt> doubts;   ///< those that refuse a force have made the track position only
   double clock_offset_s = 0;         ///< of this log's clock against the first vehicle's
@@ -57,6 +68,7 @@ struct Track {
   std::vector<stability::Instant> instants;  ///< thrust_N and mass_kg are set by apply_model()
   std::vector<stability::Neighbour> neighbours;
   std::vector<std::array<double, 4>> duty;
+  std::vector<double> given_thrust;  ///< logs::Sample::given_thrust; empty where thrust_source is kDuty
   std::vector<Eigen::Vector3d> specific_force_m_s2;
   std::vector<stability::Setpoint> targets;  ///< empty where the log has no set points; no accelerations
   std::vector<char> restarts;
@@ -80,7 +92,7 @@ struct Kinds {
 /// @param fallback_kind of vehicles that `fleet` does not name.
 std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
                                const std::string& fallback_kind, const Kinds& kinds,
-                               const logs::SignalMap& map, const CutRules& rules,
+                               const logs::SignalMap& map, const CutRules& rules, LogCache& cache,
                                std::vector<std::string>& problems);
 
 }  // namespace swarmcert::residuals

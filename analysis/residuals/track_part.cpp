@@ -130,6 +130,9 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   errors.kind = track.kind;
   errors.path = track.path;
   errors.position_only = track.position_only;
+  errors.judged = track.judged;
+  errors.thrust_source = track.thrust_source;
+  errors.force_source = track.force_source;
   errors.clock_offset_s = track.clock_offset_s;
   errors.clock_onsets = track.clock_onsets;
   errors.has_reference_clock = track.has_reference_clock;
@@ -141,7 +144,7 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
     return result;
   }
 
-  const stability::Model& model = inputs.model_for(track);
+  const stability::Model model = inputs.model_for(track);
   stability::Model nominal = model;
   nominal.effects.clear();
   apply_model(nominal, inputs.kinds, inputs.rules, track);
@@ -177,8 +180,12 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   sort_and_shorten(result.moments);
   errors.errors = errors_of({&part});
   errors.torque = torque_errors(model, inputs.kinds, track);
-  const stability::Gains* const own_gains = gains_of(gains, track.kind);
-  if (own_gains == nullptr) {
+  const auto of_log = inputs.log_gains.find(track.path);
+  const stability::Gains* const own_gains =
+      of_log != inputs.log_gains.end() ? &of_log->second : gains_of(gains, track.kind);
+  if (track.thrust_source != logs::ThrustSource::kDuty) {
+    errors.trajectory.refused = "the log has no duty of each motor";
+  } else if (own_gains == nullptr) {
     errors.trajectory.refused = "no gains.toml for vehicles of kind " + track.kind;
   } else {
     const stability::Model flown = with_lag(model, *own_gains);

@@ -129,7 +129,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     refuse_to_replace(common, (std::filesystem::path(options.fitted) / "flights.toml").string());
   }
   const residuals::GainsOfKinds gains = read_gains(options.gains);
-  const residuals::Inputs inputs = read_flights(options.flights, true);
+  const residuals::Inputs inputs = read_flights(options.flights, true, true);
   check_kinds(gains, inputs);
   Progress progress(common.quiet);
   const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };

@@ -103,11 +103,55 @@ files::Json json_of(const residuals::NeighbourMap& map) {
       {"cells", std::move(cells)}};
 }
 
+/// Sets the axes of every {x, y, z} below `json` that cannot be judged to null.
+void blank_axes(files::Json& json, const Eigen::Vector3d& judged) {
+  if (json.is_array()) {
+    for (files::Json& element : json) blank_axes(element, judged);
+  }
+  if (!json.is_object()) return;
+  const char* const kAxes[] = {"x", "y", "z"};
+  const bool is_vector = json.contains("x") && json.contains("y") && json.contains("z");
+  for (int k = 0; k < 3 && is_vector; ++k) {
+    if (judged[k] == 0) json[kAxes[k]] = nullptr;
+  }
+  for (auto& [key, member] : json.items()) blank_axes(member, judged);
+}
+
+files::Json axes_of(const Eigen::Vector3d& judged) {
+  files::Json axes = files::Json::array();
+  const char* const kAxes[] = {"x", "y", "z"};
+  for (int k = 0; k < 3; ++k) {
+    if (judged[k] != 0) axes.push_back(kAxes[k]);
+  }
+  return axes;
+}
+
+const char* name(logs::ThrustSource source) {
+  const char* const kNames[] = {"none", "duty and battery", "commanded force",
+                                "multiples of the hover thrust"};
+  return kNames[static_cast<int>(source)];
+}
+
+const char* name(logs::ForceSource source) {
+  const char* const kNames[] = {"none", "accelerometer", "derivative of the velocity",
+                                "second derivative of the position"};
+  return kNames[static_cast<int>(source)];
+}
+
+files::Json slow_mean(const residuals::TorqueErrors& torque) {
+  if (torque.slow_records == 0) return nullptr;
+  return {{"unit", "N m"},
+          {"slower_than_m_s", residuals::TorqueErrors::kSlow_m_s},
+          {"records", torque.slow_records},
+          {"mean", json_of(torque.slow_mean_Nm)}};
+}
+
 files::Json json_of(const residuals::TorqueErrors& torque) {
-  if (!torque.refused.empty()) return {{"refused", torque.refused}};
+  if (!torque.refused.empty()) return {{"refused", torque.refused}, {"slow_flight", slow_mean(torque)}};
   return {{"unit", "N m"},
           {"records", torque.records},
           {"rate_hz", torque.rate_hz},
+          {"slow_flight", slow_mean(torque)},
           {"rmse", json_of(torque.rmse_Nm)},
           {"bias", json_of(torque.bias_Nm)},
           {"max", json_of(torque.max_Nm)}};
@@ -157,7 +201,16 @@ files::Json json_of(const residuals::TrackErrors& track) {
   files::Json& records = json["records"] = files::Json::object();
   for (std::size_t k = 0; k < track.cut.size(); ++k)
     records[residuals::name(static_cast<residuals::Cut>(k))] = track.cut[k];
-  json.update(json_of(track.errors));
+  files::Json errors = json_of(track.errors);
+  if (!track.position_only) {
+    const bool has_torque = track.torque.refused.empty() || track.torque.slow_records > 0;
+    json["judged"] = {{"force", axes_of(track.judged)},
+                      {"torque", axes_of(has_torque ? Eigen::Vector3d::Ones() : Eigen::Vector3d::Zero())}};
+    json["thrust"] = name(track.thrust_source);
+    json["specific_force"] = name(track.force_source);
+    blank_axes(errors, track.judged);
+  }
+  json.update(errors);
   json["trajectory"] = json_of(track.trajectory);
   json["torque"] = json_of(track.torque);
   return json;
@@ -172,7 +225,8 @@ files::Json groups(const std::map<std::string, residuals::GroupErrors>& members)
 }  // namespace
 
 void add_comparison(const Comparison& comparison, const residuals::Inputs& inputs, files::Json& json) {
-  json["unit"] = "N";
+  json["unit"] = inputs.rules.per_mass ? "m/s^2" : "N";
+  json["judged"] = {{"force", axes_of(comparison.judged)}};
   json["overall"] = json_of(comparison.overall);
   json["flights"] = files::Json::array();
   for (const residuals::TrackErrors& track : comparison.tracks) json["flights"].push_back(json_of(track));
@@ -214,7 +268,13 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
   }
   json["clocks"] = clocks_json(comparison);
   json["torque"] = torque_json(comparison);
+  if (comparison.judged != Eigen::Vector3d::Ones()) {
+    for (const char* key : {"overall", "scenarios", "vehicles", "kinds", "compositions", "regions", "moments",
+                            "learning_error"})
+      blank_axes(json[key], comparison.judged);
+  }
   json["problems"] = comparison.problems;
+  json["left_out"] = inputs.found.left_out;
   json["skipped_files"] = inputs.found.skipped;
 }
 
@@ -265,27 +325,34 @@ void print_compositions(const Comparison& comparison, const Comparison* own) {
   }
 }
 
-void print_errors(const Comparison& comparison, const Comparison* own) {
+/// In what forces are printed.
+struct Unit {
+  const char* name;
+  double size_N;
+};
+
+void print_errors(const Comparison& comparison, const Comparison* own, const Unit& unit) {
   print_torque(comparison);
   fmt::print("\n");
-  fmt::print("{:<28}{:>9}{:>22}{:>22}{:>10}{:>9}\n", "", "records", "RMSE x y z [gf]", "bias x y z [gf]",
-             "p99.9 z", "max z");
+  fmt::print("{:<28}{:>9}{:>22}{:>22}{:>10}{:>9}\n", "", "records", fmt::format("RMSE x y z [{}]", unit.name),
+             fmt::format("bias x y z [{}]", unit.name), "p99.9 z", "max z");
+  const auto cell = [&](double value, int axis) {
+    return comparison.judged[axis] == 0 ? std::string("-") : fmt::format("{:.2f}", value / unit.size_N);
+  };
   const auto line = [&](const std::string& name, const residuals::GroupErrors& group) {
     const residuals::ErrorStatistics& s = group.statistics;
-    fmt::print("{:<28}{:>9}{:>8.2f}{:>7.2f}{:>7.2f}{:>8.2f}{:>7.2f}{:>7.2f}{:>10.2f}{:>9.2f}\n", name,
-               s.samples, s.rmse.x / stability::kGramForce_N, s.rmse.y / stability::kGramForce_N,
-               s.rmse.z / stability::kGramForce_N, s.bias.x / stability::kGramForce_N,
-               s.bias.y / stability::kGramForce_N, s.bias.z / stability::kGramForce_N,
-               s.p999.z / stability::kGramForce_N, s.max.z / stability::kGramForce_N);
+    fmt::print("{:<28}{:>9}{:>8}{:>7}{:>7}{:>8}{:>7}{:>7}{:>10}{:>9}\n", name, s.samples, cell(s.rmse.x, 0),
+               cell(s.rmse.y, 1), cell(s.rmse.z, 2), cell(s.bias.x, 0), cell(s.bias.y, 1), cell(s.bias.z, 2),
+               cell(s.p999.z, 2), cell(s.max.z, 2));
   };
   for (const auto& [name, errors] : comparison.scenarios) line(name, errors);
   for (const auto& [name, errors] : comparison.vehicles) line(name, errors);
   line("all", comparison.overall);
   print_compositions(comparison, own);
   const auto& interval = comparison.overall.rmse_interval;
-  fmt::print("\nRMSE of all: {:.4f} N, 90 % interval {:.4f} .. {:.4f}; {:.1f} % of the weight.\n",
-             comparison.overall.statistics.rmse.total, interval[3].lower, interval[3].upper,
-             100 * comparison.overall.nrmse.total);
+  fmt::print("\nRMSE of all: {:.4f} {}, 90 % interval {:.4f} .. {:.4f}; {:.1f} % of the weight.\n",
+             comparison.overall.statistics.rmse.total, unit.size_N == 1 ? unit.name : "N", interval[3].lower,
+             interval[3].upper, 100 * comparison.overall.nrmse.total);
   fmt::print("\nWhere it fails most:\n");
   for (std::size_t i = 0; i < comparison.regions.size() && i < 8; ++i) {
     const residuals::RegionErrors& region = comparison.regions[i];
@@ -293,8 +360,8 @@ void print_errors(const Comparison& comparison, const Comparison* own) {
   }
   if (!comparison.moments.empty()) {
     const residuals::Moment& worst = comparison.moments[0];
-    fmt::print("Worst moment: {} {} at {:.2f} s, {:.2f} gf\n", worst.flight, worst.vehicle, worst.time_s,
-               worst.residual_N.norm() / stability::kGramForce_N);
+    fmt::print("Worst moment: {} {} at {:.2f} s, {:.2f} {}\n", worst.flight, worst.vehicle, worst.time_s,
+               worst.residual_N.norm() / unit.size_N, unit.name);
   }
   print_trajectories(comparison.trajectories);
 }
@@ -303,12 +370,20 @@ void print_errors(const Comparison& comparison, const Comparison* own) {
 
 void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
   for (const stability::Model& model : inputs.models) {
+    if (inputs.rules.per_mass) break;
     fmt::print("Model {}: {}, {:.1f} g, {} effects\n", model.path, model.kind, 1000 * model.mass_kg,
                model.effects.size());
   }
   fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
+  if (inputs.rules.per_mass)
+    fmt::print(
+        "No model is known: residuals are per mass, and thrust is in multiples of each log's hover thrust, "
+        "so that "
+        "the mean vertical force says nothing.\n");
   print_cuts(comparison);
-  if (comparison.overall.statistics.samples > 0) print_errors(comparison, own);
+  const Unit unit = inputs.rules.per_mass ? Unit{"m/s^2", 1} : Unit{"gf", stability::kGramForce_N};
+  if (comparison.overall.statistics.samples > 0) print_errors(comparison, own, unit);
+  for (const std::string& left_out : inputs.found.left_out) fmt::print("left out: {}\n", left_out);
   print_doubts(comparison);
   for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);
   if (!inputs.found.skipped.empty())

@@ -1,13 +1,16 @@
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <limits>
+#include <map>
 #include <memory>
 #include <sstream>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/commands.h"
-#include "analysis/commands/shared/plausibility_output.h"
+#include "analysis/commands/inspect/inspect_log.h"
 #include "analysis/logs/read_log.h"
+#include "analysis/residuals/flight_set.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
@@ -171,58 +174,67 @@ files::Json inspect_model(const std::string& path, bool print) {
           {"effects", std::move(effects)}};
 }
 
-files::Json inspect_log(const std::string& path, const InspectOptions& options, const CommonOptions& common) {
+files::Json inspect_log(const std::string& path, const InspectOptions& options, const CommonOptions& common,
+                        bool in_table) {
   const logs::Log log = options.columns.empty() ? logs::read_log(path)
                                                 : logs::read_log(path, logs::read_columns(options.columns));
-  const logs::LogHealth& health = log.health;
-  const std::vector<logs::Doubt> doubts = logs::doubts_of(log);
-  const std::vector<logs::Sample>& samples = log.samples;
-  const double t0_s = samples.empty() ? 0 : samples.front().time_us * 1e-6;
-  const double t1_s = samples.empty() ? 0 : samples.back().time_us * 1e-6;
   if (!options.csv.empty()) {
     std::ostringstream text;
     logs::write_csv(log, options.t0_s, options.t1_s, text);
     files::write_file(options.csv, text.str(), common.force);
   }
+  files::Json json = {{"file", path}};
+  json.update(describe_log(log));
   if (common.prints_text()) {
-    fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {} columns\n", path, log.format,
-               health.records, t0_s, t1_s, log.channels.size());
-    for (const std::string& finding : logs::findings(health)) fmt::print("  {}\n", finding);
-    for (const logs::Doubt& doubt : doubts) fmt::print("  implausible: {}\n", doubt.words);
-    if (!log.signals.force) fmt::print("  no force can be computed: position only\n");
+    if (in_table)
+      print_log_row(path, json);
+    else
+      print_log(log);
   }
-  return {{"file", path},
-          {"kind", "log"},
-          {"format", log.format},
-          {"channels", log.channels},
-          {"records", health.records},
-          {"t0_s", t0_s},
-          {"t1_s", t1_s},
-          {"signals",
-           {{"force", log.signals.force},
-            {"rates", log.signals.rates},
-            {"targets", log.signals.targets},
-            {"commands", log.signals.commands}}},
-          {"health",
-           {{"sound", logs::is_sound(health)},
-            {"blocks", health.blocks},
-            {"damaged_blocks", health.damaged_blocks},
-            {"skipped_bytes", health.skipped_bytes},
-            {"damaged_lines", health.damaged_lines},
-            {"not_finite", health.not_finite},
-            {"clock_jumps", health.clock_jumps},
-            {"gaps", health.gaps},
-            {"longest_gap_s", health.longest_gap_s},
-            {"truncated", health.truncated},
-            {"checksum_failed", health.checksum_failed}}},
-          {"plausibility", json_of(doubts)}};
+  return json;
 }
 
-files::Json inspect(const std::string& path, const InspectOptions& options, const CommonOptions& common) {
-  if (logs::looks_like_log(path)) return inspect_log(path, options, common);
+files::Json inspect(const std::string& path, const InspectOptions& options, const CommonOptions& common,
+                    bool in_table) {
+  if (logs::looks_like_log(path)) return inspect_log(path, options, common, in_table);
   if (is_model(path)) return inspect_model(path, common.prints_text());
   return is_json(path) ? inspect_certificate(path, common.prints_text())
                        : inspect_network(path, options.network, common.prints_text());
+}
+
+/// Files as they are, folders as the logs below them, with what was taken as one flight and why.
+std::vector<std::string> expanded(const std::vector<std::string>& words, files::Json& flights, files::Json& skipped) {
+  std::vector<std::string> paths;
+  for (const std::string& word : words) {
+    if (!std::filesystem::is_directory(word)) {
+      paths.push_back(word);
+      continue;
+    }
+    const residuals::FoundFlights found = residuals::find_flights({word});
+    for (const residuals::FlightFiles& flight : found.flights) {
+      files::Json members = files::Json::array();
+      for (const auto& [vehicle, path] : flight.logs) {
+        paths.push_back(path);
+        members.push_back({{"vehicle", vehicle}, {"file", path}});
+      }
+      flights.push_back({{"name", flight.name}, {"why", flight.why}, {"logs", std::move(members)}});
+    }
+    for (const std::string& file : found.skipped) skipped.push_back(file);
+  }
+  return paths;
+}
+
+void print_grouping(const files::Json& flights, const files::Json& skipped) {
+  if (flights.empty()) return;
+  std::map<std::string, std::size_t> reasons;
+  for (const files::Json& flight : flights) {
+    ++reasons[flight["why"].get<std::string>()];
+    if (flight["logs"].size() < 2) continue;
+    fmt::print("one flight, {}: {} of {} vehicles\n", flight["why"].get<std::string>(),
+               flight["name"].get<std::string>(), flight["logs"].size());
+  }
+  for (const auto& [why, count] : reasons) fmt::print("{} flights: {}\n", count, why);
+  if (!skipped.empty()) fmt::print("{} files are no logs and were skipped\n", skipped.size());
 }
 
 int run_inspect(const InspectOptions& options, const CommonOptions& common) {
@@ -232,11 +244,13 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
     if (!(options.t0_s < options.t1_s)) throw UsageError("--t0 must be before --t1");
     refuse_to_replace(common, options.csv);
   }
-  files::Json found = files::Json::array();
+  files::Json found = files::Json::array(), flights = files::Json::array(), skipped = files::Json::array();
+  const std::vector<std::string> paths = expanded(options.files, flights, skipped);
+  const bool in_table = paths.size() > options.files.size();
   std::vector<std::string> readable;
-  for (const std::string& path : options.files) {
+  for (const std::string& path : paths) {
     try {
-      found.push_back(inspect(path, options, common));
+      found.push_back(inspect(path, options, common, in_table));
     } catch (const files::InputError& error) {
       fmt::print(stderr, "swarmcert: {}\n", error.what());
       found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
@@ -244,10 +258,15 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
     }
     readable.push_back(path);
   }
+  if (common.prints_text()) print_grouping(flights, skipped);
   files::Json result = result_head("inspect", readable);
   result["files"] = std::move(found);
+  if (!flights.empty()) {
+    result["flights"] = std::move(flights);
+    result["skipped"] = std::move(skipped);
+  }
   write_result(common, result);
-  return readable.size() == options.files.size() ? kDone : kBadInput;
+  return readable.size() == paths.size() ? kDone : kBadInput;
 }
 
 }  // namespace
@@ -262,7 +281,7 @@ Command inspect_command() {
           [](CLI::App& app) {
             const auto options = std::make_shared<InspectOptions>();
             app.add_option("FILE", options->files,
-                           "Weight files, network.toml and model.toml files, certificates, flight logs")
+                           "Weight files, network.toml and model.toml files, certificates, flight logs, folders of logs")
                 ->required();
             add_output(app, "--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
             app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");

@@ -29,7 +29,7 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
       "target_velocity_x .. z");
 }
 
-residuals::Inputs read_flights(const FlightOptions& options, bool own_models) {
+residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bool may_lack_model) {
   residuals::InputArguments arguments;
   arguments.models = options.models;
   for (const std::string& word : options.words) {
@@ -41,6 +41,7 @@ residuals::Inputs read_flights(const FlightOptions& options, bool own_models) {
                         ? bundled_folder("analysis/flights", "analysis/flights") + "/flights.toml"
                         : options.fleet;
   arguments.columns = options.columns;
+  arguments.may_lack_model = may_lack_model;
   arguments.network = options.network;
   arguments.rules.published = options.published_filter;
   arguments.rules.published_signals = options.published_signals;

@@ -23,7 +23,9 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
 /// Reads models and the list of flights; the bundled flights.toml where --flights is not given.
 /// @param own_models  vehicles of one kind may have models of their own (flights.toml).
 /// @throws files::InputError as residuals::read_inputs(), and where they have but may not.
-residuals::Inputs read_flights(const FlightOptions& options, bool own_models = false);
+/// @param may_lack_model  as residuals::InputArguments::may_lack_model.
+residuals::Inputs read_flights(const FlightOptions& options, bool own_models = false,
+                               bool may_lack_model = false);
 
 files::Json json_of(const residuals::Axes& axes);
 

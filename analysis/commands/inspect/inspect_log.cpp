@@ -1,0 +1,160 @@
+#include "analysis/commands/inspect/inspect_log.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "analysis/commands/shared/plausibility_output.h"
+#include "analysis/logs/flight_story.h"
+#include "analysis/logs/read_log.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+const char* name(logs::SignalInfo::Source source) {
+  const char* const kNames[] = {"measured", "derived", "missing"};
+  return kNames[static_cast<int>(source)];
+}
+
+files::Json finite(double value) { return std::isfinite(value) ? files::Json(value) : files::Json(nullptr); }
+
+files::Json force_axes(const logs::Log& log) {
+  files::Json axes = files::Json::array();
+  const char* const kAxes[] = {"x", "y", "z"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (log.signals.force_axes[k]) axes.push_back(kAxes[k]);
+  }
+  return axes;
+}
+
+files::Json torque_axes(const logs::Log& log) {
+  return log.signals.torque == logs::TorqueUse::kNone ? files::Json::array() : files::Json({"x", "y", "z"});
+}
+
+const char* torque_use(logs::TorqueUse use) {
+  const char* const kNames[] = {"none", "mean in slow flight", "dynamic"};
+  return kNames[static_cast<int>(use)];
+}
+
+std::string joined(const files::Json& axes) {
+  std::string text;
+  for (const files::Json& axis : axes) text += (text.empty() ? "" : " ") + axis.get<std::string>();
+  return text.empty() ? "none" : text;
+}
+
+files::Json health_of(const logs::LogHealth& health) {
+  return {{"sound", logs::is_sound(health)},
+          {"blocks", health.blocks},
+          {"damaged_blocks", health.damaged_blocks},
+          {"skipped_bytes", health.skipped_bytes},
+          {"damaged_lines", health.damaged_lines},
+          {"not_finite", health.not_finite},
+          {"clock_jumps", health.clock_jumps},
+          {"gaps", health.gaps},
+          {"longest_gap_s", health.longest_gap_s},
+          {"truncated", health.truncated},
+          {"checksum_failed", health.checksum_failed}};
+}
+
+double start_s(const logs::Log& log) { return log.samples.empty() ? 0 : log.samples.front().time_us * 1e-6; }
+double end_s(const logs::Log& log) { return log.samples.empty() ? 0 : log.samples.back().time_us * 1e-6; }
+
+}  // namespace
+
+files::Json describe_log(const logs::Log& log) {
+  const logs::FlightStory story = logs::tell(log);
+  files::Json json = {{"kind", "log"},
+                      {"format", log.format},
+                      {"channels", log.channels},
+                      {"records", log.health.records},
+                      {"t0_s", start_s(log)},
+                      {"t1_s", end_s(log)},
+                      {"epoch_s", log.epoch_s},
+                      {"in_the_air_s", story.air_s}};
+  json["no_flight"] = story.no_flight.empty() ? files::Json(nullptr) : files::Json(story.no_flight);
+  json["signals"] = files::Json::array();
+  for (const logs::SignalInfo& signal : log.sources) {
+    const bool missing = signal.source == logs::SignalInfo::Source::kMissing;
+    json["signals"].push_back({{"name", signal.name},
+                               {"source", name(signal.source)},
+                               {"from", missing ? files::Json(nullptr) : files::Json(signal.from)},
+                               {"unit", signal.unit},
+                               {"rate_hz", missing ? files::Json(nullptr) : files::Json(signal.rate_hz)},
+                               {"noise", finite(signal.noise)}});
+  }
+  json["judged"] = {{"force", force_axes(log)}, {"torque", torque_axes(log)}};
+  json["judged_torque"] = torque_use(log.signals.torque);
+  json["hover_command"] = finite(log.hover_command);
+  json["missing"] = files::Json::array();
+  for (const logs::MissingSignal& missing : story.missing)
+    json["missing"].push_back(
+        {{"signal", missing.signal}, {"for", missing.needed_for}, {"log_this", missing.log_this}});
+  json["phases"] = files::Json::array();
+  for (const logs::Phase& phase : story.phases)
+    json["phases"].push_back({{"phase", phase.name}, {"start_s", phase.start_s}, {"end_s", phase.end_s}});
+  json["events"] = files::Json::array();
+  for (const logs::LogEvent& event : story.events)
+    json["events"].push_back({{"event", event.kind},
+                              {"time_s", event.time_s},
+                              {"duration_s", event.duration_s},
+                              {"what", event.what}});
+  json["delays"] = files::Json::array();
+  for (const logs::SignalDelay& delay : log.delays)
+    json["delays"].push_back({{"signal", delay.signal},
+                              {"against", delay.against},
+                              {"delay_s", delay.delay_s},
+                              {"correlation", delay.correlation}});
+  if (story.battery_first_V > 0)
+    json["battery"] = {{"first_V", story.battery_first_V},
+                       {"last_V", story.battery_last_V},
+                       {"least_V", story.battery_least_V}};
+  json["interpretation"] = log.interpretation;
+  json["health"] = health_of(log.health);
+  json["plausibility"] = json_of(logs::doubts_of(log));
+  return json;
+}
+
+void print_log(const logs::Log& log) {
+  const logs::FlightStory story = logs::tell(log);
+  fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {:.1f} s in the air\n", log.path, log.format,
+             log.health.records, start_s(log), end_s(log), story.air_s);
+  if (!story.no_flight.empty()) fmt::print("  no flight: {}\n", story.no_flight);
+  for (const std::string& finding : logs::findings(log.health)) fmt::print("  {}\n", finding);
+  for (const logs::Doubt& doubt : logs::doubts_of(log)) fmt::print("  implausible: {}\n", doubt.words);
+  for (const logs::SignalInfo& signal : log.sources) {
+    if (signal.source == logs::SignalInfo::Source::kMissing) {
+      fmt::print("  {:<18} missing\n", signal.name);
+      continue;
+    }
+    fmt::print("  {:<18} {:<9}{:>7.1f} Hz  {}{}{}\n", signal.name, name(signal.source), signal.rate_hz, signal.from,
+               signal.unit.empty() || signal.unit == "1" ? "" : " [" + signal.unit + "]",
+               std::isfinite(signal.noise) ? fmt::format(", noise {:.2g}", signal.noise) : "");
+  }
+  for (const std::string& words : log.interpretation) fmt::print("  seen: {}\n", words);
+  for (const logs::SignalDelay& delay : log.delays)
+    fmt::print("  {} is {:.0f} ms {} {}\n", delay.signal, 1000 * std::abs(delay.delay_s),
+               delay.delay_s < 0 ? "ahead of" : "behind", delay.against);
+  fmt::print("  can be judged: force {}; torque {} ({})\n", joined(force_axes(log)), joined(torque_axes(log)),
+             torque_use(log.signals.torque));
+  for (const logs::MissingSignal& missing : story.missing)
+    fmt::print("  missing for {}: {} ({})\n", missing.needed_for, missing.signal, missing.log_this);
+  for (const logs::Phase& phase : story.phases)
+    fmt::print("  {:>8.2f} .. {:>8.2f} s  {}\n", phase.start_s, phase.end_s, phase.name);
+  for (const logs::LogEvent& event : story.events)
+    fmt::print("  {:>8.2f} s  {}: {}{}\n", event.time_s, event.kind, event.what,
+               event.duration_s > 0 ? fmt::format(", {:.3f} s", event.duration_s) : "");
+  if (story.battery_first_V > 0)
+    fmt::print("  battery in the air {:.2f} to {:.2f} V, least {:.2f} V\n", story.battery_first_V,
+               story.battery_last_V, story.battery_least_V);
+}
+
+void print_log_row(const std::string& path, const files::Json& described) {
+  const files::Json& no_flight = described["no_flight"];
+  fmt::print("{:<60} {:<14} {:>7} records {:>6.1f} s in the air, force {:<6} torque {:<6}{}\n", path,
+             described["format"].get<std::string>(), described["records"].get<std::size_t>(),
+             described["in_the_air_s"].get<double>(), joined(described["judged"]["force"]),
+             joined(described["judged"]["torque"]),
+             no_flight.is_null() ? "" : "  no flight: " + no_flight.get<std::string>());
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,20 @@
+/// @file What `inspect` says of a flight log.
+#pragma once
+
+#include <string>
+
+#include "analysis/logs/log.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// Members format, signals[], judged, missing[], phases[], events[] and what else is known of the log.
+files::Json describe_log(const logs::Log& log);
+
+/// The same as text on stdout.
+void print_log(const logs::Log& log);
+
+/// One line of a table of logs: records, time in the air, axes that can be judged, and what speaks against a flight.
+void print_log_row(const std::string& path, const files::Json& described);
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,78 @@
+#include "analysis/logs/collector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/logs/statistics_of_series.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::logs {
+namespace {
+
+/// Seconds per unit of a clock, from its median step: the largest of the usual units that gives a rate which flight logs
+/// have.
+double seconds_per_unit(const std::vector<double>& clock) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < clock.size(); ++i) {
+    if (clock[i] > clock[i - 1]) steps.push_back(clock[i] - clock[i - 1]);
+  }
+  constexpr double kSlowest_s = 0.5;
+  const double step = median(steps);
+  for (const double unit_s : {1.0, 1e-3, 1e-6}) {
+    if (step * unit_s <= kSlowest_s) return unit_s;
+  }
+  return steps.empty() ? 1 : 1e-9;
+}
+
+/// The column that is a clock by its name; -1 if none is.
+int clock_column(const RawTopic& topic) {
+  for (const char* const name :
+       {"t", "time", "timestamp", "time.s", "time.ms", "time.us", "t.s", "t.ms", "sec", "secs", "seconds",
+        "stamp", "header.stamp", "time.sec", "rosbag.timestamp"}) {
+    for (std::size_t c = 0; c < topic.columns.size(); ++c) {
+      if (plain_name(topic.columns[c].name) == name) return static_cast<int>(c);
+    }
+  }
+  return -1;
+}
+
+}  // namespace
+
+void Collector::begin(const std::vector<std::string>& names) {
+  log_.topics.emplace_back();
+  RawTopic& topic = log_.topics.back();
+  for (const std::string& name : names) topic.columns.push_back({name, "", {}});
+  const Carried stated = time_column(topic, map_);
+  int clock = stated.columns[0];
+  if (clock >= 0)
+    scale_s_ = 1e-6 * stated.multiply / stated.divide;
+  else if (map_.empty())
+    clock = clock_column(topic);
+  if (clock < 0) {
+    throw files::InputError({log_.path, "line 1", "time", "", "no column carries it",
+                             "log it, or say in a columns.toml (--columns) which column does"});
+  }
+  time_ = static_cast<std::size_t>(clock);
+  needs_.assign(names.size(), 0);
+  needs_[time_] = 1;
+  for (const Carried& carried : recognise(log_, map_).groups) {
+    for (const int column : carried.columns) {
+      if (column >= 0) needs_[static_cast<std::size_t>(column)] = 1;
+    }
+  }
+}
+
+void Collector::record(const std::vector<double>& values) {
+  RawTopic& topic = log_.topics.back();
+  for (std::size_t c = 0; c < values.size(); ++c) topic.columns[c].values.push_back(values[c]);
+}
+
+void Collector::end() {
+  RawTopic& topic = log_.topics.back();
+  const std::vector<double>& clock = topic.columns[time_].values;
+  const double scale_s = scale_s_ > 0 ? scale_s_ : seconds_per_unit(clock);
+  topic.time_s.reserve(clock.size());
+  for (const double time : clock) topic.time_s.push_back(time * scale_s);
+}
+
+}  // namespace swarmcert::logs

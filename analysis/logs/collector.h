@@ -1,0 +1,30 @@
+/// @file Records of a file with one clock as the one topic of a RawLog.
+#pragma once
+
+#include "analysis/logs/recognition.h"
+#include "analysis/logs/record_source.h"
+
+namespace swarmcert::logs {
+
+/// Collects records; the unit of the time column is decided at the end, from its steps.
+class Collector : public RecordSink {
+ public:
+  /// @param log gets one topic. It and `map` must outlive this.
+  Collector(RawLog& log, const SignalMap& map) : log_(log), map_(map) {}
+
+  /// @throws files::InputError if no column carries the time.
+  void begin(const std::vector<std::string>& names) override;
+  void record(const std::vector<double>& values) override;
+  bool needs(std::size_t column) const override { return needs_[column] != 0; }
+  /// Call once after the last record: fills RawTopic::time_s.
+  void end();
+
+ private:
+  RawLog& log_;
+  const SignalMap& map_;
+  std::vector<char> needs_;
+  std::size_t time_ = 0;
+  double scale_s_ = 0;  ///< of the time column; 0: decided from its steps
+};
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,199 @@
+#include "analysis/logs/column_names.h"
+
+#include <cctype>
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr double kDegree_rad = 3.14159265358979323846 / 180;
+
+/// `pattern` with '#' replaced by each of `words`.
+std::vector<std::string> each(const std::string& pattern, const std::vector<std::string>& words) {
+  std::vector<std::string> names;
+  for (const std::string& word : words) {
+    std::string name = pattern;
+    const std::size_t at = name.find('#');
+    names.push_back(at == std::string::npos ? name : name.replace(at, 1, word));
+  }
+  return names;
+}
+
+std::vector<std::string> axes(const std::string& pattern) { return each(pattern, {"x", "y", "z"}); }
+std::vector<std::string> rotors(const std::string& pattern) { return each(pattern, {"1", "2", "3", "4"}); }
+std::vector<std::string> quaternion(const std::string& pattern) {
+  return each(pattern, {"x", "y", "z", "w"});
+}
+std::vector<std::string> euler(const std::string& pattern) { return each(pattern, {"roll", "pitch", "yaw"}); }
+
+using Table = std::vector<NamedColumns>;
+
+/// The names of columns.toml, in SI units: what message_frames.h writes.
+void add_own(Table& t) {
+  t.push_back({kPosition, axes("position.#"), "m"});
+  t.push_back({kVelocity, axes("velocity.#"), "m/s"});
+  t.push_back({kForceBody, axes("specific.force.body.#"), "m/s^2"});
+  t.push_back({kAttitude, quaternion("attitude.#"), "1"});
+  t.push_back({kEuler, axes("euler.#"), "rad"});
+  t.push_back({kRates, axes("rate.#"), "rad/s"});
+  t.push_back({kBattery, {"battery.volt"}, "V"});
+  t.push_back({kTargetPosition, axes("target.position.#"), "m"});
+  t.push_back({kTargetVelocity, axes("target.velocity.#"), "m/s"});
+  for (int motors = 8; motors >= 3; --motors) {
+    std::vector<std::string> names;
+    for (int k = 1; k <= motors; ++k) names.push_back("motor.command." + std::to_string(k));
+    t.push_back({kMotorCommand, names, "1"});
+  }
+  t.push_back({kThrustCommand, {"thrust.command.normalised"}, "1"});
+}
+
+/// The CSV of the published flights. Its "a" is a specific force in the world.
+void add_published(Table& t) {
+  t.push_back({kPosition, axes("#[m]"), "m"});
+  t.push_back({kVelocity, axes("v#[m/s]"), "m/s"});
+  t.push_back({kForceWorld, axes("a#[m/s^2]"), "m/s^2"});
+  t.push_back({kRates, axes("w#[rad/s]"), "rad/s"});
+  t.push_back({kDuty, rotors("u#[PWM]"), "1"});
+  t.push_back({kMotorForce, rotors("u#[N]"), "N"});
+  t.push_back({kBattery, {"Vbat[V]"}, "V"});
+  t.push_back({kThrust, {"thrust_des[g]"}, "gf", kGravity_m_s2, 1000});
+  t.push_back({kTorque, axes("torque#[Nm]"), "N m"});
+}
+
+/// Crazyflie: log variables of the firmware.
+void add_crazyflie(Table& t) {
+  t.push_back({kPosition, axes("stateestimatez.#"), "mm", 1, 1000});
+  t.push_back({kPosition, axes("stateestimate.#"), "m"});
+  t.push_back({kPosition, axes("kalman.state#"), "m"});
+  t.push_back({kPosition, axes("locsrv.#"), "m"});
+  t.push_back({kPosition, axes("locsrvz.#"), "mm", 1, 1000});
+  t.push_back({kPosition, axes("extpos.#"), "m"});
+  t.push_back({kPosition, axes("ext.pos.#"), "m"});
+  t.push_back({kVelocity, axes("stateestimatez.v#"), "mm/s", 1, 1000});
+  t.push_back({kVelocity, axes("stateestimate.v#"), "m/s"});
+  // kalman.stateP* is a velocity in the body frame: with kalman.state* the velocity is derived from the position.
+  t.push_back({kForceWorld, axes("stateestimatez.a#"), "mm/s^2", 1, 1000});
+  t.push_back({kForceBody, axes("acc.#"), "g", kGravity_m_s2, 1});
+  t.push_back({kAttitude, quaternion("stateestimate.q#"), "1"});
+  t.push_back({kPackedAttitude, {"stateestimatez.quat"}, "packed"});
+  t.push_back({kAttitude, each("kalman.q#", {"1", "2", "3", "0"}), "1"});
+  t.push_back({kAttitude, quaternion("locsrv.q#"), "1"});
+  t.push_back({kEuler, axes("ctrllee.rpy#"), "rad"});
+  // The firmware's legacy convention: degrees, and a positive pitch raises the nose.
+  for (const char* group : {"stateestimate.#", "stabilizer.#"})
+    t.push_back({kEuler, euler(group), "deg", kDegree_rad, 1, Ask::kLegacyPitch});
+  t.push_back({kRates, each("stateestimatez.rate#", {"roll", "pitch", "yaw"}), "mrad/s", 1, 1000});
+  t.push_back({kRates, axes("ctrllee.omega#"), "rad/s"});
+  t.push_back({kRates, axes("gyro.#"), "deg/s", kDegree_rad, 1, Ask::kRates});
+  t.push_back({kRates, each("ctrlmel.r.#", {"roll", "pitch", "yaw"}), "rad/s", 1, 1, Ask::kLegacyPitch});
+  t.push_back({kDuty, rotors("pwm.m#.pwm"), "1/65536", 1, 65536});
+  t.push_back({kRequested, rotors("motor.m#req"), "1/65536", 1, 65536});
+  t.push_back({kRequested, rotors("motor.m#"), "1/65536", 1, 65536, Ask::kMotors});
+  t.push_back({kRotorSpeed, rotors("rpm.m#"), "rpm"});
+  t.push_back({kBattery, {"pm.vbatmv"}, "mV", 1, 1000});
+  t.push_back({kBattery, {"pm.vbat"}, "V"});
+  t.push_back({kTargetPosition, axes("ctrltargetz.#"), "mm", 1, 1000});
+  t.push_back({kTargetPosition, axes("ctrltarget.#"), "m"});
+  t.push_back({kTargetVelocity, axes("ctrltargetz.v#"), "mm/s", 1, 1000});
+  t.push_back({kTargetVelocity, axes("ctrltarget.v#"), "m/s"});
+  t.push_back({kMotorForce, rotors("motor.f#"), "N"});
+  t.push_back({kThrust, {"motor.thrust"}, "N"});
+  t.push_back({kThrust, {"ctrllee.thrustsi"}, "N"});
+  t.push_back({kThrust, {"ctrlmel.thrustsi"}, "N"});
+  t.push_back({kTorque, axes("motor.torque#"), "N m"});
+  t.push_back({kTorque, axes("ctrllee.torque#"), "N m"});
+  for (const char* name : {"ctrlmel.cmd.thrust", "controller.cmd.thrust", "controller.actuatorthrust",
+                           "ctrllee.thrust", "stabilizer.thrust"})
+    t.push_back({kThrustCommand, {name}, "1"});
+  // Accelerations of the estimate last: they are derivatives that the estimator has filtered in its own way.
+  t.push_back({kAccelerationWorld, axes("stateestimate.a#"), "g", kGravity_m_s2, 1});
+}
+
+/// CSV as people write it. The first name of a group is what the tool itself would write.
+void add_generic(Table& t) {
+  for (const char* group : {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#",
+                            "odom.position.#", "drone.#", "vicon.#", "mocap.#", "pos#", "#"})
+    t.push_back({kPosition, axes(group), "m"});
+  for (const char* group : {"velocity.#", "vel.#", "v#", "v.#", "vel#", "linear.velocity.#", "d#", "#dot"})
+    t.push_back({kVelocity, axes(group), "m/s"});
+  for (const char* group : {"imu.acc.#", "accel.#", "accelerometer.#", "imu.linear.acceleration.#", "acc#",
+                            "linear.acceleration.#", "acceleration.#", "a#", "a.#"})
+    t.push_back({kForceBody, axes(group), "", 1, 1, Ask::kAcceleration});
+  for (const char* group : {"q#", "q.#", "quat.#", "quaternion.#", "orientation.#", "pose.orientation.#",
+                            "pose.pose.orientation.#", "att.q#"})
+    t.push_back({kAttitude, quaternion(group), "1"});
+  for (const char* group : {"q#", "q.#", "quat.#", "quaternion.#"})
+    t.push_back({kAttitude, each(group, {"0", "1", "2", "3"}), "1", 1, 1, Ask::kQuaternion});
+  for (const auto& names : {euler("#"), euler("att.#"), euler("attitude.#"), euler("euler.#"),
+                            each("#", {"phi", "theta", "psi"}), axes("rpy.#"), axes("euler.#")})
+    t.push_back({kEuler, names, "", 1, 1, Ask::kAngles});
+  for (const char* group : {"imu.gyro.#", "gyr.#", "angular.velocity.#", "omega.#", "w#", "w.#", "gyro#",
+                            "omega#", "body.rate.#", "body.rates.#"})
+    t.push_back({kRates, axes(group), "", 1, 1, Ask::kRates});
+  t.push_back({kRates, {"p", "q", "r"}, "", 1, 1, Ask::kRates});
+  for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#", "thrust.#", "cmd.#"})
+    t.push_back({kDuty, rotors(group), "", 1, 1, Ask::kMotors});
+  for (const char* group : {"rpm#", "rpm.#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
+    t.push_back({kRotorSpeed, rotors(group), "rpm"});
+  for (const char* name :
+       {"battery", "vbat", "voltage", "battery.voltage", "batt", "bat", "v.bat", "battery.v"})
+    t.push_back({kBattery, {name}, "V"});
+  for (const char* group :
+       {"target.#", "ref.#", "des.#", "setpoint.#", "sp.#", "desired.#", "target.p#", "#.ref", "#.des", "#.d",
+        "p#.ref", "p#.des", "#.sp", "target.position.#", "reference.#"})
+    t.push_back({kTargetPosition, axes(group), "m"});
+  for (const char* group :
+       {"target.v#", "ref.v#", "des.v#", "setpoint.v#", "sp.v#", "v#.ref", "v#.des", "v#.sp"})
+    t.push_back({kTargetVelocity, axes(group), "m/s"});
+  for (const char* name : {"thrust", "thrust.cmd", "cmd.thrust", "collective.thrust", "thrust.setpoint"})
+    t.push_back({kThrustCommand, {name}, "1"});
+}
+
+Table make_table() {
+  Table table;
+  add_own(table);
+  add_published(table);
+  add_crazyflie(table);
+  add_generic(table);
+  return table;
+}
+
+bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; }
+
+}  // namespace
+
+const std::vector<NamedColumns>& column_names() {
+  static const Table table = make_table();
+  return table;
+}
+
+std::string plain_name(const std::string& column) {
+  std::string plain;
+  bool in_word = false;
+  for (const char c : column.substr(0, column.find_first_of("[(", 1))) {
+    if (is_word(c)) {
+      if (!in_word && !plain.empty()) plain += '.';
+      plain += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+    in_word = is_word(c);
+  }
+  // Array elements keep their index: q[0] is "q.0".
+  const std::size_t bracket = column.find('[', 1);
+  if (bracket != std::string::npos && bracket + 1 < column.size() &&
+      std::isdigit(static_cast<unsigned char>(column[bracket + 1])) != 0)
+    plain += "." + plain_name(column.substr(bracket + 1));
+  return plain;
+}
+
+bool is_called(const std::string& column, const std::string& name) {
+  if (column == name) return true;
+  if (column.size() <= name.size() + 1 || name.find('.') == std::string::npos) return false;
+  const std::size_t start = column.size() - name.size();
+  for (const char* const wish : {"target.", "ref.", "reference.", "des.", "desired.", "setpoint.", "cmd.", "command.",
+                                 "goal.", "error.", "err.", "initial."}) {
+    if (column.rfind(wish, 0) == 0) return false;
+  }
+  return column[start - 1] == '.' && column.compare(start, name.size(), name) == 0 &&
+         column.find('.') == start - 1;
+}
+
+}  // namespace swarmcert::logs

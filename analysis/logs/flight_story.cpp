@@ -1,0 +1,311 @@
+#include "analysis/logs/flight_story.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/logs/statistics_of_series.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr double kIdleShare = 0.3;      // of the thrust that is common in a log
+constexpr double kAboveStanding_m = 0.03;
+constexpr double kShortestFlight_s = 0.5, kShortestPause_s = 0.3, kLongestTakeoff_s = 3;
+constexpr double kNoThrustHeight_m = 0.15;
+
+double seconds(const Log& log, std::size_t i) { return 1e-6 * log.samples[i].time_us; }
+
+/// In a unit of its own; empty where the log has none.
+std::vector<double> thrust_of(const Log& log) {
+  std::vector<double> thrust;
+  if (log.signals.thrust == ThrustSource::kNone) return thrust;
+  for (const Sample& s : log.samples)
+    thrust.push_back(log.signals.thrust == ThrustSource::kDuty ? s.duty[0] + s.duty[1] + s.duty[2] + s.duty[3]
+                                                               : s.given_thrust);
+  return thrust;
+}
+
+double speed(const Sample& s) { return std::hypot(s.velocity_m_s[0], s.velocity_m_s[1], s.velocity_m_s[2]); }
+
+/// Turns runs of `value` that last less than `shortest_s` round; not those at the ends of the log.
+void drop_short_runs(const Log& log, std::vector<char>& flags, char value, double shortest_s, bool at_ends) {
+  std::size_t start = 0;
+  for (std::size_t i = 1; i <= flags.size(); ++i) {
+    if (i < flags.size() && flags[i] == flags[start]) continue;
+    const bool inside = start > 0 && i < flags.size();
+    if (flags[start] == value && (inside || at_ends) && seconds(log, i - 1) - seconds(log, start) < shortest_s)
+      std::fill(flags.begin() + static_cast<std::ptrdiff_t>(start), flags.begin() + static_cast<std::ptrdiff_t>(i),
+                static_cast<char>(1 - value));
+    start = i;
+  }
+}
+
+/// Splits a stretch in the air into takeoff, flight and landing.
+void add_flight(const Log& log, std::size_t first, std::size_t end, std::vector<Phase>& phases) {
+  const double t0 = seconds(log, first), t1 = seconds(log, end - 1);
+  double start = t0, stop = t1;
+  std::vector<double> heights;
+  for (std::size_t i = first; i < end; ++i) heights.push_back(log.samples[i].position_m[2]);
+  const double middle = median(heights);
+  const auto reached = [&](std::size_t i, double ground) {
+    return std::abs(log.samples[i].position_m[2] - ground) > 0.8 * std::abs(middle - ground);
+  };
+  if (first > 0) {
+    std::size_t i = first;
+    while (i + 1 < end && !reached(i, heights.front()) && seconds(log, i) - t0 < kLongestTakeoff_s) ++i;
+    start = seconds(log, i);
+    phases.push_back({"takeoff", t0, start});
+  }
+  if (end < log.samples.size()) {
+    std::size_t i = end - 1;
+    while (i > first && !reached(i, heights.back()) && t1 - seconds(log, i) < kLongestTakeoff_s) --i;
+    stop = std::max(start, seconds(log, i));
+  }
+  phases.push_back({"flight", start, stop});
+  if (end < log.samples.size()) phases.push_back({"landing", stop, t1});
+}
+
+void add_phases(const Log& log, const std::vector<char>& air, FlightStory& story) {
+  std::size_t start = 0;
+  for (std::size_t i = 1; i <= air.size(); ++i) {
+    if (i < air.size() && air[i] == air[start]) continue;
+    if (air[start] != 0) {
+      story.air_s += seconds(log, i - 1) - seconds(log, start);
+      add_flight(log, start, i, story.phases);
+    } else {
+      story.phases.push_back({"ground", seconds(log, start), seconds(log, i - 1)});
+    }
+    start = i;
+  }
+}
+
+/// One event for every run of records for which `holds`, runs nearer than 0.3 s taken together.
+template <typename Holds>
+void add_runs(const Log& log, const std::string& kind, double shortest_s, const std::string& what, const Holds& holds,
+              std::vector<LogEvent>& events) {
+  constexpr double kApart_s = 0.3;
+  double start = 0, last = 0;
+  bool open = false;
+  const auto close = [&] {
+    if (open && last - start >= shortest_s) events.push_back({kind, start, last - start, what});
+    open = false;
+  };
+  for (std::size_t i = 0; i < log.samples.size(); ++i) {
+    if (!holds(i)) continue;
+    const double now = seconds(log, i);
+    if (open && now - last > kApart_s) close();
+    if (!open) start = now;
+    open = true;
+    last = now;
+  }
+  close();
+}
+
+/// Oscillation of the attitude in flight: within windows of 1.5 s the roll or pitch rate is large and keeps one frequency.
+void add_limit_cycles(const Log& log, const std::vector<char>& air, std::vector<LogEvent>& events) {
+  constexpr double kWindow_s = 1.5, kLeast_rad_s = 1.2, kLeastCorrelation = 0.7;
+  if (!log.signals.rates || log.samples.size() < 100) return;
+  std::vector<char> cycling(log.samples.size(), 0);
+  std::size_t first = 0;
+  while (first < log.samples.size()) {
+    std::size_t end = first + 1;
+    while (end < log.samples.size() && !log.samples[end].restarts && seconds(log, end) - seconds(log, first) < kWindow_s)
+      ++end;
+    const std::size_t n = end - first;
+    const double length_s = seconds(log, end - 1) - seconds(log, first);
+    const bool flies = std::all_of(air.begin() + static_cast<std::ptrdiff_t>(first),
+                                   air.begin() + static_cast<std::ptrdiff_t>(end), [](char a) { return a != 0; });
+    for (std::size_t axis = 0; axis < 2 && flies && length_s > 0.9 * kWindow_s; ++axis) {
+      std::vector<double> rate(n);
+      double mean = 0, energy = 0;
+      for (std::size_t i = 0; i < n; ++i) mean += log.samples[first + i].rates_rad_s[axis] / static_cast<double>(n);
+      for (std::size_t i = 0; i < n; ++i) {
+        rate[i] = log.samples[first + i].rates_rad_s[axis] - mean;
+        energy += rate[i] * rate[i];
+      }
+      if (std::sqrt(energy / static_cast<double>(n)) < kLeast_rad_s) continue;
+      // The autocorrelation of an oscillation comes back after a period; that of a manoeuvre does not.
+      double best = 0;
+      bool fell = false;
+      for (std::size_t lag = 1; lag < n / 2; ++lag) {
+        double product = 0;
+        for (std::size_t i = 0; i + lag < n; ++i) product += rate[i] * rate[i + lag];
+        const double correlation =
+            product / energy * static_cast<double>(n) / static_cast<double>(n - lag);
+        fell = fell || correlation < 0;
+        if (fell) best = std::max(best, correlation);
+      }
+      if (best > kLeastCorrelation)
+        std::fill(cycling.begin() + static_cast<std::ptrdiff_t>(first),
+                  cycling.begin() + static_cast<std::ptrdiff_t>(end), 1);
+    }
+    first = end;
+  }
+  add_runs(log, "limit cycle", 0, "roll or pitch rate keeps one frequency",
+           [&](std::size_t i) { return cycling[i] != 0; }, events);
+}
+
+void add_events(const Log& log, const std::vector<char>& air, FlightStory& story) {
+  constexpr double kImpact_m_s2 = 3 * kGravity_m_s2;
+  story.events = log.events;
+  for (std::size_t i = 1; i < log.samples.size(); ++i) {
+    if (!log.samples[i].restarts) continue;
+    const double pause_s = seconds(log, i) - seconds(log, i - 1);
+    story.events.push_back({"dropout", seconds(log, i - 1), pause_s, "no record"});
+  }
+  if (log.signals.force) {
+    add_runs(log, "impact", 0, "more than 3 g",
+             [&](std::size_t i) {
+               const Vector& f = log.samples[i].specific_force_m_s2;
+               return std::hypot(f[0], f[1], f[2]) > kImpact_m_s2;
+             },
+             story.events);
+  }
+  if (log.signals.attitude) {
+    add_runs(log, "impact", 0, "thrust axis more than 60 degrees from the vertical",
+             [&](std::size_t i) { return rotation(log.samples[i])[2][2] < 0.5; }, story.events);
+  }
+  if (log.signals.thrust == ThrustSource::kDuty) {
+    add_runs(log, "saturation", 0.05, "a motor at full duty",
+             [&](std::size_t i) {
+               const auto& d = log.samples[i].duty;
+               return *std::max_element(d.begin(), d.end()) > 0.998;
+             },
+             story.events);
+  }
+  add_limit_cycles(log, air, story.events);
+  std::stable_sort(story.events.begin(), story.events.end(),
+                   [](const LogEvent& a, const LogEvent& b) { return a.time_s < b.time_s; });
+}
+
+/// The lines to log for a signal, in the language of the log's own firmware.
+std::string lines_for(const Log& log, const std::string& signal) {
+  struct Lines {
+    const char *signal, *crazyflie, *px4, *other;
+  };
+  static const Lines kLines[] = {
+      {"attitude", "stateEstimate.qx stateEstimate.qy stateEstimate.qz stateEstimate.qw", "vehicle_attitude",
+       "the attitude as a quaternion"},
+      {"specific_force", "acc.x acc.y acc.z", "vehicle_acceleration", "the accelerometer"},
+      {"velocity", "stateEstimate.vx stateEstimate.vy stateEstimate.vz", "vehicle_local_position", "the velocity"},
+      {"position", "stateEstimate.x stateEstimate.y stateEstimate.z", "vehicle_local_position", "the position"},
+      {"duty", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "actuator_motors", "the command of every motor"},
+      {"battery", "pm.vbatMV", "battery_status", "the battery's voltage"},
+      {"rates", "gyro.x gyro.y gyro.z (at 500 Hz)", "vehicle_angular_velocity (at 400 Hz or more)",
+       "the angular rates at 400 Hz or more"},
+      {"target", "ctrltarget.x ctrltarget.y ctrltarget.z ctrltarget.vx ctrltarget.vy ctrltarget.vz",
+       "trajectory_setpoint", "the set points of position and velocity"}};
+  for (const Lines& lines : kLines) {
+    if (signal != lines.signal) continue;
+    if (log.format.rfind("usd", 0) == 0) return std::string("config.txt: ") + lines.crazyflie;
+    if (log.format == "ulog") return std::string("logger_topics.txt: ") + lines.px4;
+    return lines.other;
+  }
+  return "";
+}
+
+void add_missing(const Log& log, FlightStory& story) {
+  const Signals& s = log.signals;
+  const auto add = [&](const std::string& signal, const std::string& needed_for) {
+    story.missing.push_back({signal, needed_for, lines_for(log, signal)});
+  };
+  if (s.thrust == ThrustSource::kNone) {
+    add("duty", "any force");
+    add("battery", "the thrust of the duties");
+  }
+  if (s.thrust == ThrustSource::kForce) {
+    add("duty", "thrust that does not rest on the controller's own scale; mean torques");
+    add("battery", "the thrust of the duties; the effect of the battery");
+  }
+  if (s.thrust == ThrustSource::kHoverMultiple) add("battery", "a thrust in newton instead of multiples of the hover thrust");
+  if (!s.attitude) add("attitude", "lateral forces");
+  if (!s.position) add("position", "effects of height and of neighbours");
+  if (s.specific_force == ForceSource::kNone) add("velocity", "any force, where there is no accelerometer");
+  if (s.specific_force == ForceSource::kPosition) add("velocity", "forces within 100 ms and at a quarter of the noise");
+  if (s.specific_force != ForceSource::kAccelerometer)
+    add("specific_force", "forces faster than the window of the derivative");
+  if (s.torque != TorqueUse::kDynamic) add("rates", "torques beyond their mean in slow flight");
+  if (!s.targets) add("target", "the closed loop against the flight");
+}
+
+}  // namespace
+
+std::vector<double> standing_heights_m(const std::vector<double>& time_s, const std::vector<double>& height_m,
+                                       const std::vector<double>& speed_m_s, const std::vector<char>& idle) {
+  constexpr double kStill_m_s = 0.1;
+  const std::size_t n = idle.size();
+  std::vector<double> heights(n, std::nan("")), away_s(n, INFINITY);
+  const auto stands = [&](std::size_t i) { return idle[i] != 0 && speed_m_s[i] < kStill_m_s; };
+  std::size_t last = n;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (stands(i)) last = i;
+    if (last == n) continue;
+    heights[i] = height_m[last];
+    away_s[i] = time_s[i] - time_s[last];
+  }
+  last = n;
+  for (std::size_t i = n; i-- > 0;) {
+    if (stands(i)) last = i;
+    if (last < n && time_s[last] - time_s[i] < away_s[i]) heights[i] = height_m[last];
+  }
+  return heights;
+}
+
+std::vector<char> airborne(const Log& log) {
+  const std::size_t n = log.samples.size();
+  std::vector<char> air(n, 1), idle(n, 0);
+  const std::vector<double> thrust = thrust_of(log);
+  const double common = thrust.empty() ? 0 : quantile_of(thrust, 0.75);
+  for (std::size_t i = 0; i < n && !thrust.empty(); ++i) idle[i] = !(thrust[i] > kIdleShare * common) ? 1 : 0;
+  if (!thrust.empty() && !(common > 0)) idle.assign(n, 1);
+  if (thrust.empty() && log.signals.position && n > 0) {
+    // Without a thrust, the vehicle flies while it is clearly above the lowest place at which it was still.
+    std::vector<double> heights;
+    for (const Sample& s : log.samples) heights.push_back(s.position_m[2]);
+    const double low = quantile_of(heights, 0.02);
+    for (std::size_t i = 0; i < n; ++i) idle[i] = heights[i] < low + kNoThrustHeight_m ? 1 : 0;
+    if (quantile_of(heights, 0.98) < low + kNoThrustHeight_m && std::abs(low) > 0.3) idle.assign(n, 0);
+  }
+  std::vector<double> time_s, height_m, speed_m_s;
+  for (std::size_t i = 0; i < n; ++i) {
+    time_s.push_back(seconds(log, i));
+    height_m.push_back(log.samples[i].position_m[2]);
+    speed_m_s.push_back(speed(log.samples[i]));
+  }
+  const std::vector<double> standing = standing_heights_m(time_s, height_m, speed_m_s, idle);
+  for (std::size_t i = 0; i < n; ++i) {
+    const bool low = log.signals.position && log.samples[i].position_m[2] < standing[i] + kAboveStanding_m;
+    air[i] = idle[i] == 0 && !low ? 1 : 0;
+  }
+  drop_short_runs(log, air, 0, kShortestPause_s, false);
+  drop_short_runs(log, air, 1, kShortestFlight_s, true);
+  return air;
+}
+
+FlightStory tell(const Log& log) {
+  FlightStory story;
+  const std::vector<char> air = airborne(log);
+  if (!log.samples.empty()) add_phases(log, air, story);
+  add_events(log, air, story);
+  add_missing(log, story);
+  bool any_battery = false;
+  for (std::size_t i = 0; i < air.size(); ++i) {
+    const double volt = log.samples[i].battery_V;
+    if (air[i] == 0 || !(volt > 0)) continue;
+    if (!any_battery) story.battery_first_V = story.battery_least_V = volt;
+    any_battery = true;
+    story.battery_least_V = std::min(story.battery_least_V, volt);
+    story.battery_last_V = volt;
+  }
+  if (log.armed == Armed::kNever)
+    story.no_flight = "never armed";
+  else if (log.samples.empty())
+    story.no_flight = "no record";
+  else if (story.air_s == 0)
+    story.no_flight = "stands on the ground";
+  return story;
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,198 @@
+#include "analysis/logs/interpretation.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "analysis/logs/message_frames.h"
+#include "analysis/logs/statistics_of_series.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::logs {
+namespace {
+
+using Source = SignalInfo::Source;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kAbsoluteClock_s = 1e8;  ///< clocks beyond it count from 1970, or from a receiver's epoch
+
+/// A signal of the table or, where it has none, `otherwise`.
+double value_of(const SignalTable& table, int signal, std::size_t record, double otherwise) {
+  return table.has(signal) ? table[signal][record] : otherwise;
+}
+
+Sample sample_of(const SignalTable& t, std::size_t i, const Signals& signals) {
+  Sample sample;
+  sample.time_us = t.time_us[i];
+  sample.restarts = t.restarts[i] != 0;
+  const auto three = [&](int first, double otherwise) {
+    return Vector{value_of(t, first, i, otherwise), value_of(t, first + 1, i, otherwise),
+                  value_of(t, first + 2, i, otherwise)};
+  };
+  sample.position_m = three(kPosition, 0);
+  sample.velocity_m_s = three(kVelocity, 0);
+  for (int k = 0; k < 4; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    if (t.has(kAttitude)) sample.attitude[at] = t[kAttitude + k][i];
+    sample.duty[at] = value_of(t, kDuty + k, i, signals.force ? 0 : kNaN);
+    sample.motor_force_N[at] = value_of(t, kMotorForce + k, i, kNaN);
+  }
+  if (signals.force) sample.specific_force_m_s2 = three(kForceWorld, 0);
+  if (signals.thrust != ThrustSource::kDuty) sample.given_thrust = value_of(t, kThrust, i, 0);
+  sample.battery_V = value_of(t, kBattery, i, 0);
+  sample.rates_rad_s = three(kRates, kNaN);
+  sample.target_position_m = three(kTargetPosition, kNaN);
+  sample.target_velocity_m_s = three(kTargetVelocity, kNaN);
+  sample.thrust_command_N =
+      signals.thrust == ThrustSource::kHoverMultiple ? kNaN : value_of(t, kThrust, i, kNaN);
+  sample.torque_command_Nm = three(kTorque, kNaN);
+  return sample;
+}
+
+void refuse_without_motion(const Draft& draft) {
+  const SignalTable& t = draft.table;
+  const auto any = [&](int first) { return t.has(first) || t.has(first + 1) || t.has(first + 2); };
+  if (draft.recognition.groups.empty() ||
+      (!any(kPosition) && !any(kVelocity) && !t.has_group(kForceBody, 3) && !t.has_group(kForceWorld, 3))) {
+    throw files::InputError({draft.raw.path, "", "position", "",
+                             "no column carries it, nor a velocity or an acceleration",
+                             "log it, or say in a columns.toml (--columns) which column does"});
+  }
+}
+
+/// Clocks that count from 1970 start at zero; what was taken off stands in Log::epoch_s.
+void take_epoch_off(SignalTable& table, Log& log) {
+  if (table.time_us.empty() || table.time_us.front() * 1e-6 < kAbsoluteClock_s) return;
+  log.epoch_s = std::floor(table.time_us.front() * 1e-6);
+  for (double& time_us : table.time_us) time_us -= 1e6 * log.epoch_s;
+}
+
+void add_rest(Draft& draft) {
+  const std::pair<const char*, int> groups[] = {{"target_position", kTargetPosition},
+                                                {"target_velocity", kTargetVelocity},
+                                                {"motor_force", kMotorForce},
+                                                {"torque_command", kTorque}};
+  for (const auto& [name, signal] : groups) {
+    if (draft.is_measured(signal)) draft.add_measured(name, signal);
+  }
+}
+
+void drop_bad_quaternions(Draft& draft) {
+  SignalTable& t = draft.table;
+  if (t.has(kPackedAttitude) || !t.has_group(kAttitude, 4)) return;
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    double norm = 0;
+    for (int k = 0; k < 4; ++k) norm += t[kAttitude + k][i] * t[kAttitude + k][i];
+    if (std::abs(norm - 1) < 0.05) kept.push_back(i);
+  }
+  if (kept.size() == t.size()) return;
+  draft.log.health.not_finite += t.size() - kept.size();
+  draft.log.health.records = kept.size();
+  for (auto& column : t.values) {
+    if (column.empty()) continue;
+    for (std::size_t k = 0; k < kept.size(); ++k) column[k] = column[kept[k]];
+    column.resize(kept.size());
+  }
+  for (std::size_t k = 0; k < kept.size(); ++k) t.time_us[k] = t.time_us[kept[k]];
+  t.time_us.resize(kept.size());
+  t.restarts.assign(kept.size(), 0);
+  const double gap_us = 1e6 * longest_gap_s(t.step_s());
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    t.restarts[k] = k == 0 || t.time_us[k] - t.time_us[k - 1] > gap_us ? 1 : 0;
+}
+
+double rate_hz_of(const RawTopic& topic) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < topic.time_s.size(); ++i)
+    steps.push_back(topic.time_s[i] - topic.time_s[i - 1]);
+  const double step = median(steps);
+  return step > 0 ? 1 / step : 0;
+}
+
+}  // namespace
+
+void Draft::add(const std::string& name, SignalInfo::Source source, const std::string& from,
+                const std::string& unit, double noise) const {
+  const double step_s = table.step_s();
+  const bool has_rate = source != Source::kMissing && step_s > 0;
+  log.sources.push_back({name, source, from, unit, has_rate ? 1 / step_s : 0, noise});
+}
+
+void Draft::add_measured(const std::string& name, int signal) const {
+  std::string from, unit;
+  double rate_hz = 0;
+  // A columns.toml names every axis by itself.
+  for (const Carried& carried : recognition.groups) {
+    const bool belongs = carried.signal == signal ||
+                         (recognition.groups.size() > 1 && carried.size() == 1 && carried.signal > signal &&
+                          carried.signal < signal + 3 && signal != kBattery && signal != kPackedAttitude);
+    if (!belongs) continue;
+    from += (from.empty() ? "" : ", ") + names_of(raw, carried);
+    unit = carried.unit;
+    rate_hz = rate_hz_of(raw.topics[carried.topic]);
+    if (raw.topics.size() > 1 && !raw.topics[carried.topic].name.empty())
+      from = raw.topics[carried.topic].name + ": " + from;
+  }
+  log.sources.push_back({name, Source::kMeasured, from, unit, rate_hz, kNaN});
+}
+
+void settle_judgement(Draft& draft) {
+  const SignalTable& t = draft.table;
+  Signals& signals = draft.log.signals;
+  const std::pair<bool, const char*> needed[] = {
+      {signals.specific_force != ForceSource::kNone,
+       "specific force, or a velocity or position to derive it from"},
+      {signals.thrust != ThrustSource::kNone,
+       "thrust: duty of the motors and battery voltage, or a commanded force"}};
+  for (const auto& [present, what] : needed) {
+    if (!present) signals.force_lacks += (signals.force_lacks.empty() ? "" : "; ") + std::string(what);
+  }
+  signals.force = signals.force_lacks.empty();
+  for (std::size_t k = 0; k < 3 && signals.force; ++k) {
+    const bool moves =
+        signals.specific_force == ForceSource::kAccelerometer || !draft.acceleration_m_s2[k].empty();
+    signals.force_axes[k] = moves && (k == 2 || signals.attitude);
+  }
+  signals.targets = t.has_group(kTargetPosition, 3) && t.has_group(kTargetVelocity, 3);
+  signals.commands = t.has_group(kMotorForce, 4) && t.has(kThrust) && t.has_group(kTorque, 3);
+  signals.rates = t.has_group(kRates, 3);
+  // Torques need the thrust of each rotor; their dynamics alias below the rate of the attitude loop.
+  const bool each_rotor = t.has_group(kDuty, 4) || t.has_group(kRotorSpeed, 4) || t.has_group(kRequested, 4);
+  signals.torque = !each_rotor                                                 ? TorqueUse::kNone
+                   : signals.rates && t.step_s() > 0 && t.step_s() < 1 / 400.0 ? TorqueUse::kDynamic
+                                                                               : TorqueUse::kMean;
+}
+
+Log interpret(RawLog raw, const SignalMap& map) {
+  Log log;
+  log.path = raw.path;
+  log.format = raw.format;
+  log.health = raw.health;
+  log.armed = was_armed(raw);
+  for (const RawTopic& topic : raw.topics) {
+    for (const RawColumn& column : topic.columns) log.channels.push_back(column.name);
+  }
+  add_own_names(raw);
+  Draft draft{raw, recognise(raw, map), {}, log, {}, map.empty()};
+  draft.table = signal_table(raw, draft.recognition, map, log.health, log.events);
+  for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);
+  refuse_without_motion(draft);
+  drop_bad_quaternions(draft);
+  take_epoch_off(draft.table, log);
+  for (RawTopic& topic : raw.topics) {
+    for (RawColumn& column : topic.columns) column.values = {};  // they stand in the table now
+  }
+  derive_kinematics(draft);
+  settle_attitude(draft);
+  settle_specific_force(draft);
+  settle_thrust(draft);
+  add_rest(draft);
+  settle_judgement(draft);
+  estimate_delays(draft);
+  log.samples.reserve(draft.table.size());
+  for (std::size_t i = 0; i < draft.table.size(); ++i)
+    log.samples.push_back(sample_of(draft.table, i, log.signals));
+  return log;
+}
+
+}  // namespace swarmcert::logs

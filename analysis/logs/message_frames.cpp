@@ -1,0 +1,201 @@
+#include "analysis/logs/message_frames.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <functional>
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr double kDegree_rad = 3.14159265358979323846 / 180;
+
+/// "vehicle_local_position" of a topic of that name, or of the type px4_msgs/msg/VehicleLocalPosition.
+std::string message_of(const RawTopic& topic) {
+  const std::size_t slash = topic.type.rfind('/');
+  if (topic.type.rfind("px4_msgs", 0) != 0 || slash == std::string::npos) return topic.name;
+  std::string name;
+  for (const char c : topic.type.substr(slash + 1)) {
+    if (std::isupper(static_cast<unsigned char>(c)) != 0 && !name.empty()) name += '_';
+    name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  return name;
+}
+
+/// Copies of columns of one topic under other names.
+class Renamer {
+ public:
+  explicit Renamer(RawTopic& topic) : topic_(topic) {}
+
+  /// False where the topic has no column `from`.
+  bool add(const std::string& from, const std::string& to, double factor) {
+    const RawColumn* const column = topic_.find(from);
+    if (column == nullptr || topic_.find(to) != nullptr) return false;
+    RawColumn copy{to, "", column->values};
+    for (double& value : copy.values) value *= factor;
+    topic_.columns.push_back(std::move(copy));
+    return true;
+  }
+
+  /// The first of `patterns` ('#' stands for an axis' name) whose three columns are there, as (x, -y, -z).
+  void add_vector(const std::vector<std::string>& patterns, const std::vector<std::string>& axes, const std::string& to,
+                  double factor = 1) {
+    const char* const kAxes[] = {"_x", "_y", "_z"};
+    for (const std::string& pattern : patterns) {
+      bool all = true;
+      for (std::size_t k = 0; k < 3 && all; ++k) all = topic_.find(filled(pattern, axes[k])) != nullptr;
+      for (std::size_t k = 0; k < 3 && all; ++k)
+        add(filled(pattern, axes[k]), to + kAxes[k], k == 0 ? factor : -factor);
+      if (all) return;
+    }
+  }
+
+  static std::string filled(const std::string& pattern, const std::string& word) {
+    std::string name = pattern;
+    return name.replace(name.find('#'), 1, word);
+  }
+
+ private:
+  RawTopic& topic_;
+};
+
+const std::vector<std::string> kXyz = {"x", "y", "z"}, kIndex = {"0", "1", "2"};
+
+void add_quaternion(RawTopic& topic) {
+  Renamer renamer(topic);
+  renamer.add("q[1]", "attitude_x", 1);
+  renamer.add("q[2]", "attitude_y", -1);
+  renamer.add("q[3]", "attitude_z", -1);
+  renamer.add("q[0]", "attitude_w", 1);
+}
+
+/// Motor commands from columns of servo signals in microseconds: those that are driven, from the first on. A value below
+/// 900 or so means that the output is off.
+void add_servo_outputs(RawTopic& topic, const std::string& pattern, int first) {
+  int motor = 0;
+  for (int k = first; k < first + 8; ++k) {
+    const RawColumn* const column = topic.find(Renamer::filled(pattern, std::to_string(k)));
+    if (column == nullptr || column->values.empty()) break;
+    const auto [low, high] = std::minmax_element(column->values.begin(), column->values.end());
+    if (!(*high >= 900) || !(*high <= 2500) || *high == *low) break;
+    RawColumn command{"motor_command_" + std::to_string(++motor), "", column->values};
+    for (double& value : command.values) value = std::min(std::max((value - 1000) / 1000, 0.0), 1.0);
+    topic.columns.push_back(std::move(command));
+  }
+}
+
+/// Normalised motor commands; NaN where a motor is not used.
+void add_motors(RawTopic& topic) {
+  for (int k = 0; k < 8; ++k) {
+    const RawColumn* const column = topic.find("control[" + std::to_string(k) + "]");
+    if (column == nullptr) return;
+    const bool used = std::any_of(column->values.begin(), column->values.end(),
+                                  [](double x) { return std::isfinite(x); });
+    if (!used) return;
+    RawColumn command{"motor_command_" + std::to_string(k + 1), "", column->values};
+    for (double& value : command.values) value = std::isfinite(value) ? std::max(value, 0.0) : 0;  // disarmed
+    topic.columns.push_back(std::move(command));
+  }
+}
+
+void add_px4(RawTopic& topic, const std::string& message) {
+  Renamer renamer(topic);
+  if (message == "vehicle_local_position") {
+    renamer.add_vector({"#"}, kXyz, "position");
+    renamer.add_vector({"v#"}, kXyz, "velocity");
+  } else if (message == "vehicle_attitude") {
+    add_quaternion(topic);
+    renamer.add_vector({"#speed"}, {"roll", "pitch", "yaw"}, "rate");
+  } else if (message == "vehicle_angular_velocity") {
+    renamer.add_vector({"xyz[#]"}, kIndex, "rate");
+  } else if (message == "vehicle_acceleration") {
+    renamer.add_vector({"xyz[#]"}, kIndex, "specific_force_body");
+  } else if (message == "sensor_combined") {
+    renamer.add_vector({"accelerometer_m_s2[#]"}, kIndex, "specific_force_body");
+    renamer.add_vector({"gyro_rad[#]"}, kIndex, "rate");
+  } else if (message == "battery_status") {
+    if (!renamer.add("voltage_v", "battery_volt", 1)) renamer.add("voltage_filtered_v", "battery_volt", 1);
+  } else if (message == "actuator_motors") {
+    add_motors(topic);
+  } else if (message == "actuator_outputs") {
+    add_servo_outputs(topic, "output[#]", 0);
+  } else if (message == "vehicle_thrust_setpoint") {
+    renamer.add("xyz[2]", "thrust_command_normalised", -1);
+  } else if (message == "actuator_controls_0") {
+    renamer.add("control[3]", "thrust_command_normalised", 1);
+  } else if (message == "vehicle_local_position_setpoint" || message == "trajectory_setpoint") {
+    renamer.add_vector({"position[#]"}, kIndex, "target_position");
+    renamer.add_vector({"#"}, kXyz, "target_position");
+    renamer.add_vector({"velocity[#]"}, kIndex, "target_velocity");
+    renamer.add_vector({"v#"}, kXyz, "target_velocity");
+  }
+}
+
+void add_ardupilot(RawTopic& topic) {
+  Renamer renamer(topic);
+  const std::string& message = topic.name;
+  const std::vector<std::string> ned = {"N", "E", "D"}, capital = {"X", "Y", "Z"};
+  if (message == "XKF1" || message == "NKF1") {
+    renamer.add_vector({"P#"}, ned, "position");
+    renamer.add_vector({"V#"}, ned, "velocity");
+  } else if (message == "ATT") {
+    renamer.add_vector({"#"}, {"Roll", "Pitch", "Yaw"}, "euler", kDegree_rad);
+  } else if (message == "IMU") {
+    renamer.add_vector({"Acc#"}, capital, "specific_force_body");
+    renamer.add_vector({"Gyr#"}, capital, "rate");
+  } else if (message == "BAT" || message == "CURR") {
+    renamer.add("Volt", "battery_volt", 1);
+  } else if (message == "RCOU") {
+    add_servo_outputs(topic, "C#", 1);
+  } else if (message == "CTUN") {
+    renamer.add("ThO", "thrust_command_normalised", 1);
+  }
+}
+
+/// Whether any topic of that name has a record whose `column` holds `holds`; nothing where there is no such column.
+Armed any_record(const RawLog& log, const std::string& message, const std::string& column,
+                 const std::function<bool(double)>& holds) {
+  Armed armed = Armed::kUnknown;
+  for (const RawTopic& topic : log.topics) {
+    const RawColumn* const found = message_of(topic) == message ? topic.find(column) : nullptr;
+    if (found == nullptr || found->values.empty()) continue;
+    armed = Armed::kNever;
+    if (std::any_of(found->values.begin(), found->values.end(), holds)) return Armed::kYes;
+  }
+  return armed;
+}
+
+}  // namespace
+
+void add_own_names(RawLog& log) {
+  // The first instance of a message is the one in use; others would be taken where the first lacks a column.
+  std::map<std::string, int> lowest;
+  for (const RawTopic& topic : log.topics) {
+    const auto [known, is_new] = lowest.emplace(message_of(topic), topic.instance);
+    if (!is_new) known->second = std::min(known->second, topic.instance);
+  }
+  const bool is_ardupilot = log.format.find("ardupilot") != std::string::npos;
+  for (RawTopic& topic : log.topics) {
+    const std::string message = message_of(topic);
+    if (topic.instance != lowest[message]) continue;
+    if (is_ardupilot)
+      add_ardupilot(topic);
+    else if (message == "actuator_outputs" && lowest.count("actuator_motors") != 0)
+      continue;  // the same commands after their scaling to servo signals
+    else if (log.format == "ulog" || topic.type.rfind("px4_msgs", 0) == 0)
+      add_px4(topic, message);
+  }
+}
+
+Armed was_armed(const RawLog& log) {
+  constexpr double kArmedState = 2;  // vehicle_status.ARMING_STATE_ARMED
+  for (const Armed armed :
+       {any_record(log, "actuator_armed", "armed", [](double x) { return x != 0; }),
+        any_record(log, "vehicle_status", "arming_state", [](double x) { return x == kArmedState; }),
+        any_record(log, "STAT", "Armed", [](double x) { return x != 0; })}) {
+    if (armed != Armed::kUnknown) return armed;
+  }
+  return Armed::kUnknown;
+}
+
+}  // namespace swarmcert::logs

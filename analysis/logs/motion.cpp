@@ -1,0 +1,259 @@
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "analysis/logs/interpretation.h"
+#include "analysis/logs/smoother.h"
+#include "analysis/logs/statistics_of_series.h"
+
+namespace swarmcert::logs {
+namespace {
+
+using Source = SignalInfo::Source;
+
+/// Standard deviation of the noise of a derived acceleration: what the smoother leaves of a column is held to be its noise,
+/// and goes through the smoother's weights. Correlated noise of an estimator counts as its runs last.
+double noise_of_slope(const SignalTable& t, const std::vector<double>& column, double window_s, int degree,
+                      int derivative) {
+  const std::vector<double> smooth = local_derivative(t, column, window_s, degree, 0);
+  std::vector<double> left(column.size());
+  for (std::size_t i = 0; i < column.size(); ++i) left[i] = column[i] - smooth[i];
+  // A vehicle that stands shows less noise than one that flies.
+  constexpr double kMoving_m_s = 0.03;
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    double speed = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (t.has(kVelocity + k)) speed = std::max(speed, std::abs(t[kVelocity + k][i]));
+    }
+    if (speed < kMoving_m_s) left[i] = std::nan("");
+    sizes.push_back(std::abs(left[i]));
+  }
+  const double typical = median(sizes) / 0.6745;  // 0.6745: median of the size of a normal variable of unit deviation
+  double squares = 0, products = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    if (!(std::abs(left[i]) < 3 * typical)) left[i] = std::nan("");
+    if (i == 0 || t.restarts[i] != 0 || !std::isfinite(left[i]) || !std::isfinite(left[i - 1])) continue;
+    squares += left[i] * left[i];
+    products += left[i] * left[i - 1];
+    ++count;
+  }
+  const double step_s = t.step_s();
+  if (count < 10 || !(step_s > 0)) return std::nan("");
+  const double sigma = std::sqrt(squares / static_cast<double>(count));
+  const double rho = squares > 0 ? std::min(std::max(products / squares, 0.0), 0.95) : 0;
+  const double runs = (1 + rho) / (1 - rho), n = std::max(window_s / step_s, 3.0);
+  // Variance of a fitted slope over n even steps: 12 sigma^2 / (n w^2); of a second derivative: 720 sigma^2 / (n w^4).
+  return derivative == 1 ? sigma * std::sqrt(12 * runs / n) / window_s
+                         : sigma * std::sqrt(720 * runs / n) / (window_s * window_s);
+}
+
+double root_mean_square(const std::vector<double>& values) {
+  double squares = 0, count = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    squares += value * value;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / count) : std::nan("");
+}
+
+Vector rotated(const SignalTable& t, std::size_t i, const Vector& body) {
+  Sample sample;
+  for (int k = 0; k < 4; ++k) sample.attitude[static_cast<std::size_t>(k)] = t[kAttitude + k][i];
+  const auto R = rotation(sample);
+  Vector world{};
+  for (std::size_t r = 0; r < 3; ++r) world[r] = R[r][0] * body[0] + R[r][1] * body[1] + R[r][2] * body[2];
+  return world;
+}
+
+/// How far `force` (specific force in W, per axis) is from acceleration + g: root mean square over axes and records of
+/// what remains after the mean.
+double misfit(const Draft& draft, const std::array<std::vector<double>, 3>& force) {
+  double squares = 0;
+  int axes = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (draft.acceleration_m_s2[k].empty()) continue;
+    std::vector<double> difference;
+    for (std::size_t i = 0; i < force[k].size(); ++i)
+      difference.push_back(force[k][i] - draft.acceleration_m_s2[k][i] - (k == 2 ? kGravity_m_s2 : 0));
+    const double rms = root_mean_square(difference);
+    if (!std::isfinite(rms)) continue;
+    squares += rms * rms;
+    ++axes;
+  }
+  return axes > 0 ? std::sqrt(squares / axes) : std::nan("");
+}
+
+std::array<std::vector<double>, 3> as_world(const SignalTable& t, int signal, double scale, bool body,
+                                            bool without_gravity) {
+  std::array<std::vector<double>, 3> world;
+  for (auto& axis : world) axis.resize(t.size());
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    Vector f = t.three(signal, i);
+    for (double& x : f) x *= scale;
+    if (body) f = rotated(t, i, f);
+    if (without_gravity) f[2] += kGravity_m_s2;
+    for (std::size_t k = 0; k < 3; ++k) world[k][i] = f[k];
+  }
+  return world;
+}
+
+/// The median size of the vector says whether gravity is in it and in which unit; the acceleration says in which frame.
+void settle_accelerometer(Draft& draft) {
+  const Carried& carried = *draft.recognition.find(kForceBody);
+  SignalTable& t = draft.table;
+  if (carried.ask != Ask::kAcceleration || !draft.asks_physics) return;
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    const Vector f = t.three(kForceBody, i);
+    sizes.push_back(std::hypot(f[0], f[1], f[2]));
+  }
+  const double size = median(sizes);
+  struct Unit {
+    const char* name;
+    double gravity, scale;
+  };
+  const Unit units[] = {{"m/s^2", kGravity_m_s2, 1},
+                        {"g", 1, kGravity_m_s2},
+                        {"mg", 1000, kGravity_m_s2 / 1000},
+                        {"mm/s^2", 1000 * kGravity_m_s2, 0.001}};
+  const Unit* unit = nullptr;
+  for (const Unit& candidate : units) {
+    if (size > 0.7 * candidate.gravity && size < 1.4 * candidate.gravity) unit = &candidate;
+  }
+  const bool without_gravity = unit == nullptr;
+  double best = std::nan(""), best_scale = 1;
+  bool best_body = true;
+  for (const Unit& candidate : units) {
+    if (unit != nullptr && unit != &candidate) continue;
+    for (const bool body : {true, false}) {
+      const double rms = misfit(draft, as_world(t, kForceBody, candidate.scale, body, without_gravity));
+      if (std::isfinite(best) && !(rms < best)) continue;
+      best = rms;
+      best_scale = candidate.scale;
+      best_body = body;
+    }
+  }
+  const char* unit_name = "m/s^2";
+  for (const Unit& candidate : units) {
+    if (candidate.scale == best_scale) unit_name = candidate.name;
+  }
+  draft.note(fmt::format(
+      "{}: median size {:.4g}, {} gravity, unit {}, frame {}; {:.2f} m/s^2 from the derivative of "
+      "the velocity",
+      names_of(draft.raw, carried), size, without_gravity ? "without" : "with", unit_name,
+      best_body ? "body" : "world", best));
+  const auto world = as_world(t, kForceBody, best_scale, best_body, without_gravity);
+  for (int k = 0; k < 3; ++k) t[kForceWorld + k] = world[static_cast<std::size_t>(k)];
+}
+
+}  // namespace
+
+void derive_kinematics(Draft& draft) {
+  SignalTable& t = draft.table;
+  Signals& signals = draft.log.signals;
+  signals.position = t.has_group(kPosition, 3);
+  const char* const axes[] = {"x", "y", "z"};
+  if (t.has(kPosition) || t.has(kPosition + 1) || t.has(kPosition + 2))
+    draft.add_measured("position", kPosition);
+  else
+    draft.add("position", Source::kMissing, "", "m");
+  const bool has_velocity = t.has(kVelocity) || t.has(kVelocity + 1) || t.has(kVelocity + 2);
+  const double step_s = t.step_s();
+  const double velocity_s = velocity_window_s(step_s), position_s = position_window_s(step_s);
+  draft.log.window_s = has_velocity ? velocity_s : position_s;
+  std::string velocity_from, from;
+  double noise = 0, velocity_noise = 0;
+  for (int k = 0; k < 3; ++k) {
+    auto& acceleration = draft.acceleration_m_s2[static_cast<std::size_t>(k)];
+    double axis_noise = std::nan("");
+    if (t.has(kVelocity + k)) {
+      acceleration = local_derivative(t, t[kVelocity + k], velocity_s, 2, 1);
+      axis_noise = noise_of_slope(t, t[kVelocity + k], velocity_s, 2, 1);
+    } else if (t.has(kPosition + k)) {
+      t[kVelocity + k] = local_derivative(t, t[kPosition + k], velocity_s, 2, 1);
+      velocity_noise = std::max(velocity_noise, noise_of_slope(t, t[kPosition + k], velocity_s, 2, 1));
+      for (double& v : t[kVelocity + k]) v = std::isfinite(v) ? v : 0;
+      velocity_from += axes[k];
+      acceleration = local_derivative(t, t[kPosition + k], position_s, 3, 2);
+      axis_noise = noise_of_slope(t, t[kPosition + k], position_s, 3, 2);
+    } else {
+      continue;
+    }
+    from += axes[k];
+    if (std::isfinite(axis_noise)) noise = std::max(noise, axis_noise);
+  }
+  if (has_velocity)
+    draft.add_measured("velocity", kVelocity);
+  else if (!velocity_from.empty())
+    draft.add("velocity", Source::kDerived, "position " + velocity_from + ": local quadratic over 100 ms",
+              "m/s", velocity_noise);
+  else
+    draft.add("velocity", Source::kMissing, "", "m/s");
+  if (from.empty()) {
+    draft.add("acceleration", Source::kMissing, "", "m/s^2");
+    return;
+  }
+  draft.add("acceleration", Source::kDerived,
+            has_velocity ? fmt::format("velocity {}: local quadratic over {:.0f} ms", from, 1000 * velocity_s)
+                         : fmt::format("position {}: local cubic over {:.0f} ms", from, 1000 * position_s),
+            "m/s^2", noise);
+}
+
+void settle_specific_force(Draft& draft) {
+  SignalTable& t = draft.table;
+  Signals& signals = draft.log.signals;
+  if (t.has_group(kForceWorld, 3)) {
+    signals.specific_force = ForceSource::kAccelerometer;
+    draft.add_measured("specific_force", kForceWorld);
+  } else if (t.has_group(kForceBody, 3) && signals.attitude) {
+    settle_accelerometer(draft);
+    if (!t.has(kForceWorld)) {
+      const auto world = as_world(t, kForceBody, 1, true, false);
+      for (int k = 0; k < 3; ++k) t[kForceWorld + k] = world[static_cast<std::size_t>(k)];
+    }
+    signals.specific_force = ForceSource::kAccelerometer;
+    draft.add_measured("specific_force", kForceBody);
+  } else if (!draft.acceleration_m_s2[2].empty()) {
+    signals.specific_force = draft.is_measured(kVelocity) ? ForceSource::kVelocity : ForceSource::kPosition;
+    for (int k = 0; k < 3; ++k) {
+      const auto& acceleration = draft.acceleration_m_s2[static_cast<std::size_t>(k)];
+      t[kForceWorld + k].assign(t.size(), k == 2 ? kGravity_m_s2 : 0);
+      for (std::size_t i = 0; i < acceleration.size(); ++i) {
+        if (std::isfinite(acceleration[i])) t[kForceWorld + k][i] += acceleration[i];
+      }
+    }
+    draft.add("specific_force", Source::kDerived, "acceleration + g", "m/s^2");
+    for (const SignalInfo& info : draft.log.sources) {
+      if (info.name == "acceleration") draft.log.sources.back().noise = info.noise;
+    }
+    return;
+  } else {
+    draft.add("specific_force", Source::kMissing, "", "m/s^2");
+    return;
+  }
+  // Two independent measurements: their difference is the noise of the derived one, as far as it is not the sensor's.
+  const std::array<std::vector<double>, 3> force = {t[kForceWorld], t[kForceWorld + 1], t[kForceWorld + 2]};
+  std::vector<double> differences;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (draft.acceleration_m_s2[k].empty()) continue;
+    const std::vector<double> smooth = local_derivative(t, force[k], velocity_window_s(t.step_s()), 2, 0);
+    std::vector<double> axis;
+    for (std::size_t i = 0; i < smooth.size(); ++i) {
+      const bool lateral = t.has(kVelocity) && t.has(kVelocity + 1);
+      if (!lateral || std::hypot(t[kVelocity][i], t[kVelocity + 1][i]) < 0.5)
+        axis.push_back(smooth[i] - draft.acceleration_m_s2[k][i]);
+    }
+    const double middle = median(axis);
+    for (const double d : axis) differences.push_back(std::abs(d - middle));
+  }
+  if (differences.size() < 100) return;
+  for (SignalInfo& info : draft.log.sources) {
+    // 0.6745: median of the size of a normal variable of unit deviation
+    if (info.name == "acceleration") info.noise = median(differences) / 0.6745;
+  }
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,189 @@
+#include "analysis/logs/recognition.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nn/base/input_error.h"
+#include "nn/base/suggest.h"
+
+namespace swarmcert::logs {
+namespace {
+
+/// Columns by name within a topic; an entry is -1 where the topic has none.
+std::vector<int> columns_called(const RawTopic& topic, const std::vector<std::string>& plain,
+                                const std::vector<std::string>& names) {
+  std::vector<int> columns;
+  for (const std::string& name : names) {
+    const bool exact = name.find('[') != std::string::npos;
+    int found = -1;
+    for (std::size_t c = 0; c < plain.size() && found < 0; ++c) {
+      if (exact ? topic.columns[c].name == name : is_called(plain[c], name)) found = static_cast<int>(c);
+    }
+    columns.push_back(found);
+  }
+  return columns;
+}
+
+/// Which signals need all of their columns: a vertical velocity is worth having, half a quaternion is not.
+bool may_be_partial(int signal) {
+  return signal == kEuler || signal == kPosition || signal == kVelocity || signal == kTargetPosition ||
+         signal == kTargetVelocity;
+}
+
+bool is_dead(const RawTopic& topic, const Carried& carried) {
+  bool any = false;
+  for (const int c : carried.columns) {
+    if (c < 0) continue;
+    for (const double value : topic.columns[static_cast<std::size_t>(c)].values) {
+      if (std::isfinite(value) && value != 0) any = true;
+    }
+  }
+  return !any;
+}
+
+/// Motors stand still in a log of the ground: their zeros say something. So do positions at the origin.
+bool may_be_zero(int signal) {
+  return signal == kDuty || signal == kRequested || signal == kMotorCommand || signal == kThrust ||
+         signal == kThrustCommand || signal == kTorque || signal == kMotorForce ||
+         signal == kTargetVelocity || signal == kTargetPosition;
+}
+
+bool is_unit_quaternion(const RawTopic& topic, const Carried& carried) {
+  std::size_t unit = 0;
+  for (std::size_t i = 0; i < topic.time_s.size(); ++i) {
+    double norm = 0;
+    for (const int c : carried.columns) {
+      const double q = topic.columns[static_cast<std::size_t>(c)].values[i];
+      norm += q * q;
+    }
+    if (std::abs(norm - 1) < 0.05) ++unit;
+  }
+  return 2 * unit >= topic.time_s.size();
+}
+
+/// What a topic of set points calls a position is one that is wanted.
+bool is_wish(const RawTopic& topic, int signal) {
+  const bool may_be = signal == kTargetPosition || signal == kTargetVelocity || signal == kMotorCommand ||
+                      signal == kThrustCommand || signal == kThrust || signal == kTorque || signal == kMotorForce;
+  if (may_be) return false;
+  const std::string name = plain_name(topic.name);
+  for (const char* const word : {"setpoint", "set.point", "target", "reference", "desired", "command", "cmd"}) {
+    if (name.find(word) != std::string::npos) return true;
+  }
+  return false;
+}
+
+void recognise_by_names(const RawLog& log, Recognition& found) {
+  std::vector<std::vector<std::string>> plain;
+  for (const RawTopic& topic : log.topics) {
+    plain.emplace_back();
+    for (const RawColumn& column : topic.columns) plain.back().push_back(plain_name(column.name));
+  }
+  for (const NamedColumns& row : column_names()) {
+    if (found.find(row.signal) != nullptr) continue;
+    for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
+      Carried carried{
+          row.signal, t,      columns_called(log.topics[t], plain[t], row.names), row.unit, row.multiply,
+          row.divide, row.ask};
+      const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
+      const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
+      if (missing == size || (missing > 0 && !may_be_partial(row.signal))) continue;
+      if (is_wish(log.topics[t], row.signal)) continue;
+      const bool is_quaternion = row.signal == kAttitude;
+      if (!log.topics[t].time_s.empty() && ((is_dead(log.topics[t], carried) && !may_be_zero(row.signal)) ||
+                                            (is_quaternion && !is_unit_quaternion(log.topics[t], carried)))) {
+        found.rejected.push_back(names_of(log, carried) +
+                                 (is_quaternion ? ": no unit quaternions" : ": nothing but zeros"));
+        continue;
+      }
+      found.groups.push_back(std::move(carried));
+    }
+  }
+}
+
+void recognise_by_map(const RawLog& log, const SignalMap& map, Recognition& found) {
+  std::vector<std::string> names;
+  for (const RawTopic& topic : log.topics) {
+    for (const RawColumn& column : topic.columns) names.push_back(column.name);
+  }
+  for (const SignalSource& source : map) {
+    if (source.signal == kTime) continue;
+    Carried carried{source.signal, 0, {-1}, source.unit, source.multiply, source.divide, Ask::kNothing};
+    for (std::size_t t = 0; t < log.topics.size() && carried.columns[0] < 0; ++t) {
+      for (std::size_t c = 0; c < log.topics[t].columns.size(); ++c) {
+        if (log.topics[t].columns[c].name != source.column) continue;
+        carried.topic = t;
+        carried.columns[0] = static_cast<int>(c);
+        break;
+      }
+    }
+    if (carried.columns[0] < 0) {
+      throw files::InputError({log.path, "line 1", "column", files::in_quotes(source.column),
+                               "is no column of this log, but columns.toml names it",
+                               files::did_you_mean(source.column, names)});
+    }
+    if (found.find(source.signal) == nullptr) found.groups.push_back(std::move(carried));
+  }
+}
+
+}  // namespace
+
+const Carried* Recognition::find(int signal) const {
+  for (const Carried& carried : groups) {
+    if (carried.signal == signal) return &carried;
+  }
+  return nullptr;
+}
+
+Recognition recognise(const RawLog& log, const SignalMap& map) {
+  Recognition found;
+  if (map.empty())
+    recognise_by_names(log, found);
+  else
+    recognise_by_map(log, map, found);
+  // Angles that a quaternion makes superfluous must not cost records where they are missing.
+  if (map.empty() && (found.find(kAttitude) != nullptr || found.find(kPackedAttitude) != nullptr)) {
+    found.groups.erase(std::remove_if(found.groups.begin(), found.groups.end(),
+                                      [](const Carried& carried) { return carried.signal == kEuler; }),
+                       found.groups.end());
+  }
+  for (const int signal : {kForceBody, kForceWorld, kAccelerationWorld, kVelocity, kPosition}) {
+    if (const Carried* const carried = found.find(signal)) found.clock = carried->topic;
+  }
+  return found;
+}
+
+Carried time_column(const RawTopic& topic, const SignalMap& map) {
+  Carried time{kTime, 0, {-1}, "us", 1, 1, Ask::kNothing};
+  for (const SignalSource& source : map) {
+    for (std::size_t c = 0; c < topic.columns.size() && source.signal == kTime; ++c) {
+      if (topic.columns[c].name != source.column) continue;
+      time.columns[0] = static_cast<int>(c);
+      time.unit = source.unit;
+      time.multiply = source.multiply;
+      time.divide = source.divide;
+      return time;
+    }
+  }
+  // A value in "time[ms]" of the published CSV is microseconds.
+  for (const char* const name : {"tick", "time_us", "time[ms]"}) {
+    for (std::size_t c = 0; c < topic.columns.size(); ++c) {
+      if (topic.columns[c].name != name) continue;
+      time.columns[0] = static_cast<int>(c);
+      return time;
+    }
+  }
+  return time;
+}
+
+std::string names_of(const RawLog& log, const Carried& carried) {
+  std::string names;
+  for (const int c : carried.columns) {
+    if (c < 0) continue;
+    names +=
+        (names.empty() ? "" : ", ") + log.topics[carried.topic].columns[static_cast<std::size_t>(c)].name;
+  }
+  return names;
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,308 @@
+#include "analysis/logs/signal_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kLongestPause_us = 10e6;
+constexpr double kTickRange_us = 4294967296.0;
+constexpr double kInt16Range = 65536;
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double median_step(const std::vector<double>& times) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  return median_of(std::move(steps));
+}
+
+/// Undoes the wraps of a position in 16-bit integers: neighbours that differ by almost the whole range. (Velocities and
+/// accelerations may jump that far in a crash.) Values that stay at the ends of the range are named.
+std::vector<double> without_wraps(const RawColumn& column, const std::vector<double>& time_s, bool is_position,
+                                  std::vector<LogEvent>& events) {
+  constexpr double kJump = 0.9 * kInt16Range;
+  constexpr std::size_t kMostEvents = 20;
+  const std::vector<double>& stored = column.values;
+  const bool integers = std::all_of(stored.begin(), stored.end(), [](double x) {
+    return std::abs(x) <= kInt16Range / 2 && x == std::floor(x);
+  });
+  if (!integers) return stored;
+  std::vector<double> values = stored;
+  double turns = 0, last = kNaN;
+  std::size_t wraps = 0, saturated = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double now = stored[i];
+    if (is_position && std::abs(now - last) > kJump) {
+      turns += now < last ? 1 : -1;
+      if (++wraps <= kMostEvents) events.push_back({"wrap", time_s[i], 0, column.name + ": a 16-bit integer"});
+    }
+    const bool full = now == kInt16Range / 2 - 1 || now == -kInt16Range / 2;
+    if (full && now == last && ++saturated <= kMostEvents)
+      events.push_back({"saturation", time_s[i], 0, column.name + ": a 16-bit integer at its end"});
+    last = now;
+    values[i] = now + turns * kInt16Range;
+  }
+  return values;
+}
+
+/// Angles without jumps of a whole turn, so that they can be interpolated.
+void unwrap(std::vector<double>& angles, double turn) {
+  for (std::size_t i = 1; i < angles.size(); ++i) {
+    const double turns = std::round((angles[i] - angles[i - 1]) / turn);
+    if (std::isfinite(turns)) angles[i] -= turns * turn;
+  }
+}
+
+/// Quaternions q and -q turn alike: signs by which neighbours are near, so that they can be averaged.
+std::vector<double> continuous_signs(const RawTopic& topic, const Carried& carried) {
+  std::vector<double> signs(topic.time_s.size(), 1);
+  for (std::size_t i = 1; i < signs.size(); ++i) {
+    double dot = 0;
+    for (const int c : carried.columns) {
+      const std::vector<double>& q = topic.columns[static_cast<std::size_t>(c)].values;
+      dot += q[i - 1] * q[i];
+    }
+    signs[i] = dot < 0 ? -signs[i - 1] : signs[i - 1];
+  }
+  return signs;
+}
+
+struct Series {
+  std::vector<double> time_s, values;
+};
+
+/// In order of time, without repeated times and values that are not finite.
+Series in_order(const std::vector<double>& time_s, const std::vector<double>& values) {
+  std::vector<std::size_t> order(std::min(time_s.size(), values.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::isfinite(time_s[a]) && (!std::isfinite(time_s[b]) || time_s[a] < time_s[b]);
+  });
+  Series series;
+  for (const std::size_t i : order) {
+    if (!std::isfinite(time_s[i]) || !std::isfinite(values[i])) continue;
+    if (!series.time_s.empty() && time_s[i] <= series.time_s.back()) continue;
+    series.time_s.push_back(time_s[i]);
+    series.values.push_back(values[i]);
+  }
+  return series;
+}
+
+/// The times of a topic in microseconds.
+std::vector<double> times_us(const RawTopic& topic, const SignalMap& map, bool& wraps) {
+  const Carried time = time_column(topic, map);
+  std::vector<double> times;
+  times.reserve(topic.time_s.size());
+  wraps = false;
+  if (time.columns[0] >= 0) {
+    const RawColumn& column = topic.columns[static_cast<std::size_t>(time.columns[0])];
+    wraps = column.name == "tick";
+    for (const double value : column.values) times.push_back(value * time.multiply / time.divide);
+    return times;
+  }
+  for (const double time_s : topic.time_s) {
+    // Formats store whole microseconds or nanoseconds: what the conversion to seconds cost is given back.
+    const double time_us = 1e6 * time_s, whole_us = std::nearbyint(time_us);
+    times.push_back(std::abs(time_us - whole_us) < 1e-3 ? whole_us : time_us);
+  }
+  return times;
+}
+
+/// Chooses the records that are kept.
+class RecordFilter {
+ public:
+  RecordFilter(SignalTable& table, LogHealth& health) : table_(table), health_(health) {}
+
+  void take(std::size_t record, double time_us, bool is_finite) {
+    if (wraps && !kept_.empty()) {
+      // Of all times that a 32-bit tick can mean, the one nearest to the last.
+      time_us += kTickRange_us * std::round((table_.time_us.back() - time_us) / kTickRange_us);
+    }
+    if (!is_finite || !std::isfinite(time_us)) {
+      ++health_.not_finite;
+      return;
+    }
+    if (pending_) {
+      const double after = time_us - pending_->time_us;
+      if (after > 0 && after <= kLongestPause_us)
+        accept(*pending_);
+      else
+        ++health_.clock_jumps;
+      pending_.reset();
+    }
+    if (kept_.size() == 1 && time_us <= table_.time_us[0]) {  // the first record was the odd one
+      kept_.clear();
+      table_.time_us.clear();
+      table_.restarts.clear();
+      ++health_.clock_jumps;
+    }
+    const double step = kept_.empty() ? 1 : time_us - table_.time_us.back();
+    if (step <= 0)
+      ++health_.clock_jumps;
+    else if (step > kLongestPause_us)
+      pending_ = Pending{record, time_us};
+    else
+      accept({record, time_us});
+  }
+
+  std::vector<std::size_t> end() {
+    if (pending_) ++health_.clock_jumps;
+    health_.records = kept_.size();
+    return std::move(kept_);
+  }
+
+  bool wraps = false;
+  double longest_gap_s = kLongestGap_s;
+
+ private:
+  struct Pending {
+    std::size_t record;
+    double time_us;
+  };
+  void accept(const Pending& record) {
+    bool restarts = true;
+    if (!kept_.empty()) {
+      const double pause_s = (record.time_us - table_.time_us.back()) * 1e-6;
+      restarts = pause_s > longest_gap_s;
+      if (restarts) {
+        ++health_.gaps;
+        health_.longest_gap_s = std::max(health_.longest_gap_s, pause_s);
+      }
+    }
+    kept_.push_back(record.record);
+    table_.time_us.push_back(record.time_us);
+    table_.restarts.push_back(restarts ? 1 : 0);
+  }
+
+  SignalTable& table_;
+  LogHealth& health_;
+  std::vector<std::size_t> kept_;
+  std::optional<Pending> pending_;
+};
+
+/// Signals without which a record is of no use, where the log has them.
+bool is_needed(int signal) {
+  return signal < kRates || (signal >= kDuty && signal < kTargetPosition) ||
+         (signal >= kEuler && signal < kRequested);
+}
+
+}  // namespace
+
+double longest_gap_s(double step_s) { return std::max(kLongestGap_s, step_s > 0.02 ? 2.5 * step_s : 0); }
+
+double SignalTable::step_s() const { return 1e-6 * median_step(time_us); }
+
+std::vector<double> resampled(const std::vector<double>& from_s, const std::vector<double>& series,
+                              const std::vector<double>& times_s, bool hold) {
+  const Series source = in_order(from_s, series);
+  std::vector<double> values(times_s.size(), kNaN);
+  if (source.time_s.empty()) return values;
+  const double step_s = median_step(source.time_s), own_step_s = median_step(times_s);
+  const double longest_s = std::max(kLongestGap_s, 3 * step_s);
+  const bool averages = own_step_s > 1.5 * step_s;
+  const auto begin = source.time_s.begin();
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    const double now = times_s[i];
+    const auto after = static_cast<std::size_t>(std::lower_bound(begin, source.time_s.end(), now) - begin);
+    if (averages) {
+      const auto first = static_cast<std::size_t>(
+          std::lower_bound(begin, source.time_s.end(), now - own_step_s / 2) - begin);
+      double sum = 0;
+      std::size_t k = first;
+      for (; k < source.time_s.size() && source.time_s[k] < now + own_step_s / 2; ++k)
+        sum += source.values[k];
+      if (k > first) {
+        values[i] = sum / static_cast<double>(k - first);
+        continue;
+      }
+    }
+    const bool has_after = after<source.time_s.size(), has_before = after> 0;
+    if (has_after && source.time_s[after] == now) {
+      values[i] = source.values[after];
+    } else if (has_after && has_before &&
+               (hold || source.time_s[after] - source.time_s[after - 1] <= longest_s)) {
+      const double t0 = source.time_s[after - 1], t1 = source.time_s[after];
+      values[i] = source.values[after - 1] +
+                  (now - t0) / (t1 - t0) * (source.values[after] - source.values[after - 1]);
+    } else if (has_after && (hold || source.time_s[after] - now <= longest_s)) {
+      values[i] = source.values[after];
+    } else if (has_before && (hold || now - source.time_s[after - 1] <= longest_s)) {
+      values[i] = source.values[after - 1];
+    }
+  }
+  return values;
+}
+
+SignalTable signal_table(const RawLog& log, const Recognition& recognition, const SignalMap& map,
+                         LogHealth& health, std::vector<LogEvent>& events) {
+  SignalTable table;
+  if (log.topics.empty()) return table;
+  const RawTopic& clock = log.topics[recognition.clock];
+  RecordFilter filter(table, health);
+  const std::vector<double> clock_us = times_us(clock, map, filter.wraps);
+  std::vector<double> clock_s;
+  for (const double time_us : clock_us) clock_s.push_back(1e-6 * time_us);
+  std::array<std::vector<double>, kNumSignals> all;
+  std::array<char, kNumSignals> is_own{};  // carried by the topic of the clock
+  for (const Carried& carried : recognition.groups) {
+    const RawTopic& topic = log.topics[carried.topic];
+    bool ignored = false;
+    std::vector<double> topic_s;
+    if (carried.topic != recognition.clock) {
+      for (const double time_us : times_us(topic, map, ignored)) topic_s.push_back(1e-6 * time_us);
+    }
+    std::vector<double> signs;
+    if (carried.topic != recognition.clock && carried.signal == kAttitude && carried.size() == 4)
+      signs = continuous_signs(topic, carried);
+    for (std::size_t k = 0; k < carried.size(); ++k) {
+      if (carried.columns[k] < 0) continue;
+      const RawColumn& column = topic.columns[static_cast<std::size_t>(carried.columns[k])];
+      std::vector<double> values =
+          carried.divide == 1000
+              ? without_wraps(column, topic.time_s,
+                              carried.signal == kPosition || carried.signal == kTargetPosition, events)
+              : column.values;
+      for (double& value : values) value = value * carried.multiply / carried.divide;
+      for (std::size_t i = 0; i < signs.size(); ++i) values[i] *= signs[i];
+      const int signal = carried.signal + static_cast<int>(k);
+      if (carried.topic != recognition.clock) {
+        if (carried.signal == kEuler) unwrap(values, 2 * 3.14159265358979323846);
+        values = resampled(topic_s, values, clock_s, signal == kBattery);
+      }
+      all[static_cast<std::size_t>(signal)] = std::move(values);
+      is_own[static_cast<std::size_t>(signal)] = carried.topic == recognition.clock ? 1 : 0;
+    }
+  }
+  filter.longest_gap_s = longest_gap_s(median_step(clock_s));
+  for (std::size_t i = 0; i < clock_us.size(); ++i) {
+    bool is_finite = true, others_know = true;
+    for (int signal = 0; signal < kNumSignals; ++signal) {
+      const auto k = static_cast<std::size_t>(signal);
+      if (all[k].empty() || !is_needed(signal) || std::isfinite(all[k][i])) continue;
+      (is_own[k] != 0 ? is_finite : others_know) = false;
+    }
+    if (!others_know && is_finite) continue;  // another topic has not begun, has ended or has a gap: no damage
+    filter.take(i, clock_us[i], is_finite);
+  }
+  const std::vector<std::size_t> kept = filter.end();
+  for (std::size_t s = 0; s < all.size(); ++s) {
+    if (all[s].empty()) continue;
+    table.values[s].reserve(kept.size());
+    for (const std::size_t i : kept) table.values[s].push_back(all[s][i]);
+    all[s] = {};
+  }
+  return table;
+}
+
+}  // namespace swarmcert::logs

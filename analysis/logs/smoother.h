@@ -1,0 +1,25 @@
+/// @file Derivatives of noisy series by local polynomials.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "analysis/logs/signal_table.h"
+
+namespace swarmcert::logs {
+
+/// Windows of the derived signals: where the noise of known collections falls to 1 % of the weight and below.
+inline constexpr double kVelocityWindow_s = 0.10, kPositionWindow_s = 0.16;
+
+/// The windows of a log of that median step: at least four steps.
+inline double velocity_window_s(double step_s) { return std::max(kVelocityWindow_s, 4.01 * step_s); }
+inline double position_window_s(double step_s) { return std::max(kPositionWindow_s, 6.01 * step_s); }
+
+/// A derivative of `series` at every record: a polynomial fitted by least squares to the records within half a window,
+/// never across a gap. At the ends of a stretch the window is one-sided. NaN where a stretch is too short.
+/// @param degree     1 to 3.
+/// @param derivative 0 to degree.
+std::vector<double> local_derivative(const SignalTable& table, const std::vector<double>& series,
+                                     double window_s, int degree, int derivative);
+
+}  // namespace swarmcert::logs

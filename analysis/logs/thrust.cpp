@@ -1,0 +1,293 @@
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "analysis/logs/battery_compensation.h"
+#include "analysis/logs/interpretation.h"
+#include "analysis/logs/statistics_of_series.h"
+
+namespace swarmcert::logs {
+namespace {
+
+using Source = SignalInfo::Source;
+constexpr int kFour = 4, kEight = 8;
+
+/// What the controller wants of the rotors, or what they do, as powers of the stored values.
+struct Rotors {
+  int first = 0, count = 0;
+  std::string from;
+};
+
+/// Specific force along the thrust axis over g, per record: what thrust over weight should be.
+std::vector<double> load_factor(const Draft& draft) {
+  const SignalTable& t = draft.table;
+  std::vector<double> load(t.size(), std::nan(""));
+  if (!t.has_group(kForceWorld, 3)) return load;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    const double x = t[kAttitude][i], y = t[kAttitude + 1][i];
+    const double up = 1 - 2 * (x * x + y * y);  // of the thrust axis
+    if (up > 0.5) load[i] = t[kForceWorld + 2][i] / up / kGravity_m_s2;
+  }
+  return load;
+}
+
+std::vector<double> sum_of_powers(const SignalTable& t, const Rotors& rotors, double power) {
+  std::vector<double> sum(t.size(), 0);
+  for (int k = 0; k < rotors.count; ++k) {
+    for (std::size_t i = 0; i < t.size(); ++i)
+      sum[i] += std::pow(std::max(t[rotors.first + k][i], 0.0), power);
+  }
+  return sum;
+}
+
+/// Records in which the rotors carry the vehicle: thrust above a third of what is common at its upper end.
+std::vector<char> carrying(const std::vector<double>& thrust) {
+  const double high = quantile_of(thrust, 0.9);
+  std::vector<char> flies;
+  for (const double value : thrust) flies.push_back(value > high / 3 ? 1 : 0);
+  return flies;
+}
+
+struct Scale {
+  double hover = 0;    ///< thrust in its own unit over load factor, median
+  double scatter = 0;  ///< robust relative deviation of that ratio
+};
+
+Scale scale_of(const std::vector<double>& thrust, const std::vector<double>& load) {
+  const std::vector<char> flies = carrying(thrust);
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < thrust.size(); ++i) {
+    if (flies[i] == 0) continue;
+    const double ratio = std::isfinite(load[i]) ? thrust[i] / load[i] : std::nan("");
+    if (load[i] > 0.5 && load[i] < 2) ratios.push_back(ratio);
+  }
+  Scale scale;
+  if (ratios.size() < 10) {
+    scale.hover = quantile_of(thrust, 0.5);
+    return scale;
+  }
+  scale.hover = median(ratios);
+  for (double& ratio : ratios) ratio = std::abs(ratio / scale.hover - 1);
+  scale.scatter = median(ratios) / 0.6745;
+  return scale;
+}
+
+/// Thrust in multiples of the hover thrust, linear or quadratic in the command, whichever follows the load closer.
+void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, const std::string& what) {
+  SignalTable& t = draft.table;
+  const std::vector<double> load = load_factor(draft);
+  const std::vector<double> linear = sum_of_powers(t, rotors, 1), square = sum_of_powers(t, rotors, 2);
+  const Scale of_linear = scale_of(linear, load), of_square = scale_of(square, load);
+  const bool is_square = squares_only || of_square.scatter < of_linear.scatter;
+  const Scale& scale = is_square ? of_square : of_linear;
+  if (!(scale.hover > 0)) {
+    draft.add("thrust", Source::kMissing, "", "N");
+    return;
+  }
+  draft.log.hover_command =
+      is_square ? std::sqrt(scale.hover / rotors.count) : scale.hover / static_cast<double>(rotors.count);
+  std::vector<double>& given = t[kThrust];
+  given = is_square ? square : linear;
+  for (double& value : given) value /= scale.hover;
+  draft.log.signals.thrust = ThrustSource::kHoverMultiple;
+  draft.add("thrust", Source::kDerived,
+            fmt::format("{} of {} over the value that carries the weight, at a mean command of {:.4g}", what,
+                        rotors.from, draft.log.hover_command),
+            "weight", scale.scatter);
+  draft.note(fmt::format("thrust {} in {}: relative scatter {:.3f} (linear {:.3f}, quadratic {:.3f})",
+                         is_square ? "quadratic" : "linear", rotors.from, scale.scatter, of_linear.scatter,
+                         of_square.scatter));
+}
+
+/// Duty cycles of a column of unknown scale; false where they are microseconds of a servo signal, which say no duty.
+bool settle_duty_scale(Draft& draft) {
+  const Carried* const carried = draft.recognition.find(kDuty);
+  SignalTable& t = draft.table;
+  if (carried == nullptr || carried->ask != Ask::kMotors || !draft.asks_physics) return carried != nullptr;
+  double largest = 0;
+  for (int k = 0; k < kFour; ++k) largest = std::max(largest, quantile_of(t[kDuty + k], 1));
+  if (largest > 800 && largest < 2500) {  // microseconds
+    for (int k = 0; k < kFour; ++k) {
+      t[kMotorCommand + k] = t[kDuty + k];
+      for (double& u : t[kMotorCommand + k]) u = std::min(std::max((u - 1000) / 1000, 0.0), 1.0);
+      t[kDuty + k].clear();
+    }
+    draft.note(names_of(draft.raw, *carried) + ": read as microseconds, 1000 to 2000");
+    return false;
+  }
+  double scale = 1;
+  for (const double full : {65536.0, 1000.0, 255.0, 100.0}) {
+    if (largest > 1.5 && largest <= full) scale = full;
+  }
+  for (int k = 0; k < kFour; ++k) {
+    for (double& u : t[kDuty + k]) u /= scale;
+  }
+  draft.note(fmt::format("{}: read as duty over {:g}", names_of(draft.raw, *carried), scale));
+  return true;
+}
+
+void settle_battery(Draft& draft) {
+  SignalTable& t = draft.table;
+  if (t.has(kBattery)) {
+    const double middle = median(t[kBattery]);
+    if (middle > 500 && draft.asks_physics) {
+      for (double& v : t[kBattery]) v /= 1000;
+      draft.note(fmt::format("battery: median {:.0f}, read as millivolt", middle));
+    }
+    draft.add_measured("battery", kBattery);
+    return;
+  }
+  draft.add("battery", Source::kMissing, "", "V");
+}
+
+/// "motor.m1" is the requested thrust in some firmware and the applied duty in other: the one that follows the load while
+/// the battery sags is what it is.
+bool is_requested(Draft& draft) {
+  const Carried& carried = *draft.recognition.find(kRequested);
+  SignalTable& t = draft.table;
+  if (carried.ask != Ask::kMotors || t.has_group(kDuty, kFour)) return true;
+  if (!t.has(kBattery)) return true;
+  const std::vector<double> load = load_factor(draft);
+  const std::vector<double> requested = sum_of_powers(t, {kRequested, kFour, ""}, 1);
+  std::vector<double> applied(t.size(), 0);
+  // Thrust of a brushed motor grows about with the 1.5th power of its mean voltage.
+  for (int k = 0; k < kFour; ++k) {
+    for (std::size_t i = 0; i < t.size(); ++i)
+      applied[i] += std::pow(std::max(t[kRequested + k][i], 0.0) * t[kBattery][i], 1.5);
+  }
+  const double of_request = scale_of(requested, load).scatter, of_duty = scale_of(applied, load).scatter;
+  const bool request = of_request < of_duty;
+  draft.note(fmt::format(
+      "{}: {}; relative scatter against the load {:.3f} as requested thrust, {:.3f} as applied duty",
+      names_of(draft.raw, carried), request ? "requested thrust" : "applied duty", of_request, of_duty));
+  return request;
+}
+
+void derive_duty(Draft& draft, const std::string& from) {
+  SignalTable& t = draft.table;
+  for (int k = 0; k < kFour; ++k) {
+    t[kDuty + k].resize(t.size());
+    for (std::size_t i = 0; i < t.size(); ++i)
+      t[kDuty + k][i] = compensated_duty(t[kRequested + k][i], t[kBattery][i]);
+  }
+  draft.add("duty", Source::kDerived, from + " and battery: the firmware's battery compensation", "1");
+}
+
+/// The voltage at which the firmware's compensation turns the request into the duty: that of the sum over the rotors.
+void derive_battery(Draft& draft) {
+  SignalTable& t = draft.table;
+  std::vector<double>& battery = t[kBattery];
+  battery.assign(t.size(), std::nan(""));
+  double last = std::nan("");
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    double wanted_V = 0, duty = 0;
+    for (int k = 0; k < kFour; ++k) {
+      wanted_V += compensated_duty(t[kRequested + k][i], 1, false);
+      duty += t[kDuty + k][i];
+    }
+    if (duty > 0.4) last = wanted_V / duty;
+    battery[i] = last;
+  }
+  const double middle = median(battery);
+  for (double& v : battery) v = std::isfinite(v) ? v : middle;
+  for (SignalInfo& info : draft.log.sources) {
+    if (info.name == "battery")
+      info = {
+          "battery", Source::kDerived, "requested thrust and duty: the firmware's battery compensation", "V",
+          0,         std::nan("")};
+  }
+}
+
+/// Rotors whose speed is halved or drops out are mended from the others, and named.
+void mend_rotor_speeds(Draft& draft) {
+  SignalTable& t = draft.table;
+  std::array<double, kFour> middle{};
+  std::vector<double> all;
+  for (int k = 0; k < kFour; ++k) {
+    std::vector<double> turning;
+    for (const double speed : t[kRotorSpeed + k]) {
+      if (speed > 0) turning.push_back(speed);
+    }
+    middle[static_cast<std::size_t>(k)] = median(turning);
+    all.push_back(middle[static_cast<std::size_t>(k)]);
+  }
+  const double common = quantile_of(all, 0.67);
+  for (int k = 0; k < kFour; ++k) {
+    std::vector<double>& speeds = t[kRotorSpeed + k];
+    const double share = middle[static_cast<std::size_t>(k)] / common;
+    if (share > 0.4 && share < 0.6) {
+      for (double& speed : speeds) speed *= 2;
+      draft.note(fmt::format("rotor {}: its speed is {:.2f} of the others': doubled", k + 1, share));
+    }
+    std::size_t dropped = 0;
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      double others = 0;
+      for (int j = 0; j < kFour; ++j) others += j == k ? 0 : t[kRotorSpeed + j][i] / 3;
+      if (speeds[i] > 0.1 * common || !(others > 0.6 * common)) continue;
+      speeds[i] = others;
+      ++dropped;
+    }
+    if (dropped > 0)
+      draft.note(fmt::format("rotor {}: {} records without a speed, taken from the others", k + 1, dropped));
+  }
+}
+
+int number_of_commands(const SignalTable& t) {
+  int count = 0;
+  while (count < kEight && t.has(kMotorCommand + count)) ++count;
+  return count;
+}
+
+}  // namespace
+
+void settle_thrust(Draft& draft) {
+  SignalTable& t = draft.table;
+  Signals& signals = draft.log.signals;
+  const bool has_duty = settle_duty_scale(draft) && t.has_group(kDuty, kFour);
+  settle_battery(draft);
+  bool has_request = t.has_group(kRequested, kFour);
+  if (has_duty) {
+    draft.add_measured("duty", kDuty);
+    if (has_request) draft.add_measured("requested_thrust", kRequested);
+    if (has_request && !t.has(kBattery)) derive_battery(draft);
+  } else if (has_request) {
+    const std::string from = names_of(draft.raw, *draft.recognition.find(kRequested));
+    if (!is_requested(draft)) {
+      for (int k = 0; k < kFour; ++k) t[kDuty + k] = std::move(t[kRequested + k]);
+      for (int k = 0; k < kFour; ++k) t[kRequested + k].clear();
+      draft.add_measured("duty", kRequested);
+      has_request = false;
+    } else {
+      draft.add_measured("requested_thrust", kRequested);
+      if (t.has(kBattery)) derive_duty(draft, from);
+    }
+  }
+  if (t.has_group(kRotorSpeed, kFour)) {
+    mend_rotor_speeds(draft);
+    draft.add_measured("rotor_speed", kRotorSpeed);
+  }
+  const int commands = number_of_commands(t);
+  if (t.has_group(kDuty, kFour) && t.has(kBattery)) {
+    signals.thrust = ThrustSource::kDuty;
+    draft.add("thrust", Source::kDerived, "duty and battery: the model's thrust map", "N");
+  } else if (t.has(kThrust)) {
+    signals.thrust = ThrustSource::kForce;
+    draft.add("thrust", Source::kDerived,
+              "commanded force " + names_of(draft.raw, *draft.recognition.find(kThrust)), "N");
+  } else if (t.has_group(kRotorSpeed, kFour)) {
+    set_hover_multiple(draft, {kRotorSpeed, kFour, "rotor speeds"}, true, "sum of squares");
+  } else if (has_request) {
+    set_hover_multiple(draft, {kRequested, kFour, "requested thrust"}, false, "sum");
+  } else if (t.has_group(kDuty, kFour)) {
+    set_hover_multiple(draft, {kDuty, kFour, "duty (no battery voltage)"}, false, "sum");
+  } else if (commands >= 3) {
+    set_hover_multiple(draft, {kMotorCommand, commands, fmt::format("{} motor commands", commands)}, false,
+                       "sum");
+  } else if (t.has(kThrustCommand)) {
+    set_hover_multiple(draft, {kThrustCommand, 1, "collective thrust command"}, false, "value");
+  } else {
+    draft.add("thrust", Source::kMissing, "", "N");
+  }
+}
+
+}  // namespace swarmcert::logs

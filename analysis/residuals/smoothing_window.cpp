@@ -1,0 +1,75 @@
+#include "analysis/residuals/smoothing_window.h"
+
+namespace swarmcert::residuals {
+namespace {
+
+constexpr std::size_t kCapacity = 256;
+
+/// Weights whose product with values is the derivative of order `order` (1, 2) of the polynomial of that degree fitted
+/// to them; by the orthogonal polynomials of the times.
+Eigen::VectorXd derivative_weights(const Eigen::VectorXd& times_s, int order) {
+  const Eigen::VectorXd t = times_s.array() - times_s.mean();
+  const double tt = t.squaredNorm();
+  if (order == 1) return t / tt;
+  const Eigen::VectorXd square = t.cwiseAbs2();
+  const Eigen::VectorXd second = square.array() - square.mean() - t.array() * (square.dot(t) / tt);
+  return 2 * second / second.dot(square);
+}
+
+}  // namespace
+
+SmoothingWindow::SmoothingWindow(logs::ForceSource source, double length_s, int channels)
+    : order_(source == logs::ForceSource::kPosition ? 2 : 1),
+      length_s_(length_s),
+      last_(3, channels),
+      once_(Eigen::Matrix3Xd::Zero(3, channels)),
+      twice_(Eigen::Matrix3Xd::Zero(3, channels)) {}
+
+void SmoothingWindow::restart() {
+  has_past_ = false;
+  times_s_.clear();
+  first_ = 0;
+  once_.setZero();
+  twice_.setZero();
+}
+
+void SmoothingWindow::average(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values) {
+  if (has_past_) {
+    const double h = time_s - last_s_;
+    twice_ += h * once_ + h * h / 6 * (2 * last_ + values);
+    once_ += h / 2 * (last_ + values);
+  }
+  has_past_ = true;
+  last_s_ = time_s;
+  last_ = values;
+  values = order_ == 2 ? twice_ : once_;
+  differentiate(time_s, values);
+}
+
+void SmoothingWindow::differentiate(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values) {
+  if (history_.size() == 0) history_.resize(values.size(), kCapacity);
+  if (times_s_.size() == kCapacity) {  // keep what the window still covers, at most half
+    const std::size_t kept = std::min(kCapacity / 2, times_s_.size() - first_);
+    const auto columns = static_cast<Eigen::Index>(kept);
+    history_.leftCols(columns) =
+        history_.middleCols(static_cast<Eigen::Index>(times_s_.size() - kept), columns).eval();
+    times_s_.erase(times_s_.begin(), times_s_.end() - static_cast<std::ptrdiff_t>(kept));
+    first_ = 0;
+  }
+  history_.col(static_cast<Eigen::Index>(times_s_.size())) =
+      Eigen::Map<const Eigen::VectorXd>(Eigen::Matrix3Xd(values).data(), values.size());
+  times_s_.push_back(time_s);
+  while (times_s_[first_] < time_s - length_s_) ++first_;
+  const auto count = static_cast<Eigen::Index>(times_s_.size() - first_);
+  if (count < order_ + 2) {
+    values.setZero();
+    return;
+  }
+  const Eigen::VectorXd t =
+      Eigen::Map<const Eigen::VectorXd>(times_s_.data() + first_, count).array() - times_s_[first_];
+  const Eigen::VectorXd mean =
+      history_.middleCols(static_cast<Eigen::Index>(first_), count) * derivative_weights(t, order_);
+  values = Eigen::Map<const Eigen::Matrix3Xd>(mean.data(), 3, values.cols());
+}
+
+}  // namespace swarmcert::residuals

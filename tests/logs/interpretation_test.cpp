@@ -1,0 +1,358 @@
+/// From columns to signals: units, frames and signs that the data decide, signals that are derived, and the flights of
+/// several collections.
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <sstream>
+
+#include "analysis/logs/battery_compensation.h"
+#include "analysis/logs/flight_story.h"
+#include "analysis/logs/formats/formats.h"
+#include "analysis/logs/hover_scale.h"
+#include "analysis/logs/read_log.h"
+#include "analysis/logs/record_source.h"
+#include "data.h"
+
+namespace swarmcert::tests {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// A vehicle that swings sideways: x = 0.3 sin 3 t, y = 0.2 sin 2 t, z = 1, its thrust axis along acceleration + g.
+struct Swing {
+  double t, x, y, vx, vy, ax, ay, roll, pitch;
+
+  explicit Swing(double time_s) : t(time_s) {
+    x = 0.3 * std::sin(3 * t);
+    y = 0.2 * std::sin(2 * t);
+    vx = 0.9 * std::cos(3 * t);
+    vy = 0.4 * std::cos(2 * t);
+    ax = -2.7 * std::sin(3 * t);
+    ay = -0.8 * std::sin(2 * t);
+    pitch = std::atan2(ax, logs::kGravity_m_s2);
+    roll = std::atan2(-ay, std::hypot(ax, logs::kGravity_m_s2));
+  }
+  std::array<double, 4> quaternion() const {  // x, y, z, w
+    const double cr = std::cos(roll / 2), sr = std::sin(roll / 2), cp = std::cos(pitch / 2), sp = std::sin(pitch / 2);
+    return {sr * cp, cr * sp, -sr * sp, cr * cp};
+  }
+  double load() const { return std::sqrt(ax * ax + ay * ay + logs::kGravity_m_s2 * logs::kGravity_m_s2); }
+};
+
+/// CSV of the swing at 100 Hz for 8 s; `cells` gives what follows position and velocity.
+logs::Log swing(const std::string& names, const std::function<std::string(const Swing&)>& cells,
+                const std::function<std::string(double)>& clock = [](double t) { return fmt::format("{:.4f}", t); }) {
+  std::string text = "t,px,py,pz,vx,vy,vz," + names + "\n";
+  for (int k = 0; k < 800; ++k) {
+    const Swing s(0.01 * k);
+    text += fmt::format("{},{:.6f},{:.6f},1,{:.6f},{:.6f},0,{}\n", clock(s.t), s.x, s.y, s.vx, s.vy, cells(s));
+  }
+  std::istringstream in(text);
+  return logs::parse_log(in, "swing.csv");
+}
+
+const logs::SignalInfo& signal(const logs::Log& log, const std::string& name) {
+  for (const logs::SignalInfo& info : log.sources) {
+    if (info.name == name) return info;
+  }
+  static const logs::SignalInfo none;
+  ADD_FAILURE() << log.path << " says nothing of " << name;
+  return none;
+}
+
+/// Largest distance of the thrust axis from that of the swing, over the middle of the log.
+double axis_error(const logs::Log& log) {
+  double largest = 0;
+  for (std::size_t i = 50; i + 50 < log.samples.size(); ++i) {
+    const Swing s(1e-6 * log.samples[i].time_us);
+    const auto R = logs::rotation(log.samples[i]);
+    largest = std::max({largest, std::abs(R[0][2] - s.ax / s.load()), std::abs(R[1][2] - s.ay / s.load())});
+  }
+  return largest;
+}
+
+double force_error_m_s2(const logs::Log& log) {
+  double largest = 0;
+  for (std::size_t i = 50; i + 50 < log.samples.size(); ++i) {
+    const Swing s(1e-6 * log.samples[i].time_us);
+    const logs::Vector& f = log.samples[i].specific_force_m_s2;
+    largest = std::max({largest, std::abs(f[0] - s.ax), std::abs(f[1] - s.ay),
+                        std::abs(f[2] - logs::kGravity_m_s2)});
+  }
+  return largest;
+}
+
+const char kMotors[] = ",m1,m2,m3,m4,vbat";
+std::string motors(const Swing& s) {
+  const double m = 0.5 * s.load() / logs::kGravity_m_s2;
+  return fmt::format(",{0:.5f},{0:.5f},{0:.5f},{0:.5f},3.7", m);
+}
+
+TEST(Interpretation, DecidesUnitsAndSignsOfAnglesFromTheLateralAcceleration) {
+  const double degree = 180 / kPi;
+  for (const double unit : {1.0, degree}) {
+    for (const double pitch_sign : {1.0, -1.0}) {
+      const logs::Log log = swing(std::string("roll,pitch,yaw") + kMotors, [&](const Swing& s) {
+        return fmt::format("{:.6f},{:.6f},0.0", unit * s.roll, unit * pitch_sign * s.pitch) + motors(s);
+      });
+      EXPECT_LT(axis_error(log), 0.01) << "unit " << unit << ", sign " << pitch_sign;
+      EXPECT_TRUE(log.signals.attitude);
+      EXPECT_FALSE(log.interpretation.empty());
+    }
+  }
+}
+
+TEST(Interpretation, DecidesTheOrderOfAQuaternion) {
+  const logs::Log log = swing(std::string("q0,q1,q2,q3") + kMotors, [&](const Swing& s) {
+    const auto q = s.quaternion();
+    return fmt::format("{:.6f},{:.6f},{:.6f},{:.6f}", q[3], q[0], q[1], q[2]) + motors(s);
+  });
+  EXPECT_LT(axis_error(log), 1e-3);
+}
+
+TEST(Interpretation, DecidesUnitFrameAndGravityOfAnAccelerometer) {
+  const double g = logs::kGravity_m_s2;
+  for (const double unit : {1.0, 1 / g, 1000 / g}) {  // m/s^2, g, mg
+    const logs::Log body = swing(std::string("ax,ay,az,qx,qy,qz,qw") + kMotors, [&](const Swing& s) {
+      const auto q = s.quaternion();
+      return fmt::format("0.0001,0,{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}", unit * s.load(), q[0], q[1], q[2], q[3]) +
+             motors(s);
+    });
+    EXPECT_LT(force_error_m_s2(body), 0.05) << unit;
+    EXPECT_EQ(body.signals.specific_force, logs::ForceSource::kAccelerometer);
+  }
+  const logs::Log world = swing(std::string("ax,ay,az,qx,qy,qz,qw") + kMotors, [&](const Swing& s) {
+    const auto q = s.quaternion();
+    return fmt::format("{:.6f},{:.6f},0.0,{:.6f},{:.6f},{:.6f},{:.6f}", s.ax, s.ay, q[0], q[1], q[2], q[3]) + motors(s);
+  });
+  EXPECT_LT(force_error_m_s2(world), 0.05) << "in the world, without gravity";
+}
+
+TEST(Interpretation, ReadsClocksInSecondsMillisecondsMicrosecondsAndFrom1970) {
+  const auto cells = [](const Swing& s) { return "0" + motors(s); };
+  for (const double unit : {1.0, 1e3, 1e6}) {
+    const logs::Log log = swing(std::string("mode") + kMotors, cells,
+                                [&](double t) { return fmt::format("{:.3f}", unit * (t + 1)); });
+    EXPECT_NEAR(log.samples.back().time_us - log.samples.front().time_us, 7.99e6, 1) << unit;
+  }
+  const logs::Log log = swing(std::string("mode") + kMotors, cells,
+                              [](double t) { return fmt::format("{:.6f}", 1772419726.25 + t); });
+  EXPECT_EQ(log.epoch_s, 1772419726);
+  EXPECT_NEAR(log.samples.back().time_us, 8.24e6, 1);
+}
+
+TEST(Interpretation, WithoutAnAttitudeOnlyTheVerticalForceIsJudged) {
+  const logs::Log log = swing(std::string("mode") + kMotors, [](const Swing& s) { return "0" + motors(s); });
+  EXPECT_EQ(log.signals.force_axes, (std::array<bool, 3>{false, false, true}));
+  EXPECT_EQ(signal(log, "attitude").source, logs::SignalInfo::Source::kDerived);
+  EXPECT_LT(axis_error(log), 0.01) << "the thrust axis follows acceleration + g";
+  EXPECT_LT(force_error_m_s2(log), 0.1) << "from the velocity";
+}
+
+TEST(Interpretation, VelocityAndForceFollowFromAPositionAlone) {
+  std::string text = "t,px,py,pz,qx,qy,qz,qw,m1,m2,m3,m4,vbat\n";
+  for (int k = 0; k < 800; ++k) {
+    const Swing s(0.01 * k);
+    const auto q = s.quaternion();
+    text += fmt::format("{:.4f},{:.6f},{:.6f},1,{:.6f},{:.6f},{:.6f},{:.6f}{}\n", s.t, s.x, s.y, q[0], q[1], q[2], q[3],
+                        motors(s));
+  }
+  std::istringstream in(text);
+  const logs::Log log = logs::parse_log(in, "swing.csv");
+  EXPECT_EQ(signal(log, "velocity").source, logs::SignalInfo::Source::kDerived);
+  EXPECT_EQ(log.signals.specific_force, logs::ForceSource::kPosition);
+  EXPECT_LT(force_error_m_s2(log), 0.15);
+  EXPECT_NEAR(log.samples[400].velocity_m_s[0], Swing(4).vx, 0.01);
+}
+
+TEST(Interpretation, TellsRequestedThrustFromAppliedDutyByTheBatterysSag) {
+  for (const bool requested : {false, true}) {
+    std::string text = "t,px,py,pz,vx,vy,vz,motor.m1,motor.m2,motor.m3,motor.m4,pm.vbat\n";
+    for (int k = 0; k < 800; ++k) {
+      const double t = 0.01 * k, volt = 4.1 - 0.08 * t, az = 0.3 * std::sin(4 * t), vz = -0.075 * std::cos(4 * t);
+      const double load = 1 + az / logs::kGravity_m_s2;
+      const double m = 65536 * (requested ? 0.55 * load : std::pow(load, 1 / 1.5) * 0.6 * 4.1 / volt);
+      text += fmt::format("{0:.4f},0.01,0,1,0,0,{1:.6f},{2:.1f},{2:.1f},{2:.1f},{2:.1f},{3:.4f}\n", t, vz, m, volt);
+    }
+    std::istringstream in(text);
+    const logs::Log log = logs::parse_log(in, "sag.csv");
+    const bool has_request = std::any_of(log.sources.begin(), log.sources.end(), [](const logs::SignalInfo& info) {
+      return info.name == "requested_thrust";
+    });
+    EXPECT_EQ(has_request, requested);
+    EXPECT_EQ(log.signals.thrust, logs::ThrustSource::kDuty);
+  }
+}
+
+TEST(Interpretation, SlowLogsHaveAWindowOfSeveralRecordsAndNoGapsOfTheirOwn) {
+  std::string text = "t,px,py,pz,vx,vy,vz,m1,m2,m3,m4,vbat\n";
+  for (int k = 0; k < 100; ++k) {
+    const Swing s(0.1 * k);
+    text += fmt::format("{:.2f},{:.6f},{:.6f},1,{:.6f},{:.6f},0{}\n", s.t, s.x, s.y, s.vx, s.vy, motors(s));
+  }
+  std::istringstream in(text);
+  const logs::Log log = logs::parse_log(in, "slow.csv");
+  EXPECT_EQ(log.health.gaps, 0u);
+  EXPECT_GT(log.window_s, 0.4);
+  EXPECT_TRUE(log.signals.force_axes[2]);
+}
+
+TEST(Interpretation, WrapsOfAPositionInMillimetresAreUndone) {
+  std::string text = "time_us,stateEstimateZ.x,stateEstimateZ.y,stateEstimateZ.z,stateEstimateZ.vx,stateEstimateZ.vy,"
+                     "stateEstimateZ.vz\n";
+  for (int k = 0; k < 100; ++k) {
+    const int x = 32700 + 5 * k;
+    text += fmt::format("{},{},0,1000,500,0,0\n", 10000 * k, x > 32767 ? x - 65536 : x);
+  }
+  std::istringstream in(text);
+  const logs::Log log = logs::parse_log(in, "wrap.csv");
+  EXPECT_NEAR(log.samples.back().position_m[0], 33.195, 1e-9);
+  ASSERT_EQ(log.events.size(), 1u);
+  EXPECT_EQ(log.events[0].kind, "wrap");
+}
+
+TEST(FlightStory, SplitsALogIntoGroundTakeoffFlightAndLanding) {
+  std::string text = "t,px,py,pz,vx,vy,vz,m1,m2,m3,m4,vbat\n";
+  for (int k = 0; k < 1500; ++k) {
+    const double t = 0.01 * k;
+    // On a table of 0.4 m until 3 s, up to 1.4 m within 1 s, down again from 10 to 11 s.
+    const double up = std::clamp(t - 3, 0.0, 1.0) - std::clamp(t - 10, 0.0, 1.0);
+    const double speed = (t > 3 && t < 4) ? 1 : (t > 10 && t < 11) ? -1 : 0;
+    const bool flies = t > 3 && t < 11;
+    text += fmt::format("{0:.3f},0.1,0,{1:.4f},0,0,{2},{3},{3},{3},{3},3.8\n", t, 0.4 + up, speed, flies ? 0.5 : 0.05);
+  }
+  std::istringstream in(text);
+  const logs::FlightStory story = logs::tell(logs::parse_log(in, "hop.csv"));
+  std::vector<std::string> names;
+  for (const logs::Phase& phase : story.phases) names.push_back(phase.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"ground", "takeoff", "flight", "landing", "ground"}));
+  EXPECT_NEAR(story.air_s, 8, 0.2);
+  EXPECT_EQ(story.no_flight, "");
+  EXPECT_FALSE(story.missing.empty());
+}
+
+TEST(FlightStory, ALogOfTheGroundIsNoFlight) {
+  std::string text = "t,px,py,pz,vx,vy,vz,m1,m2,m3,m4,vbat\n";
+  for (int k = 0; k < 500; ++k) text += fmt::format("{:.2f},0.1,0,0.05,0,0,0,0,0,0,0,4.1\n", 0.01 * k);
+  std::istringstream in(text);
+  EXPECT_EQ(logs::tell(logs::parse_log(in, "ground.csv")).no_flight, "stands on the ground");
+}
+
+std::vector<std::string> logs_of(const std::string& folder, std::size_t most) {
+  std::vector<std::string> paths;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(data_path("collections/" + folder))) {
+    const std::string path = entry.path().string();
+    if (entry.is_regular_file() && (path.find("log") != std::string::npos || entry.path().extension() == ".csv") &&
+        entry.path().extension() != ".yaml")
+      paths.push_back(path);
+  }
+  std::sort(paths.begin(), paths.end());
+  std::vector<std::string> chosen;
+  const std::size_t step = std::max<std::size_t>(1, paths.size() / most);
+  for (std::size_t i = 0; i < paths.size(); i += step) chosen.push_back(paths[i]);
+  return chosen;
+}
+
+/// Share of the samples of CrazyPAD logs whose applied duty is within 20 counts of what request and battery give.
+double share_within_20_counts(std::size_t most) {
+  std::size_t all = 0, near = 0;
+  for (const std::string& path : logs_of("crazypad", most)) {
+    std::ifstream in(path, std::ios::binary);
+    logs::RawLog raw;
+    logs::read_usd_events(in, path, raw);
+    const logs::RawTopic& topic = raw.topics.front();
+    for (int m = 1; m <= 4; ++m) {
+      const auto& asked = topic.find(fmt::format("motor.m{}", m))->values;
+      const auto& applied = topic.find(fmt::format("pwm.m{}_pwm", m))->values;
+      const auto& battery = topic.find("pm.vbatMV")->values;
+      for (std::size_t i = 0; i < asked.size(); ++i) {
+        ++all;
+        const double duty = logs::compensated_duty(asked[i] / 65536, battery[i] / 1000);
+        near += std::abs(65536 * duty - applied[i]) <= 20 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(all, 10000u);
+  return static_cast<double>(near) / static_cast<double>(all);
+}
+
+TEST(Collections, DutyFollowsFromRequestAndBatteryWithin20Counts) {
+  SWARMCERT_NEEDS_DATA();
+  EXPECT_GE(share_within_20_counts(4), 0.99);
+}
+
+TEST(Collections, DutyFollowsFromRequestAndBatteryWithin20CountsInEveryLog_slow) {
+  SWARMCERT_NEEDS_DATA();
+  EXPECT_GE(share_within_20_counts(1000), 0.99);
+}
+
+/// Opens logs of every collection without renaming one, and checks what can be judged.
+void check_collections(std::size_t most) {
+  struct Collection {
+    const char* folder;
+    std::array<bool, 3> axes;
+    logs::ThrustSource thrust;
+    logs::TorqueUse torque;
+    double noise_m_s2;  ///< 1.3 times the floor of the derived acceleration that independent scripts found
+  };
+  const Collection collections[] = {
+      {"crazypad", {false, false, true}, logs::ThrustSource::kDuty, logs::TorqueUse::kMean, 1.3 * 0.13},
+      {"crazyswarm2-tools", {true, true, true}, logs::ThrustSource::kForce, logs::TorqueUse::kNone, 1.3 * 0.10},
+      {"nanobench", {true, true, true}, logs::ThrustSource::kDuty, logs::TorqueUse::kMean, 1.3 * 0.09}};
+  for (const Collection& collection : collections) {
+    std::size_t opened = 0;
+    for (const std::string& path : logs_of(collection.folder, most)) {
+      const logs::Log log = logs::read_log(path);
+      EXPECT_EQ(log.signals.force_axes, collection.axes) << path;
+      EXPECT_EQ(log.signals.thrust, collection.thrust) << path;
+      EXPECT_EQ(log.signals.torque, collection.torque) << path;
+      EXPECT_LE(signal(log, "acceleration").noise, collection.noise_m_s2) << path;
+      EXPECT_GT(signal(log, "acceleration").noise, 0) << path;
+      EXPECT_EQ(logs::tell(log).no_flight, "") << path;
+      ++opened;
+    }
+    EXPECT_GE(opened, 4u) << collection.folder;
+  }
+}
+
+TEST(Collections, OpenWithTheAxesThatTheirColumnsCarry) {
+  SWARMCERT_NEEDS_DATA();
+  check_collections(5);
+}
+
+TEST(Collections, AllOpenWithTheAxesThatTheirColumnsCarry_slow) {
+  SWARMCERT_NEEDS_DATA();
+  check_collections(1000);
+}
+
+TEST(Collections, TheSimulatedPx4FlightHoversAtTheCommandThatItsEstimatorFinds) {
+  SWARMCERT_NEEDS_DATA();
+  // Its own estimator says 0.488.
+  const logs::Log log = logs::read_log(data_path("collections/px4/sample_px4_events.ulg"));
+  EXPECT_GE(log.hover_command, 0.47);
+  EXPECT_LE(log.hover_command, 0.51);
+  EXPECT_EQ(log.signals.force_axes, (std::array<bool, 3>{true, true, true}));
+  const logs::FlightStory story = logs::tell(log);
+  EXPECT_NEAR(story.air_s, 9, 2);
+  EXPECT_EQ(logs::tell(logs::read_log(data_path("collections/px4/sample.ulg"))).no_flight, "never armed");
+}
+
+TEST(Collections, NanoBenchsMotorsAreAppliedDutyAndItsGyroscopeIsInRadians) {
+  SWARMCERT_NEEDS_DATA();
+  for (const std::string& path : logs_of("nanobench", 100)) {
+    const logs::Log log = logs::read_log(path);
+    EXPECT_EQ(signal(log, "duty").source, logs::SignalInfo::Source::kMeasured) << path;
+    double largest = 0;
+    for (const logs::Sample& sample : log.samples) largest = std::max(largest, std::abs(sample.rates_rad_s[0]));
+    EXPECT_GT(largest, 0.3) << path;
+    EXPECT_LT(largest, 20) << path << ": in degrees it would be hundreds";
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
