@@ -12,7 +12,7 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr double kBlock_s = 2, kQuantile90 = 1.645;
+constexpr double kDraftBlock_s = 2, kQuantile90 = 1.645;
 
 /// Mean of several estimates with the interval that their scatter gives.
 struct Estimate {
@@ -62,7 +62,7 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
     const logs::Sample& s = log.samples[i];
     const auto R = logs::rotation(s);
     if (R[2][2] < 0.7) continue;
-    if (1e-6 * s.time_us - start_s > kBlock_s) {
+    if (1e-6 * s.time_us - start_s > kDraftBlock_s) {
       close();
       start_s = 1e-6 * s.time_us;
     }

@@ -3,14 +3,13 @@
 #include <cmath>
 #include <cstdint>
 
+#include "analysis/logs/angles.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegree_rad = kPi / 180;
 constexpr double kBelieved = 0.4;  ///< correlation from which a sign or a unit counts as seen
 
 /// The firmware's packed quaternion: two bits name the largest component, which is positive; the others have a sign

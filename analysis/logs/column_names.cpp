@@ -2,10 +2,10 @@
 
 #include <cctype>
 
+#include "analysis/logs/angles.h"
+
 namespace swarmcert::logs {
 namespace {
-
-constexpr double kDegree_rad = 3.14159265358979323846 / 180;
 
 /// `pattern` with '#' replaced by each of `words`.
 std::vector<std::string> each(const std::string& pattern, const std::vector<std::string>& words) {
@@ -188,8 +188,8 @@ bool is_called(const std::string& column, const std::string& name) {
   if (column == name) return true;
   if (column.size() <= name.size() + 1 || name.find('.') == std::string::npos) return false;
   const std::size_t start = column.size() - name.size();
-  for (const char* const wish : {"target.", "ref.", "reference.", "des.", "desired.", "setpoint.", "cmd.", "command.",
-                                 "goal.", "error.", "err.", "initial."}) {
+  for (const char* const wish : {"target.", "ref.", "reference.", "des.", "desired.", "setpoint.", "cmd.",
+                                 "command.", "goal.", "error.", "err.", "initial."}) {
     if (column.rfind(wish, 0) == 0) return false;
   }
   return column[start - 1] == '.' && column.compare(start, name.size(), name) == 0 &&

@@ -2,6 +2,7 @@
 #include <map>
 #include <set>
 
+#include "analysis/logs/angles.h"
 #include "analysis/logs/signals.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
@@ -9,8 +10,6 @@
 
 namespace swarmcert::logs {
 namespace {
-
-constexpr double kDegree_rad = 3.14159265358979323846 / 180;
 
 struct Unit {
   const char* name;

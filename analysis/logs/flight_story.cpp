@@ -10,7 +10,7 @@
 namespace swarmcert::logs {
 namespace {
 
-constexpr double kIdleShare = 0.3;      // of the thrust that is common in a log
+constexpr double kIdleShare = 0.3;  // of the thrust that is common in a log
 constexpr double kAboveStanding_m = 0.03;
 constexpr double kShortestFlight_s = 0.5, kShortestPause_s = 0.3, kLongestTakeoff_s = 3;
 constexpr double kNoThrustHeight_m = 0.15;
@@ -35,9 +35,10 @@ void drop_short_runs(const Log& log, std::vector<char>& flags, char value, doubl
   for (std::size_t i = 1; i <= flags.size(); ++i) {
     if (i < flags.size() && flags[i] == flags[start]) continue;
     const bool inside = start > 0 && i < flags.size();
-    if (flags[start] == value && (inside || at_ends) && seconds(log, i - 1) - seconds(log, start) < shortest_s)
-      std::fill(flags.begin() + static_cast<std::ptrdiff_t>(start), flags.begin() + static_cast<std::ptrdiff_t>(i),
-                static_cast<char>(1 - value));
+    if (flags[start] == value && (inside || at_ends) &&
+        seconds(log, i - 1) - seconds(log, start) < shortest_s)
+      std::fill(flags.begin() + static_cast<std::ptrdiff_t>(start),
+                flags.begin() + static_cast<std::ptrdiff_t>(i), static_cast<char>(1 - value));
     start = i;
   }
 }
@@ -83,8 +84,8 @@ void add_phases(const Log& log, const std::vector<char>& air, FlightStory& story
 
 /// One event for every run of records for which `holds`, runs nearer than 0.3 s taken together.
 template <typename Holds>
-void add_runs(const Log& log, const std::string& kind, double shortest_s, const std::string& what, const Holds& holds,
-              std::vector<LogEvent>& events) {
+void add_runs(const Log& log, const std::string& kind, double shortest_s, const std::string& what,
+              const Holds& holds, std::vector<LogEvent>& events) {
   constexpr double kApart_s = 0.3;
   double start = 0, last = 0;
   bool open = false;
@@ -111,16 +112,19 @@ void add_limit_cycles(const Log& log, const std::vector<char>& air, std::vector<
   std::size_t first = 0;
   while (first < log.samples.size()) {
     std::size_t end = first + 1;
-    while (end < log.samples.size() && !log.samples[end].restarts && seconds(log, end) - seconds(log, first) < kWindow_s)
+    while (end < log.samples.size() && !log.samples[end].restarts &&
+           seconds(log, end) - seconds(log, first) < kWindow_s)
       ++end;
     const std::size_t n = end - first;
     const double length_s = seconds(log, end - 1) - seconds(log, first);
-    const bool flies = std::all_of(air.begin() + static_cast<std::ptrdiff_t>(first),
-                                   air.begin() + static_cast<std::ptrdiff_t>(end), [](char a) { return a != 0; });
+    const bool flies =
+        std::all_of(air.begin() + static_cast<std::ptrdiff_t>(first),
+                    air.begin() + static_cast<std::ptrdiff_t>(end), [](char a) { return a != 0; });
     for (std::size_t axis = 0; axis < 2 && flies && length_s > 0.9 * kWindow_s; ++axis) {
       std::vector<double> rate(n);
       double mean = 0, energy = 0;
-      for (std::size_t i = 0; i < n; ++i) mean += log.samples[first + i].rates_rad_s[axis] / static_cast<double>(n);
+      for (std::size_t i = 0; i < n; ++i)
+        mean += log.samples[first + i].rates_rad_s[axis] / static_cast<double>(n);
       for (std::size_t i = 0; i < n; ++i) {
         rate[i] = log.samples[first + i].rates_rad_s[axis] - mean;
         energy += rate[i] * rate[i];
@@ -132,8 +136,7 @@ void add_limit_cycles(const Log& log, const std::vector<char>& air, std::vector<
       for (std::size_t lag = 1; lag < n / 2; ++lag) {
         double product = 0;
         for (std::size_t i = 0; i + lag < n; ++i) product += rate[i] * rate[i + lag];
-        const double correlation =
-            product / energy * static_cast<double>(n) / static_cast<double>(n - lag);
+        const double correlation = product / energy * static_cast<double>(n) / static_cast<double>(n - lag);
         fell = fell || correlation < 0;
         if (fell) best = std::max(best, correlation);
       }
@@ -143,8 +146,9 @@ void add_limit_cycles(const Log& log, const std::vector<char>& air, std::vector<
     }
     first = end;
   }
-  add_runs(log, "limit cycle", 0, "roll or pitch rate keeps one frequency",
-           [&](std::size_t i) { return cycling[i] != 0; }, events);
+  add_runs(
+      log, "limit cycle", 0, "roll or pitch rate keeps one frequency",
+      [&](std::size_t i) { return cycling[i] != 0; }, events);
 }
 
 void add_events(const Log& log, const std::vector<char>& air, FlightStory& story) {
@@ -156,24 +160,27 @@ void add_events(const Log& log, const std::vector<char>& air, FlightStory& story
     story.events.push_back({"dropout", seconds(log, i - 1), pause_s, "no record"});
   }
   if (log.signals.force) {
-    add_runs(log, "impact", 0, "more than 3 g",
-             [&](std::size_t i) {
-               const Vector& f = log.samples[i].specific_force_m_s2;
-               return std::hypot(f[0], f[1], f[2]) > kImpact_m_s2;
-             },
-             story.events);
+    add_runs(
+        log, "impact", 0, "more than 3 g",
+        [&](std::size_t i) {
+          const Vector& f = log.samples[i].specific_force_m_s2;
+          return std::hypot(f[0], f[1], f[2]) > kImpact_m_s2;
+        },
+        story.events);
   }
   if (log.signals.attitude) {
-    add_runs(log, "impact", 0, "thrust axis more than 60 degrees from the vertical",
-             [&](std::size_t i) { return rotation(log.samples[i])[2][2] < 0.5; }, story.events);
+    add_runs(
+        log, "impact", 0, "thrust axis more than 60 degrees from the vertical",
+        [&](std::size_t i) { return rotation(log.samples[i])[2][2] < 0.5; }, story.events);
   }
   if (log.signals.thrust == ThrustSource::kDuty) {
-    add_runs(log, "saturation", 0.05, "a motor at full duty",
-             [&](std::size_t i) {
-               const auto& d = log.samples[i].duty;
-               return *std::max_element(d.begin(), d.end()) > 0.998;
-             },
-             story.events);
+    add_runs(
+        log, "saturation", 0.05, "a motor at full duty",
+        [&](std::size_t i) {
+          const auto& d = log.samples[i].duty;
+          return *std::max_element(d.begin(), d.end()) > 0.998;
+        },
+        story.events);
   }
   add_limit_cycles(log, air, story.events);
   std::stable_sort(story.events.begin(), story.events.end(),
@@ -189,9 +196,12 @@ std::string lines_for(const Log& log, const std::string& signal) {
       {"attitude", "stateEstimate.qx stateEstimate.qy stateEstimate.qz stateEstimate.qw", "vehicle_attitude",
        "the attitude as a quaternion"},
       {"specific_force", "acc.x acc.y acc.z", "vehicle_acceleration", "the accelerometer"},
-      {"velocity", "stateEstimate.vx stateEstimate.vy stateEstimate.vz", "vehicle_local_position", "the velocity"},
-      {"position", "stateEstimate.x stateEstimate.y stateEstimate.z", "vehicle_local_position", "the position"},
-      {"duty", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "actuator_motors", "the command of every motor"},
+      {"velocity", "stateEstimate.vx stateEstimate.vy stateEstimate.vz", "vehicle_local_position",
+       "the velocity"},
+      {"position", "stateEstimate.x stateEstimate.y stateEstimate.z", "vehicle_local_position",
+       "the position"},
+      {"duty", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "actuator_motors",
+       "the command of every motor"},
       {"battery", "pm.vbatMV", "battery_status", "the battery's voltage"},
       {"rates", "gyro.x gyro.y gyro.z (at 500 Hz)", "vehicle_angular_velocity (at 400 Hz or more)",
        "the angular rates at 400 Hz or more"},
@@ -219,11 +229,13 @@ void add_missing(const Log& log, FlightStory& story) {
     add("duty", "thrust that does not rest on the controller's own scale; mean torques");
     add("battery", "the thrust of the duties; the effect of the battery");
   }
-  if (s.thrust == ThrustSource::kHoverMultiple) add("battery", "a thrust in newton instead of multiples of the hover thrust");
+  if (s.thrust == ThrustSource::kHoverMultiple)
+    add("battery", "a thrust in newton instead of multiples of the hover thrust");
   if (!s.attitude) add("attitude", "lateral forces");
   if (!s.position) add("position", "effects of height and of neighbours");
   if (s.specific_force == ForceSource::kNone) add("velocity", "any force, where there is no accelerometer");
-  if (s.specific_force == ForceSource::kPosition) add("velocity", "forces within 100 ms and at a quarter of the noise");
+  if (s.specific_force == ForceSource::kPosition)
+    add("velocity", "forces within 100 ms and at a quarter of the noise");
   if (s.specific_force != ForceSource::kAccelerometer)
     add("specific_force", "forces faster than the window of the derivative");
   if (s.torque != TorqueUse::kDynamic) add("rates", "torques beyond their mean in slow flight");

@@ -9,7 +9,7 @@
 namespace swarmcert::logs {
 
 struct Phase {
-  std::string name;  ///< ground, takeoff, flight, landing
+  std::string name;               ///< ground, takeoff, flight, landing
   double start_s = 0, end_s = 0;  ///< of the log's clock
 };
 
@@ -24,8 +24,8 @@ struct FlightStory {
   std::vector<Phase> phases;
   std::vector<LogEvent> events;  ///< in order of time
   std::vector<MissingSignal> missing;
-  double air_s = 0;       ///< in the air
-  std::string no_flight;  ///< why this is no flight; else empty
+  double air_s = 0;                                                     ///< in the air
+  std::string no_flight;                                                ///< why this is no flight; else empty
   double battery_first_V = 0, battery_last_V = 0, battery_least_V = 0;  ///< in the air; 0: not logged
 };
 

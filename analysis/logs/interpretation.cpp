@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "analysis/logs/angles.h"
 #include "analysis/logs/message_frames.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
@@ -12,7 +13,6 @@ namespace swarmcert::logs {
 namespace {
 
 using Source = SignalInfo::Source;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kAbsoluteClock_s = 1e8;  ///< clocks beyond it count from 1970, or from a receiver's epoch
 
 /// A signal of the table or, where it has none, `otherwise`.

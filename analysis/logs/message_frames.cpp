@@ -5,10 +5,10 @@
 #include <cmath>
 #include <functional>
 
+#include "analysis/logs/angles.h"
+
 namespace swarmcert::logs {
 namespace {
-
-constexpr double kDegree_rad = 3.14159265358979323846 / 180;
 
 /// "vehicle_local_position" of a topic of that name, or of the type px4_msgs/msg/VehicleLocalPosition.
 std::string message_of(const RawTopic& topic) {
@@ -38,8 +38,8 @@ class Renamer {
   }
 
   /// The first of `patterns` ('#' stands for an axis' name) whose three columns are there, as (x, -y, -z).
-  void add_vector(const std::vector<std::string>& patterns, const std::vector<std::string>& axes, const std::string& to,
-                  double factor = 1) {
+  void add_vector(const std::vector<std::string>& patterns, const std::vector<std::string>& axes,
+                  const std::string& to, double factor = 1) {
     const char* const kAxes[] = {"_x", "_y", "_z"};
     for (const std::string& pattern : patterns) {
       bool all = true;
@@ -89,8 +89,8 @@ void add_motors(RawTopic& topic) {
   for (int k = 0; k < 8; ++k) {
     const RawColumn* const column = topic.find("control[" + std::to_string(k) + "]");
     if (column == nullptr) return;
-    const bool used = std::any_of(column->values.begin(), column->values.end(),
-                                  [](double x) { return std::isfinite(x); });
+    const bool used =
+        std::any_of(column->values.begin(), column->values.end(), [](double x) { return std::isfinite(x); });
     if (!used) return;
     RawColumn command{"motor_command_" + std::to_string(k + 1), "", column->values};
     for (double& value : command.values) value = std::isfinite(value) ? std::max(value, 0.0) : 0;  // disarmed

@@ -29,7 +29,8 @@ double noise_of_slope(const SignalTable& t, const std::vector<double>& column, d
     if (speed < kMoving_m_s) left[i] = std::nan("");
     sizes.push_back(std::abs(left[i]));
   }
-  const double typical = median(sizes) / 0.6745;  // 0.6745: median of the size of a normal variable of unit deviation
+  const double typical =
+      median(sizes) / 0.6745;  // 0.6745: median of the size of a normal variable of unit deviation
   double squares = 0, products = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < column.size(); ++i) {

@@ -64,10 +64,12 @@ bool is_unit_quaternion(const RawTopic& topic, const Carried& carried) {
 /// What a topic of set points calls a position is one that is wanted.
 bool is_wish(const RawTopic& topic, int signal) {
   const bool may_be = signal == kTargetPosition || signal == kTargetVelocity || signal == kMotorCommand ||
-                      signal == kThrustCommand || signal == kThrust || signal == kTorque || signal == kMotorForce;
+                      signal == kThrustCommand || signal == kThrust || signal == kTorque ||
+                      signal == kMotorForce;
   if (may_be) return false;
   const std::string name = plain_name(topic.name);
-  for (const char* const word : {"setpoint", "set.point", "target", "reference", "desired", "command", "cmd"}) {
+  for (const char* const word :
+       {"setpoint", "set.point", "target", "reference", "desired", "command", "cmd"}) {
     if (name.find(word) != std::string::npos) return true;
   }
   return false;

@@ -6,10 +6,11 @@
 #include <numeric>
 #include <optional>
 
+#include "analysis/logs/angles.h"
+
 namespace swarmcert::logs {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kLongestPause_us = 10e6;
 constexpr double kTickRange_us = 4294967296.0;
 constexpr double kInt16Range = 65536;
@@ -29,8 +30,8 @@ double median_step(const std::vector<double>& times) {
 
 /// Undoes the wraps of a position in 16-bit integers: neighbours that differ by almost the whole range. (Velocities and
 /// accelerations may jump that far in a crash.) Values that stay at the ends of the range are named.
-std::vector<double> without_wraps(const RawColumn& column, const std::vector<double>& time_s, bool is_position,
-                                  std::vector<LogEvent>& events) {
+std::vector<double> without_wraps(const RawColumn& column, const std::vector<double>& time_s,
+                                  bool is_position, std::vector<LogEvent>& events) {
   constexpr double kJump = 0.9 * kInt16Range;
   constexpr std::size_t kMostEvents = 20;
   const std::vector<double>& stored = column.values;
@@ -45,7 +46,8 @@ std::vector<double> without_wraps(const RawColumn& column, const std::vector<dou
     const double now = stored[i];
     if (is_position && std::abs(now - last) > kJump) {
       turns += now < last ? 1 : -1;
-      if (++wraps <= kMostEvents) events.push_back({"wrap", time_s[i], 0, column.name + ": a 16-bit integer"});
+      if (++wraps <= kMostEvents)
+        events.push_back({"wrap", time_s[i], 0, column.name + ": a 16-bit integer"});
     }
     const bool full = now == kInt16Range / 2 - 1 || now == -kInt16Range / 2;
     if (full && now == last && ++saturated <= kMostEvents)
@@ -292,7 +294,8 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, cons
       if (all[k].empty() || !is_needed(signal) || std::isfinite(all[k][i])) continue;
       (is_own[k] != 0 ? is_finite : others_know) = false;
     }
-    if (!others_know && is_finite) continue;  // another topic has not begun, has ended or has a gap: no damage
+    if (!others_know && is_finite)
+      continue;  // another topic has not begun, has ended or has a gap: no damage
     filter.take(i, clock_us[i], is_finite);
   }
   const std::vector<std::size_t> kept = filter.end();
