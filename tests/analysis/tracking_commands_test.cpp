@@ -68,7 +68,7 @@ TEST(BoundCommand, WhatFloat32CostsIsPartOfTheErrorBudget) {
 }
 
 /// Gains and mass of a flight of a Crazyflie whose z loop had no integrator and whose thrust was 0.1279 N off: it hovered
-/// 0.117 m from its set point in the mean, 0.121 m at most (IMRCLab/crazyswarm2-tools, log 58).
+/// 0.117 m from its set point in the mean, 0.1137 m of which the bias explains (IMRCLab/crazyswarm2-tools, log 58).
 std::string biased_flight(const ScratchFolder& folder) {
   std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");
   const std::size_t at = model.find("mass_kg = ");
@@ -90,10 +90,11 @@ TEST(BoundCommand, EveryBoundContainsTheBias) {
     for (const Json& row : result["bounds"]) {
       if (row["axis"] != "z") continue;
       ++rows;
-      EXPECT_GE(row["total"].get<double>(), 0.121) << known << row;
+      EXPECT_GE(row["total"].get<double>(), 0.1279 / (0.0375 * 30)) << known << row;
       EXPECT_LT(row["total"].get<double>(), 0.15) << known << row;
       for (const char* const name : {"amplitude", "edge", "impulse", "amplitude_and_rate", "minimum"}) {
-        if (row[name].is_number()) EXPECT_GE(row[name].get<double>(), 0.1279 / (0.0375 * 30)) << name << row;
+        if (!row[name].is_number()) continue;
+        EXPECT_GE(row[name].get<double>(), 0.1279 / (0.0375 * 30)) << name << row;
       }
     }
     EXPECT_EQ(rows, 4);

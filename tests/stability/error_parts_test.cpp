@@ -180,18 +180,19 @@ std::vector<Declared> random_declarations(std::mt19937& random, bool has_integra
   return all;
 }
 
-TEST(ErrorParts, EverythingDeclaredTogetherStaysBelowTheBound) {
+/// @param draws per loop and per end of a run.
+void check_everything(int draws, const std::vector<double>& ends_s) {
   std::mt19937 random(3);
   int runs = 0;
   for (const Case& c : cases()) {
     SCOPED_TRACE(c.name);
     double closest = 0;
-    for (const double end_s : {0.3, 0.6, 1.2, 2.5, 6.0}) {
+    for (const double end_s : ends_s) {
       const Worst worst = worst_of(c, static_cast<int>(end_s / kStep_s));
-      for (int k = 0; k < 12; ++k) {
+      for (int k = 0; k < draws; ++k) {
         for (const Declared& declared : random_declarations(random, c.loop.Ki > 0)) {
           const AxisBounds bounds = bounds_of(c, declared);
-          const double mistakes = k % 3 == 0 ? 0.1 : 0;
+          const double mistakes = k % 3 == 1 ? 0.1 : 0;
           const double ratio = largest_error(c, declared, worst, mistakes, random) / bounds.least();
           ++runs;
           closest = std::max(closest, ratio);
@@ -202,7 +203,13 @@ TEST(ErrorParts, EverythingDeclaredTogetherStaysBelowTheBound) {
     }
     EXPECT_GT(closest, 0.75) << "the inputs did not try hard";
   }
-  EXPECT_GT(runs, 8 * 5 * 12 * 2);
+  EXPECT_GE(runs, 34 * draws * static_cast<int>(ends_s.size()));
+}
+
+TEST(ErrorParts, EverythingDeclaredTogetherStaysBelowTheBound) { check_everything(2, {0.4, 1.2, 4}); }
+
+TEST(ErrorParts, EverythingDeclaredTogetherStaysBelowTheBound_slow) {
+  check_everything(40, {0.15, 0.3, 0.6, 1.2, 2.5, 6});
 }
 
 TEST(ErrorParts, EachPartAloneIsReached) {
@@ -221,13 +228,14 @@ TEST(ErrorParts, EachPartAloneIsReached) {
       declared.other = other;
       const double bound = bounds_of(c, declared).least();
       double most = 0;
-      for (double end_s = 0.1; end_s < 8; end_s *= 1.15) {
+      for (double end_s = 0.1; end_s < 18; end_s *= 1.4) {
         const Worst worst = worst_of(c, static_cast<int>(end_s / kStep_s));
         most = std::max(most, largest_error(c, declared, worst, 0, random));
       }
-      EXPECT_LE(most, bound * (1 + 1e-7));
-      // A delay makes the bound of the initial position larger than need be; impulses between samples are worse.
-      EXPECT_GT(most, bound * (c.loop.delay_s > 0 && other.position_m > 0 ? 0.9 : 0.97));
+      // A late command is stepped as if it were linear on each step.
+      EXPECT_LE(most, bound * (1 + (c.steps == 0 && c.loop.delay_s > 0 ? 2e-5 : 1e-7)));
+      // Speeds that begin between samples are worse, and slow loops take longer than the runs.
+      EXPECT_GT(most, 0.88 * bound);
     }
   }
 }
@@ -238,9 +246,9 @@ TEST(ErrorParts, AnActingClampOfTheIntegratorIsCounted) {
   int acted = 0, never = 0;
   double closest = 0;
   for (const double limit_m_s : {0.02, 0.1, 0.4, 2.0}) {
-    for (const double end_s : {0.6, 1.5, 4.0}) {
+    for (const double end_s : {0.6, 1.5}) {
       const Worst worst = worst_of(c, static_cast<int>(end_s / kStep_s));
-      for (int k = 0; k < 20; ++k) {
+      for (int k = 0; k < 8; ++k) {
         Declared declared = random_declarations(random, true)[k % 2 == 0 ? 0 : 2];
         const AxisBounds bounds = bounds_of(c, declared, limit_m_s);
         (bounds.clamp.never_acts ? never : acted) += 1;
@@ -250,8 +258,8 @@ TEST(ErrorParts, AnActingClampOfTheIntegratorIsCounted) {
       }
     }
   }
-  EXPECT_GT(acted, 20);
-  EXPECT_GT(never, 20);
+  EXPECT_GT(acted, 8);
+  EXPECT_GT(never, 8);
   EXPECT_GT(closest, 0.7);
 }
 
@@ -262,7 +270,7 @@ TEST(ErrorParts, TheDemandOnTheIntegratorIsNotExceeded) {
     SCOPED_TRACE(c.name);
     const double share = c.steps > 0 ? c.integrator_share : 1;
     double closest = 0;
-    for (int k = 0; k < 40; ++k) {
+    for (int k = 0; k < 15; ++k) {
       Declared declared = random_declarations(random, true)[0];
       declared.known.amplitude_N = 0;
       const double demand_m_s = c.steps > 0

@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <optional>
 #include <random>
 
+#include "stability/bounds/tracking_bounds.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {
@@ -68,6 +72,37 @@ TEST(SampledLoop, ErrorsBetweenSamplesAreHardlyLarger) {
   EXPECT_GE(all.rate, at_samples.rate);
   EXPECT_GT(all.amplitude, at_samples.amplitude);
   EXPECT_LT(all.amplitude, at_samples.amplitude * (1 + 1e-6));
+}
+
+/// What sampled_loop.h states of the shipped gains.
+TEST(SampledLoop, ErrorsBetweenSamplesOfTheShippedGainsAreLargerByWhatTheHeaderStates) {
+  const std::filesystem::path folder = std::filesystem::path(SWARMCERT_SOURCE_DIR) / "controller/gains";
+  double rate = 0, amplitude = 0, edge = 0, impulse = 0;
+  int loops = 0;
+  for (const auto& file : std::filesystem::directory_iterator(folder)) {
+    if (file.path().extension() != ".toml") continue;
+    const Gains gains = load_gains(file.path().string());
+    for (const int axis : {0, 2}) {
+      const std::optional<SampledLoop> loop = sampled_axis_loop(gains, {kMass_kg}, axis);
+      if (!loop) continue;
+      ++loops;
+      for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+        const GainNorms at = sampled_norms(*loop, channel, Instants::kSampling);
+        const GainNorms all = sampled_norms(*loop, channel, Instants::kAll);
+        rate = std::max(rate, all.rate / at.rate - 1);
+        amplitude = std::max(amplitude, all.amplitude / at.amplitude - 1);
+        edge = std::max(edge, all.edge / at.edge - 1);
+        impulse = std::max(impulse, all.impulse / at.impulse - 1);
+      }
+    }
+  }
+  EXPECT_GE(loops, 8);
+  EXPECT_LE(rate, 1e-7);
+  EXPECT_LE(amplitude, 1e-4);
+  EXPECT_LE(edge, 1e-4);
+  EXPECT_LE(impulse, 4e-4);
+  EXPECT_GT(amplitude, 5e-5) << "the header states the order of magnitude";
+  EXPECT_GT(impulse, 2e-4);
 }
 
 TEST(SampledLoop, TendsToTheContinuousLoop) {

@@ -351,7 +351,7 @@ void declare_no_class(DisturbanceSource& source) {
   source.kind = "declared";
   source.note = "as given; no force error beside a constant one";
   for (stability::Disturbance& d : source.axis) {
-    d.rate_N_s = d.amplitude_N = d.variation_N = d.impulse_N_s = 0;
+    d.amplitude_N = d.variation_N = d.impulse_N_s = 0;  // its rate adds nothing to that
   }
   source.rate_norm_N_s = 0;
 }

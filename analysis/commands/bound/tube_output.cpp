@@ -180,8 +180,8 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
 
 void print_local_tube(const Json& tube) {
   const bool proved = tube["verdict"] == "proved";
-  fmt::print("\nTube around {} with {} vehicles, {:g} s: {}\n", tube["task"].get<std::string>(),
-             tube["vehicles"].get<int>(), tube["duration_s"].get<double>(),
+  fmt::print("\nTube around {} with {} vehicles, {:g} s, {} loop: {}\n", tube["task"].get<std::string>(),
+             tube["vehicles"].get<int>(), tube["duration_s"].get<double>(), tube["loop"].get<std::string>(),
              tube["verdict"].get<std::string>());
   if (proved) {
     const Json& r = tube["radius_xyz_m"];
@@ -229,8 +229,8 @@ void print_local_tube(const Json& tube) {
 
 void add_local_tube_plot(Report& report, const LocalTube& tube, const Json& json) {
   report.heading("Tube around the task");
-  report.paragraph(fmt::format("{} with {} vehicles, {:g} s: {}.", json["task"].get<std::string>(),
-                               json["vehicles"].get<int>(), tube.duration_s,
+  report.paragraph(fmt::format("{} with {} vehicles, {:g} s, {} loop: {}.", json["task"].get<std::string>(),
+                               json["vehicles"].get<int>(), tube.duration_s, json["loop"].get<std::string>(),
                                json["verdict"].get<std::string>()));
   if (!tube.proved) report.paragraph(tube.why + ".");
   std::vector<std::vector<std::string>> rows;

@@ -56,6 +56,7 @@ ErrorLoop error_loop(const AxisLoop& loop, double slice_s, int slices) {
   result.g = cells(shifted(rest, integrates));
   result.g1 = cells(shifted(rest, integrates + 1));
   result.g2 = cells(shifted(rest, integrates + 2));
+  result.h3 = cells(shifted(unit, integrates + 2));
   return result;
 }
 
@@ -96,7 +97,7 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
     loops.axis[axis] =
         last && same_loop(*loop, *last) ? loops.axis[axis - 1] : error_loop(*loop, slice_s, slices);
     const ErrorLoop& made = loops.axis[axis];
-    if (!made.h1 || !made.h2 || (made.has_lag && (!made.g1 || !made.g2))) {
+    if (!made.h1 || !made.h2 || (made.has_lag && (!made.g1 || !made.g2 || !made.h3))) {
       loops.refusal =
           std::string("the loop of axis ") + stability::axis_name(axis) + " is not verifiably stable";
       return loops;
@@ -123,6 +124,25 @@ double ErrorHistory::largest_position_m() const {
 }
 double ErrorHistory::largest_velocity_m_s() const {
   return *std::max_element(velocity_m_s.begin(), velocity_m_s.end());
+}
+
+LagStart lag_start(const ErrorLoop& loop, double slice_s) {
+  LagStart result;
+  if (!loop.has_lag) return result;
+  const Interval tau_s(loop.lags_s * (1 - 1e-15), loop.lags_s),
+      cell_s = Interval(slice_s) * Interval(1 - 1e-12, 1 + 1e-12);
+  // A kernel leaves its mean over a cell by at most the integral of its slope's absolute value there.
+  const auto values = [&](const KernelCells& kernel, const KernelCells& slope) {
+    std::vector<Interval> of_cell;
+    for (std::size_t n = 0; n < kernel.net.size(); ++n) {
+      const double away = slope.integral[n];
+      of_cell.push_back(tau_s * (kernel.net[n] / cell_s + Interval(-away, away)));
+    }
+    return of_cell;
+  };
+  result.position_m = values(*loop.h1, *loop.h2);
+  result.velocity_m_s = values(*loop.h2, *loop.h3);
+  return result;
 }
 
 ErrorHistory respond(const ErrorLoop& loop, bool lagging, const Signal& signal) {

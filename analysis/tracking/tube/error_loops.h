@@ -5,10 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "stability/bounds/interval.h"
 #include "stability/bounds/kernel_cells.h"
 #include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::analysis {
+
+using stability::Interval;
 
 /// One axis of the continuous loop without delay: m D e = s (f_a - f_hat) + s (L - 1)(f_a - m p_d''), with f_a the force
 /// that acts, f_hat what the controller believes, L the lags of its command. So e = h' * (f_a - f_hat) + g' * w with
@@ -16,6 +19,7 @@ namespace swarmcert::analysis {
 /// Each entry bounds its kernel in real arithmetic. h and g, which do not decay where Ki = 0, may be missing.
 struct ErrorLoop {
   std::optional<stability::KernelCells> h, h1, h2;  ///< h, h', h''
+  std::optional<stability::KernelCells> h3;         ///< h'''; missing where there is no lag
   std::optional<stability::KernelCells> g, g1, g2;  ///< all missing where there is no lag
   bool has_lag = false;
   double Kp = 0, Kd = 0, Ki = 0;
@@ -44,6 +48,13 @@ struct Signal {
   std::vector<double> rate;  ///< empty: not known
   double at_start = 0;       ///< at least |w(0)|; matters to the rate
 };
+
+/// Errors of one axis slice by slice that one newton of excess in the thrust at t = 0 causes, m and m/s per N: a lag that
+/// starts there adds exp(-t/tau) to the force, so that e = tau h'. Of a loop with one lag.
+struct LagStart {
+  std::vector<Interval> position_m, velocity_m_s;  ///< empty without a lag: then the thrust follows at once
+};
+LagStart lag_start(const ErrorLoop& loop, double slice_s);
 
 /// From rest: |e| <= |h'| * size, or |h| * rate + sup|h| |w(0)|, the smaller at each time; |e'| likewise, one derivative on.
 /// @param lagging the kernels g instead of h.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "analysis/tracking/tube/force_difference.h"
+
 namespace swarmcert::analysis {
 
 using stability::up;
@@ -98,7 +100,20 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
       learned_(network, tracking.model.kind, vehicles - 1),
       truth_(truth, tracking.plant.largest_thrust_N),
       motion_(sliced(task, vehicles, network_age_s, longest_slice_s)),
-      loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices) : ErrorLoops{}) {}
+      loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices) : ErrorLoops{}),
+      excess_N_(static_cast<std::size_t>(vehicles), Interval(0)) {
+  if (!refusal().empty() || !loops_.axis[2].has_lag) return;
+  lag_start_z_ = lag_start(loops_.axis[2], motion_.slice_s);
+  // Vehicles start at their set points; the prediction is what it differs from the truth, and the truth.
+  const Deviations none = all_within(Radii::none(vehicles));
+  for (int i = 0; i < vehicles; ++i) {
+    const int first = motion_.stretch_of[static_cast<std::size_t>(i)].front();
+    const Stretch& stretch = motion_.stretches[static_cast<std::size_t>(first)];
+    const Interval prediction_N =
+        ForceDifference(*this, stretch, none).over(none) + truth_sizes(stretch, none).force_N[2];
+    excess_N_[static_cast<std::size_t>(i)] = stability::hull(0, -prediction_N);
+  }
+}
 
 std::string Scene::refusal() const {
   if (motion_.slices == 0) return "the task's trajectories have no enclosure";
@@ -183,8 +198,19 @@ std::array<ErrorHistory, 3> Scene::other_errors(int vehicle, const std::vector<T
     result[axis] = respond(loop, true, feed_forward);
     result[axis].add(respond(loop, true, force));
     if (axis < 2) result[axis].add(respond(loop, false, force));
+    if (axis == 2 && loop.has_lag) result[axis].add(start_errors(vehicle));
   }
   return result;
+}
+
+ErrorHistory Scene::start_errors(int vehicle) const {
+  const Interval excess_N = excess_at_start_N(vehicle);
+  ErrorHistory history;
+  for (std::size_t n = 0; n < lag_start_z_.position_m.size(); ++n) {
+    history.position_m.push_back((excess_N * lag_start_z_.position_m[n]).mag());
+    history.velocity_m_s.push_back((excess_N * lag_start_z_.velocity_m_s[n]).mag());
+  }
+  return history;
 }
 
 std::vector<double> Scene::by_slice(int vehicle, const std::vector<double>& by_stretch) const {

@@ -71,8 +71,13 @@ class Scene {
   TruthSizes truth_sizes(const Stretch& stretch, const Deviations& deviations) const;
   std::vector<TruthSizes> truth_sizes(const Radii& radii) const;  ///< of every stretch
 
-  /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's lag,
-  /// and along x and y the truth itself.
+  /// Thrust beyond the weight at t = 0, N: rotors start anywhere between the weight and the force that the first
+  /// prediction asks for.
+  Interval excess_at_start_N(int vehicle) const { return excess_N_[static_cast<std::size_t>(vehicle)]; }
+  const LagStart& lag_start_z() const { return lag_start_z_; }
+
+  /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's lag
+  /// and the rotors' start, and along x and y the truth itself.
   std::array<ErrorHistory, 3> other_errors(int vehicle, const std::vector<TruthSizes>& truth) const;
   /// One number per slice from one per stretch.
   std::vector<double> by_slice(int vehicle, const std::vector<double>& by_stretch) const;
@@ -86,12 +91,16 @@ class Scene {
   static int neighbour(int vehicle, int j) { return j < vehicle ? j : j + 1; }
 
  private:
+  ErrorHistory start_errors(int vehicle) const;
+
   const stability::TrackingSetup& tracking_;
   double network_age_s_;
   LearnedForce learned_;
   TruthForce truth_;
   Motion motion_;
   ErrorLoops loops_;
+  std::vector<Interval> excess_N_;  ///< per vehicle
+  LagStart lag_start_z_;
 };
 
 }  // namespace swarmcert::analysis

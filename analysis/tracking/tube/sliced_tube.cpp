@@ -55,6 +55,8 @@ Deviations hull_of(const Deviations& a, const Deviations& b) {
 struct Axis {
   const ErrorLoop* loop = nullptr;
   std::vector<Interval> force, lagging;  ///< d and w, slices so far
+  const LagStart* start = nullptr;       ///< of the rotors; null: there is none
+  Interval excess_N{0};                  ///< their thrust beyond the weight at the start
   Interval position_m, velocity_m_s;     ///< from the slices before
 
   void begin_slice() {
@@ -62,6 +64,10 @@ struct Axis {
     position_m = answer_to_past(*loop->h1, force, n);
     velocity_m_s = answer_to_past(*loop->h2, force, n);
     if (!loop->has_lag) return;
+    if (start != nullptr) {
+      position_m += excess_N * start->position_m[n];
+      velocity_m_s += excess_N * start->velocity_m_s[n];
+    }
     position_m += answer_to_past(*loop->g1, lagging, n);
     velocity_m_s += answer_to_past(*loop->g2, lagging, n);
   }
@@ -85,6 +91,9 @@ class Sweep {
     for (int i = 0; i < scene.vehicles(); ++i) {
       axes_.emplace_back();
       for (std::size_t k = 0; k < 3; ++k) axes_.back()[k].loop = &scene.loops().axis[k];
+      if (!scene.loops().axis[2].has_lag) continue;
+      axes_.back()[2].start = &scene.lag_start_z();
+      axes_.back()[2].excess_N = scene.excess_at_start_N(i);
     }
     remembered_ = static_cast<int>(std::ceil(scene.network_age_s() / scene.motion().slice_s + 1e-9));
   }

@@ -56,6 +56,12 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
     if (loop.h) result.integral_m_s[axis] = largest(convolved(*loop.h, error_N));
     if (loop.g && loop.Ki > 0)
       result.integral_m_s[axis] = up(result.integral_m_s[axis] + largest(convolved(*loop.g, lagged_N)));
+    // Rotors that start with an excess add exp(-t/tau) of it to the force.
+    const double excess_N = axis == 2 ? scene.excess_at_start_N(vehicle).mag() : 0;
+    if (loop.h && loop.has_lag) {
+      result.integral_m_s[axis] =
+          up(result.integral_m_s[axis] + times(up(excess_N * loop.lags_s), loop.h->peak));
+    }
     const double feedback = up(times(loop.Kp, tube.tube.radii.position_m[i][axis]) +
                                up(times(loop.Kd, tube.tube.radii.velocity_m_s[i][axis]) +
                                   times(loop.Ki, result.integral_m_s[axis])));
@@ -70,7 +76,7 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
         truth_N = std::max(truth_N, tube.tube.truth[static_cast<std::size_t>(s)].force_N[axis].mag());
       lag_N = up(2 * truth_N + up(mass_kg * std::min(2 * planned, by_jerk)));
     }
-    result.acceleration_m_s2[axis] = up(feedback + up(up(largest(error_N) + lag_N) / mass_kg));
+    result.acceleration_m_s2[axis] = up(feedback + up(up(up(largest(error_N) + lag_N) + excess_N) / mass_kg));
     // f_hat = f_a + (f_hat - f_a) is fed forward along z.
     double fed_N = 0;
     if (axis == 2) {
@@ -230,6 +236,13 @@ void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants
                     truth_lag_s));
   }
   add("all vehicles have these gains and this model", "assumed", "and start at rest at their set points");
+  if (scene.loops().axis[2].has_lag) {
+    double excess_N = 0;
+    for (int i = 0; i < scene.vehicles(); ++i)
+      excess_N = std::max(excess_N, scene.excess_at_start_N(i).mag());
+    add("rotors start between the weight and what the first prediction asks for", "assumed",
+        fmt::format("at most {:.3g} N away from the weight", excess_N));
+  }
   add("exact position and velocity", "assumed", "also of neighbours, known from the start");
   add("predictions are a staircase", "proved",
       fmt::format("states up to {:.3g} s old are in the bounds", scene.network_age_s()));
