@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-logs::RawLog read(const std::string& text) {
+logs::RawLog csv_of(const std::string& text) {
   std::istringstream in(text);
   const logs::RawLog log = logs::parse_raw(in, "log.csv");
   EXPECT_EQ(broken_rule(log), "");
@@ -33,7 +33,7 @@ std::string cfclient_csv(int first, int last) {
 }
 
 TEST(CrazyflieCsv, ReadsWhatCfclientWrites) {
-  const logs::RawLog log = read(cfclient_csv(0, 4));
+  const logs::RawLog log = csv_of(cfclient_csv(0, 4));
   EXPECT_EQ(log.format, "csv");
   const logs::RawTopic& topic = topic_of(log, "csv");
   EXPECT_EQ(topic.time_s, (std::vector<double>{5.0, 5.01, 5.02, 5.03}));
@@ -45,7 +45,7 @@ TEST(CrazyflieCsv, ReadsWhatCfclientWrites) {
 }
 
 TEST(CrazyflieCsv, TakesUnitsFromTheHead) {
-  const logs::RawLog log = read("time[s];acc.z[g];pm.vbat (V);a.b[0]\n1;0.5;3.7;4\n");
+  const logs::RawLog log = csv_of("time[s];acc.z[g];pm.vbat (V);a.b[0]\n1;0.5;3.7;4\n");
   const logs::RawTopic& topic = topic_of(log, "csv");
   EXPECT_EQ(topic.time_s, std::vector<double>{1});
   EXPECT_EQ(topic.find("acc.z[g]")->unit, "g");
@@ -58,13 +58,13 @@ TEST(CrazyflieCsv, FindsTheUnitOfTheTimeInItsSteps) {
                                    std::pair{"2000", "us"}, std::pair{"1e7", "ns"}}) {
     std::string text = "timestamp,gyro.x\n";
     for (int k = 0; k < 10; ++k) text += std::to_string(k * std::stod(step)) + ",1\n";
-    EXPECT_EQ(read(text).texts.at("time_unit"), unit) << step;
+    EXPECT_EQ(csv_of(text).texts.at("time_unit"), unit) << step;
   }
 }
 
 TEST(CrazyflieCsv, TextInACellIsNotANumberAndCostsNoOtherCell) {
   const logs::RawLog log =
-      read("tick,sys.state,block,acc.z\n10,flying,Pose,1\n20,3,Pose,\n30,nan,Pose,inf\n");
+      csv_of("tick,sys.state,block,acc.z\n10,flying,Pose,1\n20,3,Pose,\n30,nan,Pose,inf\n");
   const logs::RawTopic& topic = topic_of(log, "csv");
   EXPECT_EQ(topic.time_s.size(), 3u);
   EXPECT_TRUE(std::isnan(values_of(topic, "sys.state")[0]));
@@ -78,7 +78,7 @@ TEST(CrazyflieCsv, TextInACellIsNotANumberAndCostsNoOtherCell) {
 }
 
 TEST(CrazyflieCsv, DamagedLinesAreCountedAndLeftOut) {
-  const logs::RawLog log = read("Timestamp,acc.z\n10,1\n20\n30,1,2\nx,1\n,1\n40,1\n5");
+  const logs::RawLog log = csv_of("Timestamp,acc.z\n10,1\n20\n30,1,2\nx,1\n,1\n40,1\n5");
   EXPECT_EQ(topic_of(log, "csv").time_s, (std::vector<double>{0.01, 0.04}));
   EXPECT_EQ(log.health.damaged_lines, 3u);
   EXPECT_EQ(log.health.not_finite, 1u);
@@ -90,7 +90,7 @@ TEST(CrazyflieCsv, OtherTablesAreNoneOfThese) {
   for (const char* const head : {"", "Timestamp", "Timestamp,roll\n1,2\n", "roll,gyro.x\n",
                                  "# time[ms],x[m],y[m]\n", "Timestamp 1.5,2.5\n", "time,1.5\n", "t,a.b.c\n"})
     EXPECT_FALSE(logs::looks_like_crazyflie_csv(head)) << head;
-  EXPECT_TRUE(refuses([] { read("Timestamp,a.b,a.b\n1,2,3\n"); }, {"log.csv", "names a column twice"}));
+  EXPECT_TRUE(refuses([] { csv_of("Timestamp,a.b,a.b\n1,2,3\n"); }, {"log.csv", "names a column twice"}));
 }
 
 TEST(CrazyflieCsv, EveryDamagedByteGivesALogOrARefusal) {

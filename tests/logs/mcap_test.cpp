@@ -16,13 +16,15 @@
 namespace swarmcert::tests {
 namespace {
 
-logs::RawLog read(const std::string& bytes) {
+logs::RawLog mcap_of(const std::string& bytes) {
   std::istringstream in(bytes);
   return logs::read_mcap(in, "bag.mcap");
 }
 
 /// x of the poses that arrived: their numbers.
-std::vector<double> poses(const logs::RawLog& log) { return values_in(log, "/cf1/pose", "pose.position.x"); }
+std::vector<double> poses_in_mcap(const logs::RawLog& log) {
+  return values_in(log, "/cf1/pose", "pose.position.x");
+}
 
 std::string pose_file(const std::string& data) {
   const std::string bytes = mcap_magic() + mcap_header() + mcap_pose_definitions() + data;
@@ -30,9 +32,9 @@ std::string pose_file(const std::string& data) {
 }
 
 TEST(Mcap, GivesMessagesInAndOutsideChunks) {
-  const logs::RawLog log = read(small_mcap());
+  const logs::RawLog log = mcap_of(small_mcap());
   EXPECT_EQ(log.format, "mcap");
-  EXPECT_EQ(poses(log), range(0, 20));
+  EXPECT_EQ(poses_in_mcap(log), range(0, 20));
   const logs::RawTopic& topic = topic_of(log, "/cf1/pose");
   EXPECT_EQ(topic.type, "geometry_msgs/msg/PoseStamped");
   EXPECT_EQ(topic.time_s[3], 1.03);
@@ -56,7 +58,7 @@ TEST(Mcap, ReadsWhatTheReferenceWriterWrote) {
     EXPECT_FALSE(log.health.truncated || log.health.checksum_failed);
     ASSERT_EQ(log.skipped.size(), 1u);
     EXPECT_EQ(log.skipped[0].name, "/json");
-    EXPECT_EQ(poses(log), range(0, 12));
+    EXPECT_EQ(poses_in_mcap(log), range(0, 12));
     const logs::RawTopic& mixed = topic_of(log, "/mixed");
     for (int k = 0; k < 12; ++k) {
       const auto i = static_cast<std::size_t>(k);
@@ -82,8 +84,8 @@ TEST(Mcap, AChunkThatFailsItsChecksumIsLeftOut) {
   std::string bytes = small_mcap();
   const std::string chunk = mcap_chunk(mcap_poses(12, 20));
   bytes[bytes.find(chunk) + chunk.size() - 3] ^= 1;
-  const logs::RawLog log = read(bytes);
-  EXPECT_EQ(poses(log), range(0, 12));
+  const logs::RawLog log = mcap_of(bytes);
+  EXPECT_EQ(poses_in_mcap(log), range(0, 12));
   EXPECT_EQ(log.health.damaged_blocks, 1u);
   EXPECT_TRUE(log.health.checksum_failed) << "that of the data section covers the chunk";
   ASSERT_EQ(log.skipped.size(), 1u);
@@ -94,18 +96,18 @@ TEST(Mcap, DefinitionsOfADamagedChunkAreTakenFromElsewhere) {
   // The definitions stand in the first chunk, which is damaged, and in the summary.
   std::string first = mcap_chunk(mcap_pose_definitions() + mcap_poses(0, 5));
   first[first.size() - 1] ^= 1;
-  const logs::RawLog log = read(mcap_magic() + mcap_header() + first + mcap_chunk(mcap_poses(5, 9)) +
-                                mcap_record(0x0F, bytes_of(0)) + mcap_pose_definitions() +
-                                mcap_record(0x02, std::string(20, '\0')) + mcap_magic());
-  EXPECT_EQ(poses(log), range(5, 9));
+  const logs::RawLog log = mcap_of(mcap_magic() + mcap_header() + first + mcap_chunk(mcap_poses(5, 9)) +
+                                   mcap_record(0x0F, bytes_of(0)) + mcap_pose_definitions() +
+                                   mcap_record(0x02, std::string(20, '\0')) + mcap_magic());
+  EXPECT_EQ(poses_in_mcap(log), range(5, 9));
 }
 
 TEST(Mcap, EndingAnywhereKeepsTheMessagesBefore) {
   const std::string bytes = small_mcap();
   std::size_t last = 0;
   for (std::size_t size = mcap_magic().size(); size < bytes.size(); ++size) {
-    const logs::RawLog log = read(bytes.substr(0, size));
-    const std::vector<double> found = poses(log);
+    const logs::RawLog log = mcap_of(bytes.substr(0, size));
+    const std::vector<double> found = poses_in_mcap(log);
     EXPECT_EQ(found, range(0, static_cast<int>(found.size()))) << size;
     EXPECT_GE(found.size(), last) << size;
     EXPECT_TRUE(log.health.truncated) << size;
@@ -122,7 +124,7 @@ TEST(Mcap, ACompressedChunkThatTheFileCutsShortIsReadAsFarAsItGoes) {
   const std::string bytes(std::istreambuf_iterator<char>(file), {});
   std::size_t last = 0, larger = 0;
   for (std::size_t size = 8; size < bytes.size(); size += 7) {
-    const logs::RawLog log = read(bytes.substr(0, size));
+    const logs::RawLog log = mcap_of(bytes.substr(0, size));
     EXPECT_EQ(broken_rule(log), "");
     EXPECT_GE(log.health.records, last) << size;
     larger += log.health.records > last ? 1 : 0;
@@ -134,20 +136,20 @@ TEST(Mcap, ACompressedChunkThatTheFileCutsShortIsReadAsFarAsItGoes) {
 
 TEST(Mcap, FindsItsWayAfterDamageOutsideChunks) {
   const std::string junk(500, '\x05');
-  const logs::RawLog log = read(pose_file(mcap_poses(0, 5) + junk + mcap_poses(5, 10)));
-  EXPECT_EQ(poses(log), range(0, 10));
+  const logs::RawLog log = mcap_of(pose_file(mcap_poses(0, 5) + junk + mcap_poses(5, 10)));
+  EXPECT_EQ(poses_in_mcap(log), range(0, 10));
   EXPECT_EQ(log.health.damaged_blocks, 1u);
   EXPECT_EQ(log.health.skipped_bytes, 500u);
 }
 
 TEST(Mcap, NamesTopicsThatItCannotRead) {
-  const logs::RawLog log = read(pose_file(
+  const logs::RawLog log = mcap_of(pose_file(
       mcap_channel(2, 0, "/json", "json") + mcap_channel(3, 9, "/no_schema") +
       mcap_schema(4, "odd/msg/Type", "wstring x\n") + mcap_channel(4, 4, "/odd") +
       mcap_schema(5, "nav_msgs/msg/Odometry", "whatever", "ros2idl") + mcap_channel(5, 5, "/odometry") +
       mcap_message(2, 1, "{}") + mcap_message(3, 1, "x") + mcap_message(4, 1, "x") + mcap_message(7, 1, "x") +
       mcap_message(7, 1, "x") + mcap_chunk("some", "xz", "some") + mcap_poses(0, 2)));
-  EXPECT_EQ(poses(log), range(0, 2));
+  EXPECT_EQ(poses_in_mcap(log), range(0, 2));
   std::map<std::string, std::string> why;
   for (const logs::RawSkip& skip : log.skipped) why[skip.name] = skip.why;
   EXPECT_NE(why["/json"].find("encoding"), std::string::npos);
@@ -159,7 +161,7 @@ TEST(Mcap, NamesTopicsThatItCannotRead) {
 }
 
 TEST(Mcap, ChannelsOfOneTopicAreInstances) {
-  const logs::RawLog log = read(
+  const logs::RawLog log = mcap_of(
       pose_file(mcap_channel(2, 1, "/cf1/pose") + mcap_poses(0, 3) + mcap_message(2, 1, cdr_pose(7, 0, 0))));
   EXPECT_EQ(values_of(topic_of(log, "/cf1/pose", 0), "pose.position.x"), range(0, 3));
   EXPECT_EQ(values_of(topic_of(log, "/cf1/pose", 1), "pose.position.x"), std::vector<double>{7});
@@ -170,14 +172,14 @@ TEST(Mcap, SizesOfChunksAreNotBelieved) {
   std::string large = mcap_chunk(records);
   large.replace(9 + 16, 8,
                 bytes_of(~std::uint64_t{0}));  // the size that it claims to have without compression
-  const logs::RawLog log = read(pose_file(large + mcap_poses(4, 6)));
-  EXPECT_EQ(poses(log), range(4, 6));
+  const logs::RawLog log = mcap_of(pose_file(large + mcap_poses(4, 6)));
+  EXPECT_EQ(poses_in_mcap(log), range(4, 6));
   EXPECT_EQ(log.health.damaged_blocks, 1u);
 }
 
 TEST(Mcap, RefusesWhatItCannotRead) {
-  EXPECT_TRUE(refuses([] { read(""); }, {"bag.mcap", "the file is empty"}));
-  EXPECT_TRUE(refuses([] { read("\x89MCAP1\r\n"); }, {"offset 0", "magic number"}));
+  EXPECT_TRUE(refuses([] { mcap_of(""); }, {"bag.mcap", "the file is empty"}));
+  EXPECT_TRUE(refuses([] { mcap_of("\x89MCAP1\r\n"); }, {"offset 0", "magic number"}));
 }
 
 TEST(Mcap, EveryDamagedByteGivesALogOrARefusal) {
@@ -187,7 +189,7 @@ TEST(Mcap, EveryDamagedByteGivesALogOrARefusal) {
     std::string bytes = sound;
     bytes[i] = static_cast<char>(bytes[i] ^ (i % 2 == 0 ? 0x80 : 0x03));
     try {
-      const logs::RawLog log = read(bytes);
+      const logs::RawLog log = mcap_of(bytes);
       EXPECT_EQ(broken_rule(log), "") << "byte " << i;
       complete += log.health.records == 20 ? 1 : 0;
     } catch (const files::InputError&) {

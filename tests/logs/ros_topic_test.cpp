@@ -13,8 +13,8 @@ namespace swarmcert::tests {
 namespace {
 
 /// A topic "/t" of `type` with `messages` at 0, 1, 2, ... seconds; `definition` may be empty.
-logs::RawLog read(const std::string& type, const std::string& definition,
-                  const std::vector<std::string>& messages) {
+logs::RawLog messages_of(const std::string& type, const std::string& definition,
+                         const std::vector<std::string>& messages) {
   logs::RawLog log;
   log.format = "test";
   std::string fault;
@@ -41,7 +41,7 @@ TEST(RosTopic, ReadsBothByteOrdersAndVersionsOfTheEncoding) {
           .number(std::int16_t{-3})
           .number(std::uint64_t{5'000'000'000})
           .number(0.5f);
-      const logs::RawLog log = read("p/T", definition, {writer.message()});
+      const logs::RawLog log = messages_of("p/T", definition, {writer.message()});
       const logs::RawTopic& topic = topic_of(log, "/t");
       EXPECT_EQ(topic.type, "p/msg/T");
       std::vector<double> values;
@@ -71,7 +71,7 @@ TEST(RosTopic, UnderstandsTheLanguageOfDefinitions) {
       .number(std::uint8_t{8})
       .number(std::uint8_t{9});
   writer.header(3, 500'000'000, "map").number(std::uint8_t{10}).number(std::uint16_t{11});
-  const logs::RawLog log = read("p/msg/T", definition, {writer.message()});
+  const logs::RawLog log = messages_of("p/msg/T", definition, {writer.message()});
   ASSERT_TRUE(log.skipped.empty()) << log.skipped[0].why;
   const logs::RawTopic& topic = topic_of(log, "/t");
   EXPECT_EQ(column_names(topic), (std::vector<std::string>{"a", "b[0]", "b[1]", "c[0]", "f", "g", "h",
@@ -99,7 +99,7 @@ TEST(RosTopic, RefusesDefinitionsThatCannotBe) {
       {std::string(std::size_t{2} << 20, '\n'), "over 1 MiB"},
   };
   for (const auto& [definition, reason] : cases) {
-    const logs::RawLog log = read("p/T", definition, {"message"});
+    const logs::RawLog log = messages_of("p/T", definition, {"message"});
     ASSERT_EQ(log.skipped.size(), 1u) << reason;
     EXPECT_NE(log.skipped[0].why.find(reason), std::string::npos) << log.skipped[0].why;
   }
@@ -110,7 +110,7 @@ TEST(RosTopic, NestingIsLimited) {
   for (int i = 0; i < 40; ++i)
     definition += "===\nMSG: p/T" + std::to_string(i) + "\nT" + std::to_string(i + 1) + " x\n";
   definition += "===\nMSG: p/T40\nuint8 x\n";
-  const logs::RawLog log = read("p/T", definition, {"message"});
+  const logs::RawLog log = messages_of("p/T", definition, {"message"});
   ASSERT_EQ(log.skipped.size(), 1u);
   EXPECT_NE(log.skipped[0].why.find("nested too deeply"), std::string::npos) << log.skipped[0].why;
 }
@@ -123,7 +123,7 @@ TEST(RosTopic, ArraysThatVaryInLengthAreNotANumberWhereTheyLackAnElement) {
     for (int i = 0; i < count; ++i) writer.number(static_cast<float>(i + 1));
     messages.push_back(writer.message());
   }
-  const logs::RawLog log = read("p/T", "float32[] values\n", messages);
+  const logs::RawLog log = messages_of("p/T", "float32[] values\n", messages);
   const logs::RawTopic& topic = topic_of(log, "/t");
   const auto text = [&](const std::string& column) {
     std::string result;
@@ -143,9 +143,9 @@ TEST(RosTopic, TransformsAndNamedPosesBecomeATopicForEachName) {
       writer.header(1, 0, "world").text(name).doubles(x, 0, 0, 0, 0, 0, 1);
     return writer.message();
   };
-  const logs::RawLog log =
-      read("tf2_msgs/msg/TFMessage", "",
-           {transforms({{"cf1", 1}, {"cf2", 10}}), transforms({{"cf2", 20}}), transforms({{"cf1", 3}})});
+  const logs::RawLog log = messages_of(
+      "tf2_msgs/msg/TFMessage", "",
+      {transforms({{"cf1", 1}, {"cf2", 10}}), transforms({{"cf2", 20}}), transforms({{"cf1", 3}})});
   ASSERT_EQ(log.topics.size(), 2u);
   EXPECT_EQ(topic_of(log, "/t[cf1]").type, "geometry_msgs/msg/TransformStamped");
   EXPECT_EQ(topic_of(log, "/t[cf1]").time_s, (std::vector<double>{0, 2}));
@@ -155,7 +155,7 @@ TEST(RosTopic, TransformsAndNamedPosesBecomeATopicForEachName) {
   CdrWriter poses;
   poses.header(1, 0, "world").count(1).text("cf7").doubles(1, 2, 3, 0, 0, 0, 1);
   const logs::RawLog named =
-      read("motion_capture_tracking_interfaces/msg/NamedPoseArray", "", {poses.message()});
+      messages_of("motion_capture_tracking_interfaces/msg/NamedPoseArray", "", {poses.message()});
   EXPECT_EQ(values_in(named, "/t[cf7]", "pose.position.z"), std::vector<double>{3});
   EXPECT_EQ(values_in(named, "/t", "header.stamp"), std::vector<double>{1});
 }
@@ -177,7 +177,7 @@ TEST(RosTopic, KnowsTheMessagesOfFlightsWithoutADefinition) {
   for (int i = 0; i < 9; ++i) imu.doubles(0);
   imu.doubles(0, 0, 9.81);
   for (int i = 0; i < 9; ++i) imu.doubles(0);
-  const logs::RawLog log = read("sensor_msgs/msg/Imu", "", {imu.message()});
+  const logs::RawLog log = messages_of("sensor_msgs/msg/Imu", "", {imu.message()});
   EXPECT_EQ(values_in(log, "/t", "linear_acceleration.z"), std::vector<double>{9.81});
   EXPECT_EQ(values_in(log, "/t", "angular_velocity.y"), std::vector<double>{0.2});
 }
@@ -188,7 +188,7 @@ TEST(RosTopic, TakesTheVersionOfAMessageWhoseSizeItHas) {
     writer.header(1, 0, "").number(std::uint32_t{77}).count(3);
     for (int i = 0; i < 3; ++i)
       is_double ? writer.number(1.0 * i) : writer.number(1.0f * static_cast<float>(i));
-    const logs::RawLog log = read("crazyflie_interfaces/msg/LogDataGeneric", "", {writer.message()});
+    const logs::RawLog log = messages_of("crazyflie_interfaces/msg/LogDataGeneric", "", {writer.message()});
     EXPECT_EQ(values_in(log, "/t", "values[2]"), std::vector<double>{2}) << is_double;
     EXPECT_TRUE(log.skipped.empty());
   }
@@ -201,7 +201,7 @@ TEST(RosTopic, ReadsTheFieldsThatAllVersionsOfAPx4MessageShare) {
       .number(15.5f)
       .number(3.0f)
       .number(std::uint8_t{4});
-  const logs::RawLog log = read("px4_msgs/msg/BatteryStatus", "", {battery.message()});
+  const logs::RawLog log = messages_of("px4_msgs/msg/BatteryStatus", "", {battery.message()});
   EXPECT_EQ(values_in(log, "/t", "voltage_v"), std::vector<double>{15.5});
 }
 
@@ -212,7 +212,7 @@ TEST(RosTopic, MessagesOfAnotherSizeThanTheirDefinitionAreCountedNotRead) {
   std::vector<std::string> messages = {sound};
   messages.insert(messages.end(), odd.begin(), odd.end());
   messages.push_back(sound + std::string(3, '\0'));  // padding to a multiple of four is usual
-  const logs::RawLog log = read("p/T", "float64 x\nfloat64 y\n", messages);
+  const logs::RawLog log = messages_of("p/T", "float64 x\nfloat64 y\n", messages);
   EXPECT_EQ(values_in(log, "/t", "y"), (std::vector<double>{2, 2}));
   EXPECT_EQ(log.health.damaged_blocks, odd.size());
   ASSERT_EQ(log.skipped.size(), 1u);
@@ -222,7 +222,8 @@ TEST(RosTopic, MessagesOfAnotherSizeThanTheirDefinitionAreCountedNotRead) {
 TEST(RosTopic, CountsOfArraysAreNotBelieved) {
   for (const std::uint32_t count : {0xFFFFFFFFu, 1000u, 300u}) {
     for (const char* const definition : {"float64[] x\n", "string[] x\n", "Empty[] x\n===\nMSG: p/Empty\n"}) {
-      const logs::RawLog log = read("p/T", definition, {CdrWriter().count(count).doubles(1, 2, 3).message()});
+      const logs::RawLog log =
+          messages_of("p/T", definition, {CdrWriter().count(count).doubles(1, 2, 3).message()});
       EXPECT_TRUE(log.topics.empty()) << definition;
       EXPECT_EQ(log.health.damaged_blocks, 1u) << definition;
     }
@@ -234,7 +235,7 @@ TEST(RosTopic, LargeArraysAreNamedAndTheRestOfTheMessageIsRead) {
   writer.count(1000);
   for (int i = 0; i < 1000; ++i) writer.number(std::uint8_t{1});
   writer.number(2.5);
-  const logs::RawLog log = read("p/Image", "uint8[] data\nfloat64 x\n", {writer.message()});
+  const logs::RawLog log = messages_of("p/Image", "uint8[] data\nfloat64 x\n", {writer.message()});
   EXPECT_EQ(column_names(topic_of(log, "/t")), std::vector<std::string>{"x"});
   ASSERT_EQ(log.skipped.size(), 1u);
   EXPECT_EQ(log.skipped[0].name, "/t.data");
@@ -247,7 +248,7 @@ TEST(RosTopic, OneLongMessageAmongManyShortOnesIsGivenUp) {
   for (int i = 0; i < 256; ++i) large.number(std::uint8_t{1});
   std::vector<std::string> messages(3000, CdrWriter().count(0).message());
   messages[0] = large.message();
-  const logs::RawLog log = read("p/T", "uint8[] data\n", messages);
+  const logs::RawLog log = messages_of("p/T", "uint8[] data\n", messages);
   EXPECT_TRUE(log.topics.empty());
   ASSERT_EQ(log.skipped.size(), 1u);
   EXPECT_EQ(log.skipped[0].records, 3000u);

@@ -19,13 +19,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-logs::RawLog read(const std::string& bytes, const std::string& path = "bag.db3") {
+logs::RawLog rosbag_of(const std::string& bytes, const std::string& path = "bag.db3") {
   std::istringstream in(bytes);
   return logs::read_rosbag_sqlite(in, path);
 }
 
 /// x of the poses that arrived: their numbers.
-std::vector<double> poses(const logs::RawLog& log) { return values_in(log, "/cf1/pose", "pose.position.x"); }
+std::vector<double> poses_in_rosbag(const logs::RawLog& log) {
+  return values_in(log, "/cf1/pose", "pose.position.x");
+}
 
 std::string zstd_of(const std::string& bytes) {
   std::string compressed(ZSTD_compressBound(bytes.size()), '\0');
@@ -56,9 +58,9 @@ class RosbagFolder : public testing::Test {
 };
 
 TEST(RosbagSqlite, GivesMessagesWithBuiltInDefinitions) {
-  const logs::RawLog log = read(small_rosbag());
+  const logs::RawLog log = rosbag_of(small_rosbag());
   EXPECT_EQ(log.format, "rosbag2 sqlite");
-  EXPECT_EQ(poses(log), range(0, 20));
+  EXPECT_EQ(poses_in_rosbag(log), range(0, 20));
   EXPECT_EQ(topic_of(log, "/cf1/pose").time_s[3], 1.03);
   EXPECT_EQ(log.health.records, 20u);
   EXPECT_EQ(log.health.damaged_blocks, 0u);
@@ -73,19 +75,19 @@ TEST(RosbagSqlite, PrefersTheDefinitionsOfTheFile) {
       "INSERT INTO message_definitions VALUES(1,'own_msgs/msg/Two','ros2msg','float64 first\nfloat64 "
       "second\n','');";
   const logs::RawLog log =
-      read(sqlite_bytes(rosbag_tables() + definitions + rosbag_topic(1, "/two", "own_msgs/msg/Two") +
-                        rosbag_message(1, 5, CdrWriter().doubles(1, 2).message())));
+      rosbag_of(sqlite_bytes(rosbag_tables() + definitions + rosbag_topic(1, "/two", "own_msgs/msg/Two") +
+                             rosbag_message(1, 5, CdrWriter().doubles(1, 2).message())));
   EXPECT_EQ(values_in(log, "/two", "second"), std::vector<double>{2});
 }
 
 TEST(RosbagSqlite, NamesTopicsThatItCannotRead) {
   const logs::RawLog log =
-      read(sqlite_bytes(rosbag_tables() + rosbag_topic(1, "/cf1/pose", "geometry_msgs/msg/PoseStamped") +
-                        rosbag_topic(2, "/odd", "odd/msg/Odd") +
-                        rosbag_topic(3, "/json", "geometry_msgs/msg/PoseStamped", "json") +
-                        rosbag_message(2, 1, "x") + rosbag_message(2, 2, "x") + rosbag_message(3, 1, "{}") +
-                        rosbag_message(9, 1, "x") + rosbag_poses(0, 2)));
-  EXPECT_EQ(poses(log), range(0, 2));
+      rosbag_of(sqlite_bytes(rosbag_tables() + rosbag_topic(1, "/cf1/pose", "geometry_msgs/msg/PoseStamped") +
+                             rosbag_topic(2, "/odd", "odd/msg/Odd") +
+                             rosbag_topic(3, "/json", "geometry_msgs/msg/PoseStamped", "json") +
+                             rosbag_message(2, 1, "x") + rosbag_message(2, 2, "x") +
+                             rosbag_message(3, 1, "{}") + rosbag_message(9, 1, "x") + rosbag_poses(0, 2)));
+  EXPECT_EQ(poses_in_rosbag(log), range(0, 2));
   ASSERT_EQ(log.skipped.size(), 3u);
   EXPECT_EQ(log.skipped[0].name, "/odd");
   EXPECT_NE(log.skipped[0].why.find("odd/msg/Odd"), std::string::npos);
@@ -95,24 +97,24 @@ TEST(RosbagSqlite, NamesTopicsThatItCannotRead) {
 }
 
 TEST(RosbagSqlite, ReadsMessagesThatWereCompressedOneByOne) {
-  const logs::RawLog log = read(sqlite_bytes(
+  const logs::RawLog log = rosbag_of(sqlite_bytes(
       rosbag_tables() + rosbag_topic(1, "/cf1/pose", "geometry_msgs/msg/PoseStamped") +
       rosbag_message(1, 1, zstd_of(cdr_pose(7, 0, 0))) + rosbag_message(1, 2, zstd_of("x").substr(0, 9))));
-  EXPECT_EQ(poses(log), std::vector<double>{7});
+  EXPECT_EQ(poses_in_rosbag(log), std::vector<double>{7});
   EXPECT_EQ(log.health.damaged_blocks, 1u);
 }
 
 TEST(RosbagSqlite, ReadsADatabaseThatWasWrittenWithAWriteAheadLog) {
   std::string bytes = small_rosbag();
   bytes[18] = bytes[19] = 2;  // as the header of such a database says
-  EXPECT_EQ(poses(read(bytes)), range(0, 20));
+  EXPECT_EQ(poses_in_rosbag(rosbag_of(bytes)), range(0, 20));
 }
 
 TEST_F(RosbagFolder, AJournalThatWasNotAppliedIsNamed) {
   write("bag.db3-wal", "what the recorder wrote last");
   write("bag.db3", small_rosbag());
   const logs::RawLog log = logs::read_raw((folder_ / "bag.db3").string());
-  EXPECT_EQ(poses(log), range(0, 20));
+  EXPECT_EQ(poses_in_rosbag(log), range(0, 20));
   EXPECT_TRUE(log.health.truncated);
   ASSERT_EQ(log.skipped.size(), 1u);
   EXPECT_NE(log.skipped[0].why.find("wal_checkpoint"), std::string::npos);
@@ -126,8 +128,8 @@ TEST(RosbagSqlite, EndingAnywhereKeepsTheMessagesBeforeOrIsRefused) {
   std::size_t most = 0;
   for (std::size_t size = 1; size < bytes.size(); size += 64) {
     try {
-      const logs::RawLog log = read(bytes.substr(0, size));
-      const std::vector<double> found = poses(log);
+      const logs::RawLog log = rosbag_of(bytes.substr(0, size));
+      const std::vector<double> found = poses_in_rosbag(log);
       EXPECT_EQ(found, range(0, static_cast<int>(found.size()))) << size;
       EXPECT_TRUE(log.health.truncated || log.health.damaged_blocks > 0 || found.size() == 20) << size;
       most = std::max(most, found.size());
@@ -144,7 +146,7 @@ TEST(RosbagSqlite, RefusesSchemasThatCouldDoAnything) {
   // A view that never ends.
   EXPECT_TRUE(refuses(
       [&] {
-        read(sqlite_bytes(
+        rosbag_of(sqlite_bytes(
             tables + topic + drop +
             "CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) "
             "SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n;"));
@@ -153,27 +155,27 @@ TEST(RosbagSqlite, RefusesSchemasThatCouldDoAnything) {
   // Columns that make large values at each row.
   EXPECT_TRUE(refuses(
       [&] {
-        read(sqlite_bytes(tables + topic + drop +
-                          "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data AS "
-                          "(zeroblob(60000000)));"
-                          "INSERT INTO messages(topic_id,timestamp) VALUES(1,1);"));
+        rosbag_of(sqlite_bytes(tables + topic + drop +
+                               "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data AS "
+                               "(zeroblob(60000000)));"
+                               "INSERT INTO messages(topic_id,timestamp) VALUES(1,1);"));
       },
       {"\"messages\"", "is missing or cannot be read"}));
   // A virtual table.
   EXPECT_TRUE(refuses(
       [&] {
-        read(sqlite_bytes(tables + topic + drop +
-                          "CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, data);"));
+        rosbag_of(sqlite_bytes(tables + topic + drop +
+                               "CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, data);"));
       },
       {"\"messages\"", "is missing or cannot be read"}));
 }
 
 TEST(RosbagSqlite, RefusesWhatItCannotRead) {
-  EXPECT_TRUE(refuses([] { read(""); }, {"bag.db3", "the file is empty"}));
-  EXPECT_TRUE(refuses([] { read("SQLite format 2"); }, {"offset 0", "magic number"}));
-  EXPECT_TRUE(refuses([] { read(sqlite_bytes("CREATE TABLE other(x);")); },
+  EXPECT_TRUE(refuses([] { rosbag_of(""); }, {"bag.db3", "the file is empty"}));
+  EXPECT_TRUE(refuses([] { rosbag_of("SQLite format 2"); }, {"offset 0", "magic number"}));
+  EXPECT_TRUE(refuses([] { rosbag_of(sqlite_bytes("CREATE TABLE other(x);")); },
                       {"\"topics\"", "is missing", "no rosbag2"}));
-  EXPECT_TRUE(refuses([] { read(sqlite_bytes("CREATE TABLE topics(x); CREATE TABLE messages(x);")); },
+  EXPECT_TRUE(refuses([] { rosbag_of(sqlite_bytes("CREATE TABLE topics(x); CREATE TABLE messages(x);")); },
                       {"\"topics\"", "does not have the columns"}));
 }
 
@@ -184,7 +186,7 @@ TEST(RosbagSqlite, EveryDamagedByteGivesALogOrARefusal) {
     std::string bytes = sound;
     bytes[i] = static_cast<char>(bytes[i] ^ (i % 2 == 0 ? 0xFF : 0x01));
     try {
-      const logs::RawLog log = read(bytes);
+      const logs::RawLog log = rosbag_of(bytes);
       EXPECT_EQ(broken_rule(log), "") << "byte " << i;
       read_all += log.health.records == 20 ? 1 : 0;
     } catch (const files::InputError&) {
@@ -205,7 +207,7 @@ TEST_F(RosbagFolder, FilesOfAFolderAreOneLogInTheOrderOfItsMetadata) {
   write("bag_2.mcap", part(9, 12));
   write_metadata({"bag_0.mcap", "some/folder/bag_1.mcap.zstd", "\"bag_2.mcap\""});
   const logs::RawLog log = logs::read_raw(folder_.string());
-  EXPECT_EQ(poses(log), range(0, 12));
+  EXPECT_EQ(poses_in_rosbag(log), range(0, 12));
   EXPECT_EQ(log.health.records, 12u);
   EXPECT_EQ(log.path, folder_.string());
   EXPECT_FALSE(log.health.truncated);
@@ -216,7 +218,7 @@ TEST_F(RosbagFolder, APartThatIsMissingIsNamed) {
   write("bag_0.db3", small_rosbag());
   write_metadata({"bag_0.db3", "bag_1.db3", "../../../etc/passwd"});
   const logs::RawLog log = logs::read_raw(folder_.string());
-  EXPECT_EQ(poses(log), range(0, 20));
+  EXPECT_EQ(poses_in_rosbag(log), range(0, 20));
   EXPECT_TRUE(log.health.truncated);
   ASSERT_EQ(log.skipped.size(), 2u);
   EXPECT_EQ(log.skipped[0].name, "bag_1.db3");

@@ -14,26 +14,26 @@
 namespace swarmcert::tests {
 namespace {
 
-logs::RawLog read(const std::string& bytes) {
+logs::RawLog ulog_of(const std::string& bytes) {
   std::istringstream in(bytes);
   return logs::read_ulog(in, "flight.ulg");
 }
 
 /// The numbers of the topic "count" that arrived.
-std::vector<double> counts(const logs::RawLog& log) { return values_in(log, "count", "number"); }
+std::vector<double> counts_in_ulog(const logs::RawLog& log) { return values_in(log, "count", "number"); }
 
 std::string count_log(const std::string& data) { return ulog_head() + ulog_count_definitions() + data; }
 
 TEST(Ulog, GivesRecordsWithTheirTimesInSeconds) {
-  const logs::RawLog log = read(count_log(ulog_counts(0, 3)));
+  const logs::RawLog log = ulog_of(count_log(ulog_counts(0, 3)));
   EXPECT_EQ(log.format, "ulog");
   EXPECT_EQ(topic_of(log, "count").time_s, (std::vector<double>{1.0, 1.01, 1.02}));
-  EXPECT_EQ(counts(log), range(0, 3));
+  EXPECT_EQ(counts_in_ulog(log), range(0, 3));
   EXPECT_EQ(log.health.records, 3u);
 }
 
 TEST(Ulog, FlattensNestedTypesAndArraysAndLeavesOutPadding) {
-  const logs::RawLog log = read(small_ulog());
+  const logs::RawLog log = ulog_of(small_ulog());
   const logs::RawTopic& whole = topic_of(log, "whole", 1);
   EXPECT_EQ(column_names(whole),
             (std::vector<std::string>{"parts[0].pair[0]", "parts[0].pair[1]", "parts[1].pair[0]",
@@ -52,10 +52,10 @@ TEST(Ulog, ReadsEveryTypeOfNumber) {
                              bytes_of(std::int64_t{-5'000'000'000}) + bytes_of(std::uint64_t{5'000'000'000}) +
                              bytes_of(1.5f) + bytes_of(-2.5) + '\1';
   const logs::RawLog log =
-      read(ulog_head() +
-           ulog_format("all:uint64_t timestamp;int8_t a;uint8_t b;int16_t c;uint16_t d;int32_t e;"
-                       "uint32_t f;int64_t g;uint64_t h;float i;double j;bool k;") +
-           ulog_subscription(1, "all") + ulog_record(1, 0, fields));
+      ulog_of(ulog_head() +
+              ulog_format("all:uint64_t timestamp;int8_t a;uint8_t b;int16_t c;uint16_t d;int32_t e;"
+                          "uint32_t f;int64_t g;uint64_t h;float i;double j;bool k;") +
+              ulog_subscription(1, "all") + ulog_record(1, 0, fields));
   std::vector<double> found;
   for (const logs::RawColumn& column : topic_of(log, "all").columns) found.push_back(column.values.at(0));
   EXPECT_EQ(found, (std::vector<double>{-1, 255, -300, 65535, -70000, 4294967295, -5e9, 5e9, 1.5, -2.5, 1}));
@@ -70,14 +70,14 @@ TEST(Ulog, KeepsInstancesOfATopicApart) {
   for (const int instance : {3, 0, 1})
     bytes +=
         ulog_record(static_cast<std::uint16_t>(10 + instance), 1, bytes_of(static_cast<float>(instance)));
-  const logs::RawLog log = read(bytes);
+  const logs::RawLog log = ulog_of(bytes);
   ASSERT_EQ(log.topics.size(), 3u);
   for (const int instance : {0, 1, 3})
     EXPECT_EQ(values_of(topic_of(log, "count", instance), "number"), std::vector<double>{1.0 * instance});
 }
 
 TEST(Ulog, ReadsInformationParametersLinesAndDropouts) {
-  const logs::RawLog log = read(small_ulog());
+  const logs::RawLog log = ulog_of(small_ulog());
   EXPECT_EQ(log.texts.at("sys_name"), "PX4");
   EXPECT_EQ(log.texts.at("ver"), "7");
   EXPECT_EQ(log.texts.at("file_timestamp_us"), "5000000");
@@ -102,15 +102,15 @@ TEST(Ulog, JoinsInformationThatGoesOverSeveralMessages) {
                         std::string(1, continues ? '\1' : '\0') + static_cast<char>(key.size()) + key + text);
   };
   const logs::RawLog log =
-      read(ulog_head() + several(false, "ab") + several(true, "cd") + several(false, "ef"));
+      ulog_of(ulog_head() + several(false, "ab") + several(true, "cd") + several(false, "ef"));
   EXPECT_EQ(log.texts.at("perf[0]"), "abcd");
   EXPECT_EQ(log.texts.at("perf[1]"), "ef");
 }
 
 TEST(Ulog, SkipsMessagesOfUnknownTypesAndNamesThem) {
   const logs::RawLog log =
-      read(count_log(ulog_counts(0, 5) + ulog_message('z', "of a later version") + ulog_counts(5, 9)));
-  EXPECT_EQ(counts(log), range(0, 9));
+      ulog_of(count_log(ulog_counts(0, 5) + ulog_message('z', "of a later version") + ulog_counts(5, 9)));
+  EXPECT_EQ(counts_in_ulog(log), range(0, 9));
   EXPECT_EQ(log.health.damaged_blocks, 0u);
   ASSERT_EQ(log.skipped.size(), 1u);
   EXPECT_EQ(log.skipped[0].name, "message type 0x7a");
@@ -124,9 +124,9 @@ TEST(Ulog, NamesTopicsWhoseDefinitionIsLost) {
             ulog_record(8, 1, "xyz");
   }
   const logs::RawLog log =
-      read(ulog_head() + ulog_count_definitions() + ulog_format("odd:uint64_t timestamp;lost part;") +
-           ulog_subscription(8, "odd") + data);
-  EXPECT_EQ(counts(log), range(0, 10));
+      ulog_of(ulog_head() + ulog_count_definitions() + ulog_format("odd:uint64_t timestamp;lost part;") +
+              ulog_subscription(8, "odd") + data);
+  EXPECT_EQ(counts_in_ulog(log), range(0, 10));
   EXPECT_EQ(log.health.damaged_blocks, 0u);
   ASSERT_EQ(log.skipped.size(), 2u);
   EXPECT_EQ(log.skipped[0].name, "message id 9");
@@ -136,9 +136,9 @@ TEST(Ulog, NamesTopicsWhoseDefinitionIsLost) {
 }
 
 TEST(Ulog, AFormatMayComeAfterTheOneThatUsesIt) {
-  const logs::RawLog log =
-      read(ulog_head() + ulog_format("outer:uint64_t timestamp;inner part;") + ulog_format("inner:float x;") +
-           ulog_subscription(1, "outer") + ulog_record(1, 1, bytes_of(2.5f)));
+  const logs::RawLog log = ulog_of(ulog_head() + ulog_format("outer:uint64_t timestamp;inner part;") +
+                                   ulog_format("inner:float x;") + ulog_subscription(1, "outer") +
+                                   ulog_record(1, 1, bytes_of(2.5f)));
   EXPECT_EQ(values_of(topic_of(log, "outer"), "part.x"), std::vector<double>{2.5});
 }
 
@@ -148,8 +148,8 @@ TEST(Ulog, FindsItsWayAfterDamageAndCountsIt) {
   for (std::size_t byte = 0; byte < 3; ++byte) {  // of the message's head: size and type
     std::string bytes = head + ulog_counts(0, 20);
     bytes[head.size() + 10 * record_bytes + byte] ^= 0x55;
-    const logs::RawLog log = read(bytes);
-    EXPECT_EQ(counts(log), joined(range(0, 10), range(11, 20))) << byte;
+    const logs::RawLog log = ulog_of(bytes);
+    EXPECT_EQ(counts_in_ulog(log), joined(range(0, 10), range(11, 20))) << byte;
     EXPECT_FALSE(log.health.truncated) << byte;
     if (byte == 2) continue;  // the type: nobody can tell damage from a later version
     EXPECT_EQ(log.health.damaged_blocks, 1u) << byte;
@@ -159,8 +159,8 @@ TEST(Ulog, FindsItsWayAfterDamageAndCountsIt) {
 
 TEST(Ulog, BytesThatBelongNowhereCostNoRecord) {
   const logs::RawLog log =
-      read(count_log(ulog_counts(0, 10) + std::string(1000, '\xA5') + ulog_counts(10, 20)));
-  EXPECT_EQ(counts(log), range(0, 20));
+      ulog_of(count_log(ulog_counts(0, 10) + std::string(1000, '\xA5') + ulog_counts(10, 20)));
+  EXPECT_EQ(counts_in_ulog(log), range(0, 20));
   EXPECT_EQ(log.health.damaged_blocks, 1u);
   EXPECT_EQ(log.health.skipped_bytes, 1000u);
 }
@@ -170,9 +170,9 @@ TEST(Ulog, EndingAnywhereKeepsTheWholeRecords) {
   const std::string bytes = head + ulog_counts(0, 8);
   const std::size_t record_bytes = ulog_counts(0, 1).size();
   for (std::size_t size = head.size(); size <= bytes.size(); ++size) {
-    const logs::RawLog log = read(bytes.substr(0, size));
+    const logs::RawLog log = ulog_of(bytes.substr(0, size));
     const std::size_t whole = (size - head.size()) / record_bytes;
-    EXPECT_EQ(counts(log), range(0, static_cast<int>(whole))) << size;
+    EXPECT_EQ(counts_in_ulog(log), range(0, static_cast<int>(whole))) << size;
     EXPECT_EQ(log.health.truncated, (size - head.size()) % record_bytes != 0) << size;
     EXPECT_EQ(log.health.damaged_blocks, 0u) << size;
   }
@@ -187,8 +187,8 @@ TEST(Ulog, ReadsSectionsThatWereAppendedAfterACrash) {
   const std::string appended = ulog_counts(5, 8);
   const std::string bytes = ulog_head() + ulog_flags(0, 1, {first, first + appended.size()}) + definitions +
                             cut + appended + ulog_counts(8, 10);
-  const logs::RawLog log = read(bytes);
-  EXPECT_EQ(counts(log), joined(range(0, 4), range(5, 10)));
+  const logs::RawLog log = ulog_of(bytes);
+  EXPECT_EQ(counts_in_ulog(log), joined(range(0, 4), range(5, 10)));
   EXPECT_EQ(log.health.damaged_blocks, 0u);
   EXPECT_EQ(log.health.skipped_bytes, 9u);
   EXPECT_FALSE(log.health.truncated);
@@ -198,19 +198,19 @@ TEST(Ulog, OffsetsOfAppendedSectionsAreNotTrusted) {
   const std::string rest = ulog_count_definitions() + ulog_counts(0, 5);
   for (const std::vector<std::uint64_t>& offsets :
        {std::vector<std::uint64_t>{~std::uint64_t{0}}, {1}, {16, 16, 16}, {1u << 31}}) {
-    const logs::RawLog log = read(ulog_head() + ulog_flags(0, 1, offsets) + rest);
-    EXPECT_EQ(counts(log), range(0, 5)) << offsets[0];
+    const logs::RawLog log = ulog_of(ulog_head() + ulog_flags(0, 1, offsets) + rest);
+    EXPECT_EQ(counts_in_ulog(log), range(0, 5)) << offsets[0];
     EXPECT_TRUE(log.health.truncated || log.health.damaged_blocks > 0) << offsets[0];
   }
 }
 
 TEST(Ulog, RefusesWhatItCannotRead) {
-  EXPECT_TRUE(refuses([] { read(""); }, {"flight.ulg", "the file is empty"}));
-  EXPECT_TRUE(refuses([] { read("ULag\x01\x12\x35 and more"); }, {"offset 0", "magic number", "PX4"}));
+  EXPECT_TRUE(refuses([] { ulog_of(""); }, {"flight.ulg", "the file is empty"}));
+  EXPECT_TRUE(refuses([] { ulog_of("ULag\x01\x12\x35 and more"); }, {"offset 0", "magic number", "PX4"}));
   EXPECT_TRUE(
-      refuses([] { read(ulog_head().substr(0, 12)); }, {"offset 12", "ends inside", "copy it again"}));
-  EXPECT_TRUE(refuses([] { read(ulog_head(9)); }, {"offset 7", "version = 9", "known are 0 and 1"}));
-  EXPECT_TRUE(refuses([] { read(ulog_head() + ulog_flags(0, 0x42)); },
+      refuses([] { ulog_of(ulog_head().substr(0, 12)); }, {"offset 12", "ends inside", "copy it again"}));
+  EXPECT_TRUE(refuses([] { ulog_of(ulog_head(9)); }, {"offset 7", "version = 9", "known are 0 and 1"}));
+  EXPECT_TRUE(refuses([] { ulog_of(ulog_head() + ulog_flags(0, 0x42)); },
                       {"offset 27", "incompatible flags = 0x42", "feature", "convert"}));
 }
 
@@ -229,19 +229,19 @@ TEST(Ulog, FormatsThatCannotBeAreNotBelieved) {
         ulog_format("f0:uint64_t timestamp;float[99999999999999999999] x;"), ulog_format("f0:uint64_t;"),
         ulog_format("f0:uint64_t timestamp;float x;float x;"),
         ulog_format("f0:uint64_t timestamp;float[4 x;")}) {
-    const logs::RawLog log = read(ulog_head() + formats + ulog_subscription(1, "f0") + record + record +
-                                  ulog_count_definitions() + ulog_counts(0, 4));
+    const logs::RawLog log = ulog_of(ulog_head() + formats + ulog_subscription(1, "f0") + record + record +
+                                     ulog_count_definitions() + ulog_counts(0, 4));
     EXPECT_EQ(log.topics.size(), 1u) << formats.substr(0, 60);
-    EXPECT_EQ(counts(log), range(0, 4)) << formats.substr(0, 60);
+    EXPECT_EQ(counts_in_ulog(log), range(0, 4)) << formats.substr(0, 60);
     EXPECT_FALSE(log.skipped.empty()) << formats.substr(0, 60);
   }
 }
 
 TEST(Ulog, LargeArraysAreNamedAndEmptyElementsCostNothing) {
   const logs::RawLog log =
-      read(ulog_head() + ulog_format("e:float[0] a;float[0] b;") + ulog_format("d:e[60000] x;") +
-           ulog_format("f:uint64_t timestamp;uint8_t[1000] dump;d[60000] nothing;float x;") +
-           ulog_subscription(1, "f") + ulog_record(1, 1, std::string(1000, 'x') + bytes_of(2.5f)));
+      ulog_of(ulog_head() + ulog_format("e:float[0] a;float[0] b;") + ulog_format("d:e[60000] x;") +
+              ulog_format("f:uint64_t timestamp;uint8_t[1000] dump;d[60000] nothing;float x;") +
+              ulog_subscription(1, "f") + ulog_record(1, 1, std::string(1000, 'x') + bytes_of(2.5f)));
   ASSERT_EQ(topic_of(log, "f").columns.size(), 1u);
   EXPECT_EQ(values_of(topic_of(log, "f"), "x"), std::vector<double>{2.5});
   ASSERT_EQ(log.skipped.size(), 1u);
@@ -250,7 +250,7 @@ TEST(Ulog, LargeArraysAreNamedAndEmptyElementsCostNothing) {
 
 TEST(Ulog, EveryDamagedByteGivesALogOrARefusal) {
   const std::string sound = small_ulog();
-  const std::size_t all = read(sound).health.records;
+  const std::size_t all = ulog_of(sound).health.records;
   std::size_t least = all;
   int refused = 0;
   for (std::size_t i = 0; i < sound.size(); ++i) {
@@ -258,7 +258,7 @@ TEST(Ulog, EveryDamagedByteGivesALogOrARefusal) {
       std::string bytes = sound;
       bytes[i] = static_cast<char>(bytes[i] ^ flip);
       try {
-        const logs::RawLog log = read(bytes);
+        const logs::RawLog log = ulog_of(bytes);
         EXPECT_EQ(broken_rule(log), "") << "byte " << i;
         if (i > sound.size() / 2) least = std::min(least, log.health.records);
       } catch (const files::InputError&) {

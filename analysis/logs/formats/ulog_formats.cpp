@@ -9,7 +9,7 @@ namespace {
 
 /// A record with its head fits into 65535 bytes.
 constexpr std::size_t kLargestRecord_bytes = 65535;
-constexpr int kDeepestNesting = 8;
+constexpr int kDeepestUlogNesting = 8;
 
 std::optional<Scalar> number_type(std::string_view name) {
   static const std::map<std::string_view, Scalar> types = {
@@ -75,11 +75,11 @@ std::optional<std::size_t> UlogFormats::element_size(const Field& field, int dep
 
 std::optional<std::size_t> UlogFormats::measure(const std::string& name, int depth) {
   const auto found = formats_.find(name);
-  if (found == formats_.end() || depth > kDeepestNesting || found->second.is_being_measured)
+  if (found == formats_.end() || depth > kDeepestUlogNesting || found->second.is_being_measured)
     return std::nullopt;
   Format& format = found->second;
   if (format.is_measured) {
-    if (depth + format.nesting > kDeepestNesting) return std::nullopt;
+    if (depth + format.nesting > kDeepestUlogNesting) return std::nullopt;
     return format.size;
   }
   format.is_being_measured = true;

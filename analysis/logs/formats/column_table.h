@@ -1,0 +1,146 @@
+/// @file Columns that grow message by message, whatever arrays the messages have.
+#pragma once
+
+#include <fmt/core.h>
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "analysis/logs/formats/ros_topic.h"
+
+namespace swarmcert::logs {
+
+inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
+inline constexpr std::size_t kLongestText_bytes = 4096;
+
+/// Place of a value within messages: a field, or an element of an array. Remembers its column, so that names are made once.
+struct RosNode {
+  const RosNode* parent = nullptr;
+  std::string label;  ///< ".x", "[3]"
+  std::optional<std::size_t> column;
+  bool is_stamp = false, has_text = false;
+  std::vector<std::unique_ptr<RosNode>> children;
+
+  std::string name() const {
+    if (parent == nullptr) return "";
+    const std::string before = parent->name();
+    return before.empty() && !label.empty() && label[0] == '.' ? label.substr(1) : before + label;
+  }
+};
+
+/// What one message says, before it is known to be sound as a whole.
+struct RosRecord {
+  std::vector<std::pair<RosNode*, double>> numbers;
+  std::vector<std::pair<RosNode*, std::string_view>> texts;
+};
+
+/// A RawTopic in the making.
+class ColumnTable {
+ public:
+  ColumnTable(const std::string& name, const std::string& type, RosBudget& budget) : budget_(budget) {
+    topic_.name = name;
+    topic_.type = type;
+  }
+
+  RosNode* root() { return &root_; }
+
+  /// The child of `parent`; nullptr if that is nullptr or there are too many. @param label of an element: its index
+  RosNode* child(RosNode* parent, std::size_t index, const std::string* field) {
+    if (parent == nullptr) return nullptr;
+    if (parent->children.size() <= index) parent->children.resize(index + 1);
+    std::unique_ptr<RosNode>& child = parent->children[index];
+    if (!child) {
+      if (places_ >= kMostPlaces || budget_.places == 0) {
+        has_too_many_columns_ = true;
+        return nullptr;
+      }
+      ++places_;
+      --budget_.places;
+      child = std::make_unique<RosNode>();
+      child->parent = parent;
+      child->label = field != nullptr ? "." + *field : "[" + std::to_string(index) + "]";
+    }
+    return child.get();
+  }
+
+  void add(double time_s, const RosRecord& record, std::size_t message_bytes) {
+    bytes_ += message_bytes;
+    ++records_;
+    if (!given_up_.empty()) return;
+    const std::size_t row = topic_.time_s.size();
+    topic_.time_s.push_back(time_s);
+    for (const auto& [node, value] : record.numbers) {
+      if (!node->column) node->column = new_column(*node, row);
+      if (*node->column < topic_.columns.size()) topic_.columns[*node->column].values.push_back(value);
+    }
+    for (RawColumn& column : topic_.columns)
+      if (column.values.size() == row) column.values.push_back(kNoValue);
+    for (const auto& [node, text] : record.texts) {
+      if (node->has_text || text.empty()) continue;
+      node->has_text = true;
+      if (topic_.texts.size() < kMostElements)
+        topic_.texts[node->name()] = text.substr(0, kLongestText_bytes);
+    }
+    limit_values();
+  }
+
+  /// @param has_elements some of what the messages say stands in topics of its own: nothing may be left for this one
+  void move_to(RawLog& log, bool has_elements) {
+    if (!given_up_.empty()) {
+      log.skipped.push_back({topic_.name, given_up_, records_});
+      return;
+    }
+    if (has_too_many_columns_)
+      log.skipped.push_back(
+          {topic_.name, fmt::format("only its first {} numbers are kept", topic_.columns.size()), 0});
+    if (topic_.time_s.empty() || (has_elements && topic_.columns.empty())) return;
+    log.health.records += topic_.time_s.size();
+    log.topics.push_back(std::move(topic_));
+  }
+
+ private:
+  static constexpr std::size_t kMostPlaces = 4 * kMostColumns;
+
+  /// Its index; beyond the last where there are too many.
+  std::size_t new_column(const RosNode& node, std::size_t row) {
+    if (topic_.columns.size() >= kMostColumns) {
+      has_too_many_columns_ = true;
+      return std::numeric_limits<std::size_t>::max();
+    }
+    topic_.columns.push_back({node.name(), node.is_stamp ? "s" : "", std::vector<double>(row, kNoValue)});
+    return topic_.columns.size() - 1;
+  }
+
+  /// One long message among many short ones would need a value of each column for each of them.
+  void limit_values() {
+    constexpr std::size_t kMostMissing = std::size_t{1} << 16;
+    constexpr std::size_t kMostPerByte = 8;
+    const std::size_t values = (topic_.columns.size() + 1) * topic_.time_s.size();
+    const std::size_t more = values - values_;
+    values_ = values;
+    if (values > kMostMissing + kMostPerByte * bytes_)
+      given_up_ = "its arrays vary too much in length to be columns";
+    if (more > budget_.values) given_up_ = "the log holds more numbers than memory may";
+    if (given_up_.empty()) {
+      budget_.values -= more;
+      return;
+    }
+    budget_.values += values - more;
+    topic_.time_s = {};
+    topic_.columns = {};
+  }
+
+  RosBudget& budget_;
+  RawTopic topic_;
+  RosNode root_;
+  std::size_t places_ = 0, values_ = 0, bytes_ = 0, records_ = 0;
+  bool has_too_many_columns_ = false;
+  std::string given_up_;  ///< why no columns are kept
+};
+
+}  // namespace swarmcert::logs
