@@ -6,7 +6,7 @@
 namespace swarmcert::logs {
 namespace {
 
-constexpr double kLongest_s = 0.15, kBelieved = 0.5;
+constexpr double kLongest_s = 0.15, kBelievedDelay = 0.5;
 
 /// Correlation of a(t) with b(t + lag records).
 double correlation_at(const SignalTable& t, double step_s, const std::vector<double>& a,
@@ -55,7 +55,7 @@ void estimate_delays(Draft& draft) {
         best = lag;
       }
     }
-    if (highest < kBelieved || best == -most || best == most) return;
+    if (highest < kBelievedDelay || best == -most || best == most) return;
     // The vertex of the parabola through the three largest.
     const auto at = static_cast<std::size_t>(best + most);
     const double left = all[at - 1], right = all[at + 1], curvature = left - 2 * highest + right;

@@ -81,10 +81,10 @@ double refine(const PhaseGains& gains, double GainNorms::*which, const std::vect
 GainNorms norms_over(const PhaseGains& gains, double period_s, Instants instants) {
   if (!gains.stable()) return {kInfinity, kInfinity, kInfinity, kInfinity};
   if (instants == Instants::kSampling) return gains.at(0);
-  constexpr int kPhases = 9;
-  const double step_s = period_s / (kPhases - 1);
+  constexpr int kPhaseSteps = 9;
+  const double step_s = period_s / (kPhaseSteps - 1);
   std::vector<GainNorms> grid;
-  for (int i = 0; i < kPhases; ++i) grid.push_back(gains.at(i * step_s));
+  for (int i = 0; i < kPhaseSteps; ++i) grid.push_back(gains.at(i * step_s));
   GainNorms result;
   for (const auto which : kAllGains) result.*which = refine(gains, which, grid, step_s);
   return result;
