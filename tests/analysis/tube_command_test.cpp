@@ -114,7 +114,7 @@ TEST(TubeCommand, WhatIsMissingOrMakesNoSenseIsSaid) {
   for (const auto& [command, words] : {
            std::pair(all + kNetwork, "--truth"),
            std::pair(all + kTruth, "--network"),
-           std::pair(bound("composite.toml") + " --task swap" + kNetwork + kTruth, "add --tube"),
+           std::pair(bound("composite.toml") + " --task swap" + kNetwork + kTruth, "--task requires --tube"),
            std::pair(bound("composite.toml") + " --tube --task swop" + kNetwork + kTruth, "swap"),
            std::pair(bound("composite.toml") + " --tube --task circle" + kNetwork + kTruth, "enclosure"),
            std::pair(all + kNetwork + kTruth + " --vehicles 1", "--vehicles"),
