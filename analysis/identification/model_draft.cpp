@@ -12,7 +12,7 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr double kDraftBlock_s = 2, kQuantile90 = 1.645;
+constexpr double kDraftBlock_s = 2, kDraftQuantile90 = 1.645;
 
 /// Mean of several estimates with the interval that their scatter gives.
 struct Estimate {
@@ -28,7 +28,7 @@ Estimate estimate(const std::vector<double>& values) {
   double squares = 0;
   for (const double value : values) squares += (value - result.value) * (value - result.value);
   const auto n = static_cast<double>(values.size());
-  const double half = values.size() > 1 ? kQuantile90 * std::sqrt(squares / (n - 1) / n) : 0;
+  const double half = values.size() > 1 ? kDraftQuantile90 * std::sqrt(squares / (n - 1) / n) : 0;
   result.lower = result.value - half;
   result.upper = result.value + half;
   return result;
@@ -96,12 +96,14 @@ void scale_body(const stability::Model& base, ModelDraft& draft) {
   model.arm_m = base.arm_m * length;
   model.torque_per_thrust_m = base.torque_per_thrust_m * length;
   for (std::size_t k = 0; k < 3; ++k) model.inertia_kg_m2[k] = base.inertia_kg_m2[k] * mass * length * length;
-  const std::string source = fmt::format("assumption: {} of {:g} kg, scaled to the mass", base.kind, base.mass_kg);
+  const std::string source =
+      fmt::format("assumption: {} of {:g} kg, scaled to the mass", base.kind, base.mass_kg);
   draft.parameters.push_back({"arm_m", model.arm_m, false, 0, 0, source});
   draft.parameters.push_back({"torque_per_thrust_m", model.torque_per_thrust_m, false, 0, 0, source});
   const char* const kAxes[] = {"x", "y", "z"};
   for (std::size_t k = 0; k < 3; ++k)
-    draft.parameters.push_back({fmt::format("inertia_{}_kg_m2", kAxes[k]), model.inertia_kg_m2[k], false, 0, 0, source});
+    draft.parameters.push_back(
+        {fmt::format("inertia_{}_kg_m2", kAxes[k]), model.inertia_kg_m2[k], false, 0, 0, source});
 }
 
 /// Motors whose command at hover is known: force proportional to the command, in a model of four rotors.
@@ -168,8 +170,9 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
   }
   draft.flights = fits.size();
   if (carried_kg.empty() && hover.empty()) {
-    throw files::InputError({found.flights[0].logs[0].second, "", "thrust", "", "no log here has a force and a flight",
-                             draft.problems.empty() ? "'swarmcert inspect' says what a log lacks" : draft.problems[0]});
+    throw files::InputError(
+        {found.flights[0].logs[0].second, "", "thrust", "", "no log here has a force and a flight",
+         draft.problems.empty() ? "'swarmcert inspect' says what a log lacks" : draft.problems[0]});
   }
   const Estimate carried = estimate(carried_kg), ratio = estimate(ratios);
   stability::Model& model = draft.model;
@@ -181,22 +184,25 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
                                 mass_kg > 0 ? "stated (--mass)" : "flights.toml, mean of the logs"});
   } else if (carried.count > 0) {
     model.mass_kg = carried.value;
-    draft.parameters.push_back({"mass_kg", carried.value, true, carried.lower, carried.upper,
-                                "fit: what the thrust carries, if its scale is right; mass, payload and thrust scale "
-                                "cannot be told apart"});
+    draft.parameters.push_back(
+        {"mass_kg", carried.value, true, carried.lower, carried.upper,
+         "fit: what the thrust carries, if its scale is right; mass, payload and thrust scale "
+         "cannot be told apart"});
   } else {
     model.mass_kg = 1;
-    draft.parameters.push_back({"mass_kg", 1, false, 0, 0, "assumption: no log shows it; state it with --mass"});
+    draft.parameters.push_back(
+        {"mass_kg", 1, false, 0, 0, "assumption: no log shows it; state it with --mass"});
   }
   scale_body(base, draft);
   if (!hover.empty()) {
     const Estimate command = estimate(hover);
-    draft.parameters.push_back({"hover_command", command.value, hover.size() > 1, command.lower, command.upper,
-                                "fit: mean motor command that carries the weight"});
+    draft.parameters.push_back({"hover_command", command.value, hover.size() > 1, command.lower,
+                                command.upper, "fit: mean motor command that carries the weight"});
     set_linear_thrust(command.value, draft);
   } else {
     const char* const kKeys[] = {"c00", "c10", "c01", "c20", "c11"};
-    const double values[] = {base.thrust.c00, base.thrust.c10, base.thrust.c01, base.thrust.c20, base.thrust.c11};
+    const double values[] = {base.thrust.c00, base.thrust.c10, base.thrust.c01, base.thrust.c20,
+                             base.thrust.c11};
     for (std::size_t k = 0; k < 5; ++k)
       draft.parameters.push_back({fmt::format("thrust.{}", kKeys[k]), values[k], false, 0, 0,
                                   "assumption: load cell, " + base.kind});

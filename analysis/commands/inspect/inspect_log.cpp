@@ -12,8 +12,8 @@ namespace swarmcert::analysis {
 namespace {
 
 const char* name(logs::SignalInfo::Source source) {
-  const char* const kNames[] = {"measured", "derived", "missing"};
-  return kNames[static_cast<int>(source)];
+  const char* const kWords[] = {"measured", "derived", "missing"};
+  return kWords[static_cast<int>(source)];
 }
 
 files::Json finite(double value) { return std::isfinite(value) ? files::Json(value) : files::Json(nullptr); }
@@ -32,8 +32,8 @@ files::Json torque_axes(const logs::Log& log) {
 }
 
 const char* torque_use(logs::TorqueUse use) {
-  const char* const kNames[] = {"none", "mean in slow flight", "dynamic"};
-  return kNames[static_cast<int>(use)];
+  const char* const kWords[] = {"none", "mean in slow flight", "dynamic"};
+  return kWords[static_cast<int>(use)];
 }
 
 std::string joined(const files::Json& axes) {
@@ -43,16 +43,11 @@ std::string joined(const files::Json& axes) {
 }
 
 files::Json health_of(const logs::LogHealth& health) {
-  return {{"sound", logs::is_sound(health)},
-          {"blocks", health.blocks},
-          {"damaged_blocks", health.damaged_blocks},
-          {"skipped_bytes", health.skipped_bytes},
-          {"damaged_lines", health.damaged_lines},
-          {"not_finite", health.not_finite},
-          {"clock_jumps", health.clock_jumps},
-          {"gaps", health.gaps},
-          {"longest_gap_s", health.longest_gap_s},
-          {"truncated", health.truncated},
+  return {{"sound", logs::is_sound(health)},          {"blocks", health.blocks},
+          {"damaged_blocks", health.damaged_blocks},  {"skipped_bytes", health.skipped_bytes},
+          {"damaged_lines", health.damaged_lines},    {"not_finite", health.not_finite},
+          {"clock_jumps", health.clock_jumps},        {"gaps", health.gaps},
+          {"longest_gap_s", health.longest_gap_s},    {"truncated", health.truncated},
           {"checksum_failed", health.checksum_failed}};
 }
 
@@ -116,8 +111,8 @@ files::Json describe_log(const logs::Log& log) {
 
 void print_log(const logs::Log& log) {
   const logs::FlightStory story = logs::tell(log);
-  fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {:.1f} s in the air\n", log.path, log.format,
-             log.health.records, start_s(log), end_s(log), story.air_s);
+  fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {:.1f} s in the air\n", log.path,
+             log.format, log.health.records, start_s(log), end_s(log), story.air_s);
   if (!story.no_flight.empty()) fmt::print("  no flight: {}\n", story.no_flight);
   for (const std::string& finding : logs::findings(log.health)) fmt::print("  {}\n", finding);
   for (const logs::Doubt& doubt : logs::doubts_of(log)) fmt::print("  implausible: {}\n", doubt.words);
@@ -126,8 +121,8 @@ void print_log(const logs::Log& log) {
       fmt::print("  {:<18} missing\n", signal.name);
       continue;
     }
-    fmt::print("  {:<18} {:<9}{:>7.1f} Hz  {}{}{}\n", signal.name, name(signal.source), signal.rate_hz, signal.from,
-               signal.unit.empty() || signal.unit == "1" ? "" : " [" + signal.unit + "]",
+    fmt::print("  {:<18} {:<9}{:>7.1f} Hz  {}{}{}\n", signal.name, name(signal.source), signal.rate_hz,
+               signal.from, signal.unit.empty() || signal.unit == "1" ? "" : " [" + signal.unit + "]",
                std::isfinite(signal.noise) ? fmt::format(", noise {:.2g}", signal.noise) : "");
   }
   for (const std::string& words : log.interpretation) fmt::print("  seen: {}\n", words);

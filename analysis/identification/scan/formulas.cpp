@@ -14,18 +14,18 @@
 namespace swarmcert::identification {
 namespace {
 
-using V = ScanVariable;
-
 constexpr Eigen::Index kSamplesOfFit = 3000;
 constexpr const char* kLetters[] = {"{a}", "{b}", "{c}"};
 /// What a form may be multiplied with.
-constexpr V kFactors[] = {V::kThrust, V::kX, V::kY, V::kZ, V::kVx, V::kVy, V::kVz, V::kSpeed};
+constexpr ScanVariable kFactors[] = {ScanVariable::kThrust, ScanVariable::kX,    ScanVariable::kY,
+                                     ScanVariable::kZ,      ScanVariable::kVx,   ScanVariable::kVy,
+                                     ScanVariable::kVz,     ScanVariable::kSpeed};
 
 /// One form with one factor, fitted.
 struct FormulaTrial {
   Form form;
   FormFit fit;
-  V factor = V::kCount;  ///< kCount: none
+  ScanVariable factor = ScanVariable::kCount;  ///< kCount: none
   double saved_bits = -kInfinity;
 };
 
@@ -37,8 +37,9 @@ struct EntryData {
   double mean_square = 0;                ///< about the mean
 };
 
-bool is_velocity(V v) {
-  return v == V::kVx || v == V::kVy || v == V::kVz || v == V::kBodyVx || v == V::kBodyVy || v == V::kClimb;
+bool is_velocity(ScanVariable v) {
+  return v == ScanVariable::kVx || v == ScanVariable::kVy || v == ScanVariable::kVz ||
+         v == ScanVariable::kBodyVx || v == ScanVariable::kBodyVy || v == ScanVariable::kClimb;
 }
 
 FormData rows_of(const ScanSamples& samples, const ScanEntry& entry, const std::vector<Eigen::Index>& rows) {
@@ -59,7 +60,7 @@ FormData rows_of(const ScanSamples& samples, const ScanEntry& entry, const std::
 EntryData data_of(const ScanSamples& samples, const ScanEntry& entry) {
   EntryData data;
   for (Eigen::Index i = 0; i < samples.size(); ++i) {
-    const bool known = std::all_of(entry.variables.begin(), entry.variables.end(), [&](V v) {
+    const bool known = std::all_of(entry.variables.begin(), entry.variables.end(), [&](ScanVariable v) {
       return std::isfinite(samples.values(i, static_cast<Eigen::Index>(v)));
     });
     if (known) data.rows.push_back(i);
@@ -77,7 +78,8 @@ EntryData data_of(const ScanSamples& samples, const ScanEntry& entry) {
   return data;
 }
 
-Eigen::VectorXd factor_of(const ScanSamples& samples, const std::vector<Eigen::Index>& rows, V factor) {
+Eigen::VectorXd factor_of(const ScanSamples& samples, const std::vector<Eigen::Index>& rows,
+                          ScanVariable factor) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i)
     values[static_cast<Eigen::Index>(i)] = samples.values(rows[i], static_cast<Eigen::Index>(factor));
@@ -101,7 +103,7 @@ double independent_samples(const EntryData& data, const FormulaTrial& trial) {
 }
 
 int numbers_of(const FormulaTrial& trial) {
-  int count = static_cast<int>(trial.form.texts.size()) + (trial.factor == V::kCount ? 0 : 1);
+  int count = static_cast<int>(trial.form.texts.size()) + (trial.factor == ScanVariable::kCount ? 0 : 1);
   for (const FormParameter& parameter : trial.form.shape) count += parameter.lower < parameter.upper ? 1 : 0;
   return count;
 }
@@ -132,7 +134,7 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
     if (entry.period_s > 0)
       form.shape[0].starts = {0.99 * kTwoPi / entry.period_s, kTwoPi / entry.period_s,
                               1.01 * kTwoPi / entry.period_s};
-    if (entry.variables[0] == V::kHeading) form.shape[0].starts = {1, 2, 3};
+    if (entry.variables[0] == ScanVariable::kHeading) form.shape[0].starts = {1, 2, 3};
   }
   return forms;
 }
@@ -155,7 +157,7 @@ FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, Entr
                    [](const FormulaTrial& a, const FormulaTrial& b) { return a.saved_bits > b.saved_bits; });
   FormulaTrial best = trials[0];
   for (std::size_t t = 0; t < std::min<std::size_t>(2, trials.size()); ++t) {
-    for (const V factor : kFactors) {
+    for (const ScanVariable factor : kFactors) {
       if (std::find(entry.variables.begin(), entry.variables.end(), factor) != entry.variables.end())
         continue;
       data.few.factor = factor_of(samples, data.thin, factor);
@@ -231,9 +233,9 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const FormulaTrial& trial)
   const char* const letters[] = {"a", "b"};
   for (std::size_t k = 0; k < texts.size(); ++k) {
     std::string text = "(" + texts[k] + ")";
-    if (trial.factor != V::kCount) text += std::string(" * ") + scan_variable(trial.factor).symbol;
+    if (trial.factor != ScanVariable::kCount) text += std::string(" * ") + scan_variable(trial.factor).symbol;
     std::string of = unit_of_coefficient(unit, trial.form.powers[k]);
-    if (trial.factor != V::kCount) of += std::string("_per_") + scan_variable(trial.factor).unit;
+    if (trial.factor != ScanVariable::kCount) of += std::string("_per_") + scan_variable(trial.factor).unit;
     add(letters[k], text, trial.fit.coefficients[static_cast<Eigen::Index>(k)], of);
   }
   if (trial.form.has_offset)
@@ -241,13 +243,15 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const FormulaTrial& trial)
   spec.expression.formulas[target_of(entry)] = formula;
   spec.name = fmt::format("{}{}_{}{}_of_{}", kFormulaPrefix, trial.form.name,
                           entry.frame == "body" ? "body_" : "", entry.axis, entry.variable);
-  if (trial.factor != V::kCount) spec.name += std::string("_and_") + scan_variable(trial.factor).name;
+  if (trial.factor != ScanVariable::kCount)
+    spec.name += std::string("_and_") + scan_variable(trial.factor).name;
   return spec;
 }
 
 bool has_formula(const ScanEntry& entry) {
-  return !entry.variables.empty() && std::all_of(entry.variables.begin(), entry.variables.end(),
-                                                 [](V v) { return scan_variable(v).symbol[0] != '\0'; });
+  return !entry.variables.empty() &&
+         std::all_of(entry.variables.begin(), entry.variables.end(),
+                     [](ScanVariable v) { return scan_variable(v).symbol[0] != '\0'; });
 }
 
 }  // namespace

@@ -200,7 +200,7 @@ class TrackSampler {
     result_.height_m.push_back(height_m);
   }
 
-  const stability::Model& model_;
+  const stability::Model model_;
   const Track& track_;
   const std::vector<Eigen::Vector3d> residual_N_;
   const TrackBlocks cut_;
