@@ -13,8 +13,9 @@ struct DraftedParameter {
   std::string name;
   double value = 0;
   bool has_interval = false;
-  double lower = 0, upper = 0;  ///< 90 %, from the scatter between flights, or between blocks of 2 s of one flight
-  std::string source;           ///< log parameter, fit, or assumption, in words
+  double lower = 0,
+         upper = 0;    ///< 90 %, from the scatter between flights, or between blocks of 2 s of one flight
+  std::string source;  ///< log parameter, fit, or assumption, in words
 };
 
 struct ModelDraft {

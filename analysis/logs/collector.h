@@ -18,6 +18,8 @@ class Collector : public RecordSink {
   bool needs(std::size_t column) const override { return needs_[column] != 0; }
   /// Call once after the last record: fills RawTopic::time_s.
   void end();
+  /// After begin(): the column that holds the time.
+  std::size_t time_index() const { return time_; }
 
  private:
   RawLog& log_;

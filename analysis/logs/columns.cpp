@@ -37,9 +37,16 @@ std::map<std::string, NamedSignal> named_signals() {
   add("time", {""}, kTime, {{"s", 1e6, 1}, {"ms", 1e3, 1}, {"us", 1, 1}});
   add("position", axes, kPosition, length);
   add("velocity", axes, kVelocity, speed);
-  add("specific_force", axes, kForceWorld, {{"m/s^2", 1, 1}, {"mm/s^2", 1, 1000}, {"g", kGravity_m_s2, 1}},
+  add("specific_force", axes, kForceWorld, {{"m/s^2", 1, 1}, {"mm/s^2", 1, 1000}, {"g", kGravity_m_s2, 1}, {"mg", kGravity_m_s2, 1000}},
       true);
   add("attitude", {"_x", "_y", "_z", "_w"}, kAttitude, {{"1", 1, 1}});
+  // Angles of R = Rz(yaw) Ry(pitch) Rx(roll); a minus stands for columns of the opposite sign.
+  const std::vector<Unit> angle = {
+      {"rad", 1, 1}, {"deg", kDegree_rad, 1}, {"-rad", -1, 1}, {"-deg", -kDegree_rad, 1}};
+  add("roll", {""}, kEuler, angle);
+  add("pitch", {""}, kEuler + 1, angle);
+  add("yaw", {""}, kEuler + 2, angle);
+  add("requested", motors, kRequested, {{"1", 1, 1}, {"PWM", 1, 65536}});
   add("rate", axes, kRates, {{"rad/s", 1, 1}, {"mrad/s", 1, 1000}, {"deg/s", kDegree_rad, 1}});
   add("duty", motors, kDuty, {{"1", 1, 1}, {"PWM", 1, 65536}});
   add("battery", {""}, kBattery, {{"V", 1, 1}, {"mV", 1, 1000}});

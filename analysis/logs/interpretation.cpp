@@ -49,14 +49,12 @@ Sample sample_of(const SignalTable& t, std::size_t i, const Signals& signals) {
 }
 
 void refuse_without_motion(const Draft& draft) {
-  const SignalTable& t = draft.table;
-  const auto any = [&](int first) { return t.has(first) || t.has(first + 1) || t.has(first + 2); };
-  if (draft.recognition.groups.empty() ||
-      (!any(kPosition) && !any(kVelocity) && !t.has_group(kForceBody, 3) && !t.has_group(kForceWorld, 3))) {
-    throw files::InputError({draft.raw.path, "", "position", "",
-                             "no column carries it, nor a velocity or an acceleration",
-                             "log it, or say in a columns.toml (--columns) which column does"});
+  for (const Carried& carried : draft.recognition.groups) {
+    if (carried.signal < kAttitude) return;  // position, velocity or acceleration
   }
+  throw files::InputError({draft.raw.path, "", "position", "",
+                           "no column carries it, nor a velocity or an acceleration",
+                           "log it, or say in a columns.toml (--columns) which column does"});
 }
 
 /// Clocks that count from 1970 start at zero; what was taken off stands in Log::epoch_s.

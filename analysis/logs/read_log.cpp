@@ -58,12 +58,14 @@ RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
   head.resize(static_cast<std::size_t>(in.gcount()));
   in.clear();
   in.seekg(0);
-  // What a columns.toml says counts, whoever wrote the CSV.
-  if (format_of(head) != nullptr && (map.empty() || kind_of(in) != Format::kCsv)) return parse_raw(in, path);
+  // The header of an old micro-SD log names variables as a CSV does. What a columns.toml says counts, whoever wrote the CSV.
+  const Format kind = kind_of(in);
+  const bool is_usd = kind == Format::kUsd || kind == Format::kUsdEvents;
+  if (!is_usd && format_of(head) != nullptr && (map.empty() || kind != Format::kCsv)) return parse_raw(in, path);
   RawLog log;
   log.path = path;
   Collector collector(log, map);
-  switch (kind_of(in)) {
+  switch (kind) {
     case Format::kUsd:
       log.format = "usd";
       read_usd(in, path, collector, log.health);

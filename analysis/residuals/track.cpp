@@ -168,7 +168,8 @@ void cut_phases(Track& track, const CutRules& rules) {
   double settled_s = -INFINITY;
   for (std::size_t i = 0; i < n; ++i) {
     const stability::Instant& now = track.instants[i];
-    if (track.restarts[i] != 0) settled_s = now.time_s + (derived ? std::max(kSettle_s, 1.5 * track.window_s) : kSettle_s);
+    if (track.restarts[i] != 0)
+      settled_s = now.time_s + (derived ? std::max(kSettle_s, 1.5 * track.window_s) : kSettle_s);
     // A height at which the vehicle stood counts where it is not the usual one within a few centimetres.
     const double usual_m = contact_height_m(track.kind);
     const bool stood_elsewhere = std::abs(standing_m[i] + kAboveStanding_m - usual_m) > kUsualWithin_m;

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "analysis/logs/battery_compensation.h"
+#include "analysis/logs/columns_draft.h"
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/hover_scale.h"
@@ -38,19 +39,22 @@ struct Swing {
     roll = std::atan2(-ay, std::hypot(ax, logs::kGravity_m_s2));
   }
   std::array<double, 4> quaternion() const {  // x, y, z, w
-    const double cr = std::cos(roll / 2), sr = std::sin(roll / 2), cp = std::cos(pitch / 2), sp = std::sin(pitch / 2);
+    const double cr = std::cos(roll / 2), sr = std::sin(roll / 2), cp = std::cos(pitch / 2),
+                 sp = std::sin(pitch / 2);
     return {sr * cp, cr * sp, -sr * sp, cr * cp};
   }
   double load() const { return std::sqrt(ax * ax + ay * ay + logs::kGravity_m_s2 * logs::kGravity_m_s2); }
 };
 
 /// CSV of the swing at 100 Hz for 8 s; `cells` gives what follows position and velocity.
-logs::Log swing(const std::string& names, const std::function<std::string(const Swing&)>& cells,
-                const std::function<std::string(double)>& clock = [](double t) { return fmt::format("{:.4f}", t); }) {
+logs::Log swing(
+    const std::string& names, const std::function<std::string(const Swing&)>& cells,
+    const std::function<std::string(double)>& clock = [](double t) { return fmt::format("{:.4f}", t); }) {
   std::string text = "t,px,py,pz,vx,vy,vz," + names + "\n";
   for (int k = 0; k < 800; ++k) {
     const Swing s(0.01 * k);
-    text += fmt::format("{},{:.6f},{:.6f},1,{:.6f},{:.6f},0,{}\n", clock(s.t), s.x, s.y, s.vx, s.vy, cells(s));
+    text +=
+        fmt::format("{},{:.6f},{:.6f},1,{:.6f},{:.6f},0,{}\n", clock(s.t), s.x, s.y, s.vx, s.vy, cells(s));
   }
   std::istringstream in(text);
   return logs::parse_log(in, "swing.csv");
@@ -81,8 +85,8 @@ double force_error_m_s2(const logs::Log& log) {
   for (std::size_t i = 50; i + 50 < log.samples.size(); ++i) {
     const Swing s(1e-6 * log.samples[i].time_us);
     const logs::Vector& f = log.samples[i].specific_force_m_s2;
-    largest = std::max({largest, std::abs(f[0] - s.ax), std::abs(f[1] - s.ay),
-                        std::abs(f[2] - logs::kGravity_m_s2)});
+    largest = std::max(
+        {largest, std::abs(f[0] - s.ax), std::abs(f[1] - s.ay), std::abs(f[2] - logs::kGravity_m_s2)});
   }
   return largest;
 }
@@ -120,7 +124,8 @@ TEST(Interpretation, DecidesUnitFrameAndGravityOfAnAccelerometer) {
   for (const double unit : {1.0, 1 / g, 1000 / g}) {  // m/s^2, g, mg
     const logs::Log body = swing(std::string("ax,ay,az,qx,qy,qz,qw") + kMotors, [&](const Swing& s) {
       const auto q = s.quaternion();
-      return fmt::format("0.0001,0,{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}", unit * s.load(), q[0], q[1], q[2], q[3]) +
+      return fmt::format("0.0001,0,{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}", unit * s.load(), q[0], q[1], q[2],
+                         q[3]) +
              motors(s);
     });
     EXPECT_LT(force_error_m_s2(body), 0.05) << unit;
@@ -128,7 +133,8 @@ TEST(Interpretation, DecidesUnitFrameAndGravityOfAnAccelerometer) {
   }
   const logs::Log world = swing(std::string("ax,ay,az,qx,qy,qz,qw") + kMotors, [&](const Swing& s) {
     const auto q = s.quaternion();
-    return fmt::format("{:.6f},{:.6f},0.0,{:.6f},{:.6f},{:.6f},{:.6f}", s.ax, s.ay, q[0], q[1], q[2], q[3]) + motors(s);
+    return fmt::format("{:.6f},{:.6f},0.0,{:.6f},{:.6f},{:.6f},{:.6f}", s.ax, s.ay, q[0], q[1], q[2], q[3]) +
+           motors(s);
   });
   EXPECT_LT(force_error_m_s2(world), 0.05) << "in the world, without gravity";
 }
@@ -159,8 +165,8 @@ TEST(Interpretation, VelocityAndForceFollowFromAPositionAlone) {
   for (int k = 0; k < 800; ++k) {
     const Swing s(0.01 * k);
     const auto q = s.quaternion();
-    text += fmt::format("{:.4f},{:.6f},{:.6f},1,{:.6f},{:.6f},{:.6f},{:.6f}{}\n", s.t, s.x, s.y, q[0], q[1], q[2], q[3],
-                        motors(s));
+    text += fmt::format("{:.4f},{:.6f},{:.6f},1,{:.6f},{:.6f},{:.6f},{:.6f}{}\n", s.t, s.x, s.y, q[0], q[1],
+                        q[2], q[3], motors(s));
   }
   std::istringstream in(text);
   const logs::Log log = logs::parse_log(in, "swing.csv");
@@ -174,16 +180,18 @@ TEST(Interpretation, TellsRequestedThrustFromAppliedDutyByTheBatterysSag) {
   for (const bool requested : {false, true}) {
     std::string text = "t,px,py,pz,vx,vy,vz,motor.m1,motor.m2,motor.m3,motor.m4,pm.vbat\n";
     for (int k = 0; k < 800; ++k) {
-      const double t = 0.01 * k, volt = 4.1 - 0.08 * t, az = 0.3 * std::sin(4 * t), vz = -0.075 * std::cos(4 * t);
+      const double t = 0.01 * k, volt = 4.1 - 0.08 * t, az = 0.3 * std::sin(4 * t),
+                   vz = -0.075 * std::cos(4 * t);
       const double load = 1 + az / logs::kGravity_m_s2;
       const double m = 65536 * (requested ? 0.55 * load : std::pow(load, 1 / 1.5) * 0.6 * 4.1 / volt);
-      text += fmt::format("{0:.4f},0.01,0,1,0,0,{1:.6f},{2:.1f},{2:.1f},{2:.1f},{2:.1f},{3:.4f}\n", t, vz, m, volt);
+      text += fmt::format("{0:.4f},0.01,0,1,0,0,{1:.6f},{2:.1f},{2:.1f},{2:.1f},{2:.1f},{3:.4f}\n", t, vz, m,
+                          volt);
     }
     std::istringstream in(text);
     const logs::Log log = logs::parse_log(in, "sag.csv");
-    const bool has_request = std::any_of(log.sources.begin(), log.sources.end(), [](const logs::SignalInfo& info) {
-      return info.name == "requested_thrust";
-    });
+    const bool has_request =
+        std::any_of(log.sources.begin(), log.sources.end(),
+                    [](const logs::SignalInfo& info) { return info.name == "requested_thrust"; });
     EXPECT_EQ(has_request, requested);
     EXPECT_EQ(log.signals.thrust, logs::ThrustSource::kDuty);
   }
@@ -203,8 +211,9 @@ TEST(Interpretation, SlowLogsHaveAWindowOfSeveralRecordsAndNoGapsOfTheirOwn) {
 }
 
 TEST(Interpretation, WrapsOfAPositionInMillimetresAreUndone) {
-  std::string text = "time_us,stateEstimateZ.x,stateEstimateZ.y,stateEstimateZ.z,stateEstimateZ.vx,stateEstimateZ.vy,"
-                     "stateEstimateZ.vz\n";
+  std::string text =
+      "time_us,stateEstimateZ.x,stateEstimateZ.y,stateEstimateZ.z,stateEstimateZ.vx,stateEstimateZ.vy,"
+      "stateEstimateZ.vz\n";
   for (int k = 0; k < 100; ++k) {
     const int x = 32700 + 5 * k;
     text += fmt::format("{},{},0,1000,500,0,0\n", 10000 * k, x > 32767 ? x - 65536 : x);
@@ -216,6 +225,35 @@ TEST(Interpretation, WrapsOfAPositionInMillimetresAreUndone) {
   EXPECT_EQ(log.events[0].kind, "wrap");
 }
 
+TEST(ColumnsDraft, ReadsTheFileToTheSameSamplesAndGivesEvidence) {
+  const std::string path = testing::TempDir() + "swarmcert-columns-draft.csv";
+  {
+    std::ofstream out(path);
+    out << "time,px,py,pz,vx,vy,vz,roll,pitch,yaw,gyro.x,gyro.y,gyro.z,m1,m2,m3,m4,vbat,mood\n";
+    for (int k = 0; k < 800; ++k) {
+      const Swing s(0.01 * k);
+      const double degree = 180 / kPi;
+      out << fmt::format("{},{:.6f},{:.6f},1,{:.6f},{:.6f},0,{:.5f},{:.5f},0.0,0.1,0.1,0{},1\n", 10 * k, s.x, s.y, s.vx,
+                         s.vy, degree * s.roll, -degree * s.pitch, motors(s));
+    }
+  }
+  const std::string draft = logs::columns_draft(path);
+  EXPECT_NE(draft.find("time = { column = \"time\", unit = \"ms\""), std::string::npos) << draft;
+  EXPECT_NE(draft.find("roll = { column = \"roll\", unit = \"deg\""), std::string::npos) << draft;
+  EXPECT_NE(draft.find("pitch = { column = \"pitch\", unit = \"-deg\""), std::string::npos) << draft;
+  EXPECT_NE(draft.find("# not used: mood"), std::string::npos) << draft;
+  EXPECT_NE(draft.find("# seen: "), std::string::npos) << draft;
+  const logs::Log guessed = logs::read_log(path), stated = logs::read_log(path, logs::parse_columns(draft, "columns.toml"));
+  ASSERT_EQ(guessed.samples.size(), stated.samples.size());
+  EXPECT_LT(axis_error(stated), 0.01);
+  for (std::size_t i = 0; i < stated.samples.size(); i += 50) {
+    EXPECT_NEAR(stated.samples[i].time_us, guessed.samples[i].time_us, 1);
+    EXPECT_NEAR(stated.samples[i].velocity_m_s[0], guessed.samples[i].velocity_m_s[0], 1e-9);
+    EXPECT_NEAR(stated.samples[i].duty[0], guessed.samples[i].duty[0], 1e-9);
+  }
+  std::filesystem::remove(path);
+}
+
 TEST(FlightStory, SplitsALogIntoGroundTakeoffFlightAndLanding) {
   std::string text = "t,px,py,pz,vx,vy,vz,m1,m2,m3,m4,vbat\n";
   for (int k = 0; k < 1500; ++k) {
@@ -224,7 +262,8 @@ TEST(FlightStory, SplitsALogIntoGroundTakeoffFlightAndLanding) {
     const double up = std::clamp(t - 3, 0.0, 1.0) - std::clamp(t - 10, 0.0, 1.0);
     const double speed = (t > 3 && t < 4) ? 1 : (t > 10 && t < 11) ? -1 : 0;
     const bool flies = t > 3 && t < 11;
-    text += fmt::format("{0:.3f},0.1,0,{1:.4f},0,0,{2},{3},{3},{3},{3},3.8\n", t, 0.4 + up, speed, flies ? 0.5 : 0.05);
+    text += fmt::format("{0:.3f},0.1,0,{1:.4f},0,0,{2},{3},{3},{3},{3},3.8\n", t, 0.4 + up, speed,
+                        flies ? 0.5 : 0.05);
   }
   std::istringstream in(text);
   const logs::FlightStory story = logs::tell(logs::parse_log(in, "hop.csv"));
@@ -245,9 +284,11 @@ TEST(FlightStory, ALogOfTheGroundIsNoFlight) {
 
 std::vector<std::string> logs_of(const std::string& folder, std::size_t most) {
   std::vector<std::string> paths;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(data_path("collections/" + folder))) {
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(data_path("collections/" + folder))) {
     const std::string path = entry.path().string();
-    if (entry.is_regular_file() && (path.find("log") != std::string::npos || entry.path().extension() == ".csv") &&
+    if (entry.is_regular_file() &&
+        (path.find("log") != std::string::npos || entry.path().extension() == ".csv") &&
         entry.path().extension() != ".yaml")
       paths.push_back(path);
   }
@@ -302,7 +343,11 @@ void check_collections(std::size_t most) {
   };
   const Collection collections[] = {
       {"crazypad", {false, false, true}, logs::ThrustSource::kDuty, logs::TorqueUse::kMean, 1.3 * 0.13},
-      {"crazyswarm2-tools", {true, true, true}, logs::ThrustSource::kForce, logs::TorqueUse::kNone, 1.3 * 0.10},
+      {"crazyswarm2-tools",
+       {true, true, true},
+       logs::ThrustSource::kForce,
+       logs::TorqueUse::kNone,
+       1.3 * 0.10},
       {"nanobench", {true, true, true}, logs::ThrustSource::kDuty, logs::TorqueUse::kMean, 1.3 * 0.09}};
   for (const Collection& collection : collections) {
     std::size_t opened = 0;
@@ -348,7 +393,8 @@ TEST(Collections, NanoBenchsMotorsAreAppliedDutyAndItsGyroscopeIsInRadians) {
     const logs::Log log = logs::read_log(path);
     EXPECT_EQ(signal(log, "duty").source, logs::SignalInfo::Source::kMeasured) << path;
     double largest = 0;
-    for (const logs::Sample& sample : log.samples) largest = std::max(largest, std::abs(sample.rates_rad_s[0]));
+    for (const logs::Sample& sample : log.samples)
+      largest = std::max(largest, std::abs(sample.rates_rad_s[0]));
     EXPECT_GT(largest, 0.3) << path;
     EXPECT_LT(largest, 20) << path << ": in degrees it would be hundreds";
   }

@@ -9,6 +9,7 @@
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/inspect/inspect_log.h"
+#include "analysis/logs/columns_draft.h"
 #include "analysis/logs/read_log.h"
 #include "analysis/residuals/flight_set.h"
 #include "nn/base/file_io.h"
@@ -24,7 +25,7 @@ struct InspectOptions {
   std::vector<std::string> files;
   files::NetworkArguments network;  ///< key and order, of every weight file
   std::string csv;
-  std::string columns;
+  std::string columns, columns_draft;
   double t0_s = -std::numeric_limits<double>::infinity();
   double t1_s = std::numeric_limits<double>::infinity();
 };
@@ -203,7 +204,8 @@ files::Json inspect(const std::string& path, const InspectOptions& options, cons
 }
 
 /// Files as they are, folders as the logs below them, with what was taken as one flight and why.
-std::vector<std::string> expanded(const std::vector<std::string>& words, files::Json& flights, files::Json& skipped) {
+std::vector<std::string> expanded(const std::vector<std::string>& words, files::Json& flights,
+                                  files::Json& skipped) {
   std::vector<std::string> paths;
   for (const std::string& word : words) {
     if (!std::filesystem::is_directory(word)) {
@@ -244,6 +246,11 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
     if (!(options.t0_s < options.t1_s)) throw UsageError("--t0 must be before --t1");
     refuse_to_replace(common, options.csv);
   }
+  if (!options.columns_draft.empty()) {
+    if (options.files.size() != 1) throw UsageError("--columns-draft takes one CSV");
+    refuse_to_replace(common, options.columns_draft);
+    files::write_file(options.columns_draft, logs::columns_draft(options.files[0]), common.force);
+  }
   files::Json found = files::Json::array(), flights = files::Json::array(), skipped = files::Json::array();
   const std::vector<std::string> paths = expanded(options.files, flights, skipped);
   const bool in_table = paths.size() > options.files.size();
@@ -272,26 +279,30 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
 }  // namespace
 
 Command inspect_command() {
-  return {"inspect", "Show and validate weight files, network.toml, models, certificates and flight logs",
-          "Exit 0 if every file can be read, else 3 with what is wrong and where. Damage inside a flight log "
-          "is skipped,\n"
-          "counted and shown.\n\n"
-          "Example: swarmcert inspect nn/networks/demo/network.toml\n"
-          "         swarmcert inspect cf50_00 --csv cf50_00.csv --t0 2 --t1 12",
-          [](CLI::App& app) {
-            const auto options = std::make_shared<InspectOptions>();
-            app.add_option("FILE", options->files,
-                           "Weight files, network.toml and model.toml files, certificates, flight logs, folders of logs")
-                ->required();
-            add_output(app, "--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
-            app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
-            app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
-            app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
-            app.add_option("--key", options->network.key,
-                           "Key of the state dict inside a nested checkpoint, e.g. model");
-            declare_order(app, options->network);
-            return [options](const CommonOptions& common) { return run_inspect(*options, common); };
-          }};
+  return {
+      "inspect", "Show and validate weight files, network.toml, models, certificates and flight logs",
+      "Exit 0 if every file can be read, else 3 with what is wrong and where. Damage inside a flight log "
+      "is skipped,\n"
+      "counted and shown.\n\n"
+      "Example: swarmcert inspect nn/networks/demo/network.toml\n"
+      "         swarmcert inspect cf50_00 --csv cf50_00.csv --t0 2 --t1 12",
+      [](CLI::App& app) {
+        const auto options = std::make_shared<InspectOptions>();
+        app.add_option(
+               "FILE", options->files,
+               "Weight files, network.toml and model.toml files, certificates, flight logs, folders of logs")
+            ->required();
+        add_output(app, "--csv", options->csv, "Write the one flight log as CSV in the authors' layout");
+        app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
+        app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
+        app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
+        add_output(app, "--columns-draft", options->columns_draft,
+                   "Write a columns.toml for the one CSV: meaning, unit and frame of its columns, with the evidence");
+        app.add_option("--key", options->network.key,
+                       "Key of the state dict inside a nested checkpoint, e.g. model");
+        declare_order(app, options->network);
+        return [options](const CommonOptions& common) { return run_inspect(*options, common); };
+      }};
 }
 
 }  // namespace swarmcert::analysis

@@ -38,10 +38,12 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
       if (rule.mass_kg > 0) masses_kg[path] = rule.mass_kg;
     }
   }
-  const std::string base =
-      options.base.empty() ? bundled_folder("models", "stability/models") + "/crazyflie-small.toml" : options.base;
+  const std::string base = options.base.empty()
+                               ? bundled_folder("models", "stability/models") + "/crazyflie-small.toml"
+                               : options.base;
   inputs.push_back(base);
-  const logs::SignalMap map = options.columns.empty() ? logs::known_columns() : logs::read_columns(options.columns);
+  const logs::SignalMap map =
+      options.columns.empty() ? logs::known_columns() : logs::read_columns(options.columns);
   const identification::ModelDraft draft =
       identification::draft_model(found, map, masses_kg, options.mass_kg, stability::read_model(base));
   std::vector<std::string> comments = {fmt::format("Drafted from {} logs.", draft.flights)};

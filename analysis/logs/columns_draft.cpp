@@ -1,0 +1,180 @@
+#include "analysis/logs/columns_draft.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <fstream>
+#include <set>
+
+#include "analysis/logs/collector.h"
+#include "analysis/logs/interpretation.h"
+#include "analysis/logs/statistics_of_series.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr double kDegree_rad = 3.14159265358979323846 / 180;
+
+struct UnitGuess {
+  const char* name;
+  double per_si;  ///< stored number of one SI unit
+};
+
+struct SignalWords {
+  int signal;
+  const char* name;
+  std::vector<const char*> parts;
+  std::vector<UnitGuess> units;
+  const char* frame;  ///< nullptr: none
+};
+
+const std::vector<SignalWords>& signal_words() {
+  static const std::vector<const char*> axes = {"_x", "_y", "_z"}, four = {"_1", "_2", "_3", "_4"};
+  static const std::vector<UnitGuess> length = {{"m", 1}, {"mm", 1000}}, speed = {{"m/s", 1}, {"mm/s", 1000}};
+  static const std::vector<SignalWords> all = {
+      {kPosition, "position", axes, length, "world"},
+      {kVelocity, "velocity", axes, speed, "world"},
+      {kForceBody, "specific_force", axes,
+       {{"m/s^2", 1}, {"mm/s^2", 1000}, {"g", 1 / kGravity_m_s2}, {"mg", 1000 / kGravity_m_s2}}, "body"},
+      {kForceWorld, "specific_force", axes, {{"m/s^2", 1}, {"mm/s^2", 1000}, {"g", 1 / kGravity_m_s2}}, "world"},
+      {kAttitude, "attitude", {"_x", "_y", "_z", "_w"}, {{"1", 1}}, nullptr},
+      {kEuler, "roll", {""}, {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}}, nullptr},
+      {kEuler + 1, "pitch", {""}, {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}}, nullptr},
+      {kEuler + 2, "yaw", {""}, {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}}, nullptr},
+      {kRates, "rate", axes, {{"rad/s", 1}, {"mrad/s", 1000}, {"deg/s", 1 / kDegree_rad}}, "body"},
+      {kDuty, "duty", four, {{"1", 1}, {"PWM", 65536}}, nullptr},
+      {kRequested, "requested", four, {{"1", 1}, {"PWM", 65536}}, nullptr},
+      {kBattery, "battery", {""}, {{"V", 1}, {"mV", 1000}}, nullptr},
+      {kTargetPosition, "target_position", axes, length, "world"},
+      {kTargetVelocity, "target_velocity", axes, speed, "world"},
+      {kMotorForce, "motor_force", four, {{"N", 1}, {"gf", 1000 / kGravity_m_s2}}, nullptr},
+      {kThrust, "thrust_command", {""}, {{"N", 1}, {"gf", 1000 / kGravity_m_s2}}, nullptr},
+      {kTorque, "torque_command", axes, {{"Nm", 1}}, nullptr}};
+  return all;
+}
+
+/// The interpreted signal of one sample; NaN where Log does not keep it.
+double interpreted(const Log& log, std::size_t i, int signal) {
+  const Sample& s = log.samples[i];
+  const auto part = [&](int first) { return static_cast<std::size_t>(signal - first); };
+  const auto R = rotation(s);
+  if (signal < kVelocity) return s.position_m[part(kPosition)];
+  if (signal < kForceWorld) return s.velocity_m_s[part(kVelocity)];
+  if (signal < kForceBody) return s.specific_force_m_s2[part(kForceWorld)];
+  if (signal < kAccelerationWorld) {
+    const std::size_t k = part(kForceBody);
+    return R[0][k] * s.specific_force_m_s2[0] + R[1][k] * s.specific_force_m_s2[1] + R[2][k] * s.specific_force_m_s2[2];
+  }
+  if (signal >= kAttitude && signal < kPackedAttitude) return s.attitude[part(kAttitude)];
+  if (signal >= kRates && signal < kDuty) return s.rates_rad_s[part(kRates)];
+  if (signal == kEuler) return std::atan2(R[2][1], R[2][2]);
+  if (signal == kEuler + 1) return -std::asin(std::min(std::max(R[2][0], -1.0), 1.0));
+  if (signal == kEuler + 2) return std::atan2(R[1][0], R[0][0]);
+  return std::nan("");
+}
+
+/// The unit whose size is nearest to the slope of the stored numbers over the interpreted ones.
+const UnitGuess& unit_of(const SignalWords& words, double slope) {
+  const UnitGuess* best = &words.units[0];
+  double nearest = INFINITY;
+  for (const UnitGuess& unit : words.units) {
+    const double distance = std::abs(std::log(slope / unit.per_si));  // NaN where the signs differ
+    if (distance < nearest) {
+      nearest = distance;
+      best = &unit;
+    }
+  }
+  return *best;
+}
+
+/// Where Log keeps no copy, the unit that the name's factor stands for, corrected by the size of the values.
+double slope_by_name(const Carried& carried, const std::vector<double>& stored) {
+  const double largest = std::max(quantile_of(stored, 1), -quantile_of(stored, 0));
+  if (carried.signal == kDuty || carried.signal == kRequested) return largest > 1.5 ? 65536 : 1;
+  if (carried.signal == kBattery) return median(stored) > 500 ? 1000 : 1;
+  return carried.divide / carried.multiply;
+}
+
+std::string time_unit(const RawTopic& topic, const RawColumn& column) {
+  for (std::size_t i = 1; i < topic.time_s.size(); ++i) {
+    const double stored = column.values[i] - column.values[0], taken = topic.time_s[i] - topic.time_s[0];
+    if (!(stored > 0) || !(taken > 0)) continue;
+    const double per_second = stored / taken;
+    return per_second > 3e4 ? "us" : per_second > 30 ? "ms" : "s";
+  }
+  return "s";
+}
+
+struct Writer {
+  std::string text;
+  std::set<std::string> used;
+
+  void line(const std::string& signal, const std::string& column, const std::string& unit, const char* frame,
+            const std::string& evidence) {
+    std::string escaped;
+    for (const char c : column) escaped += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+    text += fmt::format("{} = {{ column = \"{}\", unit = \"{}\"{} }}{}\n", signal, escaped, unit,
+                        frame == nullptr ? "" : fmt::format(", frame = \"{}\"", frame),
+                        evidence.empty() ? "" : "  # " + evidence);
+    used.insert(column);
+  }
+};
+
+}  // namespace
+
+std::string columns_draft(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
+  RawLog raw;
+  raw.path = path;
+  raw.format = "csv";
+  Collector collector(raw, known_columns());
+  read_csv(in, path, collector, raw.health);
+  collector.end();
+  const RawTopic& topic = raw.topics.front();
+  const Recognition recognition = recognise(raw, known_columns());
+  const Log log = interpret(raw, known_columns());
+  Writer writer;
+  writer.text = "# Proposed by 'swarmcert inspect --columns-draft' for " + path +
+                ".\n# Check every line: units, frames and signs decide what the residuals mean.\n";
+  for (const std::string& words : log.interpretation) writer.text += "# seen: " + words + "\n";
+  writer.text += "schema = \"swarmcert/columns/1\"\n";
+  const RawColumn& clock = topic.columns[collector.time_index()];
+  writer.line("time", clock.name, time_unit(topic, clock), nullptr, "");
+  for (const SignalWords& words : signal_words()) {
+    for (const Carried& carried : recognition.groups) {
+      const int offset = words.signal - carried.signal;
+      // roll, pitch and yaw are names of their own within one group
+      const bool is_angle = carried.signal == kEuler && offset >= 0 && offset < 3;
+      if (offset != 0 && !is_angle) continue;
+      for (std::size_t k = 0; k < words.parts.size(); ++k) {
+        const std::size_t at = k + static_cast<std::size_t>(offset);
+        if (at >= carried.size() || carried.columns[at] < 0) continue;
+        const RawColumn& column = topic.columns[static_cast<std::size_t>(carried.columns[at])];
+        // Samples and stored records differ where some were dropped: matched by their times.
+        std::vector<double> stored, taken;
+        std::size_t record = 0;
+        for (std::size_t i = 0; i < log.samples.size(); ++i) {
+          const double time_s = 1e-6 * log.samples[i].time_us + log.epoch_s;
+          while (record + 1 < topic.time_s.size() && topic.time_s[record] < time_s - 1e-6) ++record;
+          stored.push_back(column.values[record]);
+          taken.push_back(interpreted(log, i, words.signal + static_cast<int>(k)));
+        }
+        const Line line = line_through(taken, stored);
+        const bool compared = line.count > 10 && std::abs(line.correlation) > 0.5;
+        if (words.signal == kForceBody && !compared) continue;  // neither frame nor gravity could be settled
+        const UnitGuess& unit = unit_of(words, compared ? line.slope : slope_by_name(carried, stored));
+        const std::string evidence =
+            compared ? fmt::format("{:.4g} per SI unit, correlation {:.3f}", line.slope, line.correlation) : "by its name";
+        writer.line(words.name + std::string(words.parts[k]), column.name, unit.name, words.frame, evidence);
+      }
+    }
+  }
+  for (const RawColumn& column : topic.columns) {
+    if (writer.used.count(column.name) == 0) writer.text += "# not used: " + column.name + "\n";
+  }
+  return writer.text;
+}
+
+}  // namespace swarmcert::logs
