@@ -16,7 +16,7 @@ std::string bytes_of(Number number) {
 
 inline std::uint32_t crc32_of(const std::string& bytes) {
   return static_cast<std::uint32_t>(
-      crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
+      ::crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
 }
 
 /// As the flown firmware stores it: the bitwise NOT of CRC-32.
