@@ -71,4 +71,6 @@ int main() {
   // The wake's torque at each rotor (effect `downwash_torque`), learned from ten simulated walks of two
   // vehicles, falls on test flights from 0.316 to 0.070 mN m. Feeding it forward reduces sideways errors by
   // 24 to 38 %.
+
+  // %%
 }

@@ -69,7 +69,7 @@ void refuse_shared_output(const CLI::App& command) {
     if (option->get_type_name() != kOutput || option->count() == 0) continue;
     const std::string& path = option->results().back();
     const std::string name =
-        option->get_lnames().empty() ? option->get_name() : "--" + option->get_lnames()[0];
+        option->get_snames().empty() ? "--" + option->get_lnames()[0] : "-" + option->get_snames()[0];
     const std::string target =
         path == "-" ? path : std::filesystem::weakly_canonical(std::filesystem::absolute(path)).string();
     const auto [other, is_new] = written_by.emplace(target, name);

@@ -76,14 +76,14 @@ class TrainVectors : public Train {
     write_text(folder_ / "truth.toml", nominal + R"toml(
 [[effect]]
 name = "push_and_tilt"
-parameters = { push = 0.4, tilt = 4e-3 }
+parameters = { push = 0.4, tilt_N = 4e-3 }
 [effect.expression]
 per_neighbour = true
 force_x_N = "-push * dx * exp(-12 * (dx^2 + dy^2 + dz^2))"
 force_y_N = "-push * dy * exp(-12 * (dx^2 + dy^2 + dz^2))"
-torque_x_Nm = "tilt * dy * exp(-12 * (dx^2 + dy^2 + dz^2))"
-torque_y_Nm = "-tilt * dx * exp(-12 * (dx^2 + dy^2 + dz^2))"
-linear = ["push", "tilt"]
+torque_x_Nm = "tilt_N * dy * exp(-12 * (dx^2 + dy^2 + dz^2))"
+torque_y_Nm = "-tilt_N * dx * exp(-12 * (dx^2 + dy^2 + dz^2))"
+linear = ["push", "tilt_N"]
 )toml");
     for (const std::string run : {"1", "2", "3"}) {
       const Outcome outcome =

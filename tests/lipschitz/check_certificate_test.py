@@ -270,10 +270,11 @@ def run():
                 assert accepted == (not other), f"{where}: first says {said!r}, second says {other!r}"
                 # Where the slack of a proof allows it, another factor or multiplier proves the same; a law that holds
                 # for two neighbours holds for one.
+                # Another pair of points may be as steep.
                 # Another corner may decide a neuron as well, and the part may hold without.
                 harmless = mutation == certificate or is_longer or decided_otherwise(certificate, mutation, where) or where[0] in ("tool", "box") or \
                     any(key in where for key in ("factor", "t", "q", "multipliers", "conflicts", "least", "most", "radius", "law",
-                                             "neighbours", "samples"))
+                                             "neighbours", "samples", "lower_witness"))
                 assert harmless or not accepted, f"{where} was changed and both accept"
                 tried += 1
                 rejected += not accepted

@@ -76,7 +76,7 @@ TEST(Interruption, FinishedSearchesSaySo) {
 }
 
 TEST(Interruption, BranchAndBoundThatIsCutShortSaysSoAndIsProved) {
-  const files::Network network = network_of({3, 10, 10, 1});
+  const files::Network network = network_of({3, 30, 30, 30, 1});
   CertifyOptions options = few_rounds();
   options.method = UpperMethod::kBranch;
   options.branch.nodes = 1000000;
