@@ -13,6 +13,7 @@
 #include "nn/base/json.h"
 #include "nn/deep_set.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/record_samples.h"
 
 namespace swarmcert::firmware {
 namespace {
@@ -345,6 +346,13 @@ struct Golden {{
   return text + kEvaluation;
 }
 
+/// What flight code computes for every part, for certify --samples.
+std::string samples_text(const files::Network& network, std::uint64_t seed) {
+  constexpr int kCount = 64;
+  return files::to_text(
+      files::samples_json(files::record_samples(network, files::float32_output(network), kCount, seed)));
+}
+
 }  // namespace
 
 std::vector<SourceFile> export_source(const files::Network& network, const ExportOptions& options) {
@@ -360,6 +368,7 @@ std::vector<SourceFile> export_source(const files::Network& network, const Expor
   std::vector<SourceFile> files = {{kExportedHeader, header_text(network, options)},
                                    {kExportedSource, source_text(network, options)}};
   for (const FlightHeader& header : kFlightHeaders) files.push_back({header.name, header.text});
+  files.push_back({kExportedSamples, samples_text(network, options.seed)});
   return files;
 }
 

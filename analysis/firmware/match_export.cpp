@@ -17,6 +17,7 @@ namespace fs = std::filesystem;
 std::vector<std::string> generated_names() {
   std::vector<std::string> names = {kExportedHeader, kExportedSource};
   for (const FlightHeader& header : kFlightHeaders) names.emplace_back(header.name);
+  names.emplace_back(kExportedSamples);
   return names;
 }
 

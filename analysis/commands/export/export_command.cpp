@@ -12,7 +12,6 @@
 #include "nn/base/input_error.h"
 #include "nn/weights/chain.h"
 #include "nn/weights/functions.h"
-#include "nn/weights/record_samples.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -56,13 +55,6 @@ std::string certificate_of(const files::Network& network, const std::string& pat
   return hash;
 }
 
-/// What flight code computes for every part, for certify --samples.
-firmware::SourceFile samples_file(const files::Network& network, std::uint64_t seed) {
-  constexpr int kCount = 64;
-  const auto samples = files::record_samples(network, files::float32_output(network), kCount, seed);
-  return {"samples.json", files::to_text(files::samples_json(samples))};
-}
-
 int run_export(ExportOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   bool is_rounded = false;
@@ -72,8 +64,7 @@ int run_export(ExportOptions options, const CommonOptions& common) {
     inputs.push_back(options.certificate);
     options.source.certificate_sha256 = certificate_of(network, options.certificate, is_rounded);
   }
-  std::vector<firmware::SourceFile> sources = firmware::export_source(network, options.source);
-  sources.push_back(samples_file(network, options.source.seed));
+  const std::vector<firmware::SourceFile> sources = firmware::export_source(network, options.source);
   for (const firmware::SourceFile& source : sources) {
     if (fs::exists(fs::path(options.output) / source.name))
       refuse_to_replace(common, (fs::path(options.output) / source.name).string());
