@@ -6,6 +6,7 @@
 #include <fstream>
 #include <set>
 
+#include "analysis/logs/angles.h"
 #include "analysis/logs/collector.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
@@ -13,8 +14,6 @@
 
 namespace swarmcert::logs {
 namespace {
-
-constexpr double kDegree_rad = 3.14159265358979323846 / 180;
 
 struct UnitGuess {
   const char* name;
