@@ -182,12 +182,15 @@ std::vector<std::string> candidate_names(const stability::Model& model) {
 }
 
 std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage) {
+  constexpr double kGroundReach_m = 0.4;
   std::vector<Candidate> all;
   for (const std::string& name : candidate_names(model)) {
     if (name == kVehicleOffset && coverage.vehicles.size() < 2) continue;
     if (is_taken(name, model)) continue;
     Candidate next = candidate(name, model, coverage);
     if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
+    // Nobody has felt the ground from higher up.
+    if (name == "ground" && coverage.range.z_min_m > kGroundReach_m) continue;
     all.push_back(std::move(next));
   }
   return all;

@@ -58,6 +58,23 @@ std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) 
   return ranking;
 }
 
+/// Names whose shape ended at a bound of its parameters, other than where it starts: what they fit is something else.
+std::set<std::string> out_of_bounds(const Selected& selected) {
+  std::set<std::string> names;
+  for (const Refined& refined : selected.refined) {
+    const stability::EffectInfo& info = refined.candidate.info;
+    if (info.remembers || is_formula(refined.candidate.name)) continue;
+    for (std::size_t i = 0; i < refined.theta.size(); ++i) {
+      const stability::Parameter& p = info.shape[i];
+      if (p.grid.empty() || !(p.lower < p.upper)) continue;
+      const bool at_lower = refined.theta[i] <= p.lower && p.value > p.lower;
+      const bool at_upper = refined.theta[i] >= p.upper && p.value < p.upper;
+      if (at_lower || at_upper) names.insert(refined.candidate.name);
+    }
+  }
+  return names;
+}
+
 /// What is selected once nothing of it is suspect.
 struct Settled {
   Selected selected;
@@ -79,6 +96,12 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
   for (int round = 0; round < kMostRounds; ++round) {
     result.selected =
         doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
+    if (const std::set<std::string> outside = out_of_bounds(result.selected);
+        !outside.empty() && round + 1 < kMostRounds) {
+      result.suspected.insert(result.suspected.end(), outside.begin(), outside.end());
+      erase(candidates, outside);
+      continue;
+    }
     result.ranking = ranking_of(passes, result.selected);
     result.rest = remainder(passes, specs_of(result.ranking));
     if (result.rest.ratio <= kLoudRatio) break;
@@ -129,9 +152,37 @@ void scan_what_is_left(const Passes& passes, Explained& explained) {
   explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
 }
 
+bool is_answer_of_thrust(const Missing& missing) {
+  const std::vector<std::string> library = stability::effect_names();
+  if (std::find(library.begin(), library.end(), missing.effect) == library.end()) return false;
+  const stability::EffectInfo& info = stability::effect_info(missing.effect);
+  return info.remembers || is_scale(missing.effect) || missing.effect == "inflow";
+}
+
+/// Where one variable explains most of what is left, thrust and its history answer it: names of that kind that explain
+/// less than the variable does are suspects.
+void doubt_answers(const Passes& passes, Explained& explained) {
+  constexpr double kMost = 0.5;
+  if (explained.scan.entries.empty() || explained.scan.entries[0].share < kMost) return;
+  const ScanEntry& first = explained.scan.entries[0];
+  const auto squared = [](double value) { return value * value; };
+  const double left = squared(first.rmse_before_N) - squared(first.rmse_after_N);
+  std::vector<Missing>& ranking = explained.settled.ranking;
+  const auto doubtful = std::stable_partition(ranking.begin(), ranking.end(), [&](const Missing& missing) {
+    const Finding& finding = missing.finding;
+    return !is_answer_of_thrust(missing) ||
+           squared(finding.rmse_before_N) - squared(finding.rmse_after_N) > left;
+  });
+  if (doubtful == ranking.end()) return;
+  for (auto it = doubtful; it != ranking.end(); ++it) explained.settled.suspected.push_back(it->effect);
+  ranking.erase(doubtful, ranking.end());
+  explained.settled.rest = remainder(passes, specs_of(ranking));
+  scan_what_is_left(passes, explained);
+}
+
 /// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
 /// selection is done anew with them among the candidates, and they are what is left.
-Explained explain(const Passes& passes, const Coverage& covered) {
+Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   constexpr double kClearlyLess = 0.9;  // of the mean square: names are worth a little
   Explained result;
   result.settled = settle(passes, covered, {}, {});
@@ -152,6 +203,12 @@ Explained explain(const Passes& passes, const Coverage& covered) {
   result.settled = std::move(again);
   scan_what_is_left(passes, result);
   return result;
+}
+
+Explained explain(const Passes& passes, const Coverage& covered) {
+  Explained explained = explain_by_formulas(passes, covered);
+  doubt_answers(passes, explained);
+  return explained;
 }
 
 double own_ratio(const stability::Model& model) {

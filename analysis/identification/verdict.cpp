@@ -28,7 +28,12 @@ Verdict verdict_of(const std::vector<Diagnosis>& diagnoses, std::string& reason)
     return std::any_of(diagnoses.begin(), diagnoses.end(), holds);
   };
   if (any([](const Diagnosis& d) { return !d.ranking.empty(); })) return Verdict::kMissingEffect;
-  if (any([](const Diagnosis& d) { return d.remainder.flag; })) return Verdict::kUnexplained;
+  // Slow disturbances stand out of the noise's spectrum, others over some variable.
+  constexpr double kMuch = 0.1;  // of the mean square that is left
+  const auto varies = [](const Diagnosis& d) {
+    return !d.scan.entries.empty() && d.scan.entries[0].share >= kMuch;
+  };
+  if (any([&](const Diagnosis& d) { return d.remainder.flag || varies(d); })) return Verdict::kUnexplained;
   for (const Diagnosis& diagnosis : diagnoses) {
     const std::string why = not_judged(diagnosis);
     if (why.empty()) continue;

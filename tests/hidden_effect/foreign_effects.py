@@ -62,7 +62,7 @@ def gust(a=0.02, period=1.7):
     return lambda s: (a * math.sin(2 * math.pi * s.t / period), 0, 0)
 
 
-def saturation(most=0.097):
+def saturation(most=0.093):
     return lambda s, k, f: f if f < most else most + 0.1 * (f - most)
 
 

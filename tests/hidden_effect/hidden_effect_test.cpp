@@ -216,6 +216,50 @@ TEST(HiddenEffect, AFormulaOfTheModelFileIsACandidate) {
   EXPECT_TRUE(loop.run("diagnose new.toml flights", "diagnose")["ranking"].empty());
 }
 
+/// Coefficients and shapes of a formula start from the model's values, and do not stay there.
+TEST(HiddenEffect, AFormulaWithValuesIsFittedAnew) {
+  const ScratchFolder folder;
+  Loop loop(folder);
+  const std::string formula =
+      "[effect.expression]\nforce_x_N = \"a * sin(width * x)\"\nlinear = [\"a\"]\nbounds = { a = [-0.2, 0.2] "
+      "}\n";
+  loop.fly(effect("pull", "a = 0.02, width = 15") + formula, 4);
+  loop.append_to_model(effect("pull", "a = 0.01, width = 13.5") + formula);
+  const files::Json added = loop.run("add pull --model known.toml flights -o new.toml", "add");
+  ASSERT_TRUE(added["ladder"][1]["accepted"].get<bool>());
+  for (const files::Json& entry : added["effects"]) {
+    if (entry["effect"] != "pull") continue;
+    EXPECT_NEAR(entry["parameters"]["a"]["value"].get<double>(), 0.02, 0.002);
+    EXPECT_NEAR(entry["parameters"]["width"]["value"].get<double>(), 15, 0.5);
+  }
+}
+
+/// What has no name is fitted by its formula, and by a curve, on flights that the fit has not seen.
+TEST(HiddenEffect, WithoutANameIsAddedAsAFormulaAndAsAShape) {
+  const ScratchFolder folder;
+  Loop loop(folder);
+  const std::string formula = "[effect.expression]\nforce_y_N = \"a * tanh(x / width)\"\nlinear = [\"a\"]\n";
+  for (int run = 0; run < 3; ++run)
+    loop.fly(effect("fan", "a = 0.03, width = 0.2") + formula, 40 + run, run, 1);
+  const files::Json result = loop.run("diagnose known.toml flights", "diagnose");
+  EXPECT_EQ(result["verdict"], "unexplained");
+  EXPECT_TRUE(result["ranking"].empty()) << result["ranking"].dump(1);
+  ASSERT_FALSE(result["remainder"].empty());
+  EXPECT_EQ(result["remainder"][0]["variable"], "x");
+  EXPECT_EQ(result["remainder"][0]["axis"], "y");
+  for (const char* what : {"formula", "shape"}) {
+    const files::Json ladder =
+        loop.run(std::string("add ") + what + " --model known.toml flights -o new.toml", "add")["ladder"];
+    ASSERT_TRUE(ladder[1]["accepted"].get<bool>()) << what;
+    const double before = ladder[0]["test_rmse"], after = ladder[1]["test_rmse"], floor = 0.0065;
+    EXPECT_GT(before, 2 * floor) << "the truth is worth adding";
+    EXPECT_LT(after, 0.6 * before) << what;
+    // What was added is part of the model that simulates.
+    loop.demand("swarmcert simulate hover -q --force --vehicles 1 --duration 3 --model new.toml --gains " +
+                source_path("controller/gains/crazyflie-small.toml") + " -o flown");
+  }
+}
+
 TEST(HiddenEffect, OffsetsThatDifferByVehicleAreFoundByVehicle) {
   const ScratchFolder folder;
   Loop loop(folder);

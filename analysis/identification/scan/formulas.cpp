@@ -15,6 +15,7 @@ namespace swarmcert::identification {
 namespace {
 
 constexpr Eigen::Index kSamplesOfFit = 3000;
+constexpr const char* kBodyConstant = "body_constant";
 constexpr const char* kLetters[] = {"{a}", "{b}", "{c}"};
 /// What a form may be multiplied with.
 constexpr ScanVariable kFactors[] = {ScanVariable::kThrust, ScanVariable::kX,    ScanVariable::kY,
@@ -187,6 +188,25 @@ std::string unit_of(const FormParameter& parameter, const std::string& variable_
   return (parameter.unit == FormUnit::kInverse ? "_1_" : "_") + variable_unit;
 }
 
+/// Vertical forces act along the world's axis or along the thrust, whichever leaves less.
+int column_of(const ScanSamples& samples, const ScanEntry& entry, const EntryData& data,
+              const FormulaTrial& trial) {
+  constexpr int kVertical = 2, kThrust = 5;
+  if (entry.column % 3 != 2) return entry.column;
+  double world = 0, body = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const double inputs[2] = {data.all.inputs(k, 0), data.all.inputs.cols() > 1 ? data.all.inputs(k, 1) : 0};
+    const double factor = trial.factor == ScanVariable::kCount
+                              ? 1
+                              : samples.values(data.rows[i], static_cast<Eigen::Index>(trial.factor));
+    const double value = value_of(trial.form, trial.fit, inputs, factor);
+    world += value * samples.force_N(data.rows[i], kVertical);
+    body += value * samples.force_N(data.rows[i], kThrust);
+  }
+  return body > world ? kThrust : kVertical;
+}
+
 const char* target_of(const ScanEntry& entry) {
   constexpr const char* kTargets[] = {"force_x_N",  "force_y_N",  "force_z_N",
                                       "force_b1_N", "force_b2_N", "force_b3_N"};
@@ -248,7 +268,31 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const FormulaTrial& trial)
   return spec;
 }
 
+/// A constant along each axis of the body.
+Formula body_constant(const ScanSamples& samples, const ScanEntry& entry) {
+  constexpr double kIndependent = 0.2;  // of the samples
+  const double independent = std::max(kIndependent * static_cast<double>(samples.size()), 4.0);
+  Formula formula;
+  formula.form = "constant";
+  formula.variable = kBodyConstant;
+  formula.share = entry.share;
+  formula.saved_bits =
+      -0.5 * independent * std::log2(std::max(1 - entry.share, 1e-6)) - 1.5 * std::log2(independent);
+  stability::EffectSpec& spec = formula.effect;
+  spec.name = std::string(kFormulaPrefix) + kBodyConstant;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name = fmt::format("b{}_N", axis + 1);
+    const double value = samples.force_N.col(3 + axis).mean();
+    spec.parameters[name] = value;
+    spec.expression.linear.push_back(name);
+    spec.expression.bounds[name] = {-4 * std::abs(value) - 1e-3, 4 * std::abs(value) + 1e-3};
+    spec.expression.formulas[fmt::format("force_b{}_N", axis + 1)] = name;
+  }
+  return formula;
+}
+
 bool has_formula(const ScanEntry& entry) {
+  if (entry.variable == kBodyConstant) return true;
   return !entry.variables.empty() &&
          std::all_of(entry.variables.begin(), entry.variables.end(),
                      [](ScanVariable v) { return scan_variable(v).symbol[0] != '\0'; });
@@ -273,6 +317,11 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
   files::parallel_for(static_cast<int>(which.size()), jobs, [&](int i) {
     const std::size_t e = which[static_cast<std::size_t>(i)];
     const ScanEntry& entry = scan.entries[e];
+    if (entry.variable == kBodyConstant) {
+      formulas[static_cast<std::size_t>(i)] = body_constant(samples, entry);
+      formulas[static_cast<std::size_t>(i)].entry = e;
+      return;
+    }
     EntryData data = data_of(samples, entry);
     const FormulaTrial trial = best_trial(samples, entry, data);
     Formula& formula = formulas[static_cast<std::size_t>(i)];
@@ -282,7 +331,9 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
     formula.saved_bits = trial.saved_bits;
     if (!(trial.saved_bits > 0)) return;
     formula.share = (data.mean_square - trial.fit.mean_square) / std::max(total, 1e-300);
-    formula.effect = spec_of(entry, trial);
+    ScanEntry along = entry;
+    along.column = column_of(samples, entry, data, trial);
+    formula.effect = spec_of(along, trial);
   });
   formulas.erase(
       std::remove_if(formulas.begin(), formulas.end(), [](const Formula& f) { return !(f.saved_bits > 0); }),

@@ -100,16 +100,18 @@ class TrackSampler {
     int block = -1;
     double start_s = 0;
     for (std::size_t i = 0; i < track_.instants.size(); ++i) {
-      if (cut_.of_record[i] < 0) continue;
+      const int own = cut_.of_record[i] >= 0 ? cut_.of_record[i] : block;
       const double now_s = track_.instants[i].time_s;
-      if (cut_.of_record[i] != block || now_s - start_s >= kMean_s) {
-        close(block, i);
-        block = cut_.of_record[i];
+      const bool is_used = track_.cut[i] == residuals::Cut::kNone && own >= 0;
+      if (!is_used || own != block || now_s - start_s >= kMean_s) {
+        close(block);
         start_s = now_s;
       }
+      if (!is_used) continue;
+      block = own;
       add(i);
     }
-    close(block, track_.instants.size());
+    close(block);
     return std::move(result_);
   }
 
@@ -152,7 +154,7 @@ class TrackSampler {
     ++sum_.count;
   }
 
-  void close(int block, std::size_t) {
+  void close(int block) {
     if (sum_.count == 0) return;
     const double n = sum_.count;
     for (double& value : sum_.values) value /= n;
@@ -284,6 +286,27 @@ bool ScanSamples::has_neighbours() const {
     if (!std::isnan(neighbours.lateral_m(i, 0))) return true;
   }
   return false;
+}
+
+ScanSamples thinned(const ScanSamples& samples, Eigen::Index most) {
+  const Eigen::Index step = (samples.size() + most - 1) / most;
+  if (step <= 1) return samples;
+  ScanSamples few;
+  few.flights = samples.flights;
+  few.blocks = samples.blocks;
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < samples.size(); i += step) {
+    kept.push_back(i);
+    few.flight.push_back(samples.flight[static_cast<std::size_t>(i)]);
+    few.block.push_back(samples.block[static_cast<std::size_t>(i)]);
+  }
+  few.values = samples.values(kept, Eigen::all);
+  few.commanded = samples.commanded(kept, Eigen::all);
+  few.force_N = samples.force_N(kept, Eigen::all);
+  few.axes = samples.axes(kept, Eigen::all);
+  few.neighbours.lateral_m = samples.neighbours.lateral_m(kept, Eigen::all);
+  few.neighbours.height_m = samples.neighbours.height_m(kept, Eigen::all);
+  return few;
 }
 
 ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {

@@ -62,7 +62,8 @@ struct NeighbourPlaces {
   Eigen::MatrixXf lateral_m, height_m;
 };
 
-/// One row per 0.1 s of flight that lies in a block of cut_into_blocks().
+/// One row per 0.1 s of flight in the blocks of cut_into_blocks(). Records that separate a block from the next one count
+/// as part of it: nothing here remembers the past beyond the 10 ms of the accelerometer.
 struct ScanSamples {
   Eigen::MatrixXf values;     ///< [samples x kNumScanVariables]; NaN where unknown
   Eigen::MatrixXf commanded;  ///< the same as set points ask for it; NaN where nothing asks
@@ -77,6 +78,9 @@ struct ScanSamples {
   Eigen::Index size() const { return force_N.rows(); }
   bool has_neighbours() const;
 };
+
+/// Every n-th sample, so that there are at most `most`.
+ScanSamples thinned(const ScanSamples& samples, Eigen::Index most);
 
 /// Means over 0.1 s of what the flights' models leave once they have `specs` as well.
 ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs);

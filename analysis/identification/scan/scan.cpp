@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "analysis/identification/scan/curve_fit.h"
+#include "analysis/identification/scan/abscissa.h"
 #include "analysis/identification/scan/periods.h"
 #include "analysis/residuals/statistics.h"
 #include "nn/base/parallel.h"
@@ -12,86 +12,11 @@
 namespace swarmcert::identification {
 namespace {
 
-using V = ScanVariable;
-
 constexpr double kScanQuantile90 = 1.6449;  // two-sided 90 % of the normal distribution
 constexpr double kLeastShare = 0.02;        // smaller ones are of no use, accident or not
 constexpr int kFlips = 20;                  // draws of the chunks' signs
 constexpr Eigen::Index kManySamples = 40'000;
 constexpr const char* kAxes[] = {"x", "y", "z"};
-
-/// Everything that a curve can be laid over.
-struct Abscissa {
-  std::string name;
-  std::vector<V> variables;  ///< one or two; empty: places of neighbours
-  int lag = 0;
-  bool is_answer = false;
-  bool in_world = true, in_body = true;
-  std::vector<int> knots;  ///< how many to try, for each variable
-};
-
-/// A curve over an abscissa with so many knots.
-struct Curve {
-  std::vector<Knots> knots;
-  std::vector<SparseRow> rows, commanded;  ///< commanded: empty where set points say nothing
-  int columns = 0;
-};
-
-std::vector<Abscissa> abscissas(const ScanSamples& samples) {
-  std::vector<Abscissa> all;
-  for (int v = 0; v < kNumScanVariables; ++v) {
-    const auto variable = static_cast<V>(v);
-    const ScanVariableInfo& info = scan_variable(variable);
-    if (!info.in_world && !info.in_body) continue;
-    std::vector<int> knots = {4, 8, 16};
-    if (variable == V::kTime || variable == V::kBattery) knots = {4, 8};
-    all.push_back({info.name, {variable}, 0, info.is_answer, info.in_world, info.in_body, knots});
-  }
-  all.push_back({"xy", {V::kX, V::kY}, 0, false, true, false, {4, 7}});
-  if (samples.has_neighbours()) {
-    for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag)
-      all.push_back({"neighbour", {}, lag, false, true, false, {7}});
-  }
-  return all;
-}
-
-Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots) {
-  Curve curve;
-  if (abscissa.variables.empty()) {
-    // Nearer than 0.7 m to the side and 1.2 m in height; further ones count as at the edge.
-    const auto lateral_m = samples.neighbours.lateral_m.col(abscissa.lag);
-    const auto height_m = samples.neighbours.height_m.col(abscissa.lag);
-    Knots lateral, height;
-    for (int k = 0; k < knots; ++k) {
-      lateral.push_back(0.7 * k / (knots - 1));
-      height.push_back(-1.2 + 2.4 * k / (2 * knots - 2));
-    }
-    for (int k = knots; k < 2 * knots - 1; ++k) height.push_back(-1.2 + 2.4 * k / (2 * knots - 2));
-    curve.rows = hat_rows(lateral_m, lateral, height_m, height);
-    curve.columns = static_cast<int>(lateral.size() * height.size());
-    curve.knots = {lateral, height};
-    return curve;
-  }
-  const auto a = static_cast<Eigen::Index>(abscissa.variables[0]);
-  curve.knots = {knots_over(samples.values.col(a), knots)};
-  if (curve.knots[0].empty()) return {};
-  const auto asks = [&](Eigen::Index v) { return samples.commanded.col(v).allFinite(); };
-  if (abscissa.variables.size() == 1) {
-    curve.columns = knots;
-    curve.rows = hat_rows(samples.values.col(a), curve.knots[0]);
-    if (asks(a)) curve.commanded = hat_rows(samples.commanded.col(a), curve.knots[0]);
-    return curve;
-  }
-  const auto b = static_cast<Eigen::Index>(abscissa.variables[1]);
-  curve.knots.push_back(knots_over(samples.values.col(b), knots));
-  if (curve.knots[1].empty()) return {};
-  curve.columns = knots * knots;
-  curve.rows = hat_rows(samples.values.col(a), curve.knots[0], samples.values.col(b), curve.knots[1]);
-  if (asks(a) && asks(b))
-    curve.commanded =
-        hat_rows(samples.commanded.col(a), curve.knots[0], samples.commanded.col(b), curve.knots[1]);
-  return curve;
-}
 
 /// What is judged: the remainder about its mean, and its errors without any curve.
 struct Judged {
@@ -155,28 +80,6 @@ BestOfComponents best_curves(const Judged& judged, const Abscissa& abscissa) {
   return best;
 }
 
-/// Every n-th sample, so that there are not more than kManySamples.
-ScanSamples thinned(const ScanSamples& samples) {
-  const Eigen::Index step = (samples.size() + kManySamples - 1) / kManySamples;
-  if (step <= 1) return samples;
-  ScanSamples few;
-  few.flights = samples.flights;
-  few.blocks = samples.blocks;
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index i = 0; i < samples.size(); i += step) {
-    kept.push_back(i);
-    few.flight.push_back(samples.flight[static_cast<std::size_t>(i)]);
-    few.block.push_back(samples.block[static_cast<std::size_t>(i)]);
-  }
-  few.values = samples.values(kept, Eigen::all);
-  few.commanded = samples.commanded(kept, Eigen::all);
-  few.force_N = samples.force_N(kept, Eigen::all);
-  few.axes = samples.axes(kept, Eigen::all);
-  few.neighbours.lateral_m = samples.neighbours.lateral_m(kept, Eigen::all);
-  few.neighbours.height_m = samples.neighbours.height_m(kept, Eigen::all);
-  return few;
-}
-
 /// The targets about their mean, with the sign of each chunk drawn.
 Columns flipped(const Columns& targets, const Chunks& chunks, std::uint64_t seed) {
   std::mt19937_64 generator(seed);
@@ -191,7 +94,7 @@ Columns flipped(const Columns& targets, const Chunks& chunks, std::uint64_t seed
 
 /// What the largest share is by accident: three standard deviations above its mean over draws of signs.
 double accidental_share(const ScanSamples& all, const std::vector<Abscissa>& tried, int jobs) {
-  const ScanSamples samples = thinned(all);
+  const ScanSamples samples = thinned(all, kManySamples);
   std::vector<Judged> draws;
   for (int d = 0; d < kFlips; ++d) {
     const Chunks chunks = chunks_of(samples);
@@ -341,7 +244,10 @@ ScanEntry entry_of(const Judged& judged, const Abscissa& abscissa, int component
 
 void set_errors(const Judged& judged, ScanEntry& entry) {
   const double before = judged.samples.mean_square_N2;
-  const double explained = entry.share * judged.total / static_cast<double>(judged.samples.size());
+  // A curve holds the mean of its component as well.
+  const double mean = judged.targets.col(entry.column).mean();
+  const double explained =
+      mean * mean + entry.share * judged.total / static_cast<double>(judged.samples.size());
   entry.rmse_before_N = std::sqrt(before);
   entry.rmse_after_N = std::sqrt(std::max(before - explained, 0.0));
 }

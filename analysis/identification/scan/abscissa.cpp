@@ -1,0 +1,61 @@
+#include "analysis/identification/scan/abscissa.h"
+
+namespace swarmcert::identification {
+
+std::vector<Abscissa> abscissas(const ScanSamples& samples) {
+  std::vector<Abscissa> all;
+  for (int v = 0; v < kNumScanVariables; ++v) {
+    const auto variable = static_cast<ScanVariable>(v);
+    const ScanVariableInfo& info = scan_variable(variable);
+    if (!info.in_world && !info.in_body) continue;
+    std::vector<int> knots = {4, 8, 16};
+    if (variable == ScanVariable::kTime || variable == ScanVariable::kBattery) knots = {4, 8};
+    all.push_back({info.name, {variable}, 0, info.is_answer, info.in_world, info.in_body, knots});
+  }
+  all.push_back({"xy", {ScanVariable::kX, ScanVariable::kY}, 0, false, true, false, {4, 7}});
+  if (samples.has_neighbours()) {
+    for (int lag = 0; lag < NeighbourPlaces::kLags; ++lag)
+      all.push_back({"neighbour", {}, lag, false, true, false, {7}});
+  }
+  return all;
+}
+
+Curve curve_over(const ScanSamples& samples, const Abscissa& abscissa, int knots) {
+  Curve curve;
+  if (abscissa.variables.empty()) {
+    // Nearer than 0.7 m to the side and 1.2 m in height; further ones count as at the edge.
+    const auto lateral_m = samples.neighbours.lateral_m.col(abscissa.lag);
+    const auto height_m = samples.neighbours.height_m.col(abscissa.lag);
+    Knots lateral, height;
+    for (int k = 0; k < knots; ++k) {
+      lateral.push_back(0.7 * k / (knots - 1));
+      height.push_back(-1.2 + 2.4 * k / (2 * knots - 2));
+    }
+    for (int k = knots; k < 2 * knots - 1; ++k) height.push_back(-1.2 + 2.4 * k / (2 * knots - 2));
+    curve.rows = hat_rows(lateral_m, lateral, height_m, height);
+    curve.columns = static_cast<int>(lateral.size() * height.size());
+    curve.knots = {lateral, height};
+    return curve;
+  }
+  const auto a = static_cast<Eigen::Index>(abscissa.variables[0]);
+  curve.knots = {knots_over(samples.values.col(a), knots)};
+  if (curve.knots[0].empty()) return {};
+  const auto asks = [&](Eigen::Index v) { return samples.commanded.col(v).allFinite(); };
+  if (abscissa.variables.size() == 1) {
+    curve.columns = knots;
+    curve.rows = hat_rows(samples.values.col(a), curve.knots[0]);
+    if (asks(a)) curve.commanded = hat_rows(samples.commanded.col(a), curve.knots[0]);
+    return curve;
+  }
+  const auto b = static_cast<Eigen::Index>(abscissa.variables[1]);
+  curve.knots.push_back(knots_over(samples.values.col(b), knots));
+  if (curve.knots[1].empty()) return {};
+  curve.columns = knots * knots;
+  curve.rows = hat_rows(samples.values.col(a), curve.knots[0], samples.values.col(b), curve.knots[1]);
+  if (asks(a) && asks(b))
+    curve.commanded =
+        hat_rows(samples.commanded.col(a), curve.knots[0], samples.commanded.col(b), curve.knots[1]);
+  return curve;
+}
+
+}  // namespace swarmcert::identification
