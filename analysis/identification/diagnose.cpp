@@ -59,11 +59,12 @@ std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) 
 }
 
 /// Names whose shape ended at a bound of its parameters, other than where it starts: what they fit is something else.
+/// Effects of neighbours act where neighbours are, which nothing else does: their shapes may end anywhere.
 std::set<std::string> out_of_bounds(const Selected& selected) {
   std::set<std::string> names;
   for (const Refined& refined : selected.refined) {
     const stability::EffectInfo& info = refined.candidate.info;
-    if (info.remembers || is_formula(refined.candidate.name)) continue;
+    if (info.remembers || info.needs_neighbours || is_formula(refined.candidate.name)) continue;
     for (std::size_t i = 0; i < refined.theta.size(); ++i) {
       const stability::Parameter& p = info.shape[i];
       if (p.grid.empty() || !(p.lower < p.upper)) continue;

@@ -240,7 +240,7 @@ TEST(HiddenEffect, WithoutANameIsAddedAsAFormulaAndAsAShape) {
   Loop loop(folder);
   const std::string formula = "[effect.expression]\nforce_y_N = \"a * tanh(x / width)\"\nlinear = [\"a\"]\n";
   for (int run = 0; run < 3; ++run)
-    loop.fly(effect("fan", "a = 0.03, width = 0.2") + formula, 40 + run, run, 1);
+    loop.fly(effect("fan", "a = 0.06, width = 0.2") + formula, 40 + run, run, 1);
   const files::Json result = loop.run("diagnose known.toml flights", "diagnose");
   EXPECT_EQ(result["verdict"], "unexplained");
   EXPECT_TRUE(result["ranking"].empty()) << result["ranking"].dump(1);
