@@ -63,8 +63,8 @@ using Fleet = std::map<std::string, VehicleUse>;
 /// @throws files::InputError with line and key; also where a model cannot be read.
 Fleet read_fleet(const std::string& path);
 
-/// `[log."log5?"] vehicle, flight, model, gains, mass_kg, use = "all" | "position" | "none"` of the same file; paths are
-/// relative to the file's folder.
+/// Tables [log."NAME"] of the same file, where NAME may hold wildcards: vehicle, flight, model, gains, mass_kg and use
+/// ("all", "position" or "none"); paths are relative to the file's folder.
 /// @throws files::InputError with line and key.
 LogRules read_log_rules(const std::string& path);
 

@@ -24,7 +24,7 @@ Weights parse_c_source(const std::string& bytes, const std::string& path, const 
                        const std::vector<std::string>& order);
 
 /// Every network of C source of that layout that holds nothing else, by NAME.
-/// @throws InputError as parse_c_source(); also for preprocessor lines other than #include and #pragma, and for
+/// @throws InputError as parse_c_source(); also for preprocessor lines other than `include` and `pragma`, and for
 ///   continued lines, after which a compiler may read another text.
 std::map<std::string, Weights> parse_pure_c_source(const std::string& bytes, const std::string& path);
 

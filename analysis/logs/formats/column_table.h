@@ -49,7 +49,7 @@ class ColumnTable {
 
   RosNode* root() { return &root_; }
 
-  /// The child of `parent`; nullptr if that is nullptr or there are too many. @param label of an element: its index
+  /// The child of `parent`; nullptr if that is nullptr or there are too many. @param field name of the child, nullptr for an element, whose label is its index
   RosNode* child(RosNode* parent, std::size_t index, const std::string* field) {
     if (parent == nullptr) return nullptr;
     if (parent->children.size() <= index) parent->children.resize(index + 1);
