@@ -131,10 +131,10 @@ std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
   forms = forms_over(range_of(data.few.inputs.col(0)), is_velocity(entry.variables[0]));
   for (Form& form : forms) {
     if (form.name != "sinusoid") continue;
-    constexpr double kTwoPi = 6.283185307179586;
+    constexpr double kFullTurn = 6.283185307179586;
     if (entry.period_s > 0)
-      form.shape[0].starts = {0.99 * kTwoPi / entry.period_s, kTwoPi / entry.period_s,
-                              1.01 * kTwoPi / entry.period_s};
+      form.shape[0].starts = {0.99 * kFullTurn / entry.period_s, kFullTurn / entry.period_s,
+                              1.01 * kFullTurn / entry.period_s};
     if (entry.variables[0] == ScanVariable::kHeading) form.shape[0].starts = {1, 2, 3};
   }
   return forms;
