@@ -37,8 +37,8 @@ std::map<std::string, NamedSignal> named_signals() {
   add("time", {""}, kTime, {{"s", 1e6, 1}, {"ms", 1e3, 1}, {"us", 1, 1}});
   add("position", axes, kPosition, length);
   add("velocity", axes, kVelocity, speed);
-  add("specific_force", axes, kForceWorld, {{"m/s^2", 1, 1}, {"mm/s^2", 1, 1000}, {"g", kGravity_m_s2, 1}, {"mg", kGravity_m_s2, 1000}},
-      true);
+  add("specific_force", axes, kForceWorld,
+      {{"m/s^2", 1, 1}, {"mm/s^2", 1, 1000}, {"g", kGravity_m_s2, 1}, {"mg", kGravity_m_s2, 1000}}, true);
   add("attitude", {"_x", "_y", "_z", "_w"}, kAttitude, {{"1", 1, 1}});
   // Angles of R = Rz(yaw) Ry(pitch) Rx(roll); a minus stands for columns of the opposite sign.
   const std::vector<Unit> angle = {

@@ -34,13 +34,32 @@ const std::vector<SignalWords>& signal_words() {
   static const std::vector<SignalWords> all = {
       {kPosition, "position", axes, length, "world"},
       {kVelocity, "velocity", axes, speed, "world"},
-      {kForceBody, "specific_force", axes,
-       {{"m/s^2", 1}, {"mm/s^2", 1000}, {"g", 1 / kGravity_m_s2}, {"mg", 1000 / kGravity_m_s2}}, "body"},
-      {kForceWorld, "specific_force", axes, {{"m/s^2", 1}, {"mm/s^2", 1000}, {"g", 1 / kGravity_m_s2}}, "world"},
+      {kForceBody,
+       "specific_force",
+       axes,
+       {{"m/s^2", 1}, {"mm/s^2", 1000}, {"g", 1 / kGravity_m_s2}, {"mg", 1000 / kGravity_m_s2}},
+       "body"},
+      {kForceWorld,
+       "specific_force",
+       axes,
+       {{"m/s^2", 1}, {"mm/s^2", 1000}, {"g", 1 / kGravity_m_s2}},
+       "world"},
       {kAttitude, "attitude", {"_x", "_y", "_z", "_w"}, {{"1", 1}}, nullptr},
-      {kEuler, "roll", {""}, {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}}, nullptr},
-      {kEuler + 1, "pitch", {""}, {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}}, nullptr},
-      {kEuler + 2, "yaw", {""}, {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}}, nullptr},
+      {kEuler,
+       "roll",
+       {""},
+       {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}},
+       nullptr},
+      {kEuler + 1,
+       "pitch",
+       {""},
+       {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}},
+       nullptr},
+      {kEuler + 2,
+       "yaw",
+       {""},
+       {{"rad", 1}, {"deg", 1 / kDegree_rad}, {"-rad", -1}, {"-deg", -1 / kDegree_rad}},
+       nullptr},
       {kRates, "rate", axes, {{"rad/s", 1}, {"mrad/s", 1000}, {"deg/s", 1 / kDegree_rad}}, "body"},
       {kDuty, "duty", four, {{"1", 1}, {"PWM", 65536}}, nullptr},
       {kRequested, "requested", four, {{"1", 1}, {"PWM", 65536}}, nullptr},
@@ -63,7 +82,8 @@ double interpreted(const Log& log, std::size_t i, int signal) {
   if (signal < kForceBody) return s.specific_force_m_s2[part(kForceWorld)];
   if (signal < kAccelerationWorld) {
     const std::size_t k = part(kForceBody);
-    return R[0][k] * s.specific_force_m_s2[0] + R[1][k] * s.specific_force_m_s2[1] + R[2][k] * s.specific_force_m_s2[2];
+    return R[0][k] * s.specific_force_m_s2[0] + R[1][k] * s.specific_force_m_s2[1] +
+           R[2][k] * s.specific_force_m_s2[2];
   }
   if (signal >= kAttitude && signal < kPackedAttitude) return s.attitude[part(kAttitude)];
   if (signal >= kRates && signal < kDuty) return s.rates_rad_s[part(kRates)];
@@ -112,7 +132,8 @@ struct Writer {
   void line(const std::string& signal, const std::string& column, const std::string& unit, const char* frame,
             const std::string& evidence) {
     std::string escaped;
-    for (const char c : column) escaped += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+    for (const char c : column)
+      escaped += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
     text += fmt::format("{} = {{ column = \"{}\", unit = \"{}\"{} }}{}\n", signal, escaped, unit,
                         frame == nullptr ? "" : fmt::format(", frame = \"{}\"", frame),
                         evidence.empty() ? "" : "  # " + evidence);
@@ -165,7 +186,8 @@ std::string columns_draft(const std::string& path) {
         if (words.signal == kForceBody && !compared) continue;  // neither frame nor gravity could be settled
         const UnitGuess& unit = unit_of(words, compared ? line.slope : slope_by_name(carried, stored));
         const std::string evidence =
-            compared ? fmt::format("{:.4g} per SI unit, correlation {:.3f}", line.slope, line.correlation) : "by its name";
+            compared ? fmt::format("{:.4g} per SI unit, correlation {:.3f}", line.slope, line.correlation)
+                     : "by its name";
         writer.line(words.name + std::string(words.parts[k]), column.name, unit.name, words.frame, evidence);
       }
     }

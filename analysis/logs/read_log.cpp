@@ -61,7 +61,8 @@ RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
   // The header of an old micro-SD log names variables as a CSV does. What a columns.toml says counts, whoever wrote the CSV.
   const Format kind = kind_of(in);
   const bool is_usd = kind == Format::kUsd || kind == Format::kUsdEvents;
-  if (!is_usd && format_of(head) != nullptr && (map.empty() || kind != Format::kCsv)) return parse_raw(in, path);
+  if (!is_usd && format_of(head) != nullptr && (map.empty() || kind != Format::kCsv))
+    return parse_raw(in, path);
   RawLog log;
   log.path = path;
   Collector collector(log, map);

@@ -233,8 +233,8 @@ TEST(ColumnsDraft, ReadsTheFileToTheSameSamplesAndGivesEvidence) {
     for (int k = 0; k < 800; ++k) {
       const Swing s(0.01 * k);
       const double degree = 180 / kPi;
-      out << fmt::format("{},{:.6f},{:.6f},1,{:.6f},{:.6f},0,{:.5f},{:.5f},0.0,0.1,0.1,0{},1\n", 10 * k, s.x, s.y, s.vx,
-                         s.vy, degree * s.roll, -degree * s.pitch, motors(s));
+      out << fmt::format("{},{:.6f},{:.6f},1,{:.6f},{:.6f},0,{:.5f},{:.5f},0.0,0.1,0.1,0{},1\n", 10 * k, s.x,
+                         s.y, s.vx, s.vy, degree * s.roll, -degree * s.pitch, motors(s));
     }
   }
   const std::string draft = logs::columns_draft(path);
@@ -243,7 +243,8 @@ TEST(ColumnsDraft, ReadsTheFileToTheSameSamplesAndGivesEvidence) {
   EXPECT_NE(draft.find("pitch = { column = \"pitch\", unit = \"-deg\""), std::string::npos) << draft;
   EXPECT_NE(draft.find("# not used: mood"), std::string::npos) << draft;
   EXPECT_NE(draft.find("# seen: "), std::string::npos) << draft;
-  const logs::Log guessed = logs::read_log(path), stated = logs::read_log(path, logs::parse_columns(draft, "columns.toml"));
+  const logs::Log guessed = logs::read_log(path),
+                  stated = logs::read_log(path, logs::parse_columns(draft, "columns.toml"));
   ASSERT_EQ(guessed.samples.size(), stated.samples.size());
   EXPECT_LT(axis_error(stated), 0.01);
   for (std::size_t i = 0; i < stated.samples.size(); i += 50) {

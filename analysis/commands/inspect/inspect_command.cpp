@@ -297,7 +297,8 @@ Command inspect_command() {
         app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
         app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
         add_output(app, "--columns-draft", options->columns_draft,
-                   "Write a columns.toml for the one CSV: meaning, unit and frame of its columns, with the evidence");
+                   "Write a columns.toml for the one CSV: meaning, unit and frame of its columns, with the "
+                   "evidence");
         app.add_option("--key", options->network.key,
                        "Key of the state dict inside a nested checkpoint, e.g. model");
         declare_order(app, options->network);

@@ -19,6 +19,10 @@ using identification::EffectCurve;
 using identification::RoomMap;
 using identification::Study;
 
+/// Variables of residuals::variable_name() that are numbers, with their units; those after them are places of neighbours.
+constexpr const char* kVariableUnits[] = {"[m]", "[m/s]", "[-]", "[V]", "[s]", "[degrees]"};
+constexpr int kPlottedVariables = 6;
+
 /// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after).
 std::string two_maps(const std::string& name, const std::string& x, const std::string& y,
                      const ForceUnit& unit) {
@@ -28,7 +32,8 @@ std::string two_maps(const std::string& name, const std::string& x, const std::s
          "high = STATS_max > high ? STATS_max : high\nm = -low > high ? -low : high\n"
          "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\nset palette @signed_colours\nset key off\n"
          "set xlabel '" +
-         x + "'\nset ylabel '" + y + "'\nset cblabel 'mean vertical residual [" + unit.name +
+         x + "'\nset ylabel '" + y + "'\nset xtics rotate by -45\nset cblabel 'mean vertical residual [" +
+         unit.name +
          "]'\nif (exists('narrow')) { set multiplot layout 2,1 } else { set multiplot layout 1,2 }\n"
          "set title 'before'\nplot " +
          file + " using 1:2:3 with image\nset title 'after'\nplot " + file +
@@ -107,9 +112,10 @@ void add_variable(Report& report, const residuals::Comparison& before, const res
   }
   if (points < 2) return;
   const std::string label = residuals::variable_name(variable), name = fmt::format("over_{}", variable);
+  const std::string axis = label + " " + kVariableUnits[variable];
   report.figure(name, data,
-                "set xlabel '" + label + "'\nset ylabel 'mean vertical residual [" + unit.name +
-                    "]'\nplot '" + name +
+                "set xlabel '" + axis + "'\nset ylabel 'mean vertical residual [" + unit.name + "]'\nplot '" +
+                    name +
                     ".dat' using 1:2 with linespoints title 'before', '' using 1:3 with linespoints title "
                     "'after', 0 linecolor 'gray' notitle\n",
                 "Mean vertical residual over " + label + ", before and after.");
@@ -174,7 +180,7 @@ std::string write_study_report(const Study& study, const ForceUnit& unit, const 
   report.heading("Where the model failed");
   add_neighbours(report, study.before.all.neighbours, study.after.all.neighbours, unit);
   add_room(report, study.pictures.room, unit);
-  for (int variable = 0; variable < residuals::kNumVariables; ++variable)
+  for (int variable = 0; variable < kPlottedVariables; ++variable)
     add_variable(report, study.before.all, study.after.all, variable, unit);
   report.heading("What was missing");
   if (study.pictures.effects.empty()) report.paragraph("No effect was added.");
