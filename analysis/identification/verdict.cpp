@@ -22,18 +22,19 @@ const char* name(Verdict verdict) {
   return kNames[static_cast<int>(verdict)];
 }
 
+bool leaves_something(const Diagnosis& diagnosis) {
+  constexpr double kMuch = 0.1;  // of the mean square that is left
+  const auto& entries = diagnosis.scan.entries;
+  return diagnosis.remainder.flag || (!entries.empty() && entries[0].share >= kMuch);
+}
+
 Verdict verdict_of(const std::vector<Diagnosis>& diagnoses, std::string& reason) {
   reason.clear();
   const auto any = [&diagnoses](auto holds) {
     return std::any_of(diagnoses.begin(), diagnoses.end(), holds);
   };
   if (any([](const Diagnosis& d) { return !d.ranking.empty(); })) return Verdict::kMissingEffect;
-  // Slow disturbances stand out of the noise's spectrum, others over some variable.
-  constexpr double kMuch = 0.1;  // of the mean square that is left
-  const auto varies = [](const Diagnosis& d) {
-    return !d.scan.entries.empty() && d.scan.entries[0].share >= kMuch;
-  };
-  if (any([&](const Diagnosis& d) { return d.remainder.flag || varies(d); })) return Verdict::kUnexplained;
+  if (any(leaves_something)) return Verdict::kUnexplained;
   for (const Diagnosis& diagnosis : diagnoses) {
     const std::string why = not_judged(diagnosis);
     if (why.empty()) continue;

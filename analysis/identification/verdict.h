@@ -18,6 +18,10 @@ enum class Verdict {
 /// "missing_effect", "unexplained", "nothing_missing", "inconclusive".
 const char* name(Verdict verdict);
 
+/// Whether something stands out in what is left after the effects that were found: slow disturbances from the spectrum of
+/// the noise, or a variable that explains at least a tenth of the remaining mean square.
+bool leaves_something(const Diagnosis& diagnosis);
+
 /// The first of the enumeration that holds for `diagnoses`.
 /// @param reason receives why the verdict is inconclusive, else nothing.
 Verdict verdict_of(const std::vector<Diagnosis>& diagnoses, std::string& reason);

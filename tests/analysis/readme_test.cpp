@@ -205,7 +205,7 @@ TEST(Readme, EveryBlockWorksInAFreshCloneAndPrintsWhatIsShown) {
         check_bootstrap(block[i].command, clone);
     }
   }
-  EXPECT_GE(commands, 5) << "the README lost its examples";
+  EXPECT_GE(commands, 15) << "the README lost its examples";
   EXPECT_GE(compared, 10) << "the README shows no output";
 }
 

@@ -49,7 +49,7 @@ TEST_F(Study, AddsWhatIsMissingAndLowersTheErrorOfTestFlights) {
             0.5 * json["before"]["test"]["rmse"]["z"].get<double>());
   for (const char* const key : {"ladder", "remainder", "next"}) EXPECT_TRUE(json[key].is_array()) << key;
   EXPECT_EQ(read_text(folder_ / "copy.json"), read_text(folder_ / "out/study.json"));
-  EXPECT_NE(outcome.output.find("Vertical error on test flights"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("Vertical error (RMS) on test flights"), std::string::npos) << outcome.output;
   // The fitted model reproduces the error that the page states.
   EXPECT_EQ(
       run_shell("swarmcert compare out/fitted.toml flights -q --json after.json", folder_.path()).exit_code,

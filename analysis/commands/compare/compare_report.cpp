@@ -237,9 +237,8 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
                     fmt::format("{:.1f} %", 100 * region.share)});
   }
   report.table({"region", "records", "RMSE", "share of all squared residual in its mean"}, rows);
-  const char* const kUnits[] = {"[m]", "[m/s]", "[-]", "[V]", "[s]", "[degrees]"};
-  for (int variable = 0; variable < 6; ++variable)
-    add_region_plot(report, comparison, variable, kUnits[variable]);
+  for (int variable = 0; variable < kPlottedVariables; ++variable)
+    add_region_plot(report, comparison, variable, kVariableUnits[variable]);
   add_neighbour_map(report, comparison.neighbours);
   add_time_series(report, comparison);
   add_trajectories(report, comparison);

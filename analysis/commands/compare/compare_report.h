@@ -13,6 +13,12 @@ namespace swarmcert::analysis {
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
                                  const files::Json& result, const std::string& folder, bool overwrite);
 
+/// Units of the first kPlottedVariables of residuals::variable_name(), which are numbers; those after them are places of
+/// neighbours.
+inline constexpr int kPlottedVariables = 6;
+inline constexpr const char* kVariableUnits[kPlottedVariables] = {"[m]", "[m/s]", "[-]",
+                                                                  "[V]", "[s]",   "[degrees]"};
+
 /// Residuals over time with zoom, in gram-force: vehicles with the worst moments first, then the others, as far as a page
 /// can hold them.
 void add_time_series(Report& report, const residuals::Comparison& comparison);

@@ -18,7 +18,7 @@ namespace {
 
 using files::Json;
 
-/// A log of so many records still fits into memory; no battery lasts as long.
+/// Longest simulated flight: its log still fits into memory, and no battery lasts as long.
 constexpr double kLongestFlight_s = 86400;
 
 struct SimulateOptions {

@@ -8,6 +8,7 @@
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/identification/verdict.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -57,15 +58,17 @@ std::string headline(const Study& study, const ForceUnit& unit) {
   const auto shown = [&unit](double newton) { return fmt::format("{:.3g}", newton * unit.per_newton); };
   const std::vector<std::string> added = accepted_effects(study);
   const std::string left =
-      study.diagnosis.remainder.flag ? "part of the error remains unexplained" : "nothing else stands out";
+      leaves_something(study.diagnosis) ? "part of the error remains unexplained" : "nothing else stands out";
+  const std::string where = study.ladder.split.by_flight
+                                ? "on test flights"
+                                : "on the flights of the fit (too few to hold any back)";
   if (!study.ladder.too_poor.empty())
-    return fmt::format("Vertical error {} {}; no effect can be fitted: {}.",
+    return fmt::format("Vertical error (RMS) {} {}; no effect can be fitted: {}.",
                        shown(vertical_N(study.before.all)), unit.name, study.ladder.too_poor);
   if (added.empty())
-    return fmt::format("Vertical error {} {}, on test flights {} {}; no effect lowers it, and {}.",
-                       shown(vertical_N(study.before.all)), unit.name, shown(vertical_N(study.before.test)),
-                       unit.name, left);
-  return fmt::format("Vertical error on test flights {} {}, after adding {} {} {}; {}.",
+    return fmt::format("Vertical error (RMS) {} {} {}; no effect lowers it, and {}.", where,
+                       shown(vertical_N(study.before.test)), unit.name, left);
+  return fmt::format("Vertical error (RMS) {} {} {}, after adding {} {} {}; {}.", where,
                      shown(vertical_N(study.before.test)), unit.name, in_words(added),
                      shown(vertical_N(study.after.test)), unit.name, left);
 }
@@ -100,6 +103,7 @@ void print_study(const Study& study, const ForceUnit& unit) {
   fmt::print("{}\n", headline(study, unit));
   constexpr std::size_t kMostRows = 6, kMostNext = 2;
   std::size_t rows = 0;
+  fmt::print("RMSE of the force residual (estimates; all axes):\n");
   for (const stability::LadderRow& row : study.ladder.rows) {
     if (!row.accepted || ++rows > kMostRows) continue;
     fmt::print("  {:<24} fit {:>8.3g}  select {:>8.3g}  test {:>8.3g} {}\n",

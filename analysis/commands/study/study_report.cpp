@@ -19,10 +19,6 @@ using identification::EffectCurve;
 using identification::RoomMap;
 using identification::Study;
 
-/// Variables of residuals::variable_name() that are numbers, with their units; those after them are places of neighbours.
-constexpr const char* kVariableUnits[] = {"[m]", "[m/s]", "[-]", "[V]", "[s]", "[degrees]"};
-constexpr int kPlottedVariables = 6;
-
 /// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after).
 std::string two_maps(const std::string& name, const std::string& x, const std::string& y,
                      const ForceUnit& unit) {
