@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "analysis/report/report_drawing.h"
+#include "analysis/report/report_interactive.h"
 #include "analysis/report/report_scripts.h"
 #include "analysis/report/report_svg.h"
 #include "analysis/report/report_text.h"
@@ -25,30 +26,6 @@ std::string policy_source(std::string_view text) {
   unsigned char base64[4 * ((SHA256_DIGEST_LENGTH + 2) / 3) + 1];
   EVP_EncodeBlock(base64, digest, sizeof digest);
   return "'sha256-" + std::string(reinterpret_cast<const char*>(base64)) + "'";
-}
-
-/// JSON that may stand inside an HTML script element.
-std::string data_of(const std::vector<TimeSeries>& all) {
-  files::Json json = files::Json::array();
-  for (const TimeSeries& series : all) {
-    files::Json rows = files::Json::array(), marks = files::Json::array();
-    for (const std::array<float, 5>& row : series.rows) {
-      files::Json cells = files::Json::array();
-      for (const float x : row) {
-        // A thousandth of the unit is less than a pixel; more digits would double the file.
-        cells.push_back(std::isfinite(x) ? files::Json(std::round(static_cast<double>(x) * 1000) / 1000)
-                                         : files::Json(nullptr));
-      }
-      rows.push_back(std::move(cells));
-    }
-    for (const TimeSeries::Mark& mark : series.marks) {
-      marks.push_back({{"time", std::round(static_cast<double>(mark.time_s) * 1000) / 1000},
-                       {"rank", mark.rank},
-                       {"gf", mark.size_gf}});
-    }
-    json.push_back({{"name", series.name}, {"rows", std::move(rows)}, {"marks", std::move(marks)}});
-  }
-  return script_json(json.dump(-1, ' ', true, files::Json::error_handler_t::replace));
 }
 
 /// Numbers with their units stand to the right.
@@ -109,15 +86,41 @@ void Report::bars(const std::string& name, const std::vector<Bar>& bars, const s
          caption, 120 + 32 * static_cast<int>(bars.size()));
 }
 
-void Report::time_series(const std::vector<TimeSeries>& all, const std::string& caption) {
+void Report::time_series(const std::vector<TimeSeries>& all, const std::string& unit,
+                         const std::string& caption) {
   if (kTimeSeriesScript.empty()) {
     paragraph("Time series with zoom are missing: the tool was built without dygraphs (libjs-dygraphs).");
     return;
   }
   has_time_series_ = true;
-  body_.push_back(
-      "<figure><div id=\"time-series\"></div>\n<script type=\"application/json\" id=\"time-series-data\">" +
-      data_of(all) + "</script>\n<figcaption>" + html_text(caption) + "</figcaption></figure>\n");
+  body_.push_back(interactive("time-series", data_of(all, unit), caption));
+}
+
+void Report::replay(const std::vector<Replay>& flights, const std::string& unit, const std::string& caption) {
+  if (kReplayScript.empty()) {
+    paragraph("The replay in space is missing: the tool was built without three.js (libjs-three).");
+    return;
+  }
+  has_replay_ = true;
+  body_.push_back(interactive("replay", data_of(flights, unit), caption));
+}
+
+void Report::moments(const std::vector<ShownMoment>& moments) {
+  std::string html =
+      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"worst moments\"><table><thead><tr>"
+      "<th scope=\"col\">rank</th><th scope=\"col\">log</th><th scope=\"col\">time on the log [s]</th>"
+      "<th scope=\"col\">residual</th><th scope=\"col\">look</th></tr></thead><tbody>\n";
+  int rank = 0;
+  for (const ShownMoment& moment : moments) {
+    html += fmt::format(
+        "<tr><td class=\"number\">{}</td><td>{}</td><td class=\"number\">{:.2f}</td><td>{}</td>"
+        "<td><button type=\"button\" class=\"jump\" aria-label=\"Show worst moment {}\" data-series=\"{}\" "
+        "data-time=\"{:.3f}\" data-flight=\"{}\" data-flight-time=\"{:.3f}\">Show</button></td></tr>\n",
+        rank + 1, html_text(moment.series), moment.series_time_s, html_text(moment.size), rank + 1,
+        html_text(moment.series), moment.series_time_s, html_text(moment.flight), moment.flight_time_s);
+    ++rank;
+  }
+  body_.push_back(html + "</tbody></table></div>\n");
 }
 
 std::string Report::drawn(const Figure& figure, const std::string& folder) const {
@@ -150,8 +153,9 @@ std::string Report::write(const std::string& folder, bool overwrite, const std::
   }
   std::filesystem::create_directories(path);
   const std::string style = std::string(kPageStyle) + (has_time_series_ ? std::string(kTimeSeriesStyle) : "");
-  const std::string script =
-      std::string(kPageScript) + (has_time_series_ ? std::string(kTimeSeriesScript) : "");
+  const std::string script = std::string(kPageScript) +
+                             (has_time_series_ ? std::string(kTimeSeriesScript) : "") +
+                             (has_replay_ ? std::string(kReplayScript) : "");
   std::string html =
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "

@@ -11,13 +11,34 @@ namespace swarmcert::analysis {
 /// Force residuals of one vehicle over time.
 struct TimeSeries {
   std::string name;
-  std::vector<std::array<float, 5>> rows;  ///< time in s, x, y, z, z without effects; NaN breaks the curves
+  /// Time in s; x, y, z; z without effects; z of another model, NaN without one. NaN breaks the curves.
+  std::vector<std::array<float, 6>> rows;
   struct Mark {
     float time_s;  ///< of a row
     int rank;
-    double size_gf;
+    double size;  ///< in the unit of the rows
   };
   std::vector<Mark> marks;
+};
+
+/// A flight in space.
+struct Replay {
+  std::string name;
+  struct Vehicle {
+    std::string name;
+    /// Time in s; place in m; force before; force after. NaN: not known.
+    std::vector<std::array<float, 10>> rows;
+  };
+  std::vector<Vehicle> vehicles;
+};
+
+/// A moment that the time series and the replay can jump to.
+struct ShownMoment {
+  std::string series;  ///< name of a TimeSeries
+  double series_time_s;
+  std::string flight;  ///< name of a Replay
+  double flight_time_s;
+  std::string size;  ///< in words, with its unit
 };
 
 /// One bar with its interval; NaN for an end that is not known.
@@ -61,7 +82,16 @@ class Report {
 
   /// Curves with zoom, one vehicle at a time; at most once per report. Where the tool was built without dygraphs, the
   /// report says so.
-  void time_series(const std::vector<TimeSeries>& all, const std::string& caption);
+  /// @param unit of the forces
+  void time_series(const std::vector<TimeSeries>& all, const std::string& unit, const std::string& caption);
+
+  /// Flights in space with a slider over time; at most once per report. Where the tool was built without three.js, the
+  /// report says so.
+  /// @param unit of the forces
+  void replay(const std::vector<Replay>& flights, const std::string& unit, const std::string& caption);
+
+  /// A table of moments; a button in each row moves the time series and the replay there.
+  void moments(const std::vector<ShownMoment>& moments);
 
   /// Writes FOLDER/`page` and the figures' files; returns the page's path. Without gnuplot, or where it
   /// fails, the report says so in the figure's place and the data stay.
@@ -77,7 +107,7 @@ class Report {
 
   std::string title_;
   std::string result_json_, command_;
-  bool has_time_series_ = false;
+  bool has_time_series_ = false, has_replay_ = false;
   std::vector<std::string> body_;  ///< HTML; "" where the next figure goes
   std::vector<Figure> figures_;
 };

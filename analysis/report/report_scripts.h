@@ -12,4 +12,7 @@ extern const std::string_view kPageStyle;
 extern const std::string_view kTimeSeriesScript;
 extern const std::string_view kTimeSeriesStyle;
 
+/// three.js, its orbit controls and this project's script behind them; empty where the build found none (libjs-three).
+extern const std::string_view kReplayScript;
+
 }  // namespace swarmcert::analysis

@@ -2,20 +2,26 @@
 (function () {
   'use strict';
   var box = document.getElementById('time-series');
-  var all = JSON.parse(document.getElementById('time-series-data').textContent);
+  var data = JSON.parse(document.getElementById('time-series-data').textContent);
+  var all = data.series, unit = String(data.unit);
   // Colours of the page by name; dygraphs draws on a canvas, which knows no variables.
   function page(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
-  // Columns of a row: time, x, y, z, z without effects.
+  // Columns of a row: time, x, y, z, z without effects, z of the model before.
+  function minus(a, b) { return a !== null && b !== null ? a - b : null; }
   var views = [
     {title: 'vertical force: model over measurement', labels: ['measured', 'model', 'residual'],
-     colors: ['--curve-w', '--curve-z', '--curve-x'], ylabel: 'vertical force beyond thrust [gf]',
-     row: function (r) {
-       var known = r[3] !== null && r[4] !== null;
-       return [r[0], r[4], known ? r[4] - r[3] : null, r[3]];
-     }, marked: 'residual'},
+     colors: ['--curve-w', '--curve-z', '--curve-x'], ylabel: 'vertical force beyond thrust [' + unit + ']',
+     row: function (r) { return [r[0], r[4], minus(r[4], r[3]), r[3]]; }, marked: 'residual'},
     {title: 'force residual: x, y, z', labels: ['x', 'y', 'z'], colors: ['--curve-x', '--curve-y', '--curve-z'],
-     ylabel: 'force residual [gf]', row: function (r) { return [r[0], r[1], r[2], r[3]]; }, marked: 'z'}
+     ylabel: 'force residual [' + unit + ']', row: function (r) { return [r[0], r[1], r[2], r[3]]; }, marked: 'z'}
   ];
+  if (data.has_before) {
+    views.unshift(
+        {title: 'vertical force: models before and after over measurement',
+         labels: ['measured', 'model before', 'model after'], colors: ['--curve-w', '--curve-x', '--curve-z'],
+         ylabel: 'vertical force beyond thrust [' + unit + ']',
+         row: function (r) { return [r[0], r[4], minus(r[4], r[5]), minus(r[4], r[3])]; }, marked: 'model after'});
+  }
   function selection(label, names) {
     var choice = document.createElement('select');
     choice.setAttribute('aria-label', label);
@@ -47,7 +53,7 @@
       var entry = document.createElement('span');
       entry.style.color = page(view.colors[i]);
       entry.textContent = '\u25A0 ' + label +
-          (values && values[i] !== null ? ' ' + values[i].toFixed(2) + ' gf' : '') + '   ';
+          (values && values[i] !== null ? ' ' + values[i].toFixed(2) + ' ' + unit : '') + '   ';
       legend.appendChild(entry);
     });
     if (values) legend.appendChild(document.createTextNode('at ' + time.toFixed(2) + ' s'));
@@ -74,9 +80,21 @@
     tell(view);
     graph.setAnnotations(series.marks.map(function (mark) {
       return {series: view.marked, x: Number(mark.time), shortText: String(Number(mark.rank)),
-              text: 'worst moment ' + Number(mark.rank) + ': ' + Number(mark.gf).toFixed(1) + ' gf'};
+              text: 'worst moment ' + Number(mark.rank) + ': ' + Number(mark.size).toPrecision(3) + ' ' + unit};
     }));
   }
   if (all.length > 0) show();
+  document.querySelectorAll('button.jump').forEach(function (button) {
+    button.addEventListener('click', function () {
+      all.forEach(function (series, i) {
+        if (series.name !== button.dataset.series) return;
+        which.value = i;
+        show();
+        var time = Number(button.dataset.time);
+        graph.updateOptions({dateWindow: [time - 2, time + 2]});
+      });
+      box.scrollIntoView({block: 'center'});
+    });
+  });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', function () { if (graph) show(); });
 })();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <set>
 
 #include "analysis/run.h"
 #include "data.h"
@@ -81,6 +82,23 @@ TEST_F(Study, WordsThatMakeNoSenseAreExplained) {
   EXPECT_EQ(study("flights -o out --test flights").exit_code, 2);
   EXPECT_EQ(study("flights -o out --unit lbf").exit_code, 2);
   EXPECT_EQ(study("nowhere -o out").exit_code, 3);
+}
+
+TEST(Demo, CertifiesANetworkAndFindsWhatAModelLacks) {
+  const ScratchFolder folder;
+  const Outcome outcome = run_shell("swarmcert demo -q -o demo --json demo.json", folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json json = files::read_json(folder / "demo.json", "swarmcert/demo/1");
+  EXPECT_EQ(json["accepted"], true);
+  const files::Json study = files::read_json(folder / "demo/study/study.json", "swarmcert/study/1");
+  EXPECT_EQ(json["study"]["verdict"], study["verdict"]);
+  // The three effects of crazyflie-small-effects.toml, which the studied model lacks.
+  std::set<std::string> added;
+  for (const files::Json& effect : study["effects"]) added.insert(effect["effect"].get<std::string>());
+  EXPECT_EQ(added, (std::set<std::string>{"downwash", "motor_lag", "drag_linear"}));
+  for (const char* const page : {"demo/report/report.html", "demo/study/study.html"})
+    EXPECT_TRUE(std::filesystem::exists(folder / page)) << page;
+  EXPECT_EQ(run_shell("swarmcert demo -q -o demo", folder.path()).exit_code, 3) << "results are kept";
 }
 
 }  // namespace

@@ -67,6 +67,31 @@ CHECK = r"""
     const hasInk = c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(x => x > 0);
     if (!canvases.some(c => c.width > 50 && c.height > 50 && hasInk(c))) fault('empty plot', 'time series');
   }
+  const replay = document.getElementById('replay');
+  if (replay) {
+    const canvas = replay.querySelector('canvas');
+    const slider = replay.querySelector('input[type="range"]');
+    const jump = document.querySelector('button.jump');
+    if (!canvas || canvas.width < 50) fault('empty plot', 'replay');
+    else {
+      // The picture changes with time, and a worst moment moves both the slider and the picture.
+      const before = canvas.toDataURL();
+      slider.value = (Number(slider.min) + Number(slider.max)) / 2;
+      slider.dispatchEvent(new Event('input'));
+      if (canvas.toDataURL() === before) fault('empty plot', 'the replay shows the same at every time');
+      if (!jump) fault('missing plot', 'no worst moment to jump to');
+      else {
+        jump.click();
+        if (Math.abs(Number(slider.value) - Number(jump.dataset.flightTime)) > 0.01)
+          fault('empty plot', `the replay shows ${slider.value} s instead of ${jump.dataset.flightTime} s`);
+      }
+    }
+  }
+  // What a screen reader needs: a name for every control, and one top heading.
+  for (const control of document.querySelectorAll('button,select,input,[role="img"],[role="region"]')) {
+    if (shown(control) && !(control.getAttribute('aria-label') || control.textContent.trim())) fault('no name', control.outerHTML);
+  }
+  if (document.querySelectorAll('h1').length !== 1) fault('no name', 'not one top heading');
   try {
     if (!JSON.parse(document.getElementById('result').textContent).schema.startsWith('swarmcert/'))
       fault('no result', 'another schema');
@@ -110,7 +135,7 @@ class Browser:
 
         self._process = subprocess.Popen(
             [self._path, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-pipe",
-             "--disable-extensions", "--no-first-run", "--disable-background-networking",
+             "--disable-extensions", "--enable-unsafe-swiftshader", "--no-first-run", "--disable-background-networking",
              f"--user-data-dir={self._profile.name}", "about:blank"],
             preexec_fn=place, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(to_browser)
@@ -178,6 +203,8 @@ class Browser:
                 yield ["console", p["exceptionDetails"].get("text", "exception")]
             elif method == "Runtime.consoleAPICalled" and p["type"] in ("error", "warning", "assert"):
                 yield ["console", str(p["args"])[:200]]
+            elif method == "Log.entryAdded" and "GL Driver Message" in p["entry"]["text"]:
+                pass  # of the software renderer's speed, when the check reads the picture back
             elif method == "Log.entryAdded" and p["entry"]["level"] in ("error", "warning"):
                 kind = "policy" if "Content Security Policy" in p["entry"]["text"] else "console"
                 yield [kind, p["entry"]["text"][:200]]
@@ -190,7 +217,7 @@ class Browser:
 
     def faults(self, page, widths=(390, 768, 1280), schemes=("light", "dark")):
         """[kind, width, what] of all that is wrong with a report: console, policy (of content), network, overflow, missing
-        plot, empty plot, no caption, small text, contrast, no result, no command, injection. The page is loaded at every
+        plot, empty plot, no caption, small text, contrast, no name, no result, no command, injection. The page is loaded at every
         width; colour schemes and print are looked at on the widest."""
         found = []
         for width in widths:

@@ -63,6 +63,8 @@ std::string hostile(std::mt19937& generator) {
   return text;
 }
 
+constexpr int kTexts = 25;
+
 Report report_with(const std::vector<std::string>& text) {
   Report report(text[0]);
   report.result({{"schema", "swarmcert/test/1"}, {"name", text[1]}});
@@ -76,8 +78,10 @@ Report report_with(const std::vector<std::string>& text) {
   report.bars("bars", {{text[11], 1, 0.5, 2}, {text[12], 2, NAN, NAN}}, text[13], text[14]);
   TimeSeries series;
   series.name = text[15];
-  series.rows = {{0, 1, 2, 3, 4}, {1, 2, 3, 4, 5}};
-  report.time_series({series}, text[16]);
+  series.rows = {{0, 1, 2, 3, 4, 5}, {1, 2, 3, 4, 5, 6}};
+  report.time_series({series}, text[17], text[16]);
+  report.replay({{text[18], {{text[19], {{0, 1, 2, 3}, {1, 2, 3, 4}}}}}}, text[20], text[21]);
+  report.moments({{text[22], 1, text[23], 2, text[24]}});
   return report;
 }
 
@@ -104,11 +108,11 @@ bool has_gnuplot() { return run_shell("gnuplot --version", "/").exit_code == 0; 
 TEST(Report, HostileTextStaysTextAndRunsNothing) {
   const ScratchFolder folder;
   const std::string plain_page =
-      read_text(report_with(std::vector<std::string>(17, "plain")).write(folder / "plain", false));
+      read_text(report_with(std::vector<std::string>(kTexts, "plain")).write(folder / "plain", false));
   std::mt19937 generator(31);
   for (int i = 0; i < 12; ++i) {
     std::vector<std::string> text;
-    for (int k = 0; k < 17; ++k) text.push_back(hostile(generator));
+    for (int k = 0; k < kTexts; ++k) text.push_back(hostile(generator));
     const std::string page =
         read_text(report_with(text).write(folder / ("fuzzed" + std::to_string(i)), false));
     EXPECT_EQ(skeleton(page), skeleton(plain_page)) << i;
@@ -196,7 +200,7 @@ TEST(Report, DrawingsKeepShapesAndTextOnly) {
 
 TEST(Report, IsTheSameInAnotherFolderAndKeepsItsData) {
   const ScratchFolder folder;
-  const std::vector<std::string> text(17, "text");
+  const std::vector<std::string> text(kTexts, "text");
   const std::string page = read_text(report_with(text).write(folder / "one", false));
   EXPECT_EQ(read_text(report_with(text).write(folder / "another place", false)), page);
   EXPECT_TRUE(std::filesystem::exists(folder / "one/curve.dat"));
@@ -210,7 +214,7 @@ TEST(Report, SaysSoWithoutGnuplot) {
   const std::string path = getenv("PATH");
   setenv("PATH", "/nowhere", 1);
   const std::string page =
-      read_text(report_with(std::vector<std::string>(17, "text")).write(folder / "r", false));
+      read_text(report_with(std::vector<std::string>(kTexts, "text")).write(folder / "r", false));
   setenv("PATH", path.c_str(), 1);
   EXPECT_NE(page.find("Not drawn: gnuplot is missing or failed. The data are in curve.dat."),
             std::string::npos);

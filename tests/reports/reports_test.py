@@ -127,6 +127,8 @@ Kd = {{from = 0.5, to = 10, steps = 5}}
     r.report("add-hostile", "add", "drag_linear,constant_force", "--model", model, prefixed, "--keep-anyway", "-o",
              "fitted.toml", expect=(0, 4))
     r.report("diagnose-hostile", "diagnose", model, flights, expect=(0, 4))
+    r.run("study", model, flights, "-o", "study", expect=(0, 4))
+    r.pages["study-hostile"] = r.folder / "study/study.html"
     r.report("train-hostile", "train", model, flights, "--phi", 4, "--rho", 4, "--features", 4, "--epochs", 3, "-o",
              "trained", expect=(0, 4))
     r.report("gate-hostile", "gate", hostile_policy(r), expect=(1,))
@@ -173,6 +175,7 @@ def planted(good):
     yield "small text", text.replace('font-size="1', 'font-size="0')
     yield "contrast", text.replace('fill="currentColor"', 'fill="#777777"')
     yield "no caption", re.sub(r"<figcaption>.*?</figcaption>", "", text, flags=re.S)
+    yield "no name", text.replace(end, "<button type='button'></button>" + end)
     yield "no result", text.replace('id="result"', 'id="other"')
     yield "no command", text.replace('id="command"', 'id="other"')
     yield "injection", lax.replace(end, "<script>window.pwned = 1</script>" + end)

@@ -9,76 +9,154 @@
 #include "analysis/commands/certify/certify_output.h"
 #include "analysis/commands/certify/certify_report.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/study/study_output.h"
+#include "analysis/commands/study/study_report.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
 #include "nn/base/file_io.h"
 #include "nn/weights/functions.h"
+#include "stability/simulation/simulate.h"
 
 namespace swarmcert::analysis {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct DemoOptions {
   std::string output = "swarmcert-demo";
 };
 
-int run_demo(const DemoOptions& options, const CommonOptions& common) {
-  files::NetworkArguments arguments;
-  arguments.file = bundled_folder("networks", "nn/networks") + "/demo/network.toml";
-  const std::filesystem::path folder = options.output;
-  const std::string certificate_path = (folder / "cert.json").string();
-  refuse_to_replace(common, certificate_path);
-  refuse_folder(common, (folder / "report").string());
-  std::filesystem::create_directories(folder);
+/// Tells what is done, and the command that does it alone.
+class Speaker {
+ public:
+  explicit Speaker(const CommonOptions& common) : speaks_(common.prints_text()) {}
+  void operator()(const std::string& text) const {
+    if (speaks_) fmt::print("{}\n", text);
+  }
 
-  const auto say = [&common](const std::string& text) {
-    if (common.prints_text()) fmt::print("{}\n", text);
-  };
-  say(fmt::format("1. Certify the bundled network: swarmcert certify {} -o {}", arguments.file,
-                  certificate_path));
-  const files::Network network = files::load_network(arguments);
-  lipschitz::CertifyOptions certify_options;
-  certify_options.jobs = common.jobs;
+ private:
+  bool speaks_;
+};
+
+struct Certified {
+  bool accepted = false;
+  std::string page;
+};
+
+/// Certifies the bundled network, checks the certificate, and writes both with a report.
+Certified certify_network(const files::Network& network, const std::string& file, const fs::path& folder,
+                          const CommonOptions& common, const Speaker& say, files::Json& result) {
+  const std::string certificate_path = (folder / "cert.json").string();
+  say(fmt::format("1. Certify the bundled network: swarmcert certify {} -o {}", file, certificate_path));
+  lipschitz::CertifyOptions options;
+  options.jobs = common.jobs;
   Progress progress(common.quiet);
-  certify_options.progress = [&progress](int done, int total, const std::string& what) {
+  options.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
   };
-  const lipschitz::Certification found = certify(network, certify_options);
+  const lipschitz::Certification found = certify(network, options);
   files::write_file(certificate_path, files::to_text(certificate(network, found)), common.force);
   for (const lipschitz::CertifiedBound& bound : found.bounds) {
     say(fmt::format("   {:<18} proved <= {:<12.8g} witnessed >= {:<12.8g} {}", bound.function,
                     bound.upper.value(), bound.lower.witness ? bound.lower.witness->slope.value() : 0.0,
                     files::unit(network, bound.function)));
   }
-
-  say(fmt::format("2. Check the certificate: swarmcert check {} {}", certificate_path, arguments.file));
+  say(fmt::format("2. Check the certificate: swarmcert check {} {}", certificate_path, file));
   const check::CheckResult checked =
       check::check(files::read_json(certificate_path, check::kCertificateSchema), network);
   say(fmt::format("   {}: {}", checked.accepted ? "accepted" : "rejected", checked.reason));
 
-  files::Json result = result_head("demo", input_files(network));
   result["certificate_sha256"] = files::sha256(files::read_file(certificate_path));
   result["accepted"] = checked.accepted;
   CertifyOutput output;
   output.found = found;
   output.verdict = lipschitz::Verdict::kProved;
-  const std::string report =
-      write_certify_report(network, output, result, (folder / "report").string(), common.force);
-  say("3. Look at the report: " + report);
+  return {checked.accepted,
+          write_certify_report(network, output, result, (folder / "report").string(), common.force)};
+}
+
+/// Random walks of two vehicles, with the effects of crazyflie-small-effects.toml: FOLDER/1 .. FOLDER/3.
+void fly(const fs::path& folder, const std::string& models, bool force) {
+  constexpr int kFlights = 3, kVehicles = 2;
+  constexpr double kDuration_s = 25;
+  const stability::Gains gains =
+      stability::load_gains(bundled_folder("gains", "controller/gains") + "/crazyflie-small.toml");
+  for (int flight = 1; flight <= kFlights; ++flight) {
+    const auto seed = static_cast<std::uint64_t>(flight);
+    stability::Swarm swarm({stability::read_model(models + "/crazyflie-small-effects.toml")},
+                           std::vector<int>(kVehicles, 0));
+    swarm.assume_lag(gains.motor_lag_s, gains.delay_s);
+    stability::SimulationOptions how;
+    how.loop.seed = seed;
+    const stability::Simulation flown = stability::simulate(
+        swarm, gains, *stability::make_task("random-walk", {kVehicles, kDuration_s, seed}), how, nullptr);
+    const fs::path logs = folder / std::to_string(flight);
+    fs::create_directories(logs);
+    for (std::size_t i = 0; i < flown.logs.size(); ++i) {
+      files::write_file((logs / fmt::format("cf{}_00", i + 1)).string(), stability::to_usd_log(flown.logs[i]),
+                        force);
+    }
+  }
+}
+
+/// Flies with effects that the studied model lacks, and studies the flights. Returns the page's path.
+std::string study_flights(const fs::path& folder, const CommonOptions& common, const Speaker& say,
+                          files::Json& result) {
+  const std::string models = bundled_folder("models", "stability/models");
+  const std::string model = models + "/crazyflie-small.toml", flights = (folder / "flights").string(),
+                    output = (folder / "study").string();
+  say(
+      fmt::format("3. Fly with downwash, motor lag and drag, and ask what a model without them lacks:\n"
+                  "   swarmcert study {} {} -o {}",
+                  model, flights, output));
+  fly(flights, models, common.force);
+  residuals::InputArguments arguments;
+  arguments.models = {model};
+  arguments.flights = {flights};
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  Progress progress(common.quiet);
+  const identification::Study study = identification::study(
+      inputs, std::nullopt, common.jobs,
+      [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
+  files::Json answer = result_head("study", inputs.files());
+  add_study(study, inputs, answer);
+  const ForceUnit unit = force_unit("N", inputs.models[0]);
+  const std::string sentence = headline(study, unit);
+  say("   " + sentence);
+  result["study"] = {{"headline", sentence}, {"verdict", answer["verdict"]}};
+  return write_study_folder(study, unit, answer, output);
+}
+
+int run_demo(const DemoOptions& options, const CommonOptions& common) {
+  const fs::path folder = options.output;
+  refuse_to_replace(common, (folder / "cert.json").string());
+  for (const char* const part : {"report", "flights", "study"})
+    refuse_folder(common, (folder / part).string());
+  fs::create_directories(folder);
+  const Speaker say(common);
+  files::NetworkArguments arguments;
+  arguments.file = bundled_folder("networks", "nn/networks") + "/demo/network.toml";
+  const files::Network network = files::load_network(arguments);
+  files::Json result = result_head("demo", input_files(network));
+  const Certified certified = certify_network(network, arguments.file, folder, common, say, result);
+  const std::string study_page = study_flights(folder, common, say, result);
+  say(fmt::format("Look at {} and {}.", certified.page, study_page));
   write_result(common, result);
-  return checked.accepted ? kDone : kViolated;
+  return certified.accepted ? kDone : kViolated;
 }
 
 }  // namespace
 
 Command demo_command() {
-  return {
-      "demo", "Certify and check a bundled network",
-      "Certifies a network that ships with the tool and checks the certificate.\n\nExample: swarmcert demo",
-      [](CLI::App& app) {
-        const auto options = std::make_shared<DemoOptions>();
-        add_output(app, "-o,--output", options->output, "Folder for the results")->capture_default_str();
-        return [options](const CommonOptions& common) { return run_demo(*options, common); };
-      }};
+  return {"demo", "Certify a bundled network, and find out what a model lacks from flights",
+          "Certifies a network that ships with the tool and checks the certificate; then flies three short\n"
+          "simulated flights with effects that a model lacks, finds them, and shows the error fall.\n\n"
+          "Example: swarmcert demo",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<DemoOptions>();
+            add_output(app, "-o,--output", options->output, "Folder for the results")->capture_default_str();
+            return [options](const CommonOptions& common) { return run_demo(*options, common); };
+          }};
 }
 
 }  // namespace swarmcert::analysis

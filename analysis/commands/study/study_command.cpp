@@ -1,7 +1,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 
 #include "analysis/cli/command_line.h"
@@ -10,8 +9,6 @@
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/study/study_output.h"
 #include "analysis/commands/study/study_report.h"
-#include "nn/base/file_io.h"
-#include "nn/base/input_error.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -46,7 +43,6 @@ std::optional<identification::Split> split_of(const StudyOptions& options, const
 }
 
 int run_study(const StudyOptions& options, const CommonOptions& common) {
-  namespace fs = std::filesystem;
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.output);
   FlightOptions words = options.flights;
@@ -62,13 +58,7 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   files::Json result = result_head("study", inputs.files());
   add_study(study, inputs, result);
   const ForceUnit unit = force_unit(options.unit, inputs.models[0]);
-  fs::create_directories(options.output);
-  const std::string page = write_study_report(study, unit, result, options.output, true);
-  if (study.ladder.any_accepted)
-    files::write_file(
-        (fs::path(options.output) / "fitted.toml").string(),
-        stability::to_toml(study.ladder.model, {"Effects fitted to flights by swarmcert study."}), true);
-  files::write_file((fs::path(options.output) / "study.json").string(), files::to_text(result), true);
+  const std::string page = write_study_folder(study, unit, result, options.output);
   write_result(common, result);
   if (common.prints_text()) {
     print_study(study, unit);

@@ -3,6 +3,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
+#include <filesystem>
+#include <set>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_report.h"
@@ -11,6 +14,7 @@
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
+#include "nn/base/file_io.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -165,10 +169,48 @@ void add_findings(Report& report, const Study& study) {
         rows);
 }
 
-}  // namespace
+void add_moments(Report& report, const Study& study, const ForceUnit& unit) {
+  std::vector<ShownMoment> shown;
+  for (const residuals::Moment& moment : study.before.all.moments) {
+    for (const residuals::TrackErrors& track : study.before.all.tracks) {
+      if (track.path != moment.path) continue;
+      shown.push_back({series_name(track), moment.time_s, track.flight, moment.time_s - track.clock_offset_s,
+                       fmt::format("{:.3g} {}", moment.residual_N.norm() * unit.per_newton, unit.name)});
+    }
+  }
+  if (shown.empty()) return;
+  report.paragraph("The worst moments of the given model, means over 0.1 s:");
+  report.moments(shown);
+}
 
-std::string write_study_report(const Study& study, const ForceUnit& unit, const files::Json& result,
-                               const std::string& folder, bool overwrite) {
+std::size_t count_flights(const residuals::Comparison& comparison) {
+  std::set<std::string> flights;
+  for (const residuals::TrackErrors& track : comparison.tracks) flights.insert(track.flight);
+  return flights.size();
+}
+
+void add_replay(Report& report, const Study& study, const ForceUnit& unit) {
+  std::vector<Replay> flights;
+  for (const identification::ReplayFlight& flight : study.replay) {
+    Replay replay{flight.name, {}};
+    for (const identification::ReplayVehicle& vehicle : flight.vehicles) {
+      replay.vehicles.push_back({vehicle.name, vehicle.rows});
+      for (std::array<float, 10>& row : replay.vehicles.back().rows)
+        for (std::size_t k = 4; k < row.size(); ++k) row[k] *= static_cast<float>(unit.per_newton);
+    }
+    flights.push_back(std::move(replay));
+  }
+  if (flights.empty()) return;
+  report.heading("In space");
+  report.replay(flights, unit.name,
+                fmt::format("{} of {} flights, those with the worst moments first. Arrows are the residual "
+                            "force on each vehicle under the given and under the fitted model; trails are "
+                            "4 s long. Drag, or use the arrow keys, to turn; + and - zoom.",
+                            flights.size(), count_flights(study.before.all)));
+}
+
+std::string write_page(const Study& study, const ForceUnit& unit, const files::Json& result,
+                       const std::string& folder) {
   Report report("What does the model lack?");
   report.made_by(command_to_copy());
   report.result(result);
@@ -178,6 +220,7 @@ std::string write_study_report(const Study& study, const ForceUnit& unit, const 
   add_room(report, study.pictures.room, unit);
   for (int variable = 0; variable < kPlottedVariables; ++variable)
     add_variable(report, study.before.all, study.after.all, variable, unit);
+  add_moments(report, study, unit);
   report.heading("What was missing");
   if (study.pictures.effects.empty()) report.paragraph("No effect was added.");
   add_effects(report, study, unit);
@@ -191,9 +234,24 @@ std::string write_study_report(const Study& study, const ForceUnit& unit, const 
   if (next.empty())
     report.paragraph("These flights leave no question open that another flight would answer.");
   for (const std::string& flight : next) report.paragraph("Fly " + flight + ".");
-  report.heading("Over time");
-  add_time_series(report, study.after.all);
-  return report.write(folder, overwrite, "study.html");
+  add_time_series(report, study.after.all, &study.before.all, unit.name, unit.per_newton);
+  add_replay(report, study, unit);
+  return report.write(folder, true, "study.html");
+}
+
+}  // namespace
+
+std::string write_study_folder(const Study& study, const ForceUnit& unit, const files::Json& result,
+                               const std::string& folder) {
+  const std::filesystem::path path(folder);
+  std::filesystem::create_directories(path);
+  if (study.ladder.any_accepted) {
+    files::write_file(
+        (path / "fitted.toml").string(),
+        stability::to_toml(study.ladder.model, {"Effects fitted to flights by swarmcert study."}), true);
+  }
+  files::write_file((path / "study.json").string(), files::to_text(result), true);
+  return write_page(study, unit, result, folder);
 }
 
 }  // namespace swarmcert::analysis

@@ -1,15 +1,16 @@
-/// @file The page of `study`: one story, pictures first.
+/// @file What `study` leaves in its folder.
 #pragma once
 
 #include <string>
 
 #include "analysis/commands/study/study_output.h"
+#include "nn/base/json.h"
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/study.html with its plots, their data and the JSON `result`; returns its path.
-/// @throws files::InputError as Report::write().
-std::string write_study_report(const identification::Study& study, const ForceUnit& unit,
-                               const files::Json& result, const std::string& folder, bool overwrite);
+/// Writes FOLDER/study.html with the data of its plots, FOLDER/study.json (`result`) and, if an effect was added,
+/// FOLDER/fitted.toml; makes the folder. Returns the page's path. @throws as Report::write().
+std::string write_study_folder(const identification::Study& study, const ForceUnit& unit,
+                               const files::Json& result, const std::string& folder);
 
 }  // namespace swarmcert::analysis

@@ -6,7 +6,7 @@
 #include <limits>
 #include <map>
 
-#include "analysis/residuals/force_residual.h"
+#include "analysis/identification/study/residual_under.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -19,12 +19,6 @@ struct Records {
   std::vector<int> block;
   std::vector<std::vector<Eigen::Vector3f>> residual_N;  ///< [model][record]
 };
-
-std::vector<Eigen::Vector3d> residual_under(const stability::Model& model, const residuals::Inputs& inputs,
-                                            residuals::Track track) {
-  residuals::apply_model(model, inputs.kinds, inputs.rules, track);
-  return residuals::force_residual(model, inputs.kinds, inputs.rules, track);
-}
 
 void add_track(const residuals::Track& track, const std::vector<stability::Model>& models,
                const residuals::Inputs& inputs, int& next_block, Records& all) {

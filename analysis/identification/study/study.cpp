@@ -57,6 +57,7 @@ Study study(const residuals::Inputs& inputs, const std::optional<Split>& split, 
   result.after = errors_of(with_model(inputs, fitted), chosen, jobs);
   progress(4, kSteps, "pictures");
   result.pictures = picture_data(inputs, inputs.models[0], fitted);
+  result.replay = replay_data(inputs, inputs.models[0], fitted, result.before.all.moments);
   progress(kSteps, kSteps, "done");
   return result;
 }

@@ -8,6 +8,7 @@
 #include "analysis/identification/diagnose.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/study/picture_data.h"
+#include "analysis/identification/study/replay_data.h"
 #include "analysis/residuals/comparison.h"
 
 namespace swarmcert::identification {
@@ -22,6 +23,7 @@ struct Study {
   Ladder ladder;        ///< effects added one by one; ladder.model is the fitted model
   StudyErrors before, after;
   PictureData pictures;
+  std::vector<ReplayFlight> replay;  ///< flights with the worst moments under the given model first
 };
 
 /// Shows progress: steps done of all, and what is being done.
