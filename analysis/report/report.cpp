@@ -48,9 +48,11 @@ void Report::paragraph(const std::string& text) { body_.push_back("<p>" + html_t
 void Report::table(const std::vector<std::string>& header,
                    const std::vector<std::vector<std::string>>& rows) {
   // Wide tables scroll by themselves, with keys too.
-  std::string html =
-      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"table\"><table><thead><tr>";
-  for (const std::string& cell : header) html += "<th scope=\"col\">" + html_text(cell) + "</th>";
+  std::string html = fmt::format(
+      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"table {}\"><table><thead><tr>",
+      ++tables_);
+  for (const std::string& cell : header)
+    html += cell.empty() ? "<td></td>" : "<th scope=\"col\">" + html_text(cell) + "</th>";
   html += "</tr></thead><tbody>\n";
   for (const std::vector<std::string>& row : rows) {
     html += "<tr>";
@@ -163,8 +165,8 @@ std::string Report::write(const std::string& folder, bool overwrite, const std::
       "'none'; img-src data:; style-src " +
       policy_source(style) + "; script-src " + policy_source(script) +
       "\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-      html_text(title_) + "</title>\n<style>" + style + "</style></head><body>\n<h1>" + html_text(title_) +
-      "</h1>\n";
+      html_text(title_) + "</title>\n<style>" + style + "</style></head><body><main>\n<h1>" +
+      html_text(title_) + "</h1>\n";
   std::size_t next_figure = 0;
   for (const std::string& part : body_) html += part.empty() ? drawn(figures_[next_figure++], folder) : part;
   html += "<h2>How it was made</h2>\n";
@@ -178,7 +180,7 @@ std::string Report::write(const std::string& folder, bool overwrite, const std::
         "<script type=\"application/json\" id=\"result\">" +
         script_json(result_json_) + "</script>\n";
   }
-  html += "<p>swarmcert " SWARMCERT_VERSION "</p>\n<script>" + script + "</script>\n</body></html>\n";
+  html += "<p>swarmcert " SWARMCERT_VERSION "</p>\n</main><script>" + script + "</script>\n</body></html>\n";
   const std::string report = (path / page).string();
   files::write_file(report, html, true);
   return report;

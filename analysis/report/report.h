@@ -108,6 +108,7 @@ class Report {
   std::string title_;
   std::string result_json_, command_;
   bool has_time_series_ = false, has_replay_ = false;
+  int tables_ = 0;                 ///< so far: landmarks of a page need different names
   std::vector<std::string> body_;  ///< HTML; "" where the next figure goes
   std::vector<Figure> figures_;
 };

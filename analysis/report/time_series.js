@@ -78,6 +78,8 @@
       unhighlightCallback: function () { tell(view); }
     });
     tell(view);
+    // The handles of the range selector serve the mouse only; selections and buttons do the same by key.
+    plot.querySelectorAll('img').forEach(function (handle) { handle.alt = ''; });
     graph.setAnnotations(series.marks.map(function (mark) {
       return {series: view.marked, x: Number(mark.time), shortText: String(Number(mark.rank)),
               text: 'worst moment ' + Number(mark.rank) + ': ' + Number(mark.size).toPrecision(3) + ' ' + unit};

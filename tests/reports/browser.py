@@ -215,6 +215,13 @@ class Browser:
             elif method == "Page.javascriptDialogOpening":
                 yield ["injection", p["message"]]
 
+    def accessibility(self, page, axe):
+        """What axe (the text of axe.min.js) finds on a page, as [kind, rule, what]."""
+        self._load(page)
+        self._evaluate(axe + ";0")
+        found = self._evaluate("axe.run().then(all => all.violations.map(v => [v.id, v.nodes[0].html.slice(0, 200)]))")
+        return [["accessibility", rule, what] for rule, what in found]
+
     def faults(self, page, widths=(390, 768, 1280), schemes=("light", "dark")):
         """[kind, width, what] of all that is wrong with a report: console, policy (of content), network, overflow, missing
         plot, empty plot, no caption, small text, contrast, no name, no result, no command, injection. The page is loaded at every

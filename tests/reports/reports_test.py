@@ -1,4 +1,6 @@
-"""Every command's report, in a browser: reports_test.py TOOL SOURCE_FOLDER
+"""Every command's report, in a browser: reports_test.py TOOL SOURCE_FOLDER [AXE]
+
+AXE is axe.min.js of the npm package axe-core; without it only names of controls and headings are checked.
 
 Ends with 77 (skipped) where there is no Chromium. First a good report is damaged in every way that the browser must see.
 """
@@ -184,6 +186,7 @@ def planted(good):
 
 def main():
     tool, source = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve()
+    axe = pathlib.Path(sys.argv[3]).read_text() if len(sys.argv) > 3 else None
     chromium = browser.find()
     if chromium is None:
         print("skipped: no Chromium here (package chromium); reports were not looked at")
@@ -201,8 +204,13 @@ def main():
                 if kind not in seen:
                     print(f"not seen: a planted fault of kind '{kind}' (seen: {sorted(seen)})")
                     faults += 1
+            if axe:
+                page.write_text(reports.pages["bound"].read_text().replace("</main>", "<img src='data:,'></main>"))
+                if "image-alt" not in {fault[1] for fault in tab.accessibility(page, axe)}:
+                    print("not seen: a planted picture without a text")
+                    faults += 1
             for name, page in reports.pages.items():
-                found = tab.faults(page)
+                found = tab.faults(page) + (tab.accessibility(page, axe) if axe else [])
                 faults += len(found)
                 print(f"{name}: {len(found)} faults, {page.stat().st_size // 1024} kB")
                 for fault in found:
