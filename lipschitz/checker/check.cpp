@@ -167,6 +167,8 @@ void CertificateChecker::check_bound(const Json& bound) {
       {"unit", files::unit(network_, function, block)},
       {"law", names.size() == 2 ? "one_neighbour" : "none"}};
   for (const auto& [key, text] : meaning) require(bound[key] == text, where + ": " + key + " is not " + text);
+  require(scale.empty() || scale.size() == static_cast<std::size_t>(parts_.at(names.front())->inputs()),
+          where + ": scale has another size");
   const Neighbours neighbours = neighbours_of(bound, where);
   const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
   check_status(bound, where);

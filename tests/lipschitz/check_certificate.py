@@ -1097,6 +1097,7 @@ class Checker:
         require(bound["norm"] == ("weighted_l2" if scale else "l2"), f"{where}: another norm")
         require(bound["unit"] == unit_of(self.network, function, block), f"{where}: another unit")
         require(bound["law"] == ("one_neighbour" if len(names) == 2 else "none"), f"{where}: another law")
+        require(not scale or len(scale) == self.network.parts[names[0]].layers[0].inputs, f"{where}: scale has another size")
         neighbours = self.neighbours_of(bound, where)
         upper = number(bound["upper"], bound["upper_hex"], where)
         require(bound["status"] in ("finished", "interrupted"), f"{where}: unknown status")
