@@ -1,0 +1,1135 @@
+
+(** val fst : ('a1 * 'a2) -> 'a1 **)
+
+let fst = function
+| (x, _) -> x
+
+(** val snd : ('a1 * 'a2) -> 'a2 **)
+
+let snd = function
+| (_, y) -> y
+
+(** val length : 'a1 list -> int **)
+
+let rec length = function
+| [] -> 0
+| _ :: l' -> Stdlib.Int.succ (length l')
+
+(** val app : 'a1 list -> 'a1 list -> 'a1 list **)
+
+let rec app l m =
+  match l with
+  | [] -> m
+  | a :: l1 -> a :: (app l1 m)
+
+type comparison =
+| Eq
+| Lt
+| Gt
+
+(** val compOpp : comparison -> comparison **)
+
+let compOpp = function
+| Eq -> Eq
+| Lt -> Gt
+| Gt -> Lt
+
+(** val add : int -> int -> int **)
+
+let rec add = (+)
+
+(** val eqb : bool -> bool -> bool **)
+
+let eqb b1 b2 =
+  if b1 then b2 else if b2 then false else true
+
+module Nat =
+ struct
+ end
+
+module Pos =
+ struct
+  (** val succ : Big.t -> Big.t **)
+
+  let rec succ x =
+    (fun _ _ _ _ -> assert false)
+      (fun p -> (fun p -> Big.shift_left p 1) (succ p))
+      (fun p -> (fun p -> Big.succ (Big.shift_left p 1)) p)
+      (fun _ -> (fun p -> Big.shift_left p 1) Big.one)
+      x
+
+  (** val add : Big.t -> Big.t -> Big.t **)
+
+  let rec add x y =
+    (fun _ _ _ _ -> assert false)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> (fun p -> Big.shift_left p 1) (add_carry p q))
+        (fun q -> (fun p -> Big.succ (Big.shift_left p 1))
+        (add p q))
+        (fun _ -> (fun p -> Big.shift_left p 1) (succ p))
+        y)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> (fun p -> Big.succ (Big.shift_left p 1))
+        (add p q))
+        (fun q -> (fun p -> Big.shift_left p 1) (add p q))
+        (fun _ -> (fun p -> Big.succ (Big.shift_left p 1)) p)
+        y)
+      (fun _ ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> (fun p -> Big.shift_left p 1) (succ q))
+        (fun q -> (fun p -> Big.succ (Big.shift_left p 1)) q)
+        (fun _ -> (fun p -> Big.shift_left p 1) Big.one)
+        y)
+      x
+
+  (** val add_carry : Big.t -> Big.t -> Big.t **)
+
+  and add_carry x y =
+    (fun _ _ _ _ -> assert false)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> (fun p -> Big.succ (Big.shift_left p 1))
+        (add_carry p q))
+        (fun q -> (fun p -> Big.shift_left p 1) (add_carry p q))
+        (fun _ -> (fun p -> Big.succ (Big.shift_left p 1)) (succ p))
+        y)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> (fun p -> Big.shift_left p 1) (add_carry p q))
+        (fun q -> (fun p -> Big.succ (Big.shift_left p 1))
+        (add p q))
+        (fun _ -> (fun p -> Big.shift_left p 1) (succ p))
+        y)
+      (fun _ ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> (fun p -> Big.succ (Big.shift_left p 1)) (succ q))
+        (fun q -> (fun p -> Big.shift_left p 1) (succ q))
+        (fun _ -> (fun p -> Big.succ (Big.shift_left p 1)) Big.one)
+        y)
+      x
+
+  (** val pred_double : Big.t -> Big.t **)
+
+  let rec pred_double x =
+    (fun _ _ _ _ -> assert false)
+      (fun p -> (fun p -> Big.succ (Big.shift_left p 1))
+      ((fun p -> Big.shift_left p 1) p))
+      (fun p -> (fun p -> Big.succ (Big.shift_left p 1))
+      (pred_double p))
+      (fun _ -> Big.one)
+      x
+
+  (** val mul : Big.t -> Big.t -> Big.t **)
+
+  let rec mul x y =
+    (fun _ _ _ _ -> assert false)
+      (fun p -> add y ((fun p -> Big.shift_left p 1) (mul p y)))
+      (fun p -> (fun p -> Big.shift_left p 1) (mul p y))
+      (fun _ -> y)
+      x
+
+  (** val iter : ('a1 -> 'a1) -> 'a1 -> Big.t -> 'a1 **)
+
+  let rec iter f x n =
+    (fun _ _ _ _ -> assert false)
+      (fun n' -> f (iter f (iter f x n') n'))
+      (fun n' -> iter f (iter f x n') n')
+      (fun _ -> f x)
+      n
+
+  (** val div2 : Big.t -> Big.t **)
+
+  let div2 p =
+    (fun _ _ _ _ -> assert false)
+      (fun p0 -> p0)
+      (fun p0 -> p0)
+      (fun _ -> Big.one)
+      p
+
+  (** val div2_up : Big.t -> Big.t **)
+
+  let div2_up p =
+    (fun _ _ _ _ -> assert false)
+      (fun p0 -> succ p0)
+      (fun p0 -> p0)
+      (fun _ -> Big.one)
+      p
+
+  (** val compare_cont : comparison -> Big.t -> Big.t -> comparison **)
+
+  let rec compare_cont r x y =
+    (fun _ _ _ _ -> assert false)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> compare_cont r p q)
+        (fun q -> compare_cont Gt p q)
+        (fun _ -> Gt)
+        y)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> compare_cont Lt p q)
+        (fun q -> compare_cont r p q)
+        (fun _ -> Gt)
+        y)
+      (fun _ ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> Lt)
+        (fun _ -> Lt)
+        (fun _ -> r)
+        y)
+      x
+
+  (** val compare : Big.t -> Big.t -> comparison **)
+
+  let compare =
+    compare_cont Eq
+
+  (** val eqb : Big.t -> Big.t -> bool **)
+
+  let rec eqb p q =
+    (fun _ _ _ _ -> assert false)
+      (fun p0 ->
+      (fun _ _ _ _ -> assert false)
+        (fun q0 -> eqb p0 q0)
+        (fun _ -> false)
+        (fun _ -> false)
+        q)
+      (fun p0 ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> false)
+        (fun q0 -> eqb p0 q0)
+        (fun _ -> false)
+        q)
+      (fun _ ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> false)
+        (fun _ -> false)
+        (fun _ -> true)
+        q)
+      p
+ end
+
+module Z =
+ struct
+  (** val double : Big.t -> Big.t **)
+
+  let double x =
+    (fun _ _ _ _ -> assert false)
+      (fun _ -> Big.zero)
+      (fun p -> (fun p -> p) ((fun p -> Big.shift_left p 1) p))
+      (fun p -> Big.neg ((fun p -> Big.shift_left p 1) p))
+      x
+
+  (** val succ_double : Big.t -> Big.t **)
+
+  let succ_double x =
+    (fun _ _ _ _ -> assert false)
+      (fun _ -> (fun p -> p) Big.one)
+      (fun p -> (fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+      p))
+      (fun p -> Big.neg (Pos.pred_double p))
+      x
+
+  (** val pred_double : Big.t -> Big.t **)
+
+  let pred_double x =
+    (fun _ _ _ _ -> assert false)
+      (fun _ -> Big.neg Big.one)
+      (fun p -> (fun p -> p) (Pos.pred_double p))
+      (fun p -> Big.neg ((fun p -> Big.succ (Big.shift_left p 1)) p))
+      x
+
+  (** val pos_sub : Big.t -> Big.t -> Big.t **)
+
+  let rec pos_sub x y =
+    (fun _ _ _ _ -> assert false)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> double (pos_sub p q))
+        (fun q -> succ_double (pos_sub p q))
+        (fun _ -> (fun p -> p) ((fun p -> Big.shift_left p 1) p))
+        y)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> pred_double (pos_sub p q))
+        (fun q -> double (pos_sub p q))
+        (fun _ -> (fun p -> p) (Pos.pred_double p))
+        y)
+      (fun _ ->
+      (fun _ _ _ _ -> assert false)
+        (fun q -> Big.neg ((fun p -> Big.shift_left p 1) q))
+        (fun q -> Big.neg (Pos.pred_double q))
+        (fun _ -> Big.zero)
+        y)
+      x
+
+  (** val compare : Big.t -> Big.t -> comparison **)
+
+  let compare x y =
+    (fun _ _ _ _ -> assert false)
+      (fun _ ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> Eq)
+        (fun _ -> Lt)
+        (fun _ -> Gt)
+        y)
+      (fun x' ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> Gt)
+        (fun y' -> Pos.compare x' y')
+        (fun _ -> Gt)
+        y)
+      (fun x' ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> Lt)
+        (fun _ -> Lt)
+        (fun y' -> compOpp (Pos.compare x' y'))
+        y)
+      x
+
+  (** val div2 : Big.t -> Big.t **)
+
+  let div2 z0 =
+    (fun _ _ _ _ -> assert false)
+      (fun _ -> Big.zero)
+      (fun p ->
+      (fun _ _ _ _ -> assert false)
+        (fun _ -> (fun p -> p) (Pos.div2 p))
+        (fun _ -> (fun p -> p) (Pos.div2 p))
+        (fun _ -> Big.zero)
+        p)
+      (fun p -> Big.neg (Pos.div2_up p))
+      z0
+ end
+
+(** val hd : 'a1 -> 'a1 list -> 'a1 **)
+
+let hd default = function
+| [] -> default
+| x :: _ -> x
+
+(** val tl : 'a1 list -> 'a1 list **)
+
+let tl = function
+| [] -> []
+| _ :: m -> m
+
+(** val nth : int -> 'a1 list -> 'a1 -> 'a1 **)
+
+let rec nth n l default =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> match l with
+              | [] -> default
+              | x :: _ -> x)
+    (fun m -> match l with
+              | [] -> default
+              | _ :: t -> nth m t default)
+    n
+
+(** val last : 'a1 list -> 'a1 -> 'a1 **)
+
+let rec last l d =
+  match l with
+  | [] -> d
+  | a :: l0 -> (match l0 with
+                | [] -> a
+                | _ :: _ -> last l0 d)
+
+(** val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list **)
+
+let rec map f = function
+| [] -> []
+| a :: t -> (f a) :: (map f t)
+
+(** val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1 **)
+
+let rec fold_right f a0 = function
+| [] -> a0
+| b :: t -> f b (fold_right f a0 t)
+
+(** val forallb : ('a1 -> bool) -> 'a1 list -> bool **)
+
+let rec forallb f = function
+| [] -> true
+| a :: l0 -> (&&) (f a) (forallb f l0)
+
+(** val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list **)
+
+let rec combine l l' =
+  match l with
+  | [] -> []
+  | x :: tl0 ->
+    (match l' with
+     | [] -> []
+     | y :: tl' -> (x, y) :: (combine tl0 tl'))
+
+(** val firstn : int -> 'a1 list -> 'a1 list **)
+
+let rec firstn n l =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> [])
+    (fun n0 -> match l with
+               | [] -> []
+               | a :: l0 -> a :: (firstn n0 l0))
+    n
+
+(** val skipn : int -> 'a1 list -> 'a1 list **)
+
+let rec skipn n l =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> l)
+    (fun n0 -> match l with
+               | [] -> []
+               | _ :: l0 -> skipn n0 l0)
+    n
+
+(** val repeat : 'a1 -> int -> 'a1 list **)
+
+let rec repeat x n =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> [])
+    (fun k -> x :: (repeat x k))
+    n
+
+(** val dot :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
+    -> 'a1 **)
+
+let rec dot zero0 add1 mul1 u v =
+  match u with
+  | [] -> zero0
+  | a :: u' ->
+    (match v with
+     | [] -> zero0
+     | b :: v' -> add1 (mul1 a b) (dot zero0 add1 mul1 u' v'))
+
+(** val apply :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1
+    list -> 'a1 list **)
+
+let apply zero0 add1 mul1 m v =
+  map (fun row -> dot zero0 add1 mul1 row v) m
+
+(** val plus : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list -> 'a1 list **)
+
+let rec plus add1 u v =
+  match u with
+  | [] -> v
+  | a :: u' ->
+    (match v with
+     | [] -> u
+     | b :: v' -> (add1 a b) :: (plus add1 u' v'))
+
+(** val scale : ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list -> 'a1 list **)
+
+let scale mul1 a u =
+  map (mul1 a) u
+
+(** val scale_all :
+    ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list list -> 'a1 list list **)
+
+let scale_all mul1 a m =
+  map (scale mul1 a) m
+
+(** val scale_rows :
+    ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list list -> 'a1 list list **)
+
+let rec scale_rows mul1 t m =
+  match t with
+  | [] -> []
+  | a :: t' ->
+    (match m with
+     | [] -> []
+     | row :: m' -> (scale mul1 a row) :: (scale_rows mul1 t' m'))
+
+(** val columns : 'a1 -> int -> 'a1 list list -> 'a1 list list **)
+
+let rec columns zero0 n m =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> [])
+    (fun n' -> (map (hd zero0) m) :: (columns zero0 n' (map tl m)))
+    n
+
+(** val product :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1
+    list list -> 'a1 list list **)
+
+let product zero0 add1 mul1 a b =
+  let b' = columns zero0 (length (hd [] b)) b in
+  map (fun row -> apply zero0 add1 mul1 b' row) a
+
+(** val sum :
+    ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1 list list -> 'a1 list list **)
+
+let rec sum add1 a b =
+  match a with
+  | [] -> b
+  | r :: a' ->
+    (match b with
+     | [] -> a
+     | s :: b' -> (plus add1 r s) :: (sum add1 a' b'))
+
+(** val gram :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1
+    list list **)
+
+let rec gram zero0 add1 mul1 m = match m with
+| [] -> []
+| row :: m' -> (map (dot zero0 add1 mul1 row) m) :: (gram zero0 add1 mul1 m')
+
+(** val diagonal_block : 'a1 -> 'a1 list -> 'a1 list list -> 'a1 list list **)
+
+let rec diagonal_block zero0 t right =
+  match t with
+  | [] -> []
+  | a :: t' ->
+    (match right with
+     | [] -> []
+     | row :: right' ->
+       (a :: (app (repeat zero0 (length t')) row)) :: (diagonal_block zero0
+                                                        t' right'))
+
+(** val diagonal : 'a1 -> 'a1 list -> 'a1 list list **)
+
+let diagonal zero0 t =
+  diagonal_block zero0 t (map (fun _ -> []) t)
+
+(** val band :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1
+    list -> ('a1 list * 'a1 list list) list -> 'a1 list list -> 'a1 list list **)
+
+let rec band zero0 add1 mul1 two_rho minus_rho t later last0 =
+  match later with
+  | [] ->
+    sum add1 (diagonal zero0 (scale mul1 two_rho t))
+      (scale_all mul1 minus_rho
+        (gram zero0 add1 mul1 (columns zero0 (length t) last0)))
+  | p :: later' ->
+    let (t2, m2) = p in
+    app
+      (diagonal_block zero0 (scale mul1 two_rho t)
+        (columns zero0 (length t)
+          (scale_all mul1 minus_rho (scale_rows mul1 t2 m2))))
+      (band zero0 add1 mul1 two_rho minus_rho t2 later' last0)
+
+(** val lmi :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 ->
+    'a1 list -> 'a1 list list -> ('a1 list * 'a1 list list) list -> 'a1 list
+    list -> 'a1 list list **)
+
+let lmi zero0 add1 mul1 minus_one two_rho minus_rho t first later last0 =
+  sum add1
+    (scale_all mul1 minus_one
+      (gram zero0 add1 mul1 (scale_rows mul1 t first)))
+    (band zero0 add1 mul1 two_rho minus_rho t later last0)
+
+(** val norm_lmi :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1
+    list list -> 'a1 list list **)
+
+let norm_lmi zero0 add1 mul1 minus_one rho m =
+  sum add1 (diagonal zero0 (map (fun _ -> rho) m))
+    (scale_all mul1 minus_one (gram zero0 add1 mul1 m))
+
+type dyadic = Big.t * Big.t
+
+(** val zero : dyadic **)
+
+let zero =
+  (Big.zero, Big.zero)
+
+(** val add0 : dyadic -> dyadic -> dyadic **)
+
+let add0 x y =
+  let (a, e) = x in
+  let (b, f) = y in
+  if Big.equal a Big.zero
+  then y
+  else if Big.equal b Big.zero
+       then x
+       else if Big.leq e f
+            then ((Big.add a
+                    ((fun a n -> Big.shift_left a (Big.to_int n)) b
+                      (Big.sub f e))), e)
+            else ((Big.add
+                    ((fun a n -> Big.shift_left a (Big.to_int n)) a
+                      (Big.sub e f)) b), f)
+
+(** val mul0 : dyadic -> dyadic -> dyadic **)
+
+let mul0 x y =
+  ((Big.mul (fst x) (fst y)), (Big.add (snd x) (snd y)))
+
+(** val neg : dyadic -> dyadic **)
+
+let neg x =
+  ((Big.neg (fst x)), (snd x))
+
+(** val abs : dyadic -> dyadic **)
+
+let abs x =
+  ((Big.abs (fst x)), (snd x))
+
+(** val shift : Big.t -> dyadic -> dyadic **)
+
+let shift k x =
+  ((fst x), (Big.add (snd x) k))
+
+(** val is_nonnegative : dyadic -> bool **)
+
+let is_nonnegative x =
+  Big.leq Big.zero (fst x)
+
+(** val is_positive : dyadic -> bool **)
+
+let is_positive x =
+  Big.lt Big.zero (fst x)
+
+type matrixD = dyadic list list
+
+type factor = { unit0 : Big.t; scales : Big.t list; rows : Big.t list list }
+
+(** val shift_row : Big.t -> Big.t list -> dyadic list -> dyadic list **)
+
+let rec shift_row k s = function
+| [] -> []
+| x :: row' ->
+  (shift (Big.add k (hd Big.zero s)) x) :: (shift_row k (tl s) row')
+
+(** val congruence : Big.t list -> matrixD -> matrixD **)
+
+let rec congruence s = function
+| [] -> []
+| row :: p' -> (shift_row (hd Big.zero s) s row) :: (congruence (tl s) p')
+
+(** val remainder : matrixD -> factor -> matrixD **)
+
+let remainder p f =
+  sum add0 (congruence f.scales p)
+    (map
+      (map (fun g -> ((Big.neg g),
+        (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one))
+          f.unit0)))) (gram Big.zero Big.add Big.mul f.rows))
+
+(** val total : dyadic list -> dyadic **)
+
+let total u =
+  fold_right add0 zero u
+
+(** val dominant : matrixD -> dyadic list -> bool **)
+
+let rec dominant e debts =
+  match e with
+  | [] -> (match debts with
+           | [] -> true
+           | _ :: _ -> false)
+  | row :: e' ->
+    let off = map abs (tl row) in
+    (&&)
+      (is_nonnegative
+        (add0 (hd zero row) (neg (add0 (hd zero debts) (total off)))))
+      (dominant e' (plus add0 (tl debts) off))
+
+(** val shows_nonnegative : matrixD -> factor -> bool **)
+
+let shows_nonnegative p f =
+  dominant (remainder p f) []
+
+(** val split : dyadic list -> matrixD list -> dyadic list list **)
+
+let rec split t = function
+| [] -> []
+| m :: ms' -> (firstn (length m) t) :: (split (skipn (length m) t) ms')
+
+(** val neurons : matrixD list -> int **)
+
+let neurons ms =
+  fold_right (fun m n -> add (length m) n) 0 ms
+
+(** val inputs : matrixD list -> matrixD -> int **)
+
+let inputs hidden0 last0 =
+  length (hd [] (hd last0 hidden0))
+
+(** val matrix_inequality :
+    matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD **)
+
+let matrix_inequality hidden0 last0 rho t =
+  match hidden0 with
+  | [] ->
+    let n = length (hd [] last0) in
+    norm_lmi zero add0 mul0 ((Big.neg Big.one), Big.zero) rho
+      (if (<=) (length last0) n then last0 else columns zero n last0)
+  | first :: later ->
+    lmi zero add0 mul0 ((Big.neg Big.one), Big.zero)
+      (mul0 (((fun p -> p) Big.one), ((fun p -> p) Big.one)) rho) (neg rho)
+      (firstn (length first) t) first
+      (combine (split (skipn (length first) t) later) later) last0
+
+(** val shapes : int -> matrixD list -> matrixD -> bool **)
+
+let rec shapes n hidden0 last0 =
+  match hidden0 with
+  | [] -> forallb (fun row -> (=) (length row) n) last0
+  | m :: hidden' ->
+    (&&) (forallb (fun row -> (=) (length row) n) m)
+      (shapes (length m) hidden' last0)
+
+(** val check :
+    matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list -> factor ->
+    bool **)
+
+let check hidden0 last0 upper rho t f =
+  (&&) (shapes (inputs hidden0 last0) hidden0 last0)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&)
+            ((&&) ((=) (length t) (neurons hidden0))
+              (forallb is_nonnegative t)) (is_positive rho))
+          (is_nonnegative upper))
+        (is_nonnegative (add0 (mul0 upper upper) (neg rho))))
+      (shows_nonnegative (matrix_inequality hidden0 last0 rho t) f))
+
+type layerD = matrixD * dyadic list
+
+type part = { hidden : layerD list; outer : layerD;
+              clamp : (dyadic * dyadic) list }
+
+(** val no_part : part **)
+
+let no_part =
+  { hidden = []; outer = ([], []); clamp = [] }
+
+(** val part_at : part list -> int -> part **)
+
+let part_at ps k =
+  nth k ps no_part
+
+(** val layers : part -> layerD list **)
+
+let layers p =
+  app p.hidden (p.outer :: [])
+
+(** val inputs_of : part -> int **)
+
+let inputs_of p =
+  length (hd [] (fst (hd p.outer p.hidden)))
+
+type function0 =
+| Alone of int
+| Set_of of int * int
+
+(** val moved : function0 -> int **)
+
+let moved = function
+| Alone p -> p
+| Set_of (phi, _) -> phi
+
+(** val one : dyadic **)
+
+let one =
+  (((fun p -> p) Big.one), Big.zero)
+
+type kind = (int * bool list) * Big.t
+
+type claim =
+| Norm_at_most of int * int * dyadic
+| Norm_at_least of int * int * dyadic
+| Slope_at_most of function0 * bool list * dyadic list * dyadic
+| Slope_at_least of function0 * bool list * dyadic list * dyadic
+| Law of bool * kind list * int * dyadic
+
+(** val set_stages :
+    matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD
+    list * matrixD **)
+
+let set_stages phi w rho last0 =
+  match rho with
+  | [] -> (phi, (product zero add0 mul0 last0 w))
+  | v :: rho' -> ((app phi ((product zero add0 mul0 v w) :: rho')), last0)
+
+(** val outputs : matrixD list -> int -> int **)
+
+let outputs hidden0 n =
+  length (last hidden0 (repeat [] n))
+
+type stack = matrixD list * matrixD
+
+(** val check_parts :
+    stack -> stack list -> dyadic -> dyadic -> dyadic list -> factor -> bool **)
+
+let rec check_parts p ps upper r t f =
+  match ps with
+  | [] -> check (fst p) (snd p) upper r t f
+  | q :: ps' ->
+    let joined = set_stages (fst p) (snd p) (fst q) (snd q) in
+    let n = inputs (fst p) (snd p) in
+    (&&)
+      ((&&)
+        ((&&)
+          ((&&) ((=) (length (hd [] (snd p))) (outputs (fst p) n))
+            ((=) (inputs (fst joined) (snd joined)) n))
+          (shapes n (fst p) (snd p)))
+        (shapes (length (snd p)) (fst q) (snd q)))
+      (check_parts joined ps' upper r t f)
+
+(** val count : bool list -> int **)
+
+let rec count = function
+| [] -> 0
+| b :: m -> if b then Stdlib.Int.succ (count m) else count m
+
+(** val selector : bool list -> dyadic list -> matrixD **)
+
+let rec selector moves scale0 =
+  match moves with
+  | [] -> []
+  | b :: m ->
+    if b
+    then ((hd one scale0) :: (repeat zero (count m))) :: (map (fun x ->
+                                                           zero :: x)
+                                                           (selector m
+                                                             (tl scale0)))
+    else (repeat zero (count m)) :: (selector m (tl scale0))
+
+(** val positive_scale : dyadic list -> bool **)
+
+let positive_scale scale0 =
+  forallb is_positive scale0
+
+(** val reluD : dyadic -> dyadic **)
+
+let reluD x =
+  if is_nonnegative x then x else zero
+
+(** val affineD : matrixD -> dyadic list -> dyadic list -> dyadic list **)
+
+let affineD m b x =
+  plus add0 (apply zero add0 mul0 m x) b
+
+(** val networkD : layerD list -> layerD -> dyadic list -> dyadic list **)
+
+let rec networkD hidden0 last0 x =
+  match hidden0 with
+  | [] -> affineD (fst last0) (snd last0) x
+  | l :: hidden' ->
+    let (m, b) = l in networkD hidden' last0 (map reluD (affineD m b x))
+
+(** val minusD : dyadic list -> dyadic list -> dyadic list **)
+
+let minusD u v =
+  plus add0 u (scale mul0 ((Big.neg Big.one), Big.zero) v)
+
+(** val squareD : dyadic list -> dyadic **)
+
+let squareD u =
+  dot zero add0 mul0 u u
+
+type proof =
+| By_inequality of dyadic * dyadic list * factor
+| By_vector of dyadic list
+| By_product
+| By_points of dyadic list * dyadic list * (int * dyadic list) list
+| By_triangle
+
+(** val at_most : dyadic -> dyadic -> bool **)
+
+let at_most x y =
+  is_nonnegative (add0 y (neg x))
+
+(** val is_nil : 'a1 list -> bool **)
+
+let is_nil = function
+| [] -> true
+| _ :: _ -> false
+
+(** val matrix_at : part list -> int -> int -> matrixD **)
+
+let matrix_at ps p layer =
+  fst (nth layer (layers (part_at ps p)) ([], []))
+
+(** val check_norm_below : matrixD -> dyadic -> dyadic list -> bool **)
+
+let check_norm_below w l v =
+  (&&)
+    ((&&) ((&&) ((=) (length v) (length (hd [] w))) (is_nonnegative l))
+      (is_positive (squareD v)))
+    (at_most (mul0 (mul0 l l) (squareD v))
+      (squareD (apply zero add0 mul0 w v)))
+
+(** val fits_part : part -> bool **)
+
+let fits_part p =
+  forallb (fun l -> (=) (length (snd l)) (length (fst l))) (layers p)
+
+(** val matrices : part -> stack **)
+
+let matrices p =
+  ((map fst p.hidden), (fst p.outer))
+
+(** val parts_of : part list -> function0 -> part list **)
+
+let parts_of ps = function
+| Alone p -> (part_at ps p) :: []
+| Set_of (phi, rho) -> (part_at ps phi) :: ((part_at ps rho) :: [])
+
+(** val well_formed :
+    part list -> function0 -> bool list -> dyadic list -> bool **)
+
+let well_formed ps f moves scale0 =
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&) (forallb fits_part (parts_of ps f))
+          (forallb (fun p -> is_nil p.clamp) (tl (parts_of ps f))))
+        ((=) (length moves) (inputs_of (part_at ps (moved f)))))
+      (positive_scale scale0))
+    ((||) (is_nil scale0) ((=) (length scale0) (length moves)))
+
+(** val check_slope :
+    part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
+    dyadic list -> factor -> bool **)
+
+let check_slope ps f moves scale0 u rho t factor0 =
+  (&&) ((&&) (well_formed ps f moves scale0) (is_nonnegative u))
+    (check_parts ([], (selector moves scale0)) (map matrices (parts_of ps f))
+      u rho t factor0)
+
+(** val find_norm : claim list -> int -> int -> dyadic option **)
+
+let rec find_norm accepted p layer =
+  match accepted with
+  | [] -> None
+  | c :: rest ->
+    (match c with
+     | Norm_at_most (q, k, u) ->
+       if (&&) ((=) p q) ((=) layer k) then Some u else find_norm rest p layer
+     | _ -> find_norm rest p layer)
+
+(** val norms : claim list -> int -> int -> layerD list -> dyadic option **)
+
+let rec norms accepted p layer = function
+| [] -> Some one
+| _ :: ls' ->
+  (match find_norm accepted p layer with
+   | Some u ->
+     (match norms accepted p (Stdlib.Int.succ layer) ls' with
+      | Some v -> if is_nonnegative u then Some (mul0 u v) else None
+      | None -> None)
+   | None -> None)
+
+(** val norm_of : part list -> claim list -> int -> dyadic option **)
+
+let norm_of ps accepted p =
+  norms accepted p 0 (layers (part_at ps p))
+
+(** val largest : dyadic -> dyadic list -> dyadic **)
+
+let rec largest m = function
+| [] -> m
+| s :: scale' -> largest (if at_most m s then s else m) scale'
+
+(** val product_of : part list -> claim list -> function0 -> dyadic option **)
+
+let product_of ps accepted = function
+| Alone p -> norm_of ps accepted p
+| Set_of (phi, rho) ->
+  (match norm_of ps accepted phi with
+   | Some a ->
+     (match norm_of ps accepted rho with
+      | Some b -> Some (mul0 a b)
+      | None -> None)
+   | None -> None)
+
+(** val check_product :
+    part list -> claim list -> function0 -> bool list -> dyadic list ->
+    dyadic -> bool **)
+
+let check_product ps accepted f moves scale0 u =
+  let m = largest (hd one scale0) scale0 in
+  (&&)
+    ((&&) ((&&) (well_formed ps f moves scale0) (at_most (hd one scale0) m))
+      (forallb (fun s -> at_most s m) scale0))
+    (match product_of ps accepted f with
+     | Some k -> at_most (mul0 m k) u
+     | None -> false)
+
+(** val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list **)
+
+let rec clampedD c x =
+  match c with
+  | [] -> x
+  | p :: c' ->
+    let (low, high) = p in
+    (match x with
+     | [] -> x
+     | a :: x' ->
+       let b = if at_most a low then low else a in
+       (if at_most b high then b else high) :: (clampedD c' x'))
+
+(** val valueD : part -> dyadic list -> dyadic list **)
+
+let valueD p x =
+  networkD p.hidden p.outer (clampedD p.clamp x)
+
+(** val value_ofD :
+    part list -> function0 -> dyadic list -> dyadic list -> dyadic list **)
+
+let value_ofD ps f rest x =
+  match f with
+  | Alone p -> valueD (part_at ps p) x
+  | Set_of (phi, rho) ->
+    valueD (part_at ps rho) (plus add0 (valueD (part_at ps phi) x) rest)
+
+(** val agreeD : bool list -> dyadic list -> dyadic list -> bool **)
+
+let rec agreeD moves x y =
+  match moves with
+  | [] ->
+    (match x with
+     | [] -> (match y with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | m :: moves' ->
+    (match x with
+     | [] -> false
+     | a :: x' ->
+       (match y with
+        | [] -> false
+        | b :: y' ->
+          (&&) ((||) m (Big.equal (fst (add0 a (neg b))) Big.zero))
+            (agreeD moves' x' y')))
+
+(** val fraction_in : dyadic list -> dyadic list -> dyadic * dyadic **)
+
+let rec fraction_in scale0 = function
+| [] -> (zero, one)
+| a :: d' ->
+  let s = hd one scale0 in
+  let (n, m) = fraction_in (tl scale0) d' in
+  ((add0 (mul0 n (mul0 s s)) (mul0 (mul0 a a) m)), (mul0 m (mul0 s s)))
+
+(** val check_points :
+    part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic
+    list -> dyadic list -> (int * dyadic list) list -> bool **)
+
+let check_points ps f moves scale0 l x y others =
+  let rest =
+    fold_right (plus add0) []
+      (map (fun o -> valueD (part_at ps (fst o)) (snd o)) others)
+  in
+  let (n, m) = fraction_in scale0 (minusD x y) in
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&) ((&&) (positive_scale scale0) (is_nonnegative l))
+            (agreeD moves x y))
+          ((=) (length x) (inputs_of (part_at ps (moved f)))))
+        (forallb (fun o ->
+          (=) (length (snd o)) (inputs_of (part_at ps (fst o)))) others))
+      (is_positive n))
+    (at_most (mul0 (mul0 l l) n)
+      (mul0
+        (squareD (minusD (value_ofD ps f rest x) (value_ofD ps f rest y))) m))
+
+(** val same_moves : bool list -> bool list -> bool **)
+
+let rec same_moves a b =
+  match a with
+  | [] -> (match b with
+           | [] -> true
+           | _ :: _ -> false)
+  | x :: a' ->
+    (match b with
+     | [] -> false
+     | y :: b' -> (&&) (eqb x y) (same_moves a' b'))
+
+(** val find_slope :
+    claim list -> int -> int -> bool list -> dyadic option **)
+
+let rec find_slope accepted phi rho moves =
+  match accepted with
+  | [] -> None
+  | c :: rest ->
+    (match c with
+     | Slope_at_most (f, m, scale0, u) ->
+       (match f with
+        | Alone _ -> find_slope rest phi rho moves
+        | Set_of (q, k) ->
+          (match scale0 with
+           | [] ->
+             let others = find_slope rest phi rho moves in
+             if (&&) ((&&) ((=) phi q) ((=) rho k)) (same_moves moves m)
+             then (match others with
+                   | Some v -> if at_most v u then Some v else Some u
+                   | None -> Some u)
+             else others
+           | _ :: _ -> find_slope rest phi rho moves))
+     | _ -> find_slope rest phi rho moves)
+
+(** val total_of : claim list -> bool -> kind list -> int -> dyadic option **)
+
+let rec total_of accepted squares kinds rho =
+  match kinds with
+  | [] -> Some zero
+  | k :: kinds' ->
+    let (p, n) = k in
+    let (phi, moves) = p in
+    (match find_slope accepted phi rho moves with
+     | Some k0 ->
+       (match total_of accepted squares kinds' rho with
+        | Some rest ->
+          if (&&) (is_nonnegative k0) (Big.leq Big.zero n)
+          then Some
+                 (add0
+                   (mul0 (n, Big.zero) (if squares then mul0 k0 k0 else k0))
+                   rest)
+          else None
+        | None -> None)
+     | None -> None)
+
+(** val check_law :
+    part list -> claim list -> bool -> kind list -> int -> dyadic -> bool **)
+
+let check_law ps accepted stacked kinds rho u =
+  (&&) ((&&) (is_nonnegative u) (fits_part (part_at ps rho)))
+    (match total_of accepted stacked kinds rho with
+     | Some s -> at_most s (if stacked then mul0 u u else u)
+     | None -> false)
+
+(** val check_claim : part list -> claim list -> claim -> proof -> bool **)
+
+let check_claim ps accepted c p =
+  match c with
+  | Norm_at_most (p0, layer, u) ->
+    (match p with
+     | By_inequality (rho, t, f) -> check [] (matrix_at ps p0 layer) u rho t f
+     | _ -> false)
+  | Norm_at_least (p0, layer, l) ->
+    (match p with
+     | By_vector v -> check_norm_below (matrix_at ps p0 layer) l v
+     | _ -> false)
+  | Slope_at_most (f, moves, scale0, u) ->
+    (match p with
+     | By_inequality (rho, t, r) -> check_slope ps f moves scale0 u rho t r
+     | By_product -> check_product ps accepted f moves scale0 u
+     | _ -> false)
+  | Slope_at_least (f, moves, scale0, l) ->
+    (match p with
+     | By_points (x, y, others) -> check_points ps f moves scale0 l x y others
+     | _ -> false)
+  | Law (stacked, kinds, rho, u) ->
+    (match p with
+     | By_triangle -> check_law ps accepted stacked kinds rho u
+     | _ -> false)
+
+(** val step :
+    part list -> claim list -> claim -> proof -> claim list option **)
+
+let step ps accepted c p =
+  if check_claim ps accepted c p then Some (c :: accepted) else None

@@ -1,0 +1,305 @@
+
+val fst : ('a1 * 'a2) -> 'a1
+
+val snd : ('a1 * 'a2) -> 'a2
+
+val length : 'a1 list -> int
+
+val app : 'a1 list -> 'a1 list -> 'a1 list
+
+type comparison =
+| Eq
+| Lt
+| Gt
+
+val compOpp : comparison -> comparison
+
+val add : int -> int -> int
+
+val eqb : bool -> bool -> bool
+
+module Nat :
+ sig
+ end
+
+module Pos :
+ sig
+  val succ : Big.t -> Big.t
+
+  val add : Big.t -> Big.t -> Big.t
+
+  val add_carry : Big.t -> Big.t -> Big.t
+
+  val pred_double : Big.t -> Big.t
+
+  val mul : Big.t -> Big.t -> Big.t
+
+  val iter : ('a1 -> 'a1) -> 'a1 -> Big.t -> 'a1
+
+  val div2 : Big.t -> Big.t
+
+  val div2_up : Big.t -> Big.t
+
+  val compare_cont : comparison -> Big.t -> Big.t -> comparison
+
+  val compare : Big.t -> Big.t -> comparison
+
+  val eqb : Big.t -> Big.t -> bool
+ end
+
+module Z :
+ sig
+  val double : Big.t -> Big.t
+
+  val succ_double : Big.t -> Big.t
+
+  val pred_double : Big.t -> Big.t
+
+  val pos_sub : Big.t -> Big.t -> Big.t
+
+  val compare : Big.t -> Big.t -> comparison
+
+  val div2 : Big.t -> Big.t
+ end
+
+val hd : 'a1 -> 'a1 list -> 'a1
+
+val tl : 'a1 list -> 'a1 list
+
+val nth : int -> 'a1 list -> 'a1 -> 'a1
+
+val last : 'a1 list -> 'a1 -> 'a1
+
+val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
+
+val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1
+
+val forallb : ('a1 -> bool) -> 'a1 list -> bool
+
+val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list
+
+val firstn : int -> 'a1 list -> 'a1 list
+
+val skipn : int -> 'a1 list -> 'a1 list
+
+val repeat : 'a1 -> int -> 'a1 list
+
+val dot :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
+  -> 'a1
+
+val apply :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1
+  list -> 'a1 list
+
+val plus : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list -> 'a1 list
+
+val scale : ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list -> 'a1 list
+
+val scale_all : ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list list -> 'a1 list list
+
+val scale_rows :
+  ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list list -> 'a1 list list
+
+val columns : 'a1 -> int -> 'a1 list list -> 'a1 list list
+
+val product :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1
+  list list -> 'a1 list list
+
+val sum :
+  ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1 list list -> 'a1 list list
+
+val gram :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list list -> 'a1
+  list list
+
+val diagonal_block : 'a1 -> 'a1 list -> 'a1 list list -> 'a1 list list
+
+val diagonal : 'a1 -> 'a1 list -> 'a1 list list
+
+val band :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 list
+  -> ('a1 list * 'a1 list list) list -> 'a1 list list -> 'a1 list list
+
+val lmi :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 ->
+  'a1 list -> 'a1 list list -> ('a1 list * 'a1 list list) list -> 'a1 list
+  list -> 'a1 list list
+
+val norm_lmi :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 list
+  list -> 'a1 list list
+
+type dyadic = Big.t * Big.t
+
+val zero : dyadic
+
+val add0 : dyadic -> dyadic -> dyadic
+
+val mul0 : dyadic -> dyadic -> dyadic
+
+val neg : dyadic -> dyadic
+
+val abs : dyadic -> dyadic
+
+val shift : Big.t -> dyadic -> dyadic
+
+val is_nonnegative : dyadic -> bool
+
+val is_positive : dyadic -> bool
+
+type matrixD = dyadic list list
+
+type factor = { unit0 : Big.t; scales : Big.t list; rows : Big.t list list }
+
+val shift_row : Big.t -> Big.t list -> dyadic list -> dyadic list
+
+val congruence : Big.t list -> matrixD -> matrixD
+
+val remainder : matrixD -> factor -> matrixD
+
+val total : dyadic list -> dyadic
+
+val dominant : matrixD -> dyadic list -> bool
+
+val shows_nonnegative : matrixD -> factor -> bool
+
+val split : dyadic list -> matrixD list -> dyadic list list
+
+val neurons : matrixD list -> int
+
+val inputs : matrixD list -> matrixD -> int
+
+val matrix_inequality :
+  matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD
+
+val shapes : int -> matrixD list -> matrixD -> bool
+
+val check :
+  matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list -> factor -> bool
+
+type layerD = matrixD * dyadic list
+
+type part = { hidden : layerD list; outer : layerD;
+              clamp : (dyadic * dyadic) list }
+
+val no_part : part
+
+val part_at : part list -> int -> part
+
+val layers : part -> layerD list
+
+val inputs_of : part -> int
+
+type function0 =
+| Alone of int
+| Set_of of int * int
+
+val moved : function0 -> int
+
+val one : dyadic
+
+type kind = (int * bool list) * Big.t
+
+type claim =
+| Norm_at_most of int * int * dyadic
+| Norm_at_least of int * int * dyadic
+| Slope_at_most of function0 * bool list * dyadic list * dyadic
+| Slope_at_least of function0 * bool list * dyadic list * dyadic
+| Law of bool * kind list * int * dyadic
+
+val set_stages :
+  matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD list * matrixD
+
+val outputs : matrixD list -> int -> int
+
+type stack = matrixD list * matrixD
+
+val check_parts :
+  stack -> stack list -> dyadic -> dyadic -> dyadic list -> factor -> bool
+
+val count : bool list -> int
+
+val selector : bool list -> dyadic list -> matrixD
+
+val positive_scale : dyadic list -> bool
+
+val reluD : dyadic -> dyadic
+
+val affineD : matrixD -> dyadic list -> dyadic list -> dyadic list
+
+val networkD : layerD list -> layerD -> dyadic list -> dyadic list
+
+val minusD : dyadic list -> dyadic list -> dyadic list
+
+val squareD : dyadic list -> dyadic
+
+type proof =
+| By_inequality of dyadic * dyadic list * factor
+| By_vector of dyadic list
+| By_product
+| By_points of dyadic list * dyadic list * (int * dyadic list) list
+| By_triangle
+
+val at_most : dyadic -> dyadic -> bool
+
+val is_nil : 'a1 list -> bool
+
+val matrix_at : part list -> int -> int -> matrixD
+
+val check_norm_below : matrixD -> dyadic -> dyadic list -> bool
+
+val fits_part : part -> bool
+
+val matrices : part -> stack
+
+val parts_of : part list -> function0 -> part list
+
+val well_formed : part list -> function0 -> bool list -> dyadic list -> bool
+
+val check_slope :
+  part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
+  dyadic list -> factor -> bool
+
+val find_norm : claim list -> int -> int -> dyadic option
+
+val norms : claim list -> int -> int -> layerD list -> dyadic option
+
+val norm_of : part list -> claim list -> int -> dyadic option
+
+val largest : dyadic -> dyadic list -> dyadic
+
+val product_of : part list -> claim list -> function0 -> dyadic option
+
+val check_product :
+  part list -> claim list -> function0 -> bool list -> dyadic list -> dyadic
+  -> bool
+
+val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list
+
+val valueD : part -> dyadic list -> dyadic list
+
+val value_ofD :
+  part list -> function0 -> dyadic list -> dyadic list -> dyadic list
+
+val agreeD : bool list -> dyadic list -> dyadic list -> bool
+
+val fraction_in : dyadic list -> dyadic list -> dyadic * dyadic
+
+val check_points :
+  part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic list
+  -> dyadic list -> (int * dyadic list) list -> bool
+
+val same_moves : bool list -> bool list -> bool
+
+val find_slope : claim list -> int -> int -> bool list -> dyadic option
+
+val total_of : claim list -> bool -> kind list -> int -> dyadic option
+
+val check_law :
+  part list -> claim list -> bool -> kind list -> int -> dyadic -> bool
+
+val check_claim : part list -> claim list -> claim -> proof -> bool
+
+val step : part list -> claim list -> claim -> proof -> claim list option

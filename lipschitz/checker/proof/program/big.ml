@@ -1,0 +1,2 @@
+(* The name under which extracted/proved.ml knows the integers of GMP. *)
+include Z

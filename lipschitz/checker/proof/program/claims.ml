@@ -1,0 +1,190 @@
+(* Each statement of a certificate as a claim of the theorems with its proof. Only `prove` says that one holds: it asks the
+   extracted checker. Everything else here says which claim it is, and words the reason where it is refused. *)
+
+open Refusal
+open Json
+
+type source = Proved_here | Not_checked
+type t = {
+  net : Network.t;
+  json : Json.t;
+  parts : Proved.part list;
+  mutable accepted : Proved.claim list;  (* all of these hold: theorem accepted_hold *)
+  mutable log : (Proved.claim * Proved.proof) list;  (* the last one first *)
+  norms : (string, Proved.dyadic) Hashtbl.t;  (* product of the norms of a network *)
+  uppers : (string * string * (string * int) list, Proved.dyadic * source) Hashtbl.t;  (* by function, block, neighbours *)
+  mutable spectral_norms : int;
+  mutable upper_bounds : int;
+  mutable lower_bounds : int;
+  mutable not_checked : string list;
+}
+
+let prove state claim proof reason =
+  match Proved.step state.parts state.accepted claim proof with
+  | Some accepted -> state.accepted <- accepted; state.log <- (claim, proof) :: state.log
+  | None -> rejected "%s" reason
+
+let not_checked state what = state.not_checked <- what :: state.not_checked
+
+let at_most = Proved.at_most
+let times = Proved.mul0
+let plus = Proved.add0
+
+let check_status where json =
+  let status = text where (find where "status" json) in
+  require (status = "finished" || status = "interrupted") "%s: unknown status" where
+
+(* A proof by a matrix inequality. `neurons`: hidden ones of the chain. *)
+let inequality where ~neurons ~upper json =
+  let here = where ^ ".proof" in
+  require_keys here [ "rho"; "t"; "factor" ] json;
+  let rho = Exact.of_float (Exact.hex_float where (find here "rho" json)) in
+  let t = List.map Exact.of_float (Exact.hex_floats where (find here "t" json)) in
+  require (List.length t = neurons) "%s: needs one multiplier t per hidden neuron" where;
+  require (Proved.is_positive rho && List.for_all Proved.is_nonnegative t) "%s: rho is not positive, or a t negative" where;
+  require (at_most rho (times upper upper)) "%s: claims less than sqrt(rho)" where;
+  Proved.By_inequality (rho, t, Exact.factor (where ^ ".factor") (find here "factor" json))
+
+let no_factor where = where ^ ": the factor does not show that the matrix inequality holds"
+
+let check_layer state entry part k (layer : Weights.layer) =
+  let where = Printf.sprintf "layer %s %s" part layer.name in
+  require_keys where [ "network"; "name"; "spectral_norm"; "spectral_norm_hex"; "proof" ] entry;
+  require (find where "network" entry = Text part && find where "name" entry = Text layer.name) "%s is not where it is expected" where;
+  let end_ i = Exact.number where (element where i (find where "spectral_norm" entry)) (element where i (find where "spectral_norm_hex" entry)) in
+  let lower = Exact.of_float (end_ 0) and upper = Exact.of_float (end_ 1) in
+  let proof = find where "proof" entry in
+  require_keys (where ^ ".proof") [ "lower_vector"; "upper" ] proof;
+  let vector = List.map Exact.of_float (Exact.hex_floats where (find where "lower_vector" proof)) in
+  require (List.length vector = Weights.inputs layer && List.exists (fun x -> x <> Exact.zero) vector) "%s: unusable lower_vector" where;
+  let p = Functions.index state.net part in
+  prove state (Norm_at_least (p, k, lower)) (By_vector vector) (where ^ ": claims more than |W v| / |v|");
+  prove state (Norm_at_most (p, k, upper)) (inequality where ~neurons:0 ~upper (find where "upper" proof)) (no_factor where);
+  let product = Option.value ~default:Exact.one (Hashtbl.find_opt state.norms part) in
+  Hashtbl.replace state.norms part (times product upper);
+  state.spectral_norms <- state.spectral_norms + 1
+
+(* Bounds *)
+
+let most_neighbours = 1_000_000
+
+let counts where json = List.map (fun (kind, n) -> kind, whole where n) (members where json)
+
+let neighbours_of state where bound =
+  if not (has "neighbours" bound) then [] else begin
+    let counts = List.sort compare (counts where (find where "neighbours" bound)) in
+    let names = Functions.networks_of (text where (find where "function" bound)) in
+    require (List.length names = 2 && find where "domain" bound = Text "box") "%s: neighbours only of a set function on a box" where;
+    List.iter (fun (kind, n) ->
+        require (kind <> "ground" && List.mem_assoc ("phi:" ^ kind) state.net.parts && 1 <= n && n <= most_neighbours)
+          "%s: impossible neighbours" where) counts;
+    let moves kind = List.hd names = "phi:" ^ kind in
+    require (counts <> [] && (moves "ground" || List.exists (fun (kind, _) -> moves kind) counts))
+      "%s: the neighbour that moves is none of those listed" where;
+    counts
+  end
+
+let function_of state = function
+  | [ part ] -> Proved.Alone (Functions.index state.net part)
+  | [ phi; rho ] -> Proved.Set_of (Functions.index state.net phi, Functions.index state.net rho)
+  | _ -> assert false
+
+(* Neurons that a ReLU follows, where the last layer of phi and the first of rho are one. *)
+let hidden_neurons state names =
+  let hidden part = List.fold_left (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer (Functions.weights state.net part)))
+      (Functions.weights state.net part).layers in
+  List.fold_left (fun n part -> n + hidden part) 0 names
+
+let meaning state where bound names scale =
+  let f = text where (find where "function" bound) and block = text where (find where "block" bound) in
+  let in_box = find where "domain" bound = Text "box" && (match find where "box" state.json with Object _ -> true | _ -> false) in
+  [ "domain", (if in_box then "box" else "global");
+    "law", (if List.length names = 2 then "one_neighbour" else "none");
+    "norm", (if scale = [] then "l2" else "weighted_l2");
+    "unit", Functions.unit state.net f block ]
+
+let bound_keys = [ "function"; "domain"; "block"; "law"; "norm"; "scale"; "unit"; "upper"; "upper_hex"; "upper_method"; "lower";
+                   "lower_hex"; "lower_witness"; "proof"; "status" ]
+
+let check_product state where names claim scale upper =
+  let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in
+  let total = List.fold_left (fun total name -> match Hashtbl.find_opt state.norms name with
+      | Some norm -> times total norm | None -> rejected "%s: there is no network %s" where (shown name)) (Exact.of_float largest) names in
+  require (at_most total upper) "%s: claims less than the product of the norms" where;
+  prove state claim Proved.By_product (where ^ ": claims less than the product of the norms")
+
+let check_bound state bound =
+  require_keys "bound" (bound_keys @ if has "neighbours" bound then [ "neighbours" ] else []) bound;
+  let f = text "bound" (find "bound" "function" bound) and block = text "bound" (find "bound" "block" bound) in
+  let where = Printf.sprintf "bound %s %s" (shown f) (shown block) in
+  let names = Functions.networks_of f in
+  let scale = Exact.hex_floats where (find where "scale" bound) in
+  require (List.for_all (fun s -> s > 0.) scale) "%s: scale is not positive" where;
+  List.iter (fun (key, text) -> require (find where key bound = Text text) "%s: %s is not %s" where key text) (meaning state where bound names scale);
+  require (scale = [] || List.length scale = Functions.inputs state.net (List.hd names)) "%s: scale has another size" where;
+  let neighbours = neighbours_of state where bound in
+  let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" bound) (find where "upper_hex" bound)) in
+  check_status where bound;
+  let moves = Functions.moves state.net f block and func = function_of state names in
+  let exact_scale = List.map Exact.of_float scale in
+  let claim = Proved.Slope_at_most (func, moves, exact_scale, upper) in
+  let source = match find where "upper_method" bound with
+    | Text ("sdp" | "eclipse_fast") ->
+      let proof = inequality where ~neurons:(hidden_neurons state names) ~upper (find where "proof" bound) in
+      prove state claim proof (no_factor where); Proved_here
+    | Text "branch" ->
+      not_checked state (Printf.sprintf "%s <= %s: proved by parts of boxes" where
+                           (text where (find where "upper_hex" bound)));
+      Not_checked
+    | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper; Proved_here
+    | _ -> rejected "%s: unknown upper_method" where in
+  if scale = [] then Hashtbl.replace state.uppers (f, block, neighbours) (upper, source);
+  if source = Proved_here then state.upper_bounds <- state.upper_bounds + 1;
+  match find where "lower_witness" bound with
+  | Null -> require (find where "lower" bound = Null && find where "lower_hex" bound = Null) "%s: lower without a witness" where
+  | witness ->
+    let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound) (find where "lower_hex" bound)) in
+    let in_box = find where "domain" bound = Text "box" in
+    let proof = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours ~moves witness in
+    prove state (Slope_at_least (func, moves, exact_scale, lower)) proof (where ^ ": lower_witness: claims more than the slope between x and y");
+    state.lower_bounds <- state.lower_bounds + 1
+
+(* Laws *)
+
+let check_law state law =
+  require_keys "law" [ "rho"; "neighbours"; "domain"; "block"; "law"; "status"; "upper"; "upper_hex" ] law;
+  let rho = text "law" (find "law" "rho" law) and block = text "law" (find "law" "block" law) in
+  let where = Printf.sprintf "law of %s %s" (shown rho) (shown block) in
+  check_status where law;
+  let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" law) (find where "upper_hex" law)) in
+  let neighbours = List.sort compare (counts where (find where "neighbours" law)) in
+  require (not (List.mem_assoc "ground" neighbours)) "%s: the ground is no neighbour" where;
+  let terms = List.sort compare (neighbours @ if Functions.has_ground state.net then [ "ground", 1 ] else []) in
+  let domain = text where (find where "domain" law) in
+  require (domain = "box" || domain = "global") "%s: unknown domain" where;
+  let bound_of (kind, count) =
+    require (1 <= count && count <= most_neighbours) "%s: impossible number of neighbours" where;
+    let f = Printf.sprintf "set:%s:%s" kind rho in
+    let any, source = match Hashtbl.find_opt state.uppers (f, block, []) with
+      | Some found -> found | None -> rejected "%s: rests on a bound of %s that is not there" where (shown f) in
+    match Hashtbl.find_opt state.uppers (f, block, neighbours) with
+    | Some (fewer, source) when domain = "box" && neighbours <> [] && at_most fewer any -> f, count, fewer, source
+    | _ -> f, count, any, source in
+  let bounds = List.map bound_of terms in
+  require (List.mem block [ "all"; "position"; "velocity" ]) "%s: no law for this block" where;
+  let name = text where (find where "law" law) in
+  let stacked = name = "all_stacked" in
+  require (stacked || name = "all_max" || name = "own_state") "%s: unknown law" where;
+  let total = List.fold_left (fun sum (_, n, k, _) ->
+      plus sum (times (Z.of_int n, Z.zero) (if stacked then times k k else k))) Exact.zero bounds in
+  let reason = where ^ ": claims less than the law gives" in
+  require (at_most total (if stacked then times upper upper else upper)) "%s" reason;
+  if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds then
+    not_checked state (Printf.sprintf "%s: rests on a bound proved by parts of boxes" where)
+  else begin
+    let kind (f, n, _, _) =
+      (Functions.index state.net (List.hd (Functions.networks_of f)), Functions.moves state.net f block), Z.of_int n in
+    let rho = Functions.index state.net ("rho:" ^ rho) in
+    prove state (Law (stacked, List.map kind bounds, rho, upper)) By_triangle reason;
+    state.upper_bounds <- state.upper_bounds + 1
+  end

@@ -1,0 +1,53 @@
+(* A certificate as a Coq file that coqc accepts by computation in its kernel: `swarmcert-check-proved --coq`. *)
+
+let number out (m, e) = Printf.bprintf out "(%s,%s)" (Z.to_string m) (Z.to_string e)
+let integer out z = Buffer.add_string out (Z.to_string z)
+let natural out n = Printf.bprintf out "%d%%nat" n
+let flag out b = Buffer.add_string out (if b then "true" else "false")
+let list element out elements =
+  Buffer.add_char out '[';
+  List.iteri (fun k e -> if k > 0 then Buffer.add_string out ";"; element out e) elements;
+  Buffer.add_char out ']'
+let numbers = list number
+let matrix = list numbers
+let pair first second out (a, b) = Printf.bprintf out "(%a,%a)" first a second b
+
+let layer = pair matrix numbers
+let part out { Proved.hidden; outer; clamp } =
+  Printf.bprintf out "Part %a %a %a" (list layer) hidden layer outer (list (pair number number)) clamp
+let func out = function
+  | Proved.Alone p -> Printf.bprintf out "(Alone %a)" natural p
+  | Set_of (phi, rho) -> Printf.bprintf out "(Set_of %a %a)" natural phi natural rho
+let claim out = function
+  | Proved.Norm_at_most (p, k, u) -> Printf.bprintf out "Norm_at_most %a %a %a" natural p natural k number u
+  | Norm_at_least (p, k, l) -> Printf.bprintf out "Norm_at_least %a %a %a" natural p natural k number l
+  | Slope_at_most (f, moves, scale, u) -> Printf.bprintf out "Slope_at_most %a %a %a %a" func f (list flag) moves numbers scale number u
+  | Slope_at_least (f, moves, scale, l) -> Printf.bprintf out "Slope_at_least %a %a %a %a" func f (list flag) moves numbers scale number l
+  | Law (stacked, kinds, rho, u) ->
+    Printf.bprintf out "Law %a %a %a %a" flag stacked (list (pair (pair natural (list flag)) integer)) kinds natural rho number u
+let proof out = function
+  | Proved.By_inequality (rho, t, { unit0; scales; rows }) ->
+    Printf.bprintf out "By_inequality %a %a (Factor (%a) %a %a)" number rho numbers t integer unit0 (list integer) scales (list (list integer)) rows
+  | By_vector v -> Printf.bprintf out "By_vector %a" numbers v
+  | By_product -> Buffer.add_string out "By_product"
+  | By_points (x, y, others) -> Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
+  | By_triangle -> Buffer.add_string out "By_triangle"
+
+let file parts claims =
+  let out = Buffer.create (1 lsl 20) in
+  Buffer.add_string out
+    "(* coqc -R THEORY Swarmcert FILE.v , THEORY: the folder of the compiled theory.\n\
+    \   `certificate` is what is claimed of `networks`; Meaning.v says what that means. *)\n\
+     From Coq Require Import List ZArith.\nFrom Swarmcert Require Import Checker Meaning Claims Sound.\n\
+     Import ListNotations.\nOpen Scope Z_scope.\n\n";
+  List.iteri (fun k p -> Printf.bprintf out "Definition network%d : part := %a.\n" k part p) parts;
+  Printf.bprintf out "Definition networks : list part := [%s].\n\n" (String.concat "; " (List.mapi (fun k _ -> Printf.sprintf "network%d" k) parts));
+  List.iteri (fun k (c, p) ->
+      Printf.bprintf out "Definition claim%d : claim := %a.\nDefinition proof%d : proof := %a.\n" k claim c k proof p) claims;
+  Printf.bprintf out "\nDefinition certificate : list (claim * proof) := [%s].\n"
+    (String.concat "; " (List.mapi (fun k _ -> Printf.sprintf "(claim%d, proof%d)" k k) claims));
+  Buffer.add_string out
+    "Theorem accepted : check_all networks [] certificate = true.\nProof. vm_cast_no_check (eq_refl true). Qed.\n\
+     Theorem certificate_holds : Forall (fun c => holds networks (fst c)) certificate.\n\
+     Proof. exact (check_all_holds _ _ accepted). Qed.\nPrint Assumptions certificate_holds.\n";
+  Buffer.contents out

@@ -1,0 +1,150 @@
+(* NET: its networks by name ("network", "phi:<kind>", "rho:<kind>"), units, input order and clamp. *)
+
+open Refusal
+
+type t = {
+  sha256 : string;  (* of network.toml; else "" *)
+  unit : string;
+  order : string list;
+  clamp : (float * float) list;  (* [] : none *)
+  parts : (string * Weights.t) list;  (* by name, sorted *)
+}
+
+type arguments = { net : string; phi : string; rho : string; key : string; orders : (string * string list) list }
+
+let load_bytes path bytes ~key ~order =
+  if Pth.looks_like bytes then Pth.read path bytes ~key ~order
+  else if Safetensors.looks_like bytes then begin
+    if key <> "" then bad_input "%s: safetensors files are not nested: leave --key out" path;
+    Safetensors.read path bytes ~order
+  end
+  else bad_input "%s: is neither safetensors nor a PyTorch state dict, which are the formats of this checker; `swarmcert convert` \
+                  writes safetensors, and certify then names that file" path
+let load path ~key ~order =
+  match String.rindex_opt path '#' with
+  | Some mark when mark + 1 < String.length path && not (Sys.file_exists path) ->
+    if key <> "" then bad_input "%s: the name of the file already names a key" path;
+    let file = String.sub path 0 mark in
+    load_bytes file (contents file) ~key:(String.sub path (mark + 1) (String.length path - mark - 1)) ~order
+  | _ -> load_bytes path (contents path) ~key ~order
+
+let is_clamped part = part = "network" || (String.length part >= 4 && String.sub part 0 4 = "phi:" && part <> "phi:ground")
+let sizes weights = Weights.inputs (Weights.first_layer weights), Weights.outputs (Weights.last_layer weights)
+
+(* network.toml *)
+
+let allow_only path where keys members =
+  List.iter (fun (key, _) -> if not (List.mem key keys) then bad_input "%s: %s%s is not a known key" path where (shown key)) members
+let table path name = function
+  | Some (Json.Object members) -> members
+  | Some _ -> bad_input "%s: %s must be a table" path name
+  | None -> bad_input "%s: %s is missing" path name
+let text path name = function Some (Json.Text s) -> s | _ -> bad_input "%s: %s must be text in quotes" path name
+let texts path name = function
+  | Json.Array elements -> List.map (fun e -> text path name (Some e)) elements
+  | _ -> bad_input "%s: %s must be a list of texts in quotes" path name
+let numbers path name = function
+  | Some (Json.Array elements) ->
+    List.map (function Json.Number { value; _ } -> value | _ -> bad_input "%s: %s must be a list of numbers" path name) elements
+  | _ -> bad_input "%s: %s must be a list of numbers" path name
+
+let read_output path members =
+  allow_only path "output." [ "quantity"; "unit" ] members;
+  let quantity = text path "output.quantity" (List.assoc_opt "quantity" members) in
+  let unit = text path "output.unit" (List.assoc_opt "unit" members) in
+  let units = match quantity with
+    | "force_z" | "force" -> [ "gf"; "N" ] | "torque" -> [ "mN_m"; "N_m" ]
+    | _ -> bad_input "%s: output.quantity is not one of the possible values" path in
+  if not (List.mem unit units) then bad_input "%s: output.unit is not one of the possible values" path;
+  unit, Some (if quantity = "force_z" then 1 else 3)
+
+let read_input path members =
+  allow_only path "input." [ "order"; "clamp" ] members;
+  let order = match List.assoc_opt "order" members with None -> [] | Some json ->
+    let names = texts path "input.order" json in
+    if names = [] || List.length (List.sort_uniq compare names) <> List.length names then
+      bad_input "%s: input.order is empty or names an input twice" path;
+    names in
+  let clamp = match List.assoc_opt "clamp" members with None -> [] | json ->
+    let members = table path "input.clamp" json in
+    allow_only path "input.clamp." [ "lower"; "upper" ] members;
+    let lower = numbers path "input.clamp.lower" (List.assoc_opt "lower" members) in
+    let upper = numbers path "input.clamp.upper" (List.assoc_opt "upper" members) in
+    let count = if order = [] then List.length lower else List.length order in
+    if count = 0 || List.length lower <> count || List.length upper <> count then
+      bad_input "%s: input.clamp needs %d numbers each" path count;
+    if not (List.for_all2 ( <= ) lower upper) then bad_input "%s: input.clamp: lower is above upper" path;
+    List.combine lower upper in
+  order, clamp
+
+let read_gamma path members =
+  allow_only path "gamma." [ "value"; "scope"; "mode" ] members;
+  let choice key words = if not (List.mem (text path ("gamma." ^ key) (List.assoc_opt key members)) words) then
+      bad_input "%s: gamma.%s is not one of the possible values" path key in
+  choice "scope" [ "layer"; "network" ]; choice "mode" [ "clip"; "equal" ];
+  match List.assoc_opt "value" members with
+  | Some (Json.Number { value; _ }) when value > 0. -> ()
+  | _ -> bad_input "%s: gamma.value must be positive" path
+
+let read_kinds path ~key role members =
+  if members = [] then bad_input "%s: %s names no kind of vehicle" path role;
+  List.map (fun (kind, json) ->
+      let where = role ^ "." ^ kind in
+      let entry = table path where (Some json) in
+      allow_only path (where ^ ".") [ "weights"; "order" ] entry;
+      if String.contains kind ':' then bad_input "%s: a kind's name must not contain ':'" path;
+      let file = text path (where ^ ".weights") (List.assoc_opt "weights" entry) in
+      if file = "" || String.contains file '\000' then bad_input "%s: %s.weights is not the name of a file" path where;
+      let order = match List.assoc_opt "order" entry with None -> [] | Some json ->
+        let names = texts path (where ^ ".order") json in
+        if names = [] then bad_input "%s: %s.order names no layer" path where; names in
+      let file = if Filename.is_relative file then Filename.concat (Filename.dirname path) file else file in
+      role ^ ":" ^ kind, load file ~key ~order) members
+
+let check_sizes path ~order ~clamp ~components phis rhos =
+  let refuse name what = bad_input "%s: %s: does not fit the other networks (%s)" path name what in
+  let hidden = snd (sizes (snd (List.hd phis))) and outputs = snd (sizes (snd (List.hd rhos))) in
+  let stated = if order <> [] then List.length order else List.length clamp in
+  let inputs = ref stated in
+  List.iter (fun (name, w) ->
+      let i, o = sizes w in
+      if o <> hidden then refuse name "outputs";
+      if name = "phi:ground" then (if i <> 4 then refuse name "the ground's network has 4 inputs")
+      else (if !inputs = 0 then inputs := i; if i <> !inputs then refuse name "inputs")) phis;
+  List.iter (fun (name, w) ->
+      let i, o = sizes w in
+      if i <> hidden then refuse name "inputs";
+      if o <> outputs || (components <> None && components <> Some o) then refuse name "outputs") rhos
+
+let read_toml path bytes ~key =
+  let members = match Toml.parse path bytes with Json.Object m -> m | _ -> assert false in
+  if List.assoc_opt "schema" members <> Some (Json.Text "swarmcert/network/1") then
+    bad_input "%s: schema must be \"swarmcert/network/1\"" path;
+  allow_only path "" [ "schema"; "output"; "gamma"; "input"; "phi"; "rho" ] members;
+  let optional name absent read = match List.assoc_opt name members with
+    | None -> absent | json -> read path (table path name json) in
+  let unit, components = optional "output" ("", None) read_output in
+  optional "gamma" () read_gamma;
+  let order, clamp = optional "input" ([], []) read_input in
+  let kinds role = read_kinds path ~key role (table path role (List.assoc_opt role members)) in
+  let phis = kinds "phi" in
+  let rhos = kinds "rho" in
+  check_sizes path ~order ~clamp ~components phis rhos;
+  let sorted = List.sort (fun (a, _) (b, _) -> String.compare a b) (phis @ rhos) in
+  { sha256 = Sha256.to_hex (Sha256.string bytes); unit; order; clamp; parts = sorted }
+
+let plain parts = { sha256 = ""; unit = ""; order = []; clamp = []; parts }
+let read { net; phi; rho; key; orders } =
+  let order part = Option.value ~default:[] (List.assoc_opt part orders) in
+  if phi <> "" then begin
+    let p = load phi ~key ~order:(order "phi") and r = load rho ~key ~order:(order "rho") in
+    if snd (sizes p) <> fst (sizes r) then bad_input "%s: does not take as many inputs as %s has outputs" rho phi;
+    plain [ "phi:default", p; "rho:default", r ]
+  end
+  else if Filename.check_suffix net ".toml" then begin
+    if orders <> [] then bad_input "%s: --order is of one weight file, and this names several" net;
+    read_toml net (contents net) ~key
+  end
+  else plain [ "network", load net ~key ~order:(order "network") ]
+
+let as_float32 net = { net with parts = List.map (fun (name, w) -> name, Weights.as_float32 w) net.parts }

@@ -1,0 +1,17 @@
+(* What a certificate of this schema states, in words; any other text is refused. *)
+
+let schema = "swarmcert/certificate/1"
+
+let text =
+  "The functions are the operations listed under chain, in that order, with the weights stored in the files named \
+   by sha256, rounded to float32 where `as` says so: linear is W x + b, relu takes the positive part, clamp is \
+   the input clamp of network.toml. Where samples are named, they were reproduced up to largest_deviation when \
+   this was written; checking does not repeat that. Every bound holds in exact arithmetic: |f(x) - f(y)| <= upper \
+   |x - y| for all x and y that differ in the block only, and |f(x) - f(y)| >= lower |x - y| at the witness; \
+   where the domain is box, for x and y in the box. So |df| <= the sum of upper |dx_block| over blocks that make \
+   up the input. With a scale, |x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour \
+   moves from x to y, whatever the number and the places of the others; where neighbours are listed, with at most \
+   so many of each kind, the moving one included, all in the box, and the ground's input where there is one. Laws \
+   hold for the neighbours listed and the ground's input where there is one, in the box where their domain is \
+   box: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, |df| <= upper max |dx_j|; own_state, |df| <= \
+   upper |dx| where the vehicle's own state moves by dx."

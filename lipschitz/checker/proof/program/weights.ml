@@ -1,0 +1,82 @@
+(* A network as its weight file holds it, every weight exactly. *)
+
+open Refusal
+
+type layer = { name : string; weights : float array array; (* rows *) biases : float array }
+type t = { path : string; sha256 : string; precision : string; layers : layer list }
+
+let outputs layer = Array.length layer.weights
+let inputs layer = Array.length layer.weights.(0)
+let first_layer w = List.hd w.layers
+let last_layer w = List.nth w.layers (List.length w.layers - 1)
+
+(* Every number rounded to the nearest float32. *)
+let as_float32 w =
+  let round x =
+    let y = Exact.float32 x in
+    if not (Float.is_finite y) then bad_input "%s: a number is beyond the range of float32" w.path;
+    y in
+  let rounded l = { l with weights = Array.map (Array.map round) l.weights; biases = Array.map round l.biases } in
+  { w with precision = "float32"; layers = List.map rounded w.layers }
+
+(* A named tensor; `numbers` are read once its shape is known to be that of a layer. *)
+type tensor = { tensor : string; shape : int list; kind : string; numbers : unit -> float array }
+
+let most_numbers = 1 lsl 26
+
+(* "<layer>.<part>" or just "<part>". *)
+let layer_of part tensor =
+  if tensor = part then Some ""
+  else match String.rindex_opt tensor '.' with
+    | Some dot when String.sub tensor (dot + 1) (String.length tensor - dot - 1) = part -> Some (String.sub tensor 0 dot)
+    | _ -> None
+
+let starts_with prefix text = String.length text >= String.length prefix && String.sub text 0 (String.length prefix) = prefix
+let ends_with suffix text = String.length text >= String.length suffix
+  && String.sub text (String.length text - String.length suffix) (String.length suffix) = suffix
+let contains part text =
+  let n = String.length part in
+  let rec go k = k + n <= String.length text && (String.sub text k n = part || go (k + 1)) in
+  go 0
+
+(* A chain of linear layers of what a file holds, `listing` being what the order of the tensors in it means. *)
+let assemble ~path ~sha256 listing ~order tensors =
+  let refuse t what = bad_input "%s: %s: %s" path (shown t.tensor) what in
+  if List.length tensors > 4096 then bad_input "%s: holds more than 4096 tensors" path;
+  let check t =
+    if contains "parametrizations." t.tensor then refuse t "the weight is parametrised, so the file does not hold the weight itself";
+    if t.kind <> "float32" && t.kind <> "float64" then refuse t "weights must be float32 or float64";
+    if List.exists (fun n -> n <= 0) t.shape then refuse t "has a dimension of size 0";
+    if List.fold_left (fun product n -> if product > most_numbers / n then most_numbers + 1 else product * n) 1 t.shape > most_numbers
+    then refuse t "has too many numbers" in
+  List.iter check tensors;
+  let names = List.map (fun t -> t.tensor) tensors in
+  if List.length (List.sort_uniq compare names) <> List.length names then bad_input "%s: a tensor appears twice" path;
+  let of_part part t = Option.map (fun layer -> layer, t) (layer_of part t.tensor) in
+  let weights = List.filter_map (of_part "weight") tensors and biases = List.filter_map (of_part "bias") tensors in
+  if weights = [] then bad_input "%s: holds no tensor named \"<layer>.weight\"" path;
+  let precision = (snd (List.hd weights)).kind in
+  List.iter (fun t -> if t.kind <> precision then refuse t "one file has one type") tensors;
+  List.iter (fun (_, t) -> if List.length t.shape <> 2 then refuse t "a linear layer's weight has two dimensions") weights;
+  let owned t = match layer_of "bias" t.tensor with
+    | Some layer -> (match List.assoc_opt layer weights with
+        | Some w -> if t.shape <> [ List.hd w.shape ] then refuse t "does not fit the weight"; true
+        | None -> false)
+    | None -> false in
+  List.iter (fun t -> if layer_of "weight" t.tensor = None && not (owned t) then
+                refuse t "is neither the weight nor the bias of a linear layer") tensors;
+  let shapes = List.map (fun (name, t) ->
+      { Layer_order.name; outputs = List.nth t.shape 0; inputs = List.nth t.shape 1 }) weights in
+  let finite t = Array.map (fun x -> if not (Float.is_finite x) then refuse t "a number is not finite"; x) (t.numbers ()) in
+  let layer { Layer_order.name; inputs; outputs } =
+    let flat = finite (List.assoc name weights) in
+    { name;
+      weights = Array.init outputs (fun i -> Array.sub flat (i * inputs) inputs);
+      biases = (match List.assoc_opt name biases with Some t -> finite t | None -> Array.make outputs 0.) } in
+  { path; sha256; precision; layers = List.map layer (Layer_order.decide path listing ~stated:order shapes) }
+
+let width = function "float32" -> 4 | _ -> 8
+(* The k-th little-endian number. *)
+let number_at kind data first k =
+  if kind = "float32" then Int32.float_of_bits (String.get_int32_le data (first + 4 * k))
+  else Int64.float_of_bits (String.get_int64_le data (first + 8 * k))

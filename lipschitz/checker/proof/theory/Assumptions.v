@@ -1,0 +1,15 @@
+(** The theorems, and what they rest on; compared with assumptions.txt. *)
+From Coq Require Import List Reals.
+From Swarmcert Require Import Form Network Checker Meaning Sets Claims Sound.
+Open Scope R_scope.
+Set Printing Width 120.
+Check check_sound.
+Print Assumptions check_sound.
+Check check_parts_sound.
+Print Assumptions check_parts_sound.
+Check step_sound.
+Print Assumptions step_sound.
+Check accepted_hold.
+Print Assumptions accepted_hold.
+Check check_all_holds.
+Print Assumptions check_all_holds.

@@ -1,0 +1,240 @@
+(** The executable checker over dyadic numbers, and what its acceptance means. *)
+From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
+From Swarmcert Require Import Algebra Form Network.
+Import ListNotations.
+Open Scope Z_scope.
+
+(** mantissa, exponent. *)
+Definition dyadic := (Z * Z)%type.
+Definition zero : dyadic := (0, 0).
+Definition add (x y : dyadic) : dyadic :=
+  let (a, e) := x in let (b, f) := y in
+  if a =? 0 then y else if b =? 0 then x
+  else if e <=? f then (a + Z.shiftl b (f - e), e) else (Z.shiftl a (e - f) + b, f).
+Definition mul (x y : dyadic) : dyadic := (fst x * fst y, snd x + snd y).
+Definition neg (x : dyadic) : dyadic := (- fst x, snd x).
+Definition abs (x : dyadic) : dyadic := (Z.abs (fst x), snd x).
+Definition shift (k : Z) (x : dyadic) : dyadic := (fst x, snd x + k).
+Definition is_nonnegative (x : dyadic) : bool := 0 <=? fst x.
+Definition is_positive (x : dyadic) : bool := 0 <? fst x.
+
+#[global] Arguments add : simpl never.
+#[global] Arguments mul : simpl never.
+#[global] Arguments neg : simpl never.
+#[global] Arguments abs : simpl never.
+#[global] Arguments shift : simpl never.
+Definition matrixD := list (list dyadic).
+
+(** R in units of 2^unit, D = diag(2^scales). *)
+Record factor := Factor { unit : Z; scales : list Z; rows : list (list Z) }.
+
+Fixpoint shift_row (k : Z) (s : list Z) (row : list dyadic) : list dyadic :=
+  match row with [] => [] | x :: row' => shift (k + hd 0 s) x :: shift_row k (tl s) row' end.
+Fixpoint congruence (s : list Z) (p : matrixD) : matrixD :=
+  match p with [] => [] | row :: p' => shift_row (hd 0 s) s row :: congruence (tl s) p' end.
+(** D P D - R R'. *)
+Definition remainder (p : matrixD) (f : factor) : matrixD :=
+  sum add (congruence (scales f) p) (map (map (fun g => (- g, 2 * unit f))) (gram 0 Z.add Z.mul (rows f))).
+Definition total (u : list dyadic) : dyadic := fold_right add zero u.
+(** Diagonally dominant; debts: what rows above have already taken from the diagonal. *)
+Fixpoint dominant (e : matrixD) (debts : list dyadic) : bool :=
+  match e with
+  | [] => match debts with [] => true | _ => false end
+  | row :: e' =>
+      let off := map abs (tl row) in
+      is_nonnegative (add (hd zero row) (neg (add (hd zero debts) (total off)))) && dominant e' (plus add (tl debts) off)
+  end.
+Definition shows_nonnegative (p : matrixD) (f : factor) : bool := dominant (remainder p f) [].
+
+Fixpoint split (t : list dyadic) (ms : list matrixD) : list (list dyadic) :=
+  match ms with [] => [] | m :: ms' => firstn (length m) t :: split (skipn (length m) t) ms' end.
+Definition neurons (ms : list matrixD) : nat := fold_right (fun m n => (length m + n)%nat) O ms.
+
+Definition inputs (hidden : list matrixD) (last : matrixD) : nat := length (hd [] (hd last hidden)).
+Definition matrix_inequality (hidden : list matrixD) (last : matrixD) (rho : dyadic) (t : list dyadic) : matrixD :=
+  match hidden with
+  | [] =>
+      let n := length (hd [] last) in
+      norm_lmi zero add mul (-1, 0) rho (if (length last <=? n)%nat then last else columns zero n last)
+  | first :: later =>
+      lmi zero add mul (-1, 0) (mul (1, 1) rho) (neg rho) (firstn (length first) t) first
+        (List.combine (split (skipn (length first) t) later) later) last
+  end.
+(** Every row as long as the stage before it has rows; the first stage takes n inputs. *)
+Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
+  match hidden with
+  | [] => forallb (fun row => length row =? n)%nat last
+  | m :: hidden' => forallb (fun row => length row =? n)%nat m && shapes (length m) hidden' last
+  end.
+(** Accepts |f(x) - f(x')| <= upper |x - x'| of the chain with these stages. *)
+Definition check (hidden : list matrixD) (last : matrixD) (upper rho : dyadic) (t : list dyadic) (f : factor) : bool :=
+  shapes (inputs hidden last) hidden last &&
+  ((length t =? neurons hidden)%nat && forallb is_nonnegative t && is_positive rho && is_nonnegative upper
+  && is_nonnegative (add (mul upper upper) (neg rho))
+  && shows_nonnegative (matrix_inequality hidden last rho t) f).
+
+(** Meaning *)
+Open Scope R_scope.
+Definition real (x : dyadic) : R := IZR (fst x) * powerRZ 2 (snd x).
+#[global] Arguments real : simpl never.
+Notation reals := (map real).
+Notation realm := (map (map real)).
+
+Lemma two_neq : 2 <> 0. Proof. lra. Qed.
+Lemma power_pos e : 0 < powerRZ 2 e. Proof. apply powerRZ_lt. lra. Qed.
+Lemma real_shiftl a n e : (0 <= n)%Z -> real (Z.shiftl a n, e) = real (a, n + e)%Z.
+Proof.
+  intros H. unfold real. simpl. rewrite Z.shiftl_mul_pow2, mult_IZR, powerRZ_add by (auto using two_neq).
+  rewrite <- (Z2Nat.id n) at 1 by auto. rewrite <- pow_IZR, <- (Z2Nat.id n) at 1 by auto.
+  rewrite pow_powerRZ, !Z2Nat.id by lia. ring.
+Qed.
+Lemma real_same a b e : real (a + b, e)%Z = real (a, e) + real (b, e).
+Proof. unfold real. simpl. rewrite plus_IZR. ring. Qed.
+Lemma real_zero : real zero = 0. Proof. unfold real. simpl. ring. Qed.
+Lemma real_add x y : real (add x y) = real x + real y.
+Proof.
+  destruct x as [a e], y as [b f]. unfold add.
+  destruct (Z.eqb_spec a 0) as [->|_]; [unfold real; simpl; ring|].
+  destruct (Z.eqb_spec b 0) as [->|_]; [unfold real; simpl; ring|].
+  destruct (Z.leb_spec e f); rewrite real_same, real_shiftl by lia; do 2 f_equal; f_equal; lia.
+Qed.
+Lemma real_mul x y : real (mul x y) = real x * real y.
+Proof. unfold real, mul. simpl. rewrite mult_IZR, powerRZ_add by apply two_neq. ring. Qed.
+Lemma real_neg x : real (neg x) = - real x.
+Proof. unfold real, neg. simpl. rewrite opp_IZR. ring. Qed.
+Lemma real_abs x : real (abs x) = Rabs (real x).
+Proof.
+  unfold real, abs. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_pos_eq. left. apply power_pos.
+Qed.
+Lemma real_shift k x : real (shift k x) = powerRZ 2 k * real x.
+Proof. unfold real, shift. simpl. rewrite powerRZ_add by apply two_neq. ring. Qed.
+Lemma real_nonnegative x : is_nonnegative x = true -> 0 <= real x.
+Proof.
+  unfold is_nonnegative, real. intros H. apply Rmult_le_pos; [|left; apply power_pos]. apply IZR_le. now apply Z.leb_le.
+Qed.
+Lemma real_positive x : is_positive x = true -> 0 < real x.
+Proof.
+  unfold is_positive, real. intros H. apply Rmult_lt_0_compat; [|apply power_pos]. apply IZR_lt. now apply Z.ltb_lt.
+Qed.
+
+Lemma off_diagonal a row z :
+  - (a * a) * real (total (map abs row)) <= 2 * a * dotR (reals row) z + dotR (reals (map abs row)) (timesR z z).
+Proof.
+  revert z. induction row as [|r row IH]; intros z; simpl.
+  - rewrite real_zero. lra.
+  - rewrite real_add, real_abs. specialize (IH (tl z)). pose proof (Rabs_pos (real r)).
+    assert (forall b, 0 <= (a * a + b * b) * Rabs (real r) + 2 * a * b * real r) as K.
+    { intros b. destruct (Rle_dec 0 (real r)) as [G|G].
+      - rewrite Rabs_pos_eq by auto. pose proof (Rmult_le_pos _ _ (Rle_0_sqr (a + b)) G). unfold Rsqr in *. nra.
+      - rewrite Rabs_left by lra. assert (0 <= - real r) as G' by lra.
+        pose proof (Rmult_le_pos _ _ (Rle_0_sqr (a - b)) G'). unfold Rsqr in *. nra. }
+    destruct z as [|b z]; simpl in *.
+    + rewrite !dot_nil_r in IH. pose proof (Rmult_le_pos _ _ (Rle_0_sqr a) H). unfold Rsqr in *. nra.
+    + specialize (K b). nra.
+Qed.
+
+Lemma dominant_form e debts z : dominant e debts = true -> dotR (reals debts) (timesR z z) <= form (realm e) z.
+Proof.
+  revert debts z. induction e as [|row e IH]; intros debts z; simpl.
+  - destruct debts; simpl; [lra|discriminate].
+  - intros H. apply andb_prop in H. destruct H as [H1 H2]. apply real_nonnegative in H1.
+    rewrite real_add, real_neg, real_add in H1.
+    destruct z as [|a z]; [rewrite dot_nil_r; simpl; lra|].
+    specialize (IH _ z H2). rewrite (f_plus add Rplus real real_add), dot_plus_l in IH.
+    pose proof (off_diagonal a (tl row) z) as O.
+    assert (hd 0 (reals row) = real (hd zero row)) as -> by (destruct row; simpl; auto using eq_sym, real_zero).
+    assert (tl (reals row) = reals (tl row)) as -> by (destruct row; reflexivity).
+    assert (dotR (reals debts) (timesR (a :: z) (a :: z)) = real (hd zero debts) * (a * a) + dotR (reals (tl debts)) (timesR z z)) as ->.
+    { destruct debts; simpl; [rewrite real_zero|]; ring. }
+    assert (0 <= a * a * (real (hd zero row) + - (real (hd zero debts) + real (total (map abs (tl row)))))) by nra.
+    nra.
+Qed.
+
+Fixpoint scaled (s : list Z) (z : list R) : list R :=
+  match z with [] => [] | a :: z' => powerRZ 2 (hd 0%Z s) * a :: scaled (tl s) z' end.
+Lemma scaled_onto s z : exists y, scaled s y = z.
+Proof.
+  revert s. induction z as [|a z IH]; intros s; [now exists []|]. destruct (IH (tl s)) as [y Hy].
+  exists (/ powerRZ 2 (hd 0%Z s) * a :: y). simpl. rewrite Hy. f_equal. field. apply powerRZ_NOR. lra.
+Qed.
+Lemma form_congruence s p z : form (realm (congruence s p)) z = form (realm p) (scaled s z).
+Proof.
+  revert s z. induction p as [|row p IH]; intros s [|a z]; simpl; auto. rewrite IH.
+  assert (forall k s r y, dotR (reals (shift_row k s r)) y = powerRZ 2 k * dotR (reals r) (scaled s y)) as E.
+  { clear. intros k s r. revert s. induction r as [|x r IH]; intros s [|b y]; simpl; try ring.
+    rewrite IH, real_shift, powerRZ_add by apply two_neq. ring. }
+  destruct row as [|x row]; simpl; [ring|]. rewrite E, real_shift, powerRZ_add by apply two_neq. ring.
+Qed.
+
+(** (a) *)
+Theorem shows_nonnegative_sound p f : shows_nonnegative p f = true -> nonnegative (realm p).
+Proof.
+  intros H w. destruct (scaled_onto (scales f) w) as [z <-].
+  apply (dominant_form _ [] z) in H. change (0 <= form (realm (remainder p f)) z) in H. unfold remainder in H.
+  rewrite (f_sum add Rplus real real_add), form_sum, form_congruence in H.
+  set (g := gram 0%Z Z.add Z.mul (rows f)) in H.
+  assert (realm (map (map (fun g => ((- g)%Z, (2 * unit f)%Z))) g) = scale_allR (- powerRZ 2 (2 * unit f)) (map (map IZR) g)) as E.
+  { unfold scale_all, scale. rewrite !map_map. apply map_ext. intros r. rewrite !map_map. apply map_ext.
+    intros x. unfold real. cbn [fst snd]. rewrite opp_IZR. ring. }
+  rewrite E, form_scale in H. unfold g in H.
+  rewrite (f_gram 0%Z Z.add Z.mul 0 Rplus Rmult IZR eq_refl plus_IZR mult_IZR), form_gram in H.
+  pose proof (Rmult_le_pos _ _ (Rlt_le _ _ (power_pos (2 * unit f))) (square_nonneg (combine_rows z (map (map IZR) (rows f))))).
+  lra.
+Qed.
+
+Lemma split_fits t ms : length t = neurons ms -> Forall (fun x => is_nonnegative x = true) t ->
+  Forall2 fits (map realm ms) (map reals (split t ms)).
+Proof.
+  revert t. induction ms as [|m ms IH]; intros t H Ht; simpl in *; constructor.
+  - split.
+    + rewrite !map_length, firstn_length. lia.
+    + apply Forall_map. rewrite <- (firstn_skipn (length m) t) in Ht. apply Forall_app in Ht.
+      eapply Forall_impl; [|apply Ht]. intros. now apply real_nonnegative.
+  - apply IH; [rewrite skipn_length; lia|]. rewrite <- (firstn_skipn (length m) t) in Ht. now apply Forall_app in Ht.
+Qed.
+
+(** The network with these stages and any biases. *)
+Definition chain (hidden : list matrixD) (biases : list (list R)) (last : matrixD) (b : list R) : list R -> list R :=
+  network (List.combine (map realm hidden) biases) (realm last, b).
+
+Lemma norm_bound upper rho f x x' : 0 <= upper -> rho <= upper * upper ->
+  square (minus (f x) (f x')) <= rho * square (minus x x') -> norm (minus (f x) (f x')) <= upper * norm (minus x x').
+Proof.
+  intros Hu Hr H. unfold norm. rewrite <- (sqrt_square upper) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
+  apply sqrt_le_1_alt. pose proof (square_nonneg (minus x x')). nra.
+Qed.
+
+(** (d) *)
+Theorem check_sound hidden last upper rho t f : check hidden last upper rho t f = true ->
+  forall biases b, Forall2 (fun (m : matrixD) (c : list R) => length c = length m) hidden biases -> length b = length last ->
+  forall x x', length x = inputs hidden last -> length x' = inputs hidden last ->
+  norm (minus (chain hidden biases last b x) (chain hidden biases last b x')) <= real upper * norm (minus x x').
+Proof.
+  unfold check. intros H biases b Hbs Hb x x' Hx Hx'.
+  apply andb_prop in H. destruct H as [_ H]. repeat (apply andb_prop in H; destruct H as [H ?]).
+  apply Nat.eqb_eq in H. rename H into Hn, H0 into HP, H1 into Hur, H2 into Hu, H3 into Hrho, H4 into Ht.
+  apply shows_nonnegative_sound in HP. apply real_nonnegative in Hu, Hur. apply real_positive in Hrho.
+  rewrite real_add, real_mul, real_neg in Hur.
+  apply (norm_bound (real upper) (real rho) (chain hidden biases last b)); [auto|lra|]. unfold chain.
+  assert (bias_fits (realm last, b)) as Hl by (unfold bias_fits; simpl; now rewrite map_length).
+  assert (real (-1, 0)%Z = -1) as M by (unfold real; simpl; ring).
+  destruct Hbs as [|first c later biases Hc Hbs]; simpl in HP |- *.
+  - rewrite (f_norm_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M in HP.
+    destruct (length last <=? _)%nat.
+    + now apply norm_lmi_bounds.
+    + rewrite (f_columns zero 0 real real_zero) in HP. eapply norm_lmi_columns_bounds; eauto.
+  - rewrite (f_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M, real_mul, real_neg in HP.
+    replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
+    rewrite forallb_forall, <- Forall_forall in Ht.
+    pose proof (split_fits t (first :: later) Hn Ht) as S. inversion S; subst.
+    set (ls := List.combine (map realm later) biases).
+    assert (map fst ls = map realm later) as E.
+    { unfold ls. clear -Hbs. induction Hbs; simpl; congruence. }
+    apply lmi_bounds with (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later));
+      auto; try (unfold bias_fits; simpl; now rewrite map_length).
+    + unfold ls. clear -Hbs. induction Hbs; simpl; constructor; auto. unfold bias_fits. simpl. now rewrite map_length.
+    + now rewrite E.
+    + rewrite E. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) = List.combine (map reals ts) (map realm ms)) as Q.
+      { clear. induction ts as [|u ts IH]; intros [|m ms]; simpl; auto. now rewrite IH. }
+      now rewrite Q in HP.
+Qed.

@@ -1,0 +1,149 @@
+(** The checker of claims, and what its acceptance means: `step_sound`. *)
+From Coq Require Import List ZArith Reals Bool.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Blocks Lower.
+Import ListNotations.
+
+Inductive proof :=
+| By_inequality (rho : dyadic) (t : list dyadic) (f : factor)
+| By_vector (v : list dyadic)
+| By_product
+| By_points (x y : list dyadic) (others : list (nat * list dyadic))
+| By_triangle.
+
+Definition at_most (x y : dyadic) : bool := is_nonnegative (add y (neg x)).
+Definition is_nil {A} (l : list A) : bool := match l with [] => true | _ => false end.
+Definition matrix_at (ps : list part) (p layer : nat) : matrixD := fst (nth layer (layers (part_at ps p)) ([], [])).
+
+(** |W v| >= l |v|. *)
+Definition check_norm_below (w : matrixD) (l : dyadic) (v : list dyadic) : bool :=
+  (length v =? length (hd [] w))%nat && is_nonnegative l && is_positive (squareD v)
+  && at_most (mul (mul l l) (squareD v)) (squareD (apply zero add mul w v)).
+
+(** Slopes by a matrix inequality. *)
+Definition fits_part (p : part) : bool := forallb (fun l => length (snd l) =? length (fst l))%nat (layers p).
+Definition matrices (p : part) : stack := (map fst (hidden p), fst (outer p)).
+Definition parts_of (ps : list part) (f : function) : list part :=
+  match f with Alone p => [part_at ps p] | Set_of phi rho => [part_at ps phi; part_at ps rho] end.
+(** Every network's biases fit; rho has no clamp; `moves` and a scale that is stated have one entry per input. *)
+Definition well_formed (ps : list part) (f : function) (moves : list bool) (scale : list dyadic) : bool :=
+  forallb fits_part (parts_of ps f) && forallb (fun p => is_nil (clamp p)) (tl (parts_of ps f))
+  && (length moves =? inputs_of (part_at ps (moved f)))%nat
+  && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
+Definition check_slope ps f moves scale u rho t factor : bool :=
+  well_formed ps f moves scale && is_nonnegative u
+  && check_parts ([], selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
+
+(** Slopes by products of norms that were accepted before. *)
+Fixpoint find_norm (accepted : list claim) (p layer : nat) : option dyadic :=
+  match accepted with
+  | [] => None
+  | Norm_at_most q k u :: rest => if ((p =? q) && (layer =? k))%nat%bool then Some u else find_norm rest p layer
+  | _ :: rest => find_norm rest p layer
+  end.
+Fixpoint norms (accepted : list claim) (p layer : nat) (ls : list layerD) : option dyadic :=
+  match ls with
+  | [] => Some one
+  | _ :: ls' =>
+      match find_norm accepted p layer, norms accepted p (S layer) ls' with
+      | Some u, Some v => if is_nonnegative u then Some (mul u v) else None
+      | _, _ => None
+      end
+  end.
+Definition norm_of (ps : list part) (accepted : list claim) (p : nat) := norms accepted p O (layers (part_at ps p)).
+Fixpoint largest (m : dyadic) (scale : list dyadic) : dyadic :=
+  match scale with [] => m | s :: scale' => largest (if at_most m s then s else m) scale' end.
+Definition product_of (ps : list part) (accepted : list claim) (f : function) : option dyadic :=
+  match f with
+  | Alone p => norm_of ps accepted p
+  | Set_of phi rho =>
+      match norm_of ps accepted phi, norm_of ps accepted rho with Some a, Some b => Some (mul a b) | _, _ => None end
+  end.
+Definition check_product ps accepted f moves scale u : bool :=
+  let m := largest (hd one scale) scale in
+  well_formed ps f moves scale && at_most (hd one scale) m && forallb (fun s => at_most s m) scale
+  && match product_of ps accepted f with Some k => at_most (mul m k) u | None => false end.
+
+(** Slopes from below, between two points. *)
+Fixpoint clampedD (c : list (dyadic * dyadic)) (x : list dyadic) : list dyadic :=
+  match c, x with
+  | (low, high) :: c', a :: x' =>
+      let b := if at_most a low then low else a in (if at_most b high then b else high) :: clampedD c' x'
+  | _, _ => x
+  end.
+Definition valueD (p : part) (x : list dyadic) : list dyadic := networkD (hidden p) (outer p) (clampedD (clamp p) x).
+Definition value_ofD (ps : list part) (f : function) (rest x : list dyadic) : list dyadic :=
+  match f with
+  | Alone p => valueD (part_at ps p) x
+  | Set_of phi rho => valueD (part_at ps rho) (plus add (valueD (part_at ps phi) x) rest)
+  end.
+Fixpoint agreeD (moves : list bool) (x y : list dyadic) : bool :=
+  match moves, x, y with
+  | m :: moves', a :: x', b :: y' => (m || (fst (add a (neg b)) =? 0)%Z) && agreeD moves' x' y'
+  | [], [], [] => true
+  | _, _, _ => false
+  end.
+(** square_in as a fraction. *)
+Fixpoint fraction_in (scale : list dyadic) (d : list dyadic) : dyadic * dyadic :=
+  match d with
+  | [] => (zero, one)
+  | a :: d' =>
+      let s := hd one scale in
+      let (n, m) := fraction_in (tl scale) d' in (add (mul n (mul s s)) (mul (mul a a) m), mul m (mul s s))
+  end.
+Definition check_points ps f moves scale l x y others : bool :=
+  let rest := fold_right (plus add) [] (map (fun o => valueD (part_at ps (fst o)) (snd o)) others) in
+  let (n, m) := fraction_in scale (minusD x y) in
+  positive_scale scale && is_nonnegative l && agreeD moves x y && (length x =? inputs_of (part_at ps (moved f)))%nat
+  && forallb (fun o => length (snd o) =? inputs_of (part_at ps (fst o)))%nat others && is_positive n
+  && at_most (mul (mul l l) n) (mul (squareD (minusD (value_ofD ps f rest x) (value_ofD ps f rest y))) m).
+
+(** Laws: one term of the sum after the other. *)
+Fixpoint same_moves (a b : list bool) : bool :=
+  match a, b with x :: a', y :: b' => Bool.eqb x y && same_moves a' b' | [], [] => true | _, _ => false end.
+(** The least that was accepted. *)
+Fixpoint find_slope (accepted : list claim) (phi rho : nat) (moves : list bool) : option dyadic :=
+  match accepted with
+  | [] => None
+  | Slope_at_most (Set_of q k) m [] u :: rest =>
+      let others := find_slope rest phi rho moves in
+      if ((phi =? q) && (rho =? k))%nat%bool && same_moves moves m
+      then match others with Some v => if at_most v u then Some v else Some u | None => Some u end else others
+  | _ :: rest => find_slope rest phi rho moves
+  end.
+(** Sum of n k^power, and whether every kind has its bound and a count that is not negative. *)
+Fixpoint total_of (accepted : list claim) (squares : bool) (kinds : list kind) (rho : nat) : option dyadic :=
+  match kinds with
+  | [] => Some zero
+  | (phi, moves, n) :: kinds' =>
+      match find_slope accepted phi rho moves, total_of accepted squares kinds' rho with
+      | Some k, Some rest =>
+          if is_nonnegative k && (0 <=? n)%Z then Some (add (mul (n, 0%Z) (if squares then mul k k else k)) rest) else None
+      | _, _ => None
+      end
+  end.
+Definition check_law ps accepted (stacked : bool) kinds rho u : bool :=
+  is_nonnegative u && fits_part (part_at ps rho)
+  && match total_of accepted stacked kinds rho with
+     | Some s => at_most s (if stacked then mul u u else u)
+     | None => false
+     end.
+
+Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p : proof) : bool :=
+  match c, p with
+  | Norm_at_most p layer u, By_inequality rho t f => check [] (matrix_at ps p layer) u rho t f
+  | Norm_at_least p layer l, By_vector v => check_norm_below (matrix_at ps p layer) l v
+  | Slope_at_most f moves scale u, By_inequality rho t r => check_slope ps f moves scale u rho t r
+  | Slope_at_most f moves scale u, By_product => check_product ps accepted f moves scale u
+  | Slope_at_least f moves scale l, By_points x y others => check_points ps f moves scale l x y others
+  | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u
+  | _, _ => false
+  end.
+(** The claims accepted so far with one more, if it is proved. *)
+Definition step (ps : list part) (accepted : list claim) (c : claim) (p : proof) : option (list claim) :=
+  if check_claim ps accepted c p then Some (c :: accepted) else None.
+(** All of them, in this order. *)
+Fixpoint check_all (ps : list part) (accepted : list claim) (cs : list (claim * proof)) : bool :=
+  match cs with
+  | [] => true
+  | (c, p) :: cs' => check_claim ps accepted c p && check_all ps (c :: accepted) cs'
+  end.

@@ -1,0 +1,17 @@
+(** The checker as OCaml: integers are those of GMP (zarith), natural numbers are machine integers. *)
+From Coq Require Import ZArith List Extraction ExtrOcamlBasic ExtrOcamlNatInt.
+From Swarmcert Require Import Algebra Checker Meaning Claims.
+Extract Inductive positive => "Big.t"
+  ["(fun p -> Big.succ (Big.shift_left p 1))" "(fun p -> Big.shift_left p 1)" "Big.one"] "(fun _ _ _ _ -> assert false)".
+Extract Inductive Z => "Big.t" ["Big.zero" "(fun p -> p)" "Big.neg"] "(fun _ _ _ _ -> assert false)".
+Extract Inlined Constant Z.add => "Big.add".
+Extract Inlined Constant Z.sub => "Big.sub".
+Extract Inlined Constant Z.mul => "Big.mul".
+Extract Inlined Constant Z.opp => "Big.neg".
+Extract Inlined Constant Z.abs => "Big.abs".
+Extract Inlined Constant Z.eqb => "Big.equal".
+Extract Inlined Constant Z.leb => "Big.leq".
+Extract Inlined Constant Z.ltb => "Big.lt".
+(* Called with a distance that is not negative. Big.to_int raises if it is huge, Big.shift_left if it is negative. *)
+Extract Inlined Constant Z.shiftl => "(fun a n -> Big.shift_left a (Big.to_int n))".
+Extraction "proved.ml" step.

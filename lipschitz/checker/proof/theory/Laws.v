@@ -1,0 +1,135 @@
+(** An accepted law for several terms that move holds. *)
+From Coq Require Import List ZArith Reals Lra Lia Bool.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims Slopes.
+Import ListNotations.
+Open Scope R_scope.
+
+Lemma same_moves_eq a b : same_moves a b = true -> a = b.
+Proof.
+  revert b. induction a as [|x a IH]; intros [|y b]; simpl; auto; try discriminate.
+  intros H. both H. apply eqb_prop in H. f_equal; auto.
+Qed.
+Lemma find_slope_sound ps accepted phi rho moves u : Forall (holds ps) accepted ->
+  find_slope accepted phi rho moves = Some u -> holds ps (Slope_at_most (Set_of phi rho) moves [] u).
+Proof.
+  intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
+  destruct c as [| |[|q k] m [|] v| |]; simpl find_slope; auto.
+  destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
+  destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
+  destruct (find_slope rest q k m) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst; first [exact Hc | now apply IH].
+Qed.
+(** A term that moves: its bound, its values before and after, and how far it moves. *)
+Record moving := Moving { bound : R; before : list R; after : list R; far : R }.
+Lemma telescope (g : list R -> list R) n steps : (forall v, length (g v) = n) ->
+  Forall (fun m => forall s, norm (minus (g (plusR (before m) s)) (g (plusR (after m) s))) <= bound m * far m) steps ->
+  forall s, norm (minus (g (plusR (vector_sum (map before steps)) s)) (g (plusR (vector_sum (map after steps)) s)))
+    <= dotR (map bound steps) (map far steps).
+Proof.
+  intros Hn H. induction H as [|m steps Hm H IH]; intros s; simpl.
+  - unfold norm. rewrite square_minus_same, sqrt_0. lra.
+  - rewrite (minus_through _ (g (plusR (plusR (after m) (vector_sum (map before steps))) s))) by now rewrite !Hn.
+    eapply Rle_trans; [apply norm_plus|]. apply Rplus_le_compat; [rewrite !plus_assoc; apply Hm|].
+    rewrite !(plus_comm (after m)), !plus_assoc. apply IH.
+Qed.
+
+Fixpoint steps_of (ps : list part) (cs : list dyadic) (groups : list (kind * list mover)) : list moving :=
+  match cs, groups with
+  | c :: cs', g :: groups' =>
+      let v side m := value (part_at ps (fst (fst (fst g)))) (side m) in
+      map (fun m => Moving (real c) (v fst m) (v snd m) (step_of m)) (snd g) ++ steps_of ps cs' groups'
+  | _, _ => []
+  end.
+Definition law_bounds (ps : list part) (rho : nat) (cs : list dyadic) (kinds : list kind) :=
+  Forall2 (fun c (k : kind) => 0 <= real c /\ (0 <= snd k)%Z /\ holds ps (Slope_at_most (Set_of (fst (fst k)) rho) (snd (fst k)) [] c)) cs kinds.
+Lemma total_sound ps accepted squares kinds rho v : Forall (holds ps) accepted ->
+  total_of accepted squares kinds rho = Some v -> exists cs, law_bounds ps rho cs kinds /\
+  real v = fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * (if squares then real (fst ck) * real (fst ck) else real (fst ck))) (combine cs kinds)).
+Proof.
+  intros HA. revert v. induction kinds as [|[[phi moves] n] kinds IH]; intros v; simpl.
+  - intros H. inversion H. exists []. split; [constructor|]. apply real_zero.
+  - destruct (find_slope accepted phi rho moves) as [k|] eqn:Hk; [|discriminate].
+    destruct (total_of accepted squares kinds rho) as [w|] eqn:Hw; [|discriminate].
+    destruct (is_nonnegative k) eqn:Kn; [|discriminate]. destruct (Z.leb_spec 0 n); [|discriminate]. simpl.
+    intros G. inversion G. destruct (IH w eq_refl) as (cs & B & E). exists (k :: cs). split.
+    + constructor; auto. simpl. split; [now apply real_nonnegative|]. split; auto. now apply (find_slope_sound ps accepted).
+    + rewrite real_add, real_mul, E. simpl. f_equal. replace (real (n, 0%Z)) with (IZR n) by (unfold real; simpl; ring).
+      destruct squares; auto. now rewrite real_mul.
+Qed.
+Lemma steps_values ps cs kinds movers : length cs = length kinds ->
+  flat_map (terms ps fst) (combine kinds movers) = map before (steps_of ps cs (combine kinds movers)) /\
+  flat_map (terms ps snd) (combine kinds movers) = map after (steps_of ps cs (combine kinds movers)).
+Proof.
+  revert cs movers. induction kinds as [|k kinds IH]; intros [|c cs] [|ms movers]; simpl; try discriminate; auto.
+  intros H. destruct (IH cs movers ltac:(lia)) as [-> ->]. rewrite !map_app, !map_map. auto.
+Qed.
+Lemma steps_far ps cs kinds movers : length cs = length kinds -> length movers = length kinds ->
+  map far (steps_of ps cs (combine kinds movers)) = map step_of (concat movers).
+Proof.
+  revert cs movers. induction kinds as [|k kinds IH]; intros [|c cs] [|ms movers]; simpl; try discriminate; auto.
+  intros H G. rewrite !map_app, !map_map, IH by lia. reflexivity.
+Qed.
+Lemma steps_hold ps rho cs kinds movers : law_bounds ps rho cs kinds -> Forall2 may_move kinds movers ->
+  Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g)) (combine kinds movers) ->
+  Forall (fun m => forall s, norm (minus (value (part_at ps rho) (plusR (before m) s)) (value (part_at ps rho) (plusR (after m) s)))
+    <= bound m * far m) (steps_of ps cs (combine kinds movers)).
+Proof.
+  intros H. revert movers. induction H as [|c k cs kinds (Hc & Hn & Hk) H IH]; intros movers M L; [constructor|].
+  inversion M as [|? ms ? movers' [Hcount Hms] M']; subst. simpl in *. inversion L as [|? ? Lk L']; subst. simpl in Lk.
+  apply Forall_app. split; auto. apply Forall_map, Forall_forall. intros m Hm s. simpl.
+  rewrite Forall_forall in Hms, Lk. pose proof (Hk s (fst m) (snd m) (Hms _ Hm) (Lk _ Hm)) as B.
+  unfold distance in B. rewrite square_in_one in B. exact B.
+Qed.
+Lemma dot_constants (c : R) (f : mover -> R) ms : dotR (map (fun _ => c) ms) (map f ms) = c * dotR (map (fun _ => 1) ms) (map f ms).
+Proof. induction ms as [|m ms IH]; simpl; [ring|]. rewrite IH. ring. Qed.
+Lemma dot_counted (f : mover -> R) r ms : 0 <= r -> Forall (fun m => f m <= r) ms ->
+  dotR (map (fun _ => 1) ms) (map f ms) <= INR (length ms) * r.
+Proof.
+  intros Hr H. induction H as [|m ms Hm H IH]; [simpl; lra|]. cbn [map length dot]. rewrite S_INR. lra.
+Qed.
+Lemma counted ms (k : kind) : may_move k ms -> INR (length ms) <= IZR (snd k).
+Proof. intros [H _]. rewrite INR_IZR_INZ. now apply IZR_le. Qed.
+Lemma sum_of_steps ps rho cs kinds movers r : 0 <= r -> law_bounds ps rho cs kinds -> Forall2 may_move kinds movers ->
+  Forall (fun m => step_of m <= r) (concat movers) ->
+  dotR (map bound (steps_of ps cs (combine kinds movers))) (map far (steps_of ps cs (combine kinds movers))) <=
+  fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * real (fst ck)) (combine cs kinds)) * r.
+Proof.
+  intros Hr H. revert movers. induction H as [|c k cs kinds (Hc & Hn & _) H IH]; intros movers M L; [simpl; lra|].
+  inversion M as [|? ms ? movers' Hk M']; subst. simpl in L. apply Forall_app in L. destruct L as [L L'].
+  simpl. rewrite !map_app, !map_map. rewrite dot_app by (now rewrite !map_length). simpl.
+  specialize (IH _ M' L'). pose proof (dot_constants (real c) step_of ms) as D.
+  pose proof (dot_counted step_of r ms Hr L) as B. pose proof (counted _ _ Hk) as N.
+  pose proof (Rmult_le_compat_r r _ _ Hr N) as N'.
+  pose proof (Rmult_le_compat_l (real c) _ _ Hc (Rle_trans _ _ _ B N')) as P.
+  rewrite Rmult_plus_distr_r. apply Rplus_le_compat; [|exact IH]. eapply Rle_trans; [apply Req_le; exact D|]. lra.
+Qed.
+Lemma square_of_bounds ps rho cs kinds movers : law_bounds ps rho cs kinds -> Forall2 may_move kinds movers ->
+  square (map bound (steps_of ps cs (combine kinds movers))) <=
+  fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * (real (fst ck) * real (fst ck))) (combine cs kinds)).
+Proof.
+  unfold square. intros H. revert movers. induction H as [|c k cs kinds (Hc & Hn & _) H IH]; intros movers M; [simpl; lra|].
+  inversion M as [|? ms ? movers' Hk M']; subst. simpl. rewrite map_app, map_map, dot_app by reflexivity. simpl.
+  specialize (IH _ M'). pose proof (dot_constants (real c) (fun _ => real c) ms) as D.
+  pose proof (dot_counted (fun _ => real c) (real c) ms Hc) as B.
+  assert (Forall (fun _ : mover => real c <= real c) ms) as F by (apply Forall_forall; intros; lra). specialize (B F).
+  pose proof (counted _ _ Hk) as N. pose proof (Rmult_le_compat_r (real c) _ _ Hc N) as N'.
+  pose proof (Rmult_le_compat_l (real c) _ _ Hc (Rle_trans _ _ _ B N')) as P.
+  apply Rplus_le_compat; [|exact IH]. eapply Rle_trans; [apply Req_le; exact D|]. lra.
+Qed.
+Lemma Forall2_lengths {A B} (P : A -> B -> Prop) a b : Forall2 P a b -> length a = length b.
+Proof. intros H. induction H; simpl; auto. Qed.
+Lemma law_sound ps accepted stacked kinds rho u : Forall (holds ps) accepted ->
+  check_law ps accepted stacked kinds rho u = true -> holds ps (Law stacked kinds rho u).
+Proof.
+  intros HA. unfold check_law. intros H. do 2 both H. rename H0 into Ht, H1 into Hf. apply real_nonnegative in H.
+  destruct (total_of accepted stacked kinds rho) as [v|] eqn:Ev; [|discriminate]. apply at_most_real in Ht.
+  destruct (total_sound _ _ _ _ _ _ HA Ev) as (cs & B & E). simpl holds. intros movers M L.
+  pose proof (Forall2_lengths _ _ _ B) as Lc. pose proof (Forall2_lengths _ _ _ M) as Lm.
+  unfold sum_at. destruct (steps_values ps cs kinds movers Lc) as [-> ->].
+  pose proof (telescope (value (part_at ps rho)) _ _ (fun x => length_value _ x Hf) (steps_hold ps rho cs kinds movers B M L) []) as T.
+  rewrite !plus_nil_r in T. destruct stacked.
+  - eapply Rle_trans; [exact T|]. eapply Rle_trans; [apply cauchy|]. rewrite steps_far by auto.
+    apply Rmult_le_compat_r; [apply norm_nonneg|]. apply sqrt_below; auto. rewrite real_mul in Ht.
+    pose proof (square_of_bounds ps rho cs kinds movers B M). lra.
+  - intros r Hr F. eapply Rle_trans; [exact T|].
+    eapply Rle_trans; [apply (sum_of_steps ps rho cs kinds movers r Hr B M F)|]. apply Rmult_le_compat_r; auto. lra.
+Qed.

@@ -1,0 +1,91 @@
+(** What the claims of a certificate mean, over the real numbers. Together with `network`, `affine` and `relu` of Network.v,
+    `norm` and `minus` of Form.v and Network.v and `real` of Checker.v (mantissa times 2^exponent), this is all that has to
+    be read to know what an accepted certificate states. *)
+From Coq Require Import List ZArith Reals.
+From Swarmcert Require Import Algebra Form Network Checker.
+Import ListNotations.
+
+(** Weights by rows, biases. *)
+Definition layerD := (matrixD * list dyadic)%type.
+(** One network as stored; with an input clamp, an interval per input, else []. *)
+Record part := Part { hidden : list layerD; outer : layerD; clamp : list (dyadic * dyadic) }.
+Definition no_part := Part [] ([], []) [].
+Definition part_at (ps : list part) (k : nat) : part := nth k ps no_part.
+Definition layers (p : part) : list layerD := hidden p ++ [outer p].
+Definition inputs_of (p : part) : nat := length (hd [] (fst (hd (outer p) (hidden p)))).
+
+Open Scope R_scope.
+Definition real_layer (l : layerD) := (map (map real) (fst l), map real (snd l)).
+Fixpoint clamped (c : list (dyadic * dyadic)) (x : list R) : list R :=
+  match c, x with
+  | (low, high) :: c', a :: x' => Rmin (Rmax a (real low)) (real high) :: clamped c' x'
+  | _, _ => x
+  end.
+Definition value (p : part) (x : list R) : list R :=
+  network (map real_layer (hidden p)) (real_layer (outer p)) (clamped (clamp p) x).
+Definition vector_sum (us : list (list R)) : list R := fold_right plusR [] us.
+
+(** "network", "phi:..." or "rho:...", and "set:...", whose value is rho(phi(x) + rest). *)
+Inductive function := Alone (p : nat) | Set_of (phi rho : nat).
+Definition moved (f : function) : nat := match f with Alone p => p | Set_of phi _ => phi end.
+Definition value_of (ps : list part) (f : function) (rest x : list R) : list R :=
+  match f with
+  | Alone p => value (part_at ps p) x
+  | Set_of phi rho => value (part_at ps rho) (plusR (value (part_at ps phi) x) rest)
+  end.
+
+(** Of equal length, and different only where `moves` says true. *)
+Fixpoint agree (moves : list bool) (x y : list R) : Prop :=
+  match moves, x, y with
+  | m :: moves', a :: x', b :: y' => (m = true \/ a = b) /\ agree moves' x' y'
+  | [], [], [] => True
+  | _, _, _ => False
+  end.
+(** The sum of ((x_k - y_k) / scale_k)^2, its root; a scale that is left out is 1. *)
+Definition one : dyadic := (1, 0)%Z.
+Fixpoint square_in (scale : list dyadic) (d : list R) : R :=
+  match d with [] => 0 | a :: d' => (a / real (hd one scale)) * (a / real (hd one scale)) + square_in (tl scale) d' end.
+Definition distance (scale : list dyadic) (x y : list R) : R := sqrt (square_in scale (minus x y)).
+
+(** Several terms of the sum move: of kind k (phi, moves, count) at most `count`, each from `fst` to `snd`. *)
+Definition kind := (nat * list bool * Z)%type.
+Definition mover := (list R * list R)%type.
+Definition may_move (k : kind) (ms : list mover) : Prop :=
+  (Z.of_nat (length ms) <= snd k)%Z /\ Forall (fun m => agree (snd (fst k)) (fst m) (snd m)) ms.
+Definition terms (ps : list part) (side : mover -> list R) (group : kind * list mover) : list (list R) :=
+  map (fun m => value (part_at ps (fst (fst (fst group)))) (side m)) (snd group).
+Definition sum_at (ps : list part) (side : mover -> list R) (groups : list (kind * list mover)) : list R :=
+  vector_sum (flat_map (terms ps side) groups).
+Definition step_of (m : mover) : R := norm (minus (fst m) (snd m)).
+
+Inductive claim :=
+| Norm_at_most (p layer : nat) (u : dyadic)
+| Norm_at_least (p layer : nat) (l : dyadic)
+| Slope_at_most (f : function) (moves : list bool) (scale : list dyadic) (u : dyadic)
+| Slope_at_least (f : function) (moves : list bool) (scale : list dyadic) (l : dyadic)
+| Law (stacked : bool) (kinds : list kind) (rho : nat) (u : dyadic).
+
+Definition weights_at (ps : list part) (p layer : nat) : list (list R) :=
+  map (map real) (fst (nth layer (layers (part_at ps p)) ([], []))).
+Definition holds (ps : list part) (c : claim) : Prop :=
+  match c with
+  | Norm_at_most p layer u => forall d, norm (applyR (weights_at ps p layer) d) <= real u * norm d
+  | Norm_at_least p layer l =>
+      exists d, length d = length (hd [] (weights_at ps p layer)) /\ 0 < norm d /\
+        real l * norm d <= norm (applyR (weights_at ps p layer) d)
+  | Slope_at_most f moves scale u =>
+      forall rest x y, agree moves x y -> length x = inputs_of (part_at ps (moved f)) ->
+        norm (minus (value_of ps f rest x) (value_of ps f rest y)) <= real u * distance scale x y
+  | Slope_at_least f moves scale l =>
+      exists others x y, agree moves x y /\ length x = inputs_of (part_at ps (moved f)) /\ 0 < distance scale x y /\
+        Forall (fun o => length (snd o) = inputs_of (part_at ps (fst o))) others /\
+        let rest := vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) others) in
+        real l * distance scale x y <= norm (minus (value_of ps f rest x) (value_of ps f rest y))
+  | Law stacked kinds rho u =>
+      forall movers, Forall2 may_move kinds movers -> let groups := combine kinds movers in
+      Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g)) groups ->
+      let change := minus (value (part_at ps rho) (sum_at ps fst groups)) (value (part_at ps rho) (sum_at ps snd groups)) in
+      if stacked
+      then norm change <= real u * norm (map step_of (concat movers))
+      else forall r, 0 <= r -> Forall (fun m => step_of m <= r) (concat movers) -> norm change <= real u * r
+  end.

@@ -1,0 +1,146 @@
+(** ReLU networks over the reals, and what a nonnegative form says about them. *)
+From Coq Require Import List Reals Lra Lia Psatz.
+From Swarmcert Require Import Algebra Form.
+Import ListNotations.
+Open Scope R_scope.
+
+Notation matrix := (list (list R)).
+Definition relu (x : R) : R := Rmax 0 x.
+Definition affine (m : matrix) (b x : list R) : list R := plusR (applyR m x) b.
+Fixpoint network (hidden : list (matrix * list R)) (last : matrix * list R) (x : list R) : list R :=
+  match hidden with
+  | [] => affine (fst last) (snd last) x
+  | (m, b) :: hidden' => network hidden' last (map relu (affine m b x))
+  end.
+Definition bias_fits (layer : matrix * list R) := length (snd layer) = length (fst layer).
+Definition norm (u : list R) := sqrt (square u).
+
+Lemma minus_affine m b x x' : length b = length m -> minus (affine m b x) (affine m b x') = applyR m (minus x x').
+Proof.
+  intros H. rewrite apply_minus. unfold affine, minus.
+  assert (forall u v w, length u = length w -> length v = length w ->
+    plusR (plusR u w) (scaleR (-1) (plusR v w)) = plusR u (scaleR (-1) v)) as E.
+  { clear. induction u as [|a u IH]; intros [|b v] [|c w]; simpl; try discriminate; intros; auto.
+    rewrite IH by lia. f_equal. ring. }
+  apply E; unfold apply; rewrite map_length; auto.
+Qed.
+Lemma length_affine m b x : length b = length m -> length (affine m b x) = length m.
+Proof.
+  unfold affine, apply. revert b. induction m as [|r m IH]; intros [|c b]; simpl; try discriminate; auto.
+Qed.
+Lemma length_minus u v : length v = length u -> length (minus u v) = length u.
+Proof. unfold minus. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. Qed.
+
+(** dz (dy - dz) >= 0, with multipliers. *)
+Lemma relu_increment y y' : 0 <= (relu y - relu y') * ((y - y') - (relu y - relu y')).
+Proof. unfold relu, Rmax. destruct (Rle_dec 0 y), (Rle_dec 0 y'); nra. Qed.
+Lemma relu_constraint t y y' : Forall (Rle 0) t -> length y' = length y ->
+  let dz := minus (map relu y) (map relu y') in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
+Proof.
+  simpl. unfold minus. intros Ht. revert y y'.
+  induction Ht as [|a t Ha Ht IH]; intros [|b y] [|c y']; simpl; try discriminate; intros; try lra.
+  specialize (IH y y' ltac:(lia)). pose proof (Rmult_le_pos _ _ Ha (relu_increment b c)). nra.
+Qed.
+
+Definition fits (m : matrix) (t : list R) := length t = length m /\ Forall (Rle 0) t.
+
+Lemma times_scale a v w : timesR (scaleR a v) w = scaleR a (timesR v w).
+Proof. revert w. induction v as [|b v IH]; intros [|c w]; simpl; auto. rewrite IH. f_equal. ring. Qed.
+Lemma length_columns n m : length (columnsR n m) = n.
+Proof. revert m. induction n; simpl; auto. Qed.
+Lemma length_scale_rows t m : length t = length m -> length (scale_rowsR t m) = length m.
+Proof. revert m. induction t as [|a t IH]; intros [|r m]; simpl; try discriminate; auto. Qed.
+
+(** From the first hidden layer's activations h, h' on. *)
+Lemma later_layers rho t hidden ts last b h h' :
+  0 < rho -> length t = length h -> length h' = length h -> length b = length last ->
+  Forall bias_fits hidden -> Forall2 fits (map fst hidden) ts ->
+  let dz := minus h h' in
+  exists rest, form (bandR (2 * rho) (- rho) t (List.combine ts (map fst hidden)) last) (dz ++ rest) <=
+    2 * rho * dotR dz (timesR t dz) - rho * square (minus (network hidden (last, b) h) (network hidden (last, b) h')).
+Proof.
+  simpl. intros Hr. revert t ts h h'.
+  induction hidden as [|[m c] hidden IH]; intros t ts h h' Ht Hh Hb Hbs Hts.
+  - exists []. inversion Hts; subst. simpl. rewrite app_nil_r, form_sum, form_scale, minus_affine by auto.
+    assert (length (minus h h') = length t) as <- by (rewrite length_minus; auto).
+    rewrite form_gram_columns, form_diagonal by (unfold scale; rewrite map_length, length_minus; auto).
+    apply Req_le. unfold Rminus. f_equal; [|ring].
+    now rewrite times_scale, dot_scale_r.
+  - inversion Hbs as [|? ? Hc Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; subst. simpl in *. unfold bias_fits in Hc. simpl in Hc.
+    set (z := map relu (affine m c h)). set (z' := map relu (affine m c h')).
+    assert (length z = length m) as Hz by (unfold z; now rewrite map_length, length_affine).
+    assert (length z' = length m) as Hz' by (unfold z'; now rewrite map_length, length_affine).
+    destruct (IH t2 ts' z z') as [rest Hrest]; try congruence; auto.
+    exists (minus z z' ++ rest).
+    assert (length (minus h h') = length t) as L by (rewrite length_minus; auto).
+    rewrite <- L, form_block by (unfold scale; rewrite ?map_length, ?length_columns; auto).
+    rewrite dot_columns, (dot_comm (_ ++ _)), dot_app_short
+      by (rewrite length_minus by congruence; unfold apply, scale_all; rewrite !map_length, length_scale_rows; lia).
+    rewrite apply_scale_all, apply_scale_rows, dot_scale_l, (dot_comm _ (minus z z')), times_scale, dot_scale_r.
+    pose proof (relu_constraint t2 (affine m c h) (affine m c h') Hp2 ltac:(now rewrite !length_affine)) as C.
+    rewrite minus_affine in C by auto. fold z z' in C. simpl in C. nra.
+Qed.
+
+(** Completes the square rho^2 |dx|^2 - 2 rho l dx + |l|^2. *)
+Lemma completed_square rho l x : 2 * rho * dotR l x - square l <= rho * rho * square x.
+Proof.
+  pose proof (square_nonneg (minus (scaleR rho x) l)) as H. unfold square, minus in *.
+  rewrite !dot_plus_l, !dot_plus_r in H. repeat rewrite ?dot_scale_l, ?dot_scale_r in H. rewrite (dot_comm x l) in H. nra.
+Qed.
+
+Definition bounded rho (f : list R -> list R) := forall x x', square (minus (f x) (f x')) <= rho * square (minus x x').
+
+Theorem lmi_bounds rho t first b1 hidden ts last b :
+  0 < rho -> bias_fits (first, b1) -> Forall bias_fits hidden -> bias_fits (last, b) ->
+  fits first t -> Forall2 fits (map fst hidden) ts ->
+  nonnegative (lmi 0 Rplus Rmult (-1) (2 * rho) (- rho) t first (List.combine ts (map fst hidden)) last) ->
+  bounded rho (network ((first, b1) :: hidden) (last, b)).
+Proof.
+  intros Hr H1 Hh Hl [Ht Hp] Hts HP x x'. simpl. unfold bias_fits in *. simpl in *.
+  set (z := map relu (affine first b1 x)). set (z' := map relu (affine first b1 x')).
+  assert (length z = length first) as Hz by (unfold z; now rewrite map_length, length_affine).
+  assert (length z' = length first) as Hz' by (unfold z'; now rewrite map_length, length_affine).
+  destruct (later_layers rho t hidden ts last b z z') as [rest Hrest]; try congruence; auto.
+  pose proof (relu_constraint t (affine first b1 x) (affine first b1 x') Hp ltac:(now rewrite !length_affine)) as C.
+  rewrite minus_affine in C by auto. fold z z' in C. simpl in C.
+  specialize (HP (minus z z' ++ rest)). unfold lmi in HP. rewrite form_sum, form_scale, form_gram in HP.
+  set (l := combine_rows _ _) in HP.
+  assert (dotR l (minus x x') = dotR (minus z z') (timesR t (applyR first (minus x x')))) as E.
+  { unfold l. rewrite dot_combine, apply_scale_rows, dot_comm, dot_app_short, dot_comm; auto.
+    rewrite length_minus by congruence. rewrite <- (apply_scale_rows t first).
+    unfold apply. rewrite map_length, length_scale_rows; lia. }
+  pose proof (completed_square rho l (minus x x')). rewrite E in *.
+  set (s := square (minus (network _ _ z) _)) in *.
+  apply (Rmult_le_reg_l rho); auto. nra.
+Qed.
+
+(** No hidden layer. *)
+Theorem norm_lmi_bounds rho m b : 0 < rho -> bias_fits (m, b) ->
+  nonnegative (norm_lmi 0 Rplus Rmult (-1) rho m) -> bounded rho (network [] (m, b)).
+Proof.
+  intros Hr H HP x x'. simpl. rewrite minus_affine by auto. set (y := applyR m (minus x x')).
+  assert (length (map (fun _ => rho) m) = length y) as L by (unfold y, apply; now rewrite !map_length).
+  specialize (HP y). unfold norm_lmi in HP. rewrite form_sum, form_scale, form_gram, form_diagonal in HP by auto.
+  assert (timesR (map (fun _ => rho) m) y = scaleR rho y) as T.
+  { unfold y. clear. induction m as [|r m IH]; simpl; auto. now rewrite IH. }
+  rewrite T, dot_scale_r in HP. fold (square y) in HP.
+  pose proof (completed_square rho (combine_rows y m) (minus x x')) as C.
+  rewrite dot_combine in C. fold y in C. fold (square y) in C.
+  apply (Rmult_le_reg_l rho); auto. nra.
+Qed.
+
+(** The same through m' m. *)
+Theorem norm_lmi_columns_bounds rho m b n : 0 < rho -> bias_fits (m, b) ->
+  nonnegative (norm_lmi 0 Rplus Rmult (-1) rho (columnsR n m)) ->
+  forall x x', length x = n -> length x' = n ->
+  square (minus (network [] (m, b) x) (network [] (m, b) x')) <= rho * square (minus x x').
+Proof.
+  intros Hr H HP x x' Hx Hx'. simpl. rewrite minus_affine by auto. set (d := minus x x').
+  assert (length d = n) as L by (unfold d; rewrite length_minus; lia). clearbody d.
+  specialize (HP d). unfold norm_lmi in HP.
+  rewrite form_sum, form_scale, <- L, form_gram_columns, form_diagonal in HP by (now rewrite map_length, length_columns).
+  assert (forall (m : matrix) (y : list R), length m = length y -> dotR y (timesR (map (fun _ => rho) m) y) = rho * square y) as T.
+  { unfold square. clear. induction m as [|r m IH]; intros [|c y]; simpl; try discriminate; intros; [ring|].
+    rewrite IH by lia. ring. }
+  rewrite T in HP by (now rewrite length_columns). lra.
+Qed.

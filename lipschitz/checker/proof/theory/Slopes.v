@@ -1,0 +1,224 @@
+(** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
+From Coq Require Import List ZArith Reals Lra Lia Bool.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims.
+Import ListNotations.
+Open Scope R_scope.
+
+Ltac both H := apply andb_prop in H; destruct H as [H ?].
+
+Lemma at_most_real x y : at_most x y = true -> real x <= real y.
+Proof. intros H. apply real_nonnegative in H. rewrite real_add, real_neg in H. lra. Qed.
+Lemma at_most_false x y : at_most x y = false -> real y <= real x.
+Proof.
+  unfold at_most. intros H. assert (is_nonnegative (neg (add y (neg x))) = true) as N.
+  { unfold is_nonnegative, neg in *. simpl. apply Z.leb_le. apply Z.leb_gt in H. lia. }
+  apply real_nonnegative in N. rewrite real_neg, real_add, real_neg in N. lra.
+Qed.
+Lemma real_one : real one = 1. Proof. unfold one, real. simpl. ring. Qed.
+Lemma realm_apply m v : reals (apply zero add mul m v) = applyR (realm m) (reals v).
+Proof. apply (f_apply zero add mul 0 Rplus Rmult real real_zero real_add real_mul). Qed.
+Lemma real_square v : real (squareD v) = square (reals v).
+Proof. apply (f_dot zero add mul 0 Rplus Rmult real real_zero real_add real_mul). Qed.
+
+(** Norms *)
+Lemma weights_matrix ps p layer : weights_at ps p layer = realm (matrix_at ps p layer).
+Proof. reflexivity. Qed.
+Lemma norm_above_sound w u rho t f : check [] w u rho t f = true ->
+  forall d, norm (applyR (realm w) d) <= real u * norm d.
+Proof.
+  intros H d. set (n := inputs [] w). set (b := repeat 0 (length w)).
+  assert (length b = length w) as Hb by apply repeat_length.
+  pose proof (check_sound [] w u rho t f H [] b (Forall2_nil _) Hb (trim n d) (repeat 0 n)
+    (length_trim n d) (repeat_length 0 n)) as B.
+  unfold chain in B. simpl in B. rewrite minus_affine in B by (now rewrite map_length).
+  rewrite <- (length_trim n d) in B at 2 4. rewrite minus_zeros in B.
+  assert (is_nonnegative u = true /\ shapes n [] w = true) as [Hu Hs].
+  { unfold check in H. apply andb_prop in H. destruct H as [S H]. repeat both H. auto. }
+  rewrite apply_trim in B.
+  - eapply Rle_trans; [exact B|]. apply Rmult_le_compat_l; [now apply real_nonnegative|]. apply norm_le, square_trim.
+  - simpl in Hs. rewrite forallb_forall in Hs. apply Forall_forall. intros r Hr. apply in_map_iff in Hr.
+    destruct Hr as (r' & <- & Hr). rewrite map_length. apply Nat.eqb_eq. auto.
+Qed.
+Lemma norm_below_sound w l v : check_norm_below w l v = true ->
+  exists d, length d = length (hd [] (realm w)) /\ 0 < norm d /\ real l * norm d <= norm (applyR (realm w) d).
+Proof.
+  unfold check_norm_below. intros H. repeat both H. apply Nat.eqb_eq in H. exists (reals v). repeat split.
+  - rewrite map_length, H. destruct w; simpl; auto. now rewrite map_length.
+  - apply sqrt_lt_R0. rewrite <- real_square. now apply real_positive.
+  - apply at_most_real in H0. rewrite !real_mul, !real_square, realm_apply in H0. apply real_nonnegative in H2.
+    unfold norm. rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra. now apply sqrt_le_1_alt.
+Qed.
+
+(** Slopes by a matrix inequality *)
+Definition stack_of (p : part) : real_stack := (map real_layer (hidden p), real_layer (outer p)).
+Lemma value_run p x : value p x = run (stack_of p) (clamped (clamp p) x). Proof. reflexivity. Qed.
+Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
+Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
+Lemma instance_matrices p : fits_part p = true -> instance (matrices p) (stack_of p).
+Proof.
+  intros H. unfold instance, matrices, stack_of. simpl.
+  exists (map (fun l : layerD => reals (snd l)) (hidden p)), (reals (snd (outer p))). repeat split.
+  - assert (forall l, In l (hidden p) -> length (snd l) = length (fst l)) as G
+      by (intros; apply (fits_layer p); auto; apply in_or_app; auto).
+    induction (hidden p) as [|l ls IH]; simpl; constructor; [|apply IH; intros; apply G; now right].
+    rewrite map_length. apply G. now left.
+  - rewrite map_length. apply (fits_layer p); auto. apply in_or_app. right. now left.
+  - f_equal. clear. induction (hidden p) as [|l ls IH]; simpl; [|rewrite IH]; reflexivity.
+Qed.
+Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
+Proof.
+  intros H. unfold value. rewrite network_end, length_affine; simpl; rewrite ?map_length; auto.
+  apply (fits_layer p); auto. apply in_or_app. right. now left.
+Qed.
+Lemma distance_nonneg scale x y : 0 <= distance scale x y. Proof. apply sqrt_pos. Qed.
+
+Lemma moved_bound moves scale c u (g : list R -> list R) x y :
+  positive_scale scale = true -> 0 <= u -> agree moves x y ->
+  (forall v w base, length v = count moves -> length w = count moves -> length base = length moves ->
+    norm (minus (g (plusR (applyR (realm (selector moves scale)) v) base))
+                (g (plusR (applyR (realm (selector moves scale)) w) base))) <= u * norm (minus v w)) ->
+  norm (minus (g (clamped c x)) (g (clamped c y))) <= u * distance scale x y.
+Proof.
+  intros Hs Hu Ha Hg. pose proof (agree_clamped c _ _ _ Ha) as Hc. destruct (agree_lengths _ _ _ Hc) as [Hx Hy].
+  rewrite <- (selected moves scale (clamped c x)), <- (selected moves scale (clamped c y)), <- (agree_staying _ _ _ Hc) by auto.
+  eapply Rle_trans; [apply Hg; auto using length_movement, length_staying|].
+  apply Rmult_le_compat_l; auto. unfold norm. rewrite square_movement by auto. apply sqrt_le_1_alt, square_in_clamped.
+  destruct (agree_lengths _ _ _ Ha). congruence.
+Qed.
+
+Lemma slope_sound ps f moves scale u rho t factor :
+  check_slope ps f moves scale u rho t factor = true -> holds ps (Slope_at_most f moves scale u).
+Proof.
+  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 2 both H. do 4 both H.
+  rename H0 into HP, H1 into Hu, H2 into Hl, H3 into Hs, H4 into Hm, H5 into Hc.
+  apply real_nonnegative in Hu. set (S := selector moves scale) in *.
+  assert (forall base, length base = length moves -> instance ([], S) ([], (realm S, base))) as I.
+  { intros base Hb. exists [], base. repeat split; auto; [constructor|]. simpl. unfold S. now rewrite length_selector. }
+  assert (inputs [] S = count moves) as Hi by apply selector_columns.
+  pose proof (check_parts_sound _ _ _ _ _ _ HP) as C. clear HP. cbn [fst snd] in C.
+  destruct f as [p|phi k]; cbn [parts_of map forallb tl moved value_of] in *.
+  - both H. apply (instance_matrices _) in H. rewrite !value_run.
+    apply (moved_bound moves scale); auto. intros v w base Hv Hw Hb.
+    pose proof (C _ [([], stack_of (part_at ps p))] (I base Hb)
+      (Forall2_cons (matrices (part_at ps p)) ([], stack_of (part_at ps p)) H (Forall2_nil _)) v w) as B.
+    simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
+  - both H. both H0. apply instance_matrices in H, H0.
+    both Hc. unfold value at 1 3. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
+    change (network (map real_layer (hidden (part_at ps k))) (real_layer (outer (part_at ps k)))) with (run (stack_of (part_at ps k))).
+    rewrite !value_run.
+    apply (moved_bound moves scale _ _ (fun z => run (stack_of (part_at ps k)) (plusR (run (stack_of (part_at ps phi)) z) rest))); auto.
+    intros v w base Hv Hw Hb.
+    pose proof (C _ [([], stack_of (part_at ps phi)); (rest, stack_of (part_at ps k))] (I base Hb)
+      (Forall2_cons (matrices (part_at ps phi)) ([], stack_of (part_at ps phi)) H
+        (Forall2_cons (matrices (part_at ps k)) (rest, stack_of (part_at ps k)) H0 (Forall2_nil _))) v w) as B.
+    simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
+Qed.
+
+(** Slopes by products of norms *)
+Definition norm_bound_of (l : layerD) (u : R) := 0 <= u /\ forall d, norm (applyR (fst (real_layer l)) d) <= u * norm d.
+Definition product_R (us : list R) := fold_right Rmult 1 us.
+Lemma find_norm_sound ps accepted p layer u : Forall (holds ps) accepted -> find_norm accepted p layer = Some u ->
+  forall d, norm (applyR (weights_at ps p layer) d) <= real u * norm d.
+Proof.
+  intros H. induction H as [|c rest Hc H IH]; [discriminate|]. destruct c; simpl; auto.
+  destruct (Nat.eqb_spec p p0), (Nat.eqb_spec layer layer0); simpl; auto. intros E d. inversion E. subst. apply Hc.
+Qed.
+Lemma norms_sound ps accepted p v : Forall (holds ps) accepted ->
+  forall ls before, layers (part_at ps p) = before ++ ls -> norms accepted p (length before) ls = Some v ->
+  exists us, Forall2 norm_bound_of ls us /\ real v = product_R us.
+Proof.
+  intros HA ls. revert v. induction ls as [|l ls IH]; intros v before E; simpl.
+  - intros H. inversion H. exists []. split; [constructor|]. apply real_one.
+  - destruct (find_norm accepted p (length before)) as [u|] eqn:Hu; [|discriminate].
+    destruct (norms accepted p (S (length before)) ls) as [w|] eqn:Hw; [|discriminate].
+    destruct (is_nonnegative u) eqn:Hn; [|discriminate]. intros H. inversion H. subst.
+    destruct (IH w (before ++ [l])) as (us & B & G).
+    + now rewrite <- app_assoc.
+    + now rewrite app_length, Nat.add_comm.
+    + exists (real u :: us). rewrite real_mul. simpl. rewrite G. split; auto. constructor; auto. split.
+      * now apply real_nonnegative.
+      * intros d. pose proof (find_norm_sound _ _ _ _ _ HA Hu d) as F. unfold weights_at in F.
+        rewrite E, nth_middle in F. exact F.
+Qed.
+Lemma product_nonneg ls us : Forall2 norm_bound_of ls us -> 0 <= product_R us.
+Proof. intros H. induction H as [|l u ls us [Hu _] H IH]; simpl; [lra|]. now apply Rmult_le_pos. Qed.
+Lemma affine_bound l u x y : norm_bound_of l u -> length (snd l) = length (fst l) ->
+  norm (minus (affine (fst (real_layer l)) (snd (real_layer l)) x) (affine (fst (real_layer l)) (snd (real_layer l)) y)) <= u * norm (minus x y).
+Proof. intros [_ H] L. rewrite minus_affine by (simpl; now rewrite !map_length). apply H. Qed.
+Lemma network_bound hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
+  (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
+  norm (minus (network (map real_layer hs) (real_layer l) x) (network (map real_layer hs) (real_layer l) y)) <= product_R us * norm (minus x y).
+Proof.
+  revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
+  - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
+  - inversion H as [|? u ? us' Hu Hus]; subst. pose proof (affine_bound k u x y Hu (L _ (or_introl eq_refl))) as B.
+    unfold real_layer in B. simpl in B.
+    eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite (Rmult_comm u), Rmult_assoc.
+    apply Rmult_le_compat_l; [eapply product_nonneg; eauto|].
+    eapply Rle_trans; [apply norm_le, relu_contracts|exact B].
+    rewrite !length_affine; auto; rewrite !map_length; apply L; auto.
+Qed.
+Lemma part_bound ps accepted p v : Forall (holds ps) accepted -> fits_part (part_at ps p) = true ->
+  norm_of ps accepted p = Some v -> 0 <= real v /\ forall x y,
+  norm (minus (run (stack_of (part_at ps p)) x) (run (stack_of (part_at ps p)) y)) <= real v * norm (minus x y).
+Proof.
+  intros HA Hf Hv. destruct (norms_sound ps accepted p v HA _ [] eq_refl Hv) as (us & B & ->). split.
+  - eapply product_nonneg; eauto.
+  - intros x y. apply network_bound; auto. intros k. now apply fits_layer.
+Qed.
+Lemma square_in_largest m scale d : (scale = [] \/ length d = length scale) -> positive_scale scale = true ->
+  real (hd one scale) <= m -> Forall (fun s => real s <= m) scale -> square d <= m * m * square_in scale d.
+Proof.
+  intros Hl Hs Hh Hm. destruct Hl as [->|Hl].
+  - rewrite square_in_one. simpl in Hh. rewrite real_one in Hh. pose proof (square_nonneg d).
+    assert (1 <= m * m) by nra. nra.
+  - clear Hh. unfold square. revert scale Hl Hs Hm. induction d as [|a d IH]; intros [|s scale]; simpl; try discriminate; intros Hl Hs Hm; [lra|].
+    inversion Hm as [|? ? Hms Hm']; subst. apply andb_prop in Hs. destruct Hs as [Hs Hs']. apply real_positive in Hs.
+    specialize (IH scale ltac:(lia) Hs' Hm').
+    assert (a * a <= m * m * (a / real s * (a / real s))); [|lra].
+    assert (a = real s * (a / real s)) as E by (field; lra). set (q := a / real s) in *. rewrite E.
+    replace (real s * q * (real s * q)) with (real s * real s * (q * q)) by ring.
+    apply Rmult_le_compat_r; [pose proof (Rle_0_sqr q); auto|]. apply Rmult_le_compat; lra.
+Qed.
+Lemma norm_in_largest m scale moves c x y : 0 <= m -> agree moves x y -> (scale = [] \/ length scale = length moves) ->
+  positive_scale scale = true -> real (hd one scale) <= m -> Forall (fun s => real s <= m) scale ->
+  norm (minus (clamped c x) (clamped c y)) <= m * distance scale x y.
+Proof.
+  intros H0 Ha Hl Hs Hh Hm. destruct (agree_lengths _ _ _ Ha) as [Hx Hy]. unfold distance.
+  rewrite <- (sqrt_square m) by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
+  eapply Rle_trans; [apply (square_in_largest m scale); auto|].
+  - rewrite length_minus by (rewrite !length_clamped; congruence). rewrite length_clamped. destruct Hl; [left|right]; congruence.
+  - apply Rmult_le_compat_l; [nra|]. apply square_in_clamped. congruence.
+Qed.
+Lemma product_sound ps accepted f moves scale u : Forall (holds ps) accepted ->
+  check_product ps accepted f moves scale u = true -> holds ps (Slope_at_most f moves scale u).
+Proof.
+  intros HA. unfold check_product. set (m := largest _ _). intros H rest x y Ha Hx. do 3 both H.
+  unfold well_formed in H. do 4 both H. rename H3 into Hl, H4 into Hs, H6 into Hc.
+  destruct (product_of ps accepted f) as [k|] eqn:Hk; [|discriminate]. apply at_most_real in H0, H2. rewrite real_mul in H0.
+  assert (Forall (fun s => real s <= real m) scale) as Hm.
+  { rewrite forallb_forall in H1. apply Forall_forall. intros s G. now apply at_most_real, H1. }
+  destruct (positive_hd _ Hs) as [Hp _].
+  assert (scale = [] \/ length scale = length moves) as Hl'.
+  { apply orb_prop in Hl. destruct Hl as [G|G]; [left; now destruct scale|right; now apply Nat.eqb_eq]. }
+  assert (forall c, norm (minus (clamped c x) (clamped c y)) <= real m * distance scale x y) as D
+    by (intros c; apply (norm_in_largest _ _ moves); auto; lra).
+  pose proof (distance_nonneg scale x y) as Dn.
+  assert (forall z e, 0 <= z -> 0 <= real k -> e <= real k * z -> z <= real m * distance scale x y -> e <= real u * distance scale x y) as G.
+  { intros z e Z K E F. apply Rle_trans with (real k * (real m * distance scale x y)).
+    - eapply Rle_trans; [exact E|]. now apply Rmult_le_compat_l.
+    - rewrite <- Rmult_assoc, (Rmult_comm (real k)). apply Rmult_le_compat_r; auto. }
+  destruct f as [p|phi r]; cbn [parts_of forallb tl value_of product_of] in *.
+  - both H. destruct (part_bound _ _ _ _ HA H Hk) as [K B]. rewrite !value_run.
+    eapply G; [apply norm_nonneg | auto | apply B | apply D].
+  - both H. both H3. both Hc.
+    destruct (norm_of ps accepted phi) as [a|] eqn:Ea; [|discriminate].
+    destruct (norm_of ps accepted r) as [b|] eqn:Eb; [|discriminate]. inversion Hk. subst k.
+    destruct (part_bound _ _ _ _ HA H Ea) as [Ka Ba]. destruct (part_bound _ _ _ _ HA H3 Eb) as [Kb Bb].
+    unfold value at 1 3. destruct (clamp (part_at ps r)) eqn:E; [|discriminate]. simpl clamped.
+    change (network (map real_layer (hidden (part_at ps r))) (real_layer (outer (part_at ps r)))) with (run (stack_of (part_at ps r))).
+    apply (G (norm (minus (clamped (clamp (part_at ps phi)) x) (clamped (clamp (part_at ps phi)) y))));
+      [apply norm_nonneg | rewrite real_mul; nra | | apply D].
+    rewrite real_mul, (Rmult_comm (real a)), Rmult_assoc. eapply Rle_trans; [apply Bb|]. apply Rmult_le_compat_l; auto.
+    eapply Rle_trans; [apply norm_le|apply Ba]. rewrite square_shifted by (now rewrite !length_value). apply Rle_refl.
+Qed.

@@ -1,0 +1,31 @@
+# Every proof of the theory is complete and adds no axiom of its own; and every file of it is looked at by Assumptions.v, or
+# used by one that is.
+#   cmake -DTHEORY=... -P nothing_admitted_test.cmake
+cmake_minimum_required(VERSION 3.25)
+
+file(GLOB files ${THEORY}/*.v)
+list(LENGTH files count)
+if(count LESS 12)
+  message(FATAL_ERROR "only ${count} files in ${THEORY}")
+endif()
+set(theorems 0)
+foreach(file IN LISTS files)
+  file(READ ${file} text)
+  string(REGEX MATCHALL "(^|[ \n.])(Admitted|admit|give_up|Axioms?|Parameters?|Conjectures?|Hypothes[ie]s|Variables?|Abort|Unset Guard Checking|bypass_check)[ \n.(:]"
+         found "${text}")
+  if(found)
+    message(FATAL_ERROR "${file} has ${found}")
+  endif()
+  string(REGEX MATCHALL "(^|\n)(Lemma|Theorem|Corollary) " stated "${text}")
+  string(REGEX MATCHALL "Qed\\." proved "${text}")
+  list(LENGTH stated statements)
+  list(LENGTH proved proofs)
+  if(NOT statements EQUAL proofs)
+    message(FATAL_ERROR "${file} states ${statements} lemmas and proves ${proofs}")
+  endif()
+  math(EXPR theorems "${theorems} + ${statements}")
+endforeach()
+if(theorems LESS 100)
+  message(FATAL_ERROR "only ${theorems} lemmas: is this the theory?")
+endif()
+message("${count} files, ${theorems} lemmas, each proved")

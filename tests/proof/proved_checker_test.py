@@ -1,0 +1,238 @@
+#!/usr/bin/env python3
+"""Three checkers on the same certificates: the proved one, the one of the tool, and the second one in Python. Whatever
+certify writes without a box is accepted by all, with nothing left unchecked; mutations of every field are decided alike;
+malformed files are refused by each.
+
+    proved_checker_test.py SWARMCERT SOURCE_DIR MUTATIONS CHECKER    MUTATIONS: 0, one for every kind of field
+"""
+import json
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+SOURCE, MUTATIONS, CHECKER = Path(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]).resolve()
+sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
+import check_certificate as second  # noqa: E402
+import check_certificate_test as common  # noqa: E402
+
+SECONDS = 20  # until a checker counts as hung; the times themselves are printed
+
+
+def run(command):
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, errors="replace",
+                          timeout=SECONDS)
+
+
+def first(certificate, net):
+    return run([common.SWARMCERT, "check", certificate, *net, "-q"])
+
+
+def proved(certificate, net):
+    return run([CHECKER, certificate, *net])
+
+
+def pattern(path):
+    return tuple("*" if isinstance(key, int) else key for key in path)
+
+
+def kinds(folder, generator):
+    """(name, NET, options of certify, share of the mutations) for every kind of certificate."""
+    hetero = [common.heterogeneous(folder, generator)]
+    tiny, square, line = (folder / f"{name}.safetensors" for name in ("tiny", "square", "line"))
+    tiny.write_bytes(common.safetensors([2, 5, 4, 1], generator))
+    square.write_bytes(common.safetensors([3, 3, 3, 2], generator, ["first", "after", "last"]))
+    line.write_bytes(common.safetensors([3, 2], generator))
+    ordered = [square, "--order", "first,after,last"]
+    samples = folder / "square.json"
+    samples.write_text(common.recorded(second.Network(**arguments(ordered)).parts["network"], generator))
+    pair = ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
+    parts = ["--method", "branch", "--cuts", "20"]
+    slow = [("kinds by parts of a box", hetero, ["--neighbours", "2", "--domain", folder / "part.toml", *parts], 0.01)]
+    return [
+        ("plain", [tiny], [], 0.2),
+        ("one layer", [line], ["--blocks"], 0.2),
+        ("order and samples", ordered, ["--samples", samples], 0.2),
+        ("kinds, blocks, laws, scale", hetero, ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"], 0.05),
+        ("float32 and products", hetero, ["--as", "float32", "--neighbours", "2", "--method", "product"], 0.1),
+        ("kinds on a box", hetero, ["--neighbours", "small=3", "--domain", folder / "box.toml", "--method", "sdp"], 0.05),
+        ("pair", pair, ["--blocks=velocity"], 0.16),
+        ("by parts", [tiny], parts, 0.03),
+    ] + slow * (MUTATIONS > 0)
+
+
+def arguments(net):
+    return common.arguments(list(map(str, net)))
+
+
+def decided_alike(code, accepted, second_accepts, by_parts):
+    """`by_parts`: some of its claims are beyond the proved checker, which then never accepts."""
+    if accepted != second_accepts:
+        return False
+    if code == 4:
+        return by_parts
+    return (code == 0) == accepted and (not by_parts or not accepted)
+
+
+def mutate(name, net, certificate, folder, generator, count):
+    """Mutates every kind of field, then random ones until there are `count`; a row of the table."""
+    by_parts = "parts" in name
+    paths = list(common.leaves(certificate))
+    by_pattern = {}
+    for path in paths:
+        by_pattern.setdefault(pattern(path), []).append(path)
+    chosen = [generator.choice(some) for some in by_pattern.values()]
+    chosen += [generator.choice(by_pattern[p]) for p in generator.choices(list(by_pattern), k=max(0, count - len(chosen)))]
+    network = second.Network(**arguments(net))
+
+    def decide(job):
+        number, changed = job
+        path = folder / f"mutation{number}.json"
+        path.write_text(json.dumps(changed))
+        results = first(path, net), proved(path, net)
+        path.unlink()
+        return results
+
+    table = Counter()
+    with ThreadPoolExecutor(2) as pool:
+        for begin in range(0, len(chosen), 1000):
+            part = chosen[begin:begin + 1000]
+            changed = [common.forged(certificate, path, generator)[0] for path in part]
+            for path, mutation, (one, three) in zip(part, changed, pool.map(decide, enumerate(changed))):
+                assert one.returncode in (0, 1, 3), one
+                assert three.returncode in (0, 1, 3, 4), three
+                if "as" in mutation.get("network", {}) and mutation["network"]["as"] != certificate["network"]["as"]:
+                    network = second.Network(**arguments(net))  # the second checker rounds it in place
+                reason = second.check(mutation, network) if mutation.get("schema") == certificate["schema"] else "schema"
+                alike = decided_alike(three.returncode, one.returncode == 0, not reason, by_parts)
+                assert alike, (f"{name}, {path}: first {one.returncode} {one.stdout} {one.stderr}, second {reason!r}, "
+                               f"proved {three.returncode} {three.stdout} {three.stderr}")
+                table["accepted" if one.returncode == 0 else "rejected" if three.returncode != 4 else "beyond"] += 1
+    assert table["rejected"] + table["beyond"] > 0.5 * len(chosen), table
+    print(f"{name:28} {len(by_pattern):4} kinds of fields {len(chosen):7} mutations: {table['rejected']:7} rejected by all, "
+          f"{table['accepted']:6} accepted by all, {table['beyond']:6} beyond the proved one")
+    return len(chosen)
+
+
+def layer_by_layer(certificate, net, folder):
+    """The method that takes the place of sdp where its search is cut short is proved by the same inequality."""
+    changed = json.loads(json.dumps(certificate).replace('"upper_method": "sdp"', '"upper_method": "eclipse_fast"'))
+    assert changed != certificate
+    changed["content_sha256"] = second.content_sha256(changed)
+    path = folder / "layer_by_layer.json"
+    path.write_text(json.dumps(changed))
+    assert first(path, net).returncode == proved(path, net).returncode == 0
+    assert not second.check(changed, second.Network(**arguments(net)))
+
+
+def short_scale(certificate, net, folder):
+    """Of a product of norms as well, whose proof does not look at single inputs."""
+    bound = next(b for b in certificate["bounds"] if b["scale"])
+    bound.update(scale=bound["scale"][:-1], upper_method="product", proof=None, lower=None, lower_hex=None, lower_witness=None,
+                 upper=2.0 ** 90, upper_hex="0x1p+90")
+    certificate["content_sha256"] = second.content_sha256(certificate)
+    path = folder / "short_scale.json"
+    path.write_text(json.dumps(certificate))
+    reason = second.check(certificate, second.Network(**arguments(net)))
+    for said in first(path, net).stdout, reason, proved(path, net).stdout:
+        assert "scale has another size" in said, said
+
+
+def malformed(certificate, net, folder):
+    """Files that no checker may accept or stumble over."""
+    text = json.dumps(certificate)
+    bound = next(k for k, b in enumerate(certificate["bounds"]) if b["upper_method"] == "sdp")
+
+    def with_bound(change):
+        changed = json.loads(text)
+        change(changed["bounds"][bound])
+        changed["content_sha256"] = second.content_sha256(changed)
+        return json.dumps(changed)
+
+    def ragged(b):
+        b["proof"]["factor"]["rows"][0] += " 1 2 3"
+
+    def one_row_less(b):
+        b["proof"]["factor"]["rows"].pop()
+
+    def set_(key, value):
+        def change(b):
+            b["proof"]["factor"][key] = value
+        return change
+
+    def with_number(number, key="upper"):
+        return text.replace(f'"{key}": {json.dumps(certificate["bounds"][0][key])}', f'"{key}": {number}', 1)
+
+    def hex_upper(word):
+        def change(b):
+            b["upper_hex"] = word
+        return with_bound(change)
+
+    def long_word(b):
+        b["proof"]["factor"]["rows"][0] = "9" * 100000
+    scale = certificate["bounds"][bound]["proof"]["factor"]["scale"]
+    cases = {
+        "empty": b"", "no JSON": b"{", "an array": b"[]", "NaN": with_number("NaN"), "Infinity": with_number("-Infinity"),
+        "exponent of nine digits": with_number("1e999999999"), "number of 10^5 digits": with_number("9" * 100000),
+        "fraction of 10^5 digits": with_number("0." + "3" * 100000),
+        "nested 10^5 deep": b"[" * 100000 + b"]" * 100000, "nested 65 deep": b'{"schema":' + b"[" * 65 + b"]" * 65 + b"}",
+        "byte order mark": b"\xef\xbb\xbf" + text.encode(), "two documents": text + text, "not UTF-8": text.encode() + b"\xff",
+        "key twice": text[:-1] + ', "tool": "x"}', "half a surrogate": text.replace('"tool": "', '"tool": "\\ud800', 1),
+        "control character": text.replace('"tool": "', '"tool": "\x01', 1), "comment": "// x\n" + text,
+        "trailing comma": text[:-1] + ",}", "leading zero": with_number("01"), "plus sign": with_number("+1"),
+        "ragged factor": with_bound(ragged), "a row less": with_bound(one_row_less), "long integer": with_bound(long_word),
+        "huge unit": with_bound(set_("unit_exponent", 10 ** 18)), "huge scale": with_bound(set_("scale", [10 ** 9] * len(scale))),
+        "scale is text": with_bound(set_("scale", "1")), "factor is null": with_bound(lambda b: b["proof"].update(factor=None)),
+        "hex exponent": hex_upper("0x1p999999999"), "long hex": hex_upper("0x" + "1" * 100000 + "p0"),
+        "hex nan": hex_upper("nan"), "hex inf": hex_upper("inf"), "hex blank": hex_upper(" 0x1p0"), "hex plus": hex_upper("+0x1p0"),
+        "more bits than a double": hex_upper("0x1.000000000000001p3"),
+        "scale of another size": with_bound(lambda b: b.update(scale=["0x1p+0"], norm="weighted_l2")),
+    }
+    longest = {}
+    for name, data in cases.items():
+        path = folder / "malformed.json"
+        path.write_bytes(data if isinstance(data, bytes) else data.encode("utf-8", "surrogatepass"))
+        script = [sys.executable, "-B", SOURCE / "tests/lipschitz/check_certificate.py", path, *net]
+        codes = []
+        for which, command in (("first", [common.SWARMCERT, "check", path, *net, "-q"]), ("second", script),
+                               ("proved", [CHECKER, path, *net])):
+            start = time.monotonic()
+            codes.append(run(command).returncode)
+            longest[which] = max(longest.get(which, 0), time.monotonic() - start)
+        assert all(code in (1, 3) for code in codes), f"{name}: {codes}"
+    print(f"{len(cases)} malformed files refused by all; longest: " +
+          ", ".join(f"{which} {1000 * seconds:.0f} ms" for which, seconds in longest.items()))
+
+
+def main():
+    generator = random.Random(23)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        everything = kinds(folder, generator)
+        total = 0
+        for index, (name, net, options, share) in enumerate(everything):
+            path = folder / f"certificate{index}.json"
+            run([common.SWARMCERT, "certify", *net, *options, "--nodes", "20" if "parts" in name else "1", "-q", "-o", path])
+            certificate = second.parse(path.read_text())
+            one, three = first(path, net), proved(path, net)
+            assert one.returncode == 0, one
+            if "parts" in name:
+                assert three.returncode == 4 and three.stdout.startswith("not checked: bound"), three
+                assert "accepted" not in three.stdout, three
+            else:
+                assert three.returncode == 0 and three.stdout == one.stdout, f"{one} {three}"
+            if index == 0:
+                malformed(certificate, net, folder)
+                layer_by_layer(certificate, net, folder)
+            if "scale" in name:
+                short_scale(json.loads(json.dumps(certificate)), net, folder)
+            total += mutate(name, net, certificate, folder, generator, int(share * MUTATIONS))
+        print(f"{total} mutated certificates of {len(everything)} kinds: the three checkers decide alike on each")
+
+
+if __name__ == "__main__":
+    main()
