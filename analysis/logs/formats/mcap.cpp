@@ -50,12 +50,6 @@ class McapReader {
   }
 
  private:
-  struct Topic {
-    std::optional<RosTopic> topic;  ///< nothing where its messages cannot be read
-    std::string name, fault;
-    std::size_t lost = 0;
-  };
-
   /// Offsets of the sound records outside chunks; counts damage.
   std::vector<std::size_t> find_records() {
     std::vector<std::size_t> found;
@@ -243,8 +237,8 @@ class McapReader {
       ++found->second.lost;
   }
 
-  Topic begin_topic(const McapChannel& channel) {
-    Topic topic;
+  FoundTopic begin_topic(const McapChannel& channel) {
+    FoundTopic topic;
     topic.name = channel.topic;
     auto schema = schemas_.find(channel.schema);
     if (channel.encoding != "cdr") {
@@ -265,13 +259,7 @@ class McapReader {
   }
 
   void finish() {
-    for (auto& [id, topic] : topics_) {
-      if (topic.topic)
-        topic.topic->move_to(log_);
-      else
-        log_.skipped.push_back(
-            {topic.name.empty() ? fmt::format("channel {}", id) : topic.name, topic.fault, topic.lost});
-    }
+    for (auto& [id, topic] : topics_) topic.move_to(log_, fmt::format("channel {}", id));
     number_instances(log_);
     for (const auto& [id, lost] : unknown_channels_)
       log_.skipped.push_back(
@@ -290,7 +278,7 @@ class McapReader {
   std::deque<std::string> texts_;  ///< of schemas; views of them stay valid
   std::map<std::uint16_t, McapSchema> schemas_;
   std::map<std::uint16_t, McapChannel> channels_;
-  std::map<std::uint16_t, Topic> topics_;
+  std::map<std::uint16_t, FoundTopic> topics_;
   std::map<std::uint16_t, std::size_t> unknown_channels_;
   std::map<std::string, std::size_t> unknown_compressions_;
   std::optional<McapChunk> cut_chunk_;

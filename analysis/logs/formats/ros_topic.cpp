@@ -206,6 +206,13 @@ void RosTopic::move_to(RawLog& log) {
   }
 }
 
+void FoundTopic::move_to(RawLog& log, const std::string& id) {
+  if (topic)
+    topic->move_to(log);
+  else
+    log.skipped.push_back({name.empty() ? id : name, fault, lost});
+}
+
 void number_instances(RawLog& log) {
   std::map<std::string, int> counts;
   for (RawTopic& topic : log.topics) topic.instance = counts[topic.name]++;

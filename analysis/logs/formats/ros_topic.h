@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,6 +53,16 @@ class RosTopic {
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+/// A topic of a file, or why its messages cannot be read.
+struct FoundTopic {
+  std::optional<RosTopic> topic;
+  std::string name, fault;
+  std::size_t lost = 0;  ///< messages that were not read
+
+  /// Moves what was gathered to `log`, or notes there what was lost and why. `id` stands for an empty name.
+  void move_to(RawLog& log, const std::string& id);
 };
 
 /// Topics of one name become instances 0, 1, ... of it.

@@ -148,11 +148,6 @@ class RosbagReader {
   struct Definition {
     std::string encoding, text;
   };
-  struct Topic {
-    std::optional<RosTopic> topic;  ///< nothing where its messages cannot be read
-    std::string name, fault;
-    std::size_t lost = 0;
-  };
 
   /// True for a table whose rows are stored as they are; views, virtual tables and computed columns could do anything.
   bool is_plain_table(const std::string& name) {
@@ -195,7 +190,7 @@ class RosbagReader {
     while (rows.next() && topics_.size() < kMostTopics) {
       const std::string type(rows.bytes(2).substr(0, 256));
       const std::string encoding(rows.bytes(3).substr(0, 64));
-      Topic topic;
+      FoundTopic topic;
       topic.name = rows.bytes(1).substr(0, 1024);
       if (encoding != "cdr") {
         topic.fault = "its messages have the encoding \"" + encoding + "\", known is \"cdr\"";
@@ -250,7 +245,7 @@ class RosbagReader {
       ++without_topic_;
       return;
     }
-    Topic& topic = found->second;
+    FoundTopic& topic = found->second;
     if (!topic.topic) {
       ++topic.lost;
       return;
@@ -269,13 +264,7 @@ class RosbagReader {
   }
 
   void finish() {
-    for (auto& [id, topic] : topics_) {
-      if (topic.topic)
-        topic.topic->move_to(log_);
-      else
-        log_.skipped.push_back(
-            {topic.name.empty() ? fmt::format("topic {}", id) : topic.name, topic.fault, topic.lost});
-    }
+    for (auto& [id, topic] : topics_) topic.move_to(log_, fmt::format("topic {}", id));
     number_instances(log_);
     if (without_topic_ > 0)
       log_.skipped.push_back(
@@ -298,7 +287,7 @@ class RosbagReader {
   std::size_t bytes_left_ = 0, decompression_left_ = 0, without_topic_ = 0;
   std::map<std::string, Definition> definitions_;
   std::map<std::string, std::pair<std::shared_ptr<const RosLayout>, std::string>> layouts_;
-  std::map<std::int64_t, Topic> topics_;
+  std::map<std::int64_t, FoundTopic> topics_;
 };
 
 }  // namespace
