@@ -64,7 +64,7 @@ struct LeeGains {
 /// tau = -k_R e_R - k_omega e_omega + omega x J omega - J (omega x R_RB' omega_d - R_RB' omega_d_dot).
 ///
 /// Lee, Leok, McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, eq. (11). The error
-/// decays exponentially from every attitude but the half turn, slowly near it: lee_decay() states how.
+/// decays exponentially from every attitude but the half turn, slowly near it (tests/controller/attitude_decay.h).
 template <typename Scalar>
 inline Vector3<Scalar> lee_torque(const LeeGains<Scalar>& gains, const Matrix3<Scalar>& inertia_kg_m2,
                                   const AttitudeState<Scalar>& state, const AttitudeError<Scalar>& error) {
@@ -137,7 +137,7 @@ inline ReferenceRate<Scalar> reference_rate(const Vector3<Scalar>& Lambda_1_s, c
 ///
 /// The attitude law of the paper's section IV (there in a comment of the source, after Morgan et al. 2016 and
 /// Bandyopadhyay, Chung and Hadaegh 2016, who leave the attitude coordinates open). With the coordinates above the
-/// error decays exponentially from every attitude at one rate: robust_decay() states and derives it.
+/// error decays exponentially from every attitude at one rate (tests/controller/attitude_decay.h).
 template <typename Scalar>
 inline Vector3<Scalar> robust_torque(const RobustGains<Scalar>& gains, const Matrix3<Scalar>& inertia_kg_m2,
                                      const Vector3<Scalar>& omega_B_rad_s, const ReferenceRate<Scalar>& rate,

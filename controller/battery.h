@@ -22,12 +22,6 @@ struct ThrustMap {
   Scalar c00, c10, c01, c20, c11;
 };
 
-/// p = d00 + d10 g + d01 v + d20 g^2 + d11 g v.
-template <typename Scalar>
-struct PwmMap {
-  Scalar d00, d10, d01, d20, d11;
-};
-
 /// Largest g = e00 + e10 p + e01 v, where p is the mean over the motors: under load the voltage sags.
 template <typename Scalar>
 struct LargestForceMap {
@@ -35,33 +29,17 @@ struct LargestForceMap {
   Scalar lower_gf, upper_gf;  ///< the result is held between these, whatever the voltage reads
 };
 
-/// a00 + a10 x + a01 y + a20 x^2 + a11 x y, the form of the first two maps.
-template <typename Scalar>
-inline Scalar quadratic(const Scalar& a00, const Scalar& a10, const Scalar& a01, const Scalar& a20,
-                        const Scalar& a11, const Scalar& x, const Scalar& y) {
-  return a00 + product(a10, x) + product(a01, y) + product(a20, product(x, x)) + product(a11, product(x, y));
-}
-
 /// Force of one rotor in newton, never negative: outside the calibrated range the polynomial may turn below zero.
 template <typename Scalar>
 inline Scalar force_of_pwm(const ThrustMap<Scalar>& map, const Scalar& p, const Scalar& voltage_V) {
   const Scalar v = voltage_V / Scalar(kReferenceVoltage_V);
-  const Scalar g = quadratic(map.c00, map.c10, map.c01, map.c20, map.c11, p, v);
+  const Scalar g = map.c00 + product(map.c10, p) + product(map.c01, v) + product(map.c20, product(p, p)) +
+                   product(map.c11, product(p, v));
   return g < Scalar(0) ? Scalar(0) : product(g, Scalar(kNewtonPerGramForce));
 }
 
-/// p in [0, 1] for a rotor's force. Forces at or below zero, and NaN, give 0.
-template <typename Scalar>
-inline Scalar pwm_of_force(const PwmMap<Scalar>& map, const Scalar& force_N, const Scalar& voltage_V) {
-  if (!(force_N > Scalar(0))) return Scalar(0);
-  const Scalar g = force_N / Scalar(kNewtonPerGramForce);
-  const Scalar v = voltage_V / Scalar(kReferenceVoltage_V);
-  const Scalar p = quadratic(map.d00, map.d10, map.d01, map.d20, map.d11, g, v);
-  return p > Scalar(0) ? (p < Scalar(1) ? p : Scalar(1)) : Scalar(0);
-}
-
 /// p in [0, 1] at which `map` gives the force: the exact inverse of force_of_pwm() on its rising branch, by the
-/// quadratic formula, where a fitted PwmMap only comes close. 0 where no p gives so little, 1 where none gives so
+/// quadratic formula. 0 where no p gives so little, for forces at or below zero and for NaN; 1 where none gives so
 /// much.
 template <typename Scalar>
 inline Scalar pwm_of_force(const ThrustMap<Scalar>& map, const Scalar& force_N, const Scalar& voltage_V) {

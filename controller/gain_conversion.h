@@ -18,7 +18,6 @@ namespace swarmcert::controller {
 enum class ConversionStatus : std::uint8_t {
   kOk,
   kMassNotPositive,
-  kNotDiagonal,        ///< Lambda or K couples axes, which per-axis PID gains cannot
   kNotPositive,        ///< a gain is zero, negative or not a number
   kNoDoubleRoot,       ///< Kd^2 < 3 Kp: no real l exists for any Ki
   kOtherIntegralGain,  ///< a real l exists, but needs another Ki
@@ -31,8 +30,6 @@ inline const char* to_text(ConversionStatus status) {
       return "the gains have both forms";
     case ConversionStatus::kMassNotPositive:
       return "the mass is not positive";
-    case ConversionStatus::kNotDiagonal:
-      return "Lambda or K couples axes, which PID gains per axis cannot";
     case ConversionStatus::kNotPositive:
       return "a gain is not positive";
     case ConversionStatus::kNoDoubleRoot:
@@ -107,59 +104,6 @@ inline AxisComposite<Scalar> to_composite(const AxisPid<Scalar>& pid, const Scal
   result.status =
       smallest_misfit <= relative_tolerance ? ConversionStatus::kOk : ConversionStatus::kOtherIntegralGain;
   return result;
-}
-
-/// PID gains of the whole law; meaningful only with kOk.
-template <typename Scalar>
-struct PidConversion {
-  ConversionStatus status;
-  PidGains<Scalar> gains;
-};
-
-template <typename Scalar>
-inline PidConversion<Scalar> to_pid(const CompositeGains<Scalar>& gains, const Scalar& mass_kg) {
-  const Scalar zero(0);
-  if (!(mass_kg > zero)) return {ConversionStatus::kMassNotPositive, {}};
-  for (const Matrix3<Scalar>* m : {&gains.Lambda_1_s, &gains.K_kg_s}) {
-    const bool is_diagonal = m->x.y == zero && m->x.z == zero && m->y.x == zero && m->y.z == zero &&
-                             m->z.x == zero && m->z.y == zero;
-    if (!is_diagonal) return {ConversionStatus::kNotDiagonal, {}};
-    if (!(m->x.x > zero && m->y.y > zero && m->z.z > zero)) return {ConversionStatus::kNotPositive, {}};
-  }
-  const AxisPid<Scalar> x = to_pid(gains.Lambda_1_s.x.x, gains.K_kg_s.x.x, mass_kg);
-  const AxisPid<Scalar> y = to_pid(gains.Lambda_1_s.y.y, gains.K_kg_s.y.y, mass_kg);
-  const AxisPid<Scalar> z = to_pid(gains.Lambda_1_s.z.z, gains.K_kg_s.z.z, mass_kg);
-  return {
-      ConversionStatus::kOk,
-      {{x.Kp_1_s2, y.Kp_1_s2, z.Kp_1_s2}, {x.Kd_1_s, y.Kd_1_s, z.Kd_1_s}, {x.Ki_1_s3, y.Ki_1_s3, z.Ki_1_s3}}};
-}
-
-/// Composite gains of the whole law, axis by axis.
-template <typename Scalar>
-struct CompositeConversion {
-  AxisComposite<Scalar> x, y, z;
-
-  bool ok() const {
-    return x.status == ConversionStatus::kOk && y.status == ConversionStatus::kOk &&
-           z.status == ConversionStatus::kOk;
-  }
-  /// Meaningful only where ok().
-  CompositeGains<Scalar> gains() const {
-    return {diagonal(Vector3<Scalar>{x.lambda_1_s, y.lambda_1_s, z.lambda_1_s}),
-            diagonal(Vector3<Scalar>{x.k_kg_s, y.k_kg_s, z.k_kg_s})};
-  }
-};
-
-/// @param relative_tolerance as for one axis.
-template <typename Scalar>
-inline CompositeConversion<Scalar> to_composite(const PidGains<Scalar>& gains, const Scalar& mass_kg,
-                                                const Scalar& relative_tolerance) {
-  const auto axis = [&](const Scalar& kp, const Scalar& kd, const Scalar& ki) {
-    return to_composite(AxisPid<Scalar>{kp, kd, ki}, mass_kg, relative_tolerance);
-  };
-  return {axis(gains.Kp_1_s2.x, gains.Kd_1_s.x, gains.Ki_1_s3.x),
-          axis(gains.Kp_1_s2.y, gains.Kd_1_s.y, gains.Ki_1_s3.y),
-          axis(gains.Kp_1_s2.z, gains.Kd_1_s.z, gains.Ki_1_s3.z)};
 }
 
 }  // namespace swarmcert::controller

@@ -40,7 +40,6 @@ class Trainer {
   void tighten(std::vector<double> shares) { shares_ = std::move(shares); }
 
   const Vector& theta() const { return theta_; }
-  const SpectralNormalization& normalization() const { return normalization_; }
 
   /// What a checkpoint must hold, as one vector: theta, both moments, the number of steps.
   Vector state() const;

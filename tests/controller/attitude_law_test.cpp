@@ -5,14 +5,14 @@
 #include <cmath>
 #include <random>
 
-#include "controller/attitude_decay.h"
+#include "attitude_decay.h"
 #include "random_vectors.h"
 
 namespace swarmcert::controller {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// The Crazyflie's (shared reference, stability.md 3.5).
+// The Crazyflie's (Förster 2015, "System identification of the Crazyflie 2.0 nano quadrocopter", ETH Zürich).
 const Matrix3<double> kInertia = diagonal(Vector3<double>{16.571710e-6, 16.655602e-6, 29.261652e-6});
 constexpr InertiaRange kInertiaRange{16.571710e-6, 29.261652e-6};
 

@@ -14,8 +14,6 @@ namespace {
 // Coefficients published with the paper's flights (aerorobotics/neural-swarm), vehicles of the small kind.
 constexpr ThrustMap<double> kThrust{11.093358483549203, -39.08104165843915, -9.525647087583181,
                                     20.573302305476638, 38.42885066644033};
-constexpr PwmMap<double> kPwm{0.5009717811726693, 0.11823595371065385, -0.41225540923278853,
-                              -0.002065562409668875, -0.04287969844506664};
 constexpr LargestForceMap<double> kLargest{-9.855774395877377, 3.0164756915292554, 26.716368783384496, 8.0,
                                            25.0};
 
@@ -43,20 +41,6 @@ TEST(Battery, PwmOfForceOfPwmIsThePwm) {
   EXPECT_GT(tried, 10000);
 }
 
-// Two polynomials fitted to the same data are inverses of each other only as well as they fit.
-TEST(Battery, PublishedInverseMapComesWithinThreePercentOfFullPwm) {
-  double worst = 0;
-  for (double volts = 3.4; volts <= 4.15; volts += 0.05) {
-    for (double g = 4.0; g <= 11.0; g += 0.25) {
-      const double force = g * kNewtonPerGramForce;
-      worst =
-          std::fmax(worst, std::fabs(pwm_of_force(kPwm, force, volts) - pwm_of_force(kThrust, force, volts)));
-    }
-  }
-  EXPECT_LE(worst, 0.03);
-  EXPECT_GE(worst, 1e-4);
-}
-
 // Below 4 gf the published polynomial is no model any more: there it falls with PWM and voltage.
 TEST(Battery, PwmGrowsWithForceAndFallsWithVoltage) {
   double last = 0;
@@ -79,9 +63,8 @@ TEST(Battery, LargestForceFollowsVoltageWithinItsLimits) {
 TEST(Battery, ForcesOutOfReachGiveTheEndsOfTheRange) {
   EXPECT_EQ(pwm_of_force(kThrust, -0.1, 3.9), 0.0);
   EXPECT_EQ(pwm_of_force(kThrust, 10.0, 3.9), 1.0);
-  EXPECT_EQ(pwm_of_force(kPwm, 0.0, 3.9), 0.0);
+  EXPECT_EQ(pwm_of_force(kThrust, 0.0, 3.9), 0.0);
   EXPECT_EQ(pwm_of_force(kThrust, std::nan(""), 3.9), 0.0);
-  EXPECT_EQ(pwm_of_force(kPwm, std::nan(""), 3.9), 0.0);
   // A parabola that opens downwards reaches no more than its highest point.
   EXPECT_EQ(pwm_of_force(ThrustMap<double>{0, 20, 0, -10, 0}, 0.2, 4.2), 1.0);
   EXPECT_NEAR(pwm_of_force(ThrustMap<double>{0, 20, 0, -10, 0}, 7.5 * kNewtonPerGramForce, 4.2), 0.5, 1e-12);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "random_vectors.h"
+#include "rotors_on_circle.h"
 
 namespace swarmcert::controller {
 namespace {

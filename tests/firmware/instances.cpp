@@ -24,10 +24,9 @@ template Prediction<float> predict(const nn::DeepSet<float>&, const PredictionSe
 template TrackStatus update(NeighbourTrack<float>&, const VelocityFilter<float>&, const Vector3<float>&,
                             std::uint32_t);
 template Allocation<float> allocation(const Rotors<float>&);
-template Rotors<float> rotors_on_circle(int, float, float, float);
 template Rotors<float> crazyflie_rotors(float, float);
 template Heading<float> heading_of_yaw(float);
-template float pwm_of_force(const PwmMap<float>&, const float&, const float&);
-template CompositeConversion<float> to_composite(const PidGains<float>&, const float&, const float&);
-template PidConversion<float> to_pid(const CompositeGains<float>&, const float&);
+template float pwm_of_force(const ThrustMap<float>&, const float&, const float&);
+template AxisComposite<float> to_composite(const AxisPid<float>&, const float&, const float&);
+template AxisPid<float> to_pid(const float&, const float&, const float&);
 }  // namespace swarmcert::controller

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <initializer_list>
 
+#include "../controller/rotors_on_circle.h"
 #include "controller/flight_controller.h"
 #include "controller/gain_conversion.h"
 #include "controller/neighbours.h"
@@ -162,9 +163,11 @@ class Workload {
     put(controller::desired_force(composite, settings_.mass_kg, error, integral, forward));
     put(controller::integrate(settings_.integrator, integral, error.position_m,
                               controller::held_axes(composite, error.position_m, force, true)));
-    const auto conversion = controller::to_composite(settings_.position, settings_.mass_kg, 1e-3f);
-    put(conversion.x.lambda_1_s);
-    put(conversion.x.needed_Ki_1_s3);
+    const controller::PidGains<float>& pid = settings_.position;
+    const controller::AxisPid<float> pid_x{pid.Kp_1_s2.x, pid.Kd_1_s.x, pid.Ki_1_s3.x};
+    const auto conversion = controller::to_composite(pid_x, settings_.mass_kg, 1e-3f);
+    put(conversion.lambda_1_s);
+    put(conversion.needed_Ki_1_s3);
 
     const auto heading = controller::heading_of_yaw(number(4));
     const auto fallback = rotation();
@@ -195,7 +198,6 @@ class Workload {
     wanted.torque_N_m = vector(0.02f);
     const auto mixed = controller::mix(settings_.allocation, {0.005f, most}, wanted);
     put(mixed.thrust_N), put(mixed.roll_pitch_share), put(mixed.yaw_share);
-    const controller::PwmMap<float> map{0.50097178f, 0.11823595f, -0.41225541f, -0.00206556f, -0.0428797f};
     for (int k = 0; k < 4; ++k) {
       const float force = mixed.forces.at_N[k];
       put(force);
@@ -203,7 +205,6 @@ class Workload {
       put(p);
       put(controller::force_of_pwm(settings_.thrust_map, p, volts));
       sink_(controller::pwm_register(p));
-      sink_(controller::pwm_register(controller::pwm_of_force(map, force, volts)));
     }
     sink_(controller::pwm_register(number(2)));
   }

@@ -6,6 +6,8 @@
 #include <limits>
 #include <random>
 
+#include "controller/rotors_on_circle.h"
+
 namespace swarmcert::stability {
 namespace {
 

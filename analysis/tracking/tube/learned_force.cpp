@@ -86,7 +86,6 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
     if (name != files::kGroundKind) kinds.push_back(name);
   const std::string phi = network.phi.count(kind) == 1 ? kind : kinds.front();
   const std::string rho = network.rho.count(kind) == 1 ? kind : network.rho.begin()->first;
-  phi_name_ = "phi:" + phi;
   neighbour_function_ = "set:" + phi + ":" + rho;
   newton_per_unit_ = network.output_unit == "N" ? 1 : stability::kGramForce_N;
   const int inputs = network.phi.at(phi).inputs();

@@ -43,8 +43,7 @@ class LearnedForce {
 
   int states() const { return static_cast<int>(layers_.front().weights.cols()); }
   double newton_per_unit() const { return newton_per_unit_; }
-  /// The phi of neighbours ("phi:<kind>"), and the set functions of a neighbour and, if there is one, of the ground.
-  const std::string& phi_name() const { return phi_name_; }
+  /// The set functions of a neighbour and, if there is one, of the ground.
   const std::string& neighbour_function() const { return neighbour_function_; }
   const std::string& ground_function() const { return ground_function_; }
   /// Which component of (dp, dv) each input of phi is.
@@ -56,7 +55,7 @@ class LearnedForce {
   lipschitz::ReachNetwork layers_;
   lipschitz::Box clamp_;  ///< of the whole state, infinite where nothing is clamped
   std::vector<int> components_;
-  std::string phi_name_, neighbour_function_, ground_function_;
+  std::string neighbour_function_, ground_function_;
   double newton_per_unit_ = 1;
 };
 

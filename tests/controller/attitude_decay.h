@@ -1,4 +1,4 @@
-/// @file Proved decay rates of the attitude laws. For analysis and tests, not for flight.
+/// @file Proved decay rates of the attitude laws. Derivations and bounds for the tests of the laws.
 #pragma once
 
 #include <algorithm>
