@@ -14,24 +14,10 @@ namespace {
 using files::Json;
 using tests::Outcome;
 using tests::read_text;
-using tests::ScratchFolder;
 using tests::write_text;
 
-class CertifiedChain : public testing::Test {
+class CertifiedChain : public tests::CommandLineTest {
  protected:
-  Outcome run(const std::string& arguments) {
-    return tests::run_shell("swarmcert " + arguments, folder_.path());
-  }
-
-  void expect(const std::string& arguments, int exit_code, const std::vector<std::string>& words) {
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.exit_code, exit_code) << "swarmcert " << arguments << "\n" << outcome.output;
-    for (const std::string& word : words) {
-      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no \"" << word << "\" in\n"
-                                                              << outcome.output;
-    }
-  }
-
   /// A state dict of layers without biases, registered in this order. "shrink", then "grow", has slope 0: what passes
   /// the first ReLU is multiplied by 0. The other way round it is steep.
   void write_square(const std::string& first, const std::string& second) {
@@ -46,8 +32,6 @@ class CertifiedChain : public testing::Test {
                                                               {"2", second == "steep" ? steep : zero},
                                                               {"3", tests::raw_numbers<float>({0, 10})}}));
   }
-
-  ScratchFolder folder_;
 };
 
 TEST_F(CertifiedChain, AFileWithSeveralOrdersIsRefusedAndTheGivenOrderIsCertified) {

@@ -15,25 +15,10 @@ namespace {
 using files::Json;
 using tests::Outcome;
 using tests::read_text;
-using tests::ScratchFolder;
 using tests::write_text;
 
-class CommandLine : public testing::Test {
+class CommandLine : public tests::CommandLineTest {
  protected:
-  Outcome run(const std::string& arguments) {
-    return tests::run_shell("swarmcert " + arguments, folder_.path());
-  }
-
-  /// Expects `arguments` to end with `exit_code` and to say each of `words`.
-  void expect(const std::string& arguments, int exit_code, const std::vector<std::string>& words) {
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.exit_code, exit_code) << "swarmcert " << arguments << "\n" << outcome.output;
-    for (const std::string& word : words) {
-      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no \"" << word << "\" in\n"
-                                                              << outcome.output;
-    }
-  }
-
   /// A 2-2-1 network f(x) = relu(3 x1) + relu(-3 x1 + x2): its Lipschitz constant is sqrt(10), its product bound larger.
   files::Weights small_network() {
     files::Weights weights;
@@ -45,8 +30,6 @@ class CommandLine : public testing::Test {
     files::save_safetensors(weights, folder_ / name, true);
     return name;
   }
-
-  ScratchFolder folder_;
 };
 
 TEST_F(CommandLine, HelpShowsEveryCommandAndEachHasAnExample) {

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace swarmcert::tests {
 
@@ -56,6 +57,24 @@ class ScratchFolder {
 
  private:
   std::filesystem::path path_;
+};
+
+/// Tests that run `swarmcert` in a folder of their own.
+class CommandLineTest : public testing::Test {
+ protected:
+  Outcome run(const std::string& arguments) { return run_shell("swarmcert " + arguments, folder_.path()); }
+
+  /// Expects `arguments` to end with `exit_code` and to say each of `words`.
+  void expect(const std::string& arguments, int exit_code, const std::vector<std::string>& words) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << "swarmcert " << arguments << "\n" << outcome.output;
+    for (const std::string& word : words) {
+      EXPECT_NE(outcome.output.find(word), std::string::npos) << "no \"" << word << "\" in\n"
+                                                              << outcome.output;
+    }
+  }
+
+  ScratchFolder folder_;
 };
 
 inline void write_text(const std::string& path, const std::string& text) {
