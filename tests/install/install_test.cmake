@@ -15,7 +15,22 @@ set(prefix ${SCRATCH}/prefix)
 set(configure ${CMAKE_COMMAND} -G Ninja -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${COMPILER})
 
 file(REMOVE_RECURSE ${SCRATCH})
-run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --strip)
+
+# Programs that ship do not say where they were built.
+cmake_path(SET source_folder NORMALIZE ${CMAKE_CURRENT_LIST_DIR}/../..)
+string(REGEX REPLACE "/$" "" source_folder "${source_folder}")
+string(REGEX REPLACE "([][+.*?()^$|\\\\])" "\\\\\\1" pattern "${source_folder}")
+file(GLOB programs ${prefix}/bin/*)
+if(NOT programs)
+  message(FATAL_ERROR "no programs in ${prefix}/bin")
+endif()
+foreach(program IN LISTS programs)
+  file(STRINGS ${program} paths REGEX "${pattern}" LIMIT_COUNT 1)
+  if(paths)
+    message(FATAL_ERROR "${program} contains a path of the source tree: ${paths}")
+  endif()
+endforeach()
 
 # Compilers that tune for some processors fuse no sums; tuned for this one they do.
 cmake_host_system_information(RESULT processor QUERY OS_PLATFORM)
