@@ -316,7 +316,7 @@ TEST(TreeProof, IsRefusedForBoxesThatAreNone) {
 
 // --- the published networks
 
-/// Lower bounds: exact slopes between points of the box (reference/lipschitz.md, 2d).
+/// Lower bounds: exact slopes between points of the box that a separate search found.
 TEST(LocalBoundPublishedNetwork, OfTheGroundIsWithinFourPercentOfAnAttainedSlope) {
   SWARMCERT_NEEDS_DATA();
   const files::Network network = plain(files::load_weights(tests::data_path("weights/zip_f32/phi_G.pth")));

@@ -49,7 +49,7 @@ TEST(IssCheck, IsotropicGainsReachTheBallByARampAndNothingExceedsIt) {
 }
 
 TEST(IssCheck, HasTheBallOfTheTables) {
-  // Reference 1.2, A1 and A2: unit d_m, 0.45955882352941174 and 1.25 m per N/s.
+  // 1 / (k l^2) for l = 4, k = 0.136 and l = 2, k = 0.2: 0.45955882352941174 and 1.25 m per N/s.
   const IssCheck a1 = check_iss(composite("4", "0.136"), tests::small_vehicle(), with_runs(5));
   EXPECT_NEAR(a1.ball_m / a1.rate_N_s, 0.45955882352941174, 1e-12);
   const IssCheck a2 = check_iss(composite("2", "0.2"), tests::small_vehicle(), with_runs(5));
@@ -57,7 +57,7 @@ TEST(IssCheck, HasTheBallOfTheTables) {
 }
 
 TEST(IssCheck, AnisotropicGainsStayInsideWhereTheTheoremIsConservative) {
-  // Reference 1.1, V3: theorem 5.0, exact 2-norm peak gain 1.2503991779, ratio 0.25008.
+  // As in vector_gain_test.cpp: theorem 5.0, exact 2-norm peak gain 1.2503991779, ratio 0.25008.
   const IssCheck check = check_iss(composite("[2, 2, 4]", "[0.2, 0.2, 0.05]"), tests::small_vehicle(), {});
   EXPECT_EQ(check.violations, 0);
   EXPECT_LE(check.worst_ratio, 0.25008 + 1e-4);
@@ -80,7 +80,7 @@ TEST(IssCheck, FindsTheViolationsOfBrokenHypotheses) {
     const char* what;
     Gains gains;
   } broken[] = {
-      // Reference 2.1: at tau = 0.0625 the command channel's rate norm is 0.4596536, above the ball of 0.4595588.
+      // By DOP853: at tau = 0.0625 the command channel's rate norm is 0.4596536, above the ball of 0.4595588.
       {"motor lag", composite("4", "0.136", "[lag]\nmotor_s = 0.0625\n")},
       {"Lambda not symmetric", composite("[[2, 12, 0], [0, 2, 0], [0, 0, 2]]", "0.2")},
       {"complex poles",

@@ -12,7 +12,7 @@
 namespace swarmcert::stability {
 namespace {
 
-/// stability.md 2.1: Z 10/5/10 and Z 10/5/2 behind a motor, A1 (triple pole).
+/// Loops of axis_loop_test.cpp: Z 10/5/10 and Z 10/5/2 behind a motor, A1 (triple pole).
 const AxisLoop kLoops[] = {
     {0.034, 10, 5, 10, {1 / 17.4}, 0}, {0.034, 10, 5, 2, {1 / 17.4}, 0}, {0.034, 48, 12, 64, {}, 0}};
 

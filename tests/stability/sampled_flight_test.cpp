@@ -265,7 +265,7 @@ TEST(SampledFlight, MotorLagAddsWhatItsColumnSays) {
 }
 
 TEST(SampledFlight, LinearConvolutionPredictsTheSwap) {
-  // Reference 3.6: e = h' * f_a predicts the unsaturated swap to 0.5 %; 2 vehicles, Ki in effect 2, tau 1/17.4, no
+  // A separate program: e = h' * f_a predicts the unsaturated swap to 0.5 %. 2 vehicles, Ki in effect 2, tau 1/17.4, no
   // noise: simulation 0.0893 m, convolution 0.0896 m.
   Swarm swarm(with_effects({{"downwash", {{"norm_exponent", 1.2}}}, {"motor_lag", {{"tau_s", 1 / 17.4}}}}),
               2);

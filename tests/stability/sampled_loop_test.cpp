@@ -1,4 +1,4 @@
-// Reference numbers: reference/stability.md 2.3.
+// Expected norms: a separate program that sums the response by SciPy's matrix exponential, at the worst sampling phase.
 #include "stability/bounds/sampled_loop.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ TEST(SampledLoop, NormsOfTheReferenceTable) {
       {48, 12, 64, &GainNorms::amplitude, .995112641, .995113432, .998348170, .995138042, 1.147289127},
       {10, 5, 10, &GainNorms::rate, 3.333246329, 3.330897826, 3.326691089, 3.312277050, 14.705882353},
       {10, 5, 10, &GainNorms::amplitude, 4.995020814, 4.993197363, 5.002062719, 4.978843651, 5.501886995},
-      // The last number of the reference, 2.830861031, is the sum up to 200 s; up to 1000 s it is this.
+      // The last number is the sum up to 1000 s; up to 200 s it is 2.830861031.
       {20, 10, 3, &GainNorms::amplitude, 2.631073843, 2.630853459, 2.630350672, 2.629092073, 2.834290230},
   };
   for (const Row& row : rows) {

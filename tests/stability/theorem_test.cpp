@@ -1,4 +1,4 @@
-// Reference numbers: reference/stability.md 1 and 1.2.
+// Expected balls: 1 / (k l^2). Expected transients: a closed form that agrees with the matrix exponential to 1e-14.
 #include "stability/bounds/theorem.h"
 
 #include <gtest/gtest.h>
@@ -53,7 +53,7 @@ TEST(Theorem, EveryFailedHypothesisIsNamed) {
   EXPECT_TRUE(
       mentions(check_theorem(parsed("Lambda = 1\nK = [1, 0, 1]"), 1, {}), "K is not positive definite"));
   EXPECT_TRUE(mentions(check_theorem(parsed("Kp = 10\nKd = 5\nKi = 10"), 1, {}), "Kd^2 < 3 Kp"));
-  // Reference 1: l = 1.2251 needs Ki = 11.33; the fork's default needs 5.05.
+  // The root l = 1.2251 of 3 l^2 - 2 Kd l + Kp needs Ki = (Kd - 2 l) l^2 = 11.33; the second law needs 5.05.
   EXPECT_TRUE(mentions(check_theorem(parsed("Kp = 20\nKd = 10\nKi = 3"), 1, {}), "would need 11.3"));
   EXPECT_TRUE(mentions(check_theorem(parsed("Kp = 12\nKd = 8\nKi = 8"), 1, {}), "would need 5.0"));
   const std::string good = "Lambda = 4\nK = 0.136\n";
@@ -177,9 +177,9 @@ TEST(SmallGain, WhatItDoesNotProveCanBeRefutedBySimulation) {
   EXPECT_LT(pair_error(0.145, 10, 5, 2, 60), 1e-5);  // inconclusive, and yet stable
 }
 
-/// Reference 2.6: the relative mode of two vehicles is unstable above m (Kp - Ki/Kd)/2 = 0.136 N/m, or m (Kd - Ki/Kp)/2 =
-/// 0.068 N s/m.
-TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveTheLimitsOfTheReference) {
+/// Routh's criterion: the relative mode of two vehicles is unstable above m (Kp - Ki/Kd)/2 = 0.136 N/m, or
+/// m (Kd - Ki/Kp)/2 = 0.068 N s/m.
+TEST(SmallGain, AnUnstableInstanceIsFoundExactlyAboveRouthsLimits) {
   const AxisLoop z = {0.034, 10, 5, 10, {}, 0};
   const auto pair = [](double Lp, double Lv) {
     return std::vector<Coupling>{{0, 1, Lp, Lv, 0.1, 0, 0}, {1, 0, Lp, Lv, 0.1, 0, 0}};

@@ -1,4 +1,4 @@
-// Reference numbers: reference/stability.md 1.1 (an independent quadrature and simulation).
+// Expected gains: the largest int |H(t)' eta| dt over unit vectors eta by Simpson's rule; a simulation attains it.
 #include "stability/bounds/vector_gain.h"
 
 #include <gtest/gtest.h>
@@ -132,7 +132,7 @@ TEST(VectorGain, NoRandomDisturbanceExceedsItAndARampReachesTheIsotropicBall) {
   EXPECT_LE(reached, ball * (1 + 1e-9));
 }
 
-/// Reference V6: a non-symmetric Lambda can exceed d/(l^2 k); check_theorem() refuses it (theorem_test.cpp).
+/// A non-symmetric Lambda can exceed d/(l^2 k); check_theorem() refuses it (theorem_test.cpp).
 TEST(VectorGain, ANonSymmetricLambdaExceedsTheBallThatItsEigenvaluesSuggest) {
   const Matrix3 Lambda = {2, 8, 0, 0, 2, 0, 0, 0, 2};  // eigenvalues 2
   const std::vector<std::array<double, 3>> ramp(4000, {0, 1, 0});

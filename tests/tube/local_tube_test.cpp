@@ -183,7 +183,7 @@ TEST(LeastTube, FindsTheFixedPointOfAnAffineForceAndRefusesGainsOfOneAndMoreAndW
   truth.effects.clear();
   const auto task = stability::make_task("hover", {2, 10, 0});
   const Scene scene(tests::loop_of("composite"), truth, tests::demo_network(), *task, 2, 0);
-  // Triple pole: |h'|_1 = 4 e^-2 / (m a^2) = 0.9951 m/N (stability.md 1.2), reached within 10 s.
+  // Triple pole: |h'|_1 = 4 e^-2 / (m a^2) = 0.9951 m/N, reached within 10 s.
   const double gain = 0.99511237674;
   for (const double slope : {0.0, 0.3, 0.8}) {
     ToldBound bound(scene, 0.01, slope);
