@@ -53,6 +53,18 @@ def f32(x):
     return struct.unpack("<f", struct.pack("<f", x))[0]
 
 
+def f32_of(decimal):
+    """A decimal rounded once. By way of double it would be rounded twice, which matters in the middle between floats."""
+    double = float(decimal)
+    near = f32(double)
+    if near == double or math.isinf(near) or abs(double) < 2.0 ** -200:
+        return near
+    (bits,) = struct.unpack("<i", struct.pack("<f", near))
+    around = [struct.unpack("<f", struct.pack("<i", b))[0] for b in (bits - 1, bits, bits + 1)
+              if b & 0x7fffffff < 0x7f800000]
+    return min(around, key=lambda x: (abs(Fraction(x) - Fraction(decimal)), x != near))
+
+
 # --- exact numbers -------------------------------------------------------------------------------------------------
 
 def dyadics(values):
@@ -447,8 +459,7 @@ def read_c_source(data, key, order):
         precision = "float32" if kind == "float" else "float64"
         numbers = []
         for literal, suffix in re.findall(r"(-?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)([fF]?)", values[member]):
-            # The suffix f rounds once: for the literals that programs print that gives the same float.
-            numbers.append(f32(float(literal)) if suffix or kind == "float" else float(literal))
+            numbers.append(f32_of(literal) if suffix else f32(float(literal)) if kind == "float" else float(literal))
         if len(shape) == 2:
             numbers = [numbers[i * shape[1] + j] for j in range(shape[1]) for i in range(shape[0])]
             shape.reverse()

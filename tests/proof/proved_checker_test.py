@@ -19,6 +19,7 @@ SOURCE, MUTATIONS, CHECKER = Path(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[
 sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
 import check_certificate as second  # noqa: E402
 import check_certificate_test as common  # noqa: E402
+import weight_files  # noqa: E402
 
 SECONDS = 20  # until a checker counts as hung; the times themselves are printed
 
@@ -208,10 +209,36 @@ def malformed(certificate, net, folder):
           ", ".join(f"{which} {1000 * seconds:.0f} ms" for which, seconds in longest.items()))
 
 
+def every_format(folder, generator):
+    """Each checker reads the same weights from every format of weight files."""
+    network = weight_files.layers([3, 4, 3, 2], generator)
+    files = {"zip.pth": weight_files.pth_zip(network), "legacy.pth": weight_files.pth_legacy(network),
+             "net.onnx": weight_files.onnx(network), "net.c": weight_files.c_source(network)}
+    bounds = set()
+    for name, data in files.items():
+        file, path = folder / name, folder / "format.json"
+        file.write_bytes(data)
+        net = [file, "--key", "model"] if name == "zip.pth" else [file]
+        written = run([common.SWARMCERT, "certify", *net, "--nodes", "0", "-q", "--force", "-o", path])
+        assert written.returncode == 0, written
+        one, three = first(path, net), proved(path, net)
+        assert one.returncode == three.returncode == 0 and one.stdout == three.stdout, f"{name}: {one} {three}"
+        certificate = second.parse(path.read_text())
+        weights = second.read_weights(file, "model" if name == "zip.pth" else "")
+        assert [layer.biases for layer in weights.layers] == [biases for _, _, biases in network], name
+        bounds.add(certificate["bounds"][0]["upper_hex"])
+        truncated = data[:len(data) // 2]
+        file.write_bytes(truncated)
+        assert first(path, net).returncode == proved(path, net).returncode == 3, name
+    assert len(bounds) == 1, bounds
+    print(f"{len(files)} formats of weight files read alike")
+
+
 def main():
     generator = random.Random(23)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        every_format(folder, generator)
         everything = kinds(folder, generator)
         total = 0
         for index, (name, net, options, share) in enumerate(everything):

@@ -5,7 +5,7 @@ open Refusal
 let help =
   "Verify a certificate against the weights with a checker that is proved in Coq\n\
    Usage: swarmcert-check-proved [--coq] [OPTIONS] CERTIFICATE [NET]\n\n\
-   NET is a network.toml, or a weight file (safetensors, PyTorch) that holds one plain network; or instead of it\n\
+   NET is a network.toml, or a weight file that holds one plain network; or instead of it\n\
   \  --phi FILE --rho FILE   phi and rho\n\
   \  --key KEY               key of the state dict inside a nested checkpoint\n\
   \  --order A,B,C           layers in the order of evaluation; with --phi and --rho phi=A,B and rho=A,B\n\
@@ -72,6 +72,6 @@ let () =
     | exception Rejected reason -> Printf.printf "rejected: %s\n" reason; 1
     | exception Usage reason -> Printf.eprintf "swarmcert-check-proved: %s\nTry --help\n" reason; 2
     | exception Bad_input reason -> Printf.eprintf "swarmcert-check-proved: %s\n" reason; 3
-    | exception Out_of_memory -> prerr_endline "swarmcert-check-proved: out of memory"; 3
+    | exception (Out_of_memory | Stack_overflow) -> prerr_endline "swarmcert-check-proved: the files are too large for this checker"; 3
     | exception fault -> Printf.eprintf "swarmcert-check-proved: internal fault: %s\n" (Printexc.to_string fault); 70 in
   exit code

@@ -18,8 +18,12 @@ let load_bytes path bytes ~key ~order =
     if key <> "" then bad_input "%s: safetensors files are not nested: leave --key out" path;
     Safetensors.read path bytes ~order
   end
-  else bad_input "%s: is neither safetensors nor a PyTorch state dict, which are the formats of this checker; `swarmcert convert` \
-                  writes safetensors, and certify then names that file" path
+  else if Onnx.looks_like bytes then begin
+    if key <> "" then bad_input "%s: ONNX files are not nested: leave --key out" path;
+    Onnx.read path bytes ~order
+  end
+  else if C_source.looks_like bytes then C_source.read path bytes ~key ~order
+  else bad_input "%s: is no weight file: neither a PyTorch state dict, safetensors, ONNX nor generated C source" path
 let load path ~key ~order =
   match String.rindex_opt path '#' with
   | Some mark when mark + 1 < String.length path && not (Sys.file_exists path) ->

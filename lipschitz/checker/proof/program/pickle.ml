@@ -59,7 +59,7 @@ let parse path bytes start =
     | '.' -> pop ()
     | opcode -> execute opcode; go ()
   and execute = function
-    | '\x80' -> ignore (byte ())
+    | '\x80' -> if byte () > 5 then fail "the pickle protocol is newer than 5"
     | '\x95' -> ignore (take 8)
     | '(' -> marks := !stack :: !marks; stack := []
     | 'N' -> push None_

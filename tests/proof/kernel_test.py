@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""coqc accepts in its kernel what `swarmcert-check-proved --coq` writes, and refuses it after any number is changed.
+
+    kernel_test.py SWARMCERT SOURCE_DIR 0 CHECKER COQC THEORY
+"""
+import random
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+SWARMCERT, SOURCE, CHECKER, COQC, THEORY = sys.argv[1], Path(sys.argv[2]), sys.argv[4], sys.argv[5], sys.argv[6]
+sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
+import check_certificate_test as common  # noqa: E402
+
+
+def kernel(path, text):
+    path.write_text(text)
+    return subprocess.run([COQC, "-q", "-R", THEORY, "Swarmcert", path], capture_output=True, text=True)
+
+
+def main():
+    generator = random.Random(3)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        common.heterogeneous(folder, generator)
+        certificate, net = folder / "certificate.json", ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
+        subprocess.run([SWARMCERT, "certify", *net, "--neighbours", "2", "--nodes", "1", "-q", "-o", certificate], check=True,
+                       capture_output=True)
+        text = subprocess.run([CHECKER, "--coq", certificate, *net], check=True, capture_output=True, text=True).stdout
+        done = kernel(folder / "Sound.v", text)
+        assert done.returncode == 0, done.stderr
+        axioms = set(re.findall(r"^([A-Z]\w*\.\w+)", done.stdout, re.M))
+        assert axioms == {"ClassicalDedekindReals.sig_not_dec", "ClassicalDedekindReals.sig_forall_dec",
+                          "FunctionalExtensionality.functional_extensionality_dep"}, done.stdout
+        for kind in "Norm_at_most", "Norm_at_least", "Slope_at_most", "Slope_at_least", "Law":
+            assert f": claim := {kind}" in text, kind
+        # The last number of a claim is its bound.
+        claims = re.findall(r"claim := ((?:Slope_at_most|Norm_at_most) .*)\((\d+),(-?\d+)\)\.", text)
+        assert claims
+        head, mantissa, exponent = generator.choice(claims)
+        false = text.replace(f"{head}({mantissa},{exponent}).", f"{head}({int(mantissa) - 1},{exponent}).")
+        assert false != text
+        assert kernel(folder / "Claim.v", false).returncode != 0
+        print(f"{text.count('claim :=')} claims accepted by the kernel")
+
+
+if __name__ == "__main__":
+    main()
