@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <tuple>
+#include <type_traits>
 
 #include "stability/simulation/pilot.h"
 
@@ -41,63 +43,66 @@ struct Take {
   SWARMCERT_LANE void operator()(Lanes& to, const Lanes& from) const { to.take(from, part); }
 };
 
-template <typename Copy>
-void each(controller::Vector3<Lanes>& to, const controller::Vector3<Lanes>& from, const Copy& copy) {
-  copy(to.x, from.x);
-  copy(to.y, from.y);
-  copy(to.z, from.z);
+// The fields of what a slot holds. Each binding names all fields of its type: one that is added to the flight code and
+// not here does not compile, instead of being lost where lanes part. Stamps and flags are the same in all lanes that
+// fly together; Group::Flags keeps them for each vehicle.
+inline auto fields(controller::Vector3<Lanes>& v) {
+  auto& [x, y, z] = v;
+  return std::tie(x, y, z);
+}
+inline auto fields(controller::Matrix3<Lanes>& m) {
+  auto& [x, y, z] = m;
+  return std::tie(x, y, z);
+}
+inline auto fields(controller::Heading<Lanes>& heading) {
+  auto& [cosine, sine] = heading;
+  return std::tie(cosine, sine);
+}
+inline auto fields(controller::FlightReference<Lanes>& reference) {
+  auto& [position, velocity, acceleration, heading, omega, omega_dot] = reference;
+  return std::tie(position, velocity, acceleration, heading, omega, omega_dot);
+}
+inline auto fields(controller::AttitudeState<Lanes>& attitude) {
+  auto& [R_WB, omega_B] = attitude;
+  return std::tie(R_WB, omega_B);
+}
+inline auto fields(controller::Measured<Lanes>& measured) {
+  auto& [position, velocity, position_stamp, attitude, attitude_stamp, battery_V] = measured;
+  return std::tie(position, velocity, attitude, battery_V);
+}
+inline auto fields(controller::FlightMemory<Lanes>& memory) {
+  auto& [integral, rate_integral, force, R_WR, reference, has_reference, thrust_saturated, mean_p] = memory;
+  return std::tie(integral, rate_integral, force, R_WR, reference, mean_p);
+}
+inline auto fields(controller::Wrench<Lanes>& wrench) {
+  auto& [thrust, torque] = wrench;
+  return std::tie(thrust, torque);
+}
+inline auto fields(controller::RotorForces<Lanes>& forces) {
+  auto& [f] = forces;
+  static_assert(kNumRotors == 4);
+  return std::tie(f[0], f[1], f[2], f[3]);
+}
+inline auto fields(Answer<Lanes>& answer) {
+  auto& [wanted, forces] = answer;
+  return std::tie(wanted, forces);
+}
+/// What flight_step() reads: the answer is not among it.
+inline auto fields(Slot<Lanes>& slot) {
+  auto& [memory, measured, reference, prediction, torque_prediction, answer] = slot;
+  return std::tie(memory, measured, reference, prediction, torque_prediction);
 }
 
-template <typename Copy>
-void each(controller::Matrix3<Lanes>& to, const controller::Matrix3<Lanes>& from, const Copy& copy) {
-  each(to.x, from.x, copy);
-  each(to.y, from.y, copy);
-  each(to.z, from.z, copy);
-}
-
-template <typename Copy>
-void each(controller::FlightReference<Lanes>& to, const controller::FlightReference<Lanes>& from,
-          const Copy& copy) {
-  each(to.position_W_m, from.position_W_m, copy);
-  each(to.velocity_W_m_s, from.velocity_W_m_s, copy);
-  each(to.acceleration_W_m_s2, from.acceleration_W_m_s2, copy);
-  copy(to.heading.cosine, from.heading.cosine);
-  copy(to.heading.sine, from.heading.sine);
-  each(to.omega_R_rad_s, from.omega_R_rad_s, copy);
-  each(to.omega_dot_R_rad_s2, from.omega_dot_R_rad_s2, copy);
-}
-
-/// All but the flags, which are one for all lanes.
-template <typename Copy>
-void each(controller::FlightMemory<Lanes>& to, const controller::FlightMemory<Lanes>& from,
-          const Copy& copy) {
-  each(to.integral_m_s, from.integral_m_s, copy);
-  each(to.rate_integral_rad, from.rate_integral_rad, copy);
-  each(to.force_W_N, from.force_W_N, copy);
-  each(to.R_WR, from.R_WR, copy);
-  each(to.last_reference, from.last_reference, copy);
-  copy(to.mean_p, from.mean_p);
-}
-
-template <typename Copy>
-void each(Answer<Lanes>& to, const Answer<Lanes>& from, const Copy& copy) {
-  copy(to.wanted.thrust_N, from.wanted.thrust_N);
-  each(to.wanted.torque_N_m, from.wanted.torque_N_m, copy);
-  for (int r = 0; r < kNumRotors; ++r) copy(to.forces.at_N[r], from.forces.at_N[r]);
-}
-
-/// What flight_step() reads, but for the stamps and the flags.
-template <typename Copy>
-void each(Slot<Lanes>& to, const Slot<Lanes>& from, const Copy& copy) {
-  each(to.memory, from.memory, copy);
-  each(to.measured.position_W_m, from.measured.position_W_m, copy);
-  each(to.measured.velocity_W_m_s, from.measured.velocity_W_m_s, copy);
-  each(to.measured.attitude.R_WB, from.measured.attitude.R_WB, copy);
-  each(to.measured.attitude.omega_B_rad_s, from.measured.attitude.omega_B_rad_s, copy);
-  copy(to.measured.battery_V, from.measured.battery_V);
-  each(to.reference, from.reference, copy);
-  copy(to.prediction_N, from.prediction_N);
-  each(to.torque_prediction_Nm, from.torque_prediction_Nm, copy);
+/// copy(to, from) for every Lanes in `to`.
+template <typename T, typename Copy>
+void each(T& to, T& from, const Copy& copy) {
+  if constexpr (std::is_same_v<T, Lanes>) {
+    copy(to, from);
+  } else {
+    std::apply(
+        [&](auto&... into) { std::apply([&](auto&... out) { (each(into, out, copy), ...); }, fields(from)); },
+        fields(to));
+  }
 }
 
 template <typename Scalar>
