@@ -1,3 +1,5 @@
+#include "nn/base/csv.h"
+
 #include <algorithm>
 #include <charconv>
 #include <istream>
@@ -28,32 +30,6 @@ bool next_line(std::istream& in, std::string& line, bool& complete) {
   }
   if (!line.empty() && line.back() == '\r') line.pop_back();
   return any;
-}
-
-std::string trimmed(std::string text) {
-  const char* const kBlank = " \t\"";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string::npos) return "";
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
-
-std::vector<std::string> split(const std::string& line, char separator) {
-  std::vector<std::string> cells;
-  std::size_t begin = 0;
-  while (true) {
-    const std::size_t end = line.find(separator, begin);
-    cells.push_back(trimmed(line.substr(begin, end == std::string::npos ? end : end - begin)));
-    if (end == std::string::npos) return cells;
-    begin = end + 1;
-  }
-}
-
-/// The first of the usual separators that `header` has.
-char separator_of(const std::string& header) {
-  for (const char separator : {',', ';', '\t'}) {
-    if (header.find(separator) != std::string::npos) return separator;
-  }
-  return ',';
 }
 
 /// The number between `at` and `end` without the blanks around it; NaN for an empty cell. Returns false for anything else.
@@ -98,8 +74,9 @@ void read_csv(std::istream& in, const std::string& path, RecordSink& sink, LogHe
   const std::string kByteOrderMark = "\xEF\xBB\xBF";
   if (line.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0) line.erase(0, kByteOrderMark.size());
   if (!line.empty() && line[0] == '#') line.erase(0, 1);
-  const char separator = separator_of(line);
-  const std::vector<std::string> names = split(line, separator);
+  const char separator = files::csv_separator(line, ',');
+  const std::vector<std::string_view> cells = files::csv_cells(line, separator);
+  const std::vector<std::string> names(cells.begin(), cells.end());
   if (names.size() < 2 || line.size() > kLongestLine_bytes) {
     throw files::InputError({path, "line 1", "header", files::in_quotes(line), "does not name columns",
                              "the first line names them, separated by commas, semicolons or tabs"});

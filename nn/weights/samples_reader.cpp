@@ -1,9 +1,9 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <string_view>
 
+#include "nn/base/csv.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
@@ -41,42 +41,6 @@ std::string field_of(std::size_t column, int inputs) {
 
 // --- CSV
 
-char separator_of_samples(std::string_view line) {
-  for (const char separator : {',', ';', '\t'}) {
-    if (line.find(separator) != std::string_view::npos) return separator;
-  }
-  return ' ';
-}
-
-std::string_view without_blanks(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\"";
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
-/// Cells of a line; runs of blanks count as one where blanks separate.
-std::vector<std::string_view> cells_of(std::string_view line, char separator) {
-  std::vector<std::string_view> cells;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(separator, begin), line.size());
-    const std::string_view cell = without_blanks(line.substr(begin, end - begin));
-    if (separator != ' ' || !cell.empty()) cells.push_back(cell);
-    begin = end + 1;
-  }
-  return cells;
-}
-
-/// True if the whole cell is a number, "nan" and "inf" among them.
-bool is_number(std::string_view cell, double& value) {
-  if (!cell.empty() && cell.front() == '+') cell.remove_prefix(1);
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  const bool is_out_of_range = error == std::errc::result_out_of_range;
-  if (is_out_of_range)
-    value = std::numeric_limits<double>::infinity();  // or 0; either way none that was recorded
-  return (error == std::errc() || is_out_of_range) && end == cell.data() + cell.size() && !cell.empty();
-}
-
 class CsvSamples {
  public:
   CsvSamples(std::string_view text, Samples& samples) : rest_(text), samples_(samples) {}
@@ -100,8 +64,8 @@ class CsvSamples {
 
   void read(std::string_view line) {
     if (line.empty() || line.front() == '#') return;
-    if (separator_ == '\0') separator_ = separator_of_samples(line);
-    const std::vector<std::string_view> cells = cells_of(line, separator_);
+    if (separator_ == '\0') separator_ = csv_separator(line, ' ');
+    const std::vector<std::string_view> cells = csv_cells(line, separator_);
     const auto inputs = static_cast<std::size_t>(samples_.inputs);
     const std::size_t columns = inputs + static_cast<std::size_t>(samples_.outputs);
     if (cells.size() != columns)
@@ -113,12 +77,12 @@ class CsvSamples {
     const bool is_first = !has_lines_;
     has_lines_ = true;
     if (is_first && std::none_of(cells.begin(), cells.end(),
-                                 [&value](std::string_view cell) { return is_number(cell, value); }))
+                                 [&value](std::string_view cell) { return csv_number(cell, value); }))
       return;  // names of columns
     if (samples_.x.size() + samples_.y.size() + columns > kMostElements) refuse_too_many(samples_.path);
     for (std::size_t k = 0; k < columns; ++k) {
       const std::string field = field_of(k, samples_.inputs);
-      if (!is_number(cells[k], value)) refuse(field, in_quotes(cells[k]), "is not a number", kHowToRecord);
+      if (!csv_number(cells[k], value)) refuse(field, in_quotes(cells[k]), "is not a number", kHowToRecord);
       require_finite(value, samples_.path, "line " + std::to_string(line_), field);
       (k < inputs ? samples_.x : samples_.y).push_back(value);
     }

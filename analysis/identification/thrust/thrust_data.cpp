@@ -3,11 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string_view>
 
 #include "controller/battery.h"
+#include "nn/base/csv.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
@@ -20,25 +20,6 @@ constexpr double kFullPwm = 65536;
 struct Column {
   std::string name, unit, as_written;
 };
-
-std::string trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\"'";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return "";
-  return std::string(text.substr(first, text.find_last_not_of(kBlank) - first + 1));
-}
-
-std::vector<std::string> split(const std::string& line, char separator) {
-  std::vector<std::string> cells;
-  std::size_t begin = 0;
-  for (;;) {
-    const std::size_t end = line.find(separator, begin);
-    cells.push_back(
-        trimmed(std::string_view(line).substr(begin, end == std::string::npos ? end : end - begin)));
-    if (end == std::string::npos) return cells;
-    begin = end + 1;
-  }
-}
 
 std::string lower(std::string text) {
   for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
@@ -65,10 +46,11 @@ Column parse_column(const std::string& cell) {
   if (open != std::string::npos) {
     const std::size_t close = column.name.find_first_of("])", open);
     if (close != std::string::npos) {
-      const std::string inside = trimmed(column.name.substr(open + 1, close - open - 1));
+      const std::string inside(
+          files::without_blanks(std::string_view(column.name).substr(open + 1, close - open - 1)));
       column.unit = known_unit(inside);
       if (column.unit.empty()) column.unit = "?" + inside;
-      column.name = trimmed(column.name.substr(0, open));
+      column.name = files::without_blanks(column.name.substr(0, open));
     }
   } else if (const std::size_t under = column.name.rfind('_'); under != std::string::npos) {
     const std::string unit = known_unit(column.name.substr(under + 1));
@@ -87,11 +69,11 @@ class Reader {
 
   ThrustData read() {
     std::string line;
-    while (next_line(line) && trimmed(line).empty()) {
+    while (next_line(line) && files::without_blanks(line).empty()) {
     }
     read_header(line);
     while (next_line(line)) {
-      const std::string row = trimmed(line);
+      const std::string_view row = files::without_blanks(line);
       if (row.empty() || row[0] == '#') continue;
       read_row(line);
     }
@@ -116,15 +98,11 @@ class Reader {
   }
 
   void read_header(std::string line) {
-    line = trimmed(line);
+    line = std::string(files::without_blanks(line));
     if (!line.empty() && line[0] == '#') line.erase(0, 1);
-    for (const char c : {',', ';', '\t'}) {
-      if (line.find(c) != std::string::npos) {
-        separator_ = c;
-        break;
-      }
-    }
-    for (const std::string& cell : split(line, separator_)) columns_.push_back(parse_column(cell));
+    separator_ = files::csv_separator(line, ',');
+    for (const std::string_view cell : files::csv_cells(line, separator_))
+      columns_.push_back(parse_column(std::string(cell)));
     pwm_ = find({"pwm", "motor_pwm", "u"}, "pwm", {"counts", "ratio", "percent"}, data_.pwm, true);
     const auto voltage = find({"vbat", "voltage", "battery", "battery_voltage", "bat"}, "vbat", {"V", "mV"},
                               data_.voltage, false);
@@ -174,24 +152,21 @@ class Reader {
     return found;
   }
 
-  double number(const std::vector<std::string>& cells, std::size_t column) const {
+  double number(const std::vector<std::string_view>& cells, std::size_t column) const {
     const std::string& name = columns_[column].as_written;
     if (column >= cells.size()) {
       refuse(name, "", fmt::format("the row has {} cells, the header {}", cells.size(), columns_.size()),
              "complete or remove the row");
     }
-    std::string_view cell = cells[column];
-    if (!cell.empty() && cell[0] == '+') cell.remove_prefix(1);
     double value = 0;
-    const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-    if (error != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value)) {
+    if (!files::csv_number(cells[column], value) || !std::isfinite(value)) {
       refuse(name, files::in_quotes(cells[column]), "not a finite number", "correct or remove the row");
     }
     return value;
   }
 
   void read_row(const std::string& line) {
-    const std::vector<std::string> cells = split(line, separator_);
+    const std::vector<std::string_view> cells = files::csv_cells(line, separator_);
     if (cells.size() > columns_.size()) {
       refuse("", "", fmt::format("the row has {} cells, the header {}", cells.size(), columns_.size()),
              "one cell per column");
