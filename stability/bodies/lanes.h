@@ -2,8 +2,8 @@
 ///
 /// A Lanes is a Scalar of the control laws (controller/scalar.h) that stands for the same variable of eight vehicles.
 /// Each operation does in every lane what it does to a float alone, so the lanes hold the bits that fly. Only
-/// comparisons that steer the code join the lanes: where they disagree, the result is worthless, and `split` says who
-/// disagreed; the caller then computes those apart.
+/// comparisons that steer the code join the lanes: where they disagree, the result is invalid and `split` holds the
+/// lanes of one side; the caller then computes the two sides separately.
 #pragma once
 
 #include <cmath>
@@ -165,8 +165,8 @@ class Lanes {
   SWARMCERT_LANE friend Choice is_finite(const Lanes& x) {
     return Choice(x.v_ - x.v_ == Vector{});  // infinite and NaN give NaN
   }
-  // Nobody reads what the flight code makes of forces for the motors, which would part lanes by the way; logs compute it
-  // from the forces (ControllerBank::report()).
+  // The PWM that the flight code computes is not used in lanes, and computing it could split them; logs compute it from
+  // the forces (ControllerBank::report()).
   struct Nothing {};
   SWARMCERT_LANE friend Nothing pwm_register(const Lanes&) { return {}; }
   SWARMCERT_LANE friend Lanes pwm_of_force(const controller::ThrustMap<Lanes>&, const Lanes&, const Lanes&) {

@@ -1,10 +1,10 @@
-/// @file Tries to break the tracking theorem's ball and transient by integrating the loop under disturbances.
+/// @file Attempts to falsify the tracking theorem's ball and transient bound by integrating the disturbed loop.
 ///
 /// The loop: position law in continuous time with the clamped integral, behind the lags that gains.toml declares and
 /// the thrust limit of the model, on a point mass:
 ///   m v' = f - m g - (eps0 + eps(t)),  |eps'| <= d_m.
 /// With the theorem's hypotheses this is the system that the theorem speaks of; lags, clamps and gains outside the
-/// theorem's form take it away from that, and then violations are to be expected. No violation is no proof.
+/// theorem's form take it away from that, and then violations are to be expected. Finding no violation is not a proof.
 /// A run is judged only as long as it keeps the hypotheses on the flight: no saturation, no clamp that acts, a commanded
 /// force that is not near zero and points upwards. What happens later says nothing about the theorem.
 #pragma once

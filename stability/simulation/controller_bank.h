@@ -22,7 +22,7 @@ struct ControlRecord {
   bool motors_off = false;
   bool saturated = false;   ///< thrust was held at its upper limit
   std::uint8_t faults = 0;  ///< sum of controller::Fault
-  // What only logs want; see ControllerBank::report().
+  // Needed by logs only; see ControllerBank::report().
   Eigen::Vector3d force_W_N = Eigen::Vector3d::Zero();  ///< f_d
   double thrust_N = 0;
   Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
@@ -34,20 +34,20 @@ class ControllerBank {
  public:
   virtual ~ControllerBank() = default;
 
-  /// New measurements of a vehicle's position and velocity; they stand until the next call.
+  /// New measurements of a vehicle's position and velocity, valid until the next call.
   virtual void see(int vehicle, const Eigen::Vector3d& p_W_m, const Eigen::Vector3d& v_W_m_s,
                    std::uint32_t stamp_ms) = 0;
-  /// What a vehicle shall follow, until the next call.
+  /// Set point of a vehicle until the next call.
   virtual void follow(int vehicle, const Setpoint& setpoint) = 0;
   /// f_a_hat along z and tau_a_hat, until the next call; 0 before the first.
   virtual void predict(int vehicle, double prediction_N, const Eigen::Vector3d& torque_B_Nm) = 0;
   virtual void reset_integrals(int vehicle) = 0;
   /// One control period of every vehicle: controller::flight_step().
   /// @param rows    the swarm's state in rows (rigid_bodies.h); attitudes and rates are read from it.
-  /// @param records by vehicle: the answers, but for those of report().
+  /// @param records by vehicle: the answers, except those of report().
   virtual void step(const double* rows, double battery_V, std::uint32_t now_ms, bool position_is_due,
                     std::vector<ControlRecord>& records) = 0;
-  /// Completes a vehicle's record of the last step() with what only logs want.
+  /// Completes a vehicle's record of the last step() with what only logs need.
   virtual void report(int vehicle, ControlRecord* record) const = 0;
 };
 

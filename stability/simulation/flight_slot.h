@@ -15,7 +15,7 @@ controller::Vector3<Scalar> narrow(const Eigen::Vector3d& v) {
   return {static_cast<Scalar>(v.x()), static_cast<Scalar>(v.y()), static_cast<Scalar>(v.z())};
 }
 
-/// What logs want of the last period.
+/// Results of the last period that logs need.
 template <typename Scalar>
 struct Answer {
   controller::Wrench<Scalar> wanted{};
@@ -33,7 +33,7 @@ struct Slot {
   Answer<Scalar> answer;
 };
 
-// What happens to every number of a slot.
+// Operations on every number of a slot.
 struct Fill {
   const Lanes::Part& part;
   SWARMCERT_LANE void operator()(Lanes& to, const Lanes& from) const { to = from.filled(part); }
@@ -43,9 +43,9 @@ struct Take {
   SWARMCERT_LANE void operator()(Lanes& to, const Lanes& from) const { to.take(from, part); }
 };
 
-// The fields of what a slot holds. Each binding names all fields of its type: one that is added to the flight code and
-// not here does not compile, instead of being lost where lanes part. Stamps and flags are the same in all lanes that
-// fly together; Group::Flags keeps them for each vehicle.
+// The fields of the structs in a slot. Each binding names all fields of its type: if the flight code gets a field that
+// is not listed here, this file does not compile, so the field cannot be lost when lanes are computed separately.
+// Stamps and flags are the same in all lanes that fly together; Group::Flags keeps them for each vehicle.
 inline auto fields(controller::Vector3<Lanes>& v) {
   auto& [x, y, z] = v;
   return std::tie(x, y, z);

@@ -26,7 +26,7 @@ class Radio {
   void broadcast(const std::vector<Eigen::Vector3d>& positions_W_m, std::uint32_t now_ms,
                  files::Random& random);
 
-  /// Replaces what `now` says of its neighbours by what vehicle `own` knows of them.
+  /// Replaces the neighbours in `now` by what vehicle `own` knows about them.
   /// @param now all other vehicles in their order.
   /// @param neighbours, weights overwritten; weights in [0, 1] as controller::weight() has them.
   void look(int own, std::uint32_t now_ms, Instant* now, std::vector<Neighbour>& neighbours,
