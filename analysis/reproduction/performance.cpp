@@ -135,14 +135,17 @@ std::string controller_name(int controller) {
 
 std::string metres(double value) { return std::isfinite(value) ? fmt::format("{:.3f}", value) : "lost"; }
 
-void add_truth(const Truth& truth, const files::Json& flights, Finding& finding) {
-  files::Json column = {{"truth", truth.name}, {"knobs", truth.knobs}};
+/// By controller, then by the number of vehicles from kLeast on.
+using Spreads = std::array<std::array<Spread, 4>, 4>;
+
+/// The largest height errors beside the paper's: a table, and column["max_z"].
+Spreads add_heights(const Truth& truth, const files::Json& flights, files::Json& column, Finding& finding) {
+  Spreads spreads;
   Table table = {
       fmt::format("Maximum z-error [m], truth \"{}\": worst of all seeds (median) | paper", truth.name),
       {"controller", "2 CF swap", "3 CF swap", "4 CF swap", "5 CF swap"},
       {}};
   column["max_z"] = files::Json::array();
-  Spread spreads[4][4];
   for (std::size_t c = 0; c < 4; ++c) {
     std::vector<std::string> row = {controller_name(kControllers[c])};
     for (std::size_t v = 0; v < 4; ++v) {
@@ -161,6 +164,11 @@ void add_truth(const Truth& truth, const files::Json& flights, Finding& finding)
     table.rows.push_back(std::move(row));
   }
   finding.tables.push_back(std::move(table));
+  return spreads;
+}
+
+/// Errors along x and y: a table, and column["xy"].
+void add_sideways(const Truth& truth, const files::Json& flights, files::Json& column, Finding& finding) {
   Table sideways = {fmt::format("Errors along x and y [m], truth \"{}\": median, 95 %, largest", truth.name),
                     {"controller", "2 CF swap", "3 CF swap", "4 CF swap", "5 CF swap"},
                     {}};
@@ -185,16 +193,12 @@ void add_truth(const Truth& truth, const files::Json& flights, Finding& finding)
     }
   }
   finding.tables.push_back(std::move(sideways));
+}
 
-  double farthest = 0;
-  for (std::size_t v = 0; v < 4; ++v)
-    farthest = std::max(farthest, std::abs(spreads[0][v].most_m / kPaper_m[0][v] - 1));
-  double least_factor = INFINITY;  // of the networks trained with three or four, over all swarms
-  for (std::size_t c = 2; c < 4; ++c) {
-    for (std::size_t v = 0; v < 4; ++v)
-      least_factor = std::min(least_factor, spreads[0][v].most_m / spreads[c][v].most_m);
-  }
-  // A seed's networks beside the same baseline: the least over all seeds is a worst of more flights than the baseline's.
+/// By how much networks divide the worst error, for each training seed: the least over the swarms of networks trained with
+/// three or four vehicles. A seed's networks stand beside the same baseline: the least over all seeds is a worst of more
+/// flights than the baseline's.
+std::map<int, double> improvement_by_seed(const files::Json& flights, const Spreads& spreads) {
   std::map<int, double> factor_of_seed;
   for (const files::Json& flight : flights) {
     const int controller = flight.at("trained_with").get<int>();
@@ -204,9 +208,23 @@ void add_truth(const Truth& truth, const files::Json& flights, Finding& finding)
     double& least = factor_of_seed.try_emplace(flight.at("training_seed").get<int>(), INFINITY).first->second;
     least = std::min(least, baseline.most_m / most_m);
   }
+  return factor_of_seed;
+}
+
+/// What the tables say in a sentence, and its numbers in `column`.
+void add_improvement(const Truth& truth, const files::Json& flights, const Spreads& spreads,
+                     files::Json& column, Finding& finding) {
+  double farthest = 0;
+  for (std::size_t v = 0; v < 4; ++v)
+    farthest = std::max(farthest, std::abs(spreads[0][v].most_m / kPaper_m[0][v] - 1));
+  double least_factor = INFINITY;  // of the networks trained with three or four, over all swarms
+  for (std::size_t c = 2; c < 4; ++c) {
+    for (std::size_t v = 0; v < 4; ++v)
+      least_factor = std::min(least_factor, spreads[0][v].most_m / spreads[c][v].most_m);
+  }
   std::vector<std::string> factors;
   column["least_improvement_by_training_seed"] = files::Json::array();
-  for (const auto& [seed, factor] : factor_of_seed) {
+  for (const auto& [seed, factor] : improvement_by_seed(flights, spreads)) {
     column["least_improvement_by_training_seed"].push_back(number(factor));
     factors.push_back(fmt::format("{:.2f}", factor));
   }
@@ -216,7 +234,6 @@ void add_truth(const Truth& truth, const files::Json& flights, Finding& finding)
   column["least_improvement_trained_with_3_or_4"] = number(least_factor);
   column["improvement_trained_with_2_at_4"] = number(two_at_four);
   column["improvement_trained_with_3_at_5"] = number(three_at_five);
-  finding.json["columns"].push_back(std::move(column));
   finding.notes.push_back(fmt::format(
       "Truth \"{}\": baseline within {:.0f} % of the paper; networks trained with three or four "
       "divide the worst error by "
@@ -225,6 +242,14 @@ void add_truth(const Truth& truth, const files::Json& flights, Finding& finding)
       "(paper: 0.71); trained with "
       "three, at five: by {:.2f} (paper: 1.97).",
       truth.name, 100 * farthest, least_factor, fmt::join(factors, ", "), two_at_four, three_at_five));
+}
+
+void add_truth(const Truth& truth, const files::Json& flights, Finding& finding) {
+  files::Json column = {{"truth", truth.name}, {"knobs", truth.knobs}};
+  const Spreads spreads = add_heights(truth, flights, column, finding);
+  add_sideways(truth, flights, column, finding);
+  add_improvement(truth, flights, spreads, column, finding);
+  finding.json["columns"].push_back(std::move(column));
   for (const std::string& knob : truth.knobs)
     finding.notes.push_back(fmt::format("Chosen for truth \"{}\": {}.", truth.name, knob));
 }

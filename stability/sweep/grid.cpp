@@ -146,6 +146,66 @@ std::string parameter_problem(const Grid& grid, const std::string& name, double 
   return "";
 }
 
+namespace {
+
+/// Axes that the gains have, and that make sense for them.
+void require_fitting_axes(const TomlTable& axes, const Gains& gains) {
+  const bool pid_axis = axes.has("Kp") || axes.has("Kd") || axes.has("Ki");
+  const bool composite_axis = axes.has("Lambda") || axes.has("K");
+  if (pid_axis && (composite_axis || !gains.pid)) {
+    axes.refuse("", "", "varies Kp, Kd or Ki, and the gains are Lambda, K", "vary Lambda and K");
+  }
+  if (composite_axis && !gains.composite) {
+    axes.refuse("", "", "varies Lambda or K, and the gains are Kp, Kd, Ki", "vary Kp, Kd and Ki");
+  }
+  if (axes.has("integrator_step_s") && gains.rate_hz == 0 && !axes.has("rate_hz")) {
+    axes.refuse("integrator_step_s", "", "needs a sampled loop", "state rate_hz in the gains");
+  }
+}
+
+void read_axes(const TomlTable& axes, Grid& grid) {
+  axes.allow_only(grid_parameters());
+  double cells = 1;
+  for (const std::string& name : axes.keys()) {
+    grid.axes.push_back(read_axis(axes, name));
+    for (const double value : grid.axes.back().values) {
+      const std::string problem = parameter_problem(grid, name, value);
+      if (!problem.empty()) axes.refuse(name, "", problem);
+    }
+    cells *= static_cast<double>(grid.axes.back().values.size());
+  }
+  if (grid.axes.empty()) axes.refuse("", "", "has no axis", "e.g. [axes.Kp] from = 5, to = 20, steps = 50");
+  if (cells > kMostCells) axes.refuse("", fmt::format("{:.0f} cells", cells), "are more than ten million");
+  require_fitting_axes(axes, grid.gains);
+}
+
+/// After grid.compute.
+void read_pareto(const TomlTable& top, Grid& grid) {
+  grid.pareto = read_quantities(top, "pareto");
+  for (const std::string& name : grid.pareto) {
+    if (std::find(grid.compute.begin(), grid.compute.end(), name) == grid.compute.end()) {
+      top.refuse("pareto", files::in_quotes(name), "is not computed", "add it to compute");
+    }
+  }
+}
+
+void read_limits(const TomlTable& limits, Grid& grid) {
+  limits.allow_only(quantity_names());
+  for (const std::string& name : limits.keys()) {
+    const TomlTable limit = limits.table(name);
+    limit.allow_only({"least", "most"});
+    const double least = limit.has("least") ? limit.number("least") : -INFINITY;
+    const double most = limit.has("most") ? limit.number("most") : INFINITY;
+    if (least > most) {
+      limit.refuse("least", fmt::format("{:g}", least), fmt::format("is more than most = {:g}", most),
+                   "no cell can meet both");
+    }
+    grid.limits.push_back({name, least, most});
+  }
+}
+
+}  // namespace
+
 Grid load_grid(const std::string& path) {
   const std::string text = files::read_file(path);
   const toml::table document = files::parse_toml(text, path);
@@ -164,54 +224,10 @@ Grid load_grid(const std::string& path) {
   grid.model = read_model(model);
   grid.inputs = {path, gains, model};
   if (top.has("axis")) grid.axis = static_cast<int>(top.choice("axis", {"x", "y", "z"}));
-  const TomlTable axes = top.table("axes");
-  axes.allow_only(grid_parameters());
-  double cells = 1;
-  for (const std::string& name : axes.keys()) {
-    grid.axes.push_back(read_axis(axes, name));
-    for (const double value : grid.axes.back().values) {
-      const std::string problem = parameter_problem(grid, name, value);
-      if (!problem.empty()) axes.refuse(name, "", problem);
-    }
-    cells *= static_cast<double>(grid.axes.back().values.size());
-  }
-  if (grid.axes.empty()) axes.refuse("", "", "has no axis", "e.g. [axes.Kp] from = 5, to = 20, steps = 50");
-  if (cells > kMostCells) axes.refuse("", fmt::format("{:.0f} cells", cells), "are more than ten million");
-  const bool pid_axis = axes.has("Kp") || axes.has("Kd") || axes.has("Ki");
-  const bool composite_axis = axes.has("Lambda") || axes.has("K");
-  if (pid_axis && (composite_axis || !grid.gains.pid)) {
-    axes.refuse("", "", "varies Kp, Kd or Ki, and the gains are Lambda, K", "vary Lambda and K");
-  }
-  if (composite_axis && !grid.gains.composite) {
-    axes.refuse("", "", "varies Lambda or K, and the gains are Kp, Kd, Ki", "vary Kp, Kd and Ki");
-  }
-  if (axes.has("integrator_step_s") && grid.gains.rate_hz == 0 && !axes.has("rate_hz")) {
-    axes.refuse("integrator_step_s", "", "needs a sampled loop", "state rate_hz in the gains");
-  }
+  read_axes(top.table("axes"), grid);
   grid.compute = read_quantities(top, "compute");
-  if (top.has("pareto")) {
-    grid.pareto = read_quantities(top, "pareto");
-    for (const std::string& name : grid.pareto) {
-      if (std::find(grid.compute.begin(), grid.compute.end(), name) == grid.compute.end()) {
-        top.refuse("pareto", files::in_quotes(name), "is not computed", "add it to compute");
-      }
-    }
-  }
-  if (top.has("limits")) {
-    const TomlTable limits = top.table("limits");
-    limits.allow_only(quantity_names());
-    for (const std::string& name : limits.keys()) {
-      const TomlTable limit = limits.table(name);
-      limit.allow_only({"least", "most"});
-      const double least = limit.has("least") ? limit.number("least") : -INFINITY;
-      const double most = limit.has("most") ? limit.number("most") : INFINITY;
-      if (least > most) {
-        limit.refuse("least", fmt::format("{:g}", least), fmt::format("is more than most = {:g}", most),
-                     "no cell can meet both");
-      }
-      grid.limits.push_back({name, least, most});
-    }
-  }
+  if (top.has("pareto")) read_pareto(top, grid);
+  if (top.has("limits")) read_limits(top.table("limits"), grid);
   if (top.has("disturbance")) read_disturbance(top.table("disturbance"), grid.disturbance);
   return grid;
 }
