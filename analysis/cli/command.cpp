@@ -8,6 +8,7 @@
 #include "analysis/cli/command_line.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::analysis {
@@ -52,6 +53,9 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   phi->needs(rho)->excludes(file);
   rho->needs(phi)->excludes(file);
   app.add_option("--key", arguments.key, "Key of the state dict inside a nested checkpoint, e.g. model");
+  app.add_option("--activation", arguments.activation,
+                 std::string("Between the layers, which a state dict does not tell: ") + files::kActivations)
+      ->capture_default_str();
   declare_order(app, arguments);
 }
 
@@ -63,6 +67,10 @@ files::Network load_net(const files::NetworkArguments& arguments) {
   if (has_pair ? !arguments.order.empty() : !arguments.phi_order.empty() || !arguments.rho_order.empty())
     throw UsageError(has_pair ? "--order: say of which file: --order phi=fc1,fc2 or rho=fc1,fc2"
                               : "--order phi=... and rho=... go with --phi and --rho");
+  if (!files::is_activation(arguments.activation))
+    throw UsageError("--activation " + arguments.activation +
+                     ": only piecewise linear functions, which ReLU can express, can be certified: " +
+                     files::kActivations);
   return files::load_network(arguments);
 }
 

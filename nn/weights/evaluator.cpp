@@ -35,6 +35,7 @@ Weights as_float32(Weights weights) {
     const auto bias = converted<float>(layer.biases, weights.path, layer.name + ".bias");
     layer.weights.assign(weight.begin(), weight.end());
     layer.biases.assign(bias.begin(), bias.end());
+    layer.weight_rounding = layer.bias_rounding = 0;  // the float32 numbers are the network now
   }
   weights.precision = Precision::kFloat32;
   return weights;

@@ -7,6 +7,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
+#include "nn/weights/activation.h"
 
 namespace swarmcert::files {
 namespace {
@@ -229,7 +230,9 @@ Network as_float32(Network network) {
   return network;
 }
 
-Network load_network(const NetworkArguments& arguments) {
+namespace {
+
+Network load_with_relu(const NetworkArguments& arguments) {
   const bool is_pair = !arguments.phi.empty() && !arguments.rho.empty();
   if (arguments.file.empty() ? !is_pair : !(arguments.phi.empty() && arguments.rho.empty())) {
     throw std::invalid_argument("load_network: name one file, or a phi and a rho");
@@ -254,6 +257,19 @@ Network load_network(const NetworkArguments& arguments) {
   }
   Network network;
   network.plain = parse_weights(bytes, arguments.file, arguments.key, arguments.order);
+  return network;
+}
+
+}  // namespace
+
+Network load_network(const NetworkArguments& arguments) {
+  Network network = load_with_relu(arguments);
+  const auto set = [&arguments](Weights& weights) {
+    weights = with_activation(std::move(weights), arguments.activation);
+  };
+  if (network.plain) set(*network.plain);
+  for (auto& [kind, weights] : network.phi) set(weights);
+  for (auto& [kind, weights] : network.rho) set(weights);
   return network;
 }
 

@@ -68,6 +68,7 @@ struct NetworkArguments {
   std::string key;       ///< see load_weights(); holds for every weight file
   /// Orders of layers as load_weights() takes them: of `file`, where that is one plain weight file, of `phi` and `rho`.
   std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
+  std::string activation = "relu";  ///< between the layers of every weight file: see with_activation()
 };
 
 /// Loads NET. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files

@@ -140,10 +140,12 @@ NpyArray parse_npy(const std::string& bytes, const std::string& path, const std:
            kCopyAgain);
   NpyHeader header(std::string_view(bytes).substr(begin, length), path, entry);
   header.run();
-  if (header.type != "<f4" && header.type != "<f8")
-    refuse(in_quotes(header.type), "numbers must be little-endian float32 or float64",
+  if (header.type != "<f4" && header.type != "<f8" && header.type != "<f2")
+    refuse(in_quotes(header.type), "numbers must be little-endian float16, float32 or float64",
            "array.astype(\"float64\") before saving");
-  const Precision precision = header.type == "<f4" ? Precision::kFloat32 : Precision::kFloat64;
+  const Precision precision = header.type == "<f4"   ? Precision::kFloat32
+                              : header.type == "<f2" ? Precision::kFloat16
+                                                     : Precision::kFloat64;
   const std::optional<std::uint64_t> count = element_count(header.shape);
   if (!count)
     refuse(shape_text(header.shape), "has more than " + std::to_string(kMostElements) + " numbers", "");

@@ -1,4 +1,4 @@
-/// @file ONNX models that are one chain of affine layers with ReLU between them.
+/// @file ONNX models of affine and piecewise linear operations, as ReLU chains.
 #pragma once
 
 #include <string>
@@ -12,9 +12,12 @@ bool looks_like_onnx(const std::string& bytes);
 
 /// The network in `bytes`; `path` for messages.
 ///
-/// Accepted nodes, in a chain from the graph's one input to its one output: Gemm (alpha = beta = 1, the input not
-/// transposed), MatMul with Add, Relu, Identity; Constant and Identity for weights. Weights lie in the file itself, in
-/// float32 or float64. A layer is called as its weight without ".weight".
+/// Accepted nodes, from the graph's one input to its one output: affine ones (Gemm, MatMul, Conv, BatchNormalization in
+/// inference, AveragePool, Add, Sub, Mul and Div by constants, skip connections), which are folded exactly or with the
+/// rounding stated in Layer; piecewise linear ones (Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, MaxPool),
+/// which are written with ReLU, the same function; and those that only rearrange. A Softmax at the end is left out.
+/// Weights lie in the file itself, in float16, bfloat16, float32 or float64. The batch is 1. A layer is called as its
+/// first weight without ".weight".
 /// @throws InputError for anything else, naming node, tensor or attribute, or as assemble().
 Weights parse_onnx(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
 

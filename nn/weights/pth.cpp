@@ -25,6 +25,8 @@ using StorageBytes = std::function<std::string_view(const PickledStorage&, Preci
 std::optional<Precision> precision_of(std::string_view storage_type) {
   if (storage_type == "FloatStorage") return Precision::kFloat32;
   if (storage_type == "DoubleStorage") return Precision::kFloat64;
+  if (storage_type == "HalfStorage") return Precision::kFloat16;
+  if (storage_type == "BFloat16Storage") return Precision::kBfloat16;
   return std::nullopt;
 }
 

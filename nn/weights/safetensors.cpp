@@ -82,6 +82,8 @@ class Reader {
     entry.tensor.type = value["dtype"].get<std::string>();
     if (entry.tensor.type == "F32") entry.tensor.precision = Precision::kFloat32;
     if (entry.tensor.type == "F64") entry.tensor.precision = Precision::kFloat64;
+    if (entry.tensor.type == "F16") entry.tensor.precision = Precision::kFloat16;
+    if (entry.tensor.type == "BF16") entry.tensor.precision = Precision::kBfloat16;
     entry.tensor.shape = counts(value, field, "shape");
     const std::vector<std::uint64_t> offsets = counts(value, field, "data_offsets");
     if (offsets.size() != 2 || offsets[0] > offsets[1] || offsets[1] > data_.size()) {

@@ -2,9 +2,12 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <set>
 
 #include "nn/base/input_error.h"
+#include "nn/weights/parametrized.h"
+#include "nn/weights/relu_chain.h"
 
 #if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
 #error "weight files are little-endian, and append_numbers() copies their bytes as they are"
@@ -33,11 +36,6 @@ class Assembler {
       : tensors_(tensors), read_(read), path_(path), listing_(listing), order_(order) {}
 
   Weights run() {
-    if (tensors_.size() > kMostTensors) {
-      throw InputError(
-          {path_, "", "", "", "holds more than " + std::to_string(kMostTensors) + " tensors", ""});
-    }
-    refuse_parametrised();
     refuse_other_structures();
     for (std::size_t i = 0; i < tensors_.size(); ++i) find_weight(i);
     for (std::size_t i = 0; i < tensors_.size(); ++i) find_bias(i);
@@ -50,6 +48,10 @@ class Assembler {
     weights.order_source = sort_parts();
     weights.path = path_;
     weights.precision = *tensors_[parts_.front().weight].precision;
+    if (width(weights.precision) == 2) {
+      weights.notes.push_back(std::string("stored as ") + name(weights.precision) + ", read as float32");
+      weights.precision = Precision::kFloat32;
+    }
     for (const LayerParts& parts : parts_) weights.layers.push_back(layer(parts));
     return weights;
   }
@@ -58,32 +60,6 @@ class Assembler {
   [[noreturn]] void refuse(std::size_t i, const std::string& value, const std::string& what,
                            const std::string& mend = "") const {
     throw InputError({path_, "", tensors_[i].name, value, what, mend});
-  }
-
-  /// Reparametrised weights are recomputed by Python code at every call; the stored tensors are not W.
-  void refuse_parametrised() const {
-    for (std::size_t i = 0; i < tensors_.size(); ++i) {
-      const std::string& name = tensors_[i].name;
-      const auto ends_with = [&name](const std::string& suffix) {
-        return name.size() >= suffix.size() &&
-               name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0;
-      };
-      if (name.find("parametrizations.") != std::string::npos) {
-        refuse(i, "",
-               "the weight is parametrised (spectral_norm), so the file does not hold the weight itself",
-               "call torch.nn.utils.parametrize.remove_parametrizations(layer, \"weight\") before saving");
-      }
-      if (ends_with("weight_g")) {
-        refuse(i, "",
-               "the weight is parametrised by weight_norm, so the file does not hold the weight itself",
-               "call torch.nn.utils.remove_weight_norm(layer) before saving");
-      }
-      if (ends_with("weight_orig") || ends_with("weight_u")) {
-        refuse(i, "",
-               "the weight is parametrised by spectral_norm, so the file does not hold the weight itself",
-               "call torch.nn.utils.remove_spectral_norm(layer) before saving");
-      }
-    }
   }
 
   /// Tensors that only layers of other kinds have, with the kind's name and what to do.
@@ -127,7 +103,7 @@ class Assembler {
   void check_type(std::size_t i) const {
     const DeclaredTensor& tensor = tensors_[i];
     if (!tensor.precision) {
-      refuse(i, tensor.type, "weights must be float32 or float64",
+      refuse(i, tensor.type, "weights must be float16, bfloat16, float32 or float64",
              "convert before saving: model.float().state_dict()");
     }
     const DeclaredTensor& first = parts_.empty() ? tensor : tensors_[parts_.front().weight];
@@ -253,11 +229,35 @@ void append_as(const char* bytes, std::uint64_t count, std::uint64_t stride, std
   }
 }
 
+void append_halves(const char* bytes, std::uint64_t count, std::uint64_t stride,
+                   double (*number_of)(std::uint16_t), std::vector<double>& numbers) {
+  for (std::uint64_t i = 0; i < count; ++i) {
+    std::uint16_t bits;
+    std::memcpy(&bits, bytes + i * stride * sizeof bits, sizeof bits);
+    numbers.push_back(number_of(bits));
+  }
+}
+
 }  // namespace
 
 Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
                  const std::string& path, Listing listing, const std::vector<std::string>& order) {
-  return Assembler(tensors, read, path, listing, order).run();
+  if (tensors.size() > kMostTensors)
+    throw InputError({path, "", "", "", "holds more than " + std::to_string(kMostTensors) + " tensors", ""});
+  const EffectiveTensors effective = effective_tensors(tensors, read, path);
+  const TensorReader read_effective = [&](std::size_t i) {
+    const auto computed = effective.computed.find(i);
+    return computed == effective.computed.end() ? read(effective.sources[i]) : computed->second.numbers;
+  };
+  Weights weights = Assembler(effective.tensors, read_effective, path, listing, order).run();
+  for (const auto& [i, computed] : effective.computed)
+    for (Layer& layer : weights.layers)
+      if (tensor_name(layer, "weight") == effective.tensors[i].name)
+        layer.weight_rounding = computed.rounding;
+  if (!effective.computed.empty() && weights.precision == Precision::kFloat32)
+    weights.precision = least_precision(weights.layers);
+  weights.notes.insert(weights.notes.end(), effective.notes.begin(), effective.notes.end());
+  return weights;
 }
 
 std::string tensor_name(const Layer& layer, const char* part) {
@@ -266,15 +266,47 @@ std::string tensor_name(const Layer& layer, const char* part) {
 
 void append_numbers(const char* bytes, std::uint64_t count, std::uint64_t stride, Precision precision,
                     std::vector<double>& numbers) {
-  if (precision == Precision::kFloat32) {
-    append_as<float>(bytes, count, stride, numbers);
-  } else {
-    append_as<double>(bytes, count, stride, numbers);
+  switch (precision) {
+    case Precision::kFloat32:
+      return append_as<float>(bytes, count, stride, numbers);
+    case Precision::kFloat64:
+      return append_as<double>(bytes, count, stride, numbers);
+    case Precision::kFloat16:
+      return append_halves(bytes, count, stride, from_float16, numbers);
+    case Precision::kBfloat16:
+      return append_halves(bytes, count, stride, from_bfloat16, numbers);
   }
 }
 
+double from_float16(std::uint16_t bits) {
+  const double sign = (bits & 0x8000) != 0 ? -1.0 : 1.0;
+  const int exponent = bits >> 10 & 0x1f;
+  const int fraction = bits & 0x3ff;
+  if (exponent == 0x1f)
+    return fraction != 0 ? std::numeric_limits<double>::quiet_NaN()
+                         : sign * std::numeric_limits<double>::infinity();
+  if (exponent == 0) return sign * std::ldexp(fraction, -24);
+  return sign * std::ldexp(1024 + fraction, exponent - 25);
+}
+
+double from_bfloat16(std::uint16_t bits) {
+  const std::uint32_t wide = static_cast<std::uint32_t>(bits) << 16;
+  float number;
+  std::memcpy(&number, &wide, sizeof number);
+  return static_cast<double>(number);
+}
+
 std::size_t width(Precision precision) {
-  return precision == Precision::kFloat32 ? sizeof(float) : sizeof(double);
+  switch (precision) {
+    case Precision::kFloat32:
+      return 4;
+    case Precision::kFloat16:
+    case Precision::kBfloat16:
+      return 2;
+    case Precision::kFloat64:
+      break;
+  }
+  return 8;
 }
 
 std::string shape_text(const std::vector<std::uint64_t>& shape) {

@@ -39,7 +39,11 @@ std::string tensor_name(const Layer& layer, const char* part);
 void append_numbers(const char* bytes, std::uint64_t count, std::uint64_t stride, Precision precision,
                     std::vector<double>& numbers);
 
-/// Bytes of one number: 4 or 8.
+/// The number that these bits are, exactly.
+double from_float16(std::uint16_t bits);
+double from_bfloat16(std::uint16_t bits);
+
+/// Bytes of one number: 2, 4 or 8.
 std::size_t width(Precision precision);
 
 /// "[40, 25]".

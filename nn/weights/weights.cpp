@@ -1,10 +1,15 @@
 #include "nn/weights/weights.h"
 
+#include <cmath>
 #include <filesystem>
 
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/c_source.h"
+#include "nn/weights/enclosed.h"
+#include "nn/weights/mat_file.h"
+#include "nn/weights/named_arrays.h"
+#include "nn/weights/nnet.h"
 #include "nn/weights/onnx.h"
 #include "nn/weights/pth.h"
 #include "nn/weights/safetensors.h"
@@ -13,7 +18,8 @@ namespace swarmcert::files {
 namespace {
 
 [[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
-  std::string what = "is neither a PyTorch state dict (.pth), safetensors, ONNX nor generated C weights";
+  std::string what =
+      "is neither a PyTorch state dict (.pth), safetensors, ONNX, .npz, .mat, .nnet nor generated C weights";
   std::string mend = "save one with torch.save(model.state_dict(), ...)";
   if (bytes.empty()) {
     what = "is empty";
@@ -34,7 +40,31 @@ void refuse_key(const std::string& key, const std::string& path, const std::stri
 
 }  // namespace
 
-const char* name(Precision precision) { return precision == Precision::kFloat32 ? "float32" : "float64"; }
+const char* name(Precision precision) {
+  switch (precision) {
+    case Precision::kFloat32:
+      return "float32";
+    case Precision::kFloat16:
+      return "float16";
+    case Precision::kBfloat16:
+      return "bfloat16";
+    case Precision::kFloat64:
+      break;
+  }
+  return "float64";
+}
+
+double rounding_of_slope(const Weights& weights) {
+  constexpr double kUp = 1 + 0x1p-26;  // covers the rounding of as many layers as a file can hold
+  double product = 1, share = 0;       // of |W|_F; sum of weight_rounding / |W|_F
+  for (const Layer& layer : weights.layers) {
+    const double norm = norm_up(layer.weights);
+    product *= norm * kUp;
+    if (layer.weight_rounding > 0) share += layer.weight_rounding / norm * kUp;
+  }
+  if (!(share > 0)) return 0;
+  return product * std::expm1(share * kUp) * kUp * kUp;  // 1 + s <= exp(s)
+}
 
 const char* name(OrderSource source) {
   switch (source) {
@@ -53,7 +83,10 @@ const char* name(OrderSource source) {
 Weights parse_weights(const std::string& bytes, const std::string& path, const std::string& key,
                       const std::vector<std::string>& order) {
   Weights weights;
-  if (looks_like_pth_zip(bytes)) {
+  if (looks_like_npz(bytes)) {
+    refuse_key(key, path, ".npz");
+    weights = parse_npz(bytes, path, order);
+  } else if (looks_like_pth_zip(bytes)) {
     weights = parse_pth_zip(bytes, path, key, order);
   } else if (looks_like_pth_legacy(bytes)) {
     weights = parse_pth_legacy(bytes, path, key, order);
@@ -63,6 +96,12 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
   } else if (looks_like_onnx(bytes)) {
     refuse_key(key, path, "ONNX");
     weights = parse_onnx(bytes, path, order);
+  } else if (looks_like_mat(bytes)) {
+    refuse_key(key, path, ".mat");
+    weights = parse_mat(bytes, path, order);
+  } else if (looks_like_nnet(bytes)) {
+    refuse_key(key, path, ".nnet");
+    weights = parse_nnet(bytes, path, order);
   } else if (looks_like_c_source(bytes)) {
     weights = parse_c_source(bytes, path, key, order);
   } else {

@@ -9,10 +9,11 @@
 
 namespace swarmcert::files {
 
-/// The format in which the file stores its weights. Both convert to double without rounding.
-enum class Precision { kFloat32, kFloat64 };
+/// A format of numbers. All convert to double without rounding. A network is float32 or float64: one that a file stores
+/// in half precision, float16 or bfloat16, is a float32 network.
+enum class Precision { kFloat32, kFloat64, kFloat16, kBfloat16 };
 
-/// "float32" or "float64".
+/// "float32", "float64", "float16", "bfloat16".
 const char* name(Precision precision);
 
 /// What the order of the layers rests on. A file that states it states ReLU between the layers as well; in every other
@@ -34,6 +35,10 @@ struct Layer {
   int inputs = 0;
   std::vector<double> weights;  ///< W, [outputs x inputs], row-major
   std::vector<double> biases;   ///< b, [outputs]; zeros where the file has none
+  /// Where the file's own W or b, folded out of several layers, is no double: it is within this Frobenius norm of
+  /// `weights`, and within this Euclidean norm of `biases`. 0: they are the file's own.
+  double weight_rounding = 0;
+  double bias_rounding = 0;
 };
 
 /// A ReLU multilayer perceptron: ReLU after every layer but the last.
@@ -45,16 +50,18 @@ struct Weights {
   Precision precision = Precision::kFloat32;
   std::vector<Layer> layers;
   OrderSource order_source = OrderSource::kFile;
+  std::vector<std::string> notes;  ///< what was folded, rewritten, left out or assumed; one clause each
 
   int inputs() const { return layers.front().inputs; }
   int outputs() const { return layers.back().outputs; }
 };
 
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
-/// and legacy pickle, float32 and float64, strided views), safetensors, ONNX models that are a chain of linear layers,
-/// and the C source that the networks' authors generate.
-/// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. Which layer follows which, ONNX models and
-/// our safetensors state; for other files see decide_layer_order().
+/// and legacy pickle, strided views, weights under spectral_norm and weight_norm), safetensors, ONNX models of affine
+/// and piecewise linear operations, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and the C source that the networks'
+/// authors generate.
+/// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. Which layer follows which, ONNX models,
+/// .nnet and our safetensors state; for other files see decide_layer_order().
 /// @param path where no such file exists, "FILE#KEY" is FILE with the key KEY.
 /// @param key for nested checkpoints: the dotted path of the state dict inside it, e.g. "model"; empty: the top. For C
 ///   source: the name of one of its networks.
@@ -70,6 +77,11 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
 /// @throws InputError if the file exists and `overwrite` is false, or if the name of a layer is not UTF-8.
 void save_safetensors(const Weights& weights, const std::string& path, bool overwrite);
+
+/// How much larger than the Lipschitz constant of the network as it was read that of the file's own function can be,
+/// where its folded weights are no doubles: the product of |W|_F + weight_rounding less the product of |W|_F. It may be
+/// added to every bound that holds for all slopes of the activations between 0 and 1. 0 where nothing was rounded.
+double rounding_of_slope(const Weights& weights);
 
 /// Every number rounded to the nearest float32, ties to even: what a C compiler makes of a float64 file's numbers.
 /// A float32 network stays as it is.

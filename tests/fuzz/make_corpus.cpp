@@ -5,6 +5,7 @@
 #include <random>
 
 #include "analysis/log_writer.h"
+#include "data.h"
 #include "logs/dataflash_writer.h"
 #include "logs/mcap_writer.h"
 #include "logs/rosbag_writer.h"
@@ -96,6 +97,13 @@ void add_weights(Corpus& corpus, const std::string& data) {
   const std::string deeper = "}(" + text_op("model") + "}(" + text_op("net") + state + "uu";
   corpus.add(with_key(2, zip_file(pickle(deeper), small_storages<float>())));
 
+  for (const auto& entry : fs::directory_iterator(source_path("tests/nn/files"))) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string bytes(std::istreambuf_iterator<char>(file), {});
+    if (entry.path().extension() != ".py" && entry.path().extension() != ".json")
+      corpus.add(with_key(0, bytes));
+  }
+  corpus.add(with_key(0, "// nnet\n1,2,1,2,\n2,1,\n0,\n-1,-2,\n1,2,\n0,0.5,0,\n1,2,1,\n1,-1,\n0.5,\n"));
   if (data.empty() || !fs::exists(data)) return;
   for (const char* const folder : {"zip_f32", "legacy_f64"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(data) / "weights" / folder)) {

@@ -246,7 +246,8 @@ class Weights:
         assert self.layers and all(math.isfinite(x) for layer in self.layers for x in layer.weights + layer.biases)
         self.layers = in_order(self.layers, listing, order)
         assert all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:]))
-        self.precision, self.sha256 = precision, hashlib.sha256(data).hexdigest()
+        self.precision = "float32" if precision in ("float16", "bfloat16") else precision
+        self.sha256 = hashlib.sha256(data).hexdigest()
 
     def round_to_float32(self):
         self.layers = [layer.rounded() for layer in self.layers]
@@ -254,13 +255,19 @@ class Weights:
 
 
 def unpack(precision, data):
+    if precision == "float16":
+        return list(struct.unpack(f"<{len(data) // 2}e", data))
+    if precision == "bfloat16":
+        wide = b"".join(b"\0\0" + data[i:i + 2] for i in range(0, len(data), 2))
+        return list(struct.unpack(f"<{len(data) // 2}f", wide))
     return list(struct.unpack(f"<{len(data) // (4 if precision == 'float32' else 8)}"
                               f"{'f' if precision == 'float32' else 'd'}", data))
 
 
 class StorageType:
     def __init__(self, name):
-        self.precision = {"FloatStorage": "float32", "DoubleStorage": "float64"}[name]
+        self.precision = {"FloatStorage": "float32", "DoubleStorage": "float64", "HalfStorage": "float16",
+                          "BFloat16Storage": "bfloat16"}[name]
 
 
 class Tensor:
@@ -442,6 +449,10 @@ def read_onnx(data, order):
                 add(current, "bias", stored[inputs[2]], False)
         elif kind == "Add":
             add(current, "bias", stored[inputs[0] if inputs[0] in stored else inputs[1]], False)
+        elif kind not in ("Relu", "Identity"):
+            raise ValueError(f"this checker does not read ONNX's {kind}")
+        if any(attributes.get(factor, {}).get(2) not in (None, b"\0\0\x80?") for factor in ("alpha", "beta")):
+            raise ValueError("this checker does not read Gemm with factors")
     return Weights(tensors, precision, data, "evaluation", order)
 
 

@@ -4,6 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
 #include "onnx_writer.h"
 #include "refusal.h"
 
@@ -105,29 +109,28 @@ TEST(Onnx, GraphsThatAreNoChainOfLinearLayersAreRefusedByNode) {
     OnnxModel model;
     model.nodes = std::move(nodes);
     model.tensors = {w, b};
+    model.shape = {1, 2};
     return model.bytes();
   };
   const std::string gemm = onnx_node("Gemm", {"x", "w", "b"}, {"h"});
   const auto expect = [&](const std::vector<std::string>& nodes, const std::string& piece) {
     EXPECT_TRUE(onnx_is_refused(with(nodes), {"net.onnx: offset ", piece}));
   };
-  expect({onnx_node("Tanh", {"x"}, {"y"})}, "Tanh: is not Gemm");
-  expect({gemm, onnx_node("Tanh", {"h"}, {"y"})}, "is not Gemm, MatMul");
-  expect({gemm, onnx_node("Gemm", {"h", "w"}, {"y"})}, "two linear layers without a Relu");
-  expect({onnx_node("Relu", {"x"}, {"y"})}, "does not follow a linear layer");
-  expect({gemm, onnx_node("Relu", {"h"}, {"y"})}, "ends in a Relu");
-  expect({gemm, onnx_node("Relu", {"h"}, {"r"}), onnx_node("Relu", {"r"}, {"y"})}, "does not follow");
-  expect({onnx_node("Gemm", {"x", "w", "b"}, {"y"}, {onnx_float("alpha", 2)})}, "alpha is not 1");
-  expect({onnx_node("Gemm", {"x", "w", "b"}, {"y"}, {onnx_float("beta", 0)})}, "beta is not 1");
+  expect({onnx_node("Tanh", {"x"}, {"y"})}, "Tanh: is none of the operators");
+  expect({gemm, onnx_node("Tanh", {"h"}, {"y"})}, "train with ReLU, LeakyReLU or Hardtanh");
+  expect({gemm, onnx_node("Mul", {"h", "h"}, {"y"})}, "Mul: is no affine function");
+  expect({gemm, onnx_node("Div", {"w", "h"}, {"y"})}, "Div: divides a constant by a value");
   expect({onnx_node("Gemm", {"x", "w", "b"}, {"y"}, {onnx_integer("transA", 1)})}, "transposes its input");
   expect({onnx_node("Gemm", {"w", "x", "b"}, {"y"})}, "is not the input times weights");
-  expect({onnx_node("Gemm", {"x", "x", "b"}, {"y"})}, "uses its input twice");
-  expect({onnx_node("Gemm", {"x", "other"}, {"y"})}, "neither the value before it nor stored");
+  expect({onnx_node("Gemm", {"x", "x", "b"}, {"y"})}, "\"x\" for an input that must be stored");
+  expect({onnx_node("Gemm", {"x", "other"}, {"y"})}, "neither computed before it nor stored");
   expect({onnx_node("MatMul", {"x", ""}, {"y"})}, "lacks its weights");
-  expect({onnx_node("MatMul", {"w", "x"}, {"y"})}, "is not Gemm, MatMul");
-  expect({onnx_node("Add", {"x", "b"}, {"y"})}, "adds where no layer");
-  expect({gemm, onnx_node("Add", {"h", "b"}, {"y"})}, "adds where no layer takes a bias");
   expect({gemm, onnx_node("Relu", {"w"}, {"y"})}, "does not take the value that the node before it gives");
+  expect({gemm, onnx_node("Conv", {"h", "w"}, {"y"})}, "Conv: its weights of shape [2, 2] are no kernel");
+  expect({gemm, onnx_node("MaxPool", {"h"}, {"y"})}, "MaxPool: its input must have the shape [1, channels");
+  expect({gemm, onnx_node("Reshape", {"h"}, {"y"}, {onnx_integers("shape", {3})})},
+         "Reshape: its shape does not fit");
+  expect({gemm, onnx_node("Cast", {"h"}, {"y"}, {onnx_integer("to", 7)})}, "Cast: casts to a type");
   expect({gemm}, "is not where its chain of nodes ends");
   expect({onnx_node("Identity", {"x"}, {"y"})}, "has no linear layer");
   expect({onnx_node("Constant", {}, {"c"})}, "holds no tensor");
@@ -140,13 +143,14 @@ TEST(Onnx, TensorsThatCannotBeWeightsAreRefused) {
     OnnxModel model;
     model.nodes = {onnx_node("MatMul", {"x", "w"}, {"y"})};
     model.tensors = std::move(tensors);
+    model.shape = {1, 2};
     return model.bytes();
   };
   const std::string data = raw_numbers(std::vector<float>{1, 2, 3, 4});
   const std::string good = onnx_raw("w", {2, 2}, {1, 2, 3, 4});
   EXPECT_TRUE(onnx_is_refused(with({good, good}), {"\"w\"", "appears twice"}));
-  EXPECT_TRUE(onnx_is_refused(with({onnx_tensor("w", {2, 2}, 10, onnx_text(9, data))}),
-                              {"data type 10", "float32 or float64"}));
+  EXPECT_TRUE(onnx_is_refused(with({onnx_tensor("w", {2, 2}, 9, onnx_text(9, "\1\1\1\1"))}),
+                              {"data type 9", "float32 or float64"}));
   EXPECT_TRUE(onnx_is_refused(with({onnx_raw("w", {2, 3}, {1, 2, 3, 4})}),
                               {"16 bytes of numbers for the shape [2, 3]"}));
   EXPECT_TRUE(
@@ -164,6 +168,104 @@ TEST(Onnx, TensorsThatCannotBeWeightsAreRefused) {
   EXPECT_TRUE(onnx_is_refused(
       with({onnx_tensor("w", {2, 2}, 1, onnx_text(9, data) + onnx_varint_field(14, 1))}), {"another file"}));
   EXPECT_TRUE(onnx_is_refused(with({onnx_raw("w", {2, 2}, {1, 2, 3, NAN})}), {"not finite"}));
+}
+
+/// The layers of a model of `nodes` on two inputs, with w = [[1, 2], [3, 4]] and b = [1, -2].
+Weights of_nodes(std::vector<std::string> nodes) {
+  OnnxModel model;
+  model.nodes = std::move(nodes);
+  model.tensors = {onnx_raw("w", {2, 2}, {1, 2, 3, 4}), onnx_raw("b", {2}, {1, -2})};
+  model.shape = {1, 2};
+  return parse_weights(model.bytes(), "net.onnx");
+}
+
+TEST(Onnx, TwoLinearLayersInARowAreTheirExactProduct) {
+  const Weights weights = of_nodes({onnx_node("Gemm", {"x", "w", "b"}, {"h"}, {onnx_float("alpha", 2)}),
+                                    onnx_node("Gemm", {"h", "w", "b"}, {"y"}, {onnx_integer("transB", 1)})});
+  ASSERT_EQ(weights.layers.size(), 1u);
+  // y = w (2 w' x + b) + b
+  EXPECT_EQ(weights.layers[0].weights, (std::vector<double>{10, 22, 22, 50}));
+  EXPECT_EQ(weights.layers[0].biases, (std::vector<double>{-2, -7}));
+  EXPECT_EQ(weights.layers[0].weight_rounding, 0);
+  EXPECT_EQ(weights.precision, Precision::kFloat32);
+  EXPECT_EQ(rounding_of_slope(weights), 0);
+}
+
+TEST(Onnx, AQuotientThatIsNoDoubleIsEnclosed) {
+  OnnxModel model;
+  model.nodes = {onnx_node("Div", {"x", "c"}, {"h"}), onnx_node("MatMul", {"h", "w"}, {"y"})};
+  model.tensors = {onnx_raw("w", {1, 1}, {1}), onnx_raw("c", {1}, {3})};
+  const Weights weights = parse_weights(model.bytes(), "net.onnx");
+  const Layer& layer = weights.layers[0];
+  const double missed =
+      std::fabs(std::fma(3, layer.weights[0], -1.0)) / 3;  // of 1/3; exact up to the division
+  EXPECT_GT(missed, 0);
+  EXPECT_GE(layer.weight_rounding, missed);
+  EXPECT_LT(layer.weight_rounding, 4 * missed);
+  EXPECT_GE(rounding_of_slope(weights), layer.weight_rounding);
+  EXPECT_EQ(weights.precision, Precision::kFloat64);
+}
+
+TEST(Onnx, AnActivationAtTheEndIsFollowedByAnIdentityLayer) {
+  const Weights weights = of_nodes({onnx_node("Gemm", {"x", "w", "b"}, {"h"}),
+                                    onnx_node("Relu", {"h"}, {"r"}), onnx_node("Relu", {"r"}, {"y"})});
+  ASSERT_EQ(weights.layers.size(), 3u);
+  EXPECT_EQ(weights.layers.back().weights, (std::vector<double>{1, 0, 0, 1}));
+  EXPECT_FALSE(weights.notes.empty());
+}
+
+TEST(Onnx, PiecewiseLinearFunctionsAreTheSameFunctionWithRelu) {
+  struct Case {
+    std::vector<std::string> nodes;
+    std::function<double(double)> function;
+  };
+  const std::vector<Case> cases = {
+      {{onnx_node("LeakyRelu", {"x"}, {"y"}, {onnx_float("alpha", 0.25F)})},
+       [](double x) { return x < 0 ? 0.25 * x : x; }},
+      {{onnx_node("PRelu", {"x", "b"}, {"y"})}, [](double x) { return x; }},  // slopes 1 and -2: see below
+      {{onnx_node("Abs", {"x"}, {"y"})}, [](double x) { return std::fabs(x); }},
+      {{onnx_node("Clip", {"x"}, {"y"}, {onnx_float("min", -0.5F), onnx_float("max", 1.5F)})},
+       [](double x) { return std::min(std::max(x, -0.5), 1.5); }},
+      {{onnx_node("Clip", {"x"}, {"y"}, {onnx_float("max", 1.5F)})},
+       [](double x) { return std::min(x, 1.5); }},
+      {{onnx_node("HardSigmoid", {"x"}, {"y"}, {onnx_float("alpha", 0.25F)})},
+       [](double x) { return std::min(std::max(0.25 * x + 0.5, 0.0), 1.0); }},
+      {{onnx_node("Relu", {"x"}, {"r"}), onnx_node("Sub", {"x", "r"}, {"y"})},
+       [](double x) { return std::min(x, 0.0); }},
+      {{onnx_node("Neg", {"x"}, {"n"}), onnx_node("Max", {"x", "n"}, {"y"})},
+       [](double x) { return std::fabs(x); }},
+  };
+  for (const Case& one : cases) {
+    const Evaluator<double> f(of_nodes(one.nodes));
+    for (const double x : {-4.0, -0.75, 0.0, 0.5, 1.0, 3.0})
+      EXPECT_EQ(f({x, 1.0})[0], one.function(x)) << x;  // every number is a small multiple of 1/16
+  }
+  const Evaluator<double> prelu(of_nodes(cases[1].nodes));
+  EXPECT_EQ(prelu({-1.0, -3.0}), (std::vector<double>{-1, 6}));
+}
+
+TEST(Onnx, ASmallKernelOnALargeImageIsRefusedByItsNode) {
+  OnnxModel model;
+  model.nodes = {onnx_node("Conv", {"x", "k"}, {"y"}, {onnx_integers("pads", {1, 1, 1, 1})})};
+  model.tensors = {onnx_raw("k", {1, 1, 3, 3}, {1, 1, 1, 1, 1, 1, 1, 1, 1})};
+  model.shape = {1, 1, 4, 4};
+  EXPECT_EQ(parse_weights(model.bytes(), "net.onnx").outputs(), 16);
+  model.shape = {1, 1, 1000, 1000};
+  EXPECT_TRUE(onnx_is_refused(model.bytes(), {"Conv", "dense layer", "too many numbers"}));
+  model.shape = {1, 1, 100, 100};
+  EXPECT_TRUE(onnx_is_refused(model.bytes(), {"dense layers has more than 2^25 numbers"}));
+}
+
+TEST(Onnx, HalfPrecisionIsExact) {
+  for (const bool brain : {false, true}) {
+    OnnxModel model;
+    model.nodes = {onnx_node("MatMul", {"x", "w"}, {"y"})};
+    const std::string data = brain ? std::string("\xc0\x3f", 2) : std::string("\x01\xbe", 2);
+    model.tensors = {onnx_tensor("w", {1, 1}, brain ? 16 : 10, onnx_text(9, data))};
+    const Weights weights = parse_weights(model.bytes(), "net.onnx");
+    EXPECT_EQ(weights.layers[0].weights[0], brain ? 1.5 : -1.5009765625);  // 0x3fc0; 0xbe01
+    EXPECT_EQ(weights.precision, Precision::kFloat32);
+  }
 }
 
 TEST(Onnx, ModelsWithoutOneGraphInputAndOutputAreRefused) {

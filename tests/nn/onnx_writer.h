@@ -45,6 +45,11 @@ inline std::string onnx_integer(const std::string& name, std::uint64_t value) {
 inline std::string onnx_float(const std::string& name, float value) {
   return onnx_text(1, name) + "\x15" + raw_numbers(std::vector<float>{value});
 }
+inline std::string onnx_integers(const std::string& name, const std::vector<std::uint64_t>& values) {
+  std::string packed;
+  for (const std::uint64_t value : values) packed += onnx_varint(value);
+  return onnx_text(1, name) + onnx_text(8, packed);
+}
 inline std::string onnx_node(const std::string& type, const std::vector<std::string>& inputs,
                              const std::vector<std::string>& outputs,
                              const std::vector<std::string>& attributes = {},
@@ -60,16 +65,25 @@ inline std::string constant_node(const std::string& output, const std::string& t
   return onnx_node("Constant", {}, {output}, {onnx_text(1, "value") + onnx_text(5, tensor)});
 }
 
+/// The type of a value of float32 numbers.
+inline std::string onnx_shape(const std::vector<std::uint64_t>& shape) {
+  std::string dimensions;
+  for (const std::uint64_t size : shape) dimensions += onnx_text(1, onnx_varint_field(1, size));
+  return onnx_text(2, onnx_text(1, onnx_varint_field(1, 1) + onnx_text(2, dimensions)));
+}
+
 struct OnnxModel {
   std::vector<std::string> nodes, tensors;
   std::vector<std::string> inputs = {"x"}, outputs = {"y"};
+  std::vector<std::uint64_t> shape;  ///< of the inputs; empty: not stated
   std::string graph_extra;
 
   std::string bytes() const {
     std::string graph;
     for (const std::string& node : nodes) graph += onnx_text(1, node);
     for (const std::string& tensor : tensors) graph += onnx_text(5, tensor);
-    for (const std::string& input : inputs) graph += onnx_text(11, onnx_text(1, input));
+    for (const std::string& input : inputs)
+      graph += onnx_text(11, onnx_text(1, input) + (shape.empty() ? "" : onnx_shape(shape)));
     for (const std::string& output : outputs) graph += onnx_text(12, onnx_text(1, output));
     return onnx_varint_field(1, 8) + onnx_text(2, "test") + onnx_text(7, graph + graph_extra);
   }

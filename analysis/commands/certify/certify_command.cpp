@@ -32,7 +32,6 @@ struct CertifyOptions {
   files::NetworkArguments network;
   std::string method = "auto";
   std::string as;
-  std::string activation = "relu";
   std::vector<std::string> samples;
   double sample_tolerance = files::kSampleTolerance;
   std::string blocks;
@@ -227,9 +226,6 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
-  if (options.activation != "relu")
-    throw UsageError("--activation " + options.activation +
-                     ": only networks with ReLU between their layers can be certified");
   parse_blocks(options);
   files::Network network = load_net(options.network);
   if (!options.neighbours.empty() && network.plain)
@@ -332,9 +328,6 @@ Command certify_command() {
                "its search is interrupted), auto (the smallest of the three), "
                "or branch (branch and bound over the box of --domain; without --domain over all inputs)")
             ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
-            ->capture_default_str();
-        app.add_option("--activation", options->activation,
-                       "Between the layers, which a state dict does not tell: only relu can be certified")
             ->capture_default_str();
         app.add_option("--samples", options->samples,
                        "Inputs and outputs recorded from the trained network (CSV, .npz or JSON), which the "

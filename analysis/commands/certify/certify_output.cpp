@@ -104,7 +104,9 @@ Json chain_sources_json(const files::Network& network) {
   for (const auto& [name, weights] : files::parts(network)) {
     const bool is_stated = weights->order_source == files::OrderSource::kFile;
     sources[name] = {{"order", files::name(weights->order_source)},
-                     {"activation", is_stated ? "file" : "assumed"}};
+                     {"activation", is_stated ? "file" : "assumed"},
+                     {"notes", weights->notes},
+                     {"rounding_of_slope", files::rounding_of_slope(*weights)}};
   }
   return sources;
 }
@@ -312,6 +314,14 @@ void print_chains(const files::Network& network, const Certification& found) {
                             weights->layers.size() > 1 && samples == found.samples.end();
     if (is_assumed) remark += "; ReLU is assumed, --samples compares";
     fmt::print("  {}  {}  ({})\n", name, files::chain_words(files::chain(network, name)), remark);
+    for (const std::string& note : weights->notes) fmt::print("    {}\n", note);
+    const double rounding = files::rounding_of_slope(*weights);
+    if (rounding > 0)
+      fmt::print(
+          "    folded weights that are no doubles are rounded to nearest; the bounds for all inputs plus "
+          "{:.2g} "
+          "hold for the exact ones\n",
+          rounding);
     if (samples == found.samples.end()) continue;
     const files::SampleAgreement& agreement = samples->second;
     fmt::print("    reproduces {} samples of {}: largest deviation {:.3g}, tolerance {:.3g}\n",

@@ -38,7 +38,9 @@ files::Json describe(const files::Weights& weights) {
   return {{"file", weights.path},
           {"sha256", weights.sha256},
           {"precision", files::name(weights.precision)},
-          {"layers", std::move(layers)}};
+          {"layers", std::move(layers)},
+          {"notes", weights.notes},
+          {"rounding_of_slope", files::rounding_of_slope(weights)}};
 }
 
 bool is_json(const std::string& path) {
@@ -135,6 +137,7 @@ files::Json inspect_network(const std::string& path, files::NetworkArguments arg
     for (const files::Layer& layer : weights->layers) {
       fmt::print("  {:<10} {} -> {}\n", layer.name, layer.inputs, layer.outputs);
     }
+    for (const std::string& note : weights->notes) fmt::print("  {}\n", note);
   }
   files::Json json = {{"file", path}, {"kind", "network"}};
   json.update(description(network));

@@ -1,0 +1,300 @@
+#include "nn/weights/mat_file.h"
+
+#include <zlib.h>
+
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "nn/base/input_error.h"
+#include "nn/weights/named_arrays.h"
+#include "nn/weights/tensors.h"
+
+namespace swarmcert::files {
+namespace {
+
+// MATLAB, "MAT-File Format", Level 5: types of data elements and classes of arrays.
+constexpr std::uint32_t kInt8 = 1, kUint8 = 2, kInt16 = 3, kUint16 = 4, kInt32 = 5, kUint32 = 6, kSingle = 7,
+                        kDouble = 9, kInt64 = 12, kUint64 = 13, kMatrix = 14, kCompressed = 15;
+constexpr std::uint32_t kCellClass = 1, kDoubleClass = 6, kSingleClass = 7, kLastNumericClass = 15;
+constexpr std::uint32_t kComplexFlag = 0x800;
+constexpr std::size_t kHeader_bytes = 128;
+constexpr std::size_t kMostCells = 4096;
+constexpr std::uint64_t kMostDecompressed_bytes = std::uint64_t{1} << 27;
+constexpr char kSaveAgain[] =
+    "save in MATLAB with save('net.mat', 'weights', '-v7'), or with scipy.io.savemat";
+
+struct MatElement {
+  std::uint32_t type = 0;
+  std::string_view data;
+  std::size_t offset = 0;
+};
+
+struct MatVariable {
+  std::string name;
+  bool is_numeric = false;
+  std::optional<NamedArray> array;  ///< of a numeric one
+  std::vector<NamedArray> cells;    ///< of a cell array of numeric ones
+  bool is_cell = false;
+};
+
+/// Elements that follow one another in a piece of the file, or of what a piece of it decompresses to.
+class MatElements {
+ public:
+  MatElements(std::string_view data, std::size_t offset, const std::string& path)
+      : data_(data), offset_(offset), path_(path) {}
+
+  bool next(MatElement& element) {
+    if (at_ >= data_.size()) return false;
+    element.offset = offset_ + at_;
+    if (data_.size() - at_ < 8) refuse(element.offset, "an element is cut off");
+    const std::uint32_t first = word(at_), second = word(at_ + 4);
+    if (first >> 16 != 0) {  // small: size and type share a word
+      const std::uint32_t size = first >> 16;
+      if (size > 4) refuse(element.offset, "a small element has more than 4 bytes");
+      element.type = first & 0xffff;
+      element.data = data_.substr(at_ + 4, size);
+      at_ += 8;
+      return true;
+    }
+    element.type = first;
+    if (second > data_.size() - at_ - 8) refuse(element.offset, "an element is longer than what holds it");
+    element.data = data_.substr(at_ + 8, second);
+    at_ += 8 + second;
+    if (element.type != kCompressed) at_ = std::min(data_.size(), (at_ + 7) / 8 * 8);
+    return true;
+  }
+
+  MatElement expect(std::uint32_t type, const char* what) {
+    MatElement element;
+    if (!next(element) || (type != 0 && element.type != type))
+      refuse(offset_ + at_, std::string("an array lacks its ") + what);
+    return element;
+  }
+
+  [[noreturn]] void refuse(std::size_t offset, const std::string& what,
+                           const std::string& mend = kCopyAgain) const {
+    throw InputError({path_, "offset " + std::to_string(offset), "", "", what, mend});
+  }
+
+ private:
+  std::uint32_t word(std::size_t at) const {
+    std::uint32_t value;
+    std::memcpy(&value, data_.data() + at, sizeof value);
+    return value;
+  }
+
+  std::string_view data_;
+  std::size_t offset_;
+  const std::string& path_;
+  std::size_t at_ = 0;
+};
+
+template <typename Stored>
+void append_values(std::string_view data, std::vector<double>& numbers) {
+  for (std::size_t i = 0; i + sizeof(Stored) <= data.size(); i += sizeof(Stored)) {
+    Stored value;
+    std::memcpy(&value, data.data() + i, sizeof value);
+    numbers.push_back(static_cast<double>(value));
+  }
+}
+
+class MatReader {
+ public:
+  MatReader(const std::string& bytes, const std::string& path) : bytes_(bytes), path_(path) {}
+
+  std::vector<MatVariable> run() {
+    MatElements elements(std::string_view(bytes_).substr(kHeader_bytes), kHeader_bytes, path_);
+    std::vector<MatVariable> variables;
+    for (MatElement element; elements.next(element);) {
+      if (element.type == kCompressed) {
+        const std::string inflated = decompressed(element);
+        MatElements inner(inflated, element.offset, path_);
+        variables.push_back(variable(inner.expect(kMatrix, "contents"), 0));
+      } else if (element.type == kMatrix) {
+        variables.push_back(variable(element, 0));
+      } else {
+        elements.refuse(element.offset, "an element is no array");
+      }
+      if (variables.size() > kMostCells) elements.refuse(element.offset, "holds too many variables");
+    }
+    return variables;
+  }
+
+ private:
+  [[noreturn]] void refuse(std::size_t offset, const std::string& name, const std::string& what,
+                           const std::string& mend = kSaveAgain) const {
+    throw InputError({path_, "offset " + std::to_string(offset), name, "", what, mend});
+  }
+
+  /// At most what the largest network needs, however much the file claims.
+  std::string decompressed(const MatElement& element) {
+    std::string result;
+    z_stream stream{};
+    if (inflateInit(&stream) != Z_OK) refuse(element.offset, "", "cannot be decompressed");
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(element.data.data()));
+    stream.avail_in = static_cast<uInt>(element.data.size());
+    std::vector<char> buffer(std::size_t{1} << 16);
+    int status = Z_OK;
+    while (status == Z_OK && result.size() <= room_bytes_) {
+      stream.next_out = reinterpret_cast<Bytef*>(buffer.data());
+      stream.avail_out = static_cast<uInt>(buffer.size());
+      status = inflate(&stream, Z_NO_FLUSH);
+      result.append(buffer.data(), buffer.size() - stream.avail_out);
+    }
+    inflateEnd(&stream);
+    if (result.size() > room_bytes_)
+      refuse(element.offset, "", "decompresses to more than 128 MiB",
+             "save without compression: save(..., '-v6')");
+    if (status != Z_STREAM_END) refuse(element.offset, "", "its compressed data are damaged", kCopyAgain);
+    room_bytes_ -= result.size();
+    return result;
+  }
+
+  MatVariable variable(const MatElement& matrix, int depth) {
+    MatVariable result;
+    if (matrix.data.empty()) return result;
+    MatElements parts(matrix.data, matrix.offset + 8, path_);
+    const MatElement flags = parts.expect(kUint32, "flags");
+    if (flags.data.size() != 8) refuse(flags.offset, "", "the flags of an array are damaged", kCopyAgain);
+    std::uint32_t word;
+    std::memcpy(&word, flags.data.data(), sizeof word);
+    const std::uint32_t array_class = word & 0xff;
+    const std::vector<std::uint64_t> shape = sizes(parts.expect(kInt32, "size"));
+    result.name = std::string(parts.expect(kInt8, "name").data);
+    if (array_class == kCellClass && depth == 0) {
+      result.is_cell = true;
+      read_cells(parts, shape, result);
+    } else if (array_class >= kDoubleClass && array_class <= kLastNumericClass) {
+      if ((word & kComplexFlag) != 0) refuse(matrix.offset, in_quotes(result.name), "holds complex numbers");
+      result.is_numeric = true;
+      result.array = numbers(parts.expect(0, "numbers"), shape, result.name);
+      result.array->is_float32 = array_class == kSingleClass;
+    }
+    return result;
+  }
+
+  std::vector<std::uint64_t> sizes(const MatElement& element) const {
+    std::vector<double> stated;
+    append_values<std::int32_t>(element.data, stated);
+    std::vector<std::uint64_t> shape;
+    for (const double size : stated) {
+      if (size < 0) refuse(element.offset, "", "a dimension is below 0", kCopyAgain);
+      shape.push_back(static_cast<std::uint64_t>(size));
+    }
+    if (shape.size() < 2 || shape.size() > 8 || !element_count(shape))
+      refuse(element.offset, "", "an array has too many dimensions or entries");
+    return shape;
+  }
+
+  void read_cells(MatElements& parts, const std::vector<std::uint64_t>& shape, MatVariable& result) {
+    const std::uint64_t count = *element_count(shape);
+    if (count > kMostCells) refuse(0, in_quotes(result.name), "has more than 4096 cells");
+    for (std::uint64_t k = 0; k < count; ++k) {
+      const MatElement element = parts.expect(kMatrix, "cells");
+      MatVariable cell = variable(element, 1);
+      if (!cell.array)
+        refuse(element.offset, in_quotes(result.name),
+               "cell " + std::to_string(k + 1) + " is no numeric array");
+      result.cells.push_back(std::move(*cell.array));
+    }
+  }
+
+  /// The file lists columns first.
+  NamedArray numbers(const MatElement& element, const std::vector<std::uint64_t>& shape,
+                     const std::string& name) const {
+    std::vector<double> listed;
+    switch (element.type) {
+      case kInt8:
+        append_values<std::int8_t>(element.data, listed);
+        break;
+      case kUint8:
+        append_values<std::uint8_t>(element.data, listed);
+        break;
+      case kInt16:
+        append_values<std::int16_t>(element.data, listed);
+        break;
+      case kUint16:
+        append_values<std::uint16_t>(element.data, listed);
+        break;
+      case kInt32:
+        append_values<std::int32_t>(element.data, listed);
+        break;
+      case kUint32:
+        append_values<std::uint32_t>(element.data, listed);
+        break;
+      case kSingle:
+        append_values<float>(element.data, listed);
+        break;
+      case kDouble:
+        append_values<double>(element.data, listed);
+        break;
+      case kInt64:
+      case kUint64:
+      default:
+        refuse(element.offset, in_quotes(name), "holds numbers of a type that weights do not have");
+    }
+    if (listed.size() != *element_count(shape))
+      refuse(element.offset, in_quotes(name),
+             "holds " + std::to_string(listed.size()) + " numbers for the shape " + shape_text(shape),
+             kCopyAgain);
+    NamedArray array{name, shape, std::move(listed), false};
+    if (shape.size() != 2) return array;
+    const std::vector<double> columns = std::move(array.numbers);
+    array.numbers.clear();
+    for (std::uint64_t i = 0; i < shape[0]; ++i)
+      for (std::uint64_t j = 0; j < shape[1]; ++j) array.numbers.push_back(columns[j * shape[0] + i]);
+    return array;
+  }
+
+  const std::string& bytes_;
+  const std::string& path_;
+  std::uint64_t room_bytes_ = kMostDecompressed_bytes;
+};
+
+}  // namespace
+
+bool looks_like_mat(const std::string& bytes) {
+  return bytes.size() >= kHeader_bytes && bytes.compare(0, 7, "MATLAB ") == 0 &&
+         (bytes.compare(126, 2, "IM") == 0 || bytes.compare(126, 2, "MI") == 0);
+}
+
+Weights parse_mat(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
+  if (bytes.compare(0, 10, "MATLAB 7.3") == 0 || bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
+    throw InputError({path, "offset 124", "", "", "is a MAT file of another version than 5", kSaveAgain});
+  if (bytes.compare(126, 2, "IM") != 0)
+    throw InputError({path, "offset 126", "", "", "the numbers are not little-endian", kSaveAgain});
+  std::vector<NamedArray> cells, arrays;
+  std::string left_out;
+  const auto leave_out = [&left_out](const std::string& name) {
+    left_out += (left_out.empty() ? "" : ", ") + in_quotes(name);
+  };
+  bool has_weights = false;
+  for (MatVariable& variable : MatReader(bytes, path).run()) {
+    const bool are_weights = variable.name == "weights" || variable.name == "W";
+    const bool are_biases = variable.name == "biases" || variable.name == "bias" || variable.name == "b";
+    if (variable.is_cell && (are_weights || are_biases)) {
+      has_weights = has_weights || are_weights;
+      for (std::size_t k = 0; k < variable.cells.size(); ++k) {
+        variable.cells[k].name = "layer" + std::to_string(k + 1) + (are_weights ? ".weight" : ".bias");
+        cells.push_back(std::move(variable.cells[k]));
+      }
+    } else if (variable.array) {
+      arrays.push_back(std::move(*variable.array));
+    } else {
+      leave_out(variable.name);
+    }
+  }
+  if (has_weights)
+    for (const NamedArray& array : arrays) leave_out(array.name);
+  if (!has_weights && arrays.empty())
+    throw InputError(
+        {path, "", "", "", "holds neither a cell array \"weights\" nor numeric matrices", kSaveAgain});
+  Weights weights = network_of_arrays(has_weights ? cells : arrays, path, order);
+  if (!left_out.empty()) weights.notes.push_back("other variables are left out: " + left_out);
+  return weights;
+}
+
+}  // namespace swarmcert::files

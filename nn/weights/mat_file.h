@@ -1,0 +1,18 @@
+/// @file MATLAB's MAT files, version 5, with the weights of a network, as LipSDP and ECLipsE use them.
+#pragma once
+
+#include <string>
+
+#include "nn/weights/weights.h"
+
+namespace swarmcert::files {
+
+/// True if `bytes` begin as a MAT file of version 5 or later does.
+bool looks_like_mat(const std::string& bytes);
+
+/// The network in `bytes`: a cell array "weights" of matrices [outputs, inputs], with "biases" where there are any; or
+/// matrices with names that network_of_arrays() knows. Numeric arrays of every class, compressed (-v7) or not (-v6).
+/// @throws InputError for anything else, with the offset.
+Weights parse_mat(const std::string& bytes, const std::string& path, const std::vector<std::string>& order);
+
+}  // namespace swarmcert::files
