@@ -140,7 +140,7 @@ TEST(Nnet, DamagedLinesAreRefusedByNumber) {
   };
   EXPECT_TRUE(is_refused(with("2,2,1,\n0", "2,3,1,\n0"), {"line 11", "expected 2 numbers"}));
   EXPECT_TRUE(is_refused(with("2.0,4.0,8.0", "0.0,4.0,8.0"), {"line 8", "a range is 0"}));
-  EXPECT_TRUE(is_refused(with("0.5,2.0", "0.5,nan"), {"line 11", "finite number"}));
+  EXPECT_TRUE(is_refused(with("0.5,2.0", "0.5,nan"), {"line 10", "finite number"}));
   EXPECT_TRUE(is_refused(with("2,2,1,\n0", "2,2,2,\n0"), {"line 3", "contradict"}));
   EXPECT_TRUE(is_refused(with("2,2,1,2", "99999999,2,1,2"), {"line 2", "expected a count"}));
   EXPECT_TRUE(is_refused(text.substr(0, text.size() - 5), {"ends early"}));
