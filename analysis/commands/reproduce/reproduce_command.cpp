@@ -10,6 +10,7 @@
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/shard_option.h"
 #include "analysis/report/report.h"
 #include "analysis/reproduction/experiments.h"
 #include "nn/base/file_io.h"
@@ -35,16 +36,6 @@ const Experiment& experiment(const std::string& name) {
     names.push_back(known.name);
   }
   throw UsageError("unknown experiment " + name + ": " + files::did_you_mean(name, names));
-}
-
-/// "i/N", 0 <= i < N or 1 <= i <= N: both cover all units.
-void read_shard(const std::string& text, reproduction::Setting& setting) {
-  int index = -1, count = 0, read = 0;
-  if (std::sscanf(text.c_str(), "%d/%d%n", &index, &count, &read) != 2 ||
-      read != static_cast<int>(text.size()) || index < 0 || count < 1 || index > count)
-    throw UsageError("--shard " + text + ": not i/N with 0 <= i <= N");
-  setting.shard = index % count;
-  setting.shards = count;
 }
 
 void print(const Finding& finding) {
@@ -84,7 +75,9 @@ std::string write_report(const ReproduceOptions& options, const Finding& finding
 
 int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   const Experiment& chosen = experiment(options.name);
-  read_shard(options.shard, options.setting);
+  const Shard shard = parse_shard(options.shard);
+  options.setting.shard = shard.index % shard.count;
+  options.setting.shards = shard.count;
   const fs::path result_file = fs::path(options.output) / options.name / "result.json";
   refuse_to_replace(common, common.json);
   reproduction::Setting& setting = options.setting;

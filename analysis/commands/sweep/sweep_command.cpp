@@ -6,6 +6,7 @@
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/shared/shard_option.h"
 #include "analysis/commands/sweep/sweep_report.h"
 #include "nn/base/file_io.h"
 #include "stability/sweep/shards.h"
@@ -19,21 +20,6 @@ struct SweepOptions {
   std::string grid, folder, shard, report;
   bool resume = false;
 };
-
-/// "2/8"
-void read_shard(const std::string& text, stability::SweepOptions& options) {
-  if (text.empty()) return;
-  const std::size_t slash = text.find('/');
-  char* end = nullptr;
-  const long shard = std::strtol(text.c_str(), &end, 10);
-  const bool has_shard = slash != std::string::npos && end == text.c_str() + slash && slash > 0;
-  const long count = has_shard ? std::strtol(text.c_str() + slash + 1, &end, 10) : 0;
-  if (!has_shard || *end != '\0' || count < 1 || count > 1'000'000 || shard < 0 || shard > count) {
-    throw UsageError("--shard " + text + ": write I/N with 0 <= I <= N, e.g. 2/8");
-  }
-  options.shard = static_cast<int>(shard);
-  options.count = static_cast<int>(count);
-}
 
 std::string report_folder(const std::string& folder, const std::string& report) {
   return report.empty() ? (std::filesystem::path(folder) / "report").string() : report;
@@ -66,7 +52,9 @@ int run_sweep(const SweepOptions& options, const CommonOptions& common) {
     refuse_folder(common, report_folder(options.folder, options.report));
   const stability::Grid grid = stability::load_grid(options.grid);
   stability::SweepOptions sweep;
-  read_shard(options.shard, sweep);
+  const Shard shard = parse_shard(options.shard.empty() ? "0/1" : options.shard);
+  sweep.shard = shard.index;
+  sweep.count = shard.count;
   sweep.resume = options.resume;
   sweep.overwrite = common.force;
   sweep.jobs = common.jobs;
