@@ -94,10 +94,10 @@ int run_export(ExportOptions options, const CommonOptions& common) {
 
 Command export_command() {
   return {
-      "export", "Firmware source of a network, with golden vectors and a self-test",
-      "Weights as hexadecimal floats, the clamp, the scale to newton, the evaluator, and golden vectors "
-      "which the "
-      "firmware\nchecks at start. 'swarmcert match' proves that a source file or an ELF still holds these "
+      "export", "Write firmware source for a network, with golden vectors and a self-test",
+      "Writes the weights as hexadecimal floats, the clamp, the scale to newton, the evaluator, and golden "
+      "vectors\nthat the firmware checks at start. 'swarmcert match' proves that a source file or an ELF "
+      "still holds these "
       "weights.\n\n"
       "Example: swarmcert export nn/networks/demo/network.toml -o firmware",
       [](CLI::App& app) {
@@ -106,7 +106,8 @@ Command export_command() {
         add_output(app, "-o,--output", options->output, "Folder for the source")->required();
         declare_as(app, options->as);
         app.add_option("--certificate", options->certificate, "Certificate whose hash goes into the source");
-        app.add_option("--most-neighbours", options->source.most_neighbours, "Neighbours of one evaluation")
+        app.add_option("--most-neighbours", options->source.most_neighbours,
+                       "Largest number of neighbours in one evaluation")
             ->check(CLI::Range(1, 64))
             ->capture_default_str();
         app.add_option("--seed", options->source.seed, "Seed of the golden vectors")->capture_default_str();

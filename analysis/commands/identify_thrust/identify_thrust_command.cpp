@@ -105,12 +105,13 @@ Command identify_thrust_command() {
       "The CSV names its columns in the first line: pwm, vbat, thrust_gf (of one rotor), and optionally run, "
       "which\n"
       "numbers the ramps. Units: pwm[counts], pwm[ratio], vbat[V], vbat[mV], thrust[gf], thrust[N].\n"
-      "Exit 0 if the data determine all three polynomials, 4 if not (with what they lack).\n\n"
+      "Exit 0 if the data determine all three polynomials, 4 if not (the output says what is missing).\n\n"
       "Example: swarmcert identify-thrust load_cell.csv --rotors 4 --json thrust.json",
       [](CLI::App& app) {
         const auto options = std::make_shared<IdentifyThrustOptions>();
         app.add_option("CSV", options->file, "Load-cell recording")->required();
-        app.add_option("--rotors", options->rotors, "Rotors that push on the load cell together (default: 1)")
+        app.add_option("--rotors", options->rotors,
+                       "Number of rotors whose thrust the load cell measures together (default: 1)")
             ->check(CLI::Range(1, controller::kMostRotors));
         app.add_option("--confidence", options->confidence,
                        "Confidence level of the coefficients' intervals (default: 0.95)")

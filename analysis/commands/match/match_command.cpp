@@ -121,12 +121,12 @@ int run_match(MatchOptions options, const CommonOptions& common) {
 }  // namespace
 
 Command match_command() {
-  return {"match", "Whether firmware source or an ELF is exactly this network",
+  return {"match", "Check that firmware source or an ELF is exactly this network",
           "FILE is the folder of an export, or one of its files: the export is regenerated and every file "
           "compared byte for byte,\n"
           "with CR LF at line ends read as LF. In other C or C++ source and in a little-endian ELF, with or "
           "without symbols,\n"
-          "every weight and bias must stand bit for bit; the evaluator in a linked ELF for Cortex-M is run "
+          "every weight and bias must match bit for bit; the evaluator in a linked ELF for Cortex-M is run "
           "with golden vectors\n"
           "where qemu-system-arm is installed. Exit code 0 if all is equal; 1 and the first difference; 4 if "
           "something\n"
@@ -148,7 +148,7 @@ Command match_command() {
             app.add_option("--certificate", options->certificate,
                            "Certificate that an export was made with, if it names one");
             app.add_option("--most-neighbours", options->most_neighbours,
-                           "Neighbours of one evaluation in an ELF, as at its export")
+                           "Largest number of neighbours in an evaluation of an ELF")
                 ->check(CLI::Range(1, 64))
                 ->capture_default_str();
             return [options](const CommonOptions& common) { return run_match(*options, common); };

@@ -138,23 +138,22 @@ Command reproduce_command() {
     words.push_back(known.name);
     names += fmt::format("  {:<14} {}\n", known.name, known.summary);
   }
-  return {"reproduce", "The paper's table and figures again, and what lies beyond them",
+  return {"reproduce", "Reproduce the paper's table and figures, and experiments beyond them",
           "Experiments\n" + names +
               "\nWrites DIR/EXPERIMENT/: report.html, its plots with their data, result.json. Flights and "
               "networks "
-              "in\nDIR/small or DIR/full are shared: what is there is not done again, and an interrupted "
-              "call goes "
-              "on.\nResults are shown as found, with their seeds. Interaction torques are learned by "
+              "in\nDIR/small or DIR/full are shared: existing ones are reused, and an interrupted run "
+              "continues.\nResults are shown as found, with their seeds. Interaction torques are learned by "
               "train --quantity\ntorque, and flown by simulate --torque-network.\n\nExample: swarmcert "
               "reproduce table -o "
               "reproduced\n"
               "         swarmcert reproduce table --full --shard 1/2 -o reproduced",
           [words](CLI::App& app) {
             const auto options = std::make_shared<ReproduceOptions>();
-            app.add_option("EXPERIMENT", options->name, "What to do, see above")
+            app.add_option("EXPERIMENT", options->name, "Experiment to run, see Experiments below")
                 ->type_name(fmt::format("{{{}}}", fmt::join(words, ",")))
                 ->required();
-            add_output(app, "-o,--output", options->output, "Folder for everything")->required();
+            add_output(app, "-o,--output", options->output, "Output folder")->required();
             app.add_flag("--full", options->setting.full, "Full size: a minute per task, more seeds");
             app.add_option("--shard", options->shard, "i/N: only this part, for several machines");
             app.add_option("--seed", options->setting.seed, "Seed of flights, noise and networks")

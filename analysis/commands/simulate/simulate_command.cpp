@@ -220,18 +220,18 @@ Command simulate_command() {
               "      --gains controller/gains/crazyflie-small.toml -o flights",
           [](CLI::App& app) {
             auto options = std::make_shared<SimulateOptions>();
-            app.add_option("TASK", options->task, "What to fly, see above")
+            app.add_option("TASK", options->task, "Task to fly, see Tasks below")
                 ->type_name(fmt::format("{{{}}}", fmt::join(stability::task_names(), ",")))
                 ->required();
-            app.add_option("--vehicles", options->vehicles, "How many")->check(CLI::Range(1, 1000));
+            app.add_option("--vehicles", options->vehicles, "Number of vehicles")->check(CLI::Range(1, 1000));
             app.add_option("--model", options->models, "model.toml: one for all vehicles, or one for each")
                 ->required();
             app.add_option("--gains", options->gains, "gains.toml")->required();
             app.add_option("--network", options->network.file,
                            "network.toml whose prediction the controller uses");
             app.add_option("--torque-network", options->torque_network,
-                           "network.toml of train --quantity torque, whose prediction is taken from the "
-                           "torque that the attitude law asks for");
+                           "network.toml made by train --quantity torque; its prediction is subtracted "
+                           "from the torque that the attitude law commands");
             auto* phi =
                 app.add_option("--phi", options->network.phi, "Weight file of phi, in place of --network");
             auto* rho =
@@ -261,10 +261,10 @@ Command simulate_command() {
                            "Seconds until neighbours' positions arrive at the network (default 0)")
                 ->check(CLI::Range(0.0, 10.0));
             app.add_option("--radio-loss", options->radio.loss,
-                           "Share of neighbours' positions that are lost (default 0); after 500 ms without "
-                           "one, a neighbour no longer counts")
+                           "Fraction of neighbours' positions that are lost (default 0); a neighbour that "
+                           "has not been heard for 500 ms is ignored")
                 ->check(CLI::Range(0.0, 1.0));
-            app.add_flag("--no-noise", options->no_noise, "The controller sees the true state");
+            app.add_flag("--no-noise", options->no_noise, "No noise: the controller gets the true state");
             return [options](const CommonOptions& common) { return run_simulate(*options, common); };
           }};
 }

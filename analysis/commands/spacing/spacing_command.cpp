@@ -143,9 +143,10 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
 
 Command spacing_command() {
   return {"spacing", "Least distance and crossing speed for vehicles that pass below one another",
-          "For every height gap: may the lower vehicle stay there, how far to the side must it keep "
-          "otherwise, and\n"
-          "how fast must it cross for its error bound to stay below the limit with thrust to spare.\n\n"
+          "States for every height gap whether the lower vehicle may stay there, how far to the side it "
+          "must keep\n"
+          "otherwise, and how fast it must cross so that its error bound stays below the limit with thrust\n"
+          "to spare.\n\n"
           "Example: swarmcert spacing --gains controller/gains/crazyflie-small.toml --model "
           "stability/models/crazyflie-small.toml \\\n           --max-error 0.1",
           [](CLI::App& app) {
@@ -155,16 +156,17 @@ Command spacing_command() {
             app.add_option("--max-error", question.max_error_m, "Largest vertical error, m")
                 ->required()
                 ->check(CLI::PositiveNumber);
-            app.add_option("--neighbours", question.neighbours, "Vehicles above at once (default 1)")
+            app.add_option("--neighbours", question.neighbours, "Vehicles above at the same time (default 1)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--neighbour-model", options->neighbour_model, "model.toml of the vehicles above");
             app.add_option("--guard", question.guard, "Factor on predicted forces (default 1)")
                 ->check(CLI::Range(1.0, 100.0));
-            app.add_option("--from", question.from_m, "Least height gap, m (default 0.15)")
+            app.add_option("--from", question.from_m, "Smallest height gap, m (default 0.15)")
                 ->check(CLI::PositiveNumber);
             app.add_option("--to", question.to_m, "Largest height gap, m (default 0.8)")
                 ->check(CLI::PositiveNumber);
-            app.add_option("--steps", question.steps, "Rows (default 27)")->check(CLI::Range(1, 10000));
+            app.add_option("--steps", question.steps, "Number of height gaps (default 27)")
+                ->check(CLI::Range(1, 10000));
             add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
             return [options](const CommonOptions& common) { return run_spacing(*options, common); };
           }};

@@ -88,9 +88,10 @@ Command sweep_command() {
   return {"sweep", "Bounds over a grid of gains and vehicles: tables, heatmaps, Pareto front",
           "Writes shard files, points as sweep.json, and a report with heatmaps into the folder. Cells that "
           "are not\n"
-          "feasible carry the reason. --shard I/N computes every N-th cell: a job array runs one shard per "
+          "feasible state the reason. --shard I/N computes every N-th cell: a job array runs one shard per "
           "task, and\n"
-          "'swarmcert merge' makes the same bytes of them as an undivided run. Ctrl-C keeps what is done.\n\n"
+          "'swarmcert merge' turns them into the bytes of an undivided run. Ctrl-C keeps the cells computed "
+          "so far.\n\n"
           "Example: swarmcert sweep grid.toml -o sweep",
           [](CLI::App& app) {
             const auto options = std::make_shared<SweepOptions>();
@@ -98,9 +99,8 @@ Command sweep_command() {
             add_output(app, "-o,--output", options->folder, "Folder for the results")->required();
             add_output(app, "--report", options->report,
                        "Folder for the report (default: report in that folder)");
-            app.add_option(
-                "--shard", options->shard,
-                "I/N: compute only the I-th of N parts; I counts 0 .. N-1 or 1 .. N, N being the same as 0");
+            app.add_option("--shard", options->shard,
+                           "I/N: compute only part I of N, counted from 0 or from 1 (part N is part 0)");
             leave_out_of_record(app.add_flag("--resume", options->resume,
                                              "Keep the cells that the shard's file already contains"));
             return [options](const CommonOptions& common) { return run_sweep(*options, common); };
@@ -110,8 +110,7 @@ Command sweep_command() {
 Command merge_command() {
   return {
       "merge", "Merge the shards of a sweep",
-      "Checks that no cell is missing or there twice, then writes what an undivided sweep writes, byte for "
-      "byte.\n\n"
+      "Checks that every cell is present exactly once, then writes the same bytes as an undivided sweep.\n\n"
       "Example: swarmcert merge sweep",
       [](CLI::App& app) {
         const auto options = std::make_shared<SweepOptions>();
