@@ -130,46 +130,67 @@ void write_report(const SimulateOptions& options, const CommonOptions& common,
   report.write(options.report, common.force);
 }
 
-int run_simulate(SimulateOptions options, const CommonOptions& common) {
+bool has_model_each(const SimulateOptions& options) {
+  return static_cast<int>(options.models.size()) == options.vehicles;
+}
+
+void require_task_and_models(const SimulateOptions& options) {
   const std::vector<std::string> tasks = stability::task_names();
   if (std::find(tasks.begin(), tasks.end(), options.task) == tasks.end()) {
     throw UsageError("unknown task " + options.task + ": " + files::did_you_mean(options.task, tasks));
   }
-  const bool one_each = static_cast<int>(options.models.size()) == options.vehicles;
-  if (!one_each && options.models.size() != 1) {
+  if (!has_model_each(options) && options.models.size() != 1) {
     throw UsageError(fmt::format("{} models for {} vehicles: give one for all, or one for each",
                                  options.models.size(), options.vehicles));
   }
-  refuse_folder(common, options.output);
-  refuse_folder(common, options.report);
-  refuse_to_replace(common, common.json);
+}
+
+/// @param inputs takes the paths of the models.
+stability::Swarm read_swarm(const SimulateOptions& options, std::vector<std::string>& inputs) {
   std::vector<stability::Model> models;
   std::vector<int> kind_of;
-  std::vector<std::string> inputs;
   for (int i = 0; i < options.vehicles; ++i) {
-    const std::string& path = options.models[one_each ? static_cast<std::size_t>(i) : 0];
+    const std::string& path = options.models[has_model_each(options) ? static_cast<std::size_t>(i) : 0];
     const auto known = std::find(inputs.begin(), inputs.end(), path);
     kind_of.push_back(static_cast<int>(known - inputs.begin()));
     if (known != inputs.end()) continue;
     models.push_back(stability::read_model(path));
     inputs.push_back(path);
   }
+  return stability::Swarm(std::move(models), std::move(kind_of));
+}
+
+/// @param inputs takes the paths of its files.
+std::unique_ptr<files::Network> read_network(const files::NetworkArguments& arguments,
+                                             std::vector<std::string>& inputs) {
+  auto network = std::make_unique<files::Network>(load_net(arguments));
+  for (const std::string& path : input_files(*network)) inputs.push_back(path);
+  return network;
+}
+
+void write_logs(const SimulateOptions& options, const stability::Simulation& flown, bool overwrite) {
+  std::filesystem::create_directories(options.output);
+  for (std::size_t i = 0; i < flown.logs.size(); ++i) {
+    const auto path = std::filesystem::path(options.output) / log_name(static_cast<int>(i), options.run);
+    files::write_file(path.string(), stability::to_usd_log(flown.logs[i]), overwrite);
+  }
+}
+
+int run_simulate(SimulateOptions options, const CommonOptions& common) {
+  require_task_and_models(options);
+  refuse_folder(common, options.output);
+  refuse_folder(common, options.report);
+  refuse_to_replace(common, common.json);
+  std::vector<std::string> inputs;
+  stability::Swarm swarm = read_swarm(options, inputs);
   const stability::Gains gains = stability::load_gains(options.gains);
   inputs.push_back(options.gains);
-  std::unique_ptr<files::Network> network;
-  if (has_force_network(options)) {
-    network = std::make_unique<files::Network>(load_net(options.network));
-    for (const std::string& path : input_files(*network)) inputs.push_back(path);
-  }
-  std::unique_ptr<files::Network> torque_network;
-  if (!options.torque_network.empty()) {
-    torque_network =
-        std::make_unique<files::Network>(files::load_network({options.torque_network, "", "", ""}));
-    for (const std::string& path : input_files(*torque_network)) inputs.push_back(path);
-  }
+  const std::unique_ptr<files::Network> network =
+      has_force_network(options) ? read_network(options.network, inputs) : nullptr;
+  const std::unique_ptr<files::Network> torque_network =
+      options.torque_network.empty() ? nullptr : read_network({options.torque_network, "", "", ""}, inputs);
   const std::unique_ptr<stability::Task> task =
       stability::make_task(options.task, {options.vehicles, options.duration_s, options.seed});
-  stability::Swarm swarm(std::move(models), std::move(kind_of));
   swarm.assume_lag(gains.motor_lag_s, gains.delay_s);
 
   Progress progress(common.quiet);
@@ -189,11 +210,7 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
         {options.gains, "", "rate_hz", "", error.what(), "choose rates that divide 500 Hz"});
   }
 
-  std::filesystem::create_directories(options.output);
-  for (std::size_t i = 0; i < flown.logs.size(); ++i) {
-    const auto path = std::filesystem::path(options.output) / log_name(static_cast<int>(i), options.run);
-    files::write_file(path.string(), stability::to_usd_log(flown.logs[i]), common.force);
-  }
+  write_logs(options, flown, common.force);
   const Json result = result_json(options, inputs, flown, *task);
   if (!options.report.empty()) write_report(options, common, flown, result);
   write_result(common, result);

@@ -56,6 +56,56 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
   return field;
 }
 
+/// @param source of the field.
+void add_spacing(const stability::SpacingQuestion& question, const stability::Spacing& found,
+                 const std::string& source, files::Json& result) {
+  result["max_error_m"] = question.max_error_m;
+  result["neighbours"] = question.neighbours;
+  result["guard"] = question.guard;
+  result["field"] = source;
+  result["least_gap_to_stay_m"] = finite(found.least_gap_to_stay_m);
+  result["least_gap_to_cross_m"] = finite(found.least_gap_to_cross_m);
+  result["shape"] = files::Json::array();
+  for (const stability::SpacingRow& row : found.shape) {
+    result["shape"].push_back({{"height_gap_m", row.height_gap_m},
+                               {"peak_force_N", row.peak_force_N},
+                               {"stay_error_m", finite(row.stay_error_m)},
+                               {"may_stay", row.may_stay},
+                               {"keep_out_radius_m", finite(row.keep_out_radius_m)},
+                               {"may_cross", std::isfinite(row.least_speed_m_s)},
+                               {"least_speed_m_s", finite(row.least_speed_m_s)},
+                               {"thrust_margin_N", row.thrust_margin_N}});
+  }
+}
+
+void print_spacing(const stability::SpacingQuestion& question, const stability::Spacing& found,
+                   const std::string& source) {
+  fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}\n\n",
+             question.max_error_m, question.neighbours, source, question.guard);
+  fmt::print("  {:>8} {:>9} {:>11} {:>10} {:>14} {:>12}\n", "gap", "force", "error if", "keep out",
+             "cross at", "thrust left");
+  fmt::print("  {:>8} {:>9} {:>11} {:>10} {:>14} {:>12}\n", "m", "N", "it stays, m", "radius, m",
+             "least, m/s", "N");
+  for (const stability::SpacingRow& row : found.shape) {
+    fmt::print("  {:>8.3f} {:>9.4f} {:>11.4f} {:>10.3f} {:>14} {:>12.4f}\n", row.height_gap_m,
+               row.peak_force_N, row.stay_error_m, row.keep_out_radius_m,
+               row.may_stay                         ? "may stay"
+               : std::isfinite(row.least_speed_m_s) ? fmt::format("{:.2f}", row.least_speed_m_s)
+                                                    : "never",
+               row.thrust_margin_N);
+  }
+  fmt::print("\nleast gap to stay below: {}; to cross below: {}\n",
+             std::isfinite(found.least_gap_to_stay_m) ? fmt::format("{:.3f} m", found.least_gap_to_stay_m)
+                                                      : "none in range",
+             std::isfinite(found.least_gap_to_cross_m) ? fmt::format("{:.3f} m", found.least_gap_to_cross_m)
+                                                       : "none in range");
+  if (question.guard == 1) {
+    fmt::print(
+        "Peaks in ten recorded swaps were 1.0 to 2.6 times what such a model predicts: --guard covers "
+        "that.\n");
+  }
+}
+
 int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
   if (options.question.steps > 1 && !(options.question.from_m < options.question.to_m)) {
     throw UsageError(fmt::format("--from {:g} --to {:g}: --from is the smaller height gap",
@@ -88,52 +138,13 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
   const stability::Spacing found = spacing(acting, gains, vehicle, field, options.question);
 
   files::Json result = result_head("spacing", inputs);
-  result["max_error_m"] = options.question.max_error_m;
-  result["neighbours"] = options.question.neighbours;
-  result["guard"] = options.question.guard;
-  result["field"] = source;
-  result["least_gap_to_stay_m"] = finite(found.least_gap_to_stay_m);
-  result["least_gap_to_cross_m"] = finite(found.least_gap_to_cross_m);
-  result["shape"] = files::Json::array();
-  for (const stability::SpacingRow& row : found.shape) {
-    result["shape"].push_back({{"height_gap_m", row.height_gap_m},
-                               {"peak_force_N", row.peak_force_N},
-                               {"stay_error_m", finite(row.stay_error_m)},
-                               {"may_stay", row.may_stay},
-                               {"keep_out_radius_m", finite(row.keep_out_radius_m)},
-                               {"may_cross", std::isfinite(row.least_speed_m_s)},
-                               {"least_speed_m_s", finite(row.least_speed_m_s)},
-                               {"thrust_margin_N", row.thrust_margin_N}});
-  }
+  add_spacing(options.question, found, source, result);
   write_result(common, result);
   std::string report;
   if (!options.report.empty())
     report = write_spacing_report(options.question, found, result, options.report, common.force);
   if (common.prints_text()) {
-    fmt::print("Error at most {} m below {} vehicle(s), no feed-forward; field: {}; guard factor {}\n\n",
-               options.question.max_error_m, options.question.neighbours, source, options.question.guard);
-    fmt::print("  {:>8} {:>9} {:>11} {:>10} {:>14} {:>12}\n", "gap", "force", "error if", "keep out",
-               "cross at", "thrust left");
-    fmt::print("  {:>8} {:>9} {:>11} {:>10} {:>14} {:>12}\n", "m", "N", "it stays, m", "radius, m",
-               "least, m/s", "N");
-    for (const stability::SpacingRow& row : found.shape) {
-      fmt::print("  {:>8.3f} {:>9.4f} {:>11.4f} {:>10.3f} {:>14} {:>12.4f}\n", row.height_gap_m,
-                 row.peak_force_N, row.stay_error_m, row.keep_out_radius_m,
-                 row.may_stay                         ? "may stay"
-                 : std::isfinite(row.least_speed_m_s) ? fmt::format("{:.2f}", row.least_speed_m_s)
-                                                      : "never",
-                 row.thrust_margin_N);
-    }
-    fmt::print("\nleast gap to stay below: {}; to cross below: {}\n",
-               std::isfinite(found.least_gap_to_stay_m) ? fmt::format("{:.3f} m", found.least_gap_to_stay_m)
-                                                        : "none in range",
-               std::isfinite(found.least_gap_to_cross_m) ? fmt::format("{:.3f} m", found.least_gap_to_cross_m)
-                                                         : "none in range");
-    if (options.question.guard == 1) {
-      fmt::print(
-          "Peaks in ten recorded swaps were 1.0 to 2.6 times what such a model predicts: --guard covers "
-          "that.\n");
-    }
+    print_spacing(options.question, found, source);
     if (!report.empty()) fmt::print("report: {}\n", report);
   }
   return kDone;
