@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/activation.h"
@@ -30,6 +31,8 @@ void add_order(files::NetworkArguments& arguments, const std::string& text) {
 }
 
 }  // namespace
+
+bool CommonOptions::prints_text() const { return json != "-" && host() == nullptr; }
 
 void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
   app.add_option_function<std::vector<std::string>>(
@@ -60,6 +63,7 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
 }
 
 files::Network load_net(const files::NetworkArguments& arguments) {
+  if (host() != nullptr && host()->network) return *host()->network;
   if (arguments.file.empty() && arguments.phi.empty()) {
     throw UsageError("no network: name a network.toml, one weight file, or --phi F --rho F");
   }
@@ -102,11 +106,13 @@ void refuse_folder(const CommonOptions& common, const std::string& folder) {
 }
 
 void write_result(const CommonOptions& common, const files::Json& result) {
+  if (host() != nullptr) host()->result = result;
   if (!common.json.empty()) files::write_file(common.json, files::to_text(result), common.force);
 }
 
 std::vector<std::string> input_files(const files::Network& network) {
   std::vector<std::string> paths;
+  if (host() != nullptr && host()->network) return paths;
   if (!network.path.empty()) paths.push_back(network.path);
   for (const auto& [name, weights] : files::parts(network)) paths.push_back(weights->path);
   return paths;

@@ -30,7 +30,8 @@ struct CommonOptions {
   bool quiet = false;
   int jobs = 0;
 
-  bool prints_text() const { return json != "-"; }
+  /// Not where the result goes to standard output, nor under a host.
+  bool prints_text() const;
 };
 
 /// One command: declares its options on a CLI::App, then runs.
@@ -53,7 +54,7 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments);
 /// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Loads NET. @throws UsageError if nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
+/// Loads NET, or takes the host's. @throws UsageError if nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
 files::Network load_net(const files::NetworkArguments& arguments);
 
 /// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line
@@ -67,10 +68,10 @@ void refuse_to_replace(const CommonOptions& common, const std::string& path);
 /// --force is not given. "" is no folder.
 void refuse_folder(const CommonOptions& common, const std::string& folder);
 
-/// Writes `result` where --json says, if it says.
+/// Writes `result` where --json says, if it says, and hands it to the host, if there is one.
 void write_result(const CommonOptions& common, const files::Json& result);
 
-/// Files that NET was read from.
+/// Files that NET was read from; none where it is a host's.
 std::vector<std::string> input_files(const files::Network& network);
 
 }  // namespace swarmcert::analysis

@@ -22,7 +22,7 @@ struct Remembered {
 };
 
 Remembered& remembered() {
-  static Remembered line;
+  thread_local Remembered line;  // a host may run several commands at once
   return line;
 }
 

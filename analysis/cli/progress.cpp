@@ -43,13 +43,18 @@ void on_interrupt(int signal) {
 
 }  // namespace
 
-Progress::Progress(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {}
+Progress::Progress(bool quiet) : host_(host()), quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() {
   if (drawn_ && terminal_) fmt::print(stderr, "\r\033[K");
 }
 
 void Progress::show(int done, int total, const std::string& what) {
+  if (host_ != nullptr) {
+    if (host_->interrupted) throw Interrupted();
+    if (host_->progress && total > 0) host_->progress(done, total, what);
+    return;
+  }
   const std::lock_guard<std::mutex> lock(mutex_);
   if (quiet_ || total <= 0 || std::chrono::steady_clock::now() - start_ < std::chrono::seconds(2)) return;
   drawn_ = true;
@@ -74,7 +79,11 @@ void set_timer(double seconds) {
 
 }  // namespace
 
-CancelOnInterrupt::CancelOnInterrupt(double seconds) {
+CancelOnInterrupt::CancelOnInterrupt(double seconds) : host_(host()) {
+  if (host_ != nullptr) {
+    if (seconds > 0) host_->deadline_s = steady_s() + seconds;
+    return;
+  }
   interrupted = signalled = false;
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
@@ -84,14 +93,20 @@ CancelOnInterrupt::CancelOnInterrupt(double seconds) {
 }
 
 CancelOnInterrupt::~CancelOnInterrupt() {
+  if (host_ != nullptr) {
+    host_->deadline_s = 0;
+    return;
+  }
   set_timer(0);
   std::signal(SIGALRM, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   std::signal(SIGINT, SIG_DFL);
 }
 
-bool CancelOnInterrupt::was_signalled() const { return signalled; }
+bool CancelOnInterrupt::was_signalled() const { return host_ != nullptr ? host_->interrupted : signalled; }
 
-const std::atomic<bool>* CancelOnInterrupt::flag() const { return &interrupted; }
+const std::atomic<bool>* CancelOnInterrupt::flag() const {
+  return host_ != nullptr ? &host_->stop : &interrupted;
+}
 
 }  // namespace swarmcert::analysis

@@ -6,10 +6,13 @@
 #include <mutex>
 #include <string>
 
+#include "analysis/cli/host.h"
+
 namespace swarmcert::analysis {
 
 /// Shows how far work is: a bar that redraws itself on a terminal, else a line for every tenth of it. Silent where
-/// `quiet`, and for work that ends within two seconds. Safe to call from several threads.
+/// `quiet`, and for work that ends within two seconds. Safe to call from several threads. Under a host (host.h) it
+/// informs the host instead.
 class Progress {
  public:
   explicit Progress(bool quiet);
@@ -17,9 +20,11 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
+  /// @throws Interrupted where a host has interrupted the command.
   void show(int done, int total, const std::string& what);
 
  private:
+  Host* const host_;
   const bool quiet_;
   const bool terminal_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -29,7 +34,7 @@ class Progress {
 };
 
 /// Set by Ctrl-C (SIGINT) or SIGTERM while an instance exists, or once a time has passed; another such signal a second later
-/// ends the process.
+/// ends the process. Under a host, signals are the host's matter: it sets the flag.
 class CancelOnInterrupt {
  public:
   /// @param seconds wall clock from now on; 0: no limit.
@@ -41,6 +46,9 @@ class CancelOnInterrupt {
   const std::atomic<bool>* flag() const;
   /// Whether a signal came, rather than the end of the time.
   bool was_signalled() const;
+
+ private:
+  Host* const host_;
 };
 
 }  // namespace swarmcert::analysis

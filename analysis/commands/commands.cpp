@@ -26,6 +26,7 @@ const std::vector<Command>& commands() {
       match_command(),            //
       gate_command(),             //
       verify_bundle_command(),    //
+      schema_command(),           //
       demo_command(),
   };
   return all;

@@ -26,6 +26,7 @@ Command match_command();
 Command merge_command();
 Command model_command();
 Command reproduce_command();
+Command schema_command();
 Command simulate_command();
 Command spacing_command();
 Command study_command();

@@ -11,6 +11,9 @@
 #include <sstream>
 #include <string>
 #include <vector>
+#ifdef SWARMCERT_CHECKS_SCHEMAS
+#include "schemas/schema_check.h"
+#endif
 
 namespace swarmcert::tests {
 
@@ -19,12 +22,14 @@ struct Outcome {
   std::string output;  ///< standard output and standard error, as a terminal shows them
 };
 
-/// Runs `command` in a shell with the built tool first in PATH, in `folder`.
+/// Runs `command` in a shell with the built tool first in PATH, in `folder`. Results that it prints, or writes into a folder
+/// for temporary files, must conform to their schemas.
 inline Outcome run_shell(const std::string& command, const std::filesystem::path& folder) {
   const std::string tool_folder = std::filesystem::path(SWARMCERT_TOOL).parent_path().string();
   const std::string line =
       "cd '" + folder.string() + "' && PATH='" + tool_folder + "':$PATH && { " + command + "\n} 2>&1";
   Outcome outcome;
+  [[maybe_unused]] const auto start = std::filesystem::file_time_type::clock::now();
   FILE* pipe = popen(line.c_str(), "r");
   if (pipe == nullptr) return outcome;
   std::array<char, 4096> buffer{};
@@ -32,6 +37,12 @@ inline Outcome run_shell(const std::string& command, const std::filesystem::path
     outcome.output += buffer.data();
   const int status = pclose(pipe);
   outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+#ifdef SWARMCERT_CHECKS_SCHEMAS
+  expect_schema(outcome.output, command);
+  const std::string temporary = std::filesystem::temp_directory_path().string();
+  if (std::filesystem::absolute(folder).string().rfind(temporary, 0) == 0)
+    expect_schemas_of_files(folder, start);
+#endif
   return outcome;
 }
 

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/add/add_report.h"
@@ -125,10 +126,10 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   result["written"] = ladder.any_accepted;
   result["problems"] = ladder.problems;
   if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;
-  for (const std::string& problem : ladder.problems) fmt::print(stderr, "warning: {}\n", problem);
+  for (const std::string& problem : ladder.problems) note("warning: " + problem);
   write_result(common, result);
   if (!ladder.too_poor.empty()) {
-    fmt::print(stderr, "inconclusive: {}; 'swarmcert compare' says what was cut\n", ladder.too_poor);
+    note("inconclusive: " + ladder.too_poor + "; 'swarmcert compare' says what was cut");
     return kInconclusive;
   }
   if (common.prints_text()) {

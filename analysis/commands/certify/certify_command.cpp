@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/certify/certify_output.h"
 #include "analysis/commands/certify/certify_report.h"
@@ -285,8 +286,10 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
     output.maps = lipschitz::slope_maps(network, found, map);
   }
   const Verdict verdict = output.verdict = judge(found, options.max_lipschitz);
-  if (!options.output.empty()) {
-    files::write_file(options.output, files::to_text(certificate(network, found)), common.force);
+  if (!options.output.empty() || host() != nullptr) {
+    const std::string text = files::to_text(certificate(network, found));
+    if (!options.output.empty()) files::write_file(options.output, text, common.force);
+    if (host() != nullptr) host()->certificate_written = text;
   }
   const files::Json result = certify_json(network, output);
   write_result(common, result);

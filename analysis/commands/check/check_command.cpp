@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "analysis/cli/host.h"
 #include "analysis/commands/commands.h"
 #include "lipschitz/checker/check.h"
 #include "nn/weights/chain.h"
@@ -15,11 +16,15 @@ struct CheckOptions {
 };
 
 int run_check(const CheckOptions& options, const CommonOptions& common) {
-  const files::Json certificate = files::read_json(options.certificate, check::kCertificateSchema);
+  const bool is_in_memory = host() != nullptr && host()->certificate;
+  const files::Json certificate =
+      is_in_memory ? files::parse_json(*host()->certificate, options.certificate, check::kCertificateSchema)
+                   : files::read_json(options.certificate, check::kCertificateSchema);
   const files::Network network = load_net(options.network);
   const check::CheckResult verdict = check::check(certificate, network);
 
-  std::vector<std::string> inputs = {options.certificate};
+  std::vector<std::string> inputs;
+  if (!is_in_memory) inputs.push_back(options.certificate);
   for (const std::string& path : input_files(network)) inputs.push_back(path);
   files::Json result = result_head("check", inputs);
   result["accepted"] = verdict.accepted;

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/compare/budget_output.h"
@@ -160,9 +161,9 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (comparison.overall.statistics.samples > 0) return kDone;
-  fmt::print(stderr, "no usable record: nothing was compared{}\n",
-             comparison.problems.empty() ? "; 'swarmcert inspect LOG' says what is in a log"
-                                         : ": " + comparison.problems[0]);
+  note("no usable record: nothing was compared" + (comparison.problems.empty()
+                                                       ? "; 'swarmcert inspect LOG' says what is in a log"
+                                                       : ": " + comparison.problems[0]));
   const bool refused = std::any_of(comparison.tracks.begin(), comparison.tracks.end(), [](const auto& track) {
     return std::any_of(track.doubts.begin(), track.doubts.end(),
                        [](const auto& d) { return d.refuses_force; });

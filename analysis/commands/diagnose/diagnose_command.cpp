@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
@@ -35,8 +36,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     if (common.prints_text()) print_diagnosis(diagnoses.back());
   }
   add_diagnoses(diagnoses, result);
-  for (const files::Json& problem : result["problems"])
-    fmt::print(stderr, "warning: {}\n", problem.get<std::string>());
+  for (const files::Json& problem : result["problems"]) note("warning: " + problem.get<std::string>());
   write_result(common, result);
   std::string reason;
   const identification::Verdict verdict = identification::verdict_of(diagnoses, reason);
@@ -46,7 +46,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (verdict != identification::Verdict::kInconclusive) return kDone;
-  fmt::print(stderr, "inconclusive: {}\n", reason);
+  note("inconclusive: " + reason);
   return kInconclusive;
 }
 

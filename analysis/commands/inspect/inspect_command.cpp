@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/inspect/inspect_log.h"
 #include "analysis/logs/columns_draft.h"
@@ -262,7 +263,7 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
     try {
       found.push_back(inspect(path, options, common, in_table));
     } catch (const files::InputError& error) {
-      fmt::print(stderr, "swarmcert: {}\n", error.what());
+      note(std::string("swarmcert: ") + error.what());
       found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
       continue;
     }

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
@@ -65,7 +66,7 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
     fmt::print("Page: {}\n", page);
   }
   if (study.ladder.too_poor.empty()) return kDone;
-  fmt::print(stderr, "inconclusive: {}; 'swarmcert compare' says what was cut\n", study.ladder.too_poor);
+  note("inconclusive: " + study.ladder.too_poor + "; 'swarmcert compare' says what was cut");
   return kInconclusive;
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/shard_option.h"
@@ -66,8 +67,8 @@ int run_sweep(const SweepOptions& options, const CommonOptions& common) {
   sweep.cancelled = interrupt.flag();
   const stability::SweepOutcome outcome = run_shard(grid, options.folder, sweep);
   if (!outcome.complete()) {
-    fmt::print(stderr, "swarmcert: interrupted after {} of {} cells, kept in {}; --resume continues\n",
-               outcome.done, outcome.total, outcome.file);
+    note(fmt::format("swarmcert: interrupted after {} of {} cells, kept in {}; --resume continues",
+                     outcome.done, outcome.total, outcome.file));
     return kInconclusive;
   }
   if (sweep.count == 1)

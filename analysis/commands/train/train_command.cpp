@@ -8,6 +8,7 @@
 #include <set>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
@@ -271,8 +272,8 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   outcome.trained = learning::run_with_teachers(data, options.run, options.teachers);
   const learning::Run& run = outcome.trained.run;
   if (run.was_cancelled) {
-    fmt::print(stderr, "stopped after {} epochs{}; --resume goes on\n", run.epochs.size(),
-               options.teachers > 0 ? fmt::format(" of seed {}", run.seed) : "");
+    note(fmt::format("stopped after {} epochs{}; --resume goes on", run.epochs.size(),
+                     options.teachers > 0 ? fmt::format(" of seed {}", run.seed) : ""));
     return kInconclusive;
   }
 
