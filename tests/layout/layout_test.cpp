@@ -89,6 +89,8 @@ const std::vector<Layer>& layers() {
         "stability/simulation",
         "stability/iss",
         "stability/sweep"}},
+      {"analysis/python",
+       {"analysis/cli", "analysis/commands", "analysis/logs", "analysis/residuals", "nn/base", "nn/weights"}},
       {"analysis", {"analysis/cli", "analysis/commands", "nn/base"}},
   };
   return all;
