@@ -45,7 +45,8 @@ py::dict options() {
     command.declare(app);
     py::dict of;
     for (const CLI::Option* option : app.get_options()) {
-      for (const std::string& name : option->get_lnames()) of[name.c_str()] = option->get_expected_max() > 0;
+      for (const std::string& name : option->get_lnames())
+        if (name != "help") of[name.c_str()] = option->get_expected_max() > 0;
     }
     result[command.name.c_str()] = of;
   }

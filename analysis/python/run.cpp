@@ -34,7 +34,9 @@ class Worker {
   Worker(Host& host, Shared& shared, std::vector<std::string> words)
       : host_(host), words_(std::move(words)), thread_([this, &shared] { work(shared); }) {}
   ~Worker() {
-    if (thread_.joinable()) join();
+    if (!thread_.joinable()) return;
+    interrupt();
+    join();
   }
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;

@@ -5,6 +5,7 @@ import inspect
 import json
 import pathlib
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas
@@ -95,6 +96,30 @@ def test_every_command_gives_the_bytes_of_the_command_line(folder, flights, capf
 
     assert seen == set(_OPTIONS) - {"reproduce"}  # its smallest experiment takes minutes
     assert capfd.readouterr() == ("", "")
+
+
+def test_commands_without_searches_end_where_progress_raises(flights):
+    class Enough(Exception):
+        pass
+
+    def progress(done, total, what):
+        raise Enough
+
+    for call in (swarmcert.compare, swarmcert.diagnose):
+        with pytest.raises(Enough):
+            call(MODEL, flights, progress=progress)
+    assert swarmcert.compare(MODEL, flights).holds
+
+
+def test_threads_do_not_disturb_one_another(flights):
+    with ThreadPoolExecutor(4) as pool:
+        jobs = [pool.submit(swarmcert.compare, MODEL, flights / run) for run in "1231"]
+        jobs += [pool.submit(swarmcert.certify, NETWORK, nodes=0, seed=seed) for seed in (1, 2)]
+        results = [job.result() for job in jobs]
+    for run, result in zip("123", results):
+        assert result.text == swarmcert.compare(MODEL, flights / run).text
+    assert results[0].text == results[3].text
+    assert [result.command_line[-1] for result in results[4:]] == ["1", "2"]
 
 
 def test_notes_hold_what_the_command_line_says_on_standard_error(flights, tmp_path):

@@ -24,7 +24,7 @@ def _text(value: Any) -> str:
 
 
 def _words(command: str, options: Mapping[str, Any]) -> List[str]:
-    """Options as words; a list or tuple of texts is an option given several times, one of numbers a list with commas."""
+    """Options as words: a list of texts is an option given several times, one of numbers a list with commas."""
     known = _OPTIONS[command]
     words: List[str] = []
     for key, value in options.items():
@@ -86,8 +86,8 @@ def certify(
 ) -> Certification:
     """Spectral norms and Lipschitz bounds that hold in exact arithmetic.
 
-    Nothing is printed and no file is written or read, except the files that `net` or options name, so that it can be called
-    in every epoch of a training loop; the interpreter's lock is released, and Ctrl-C raises KeyboardInterrupt.
+    Nothing is printed and no file is written or read, except the files that `net` or options name, so that it can be
+    called in every epoch of a training loop; the interpreter's lock is released, and Ctrl-C raises KeyboardInterrupt.
 
     Args:
         net: one of
@@ -130,7 +130,9 @@ def check(certificate: Any, net: Any, *, order: Any = (), description: Optional[
     return _run("check", [text], options, None, loaded)
 
 
-def _flights(command: str, models: Sequence[Any], flights: Any, options: Dict[str, Any], progress: Optional[Progress]):
+def _flights(
+    command: str, models: Sequence[Any], flights: Any, options: Dict[str, Any], progress: Optional[Progress]
+) -> Result:
     """Flights are a path, a mapping, or a list of these."""
     if isinstance(flights, (str, os.PathLike)) or hasattr(flights, "keys"):
         flights = [flights]
@@ -153,8 +155,8 @@ def compare(model: Any, flights: Any, *, progress: Optional[Progress] = None, **
 
     Args:
         model: path of a model.toml, a list of them, or None for known vehicles.
-        flights: paths of logs or folders; or arrays: a dict as Log has it, or {"cf1": ..., "cf2": ...} for the vehicles of
-            one flight; or a list of these, one per flight. Arrays are handed over in temporary files.
+        flights: paths of logs or folders; or arrays: a dict as Log has it, or {"cf1": ..., "cf2": ...} for the vehicles
+            of one flight; or a list of these, one per flight. Arrays are handed over in temporary files.
         options: those of `swarmcert compare --help`.
 
     Returns:

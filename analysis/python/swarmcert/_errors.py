@@ -1,5 +1,7 @@
 """Exceptions of the package."""
 
+from typing import Any
+
 
 class InputError(ValueError):
     """A file or an array that cannot be used.
@@ -13,7 +15,16 @@ class InputError(ValueError):
         hint:  what to do about it
     """
 
-    def __init__(self, message, file="", where="", field="", value="", what="", hint=""):
+    def __init__(
+        self,
+        message: str,
+        file: str = "",
+        where: str = "",
+        field: str = "",
+        value: str = "",
+        what: str = "",
+        hint: str = "",
+    ) -> None:
         super().__init__(message)
         self.file = file
         self.where = where
@@ -22,11 +33,9 @@ class InputError(ValueError):
         self.what = what
         self.hint = hint
 
-    def __reduce__(self):
-        return (
-            InputError,
-            (self.args[0], self.file, self.where, self.field, self.value, self.what, self.hint),
-        )
+    def __reduce__(self) -> Any:
+        parts = (self.args[0], self.file, self.where, self.field, self.value, self.what, self.hint)
+        return (InputError, parts)
 
 
 class UsageError(ValueError):

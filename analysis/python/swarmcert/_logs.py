@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from typing import Any, Dict, List, Mapping, NamedTuple
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
@@ -45,13 +45,13 @@ _COLUMNS = {
 }
 
 
-class Log(Mapping):
+class Log(Mapping[str, np.ndarray]):
     """A flight log in SI units: a mapping from names to arrays of float64, [n] or [n, k].
 
     time_s [n]; position_m, velocity_m_s, specific_force_m_s2 (what an accelerometer feels, +9.81 upwards at rest),
-    target_position_m, target_velocity_m_s [n, 3], in the world with z up; attitude [n, 4]: unit quaternion x, y, z, w that
-    turns body into world; rates_rad_s, torque_command_N_m [n, 3], in the body; duty [n, 4]: PWM/65536; battery_V [n];
-    thrust_N or thrust_over_hover [n] where the thrust does not come from the duties; motor_force_N [n, 4];
+    target_position_m, target_velocity_m_s [n, 3], in the world with z up; attitude [n, 4]: unit quaternion x, y, z, w
+    that turns body into world; rates_rad_s, torque_command_N_m [n, 3], in the body; duty [n, 4]: PWM/65536;
+    battery_V [n]; thrust_N or thrust_over_hover [n] where the thrust does not come from the duties; motor_force_N [n, 4];
     thrust_command_N [n]. What the log does not have is not there.
 
     Attributes:
@@ -79,7 +79,7 @@ class Log(Mapping):
     def __getitem__(self, name: str) -> np.ndarray:
         return self._signals[name]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         return iter(self._signals)
 
     def __len__(self) -> int:
@@ -126,7 +126,7 @@ class Written:
     """
 
     def __init__(self, flights: List[Any]):
-        self._folder = None
+        self._folder: Optional[tempfile.TemporaryDirectory] = None
         self.words: List[str] = []
         self.columns = ""
         self._names: Dict[str, str] = {}
@@ -161,7 +161,7 @@ class Written:
                 frame = ', frame = "world"' if signal.startswith("specific_force") else ""
                 file.write(f'{signal} = {{ column = "{signal}", unit = "{unit}"{frame} }}\n')
 
-    def _write_csv(self, path: str, signals: Mapping) -> None:
+    def _write_csv(self, path: str, signals: Mapping[str, Any]) -> None:
         columns: Dict[str, np.ndarray] = {}
         for name, values in signals.items():
             if name not in _COLUMNS:

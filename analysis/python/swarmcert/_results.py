@@ -1,12 +1,12 @@
 """What the commands return."""
 
 import json
-from typing import Any, Dict, Iterator, List
+from typing import Any, Dict, Iterator, List, Tuple
 
 import numpy as np
 
 
-def _flat(row: Dict[str, Any], prefix: str = "") -> Iterator:
+def _flat(row: Dict[str, Any], prefix: str = "") -> Iterator[Tuple[str, Any]]:
     """Members of nested objects as "outer.inner"; arrays stay as they are."""
     for key, value in row.items():
         if isinstance(value, dict):
@@ -33,8 +33,8 @@ def _column(values: List[Any]) -> np.ndarray:
 class Result:
     """The result of a command: the same JSON that `--json` writes, to the last bit.
 
-    Fields are attributes and items: ``result.overall["rmse"]["z"]``, ``result["overall"]``. Their meaning and units stand in
-    the schema, ``swarmcert.schema(result.command)``.
+    Fields are attributes and items: ``result.overall["rmse"]["z"]``, ``result["overall"]``. Their meaning and units
+    stand in the schema, ``swarmcert.schema(result.command)``.
 
     Attributes:
         code:  exit code of the command line: 0 done or holds, 1 violated or refuted, 4 inconclusive
@@ -42,7 +42,7 @@ class Result:
         text:  the JSON as text
     """
 
-    def __init__(self, code: int, text: str, notes: List[str]):
+    def __init__(self, code: int, text: str, notes: List[str]) -> None:
         self.code = code
         self.text = text
         self.notes = list(notes)
@@ -90,8 +90,8 @@ class Result:
     def table(self, name: str) -> Dict[str, np.ndarray]:
         """A list of objects as columns, for ``pandas.DataFrame(result.table("regions"))``.
 
-        Members of nested objects become columns such as "rmse.z". Numbers are float64 [rows] with NaN for null. An object
-        whose members are objects, such as compare's `vehicles`, is taken as rows with their names in the column "name".
+        Members of nested objects become columns such as "rmse.z". Numbers are float64 [rows] with NaN for null. An
+        object whose members are objects, such as compare's `vehicles`, is taken as rows, their names in "name".
         """
         value = self.data[name]
         if isinstance(value, dict):
@@ -106,7 +106,7 @@ class Result:
 class Certification(Result):
     """Result of certify(); `certificate` is the text that `certify -o` writes, for check() or a file."""
 
-    def __init__(self, code: int, text: str, notes: List[str], certificate: str):
+    def __init__(self, code: int, text: str, notes: List[str], certificate: str) -> None:
         super().__init__(code, text, notes)
         self.certificate = certificate
 
@@ -114,8 +114,8 @@ class Certification(Result):
         """The proved Lipschitz constant over all inputs of all coordinates, in `bounds[].unit`.
 
         Args:
-            function: "network", "phi:small", "set:small:small", ...; without it the largest of the whole network: of the
-                plain network or of all set functions.
+            function: "network", "phi:small", "set:small:small", ...; without it the largest of the whole network: of
+                the plain network or of all set functions.
         """
         found = [
             bound["upper"]
