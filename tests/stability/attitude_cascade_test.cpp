@@ -1,0 +1,93 @@
+#include "stability/bounds/attitude_cascade.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "stability/bounds/axis_loop.h"
+
+namespace swarmcert::stability {
+namespace {
+
+/// Gains that flew: position 9/7/0, KR 9e-3 N m, Kw 1.25e-3 N m s, KI 40e-3 N m/s, inertia 16.57e-6 kg m^2.
+constexpr double kInertia = 16.57e-6;
+Cascade flown() {
+  return {9, 7, 0, 1.5, AttitudeLoop{9e-3 / kInertia, 1.25e-3 / kInertia, 40e-3 / kInertia}, 0.0575};
+}
+
+TEST(AttitudeCascade, WithoutAttitudeItIsTheAxisLoop) {
+  for (const double Ki : {0.0, 10.0}) {
+    const Cascade loop{10, 5, Ki, 1, std::nullopt, 1 / 17.4};
+    const AxisLoop axis{1, 10, 5, Ki, {1 / 17.4}, 0};
+    const ResponseNorms force = response_norms(cascade_transfer(loop, CascadeInput::kAcceleration));
+    const GainNorms expected = continuous_norms(axis, Channel::kForce);
+    EXPECT_NEAR(force.integral_abs, expected.amplitude, 1e-9 * expected.amplitude);
+    EXPECT_NEAR(force.step_max_abs, expected.edge, 1e-9 * expected.edge);
+    const ResponseNorms velocity = response_norms(cascade_transfer(loop, CascadeInput::kVelocityError));
+    const GainNorms of_estimate = continuous_norms(axis, Estimate::kVelocity);
+    EXPECT_NEAR(velocity.integral_abs, of_estimate.amplitude, 1e-9 * of_estimate.amplitude);
+  }
+}
+
+TEST(AttitudeCascade, AStiffAttitudeLoopIsAsGoodAsNone) {
+  const Cascade direct{10, 5, 3, 1, std::nullopt, 0};
+  const Cascade stiff{10, 5, 3, 1, AttitudeLoop{4e6, 4e3, 0}, 0};
+  const auto amplitude = [](const Cascade& loop) {
+    return response_norms(cascade_transfer(loop, CascadeInput::kAcceleration)).integral_abs;
+  };
+  EXPECT_NEAR(amplitude(stiff), amplitude(direct), 0.01 * amplitude(direct));
+}
+
+TEST(AttitudeCascade, ASteadyTorqueLeavesTheErrorOfItsTilt) {
+  // Without integrators a torque per inertia alpha tilts by alpha/(KR/J ratio), and that acceleration is held by
+  // ratio Kp e.
+  const Cascade loop{9, 7, 0, 1.5, AttitudeLoop{500, 60, 0}, 0.03};
+  const double steady =
+      std::abs(response_norms(cascade_transfer(loop, CascadeInput::kAngularAcceleration)).integral);
+  EXPECT_NEAR(steady, 9.81 / (1.5 * 500) / (1.5 * 9), 1e-9);
+}
+
+TEST(AttitudeCascade, AnIntegratorOfTheAttitudeRemovesIt) {
+  Cascade loop{9, 7, 0, 1.5, AttitudeLoop{500, 60, 1000}, 0.03};
+  ASSERT_TRUE(is_stable(loop));
+  EXPECT_NEAR(response_norms(cascade_transfer(loop, CascadeInput::kAngularAcceleration)).integral, 0, 1e-9);
+}
+
+TEST(AttitudeCascade, AtItsMarginsTheLoopStopsBeingStable) {
+  // The flown inner loop is stable with less motor lag; margins are those of this one.
+  Cascade loop = flown();
+  loop.lag_s = 0.01;
+  const CascadeMargins margins = cascade_margins(loop);
+  ASSERT_GT(margins.gain, 1);
+  ASSERT_TRUE(std::isfinite(margins.gain));
+  const auto at = [&loop](double factor) {
+    Cascade changed = loop;
+    changed.ratio *= factor;
+    return is_stable(changed);
+  };
+  EXPECT_TRUE(at(0.999 * margins.gain));
+  EXPECT_FALSE(at(1.001 * margins.gain));
+  ASSERT_GT(margins.low_gain, 0);
+  EXPECT_TRUE(at(1.001 * margins.low_gain));
+  EXPECT_FALSE(at(0.999 * margins.low_gain));
+  EXPECT_GT(margins.delay_s, 0);
+  EXPECT_GT(margins.damping, 0);
+  EXPECT_LT(margins.damping, 1);
+}
+
+TEST(AttitudeCascade, AnUnstableLoopHasNoMargins) {
+  Cascade loop = flown();
+  loop.attitude->Kw_J_s /= 100;
+  ASSERT_FALSE(is_stable(loop));
+  EXPECT_EQ(cascade_margins(loop).delay_s, 0);
+  EXPECT_EQ(cascade_margins(loop).gain, 0);
+  EXPECT_TRUE(std::isinf(response_norms(cascade_transfer(loop, CascadeInput::kAcceleration)).integral_abs));
+}
+
+TEST(AttitudeCascade, RefusesATorqueWithoutAnAttitudeLoop) {
+  EXPECT_THROW(cascade_transfer({9, 7, 0, 1, std::nullopt, 0}, CascadeInput::kAngularAcceleration),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
