@@ -14,6 +14,8 @@ const std::vector<Experiment>& experiments() {
       {"superposition", "f(a,b) - f(a) - f(b): truth, network, recorded flights", superposition},
       {"lipschitz", "test error, certified bound and tracking error over gamma", lipschitz_tradeoff},
       {"real-flights", "the published flights: beside the published networks; physics first", real_flights},
+      {"gains-in-flight", "errors of gains that flew, predicted from the gains: --calibrate, --flights",
+       gains_in_flight},
   };
   return all;
 }

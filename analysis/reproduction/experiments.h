@@ -23,6 +23,10 @@ Finding superposition(const Setting& setting);
 Finding lipschitz_tradeoff(const Setting& setting);
 /// Training on the published flights beside the published networks; then physics first.
 Finding real_flights(const Setting& setting);
+/// Peak tracking errors of gains that flew, bounded from the gains with a stated coverage: calibrated on the flights of
+/// one folder, reported on those of another.
+/// @throws files::InputError where a folder is missing or its flights are too few for the coverage.
+Finding gains_in_flight(const Setting& setting);
 
 struct Experiment {
   std::string name, summary;

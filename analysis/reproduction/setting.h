@@ -23,6 +23,8 @@ struct Setting {
   std::string gains;   ///< gains.toml of the simulated vehicles
   std::string fleet;   ///< flights.toml of the recorded vehicles
   std::string recorded;  ///< folder of the published data: flights/development, flights/visible_test, weights
+  std::string calibrate, flights;  ///< folders for gains_in_flight()
+  double coverage = 0.9;           ///< that it promises
   std::function<void(int done, int total, const std::string& what)> progress;
 
   bool computes(int unit) const { return unit % shards == shard; }

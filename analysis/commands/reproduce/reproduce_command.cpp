@@ -86,6 +86,12 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   if (!setting.recorded.empty() && !fs::is_directory(setting.recorded))
     throw files::InputError({setting.recorded, "", "--recorded", "", "is not a folder",
                              "name the one of the published data, with flights/ and weights/"});
+  for (const auto& [name, folder] :
+       {std::pair("--calibrate", &setting.calibrate), {"--flights", &setting.flights}}) {
+    if (!folder->empty() && !fs::is_directory(*folder))
+      throw files::InputError(
+          {*folder, "", name, "", "is not a folder", "name one with logs/logNN and info/infoNN.yaml"});
+  }
   setting.jobs = common.jobs;
   setting.work = (fs::path(options.output) / (setting.full ? "full" : "small")).string();
   setting.models = bundled_folder("models", "stability/models");
@@ -138,32 +144,43 @@ Command reproduce_command() {
     words.push_back(known.name);
     names += fmt::format("  {:<14} {}\n", known.name, known.summary);
   }
-  return {"reproduce", "Reproduce the paper's table and figures, and experiments beyond them",
-          "Experiments\n" + names +
-              "\nWrites DIR/EXPERIMENT/: report.html, its plots with their data, result.json. Flights and "
-              "networks "
-              "in\nDIR/small or DIR/full are shared: existing ones are reused, and an interrupted run "
-              "continues.\nResults are shown as found, with their seeds. Interaction torques are learned by "
-              "train --quantity\ntorque, and flown by simulate --torque-network.\n\nExample: swarmcert "
-              "reproduce table -o "
-              "reproduced\n"
-              "         swarmcert reproduce table --full --shard 1/2 -o reproduced",
-          [words](CLI::App& app) {
-            const auto options = std::make_shared<ReproduceOptions>();
-            app.add_option("EXPERIMENT", options->name, "Experiment to run, see Experiments below")
-                ->type_name(fmt::format("{{{}}}", fmt::join(words, ",")))
-                ->required();
-            add_output(app, "-o,--output", options->output, "Output folder")->required();
-            app.add_flag("--full", options->setting.full, "Full size: a minute per task, more seeds");
-            app.add_option("--shard", options->shard, "i/N: only this part, for several machines");
-            app.add_option("--seed", options->setting.seed, "Seed of flights, noise and networks")
-                ->capture_default_str();
-            app.add_flag("--updraft", options->setting.updraft,
-                         "The simulated truth has an updraft around downwash");
-            app.add_option("--recorded", options->setting.recorded,
-                           "Folder of the published data, with flights/ and weights/");
-            return [options](const CommonOptions& common) { return run_reproduce(*options, common); };
-          }};
+  return {
+      "reproduce", "Reproduce the paper's table and figures, and experiments beyond them",
+      "Experiments\n" + names +
+          "\nWrites DIR/EXPERIMENT/: report.html, its plots with their data, result.json. Flights and "
+          "networks "
+          "in\nDIR/small or DIR/full are shared: existing ones are reused, and an interrupted run "
+          "continues.\nResults are shown as found, with their seeds. Interaction torques are learned by "
+          "train --quantity\ntorque, and flown by simulate --torque-network.\n\nExample: swarmcert "
+          "reproduce table -o "
+          "reproduced\n"
+          "         swarmcert reproduce table --full --shard 1/2 -o reproduced\n"
+          "         swarmcert reproduce gains-in-flight --calibrate flown --flights new -o reproduced",
+      [words](CLI::App& app) {
+        const auto options = std::make_shared<ReproduceOptions>();
+        app.add_option("EXPERIMENT", options->name, "Experiment to run, see Experiments below")
+            ->type_name(fmt::format("{{{}}}", fmt::join(words, ",")))
+            ->required();
+        add_output(app, "-o,--output", options->output, "Output folder")->required();
+        app.add_flag("--full", options->setting.full, "Full size: a minute per task, more seeds");
+        app.add_option("--shard", options->shard, "i/N: only this part, for several machines");
+        app.add_option("--seed", options->setting.seed, "Seed of flights, noise and networks")
+            ->capture_default_str();
+        app.add_flag("--updraft", options->setting.updraft,
+                     "The simulated truth has an updraft around downwash");
+        app.add_option("--recorded", options->setting.recorded,
+                       "Folder of the published data, with flights/ and weights/");
+        app.add_option("--calibrate", options->setting.calibrate,
+                       "gains-in-flight: folder with logs/logNN[_k] and info/infoNN.yaml to calibrate on");
+        app.add_option("--flights", options->setting.flights,
+                       "gains-in-flight: such a folder to report on; the same one again judges each gain set "
+                       "by the others");
+        app.add_option("--coverage", options->setting.coverage,
+                       "gains-in-flight: probability with which a flight stays below its bound")
+            ->check(CLI::Range(0.5, 0.99))
+            ->capture_default_str();
+        return [options](const CommonOptions& common) { return run_reproduce(*options, common); };
+      }};
 }
 
 }  // namespace swarmcert::analysis

@@ -1,0 +1,12 @@
+/// @file Rank correlation.
+#pragma once
+
+#include <vector>
+
+namespace swarmcert::reproduction {
+
+/// Spearman's: the correlation of ranks, ties at their mean rank. NaN for fewer than three values, or where one side is
+/// constant.
+double rank_correlation(const std::vector<double>& a, const std::vector<double>& b);
+
+}  // namespace swarmcert::reproduction

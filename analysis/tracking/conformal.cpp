@@ -1,0 +1,65 @@
+#include "analysis/tracking/conformal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+
+namespace swarmcert::analysis {
+namespace {
+
+/// Guards sums of weights like 1/3 + 1/3 + 1/3 against rounding.
+constexpr double kWeightRounding = 1e-9;
+
+/// P(at least `least` hits in `runs`), each with probability p in (0, 1).
+double binomial_tail(int runs, int least, double p) {
+  double total = 0;
+  for (int k = least; k <= runs; ++k) {
+    total += std::exp(std::lgamma(runs + 1.0) - std::lgamma(k + 1.0) - std::lgamma(runs - k + 1.0) +
+                      k * std::log(p) + (runs - k) * std::log1p(-p));
+  }
+  return total;
+}
+
+}  // namespace
+
+int fewest_groups(double level) { return static_cast<int>(std::ceil(level / (1 - level) - kWeightRounding)); }
+
+double beta_quantile(int a, int b, double probability) {
+  // P(Beta(a, b) <= x) = P(at least a hits in a + b - 1).
+  double low = 0, high = 1;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (binomial_tail(a + b - 1, a, middle) < probability ? low : high) = middle;
+  }
+  return (low + high) / 2;
+}
+
+ConformalThreshold conformal_threshold(const std::vector<FlightScore>& scores, double level) {
+  if (!(level > 0 && level < 1)) throw std::invalid_argument("conformal_threshold: level not in (0, 1)");
+  std::map<std::string, int> flights_of;
+  for (const FlightScore& score : scores) ++flights_of[score.group];
+  ConformalThreshold result;
+  result.level = level;
+  result.groups = static_cast<int>(flights_of.size());
+  result.flights = static_cast<int>(scores.size());
+  if (result.groups < fewest_groups(level)) {
+    throw std::invalid_argument("conformal_threshold: too few groups for this level");
+  }
+  std::vector<std::pair<double, double>> weighted;
+  for (const FlightScore& score : scores) weighted.emplace_back(score.value, 1.0 / flights_of[score.group]);
+  std::sort(weighted.begin(), weighted.end());
+  const double needed = level * (result.groups + 1) - kWeightRounding;
+  double weight = 0;
+  for (const auto& [value, of_flight] : weighted) {
+    weight += of_flight;
+    result.threshold = value;
+    if (weight >= needed) break;
+  }
+  const int rank = std::min(result.groups, static_cast<int>(std::ceil(needed)));
+  result.coverage_90 = {beta_quantile(rank, result.groups + 1 - rank, 0.05),
+                        beta_quantile(rank, result.groups + 1 - rank, 0.95)};
+  return result;
+}
+
+}  // namespace swarmcert::analysis

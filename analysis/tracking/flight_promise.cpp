@@ -1,0 +1,124 @@
+#include "analysis/tracking/flight_promise.h"
+
+#include <cmath>
+#include <limits>
+
+#include "nn/base/input_error.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using files::Json;
+
+/// |number| of an axis; infinite where it was not judged.
+double size_along(const Json& error, const char* key, int axis, const std::string& path) {
+  const std::string field = std::string("flights.learning_error.") + key;
+  if (!error.contains(key) || !error[key].is_object() || !error[key].contains(stability::axis_name(axis))) {
+    throw files::InputError(
+        {path, "", field, "", "is missing", "write the file with swarmcert compare --json"});
+  }
+  const Json& value = error[key][stability::axis_name(axis)];
+  if (value.is_null()) return std::numeric_limits<double>::infinity();
+  if (!value.is_number() || !std::isfinite(value.get<double>()))
+    throw files::InputError({path, "", field, value.dump().substr(0, 40), "is not a number", ""});
+  return std::abs(value.get<double>());
+}
+
+stability::DisturbanceSource source_of(const Json& error, double window_s, const std::string& path) {
+  stability::DisturbanceSource source;
+  source.kind = "measured";
+  for (int axis = 0; axis < 3; ++axis) {
+    stability::Disturbance& d = source.axis[axis];
+    d.rate_N_s = size_along(error, "rate", axis, path);
+    d.amplitude_N = size_along(error, "amplitude", axis, path);
+    d.variation_N = size_along(error, "variation", axis, path);
+    d.impulse_N_s = size_along(error, "impulse", axis, path);
+    d.passes = stability::Disturbance::kManyPasses;
+    d.pass_period_s = d.pass_length_s = window_s;
+    d.variation_per_pass = true;
+    const double bias_N = size_along(error, "bias", axis, path);
+    source.bias_N[axis] = std::isfinite(bias_N) ? bias_N : 0;
+  }
+  source.classes_contain_bias = source.amplitudes_reach_bias();
+  return source;
+}
+
+/// Adds what acts beside the class.
+void add_declared(const stability::DisturbanceSource& declared, stability::DisturbanceSource& source) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (declared.bias_N[axis] != 0) source.classes_contain_bias = false;
+    source.bias_N[axis] += std::abs(declared.bias_N[axis]);
+    source.velocity_error_m_s[axis] = declared.velocity_error_m_s[axis];
+    source.position_error_m[axis] = declared.position_error_m[axis];
+  }
+}
+
+double bound_m(const stability::Gains& gains, const stability::Plant& plant,
+               const stability::ExactGains& exact, const stability::DisturbanceSource& source,
+               const stability::InitialError& initial) {
+  const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(exact.axis)];
+  const stability::Disturbance& known = source.axis[exact.axis];
+  const stability::OtherErrors other = source.other(exact.axis, initial);
+  if (exact.loop == stability::Loop::kSampled) {
+    return axis_bounds(*sampled_axis_loop(gains, plant, exact.axis), exact.channel, exact.all_times, known,
+                       other, source.classes_contain_bias, limit_m_s)
+        .least();
+  }
+  return axis_bounds(*axis_loop(gains, plant, exact.axis), exact.channel, exact.all_times, known, other,
+                     source.classes_contain_bias, limit_m_s)
+      .least();
+}
+
+}  // namespace
+
+std::vector<FlightClass> read_flight_classes(const std::string& path) {
+  const Json document = files::read_json(path, "swarmcert/compare/1");
+  const auto refuse = [&path](const std::string& field, const std::string& what) -> void {
+    throw files::InputError({path, "", field, "", what, "write the file with swarmcert compare --json"});
+  };
+  if (!document.contains("flights") || !document["flights"].is_array()) refuse("flights", "is missing");
+  if (document.value("unit", "N") != "N") {
+    throw files::InputError({path, "", "unit", files::in_quotes(document.value("unit", "")), "is no force",
+                             "name vehicles with a mass, so that compare judges forces"});
+  }
+  const Json* const summary = document.contains("learning_error") ? &document["learning_error"] : nullptr;
+  if (summary == nullptr || !summary->contains("window_s") || !(*summary)["window_s"].is_number() ||
+      !((*summary)["window_s"].get<double>() > 0))
+    refuse("learning_error.window_s", "is not a positive number");
+  std::vector<FlightClass> flights;
+  for (const Json& flight : document["flights"]) {
+    if (!flight.is_object() || !flight.contains("learning_error"))
+      refuse("flights.learning_error", "is missing: the file is of an older version");
+    if (!flight["learning_error"].is_object()) continue;
+    flights.push_back({flight.value("flight", ""), flight.value("vehicle", ""),
+                       source_of(flight["learning_error"], (*summary)["window_s"].get<double>(), path)});
+  }
+  return flights;
+}
+
+std::vector<PromisedBound> promised_bounds(const stability::Gains& gains, const stability::Plant& plant,
+                                           const stability::TrackingReport& report,
+                                           const std::vector<FlightClass>& flights,
+                                           const stability::DisturbanceSource& declared,
+                                           const stability::InitialError& initial, double level) {
+  std::vector<PromisedBound> rows;
+  for (std::size_t k = 0; k < report.exact.size(); ++k) {
+    const stability::ExactGains& exact = report.exact[k];
+    double beside_m = 0;
+    for (const stability::AxisBounds& row : report.bounds) {
+      if (row.axis == exact.axis && row.channel == exact.channel && row.loop == exact.loop)
+        beside_m = row.staircase_m + row.float32_m;
+    }
+    std::vector<FlightScore> scores;
+    for (const FlightClass& flight : flights) {
+      stability::DisturbanceSource source = flight.source;
+      add_declared(declared, source);
+      scores.push_back({flight.flight, beside_m + bound_m(gains, plant, exact, source, initial)});
+    }
+    rows.push_back({exact.axis, exact.channel, exact.loop, conformal_threshold(scores, level)});
+  }
+  return rows;
+}
+
+}  // namespace swarmcert::analysis
