@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "analysis/residuals/published_lag.h"
 #include "nn/base/file_io.h"
 #include "nn/training/deep_set_loss.h"
 #include "nn/weights/record_samples.h"
@@ -67,17 +68,52 @@ files::Network write_network(const LearningData& data, const training::Vector& t
   return network;
 }
 
-void write_models(const residuals::Inputs& inputs, const training::Layout& layout,
-                  const std::string& folder) {
-  for (stability::Model model : inputs.models) {
-    if (layout.find("rho:" + model.kind) < 0) continue;
+namespace {
+
+/// The residual of published signals is that of a model with their lag and no other.
+void set_published_lag(stability::Model& model) {
+  auto& effects = model.effects;
+  effects.erase(std::remove_if(effects.begin(), effects.end(),
+                               [](const stability::EffectSpec& effect) {
+                                 return effect.name == "motor_lag" || effect.name == "delay";
+                               }),
+                effects.end());
+  stability::EffectSpec lag;
+  lag.name = "motor_lag";
+  lag.parameters = {{"gain", 1}, {"tau_s", residuals::kPublishedLag_s}};
+  effects.push_back(std::move(lag));
+}
+
+}  // namespace
+
+void write_models(const residuals::Inputs& inputs, const training::Layout& layout, const std::string& folder,
+                  bool with_network) {
+  const auto write = [&](stability::Model model, const std::string& name) {
+    if (inputs.rules.has_published_signals()) set_published_lag(model);
     stability::EffectSpec effect;
     effect.name = "deep_set";
     effect.network = "network.toml";
-    model.effects.push_back(std::move(effect));
-    files::write_file((fs::path(folder) / ("model-" + model.kind + ".toml")).string(),
-                      to_toml(model, {"With the network in this folder."}), true);
+    if (with_network) model.effects.push_back(std::move(effect));
+    files::write_file((fs::path(folder) / ("model-" + name + ".toml")).string(),
+                      to_toml(model, {with_network ? "With the network in this folder."
+                                                   : "Without the network in this folder: on the selecting "
+                                                     "flights it is worse than none."}),
+                      true);
+  };
+  const auto is_learned = [&layout](const std::string& kind) { return layout.find("rho:" + kind) >= 0; };
+  for (const stability::Model& model : inputs.models)
+    if (is_learned(model.kind)) write(model, model.kind);
+  if (inputs.vehicle_models.empty()) return;
+  std::string fleet = "schema = \"swarmcert/flights/1\"\n";
+  for (const auto& [vehicle, use] : inputs.fleet) {
+    if (!is_learned(use.kind)) continue;
+    const auto own = inputs.vehicle_models.find(vehicle);
+    if (own != inputs.vehicle_models.end()) write(own->second, vehicle);
+    fleet += fmt::format("\n[vehicle.{}]\nmodel = \"model-{}.toml\"\nuse = \"{}\"\n", vehicle,
+                         own != inputs.vehicle_models.end() ? vehicle : use.kind,
+                         use.position_only ? "position" : "all");
   }
+  files::write_file((fs::path(folder) / "flights.toml").string(), fleet, true);
 }
 
 double Certified::largest() const {

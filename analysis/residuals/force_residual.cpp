@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/residuals/published_lag.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::residuals {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-/// The authors' lag per record of about 10 ms.
-constexpr double kPublishedLag = 0.16;
 constexpr double kLargestPublishedForce_gf = 50;
 
 stability::EffectContext context_of(const stability::Model& model, const Kinds& kinds) {
@@ -55,7 +54,7 @@ void pass_published_lag(Track& track) {
   double lagged_N = 0;
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     stability::Instant& now = track.instants[i];
-    lagged_N = i == 0 ? now.thrust_N : lagged_N + kPublishedLag * (now.thrust_N - lagged_N);
+    lagged_N = i == 0 ? now.thrust_N : lagged_N + kPublishedLagPerRecord * (now.thrust_N - lagged_N);
     now.thrust_N = lagged_N;
   }
 }

@@ -63,6 +63,70 @@ TEST_F(Train, LearnsTheDownwashOfFlightsThatItDidNotSeeAndCertifiesTheResult) {
   EXPECT_LT(rmse("out/model-small.toml"), 0.7 * rmse("nominal.toml"));
 }
 
+TEST_F(Train, KeepsNoNetworkThatIsWorseThanNoneOnTheSelectingFlights) {
+  // Downwash in the flights to fit, none in those that select: what is learned must not fly.
+  ASSERT_EQ(
+      execute("swarmcert simulate swap --vehicles 2 --model nominal.toml --gains '" +
+              std::string(SWARMCERT_SOURCE_DIR) + "/controller/gains/crazyflie-small.toml' --seed 9 -o calm")
+          .exit_code,
+      0);
+  const Outcome outcome = execute(
+      "swarmcert train nominal.toml flights/1 flights/2 --select calm --test flights/3 --phi 12,12 --rho 12 "
+      "--features 8 --epochs 10 --batch 256 --rate 5e-3 -o out --json result.json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const Json result = files::read_json(folder_ / "result.json", "swarmcert/train/1");
+  EXPECT_FALSE(result["kept"].get<bool>());
+  EXPECT_GE(result["select_rmse"].get<double>(), result["select_rmse_of_nothing"].get<double>());
+  ASSERT_EQ(result["select"].size(), 1u);
+  EXPECT_TRUE(result["select"][0]["worse_than_none"].get<bool>());
+  EXPECT_NE(outcome.output.find("no network is kept"), std::string::npos) << outcome.output;
+  EXPECT_EQ(read_text(folder_ / "out/model-small.toml").find("deep_set"), std::string::npos);
+
+  // With flights like those to fit, it is kept without a warning.
+  const Outcome like = execute(
+      "swarmcert train nominal.toml flights/1 flights/2 --select flights/3 --phi 12,12 --rho 12 --features 8 "
+      "--epochs 10 --batch 256 --rate 5e-3 -o kept --json kept.json");
+  ASSERT_EQ(like.exit_code, 0) << like.output;
+  EXPECT_TRUE(files::read_json(folder_ / "kept.json", "swarmcert/train/1")["kept"].get<bool>());
+  EXPECT_EQ(like.output.find("worse than none"), std::string::npos) << like.output;
+  EXPECT_NE(read_text(folder_ / "kept/model-small.toml").find("deep_set"), std::string::npos);
+}
+
+TEST_F(Train, TakesVehiclesOfOneKindWithModelsOfTheirOwn) {
+  // As compare --fitted writes them.
+  std::string heavy = read_text(folder_ / "nominal.toml");
+  const std::string mass = "mass_kg = 0.034";
+  heavy.replace(heavy.find(mass), mass.size(), "mass_kg = 0.035");
+  write_text(folder_ / "heavy.toml", heavy);
+  write_text(folder_ / "flights.toml",
+             "schema = \"swarmcert/flights/1\"\n[vehicle.cf1]\nmodel = \"nominal.toml\"\n"
+             "[vehicle.cf2]\nmodel = \"heavy.toml\"\n");
+  const Outcome outcome = execute(
+      "swarmcert train flights --flights flights.toml --phi 12,12 --rho 12 --features 8 --epochs 25 --batch "
+      "256 --rate 5e-3 -o out");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(read_text(folder_ / "out/flights.toml").find("model-cf"), std::string::npos);
+  const auto rmse = [&](const std::string& fleet) {
+    const Outcome compared =
+        execute("swarmcert compare flights --flights " + fleet + " --force --json compared.json");
+    EXPECT_EQ(compared.exit_code, 0) << compared.output;
+    return files::read_json(folder_ / "compared.json", "swarmcert/compare/1")["overall"]["rmse"]["z"]
+        .get<double>();
+  };
+  EXPECT_LT(rmse("out/flights.toml"), 0.8 * rmse("flights.toml"));
+}
+
+TEST_F(Train, ModelsForPublishedSignalsHaveTheLagOfTheirLabels) {
+  const Outcome outcome = execute(train("--epochs 3 --batch 256 --published-signals -o out"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const std::string model = read_text(folder_ / "out/model-small.toml");
+  const std::size_t lag = model.find("\"motor_lag\"");
+  ASSERT_NE(lag, std::string::npos) << model;
+  EXPECT_EQ(model.find("\"motor_lag\"", lag + 1), std::string::npos) << "one lag";
+  // 16 % of the way per record of 10 ms: 0.01 / -log(0.84).
+  EXPECT_NE(model.find("0.0573548"), std::string::npos) << model;
+}
+
 /// Wakes push to the side and tilt; logs at 500 Hz show both.
 class TrainVectors : public Train {
  protected:

@@ -49,10 +49,10 @@ struct Scores {
 };
 
 std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Vector& theta,
-                                                    int jobs) {
+                                                    Use use, int jobs) {
   std::map<std::string, std::vector<Eigen::Index>> members;
   for (const learning::TrackSamples& track : data.tracks) {
-    if (track.use != Use::kTest) continue;
+    if (track.use != use) continue;
     for (Eigen::Index s = track.begin; s < track.end; ++s) members[track.composition].push_back(s);
   }
   std::map<std::string, Scores> result;
@@ -91,7 +91,12 @@ struct Outcome {
   Scores all;
   std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
   std::map<std::string, Scores> compositions;
+  Scores select;  ///< of the flights that decide whether there is to be a network
+  std::map<std::string, Scores> select_compositions;
   learning::Certified certified;
+
+  /// A network that is worse than none on the selecting flights is not kept.
+  bool kept() const { return !(select.network >= select.nothing); }
 };
 
 files::Json result_of(const TrainOptions& options, const std::vector<std::string>& inputs,
@@ -121,6 +126,16 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
     json["test"].push_back(
         {{"vehicles", composition}, {"rmse", scores.network * SI}, {"rmse_of_nothing", scores.nothing * SI}});
   }
+  json["kept"] = outcome.kept();
+  json["select_rmse"] = number_or_null(outcome.select.network * SI);
+  json["select_rmse_of_nothing"] = number_or_null(outcome.select.nothing * SI);
+  json["select"] = files::Json::array();
+  for (const auto& [composition, scores] : outcome.select_compositions) {
+    json["select"].push_back({{"vehicles", composition},
+                              {"rmse", scores.network * SI},
+                              {"rmse_of_nothing", scores.nothing * SI},
+                              {"worse_than_none", scores.network >= scores.nothing}});
+  }
   json["bounds"] = files::Json::array();
   for (const auto& [function, upper] : outcome.certified.set_bounds)
     json["bounds"].push_back({{"function", function},
@@ -146,6 +161,22 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
                               {fmt::format("select_rmse_{}", target.unit), epoch.select_rmse}});
   json["problems"] = data.problems;
   return json;
+}
+
+/// Where the selecting flights are better off without the network.
+void print_worse_than_none(const Outcome& outcome, const std::string& unit) {
+  if (!outcome.kept()) {
+    fmt::print(
+        "no network is kept: on the selecting flights it leaves {:.3f} {}, none {:.3f}; the models written "
+        "are "
+        "without it\n",
+        outcome.select.network, unit, outcome.select.nothing);
+  }
+  for (const auto& [composition, scores] : outcome.select_compositions) {
+    if (scores.network < scores.nothing) continue;
+    fmt::print("warning: worse than none for {}: {:.3f} {} on the selecting flights, {:.3f} without\n",
+               composition, scores.network, unit, scores.nothing);
+  }
 }
 
 void print(const TrainOptions& options, const LearningData& data, const Outcome& outcome) {
@@ -186,6 +217,7 @@ void print(const TrainOptions& options, const LearningData& data, const Outcome&
     fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
                outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
   for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
+  print_worse_than_none(outcome, target.unit);
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
 
@@ -217,7 +249,7 @@ std::optional<residuals::Inputs> others(const TrainOptions& options, const std::
   for (const std::string& word : options.flights.words) {
     if (fs::path(word).extension() == ".toml") chosen.models.push_back(word);
   }
-  return read_flights(chosen);
+  return read_flights(chosen, true);
 }
 
 /// A flight that is fitted and judges as well would make errors look too good without a word.
@@ -251,7 +283,7 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   if (options.run.max_lipschitz > 0 && options.gamma_mode == "equal")
     throw UsageError("--max-lipschitz scales layers, which --gamma-mode equal forbids");
 
-  const residuals::Inputs inputs = read_flights(options.flights);
+  const residuals::Inputs inputs = read_flights(options.flights, true);
   const std::optional<residuals::Inputs> select = others(options, options.select);
   const std::optional<residuals::Inputs> test = others(options, options.test);
   const learning::LearningFlights flights = {&inputs, select ? &*select : nullptr, test ? &*test : nullptr};
@@ -278,7 +310,10 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   }
 
   const files::Network network = learning::write_network(data, run.theta, trainer.gamma, options.output);
-  learning::write_models(inputs, data.layout, options.output);
+  outcome.select = {learning::rmse_of_nothing(data, Use::kSelect),
+                    learning::rmse(data, run.theta, Use::kSelect, common.jobs)};
+  outcome.select_compositions = scores_by_composition(data, run.theta, Use::kSelect, common.jobs);
+  learning::write_models(inputs, data.layout, options.output, outcome.kept());
   lipschitz::CertifyOptions certify_options;
   certify_options.jobs = common.jobs;
   certify_options.lower.seed = trainer.seed;
@@ -286,7 +321,7 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   outcome.all = {learning::rmse_of_nothing(data, Use::kTest),
                  learning::rmse(data, run.theta, Use::kTest, common.jobs)};
   if (data.samples.outputs > 1) outcome.components = scores_by_component(data, run.theta);
-  outcome.compositions = scores_by_composition(data, run.theta, common.jobs);
+  outcome.compositions = scores_by_composition(data, run.theta, Use::kTest, common.jobs);
 
   std::vector<std::string> files = inputs.files();
   for (const residuals::Inputs* more : {flights.select, flights.test}) {
