@@ -1,6 +1,7 @@
 // bound as a user runs it: what the force error is known from, uncertain and coupled loops, swarms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "analysis/tracking_runs.h"
@@ -69,6 +70,10 @@ TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
   const double one = result["exact"][9]["between_samples"]["impulse"].get<double>();
   const Json compare = files::parse_json(read_text(folder / "compare.json"), "compare.json");
   const double J = compare["learning_error"]["impulse"]["max"]["z"].get<double>();
+  double largest_of_flights = 0;
+  for (const Json& flight : compare["flights"])
+    largest_of_flights = std::max(largest_of_flights, flight["learning_error"]["impulse"]["z"].get<double>());
+  EXPECT_EQ(largest_of_flights, J);
   EXPECT_GE(result["bounds"][9]["impulse"].get<double>(), 2 * one * J * (1 - 1e-9));
 }
 

@@ -7,8 +7,10 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
+#include "analysis/commands/bound/bound_attitude.h"
 #include "analysis/commands/bound/bound_extras.h"
 #include "analysis/commands/bound/bound_output.h"
+#include "analysis/commands/bound/bound_promise.h"
 #include "analysis/commands/bound/bound_report.h"
 #include "analysis/commands/bound/disturbance_input.h"
 #include "analysis/commands/bound/float_errors.h"
@@ -25,6 +27,8 @@ struct BoundOptions {
   std::vector<std::string> uncertain;
   bool is_uncertain = false;
   int most_loops = UncertainRun{}.most_loops;
+  double coverage = 0;   ///< 0: no promise
+  std::string attitude;  ///< empty: no attitude loop
   bool verified = false;
   bool tube = false;
   TubeArguments task;
@@ -117,6 +121,14 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     run.cancelled = interrupt.flag();
     result["uncertain"] = uncertain_json(input, options.uncertain, run);
   }
+  if (options.coverage > 0) {
+    // Beside the file's classes stands only what was given on the command line.
+    DisturbanceArguments others = options.disturbance;
+    others.from.clear();
+    result["coverage"] = promise_json(input, report, load_disturbance(others, input).source, options.initial,
+                                      options.disturbance.from, options.coverage);
+  }
+  if (!options.attitude.empty()) result["attitude"] = attitude_json(input, options.attitude);
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
   if (local) result["local_tube"] = local_tube_json(options.task, *local);
@@ -131,6 +143,8 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     print_float_errors(float32);
     if (disturbance.truth) print_truth(*disturbance.truth);
     if (options.is_uncertain) print_uncertain(result["uncertain"]);
+    if (options.coverage > 0) print_promise(result["coverage"]);
+    if (!options.attitude.empty()) print_attitude(result["attitude"]);
     if (options.verified) print_verified(result["verified"]);
     if (local) print_local_tube(result["local_tube"]);
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
@@ -184,6 +198,15 @@ Command bound_command() {
                        "bounds if the limit is reached")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
+        app.add_option(
+            "--attitude-gains", options->attitude,
+            "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade");
+        app.add_option("--coverage", options->coverage,
+                       "Bound that a further flight like those of --from keeps with this probability "
+                       "(split-conformal "
+                       "prediction over flights)")
+            ->check(CLI::Range(0.5, 0.999))
+            ->needs("--from");
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
         app.add_flag("--tube", options->tube,
                      "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "

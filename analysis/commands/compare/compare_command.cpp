@@ -16,6 +16,7 @@
 #include "analysis/commands/compare/compare_report.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/flight_errors.h"
 #include "analysis/residuals/injected_log.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
@@ -119,6 +120,36 @@ files::Json inject(const residuals::Inputs& inputs, const std::string& folder, b
           {"unchanged", std::move(unchanged)}};
 }
 
+/// flights[].learning_error: the largest values over a flight's windows, from which bound --coverage makes its promise.
+void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& result) {
+  std::map<std::string, residuals::FlightError> errors;
+  for (residuals::FlightError& error : residuals::flight_errors(inputs, jobs)) {
+    const std::string path = error.path;
+    errors[path] = std::move(error);
+  }
+  for (files::Json& flight : result["flights"]) {
+    const auto found = errors.find(flight["file"].get<std::string>());
+    if (found == errors.end()) {
+      flight["learning_error"] = nullptr;
+      continue;
+    }
+    // Axes along which no force can be judged are null, as in the errors of the flight.
+    const auto axes = [&flight](const Eigen::Vector4d& v) {
+      files::Json json = files::Json::object();
+      for (int k = 0; k < 4; ++k) {
+        const char* const kNames[] = {"x", "y", "z", "total"};
+        const bool is_judged = k == 3 || !flight["rmse"][kNames[k]].is_null();
+        json[kNames[k]] = is_judged ? files::Json(v[k]) : files::Json();
+      }
+      return json;
+    };
+    const residuals::ErrorWindow& largest = found->second.largest;
+    flight["learning_error"] = {{"windows", found->second.windows},     {"bias", axes(found->second.bias)},
+                                {"amplitude", axes(largest.amplitude)}, {"rate", axes(largest.rate)},
+                                {"variation", axes(largest.variation)}, {"impulse", axes(largest.impulse)}};
+  }
+}
+
 int run_compare(const CompareOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -139,6 +170,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   for (const auto& [kind, file] : gains) files.push_back(file.path);
   files::Json result = result_head("compare", files);
   add_comparison(comparison, inputs, result);
+  if (!common.json.empty()) add_flight_errors(inputs, common.jobs, result);
   std::optional<residuals::Comparison> own;
   if (options.flights.published_filter) {
     FlightOptions without = options.flights;

@@ -1,0 +1,124 @@
+// bound as a user runs it: promises for a further flight, and the margins of the attitude loop.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "analysis/tracking_runs.h"
+
+namespace swarmcert::tests {
+namespace {
+
+using files::Json;
+
+/// Gain sets that flew: 111 without a limit cycle, 119 and one axis of 29 with one.
+TEST(BoundCommand, SaysWhichGainsAreCloseToALimitCycleOfTheAttitudeLoop) {
+  const ScratchFolder folder;
+  std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");
+  write_text(folder / "model.toml",
+             model + "\n[[effect]]\nname = \"thrust_ratio\"\nparameters = { ratio = 1.5 }\n");
+  const auto verdict = [&](const std::string& position, const std::string& attitude) {
+    write_text(folder / "gains.toml",
+               "schema = \"swarmcert/gains/1\"\n[position]\n" + position + "\n[lag]\nmotor_s = 0.0575\n");
+    const Json result =
+        json_of(folder, "bound --gains gains.toml --model model.toml --attitude-gains " + attitude);
+    EXPECT_EQ(result["attitude"].size(), 2u);
+    return result["attitude"][0];
+  };
+  const Json calm = verdict("Kp = 17\nKd = 7\nKi = 10", "0.010,0.001125,0.040");
+  EXPECT_EQ(calm["verdict"], "clear") << calm;
+  EXPECT_GT(calm["exact"]["torque"]["amplitude"].get<double>(), 0);
+  EXPECT_EQ(verdict("Kp = 9\nKd = 7\nKi = 0", "0.007,0.001125,0.040")["verdict"], "close to a limit cycle");
+  EXPECT_EQ(verdict("Kp = 9\nKd = 7\nKi = 5", "0.0055,0.0013,0.018")["verdict"], "close to a limit cycle");
+  const Json unstable = verdict("Kp = 9\nKd = 7\nKi = 0", "0.009,0.002,0.040");
+  EXPECT_EQ(unstable["verdict"], "unstable");
+  EXPECT_FALSE(unstable["stable"].get<bool>());
+  EXPECT_TRUE(unstable["exact"]["force"]["amplitude"].is_null());
+  for (const std::string wrong : {"1,2", "0.01,0,0", "a,b,c", "0.01,0.001,-1", "0.01,0.001,0.04,1"}) {
+    EXPECT_EQ(run_shell("swarmcert bound --gains gains.toml --model model.toml --attitude-gains " + wrong,
+                        folder.path())
+                  .exit_code,
+              2)
+        << wrong;
+  }
+}
+
+/// A result of compare whose flights had these amplitudes along all axes, and otherwise anything.
+std::string compared_flights(const ScratchFolder& folder, const std::vector<double>& amplitudes) {
+  Json flights = Json::array();
+  for (std::size_t k = 0; k < amplitudes.size(); ++k) {
+    const auto axes = [](double x) { return Json{{"x", x}, {"y", x}, {"z", x}, {"total", x}}; };
+    flights.push_back({{"flight", "flight" + std::to_string(k)},
+                       {"vehicle", "cf1"},
+                       {"learning_error",
+                        {{"windows", 3},
+                         {"bias", axes(0)},
+                         {"amplitude", axes(amplitudes[k])},
+                         {"rate", axes(1e6)},
+                         {"variation", axes(1e6)},
+                         {"impulse", axes(1e6)}}}});
+  }
+  const Json compare = {{"schema", "swarmcert/compare/1"},
+                        {"unit", "N"},
+                        {"learning_error", {{"window_s", 4.5}, {"bias", 0}, {"amplitude", 1}, {"rate", 1}}},
+                        {"flights", flights}};
+  write_text(folder / "compare.json", compare.dump());
+  return " --from compare.json";
+}
+
+TEST(BoundCommand, PromisesAFurtherFlightTheBoundOfTheRankThatConformalPredictionNames) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  std::vector<double> amplitudes;
+  for (int k = 1; k <= 19; ++k) amplitudes.push_back(0.01 * k);
+  const std::string from = compared_flights(folder, amplitudes);
+  const Json result = json_of(folder, "bound" + gains + from + " --coverage 0.9");
+  const Json& promise = result["coverage"];
+  EXPECT_EQ(promise["level"], 0.9);
+  EXPECT_EQ(promise["flights"], 19);
+  // k = ceil(0.9 * 20) = 18 of 19: Beta(18, 2), quantiles by the incomplete beta function.
+  EXPECT_NEAR(promise["interval"][0].get<double>(), 0.7736, 1e-3);
+  EXPECT_NEAR(promise["interval"][1].get<double>(), 0.9810, 1e-3);
+  // The bound of the class of the 18th flight, whose rate says nothing.
+  const Json of_class = json_of(folder, "bound" + gains + " --amplitude 0.18");
+  ASSERT_EQ(promise["bounds"].size(), of_class["bounds"].size());
+  for (std::size_t k = 0; k < promise["bounds"].size(); ++k) {
+    const double expected = of_class["bounds"][k]["total"].get<double>();
+    EXPECT_NEAR(promise["bounds"][k]["total"].get<double>(), expected, 0.01 * expected) << k;
+  }
+}
+
+TEST(BoundCommand, APromiseContainsWhatIsDeclaredBesideTheFlights) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nKp = 9\nKd = 7\nKi = 0\n");
+  const std::string from = compared_flights(folder, std::vector<double>(9, 0.01)) + " --coverage 0.9";
+  const auto total = [&](const std::string& more) {
+    return json_of(folder, "bound" + gains + from + more)["coverage"]["bounds"][0]["total"].get<double>();
+  };
+  const double alone = total("");
+  EXPECT_NEAR(total(" --bias 0.1") - alone, 0.1 / 0.034 / 9, 1e-6);
+  EXPECT_GT(total(" --velocity-error 0.1"), alone + 0.05);
+}
+
+TEST(BoundCommand, RefusesAPromiseThatTheFlightsCannotCarry) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");
+  const auto run = [&](const std::string& words) {
+    return run_shell("swarmcert bound" + gains + words, folder.path());
+  };
+  const std::string from = compared_flights(folder, std::vector<double>(8, 0.01));
+  const Outcome few = run(from + " --coverage 0.9");
+  EXPECT_EQ(few.exit_code, 3) << few.output;
+  EXPECT_NE(few.output.find("at least 9"), std::string::npos) << few.output;
+  EXPECT_EQ(run(from + " --coverage 0.8").exit_code, 0);
+  EXPECT_EQ(run(" --amplitude 1 --coverage 0.9").exit_code, 2) << "no flights";
+  EXPECT_EQ(run(from + " --coverage 1").exit_code, 2);
+  write_text(
+      folder / "compare.json",
+      R"({"schema": "swarmcert/compare/1", "learning_error": {"window_s": 4.5, "amplitude": 1, "rate": 1},
+                 "flights": [{"flight": "a"}]})");
+  EXPECT_EQ(run(" --from compare.json --coverage 0.5").exit_code, 3) << "of an older version";
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
