@@ -67,9 +67,67 @@ std::pair<double, double> battery_range(const TomlTable& vehicle) {
   return range;
 }
 
+RotorPlace read_rotor(const TomlTable& table) {
+  table.allow_only({"position_m", "spin"});
+  const std::vector<double> position = table.numbers("position_m");
+  if (position.size() != 3)
+    table.refuse("position_m", "", "must be three numbers, [x, y, z]: forward, left and up from the centre");
+  return {position[0], position[1], position[2], table.choice("spin", {"ccw", "cw"}) == 0};
+}
+
+/// rotors and, from them, arm_m; without rotors, arm_m of four in X.
+void read_rotors(const TomlTable& vehicle, Model* model) {
+  if (!vehicle.has("rotors")) {
+    model->arm_m = positive(vehicle, "arm_m");
+    return;
+  }
+  if (vehicle.has("arm_m"))
+    vehicle.refuse("arm_m", "", "stands beside rotors, which say where each rotor is",
+                   "leave one of the two out");
+  for (const TomlTable& rotor : vehicle.tables("rotors")) model->rotors.push_back(read_rotor(rotor));
+  const std::size_t count = model->rotors.size();
+  if (count < kFewestRotors || count > kMostRotors) {
+    vehicle.refuse("rotors", fmt::format("{} rotors", count),
+                   fmt::format("must be {} to {} rotors", kFewestRotors, kMostRotors));
+  }
+  // Rotors on one line through the centre of mass cannot hold an attitude.
+  double xx = 0, xy = 0, yy = 0;
+  for (const RotorPlace& rotor : model->rotors) {
+    model->arm_m += std::hypot(rotor.x_m, rotor.y_m) / static_cast<double>(count);
+    xx += rotor.x_m * rotor.x_m;
+    xy += rotor.x_m * rotor.y_m;
+    yy += rotor.y_m * rotor.y_m;
+  }
+  if (!(xx * yy - xy * xy > 1e-6 * xx * yy))
+    vehicle.refuse("rotors", "", "lie on one line: roll and pitch cannot both be controlled");
+}
+
+/// The polynomial of the load cell or, for other vehicles, the curve in newton.
+void read_thrust(const TomlTable& vehicle, Model* model) {
+  if (!vehicle.has("thrust_curve")) {
+    const TomlTable thrust = vehicle.table("thrust");
+    thrust.allow_only({"c00", "c10", "c01", "c20", "c11"});
+    model->thrust = {thrust.number("c00"), thrust.number("c10"), thrust.number("c01"), thrust.number("c20"),
+                     thrust.number("c11")};
+    return;
+  }
+  if (vehicle.has("thrust"))
+    vehicle.refuse("thrust", "", "stands beside thrust_curve, which says the same",
+                   "leave one of the two out");
+  const TomlTable curve = vehicle.table("thrust_curve");
+  curve.allow_only({"force_N"});
+  const std::vector<double> force_N = curve.numbers("force_N");
+  if (force_N.size() != 3)
+    curve.refuse("force_N", "",
+                 "must be [a, b, c]: a rotor gives a + b u + c u^2 newton at command u in 0 .. 1");
+  if (!(force_N[1] >= 0) || !(force_N[1] + 2 * force_N[2] >= 0) || !(force_N[1] + force_N[2] > 0))
+    curve.refuse("force_N", "", "does not grow with the command in 0 .. 1");
+  set_thrust_curve({force_N[0], force_N[1], force_N[2]}, *model);
+}
+
 void read_vehicle(const TomlTable& vehicle, Model* model) {
-  vehicle.allow_only(
-      {"kind", "mass_kg", "inertia_kg_m2", "arm_m", "torque_per_thrust_m", "thrust", "battery_range_V"});
+  vehicle.allow_only({"kind", "mass_kg", "inertia_kg_m2", "arm_m", "rotors", "torque_per_thrust_m", "thrust",
+                      "thrust_curve", "battery_range_V"});
   model->kind = vehicle.text("kind");
   if (model->kind.empty()) vehicle.refuse("kind", "", "is empty", "name it, e.g. \"small\"");
   model->mass_kg = positive(vehicle, "mass_kg");
@@ -78,13 +136,10 @@ void read_vehicle(const TomlTable& vehicle, Model* model) {
     vehicle.refuse("inertia_kg_m2", "", "must be three positive numbers, [Jxx, Jyy, Jzz]");
   }
   std::copy(inertia.begin(), inertia.end(), model->inertia_kg_m2.begin());
-  model->arm_m = positive(vehicle, "arm_m");
+  read_rotors(vehicle, model);
   model->torque_per_thrust_m = positive(vehicle, "torque_per_thrust_m");
   model->battery_range_V = battery_range(vehicle);
-  const TomlTable thrust = vehicle.table("thrust");
-  thrust.allow_only({"c00", "c10", "c01", "c20", "c11"});
-  model->thrust = {thrust.number("c00"), thrust.number("c10"), thrust.number("c01"), thrust.number("c20"),
-                   thrust.number("c11")};
+  read_thrust(vehicle, model);
   check_vehicle_units(vehicle, *model);
 }
 
@@ -258,6 +313,27 @@ Model parse_model(const std::string& text, const std::string& path) {
     model.effects.push_back(std::move(spec));
   }
   return model;
+}
+
+std::vector<RotorPlace> rotor_places(const Model& model) {
+  if (!model.rotors.empty()) return model.rotors;
+  const double d = model.arm_m * std::sqrt(0.5);
+  return {{d, -d, 0, true}, {-d, -d, 0, false}, {-d, d, 0, true}, {d, d, 0, false}};
+}
+
+void set_thrust_curve(const std::array<double, 3>& curve_N, Model& model) {
+  model.thrust_curve_N = curve_N;
+  model.thrust = {};
+  model.thrust.c00 = curve_N[0] / kGramForce_N;
+  model.thrust.c10 = curve_N[1] / kGramForce_N;
+  model.thrust.c20 = curve_N[2] / kGramForce_N;
+}
+
+void refuse_other_rotors(const Model& model, const std::string& what) {
+  if (model.rotors.empty()) return;
+  throw files::InputError({model.path.empty() ? model.kind : model.path, "", "vehicle.rotors",
+                           fmt::format("{} rotors", model.rotors.size()), what + " needs four rotors in X",
+                           "give arm_m in place of rotors if the vehicle is one"});
 }
 
 std::string battery_problem(const Model& model, double battery_V) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +36,18 @@ struct ThrustMap {
   /// Largest force of one rotor, in newton.
   double largest_N(double battery_V) const { return force_N(1, battery_V); }
 };
+
+/// One rotor, which pushes along the body's z axis. Body axes: x forward, y left, z up.
+struct RotorPlace {
+  double x_m = 0, y_m = 0, z_m = 0;
+  bool counterclockwise = true;  ///< seen from above; its reaction turns the body the other way
+
+  /// Yaw torque per newton of thrust, with sign, of a rotor with the ratio `torque_per_thrust_m`.
+  double yaw_m(double torque_per_thrust_m) const {
+    return counterclockwise ? -torque_per_thrust_m : torque_per_thrust_m;
+  }
+};
+inline constexpr std::size_t kFewestRotors = 3, kMostRotors = 8;
 
 /// What the logs' sensors do to the truth. Defaults: the published flights (BMI088 accelerometer behind a two-pole
 /// low-pass of 30 Hz, logged at about 100 Hz; positions from motion capture).
@@ -93,24 +106,43 @@ struct LadderRow {
   std::map<std::string, double> values;
 };
 
-/// One kind of vehicle. Invariant after read_model(): all numbers finite, mass, inertia and arm positive, every
-/// effect known and within its parameters' bounds.
+/// One kind of vehicle. Invariant after read_model(): all numbers finite, mass, inertia and arm positive, 3 to 8 rotors,
+/// every effect known and within its parameters' bounds.
 struct Model {
   std::string path;    ///< as the user gave it; empty if made in memory
   std::string sha256;  ///< of the file
   std::string kind;    ///< "small", "large", ...: which phi and rho of a network belong to it
   double mass_kg = 0;
   std::array<double, 3> inertia_kg_m2 = {0, 0, 0};  ///< diagonal, body axes x forward, y left, z up
-  double arm_m = 0;                                 ///< from the centre to each of the four rotors, in X
+  double arm_m = 0;                                 ///< from the centre to the rotors; their mean distance
   double torque_per_thrust_m = 0;                   ///< yaw torque of a rotor per newton of its thrust
   std::pair<double, double> battery_range_V = kOneCell_V;  ///< voltages at which the vehicle can be
   ThrustMap thrust;
+  /// Force of one rotor at command u in [0, 1], whatever the voltage: a + b u + c u^2, in newton. Where a file states it,
+  /// `thrust` is the same polynomial in gram-force.
+  std::optional<std::array<double, 3>> thrust_curve_N;
+  /// In the order of the motors in logs. Empty: four rotors in X at `arm_m`, in the order of a Crazyflie's motors.
+  std::vector<RotorPlace> rotors;
   SensorModel sensor;
   std::vector<EffectSpec> effects;
   std::vector<LadderRow> ladder;  ///< empty where effects were not fitted step by step
 
   double weight_N() const { return mass_kg * kGravity_m_s2; }
+  std::size_t num_rotors() const { return rotors.empty() ? 4 : rotors.size(); }
+  /// Of all rotors together.
+  double largest_thrust_N(double battery_V) const {
+    return static_cast<double>(num_rotors()) * thrust.largest_N(battery_V);
+  }
 };
+
+/// Where the rotors are: Model::rotors or, where that is empty, four in X: front right, back right, back left, front left.
+std::vector<RotorPlace> rotor_places(const Model& model);
+
+/// Sets `thrust_curve_N` and the `thrust` that is the same.
+void set_thrust_curve(const std::array<double, 3>& curve_N, Model& model);
+
+/// @throws files::InputError where the rotors are not four in X, which `what` needs.
+void refuse_other_rotors(const Model& model, const std::string& what);
 
 /// Reads a model file.
 /// @throws files::InputError with line, key, value and mend; unknown keys, effects and parameters get a did-you-mean.

@@ -112,6 +112,24 @@ std::string row_text(const LadderRow& row) {
   return text;
 }
 
+std::string rotors_text(const Model& model) {
+  if (model.rotors.empty()) return "";
+  std::string text = "rotors = [  # forward, left and up from the centre; spin seen from above\n";
+  for (const RotorPlace& rotor : model.rotors) {
+    text += "  { position_m = [" + number(rotor.x_m) + ", " + number(rotor.y_m) + ", " + number(rotor.z_m) +
+            "], spin = " + (rotor.counterclockwise ? "\"ccw\"" : "\"cw\"") + " },\n";
+  }
+  return text + "]\n";
+}
+
+std::string thrust_text(const Model& model) {
+  if (model.thrust_curve_N)
+    return "\n[vehicle.thrust_curve]\nforce_N = [" + joined(*model.thrust_curve_N, number) + "]\n";
+  const ThrustMap& map = model.thrust;
+  return "\n[vehicle.thrust]\nc00 = " + number(map.c00) + "\nc10 = " + number(map.c10) +
+         "\nc01 = " + number(map.c01) + "\nc20 = " + number(map.c20) + "\nc11 = " + number(map.c11) + "\n";
+}
+
 }  // namespace
 
 std::string to_toml(const EffectSpec& effect) { return effect_text(effect).substr(1); }
@@ -123,16 +141,13 @@ std::string to_toml(const Model& model, const std::vector<std::string>& comments
   text += "kind = " + quoted(model.kind) + "\n";
   text += "mass_kg = " + number(model.mass_kg) + "\n";
   text += "inertia_kg_m2 = [" + joined(model.inertia_kg_m2, number) + "]\n";
-  text += "arm_m = " + number(model.arm_m) + "\n";
+  if (model.rotors.empty()) text += "arm_m = " + number(model.arm_m) + "\n";
   text += "torque_per_thrust_m = " + number(model.torque_per_thrust_m) + "\n";
   if (model.battery_range_V != kOneCell_V) {
     text += "battery_range_V = [" + number(model.battery_range_V.first) + ", " +
             number(model.battery_range_V.second) + "]\n";
   }
-  const ThrustMap& map = model.thrust;
-  text += "\n[vehicle.thrust]\n";
-  text += "c00 = " + number(map.c00) + "\nc10 = " + number(map.c10) + "\nc01 = " + number(map.c01) +
-          "\nc20 = " + number(map.c20) + "\nc11 = " + number(map.c11) + "\n";
+  text += rotors_text(model) + thrust_text(model);
   const SensorModel& sensor = model.sensor;
   text += "\n[sensor]\n";
   text += "accelerometer_cutoff_hz = " + number(sensor.accelerometer_cutoff_hz) + "\n";

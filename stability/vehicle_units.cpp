@@ -26,27 +26,36 @@ bool fits_arm(double gyration_to_arm) { return gyration_to_arm > 0.05 && gyratio
 
 /// Where the rotors do not lift the vehicle: the mass if it is one in gram, else the thrust map.
 void check_lift(const files::TomlTable& vehicle, const Model& model) {
-  const double lift_N = 4 * model.thrust.largest_N(kFullBattery_V);
+  const double lift_N = model.largest_thrust_N(kFullBattery_V);
+  const std::string rotors = fmt::format("{} rotors", model.num_rotors());
   const double mass_kg = model.mass_kg;
   const std::string mass = fmt::format("{:g}", mass_kg);
   if (lift_N > kLargestThrustToWeight * model.weight_N()) {
     vehicle.refuse("mass_kg", mass,
-                   fmt::format("weighs {:.3g} N, and four rotors give {:.3g} N, {:.3g} times as much",
-                               model.weight_N(), lift_N, lift_N / model.weight_N()),
-                   "mass is in kg and the thrust polynomial in gram-force: correct the one that is not");
+                   fmt::format("weighs {:.3g} N, and {} give {:.3g} N, {:.3g} times as much",
+                               model.weight_N(), rotors, lift_N, lift_N / model.weight_N()),
+                   fmt::format("mass is in kg and {}: correct the one that is not",
+                               model.thrust_curve_N ? "thrust_curve.force_N in newton"
+                                                    : "the thrust polynomial in gram-force"));
   }
   if (lift_N > model.weight_N()) return;
   const bool lifts_gram = lift_N > model.weight_N() / 1000;
   if (lifts_gram && !fits_arm(gyration_to_arm(model, mass_kg)) &&
       fits_arm(gyration_to_arm(model, mass_kg / 1000))) {
     vehicle.refuse("mass_kg", mass,
-                   fmt::format("weighs {:.4g} N, and four rotors lift {:.3g} N; gram were probably meant",
-                               model.weight_N(), lift_N),
+                   fmt::format("weighs {:.4g} N, and {} lift {:.3g} N; gram were probably meant",
+                               model.weight_N(), rotors, lift_N),
                    fmt::format("mass is in kg: {:g} g are {:g}", mass_kg, mass_kg / 1000));
+  }
+  if (model.thrust_curve_N) {
+    vehicle.refuse("thrust_curve", "",
+                   fmt::format("{} give {:.4g} N at full command, and the vehicle weighs {:.4g} N", rotors,
+                               lift_N, model.weight_N()),
+                   "force_N is of one rotor, in newton, for a command of 0 .. 1");
   }
   vehicle.refuse(
       "thrust", "",
-      fmt::format("four rotors give {:.4g} N at 4.2 V, and the vehicle weighs {:.4g} N", lift_N,
+      fmt::format("{} give {:.4g} N at 4.2 V, and the vehicle weighs {:.4g} N", rotors, lift_N,
                   model.weight_N()),
       "the polynomial is in gram-force (not newton) of p = PWM / 65536 (not percent or counts) and "
       "v = V / 4.2");
@@ -55,7 +64,7 @@ void check_lift(const files::TomlTable& vehicle, const Model& model) {
 void check_arm(const files::TomlTable& vehicle, const Model& model) {
   if (model.arm_m <= kLongestArm_m) return;
   vehicle.refuse(
-      "arm_m", fmt::format("{:g}", model.arm_m),
+      model.rotors.empty() ? "arm_m" : "rotors", fmt::format("{:g}", model.arm_m),
       fmt::format("means that the rotors are at {:g} m from the centre; millimetres were probably meant",
                   model.arm_m),
       fmt::format("it is in m, from the centre to a rotor: {:g} mm are {:g}", model.arm_m,

@@ -3,9 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "analysis/identification/draft_geometry.h"
 #include "analysis/logs/flight_story.h"
+#include "analysis/logs/plausibility.h"
 #include "analysis/logs/read_log.h"
 #include "nn/base/input_error.h"
 
@@ -40,6 +43,10 @@ struct LogFit {
   logs::ThrustSource thrust = logs::ThrustSource::kNone;
   std::vector<double> mass_kg;  ///< thrust over specific force along the thrust axis, per block of 2 s
   double hover_command = 0, delay_s = NAN;
+  std::size_t motors = 0;  ///< whose commands the log has; 0: it has duties, or a force
+  int motor_power = 1;
+  double least_V = INFINITY, most_V = 0;  ///< of the battery in the air
+  std::map<std::string, double> parameters;
 };
 
 /// Thrust over specific force along the thrust axis, means over blocks in the air: the mass, if the thrust is right.
@@ -48,6 +55,9 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
   result.path = log.path;
   result.thrust = log.signals.thrust;
   result.hover_command = log.hover_command;
+  result.motors = static_cast<std::size_t>(log.signals.motor_commands);
+  result.motor_power = log.motor_power;
+  result.parameters = log.parameters;
   for (const logs::SignalDelay& delay : log.delays) {
     if (delay.signal == "specific_force" && delay.against == "thrust") result.delay_s = delay.delay_s;
   }
@@ -60,6 +70,10 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
   for (std::size_t i = 0; i < log.samples.size(); ++i) {
     if (air[i] == 0) continue;
     const logs::Sample& s = log.samples[i];
+    if (s.battery_V > 0) {
+      result.least_V = std::min(result.least_V, s.battery_V);
+      result.most_V = std::max(result.most_V, s.battery_V);
+    }
     const auto R = logs::rotation(s);
     if (R[2][2] < 0.7) continue;
     if (1e-6 * s.time_us - start_s > kDraftBlock_s) {
@@ -106,27 +120,82 @@ void scale_body(const stability::Model& base, ModelDraft& draft) {
         {fmt::format("inertia_{}_kg_m2", kAxes[k]), model.inertia_kg_m2[k], false, 0, 0, source});
 }
 
-/// Motors whose command at hover is known: force proportional to the command, in a model of four rotors.
-void set_linear_thrust(double hover_command, ModelDraft& draft) {
-  stability::ThrustMap& map = draft.model.thrust;
-  map = {};
-  map.c10 = draft.model.weight_N() / 4 / hover_command / stability::kGramForce_N;
-  draft.parameters.push_back({"thrust.c10", map.c10, false, 0, 0,
-                              "fit: force proportional to the command, the weight at the hover command"});
+/// Rotors and their thrust from logs with the commands of the motors: the weight at the hover command.
+void set_motors(const LogFit& log, double hover_command, ModelDraft& draft) {
+  stability::Model& model = draft.model;
+  const DraftedGeometry geometry = geometry_of(log.parameters, log.motors, model.arm_m);
+  model.rotors = geometry.rotors;
+  const auto add = [&draft](const std::string& name, double value, const std::string& source) {
+    draft.parameters.push_back({name, value, false, 0, 0, source});
+  };
+  for (std::size_t k = 0; k < model.rotors.size(); ++k) {
+    const stability::RotorPlace& rotor = model.rotors[k];
+    const std::string name = fmt::format("rotors[{}].", k + 1);
+    add(name + "x_m", rotor.x_m, geometry.source);
+    add(name + "y_m", rotor.y_m, geometry.source);
+    add(name + "spin", rotor.counterclockwise ? 1 : -1, geometry.source + "; 1: ccw, -1: cw");
+  }
+  if (geometry.torque_per_thrust_m > 0) {
+    model.torque_per_thrust_m = geometry.torque_per_thrust_m;
+    for (DraftedParameter& p : draft.parameters) {
+      if (p.name == "torque_per_thrust_m")
+        p = {p.name, model.torque_per_thrust_m, false, 0, 0, "log parameters CA_ROTOR*_KM"};
+    }
+  }
+  const double each_N = model.weight_N() / static_cast<double>(log.motors);
+  std::array<double, 3> curve_N{};
+  curve_N[static_cast<std::size_t>(log.motor_power)] = each_N / std::pow(hover_command, log.motor_power);
+  set_thrust_curve(curve_N, model);
+  const std::string law = log.motor_power == 2 ? "the square of the command" : "the command";
+  add(fmt::format("thrust_curve.force_N[{}]", log.motor_power),
+      curve_N[static_cast<std::size_t>(log.motor_power)],
+      fmt::format("fit: force proportional to {}, the weight at the hover command", law));
+  for (const char* stated : {"MPC_THR_HOVER", "MOT_THST_HOVER"}) {
+    const auto found = log.parameters.find(stated);
+    if (found != log.parameters.end())
+      add(stated, found->second, "log parameter, for comparison with hover_command");
+  }
+}
+
+/// A battery of several cells needs its range; a fifth of room below what was flown, a tenth above.
+void set_battery_range(const std::vector<LogFit>& fits, ModelDraft& draft) {
+  double least_V = INFINITY, most_V = 0;
+  for (const LogFit& log : fits) {
+    least_V = std::min(least_V, log.least_V);
+    most_V = std::max(most_V, log.most_V);
+  }
+  auto& range = draft.model.battery_range_V;
+  if (!(most_V > 0) || (least_V >= range.first && most_V <= range.second)) return;
+  range = {0.8 * least_V, 1.1 * most_V};
+  const std::string source = "log: what was flown, with room for a fifth less and a tenth more";
+  draft.parameters.push_back({"battery_range_V.least", range.first, false, 0, 0, source});
+  draft.parameters.push_back({"battery_range_V.most", range.second, false, 0, 0, source});
+}
+
+/// Why a log is damaged or implausible; empty where it is neither.
+std::string why_not_trusted(const logs::Log& log) {
+  if (!logs::is_sound(log.health)) return "damaged: " + logs::findings(log.health).front();
+  for (const logs::Doubt& doubt : logs::doubts_of(log)) {
+    if (doubt.refuses_force) return "implausible: " + doubt.words;
+  }
+  return "";
 }
 
 std::vector<LogFit> fits_of(const residuals::FoundFlights& found, const logs::SignalMap& map,
-                            const stability::Model& base, ModelDraft& draft) {
+                            const stability::Model& base, bool keep, ModelDraft& draft) {
   std::vector<LogFit> fits;
   for (const residuals::FlightFiles& flight : found.flights) {
     for (const auto& [vehicle, path] : flight.logs) {
       try {
         const logs::Log log = logs::read_log(path, map);
         const logs::FlightStory story = logs::tell(log);
+        const std::string doubt = keep ? "" : why_not_trusted(log);
         if (!story.no_flight.empty()) {
           draft.problems.push_back(path + ": no flight: " + story.no_flight);
         } else if (!log.signals.force) {
           draft.problems.push_back(path + ": the log lacks " + log.signals.force_lacks);
+        } else if (!doubt.empty()) {
+          draft.problems.push_back(path + ": " + doubt + " (--keep takes it)");
         } else {
           fits.push_back(fit(log, base));
         }
@@ -141,7 +210,7 @@ std::vector<LogFit> fits_of(const residuals::FoundFlights& found, const logs::Si
 }  // namespace
 
 ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalMap& map,
-                       const std::map<std::string, double>& masses_kg, double mass_kg,
+                       const std::map<std::string, double>& masses_kg, double mass_kg, bool keep,
                        const stability::Model& base) {
   ModelDraft draft;
   draft.model = base;
@@ -149,12 +218,20 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
   draft.model.kind = "draft";
   draft.model.effects.clear();
   draft.model.ladder.clear();
-  const std::vector<LogFit> fits = fits_of(found, map, base, draft);
+  const std::vector<LogFit> fits = fits_of(found, map, base, keep, draft);
+  const LogFit* motors = nullptr;  // the first log with commands in place of forces
   std::vector<double> carried_kg, ratios, delays_s, hover;
   for (const LogFit& log : fits) {
     if (std::isfinite(log.delay_s) && log.delay_s >= 0) delays_s.push_back(log.delay_s);
     if (log.thrust == logs::ThrustSource::kHoverMultiple) {
-      hover.push_back(log.hover_command);
+      if (!motors) motors = &log;
+      if (log.motors == motors->motors && log.motor_power == motors->motor_power)
+        hover.push_back(log.hover_command);
+      else
+        draft.problems.push_back(fmt::format(
+            "{}: {} motors whose thrust grows with power {} of the command; {} "
+            "has {} and {}",
+            log.path, log.motors, log.motor_power, motors->path, motors->motors, motors->motor_power));
       continue;
     }
     if (log.mass_kg.empty()) continue;
@@ -198,7 +275,17 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
     const Estimate command = estimate(hover);
     draft.parameters.push_back({"hover_command", command.value, hover.size() > 1, command.lower,
                                 command.upper, "fit: mean motor command that carries the weight"});
-    set_linear_thrust(command.value, draft);
+    if (motors->motors > 0) {
+      set_motors(*motors, command.value, draft);
+    } else {
+      // Rotor speeds, or a collective command of any unit: no command of 0 .. 1 of each motor.
+      const double each_N = draft.model.weight_N() / 4;
+      const bool is_share = command.value < 1;
+      set_thrust_curve({0, each_N / (is_share ? command.value : 0.5), 0}, draft.model);
+      draft.parameters.push_back({"thrust_curve.force_N[1]", (*draft.model.thrust_curve_N)[1], false, 0, 0,
+                                  is_share ? "assumption: four rotors, force proportional to the command"
+                                           : "assumption: four rotors that give twice the weight"});
+    }
   } else {
     const char* const kKeys[] = {"c00", "c10", "c01", "c20", "c11"};
     const double values[] = {base.thrust.c00, base.thrust.c10, base.thrust.c01, base.thrust.c20,
@@ -207,6 +294,7 @@ ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalM
       draft.parameters.push_back({fmt::format("thrust.{}", kKeys[k]), values[k], false, 0, 0,
                                   "assumption: load cell, " + base.kind});
   }
+  set_battery_range(fits, draft);
   if (ratio.count > 0) {
     stability::EffectSpec effect;
     effect.name = "thrust_ratio";

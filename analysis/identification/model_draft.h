@@ -29,10 +29,11 @@ struct ModelDraft {
 /// @param masses_kg  by path, from flights.toml; empty where none is known.
 /// @param mass_kg  of the vehicle; 0: not known. Then the mass is what the thrust carries if the thrust map, or the
 ///   controller's own scale, is right; without either, 1 kg.
+/// @param keep  damaged and implausible logs are used all the same.
 /// @param base  gives the thrust map of duties and what no log says, scaled to the mass.
 /// @throws files::InputError if no log has a force and a flight.
 ModelDraft draft_model(const residuals::FoundFlights& found, const logs::SignalMap& map,
-                       const std::map<std::string, double>& masses_kg, double mass_kg,
+                       const std::map<std::string, double>& masses_kg, double mass_kg, bool keep,
                        const stability::Model& base);
 
 }  // namespace swarmcert::identification

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/logs/limit_cycles.h"
 #include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
@@ -104,53 +105,6 @@ void add_runs(const Log& log, const std::string& kind, double shortest_s, const 
   close();
 }
 
-/// Oscillation of the attitude in flight: within windows of 1.5 s the roll or pitch rate is large and keeps one frequency.
-void add_limit_cycles(const Log& log, const std::vector<char>& air, std::vector<LogEvent>& events) {
-  constexpr double kWindow_s = 1.5, kLeast_rad_s = 1.2, kLeastCorrelation = 0.7;
-  if (!log.signals.rates || log.samples.size() < 100) return;
-  std::vector<char> cycling(log.samples.size(), 0);
-  std::size_t first = 0;
-  while (first < log.samples.size()) {
-    std::size_t end = first + 1;
-    while (end < log.samples.size() && !log.samples[end].restarts &&
-           seconds(log, end) - seconds(log, first) < kWindow_s)
-      ++end;
-    const std::size_t n = end - first;
-    const double length_s = seconds(log, end - 1) - seconds(log, first);
-    const bool flies =
-        std::all_of(air.begin() + static_cast<std::ptrdiff_t>(first),
-                    air.begin() + static_cast<std::ptrdiff_t>(end), [](char a) { return a != 0; });
-    for (std::size_t axis = 0; axis < 2 && flies && length_s > 0.9 * kWindow_s; ++axis) {
-      std::vector<double> rate(n);
-      double mean = 0, energy = 0;
-      for (std::size_t i = 0; i < n; ++i)
-        mean += log.samples[first + i].rates_rad_s[axis] / static_cast<double>(n);
-      for (std::size_t i = 0; i < n; ++i) {
-        rate[i] = log.samples[first + i].rates_rad_s[axis] - mean;
-        energy += rate[i] * rate[i];
-      }
-      if (std::sqrt(energy / static_cast<double>(n)) < kLeast_rad_s) continue;
-      // The autocorrelation of an oscillation comes back after a period; that of a manoeuvre does not.
-      double best = 0;
-      bool fell = false;
-      for (std::size_t lag = 1; lag < n / 2; ++lag) {
-        double product = 0;
-        for (std::size_t i = 0; i + lag < n; ++i) product += rate[i] * rate[i + lag];
-        const double correlation = product / energy * static_cast<double>(n) / static_cast<double>(n - lag);
-        fell = fell || correlation < 0;
-        if (fell) best = std::max(best, correlation);
-      }
-      if (best > kLeastCorrelation)
-        std::fill(cycling.begin() + static_cast<std::ptrdiff_t>(first),
-                  cycling.begin() + static_cast<std::ptrdiff_t>(end), 1);
-    }
-    first = end;
-  }
-  add_runs(
-      log, "limit cycle", 0, "roll or pitch rate keeps one frequency",
-      [&](std::size_t i) { return cycling[i] != 0; }, events);
-}
-
 void add_events(const Log& log, const std::vector<char>& air, FlightStory& story) {
   constexpr double kImpact_m_s2 = 3 * kGravity_m_s2;
   story.events = log.events;
@@ -182,7 +136,7 @@ void add_events(const Log& log, const std::vector<char>& air, FlightStory& story
         },
         story.events);
   }
-  add_limit_cycles(log, air, story.events);
+  for (LogEvent& cycle : limit_cycles(log, air)) story.events.push_back(std::move(cycle));
   std::stable_sort(story.events.begin(), story.events.end(),
                    [](const LogEvent& a, const LogEvent& b) { return a.time_s < b.time_s; });
 }

@@ -2,8 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
+#include "analysis/logs/absolute_time.h"
 #include "analysis/logs/angles.h"
 #include "analysis/logs/message_frames.h"
 #include "analysis/logs/statistics_of_series.h"
@@ -13,7 +17,44 @@ namespace swarmcert::logs {
 namespace {
 
 using Source = SignalInfo::Source;
-constexpr double kAbsoluteClock_s = 1e8;  ///< clocks beyond it count from 1970, or from a receiver's epoch
+
+/// "cf1" of "/cf1/pose"; empty for topics without a name space.
+std::string name_space(const std::string& topic) {
+  const std::size_t end = topic.find('/', 1);
+  return topic.empty() || topic[0] != '/' || end == std::string::npos ? "" : topic.substr(1, end - 1);
+}
+
+/// A bag may hold several vehicles, "/cf1/pose" beside "/cf2/pose": of these, only the topics of the first are kept.
+void keep_one_vehicle(RawLog& raw, Log& log) {
+  std::map<std::string, std::vector<std::string>>
+      spaces;  // by the rest of the topic's name, in the order of the file
+  for (const RawTopic& topic : raw.topics) {
+    const std::string space = name_space(topic.name);
+    if (space.empty()) continue;
+    std::vector<std::string>& of_rest = spaces[topic.name.substr(space.size() + 1)];
+    if (std::find(of_rest.begin(), of_rest.end(), space) == of_rest.end()) of_rest.push_back(space);
+  }
+  std::set<std::string> others;
+  std::string first;
+  for (const RawTopic& topic : raw.topics) {
+    const std::string space = name_space(topic.name);
+    if (space.empty() || !first.empty()) continue;
+    const std::vector<std::string>& all = spaces[topic.name.substr(space.size() + 1)];
+    if (all.size() < 2) continue;
+    first = space;
+  }
+  for (const auto& [rest, all] : spaces) {
+    if (all.size() > 1) others.insert(all.begin(), all.end());
+  }
+  others.erase(first);
+  if (others.empty()) return;
+  const auto is_other = [&](const RawTopic& topic) { return others.count(name_space(topic.name)) != 0; };
+  raw.topics.erase(std::remove_if(raw.topics.begin(), raw.topics.end(), is_other), raw.topics.end());
+  std::string names;
+  for (const std::string& other : others) names += (names.empty() ? "" : ", ") + other;
+  log.interpretation.push_back("the file holds several vehicles: " + first + " is taken, not " + names +
+                               "; one file of each vehicle makes them one flight");
+}
 
 /// A signal of the table or, where it has none, `otherwise`.
 double value_of(const SignalTable& table, int signal, std::size_t record, double otherwise) {
@@ -37,6 +78,8 @@ Sample sample_of(const SignalTable& t, std::size_t i, const Signals& signals) {
     sample.motor_force_N[at] = value_of(t, kMotorForce + k, i, kNaN);
   }
   if (signals.force) sample.specific_force_m_s2 = three(kForceWorld, 0);
+  for (int k = 0; k < signals.motor_commands; ++k)
+    sample.motor_command[static_cast<std::size_t>(k)] = static_cast<float>(t[kMotorCommand + k][i]);
   if (signals.thrust != ThrustSource::kDuty) sample.given_thrust = value_of(t, kThrust, i, 0);
   sample.battery_V = value_of(t, kBattery, i, 0);
   sample.rates_rad_s = three(kRates, kNaN);
@@ -57,9 +100,14 @@ void refuse_without_motion(const Draft& draft) {
                            "log it, or say in a columns.toml (--columns) which column does"});
 }
 
-/// Clocks that count from 1970 start at zero; what was taken off stands in Log::epoch_s.
-void take_epoch_off(SignalTable& table, Log& log) {
-  if (table.time_us.empty() || table.time_us.front() * 1e-6 < kAbsoluteClock_s) return;
+/// Clocks that count from 1970 start at zero; what was taken off stands in Log::epoch_s. Others keep their start, and a
+/// receiver may know when that was.
+void take_epoch_off(const RawLog& raw, SignalTable& table, Log& log) {
+  if (table.time_us.empty()) return;
+  if (table.time_us.front() * 1e-6 < kAbsoluteClock_s) {
+    log.epoch_s = std::max(0.0, receiver_offset_s(raw));
+    return;
+  }
   log.epoch_s = std::floor(table.time_us.front() * 1e-6);
   for (double& time_us : table.time_us) time_us -= 1e6 * log.epoch_s;
 }
@@ -117,19 +165,24 @@ void Draft::add(const std::string& name, SignalInfo::Source source, const std::s
 }
 
 void Draft::add_measured(const std::string& name, int signal) const {
-  std::string from, unit;
+  std::string from, unit, topic;
   double rate_hz = 0;
+  const bool is_four = signal == kAttitude || signal == kDuty || signal == kMotorForce ||
+                       signal == kRequested || signal == kRotorSpeed;
+  const int width = signal == kMotorCommand ? 8 : is_four ? 4 : 3;
   // A columns.toml names every axis by itself.
   for (const Carried& carried : recognition.groups) {
     const bool belongs = carried.signal == signal ||
                          (recognition.groups.size() > 1 && carried.size() == 1 && carried.signal > signal &&
-                          carried.signal < signal + 3 && signal != kBattery && signal != kPackedAttitude);
+                          carried.signal < signal + width && signal != kBattery && signal != kPackedAttitude);
     if (!belongs) continue;
-    from += (from.empty() ? "" : ", ") + names_of(raw, carried);
+    const RawTopic& carrier = raw.topics[carried.topic];
+    from += from.empty() ? "" : ", ";
+    if (raw.topics.size() > 1 && !carrier.name.empty() && carrier.name != topic) from += carrier.name + ": ";
+    topic = carrier.name;
+    from += names_of(raw, carried);
     unit = carried.unit;
-    rate_hz = rate_hz_of(raw.topics[carried.topic]);
-    if (raw.topics.size() > 1 && !raw.topics[carried.topic].name.empty())
-      from = raw.topics[carried.topic].name + ": " + from;
+    rate_hz = rate_hz_of(carrier);
   }
   log.sources.push_back({name, Source::kMeasured, from, unit, rate_hz, kNaN});
 }
@@ -155,7 +208,8 @@ void settle_judgement(Draft& draft) {
   signals.commands = t.has_group(kMotorForce, 4) && t.has(kThrust) && t.has_group(kTorque, 3);
   signals.rates = t.has_group(kRates, 3);
   // Torques need the thrust of each rotor; their dynamics alias below the rate of the attitude loop.
-  const bool each_rotor = t.has_group(kDuty, 4) || t.has_group(kRotorSpeed, 4) || t.has_group(kRequested, 4);
+  const bool each_rotor = t.has_group(kDuty, 4) || t.has_group(kRotorSpeed, 4) ||
+                          t.has_group(kRequested, 4) || signals.motor_commands > 0;
   signals.torque = !each_rotor                                                 ? TorqueUse::kNone
                    : signals.rates && t.step_s() > 0 && t.step_s() < 1 / 400.0 ? TorqueUse::kDynamic
                                                                                : TorqueUse::kMean;
@@ -167,6 +221,8 @@ Log interpret(RawLog raw, const SignalMap& map) {
   log.format = raw.format;
   log.health = raw.health;
   log.armed = was_armed(raw);
+  log.parameters = raw.parameters;
+  keep_one_vehicle(raw, log);
   for (const RawTopic& topic : raw.topics) {
     for (const RawColumn& column : topic.columns) log.channels.push_back(column.name);
   }
@@ -176,7 +232,7 @@ Log interpret(RawLog raw, const SignalMap& map) {
   for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);
   refuse_without_motion(draft);
   drop_bad_quaternions(draft);
-  take_epoch_off(draft.table, log);
+  take_epoch_off(raw, draft.table, log);
   for (RawTopic& topic : raw.topics) {
     for (RawColumn& column : topic.columns) column.values = {};  // they stand in the table now
   }

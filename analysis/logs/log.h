@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,8 @@ struct Sample {
   Vector torque_command_Nm{};  ///< B
   /// Total thrust where it does not come from the duties: Signals::thrust says in what unit.
   double given_thrust = 0;
+  /// Normalised command of each of Signals::motor_commands motors, 0 .. 1.
+  std::array<float, 8> motor_command{};
   bool restarts = false;  ///< first record, or more than kLongestGap_s after the one before
 };
 
@@ -70,6 +73,8 @@ struct Signals {
   std::string force_lacks;           ///< which signals are missing for that, in words; empty where `force`
   std::array<bool, 3> force_axes{};  ///< axes of W along which a force can be judged
   ThrustSource thrust = ThrustSource::kNone;
+  int motor_commands =
+      0;  ///< motors whose normalised commands gave `thrust`; 0: it comes from something else
   ForceSource specific_force = ForceSource::kNone;
   TorqueUse torque = TorqueUse::kNone;
   bool position = false;  ///< all three axes
@@ -131,9 +136,13 @@ struct Log {
       interpretation;  ///< what was decided from the data rather than from names, and why
   /// Mean command of a motor that carries the weight, where Signals::thrust is kHoverMultiple; else NaN.
   double hover_command = std::numeric_limits<double>::quiet_NaN();
+  /// The thrust of a motor grows with this power of its command, 1 or 2; where Signals::motor_commands is not 0.
+  int motor_power = 1;
+  std::map<std::string, double>
+      parameters;       ///< of the vehicle, as the log starts, by their names in the file
   double window_s = 0;  ///< of the derivative behind a derived specific force
   Armed armed = Armed::kUnknown;
-  double epoch_s = 0;  ///< add to Sample::time_us to get the file's own clock, where that is absolute
+  double epoch_s = 0;  ///< plus Sample::time_us is the time since 1970; 0: not known
   LogHealth health;
   std::vector<std::string> channels;  ///< as the file names them
   std::vector<Sample> samples;

@@ -7,6 +7,7 @@
 #include <regex>
 #include <sstream>
 
+#include "analysis/logs/absolute_time.h"
 #include "analysis/logs/byte_window.h"
 #include "analysis/logs/collector.h"
 #include "analysis/logs/formats/formats.h"
@@ -155,6 +156,11 @@ bool is_flight_table(const std::string& path) {
 std::pair<double, double> time_span_s(const std::string& path) {
   constexpr std::streamoff kEnd_bytes = 16384;
   try {
+    std::ifstream whole(path, std::ios::binary);
+    const Format kind = kind_of(whole);
+    if (kind == Format::kUsd || kind == Format::kUsdEvents)
+      return {0, 0};  // their clocks start with the vehicle
+    if (kind != Format::kCsv || format_of_file(path) != nullptr) return absolute_span_s(read_raw(path));
     const auto [head, tail] = ends_of(path, kEnd_bytes);
     std::istringstream in(head.substr(0, head.rfind('\n') + 1) + tail);
     RawLog log;

@@ -90,6 +90,10 @@ void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, c
   given = is_square ? square : linear;
   for (double& value : given) value /= scale.hover;
   draft.log.signals.thrust = ThrustSource::kHoverMultiple;
+  if (rotors.first == kMotorCommand) {
+    draft.log.signals.motor_commands = rotors.count;
+    draft.log.motor_power = is_square ? 2 : 1;
+  }
   draft.add("thrust", Source::kDerived,
             fmt::format("{} of {} over the value that carries the weight, at a mean command of {:.4g}", what,
                         rotors.from, draft.log.hover_command),

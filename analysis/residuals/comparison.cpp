@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "analysis/residuals/force_unit.h"
 #include "analysis/residuals/track_part.h"
 #include "nn/base/parallel.h"
 
@@ -57,7 +58,7 @@ Trajectories trajectories(const std::vector<TrackPart>& parts, bool has_gains) {
   return all;
 }
 
-std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts) {
+std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts, const ForceUnit& unit) {
   std::vector<RegionErrors> regions;
   double all_squares = 0;
   for (const TrackPart& part : parts) {
@@ -83,11 +84,11 @@ std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts) {
       const Axes& bias = region.statistics.bias;
       region.share =
           all_squares > 0 ? static_cast<double>(r[k].size()) * bias.total * bias.total / all_squares : 0;
-      region.words = fmt::format("{}: {:+.2f} gf", region_name(variable, region.region),
-                                 bias.z / stability::kGramForce_N);
+      region.words = fmt::format("{}: {:+.2f} {}", region_name(variable, region.region), bias.z / unit.size_N,
+                                 unit.name);
       if (std::hypot(bias.x, bias.y) > std::abs(bias.z)) {
         region.words +=
-            fmt::format(" up, {:.2f} gf sideways", std::hypot(bias.x, bias.y) / stability::kGramForce_N);
+            fmt::format(" up, {:.2f} {} sideways", std::hypot(bias.x, bias.y) / unit.size_N, unit.name);
       }
       regions.push_back(std::move(region));
     }
@@ -158,7 +159,7 @@ Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, con
   for (const auto& [name, members] : vehicles) result.vehicles[name] = errors_of(members);
   for (const auto& [name, members] : kinds) result.kinds[name] = errors_of(members);
   for (const auto& [name, members] : compositions) result.compositions[name] = errors_of(members);
-  result.regions = regions_of_all(parts);
+  result.regions = regions_of_all(parts, force_unit(inputs));
   sort_and_shorten(result.moments);
   std::vector<Eigen::Vector4d> bias;
   std::vector<ErrorWindow> windows;

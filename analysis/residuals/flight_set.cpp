@@ -129,16 +129,18 @@ double overlap(const std::pair<double, double>& a, const std::pair<double, doubl
   return common / std::min(a.second - a.first, b.second - b.first);
 }
 
-/// CSV files of one folder that were recorded at the same time on a common clock are one flight.
+/// Logs of one folder that were recorded at the same time on a common clock are one flight.
 void group_by_clock(std::vector<FoundLog>& logs) {
   constexpr double kAbsolute_s = 1e8;
+  std::map<fs::path, int> in_folder;
+  for (const FoundLog& log : logs) ++in_folder[fs::path(log.path).parent_path()];
   struct Timed {
     std::size_t index;
     std::pair<double, double> span_s;
   };
   std::vector<Timed> timed;
   for (std::size_t i = 0; i < logs.size(); ++i) {
-    if (logs[i].why != "one file" || !logs[i].csv) continue;
+    if (logs[i].why != "one file" || in_folder[fs::path(logs[i].path).parent_path()] < 2) continue;
     const auto span_s = logs::time_span_s(logs[i].path);
     if (!(span_s.first > kAbsolute_s) || !(span_s.second > span_s.first)) continue;
     for (const Timed& other : timed) {

@@ -34,17 +34,28 @@ void pass_stage(const stability::AppliedEffect& stage, Track& track) {
 
 bool is_stage(const std::string& effect) { return effect == "delay" || effect == "motor_lag"; }
 
+/// The model says what its motors give at the commands of the log, which are those of as many motors.
+bool knows_motors(const stability::Model& model, const Track& track) {
+  return model.thrust_curve_N && static_cast<std::size_t>(track.motor_commands) == model.num_rotors();
+}
+
 /// Before the model's lags: duties through the thrust map, or what the log says of the thrust.
 double commanded_thrust_N(const stability::Model& model, const Track& track, std::size_t record) {
   switch (track.thrust_source) {
     case logs::ThrustSource::kForce:
       return track.given_thrust[record];
     case logs::ThrustSource::kHoverMultiple:
-      return track.given_thrust[record] * model.weight_N();
+      if (!knows_motors(model, track)) return track.given_thrust[record] * model.weight_N();
+      break;
     default:
       break;
   }
   double thrust_N = 0;
+  if (track.thrust_source == logs::ThrustSource::kHoverMultiple) {
+    for (std::size_t k = 0; k < model.num_rotors(); ++k)
+      thrust_N += model.thrust.force_N(track.motor_command[record][k], stability::kFullBattery_V);
+    return thrust_N;
+  }
   for (const double duty : track.duty[record])
     thrust_N += model.thrust.force_N(duty, track.instants[record].battery_V);
   return thrust_N;

@@ -1,5 +1,7 @@
 #include "analysis/residuals/inputs.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <set>
@@ -88,6 +90,7 @@ Inputs read_inputs(const InputArguments& arguments) {
     inputs.log_rules = read_log_rules(arguments.fleet);
     inputs.named_files.push_back(arguments.fleet);
   }
+  inputs.words = arguments.flights;
   inputs.found = find_flights(arguments.flights, inputs.log_rules);
   for (const std::string& path : arguments.models) {
     inputs.models.push_back(stability::read_model(path));
@@ -181,6 +184,12 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
   for (Track& track : tracks) {
     if (track.position_only) continue;
     const stability::Model model = model_for(track);
+    if (track.thrust_source == logs::ThrustSource::kDuty && model.num_rotors() != 4 && !rules.per_mass) {
+      problems.push_back(fmt::format("{}: the log has the duties of 4 motors, and {} has {} rotors",
+                                     track.path, model.path, model.num_rotors()));
+      track.position_only = true;
+      continue;
+    }
     apply_model(model, kinds, rules, track);
     cut_large_forces(model, rules, track);
     cut_impacts(model, rules, track);

@@ -33,6 +33,7 @@ struct Inputs {
   std::map<std::string, stability::Model> vehicle_models;
   Kinds kinds;
   Fleet fleet;
+  std::vector<std::string> words;  ///< files and folders of flights, as the user named them
   FoundFlights found;
   LogRules log_rules;
   /// What `[log]` rules give single logs, by path: a model, a mass, gains.

@@ -9,6 +9,7 @@ namespace {
 std::size_t bytes_of(const logs::Log& log) {
   std::size_t bytes = sizeof log + log.samples.capacity() * sizeof(logs::Sample);
   for (const std::string& channel : log.channels) bytes += sizeof channel + channel.capacity();
+  for (const auto& [name, value] : log.parameters) bytes += sizeof value + sizeof name + name.capacity();
   return bytes;
 }
 

@@ -13,7 +13,7 @@ constexpr double kBefore_s = 0.1, kAfter_s = 0.3;
 /// Largest specific force of a flight, in m/s^2.
 double largest_specific_force(const stability::Model& model, double battery_V) {
   constexpr double kMargin = 1.25, kLeast_m_s2 = 2 * stability::kGravity_m_s2;
-  return std::max(kMargin * 4 * model.thrust.largest_N(battery_V) / model.mass_kg, kLeast_m_s2);
+  return std::max(kMargin * model.largest_thrust_N(battery_V) / model.mass_kg, kLeast_m_s2);
 }
 
 bool leaps(const stability::Model& model, const Track& track, std::size_t i) {

@@ -11,22 +11,47 @@
 namespace swarmcert::residuals {
 namespace {
 
-/// Rotors: front right, back right, back left, front left; the first turns the body clockwise seen from above.
-Eigen::Vector3d rotor_torque_Nm(const stability::Model& model, const std::array<double, 4>& duty,
-                                double battery_V) {
-  double f[4];
-  for (std::size_t r = 0; r < 4; ++r) f[r] = model.thrust.force_N(duty[r], battery_V);
-  const double offset_m = model.arm_m * std::sqrt(0.5);
-  return {offset_m * (f[2] + f[3] - f[0] - f[1]), offset_m * (f[1] + f[2] - f[0] - f[3]),
-          model.torque_per_thrust_m * (f[1] + f[3] - f[0] - f[2])};
+/// Why the log does not say the force of each of the model's rotors; empty where it does.
+std::string why_no_rotor_forces(const stability::Model& model, const Track& track) {
+  const bool by_duty = track.thrust_source == logs::ThrustSource::kDuty;
+  const std::size_t motors = by_duty ? 4 : static_cast<std::size_t>(track.motor_commands);
+  if (motors == 0) return "the log has neither duty nor command of each motor";
+  if (motors == model.num_rotors()) return "";
+  return fmt::format("the log has {} motors and the model {} rotors", motors, model.num_rotors());
+}
+
+/// Of the rotors at `record`. Precondition: why_no_rotor_forces() is empty.
+Eigen::Vector3d rotor_torque_Nm(const stability::Model& model,
+                                const std::vector<stability::RotorPlace>& rotors, const Track& track,
+                                std::size_t record) {
+  const bool by_duty = track.thrust_source == logs::ThrustSource::kDuty;
+  const double battery_V = track.instants[record].battery_V;
+  double shares = 0;
+  const auto share = [&](std::size_t k) {
+    return std::pow(track.motor_command[record][k], track.motor_power);
+  };
+  for (std::size_t k = 0; k < rotors.size() && !by_duty; ++k) shares += share(k);
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < rotors.size(); ++k) {
+    double force_N = 0;
+    if (by_duty)
+      force_N = model.thrust.force_N(track.duty[record][k], battery_V);
+    else if (model.thrust_curve_N)
+      force_N = model.thrust.force_N(track.motor_command[record][k], battery_V);
+    else if (shares > 0)
+      force_N = track.given_thrust[record] * model.weight_N() * share(k) / shares;
+    torque +=
+        force_N * Eigen::Vector3d(rotors[k].y_m, -rotors[k].x_m, rotors[k].yaw_m(model.torque_per_thrust_m));
+  }
+  return torque;
 }
 
 /// Of the rotors, behind the model's motor lag, and of its effects.
 std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model, const Kinds& kinds,
                                                   const Track& track) {
   std::vector<Eigen::Vector3d> torque(track.instants.size());
-  for (std::size_t i = 0; i < torque.size(); ++i)
-    torque[i] = rotor_torque_Nm(model, track.duty[i], track.instants[i].battery_V);
+  const std::vector<stability::RotorPlace> rotors = rotor_places(model);
+  for (std::size_t i = 0; i < torque.size(); ++i) torque[i] = rotor_torque_Nm(model, rotors, track, i);
   const stability::EffectContext context = {model.kind, kinds.names, model.path};
   const auto add = [&](const stability::EffectSpec& spec) {
     const stability::AppliedEffect effect(spec, context);
@@ -55,10 +80,8 @@ std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model,
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track) {
   TorqueResidual residual;
   const std::size_t n = track.instants.size();
-  if (track.thrust_source != logs::ThrustSource::kDuty) {
-    residual.refused = "the log has no duty of each motor";
-    return residual;
-  }
+  residual.refused = why_no_rotor_forces(model, track);
+  if (!residual.refused.empty()) return residual;
   if (!track.has_rates || n < 3) {
     residual.refused = n < 3 ? "the log is empty" : "the log has no angular rates";
     return residual;
@@ -91,12 +114,13 @@ namespace {
 
 /// Means over slow flight, where the torques of the rotors should cancel.
 void add_mean(const stability::Model& model, const Track& track, TorqueErrors& errors) {
-  if (track.thrust_source != logs::ThrustSource::kDuty) return;
+  if (!why_no_rotor_forces(model, track).empty()) return;
+  const std::vector<stability::RotorPlace> rotors = rotor_places(model);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     const stability::Instant& now = track.instants[i];
     if (track.cut[i] != Cut::kNone || now.v_W_m_s.norm() > TorqueErrors::kSlow_m_s) continue;
-    sum -= rotor_torque_Nm(model, track.duty[i], now.battery_V);
+    sum -= rotor_torque_Nm(model, rotors, track, i);
     ++errors.slow_records;
   }
   if (errors.slow_records == 0) return;

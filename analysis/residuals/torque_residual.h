@@ -22,7 +22,7 @@ struct TorqueResidual {
       torque_B_Nm;  ///< one per record, NaN where omega' is unknown; empty where refused
 };
 
-/// tau_u: thrust map of the rotors' duties, arm, torque per thrust, behind the model's motor lag; tau_a: the torque of
+/// tau_u: forces of the rotors by duty and thrust map, or by the motors' commands, at the places of the rotors, behind the model's motor lag; tau_a: the torque of
 /// the model's effects. omega' is the central difference over three records; tau_u and tau_a are averaged over the same.
 /// @throws files::InputError where an effect of the model cannot be made.
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track);

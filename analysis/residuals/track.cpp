@@ -15,12 +15,16 @@ namespace {
 
 constexpr double kCrashTiltCosine = 0.5;  // 60 degrees
 constexpr double kBeforeCrash_s = 0.3;
-constexpr double kLeastDuty = 0.8;
+constexpr double kLeastDuty = 0.8, kLeastDutyShare = 0.5;  // of what is common in a log
 constexpr double kSettle_s = 0.15;
 constexpr double kLeastShare = 0.3;  // of the thrust that is common in a log
 constexpr double kAboveStanding_m = 0.02, kUsualWithin_m = 0.03;
 
-double contact_height_m(const std::string& kind) { return kind == "large" ? 0.085 : 0.07; }
+/// Where the published vehicles stand; NaN for others, whose logs have to show it.
+double contact_height_m(const std::string& kind) {
+  if (kind == "large") return 0.085;
+  return kind == "small" ? 0.07 : std::numeric_limits<double>::quiet_NaN();
+}
 
 Eigen::Vector3d vector(const logs::Vector& v) { return {v[0], v[1], v[2]}; }
 
@@ -106,6 +110,7 @@ void fill_instants(Track& track, const logs::Log& log) {
     track.specific_force_m_s2[i] = vector(s.specific_force_m_s2);
     track.restarts[i] = s.restarts ? 1 : 0;
     if (track.thrust_source != logs::ThrustSource::kDuty) track.given_thrust.push_back(s.given_thrust);
+    if (track.motor_commands > 0) track.motor_command.push_back(s.motor_command);
     if (log.signals.targets)
       track.targets.push_back(
           {vector(s.target_position_m), vector(s.target_velocity_m_s), Eigen::Vector3d::Zero()});
@@ -129,18 +134,17 @@ void derive_specific_force(Track& track) {
 /// Whether the rotors carry next to nothing, per record.
 std::vector<char> rotors_idle(const Track& track) {
   std::vector<char> idle(track.instants.size(), 0);
-  if (track.thrust_source == logs::ThrustSource::kDuty) {
-    for (std::size_t i = 0; i < idle.size(); ++i) {
-      const auto& d = track.duty[i];
-      idle[i] = d[0] + d[1] + d[2] + d[3] < kLeastDuty ? 1 : 0;
-    }
-    return idle;
+  const bool by_duty = track.thrust_source == logs::ThrustSource::kDuty;
+  std::vector<double> thrust = track.given_thrust;
+  if (by_duty) {
+    for (const auto& d : track.duty) thrust.push_back(d[0] + d[1] + d[2] + d[3]);
   }
-  std::vector<double> sorted = track.given_thrust;
-  if (sorted.empty()) return idle;
+  if (thrust.empty()) return idle;
+  std::vector<double> sorted = thrust;
   const auto high = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 3 / 4);
   std::nth_element(sorted.begin(), high, sorted.end());
-  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = track.given_thrust[i] < kLeastShare * *high ? 1 : 0;
+  const double least = by_duty ? std::min(kLeastDuty, kLeastDutyShare * *high) : kLeastShare * *high;
+  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = thrust[i] < least ? 1 : 0;
   return idle;
 }
 
@@ -171,9 +175,9 @@ void cut_phases(Track& track, const CutRules& rules) {
     if (track.restarts[i] != 0)
       settled_s = now.time_s + (derived ? std::max(kSettle_s, 1.5 * track.window_s) : kSettle_s);
     // A height at which the vehicle stood counts where it is not the usual one within a few centimetres.
-    const double usual_m = contact_height_m(track.kind);
-    const bool stood_elsewhere = std::abs(standing_m[i] + kAboveStanding_m - usual_m) > kUsualWithin_m;
-    const double contact_m = stood_elsewhere ? standing_m[i] + kAboveStanding_m : usual_m;
+    const double usual_m = contact_height_m(track.kind), stood_m = standing_m[i] + kAboveStanding_m;
+    const bool is_usual = std::isfinite(usual_m) && !(std::abs(stood_m - usual_m) > kUsualWithin_m);
+    const double contact_m = is_usual ? usual_m : stood_m;
     Cut& cut = track.cut[i];
     if (now.time_s >= crash_s)
       cut = Cut::kCrash;
@@ -187,6 +191,12 @@ void cut_phases(Track& track, const CutRules& rules) {
     if (derived && (cut == Cut::kNotFlying || cut == Cut::kContact))
       settled_s = std::max(settled_s, now.time_s + track.window_s);
   }
+}
+
+std::string words_of(const std::vector<std::string>& findings) {
+  std::string words;
+  for (const std::string& finding : findings) words += (words.empty() ? "" : "; ") + finding;
+  return words;
 }
 
 struct LoadedLog {
@@ -232,8 +242,12 @@ const char* rule(Cut cut) {
   static const char* const kRules[] = {
       "everything else",
       "from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end of the log",
-      "the four duties add up to less than 0.8: rotors off or idle, outside the thrust calibration",
-      "at or below 0.07 m (large: 0.085 m), where a vehicle stands on the ground",
+      "the duties add up to less than 0.8 (where that is less: to less than half, thrust of other sources to "
+      "less "
+      "than 0.3 of what is common in the log): rotors off or idle, outside the thrust calibration",
+      "at or below 2 cm above the height at which the vehicle stood with idle rotors (kind small: 0.07 m, "
+      "large: "
+      "0.085 m)",
       "within 0.15 s after the start and after a gap of more than 30 ms: filters have no past",
       "the position of a neighbour is unknown: its log has a gap, has not begun or has ended",
       "published filter only: |f_a,z| of 50 gf or more",
@@ -280,13 +294,20 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
       problems.push_back(path + ": only a neighbour: the log lacks " + log.signals.force_lacks);
     track.doubts = logs::doubts_of(log);
     for (const logs::Doubt& doubt : track.doubts) {
-      if (!doubt.refuses_force || track.position_only) continue;
+      if (!doubt.refuses_force || track.position_only || rules.keep) continue;
       track.position_only = true;
       problems.push_back(path + ": " + doubt.words);
+    }
+    if (rules.fits && !rules.keep && !track.position_only && !logs::is_sound(log.health)) {
+      track.position_only = true;
+      problems.push_back(path + ": left out, the log is damaged: " + words_of(logs::findings(log.health)) +
+                         " (--keep takes it)");
     }
     track.has_rates = log.signals.rates;
     track.has_height = log.signals.position;
     track.thrust_source = log.signals.thrust;
+    track.motor_commands = log.signals.motor_commands;
+    track.motor_power = log.motor_power;
     track.force_source = log.signals.specific_force;
     track.window_s = log.window_s;
     track.torque_use = log.signals.torque;
@@ -295,7 +316,11 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     track.health = log.health;
     onsets.push_back(onsets_s(log));
     track.has_reference_clock = all.empty();
-    if (!rules.published && !all.empty())
+    track.has_absolute_clock =
+        !rules.published && !all.empty() && log.epoch_s > 0 && all.front().log->epoch_s > 0;
+    if (track.has_absolute_clock)
+      track.clock_offset_s = all.front().log->epoch_s - log.epoch_s;
+    else if (!rules.published && !all.empty())
       track.clock_offset_s = clock_offset_s(onsets[0], onsets.back(), &track.clock_onsets);
     tracks.push_back(std::move(track));
     all.push_back({std::move(read), tracks.size() - 1});

@@ -19,10 +19,10 @@ namespace swarmcert::residuals {
 /// Why a record is not used. The first that applies, in this order.
 enum class Cut : unsigned char {
   kNone,
-  kCrash,      ///< from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end
-  kNotFlying,  ///< the sum of the four duties is below 0.8: rotors off or idle, outside the thrust calibration
-  kContact,    ///< at or below the height where the vehicle stands (0.07 m; large 0.085 m)
-  kSettling,   ///< within 0.15 s after the start or after a gap in the log: filters have no past
+  kCrash,       ///< from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end
+  kNotFlying,   ///< rotors off or idle, outside the thrust calibration; see rule()
+  kContact,     ///< at or below the height where the vehicle stands
+  kSettling,    ///< within 0.15 s after the start or after a gap in the log: filters have no past
   kNeighbour,   ///< a neighbour's position is unknown: its log has a gap, has not begun or has ended
   kLargeForce,  ///< only with CutRules::published
   kImpact,  ///< about a record that no flight has, see cut_impacts(): collisions, touch-down, wrapped integers
@@ -42,6 +42,10 @@ struct CutRules {
   bool published_signals = false;
   /// Impacts are not cut. Set with --published-signals: the authors' labels keep them.
   bool keep_impacts = false;
+  /// Damaged logs are only neighbours: what is fitted to flights must not rest on them.
+  bool fits = false;
+  /// Damaged and implausible logs are judged and fitted all the same.
+  bool keep = false;
 
   /// No model is known: the thrust of every log is taken in multiples of its hover thrust.
   bool per_mass = false;
@@ -65,9 +69,13 @@ struct Track {
   double clock_offset_s = 0;         ///< of this log's clock against the first vehicle's
   int clock_onsets = 0;              ///< how many common starts of a trajectory gave it; 0: not estimated
   bool has_reference_clock = false;  ///< the first log of its flight
+  bool has_absolute_clock = false;   ///< the offset is the difference of two absolute clocks
   std::vector<stability::Instant> instants;  ///< thrust_N and mass_kg are set by apply_model()
   std::vector<stability::Neighbour> neighbours;
   std::vector<std::array<double, 4>> duty;
+  /// logs::Sample::motor_command of `motor_commands` motors, with their power; empty where that is 0.
+  std::vector<std::array<float, 8>> motor_command;
+  int motor_commands = 0, motor_power = 1;
   std::vector<double> given_thrust;  ///< logs::Sample::given_thrust; empty where thrust_source is kDuty
   std::vector<Eigen::Vector3d> specific_force_m_s2;
   std::vector<stability::Setpoint> targets;  ///< empty where the log has no set points; no accelerations

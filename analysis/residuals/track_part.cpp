@@ -136,6 +136,7 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   errors.clock_offset_s = track.clock_offset_s;
   errors.clock_onsets = track.clock_onsets;
   errors.has_reference_clock = track.has_reference_clock;
+  errors.has_absolute_clock = track.has_absolute_clock;
   errors.findings = logs::findings(track.health);
   errors.doubts = track.doubts;
   errors.is_sound = logs::is_sound(track.health);
@@ -159,6 +160,8 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
     ++errors.cut[static_cast<std::size_t>(track.cut[i])];
     if (track.cut[i] != Cut::kNone) continue;
     const stability::Instant& now = track.instants[i];
+    if (i > 0 && track.cut[i - 1] == Cut::kNone && track.restarts[i] == 0)
+      errors.used_s += now.time_s - track.instants[i - 1].time_s;
     ResidualPoint point{r[i].cast<float>(), r0[i].cast<float>(), {}};
     regions_of(now, now.time_s - track.instants.front().time_s, point.regions);
     part.points.push_back(point);
@@ -179,12 +182,18 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   result.moments = moments_of(track, r);
   sort_and_shorten(result.moments);
   errors.errors = errors_of({&part});
-  errors.torque = torque_errors(model, inputs.kinds, track);
+  if (inputs.rules.per_mass)
+    errors.torque.refused =
+        "no model says where the rotors are: name one ('swarmcert model draft' writes it)";
+  else
+    errors.torque = torque_errors(model, inputs.kinds, track);
   const auto of_log = inputs.log_gains.find(track.path);
   const stability::Gains* const own_gains =
       of_log != inputs.log_gains.end() ? &of_log->second : gains_of(gains, track.kind);
   if (track.thrust_source != logs::ThrustSource::kDuty) {
     errors.trajectory.refused = "the log has no duty of each motor";
+  } else if (!model.rotors.empty()) {
+    errors.trajectory.refused = "simulation needs four rotors in X";
   } else if (own_gains == nullptr) {
     errors.trajectory.refused = "no gains.toml for vehicles of kind " + track.kind;
   } else {

@@ -11,7 +11,7 @@ TrackingSetup load_tracking_setup(const std::string& gains, const std::string& m
   result.gains = load_gains(gains);
   result.model = read_model(model);
   result.plant.mass_kg = result.model.mass_kg;
-  result.plant.largest_thrust_N = 4 * result.model.thrust.largest_N(battery_V);
+  result.plant.largest_thrust_N = result.model.largest_thrust_N(battery_V);
   for (const EffectSpec& effect : result.model.effects) {
     if (effect.is_expression()) continue;
     const auto first = [&](bool shape) {

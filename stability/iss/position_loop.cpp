@@ -21,7 +21,7 @@ PositionLoop::PositionLoop(const Gains& gains, const Model& model)
       mass_kg_(model.mass_kg),
       motor_s_(gains.motor_lag_s),
       attitude_s_(gains.attitude_lag_s),
-      largest_N_(4 * model.thrust.largest_N(kFullBattery_V)) {
+      largest_N_(model.largest_thrust_N(kFullBattery_V)) {
   if (gains.composite) {
     // f_d = m v_r' - K s: -(m Lambda^2 + 2 K Lambda) p~ - (2 m Lambda + K) v - K Lambda^2 I.
     const Eigen::Matrix3d lambda = matrix_of(gains.composite->Lambda), k = matrix_of(gains.composite->K);

@@ -21,6 +21,7 @@ controller::Matrix3<Scalar> matrix(const Matrix3& m) {
 template <typename Scalar, typename Position>
 void fill(const Gains& gains, const Model& model, double attitude_step_s,
           controller::FlightSettings<Scalar, Position>* settings) {
+  refuse_other_rotors(model, "the controller's mixing");
   settings->mass_kg = static_cast<Scalar>(model.mass_kg);
   settings->inertia_kg_m2 = diagonal(vector<Scalar>(model.inertia_kg_m2));
   const double step_s = attitude_step_s > 0 ? gains.integrator_step_s : 0;

@@ -45,6 +45,7 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
   batches_.resize(models_.size());
   for (std::size_t i = 0; i < models_.size(); ++i) {
     const Model& model = models_[i];
+    refuse_other_rotors(model, "simulation");
     Kind& kind = kinds_[i];
     kind.mass_kg = model.mass_kg;
     kind.offset_m = model.arm_m * std::sqrt(0.5);

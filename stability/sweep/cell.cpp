@@ -41,7 +41,7 @@ Variant variant_of(const Grid& grid, const std::vector<double>& values) {
     if (name == "vehicles") v.neighbours = std::max(0.0, value - 1);
   }
   if (v.gains.rate_hz > 0 && !own_step) v.gains.integrator_step_s = 1 / v.gains.rate_hz;
-  v.plant.largest_thrust_N = v.plant.thrust_scale * 4 * grid.model.thrust.largest_N(battery_V);
+  v.plant.largest_thrust_N = v.plant.thrust_scale * grid.model.largest_thrust_N(battery_V);
   // Firmware commands forces with the mass it was told: another mass scales what its gains do.
   v.plant.thrust_scale *= grid.model.mass_kg / v.plant.mass_kg;
   return v;

@@ -139,7 +139,7 @@ std::string parameter_problem(const Grid& grid, const std::string& name, double 
   if (name == "battery_V") return battery_problem(grid.model, value);
   if (name == "rate_hz" && (value < kLeast_hz || value > kLargest_hz))
     return fmt::format("{:g} Hz is no rate of a loop; it is in hertz: 100 Hz are 100", value);
-  const double lifted_kg = 4 * grid.model.thrust.largest_N(kFullBattery_V) / kGravity_m_s2;
+  const double lifted_kg = grid.model.largest_thrust_N(kFullBattery_V) / kGravity_m_s2;
   if (name == "mass_kg" && value > 100 * lifted_kg)
     return fmt::format("{:g} kg, and the rotors lift {:.3g} kg; it is in kg: {:g} g are {:g}", value,
                        lifted_kg, value, value / 1000);

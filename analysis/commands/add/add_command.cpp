@@ -105,7 +105,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   if (options.flights.words.empty()) throw UsageError("add needs flights: name logs or folders of them");
   refuse_to_replace(common, options.output);
   if (options.flights.models.size() != 1) throw UsageError("add takes one --model");
-  const residuals::Inputs inputs = read_flights(options.flights);
+  const residuals::Inputs inputs = read_flights(options.flights, false, false, true);
   identification::LadderOptions what;
   what.automatic = options.effects == "auto";
   if (!what.automatic) {

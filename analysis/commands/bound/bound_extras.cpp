@@ -76,9 +76,10 @@ UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string
       plant.delay_s = range;
     } else if (name == "battery" && range.from > 0) {
       // Thrust at the PWM that hovers with a full battery, without compensation.
-      const double hover = input.model.thrust.pwm(input.model.weight_N() / 4, kFullBattery_V);
+      const auto rotors = static_cast<double>(input.model.num_rotors());
+      const double hover = input.model.thrust.pwm(input.model.weight_N() / rotors, kFullBattery_V);
       const auto ratio = [&](double v) {
-        return input.model.thrust.force_N(hover, v) * 4 / input.model.weight_N();
+        return input.model.thrust.force_N(hover, v) * rotors / input.model.weight_N();
       };
       const double a = ratio(range.from);
       const double b = ratio(range.to);

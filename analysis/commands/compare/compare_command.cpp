@@ -67,7 +67,7 @@ identification::Budget budget_of(const CompareOptions& options, const residuals:
     if (std::filesystem::path(word).extension() == ".toml") words.words.push_back(word);
   }
   words.words.insert(words.words.end(), options.budget.begin(), options.budget.end());
-  residuals::Inputs fit = read_flights(words, true);
+  residuals::Inputs fit = read_flights(words, true, false, true);
   std::set<std::filesystem::path> judged;
   for (const residuals::FlightFiles& flight : inputs.found.flights) {
     for (const auto& [vehicle, log] : flight.logs) judged.insert(std::filesystem::weakly_canonical(log));
@@ -210,7 +210,8 @@ Command compare_command() {
       "compare", "Compare a model with flights: force residuals, and where the model fails",
       "Records on the ground, after a crash, with rotors off, after gaps and without a known neighbour are "
       "cut;\n"
-      "the result counts them. Forces are in newton in the JSON, in gram-force on the terminal.\n\n"
+      "the result counts them. Forces are in newton in the JSON, on the terminal in gram-force for vehicles "
+      "below 1 N, else in newton.\n\n"
       "Example: swarmcert compare stability/models/crazyflie-small.toml flights/ --report out\n"
       "         swarmcert compare flights/ --network network.toml --published-filter\n"
       "         swarmcert compare test/ --budget development/ --network network.toml\n"

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "analysis/commands/compare/log_output.h"
+#include "analysis/commands/shared/collection_table.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/plausibility_output.h"
+#include "analysis/residuals/force_unit.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -157,6 +160,36 @@ files::Json json_of(const residuals::TorqueErrors& torque) {
           {"max", json_of(torque.max_Nm)}};
 }
 
+/// What became of every log: axes with records that were compared.
+std::vector<LogOutcome> outcomes_of(const Comparison& comparison, const residuals::Inputs& inputs) {
+  std::map<std::string, const residuals::TrackErrors*> tracks;
+  for (const residuals::TrackErrors& track : comparison.tracks) tracks[track.path] = &track;
+  std::vector<LogOutcome> outcomes;
+  for (const residuals::FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) {
+      LogOutcome outcome;
+      outcome.path = path;
+      const auto found = tracks.find(path);
+      outcome.opened = found != tracks.end();
+      const bool is_used = outcome.opened && found->second->errors.statistics.samples > 0;
+      if (!outcome.opened)
+        outcome.left_out_why = "unreadable";
+      else if (found->second->position_only)
+        outcome.left_out_why = "only a neighbour";
+      else if (!is_used)
+        outcome.left_out_why = "no usable record";
+      for (int k = 0; k < 3 && is_used; ++k) outcome.force[k] = found->second->judged[k] != 0;
+      if (is_used) {
+        const residuals::TorqueErrors& torque = found->second->torque;
+        outcome.torque = torque.refused.empty() || torque.slow_records > 0;
+        outcome.seconds = found->second->used_s;
+      }
+      outcomes.push_back(outcome);
+    }
+  }
+  return outcomes;
+}
+
 /// How many logs have a torque residual; where none has, why.
 files::Json torque_json(const Comparison& comparison) {
   std::size_t tracks = 0;
@@ -173,6 +206,9 @@ void print_torque(const Comparison& comparison) {
   const files::Json summary = torque_json(comparison);
   if (summary.contains("refused")) {
     fmt::print("Torque residual refused: {}.\n", summary["refused"].get<std::string>());
+    const auto slow = std::count_if(comparison.tracks.begin(), comparison.tracks.end(),
+                                    [](const auto& track) { return track.torque.slow_records > 0; });
+    if (slow > 0) fmt::print("Mean torque in slow flight: {} logs, flights[].torque in the JSON.\n", slow);
     return;
   }
   for (const residuals::TrackErrors& track : comparison.tracks) {
@@ -184,20 +220,21 @@ void print_torque(const Comparison& comparison) {
 }
 
 files::Json json_of(const residuals::TrackErrors& track) {
-  files::Json json = {{"flight", track.flight},
-                      {"scenario", track.scenario},
-                      {"vehicle", track.vehicle},
-                      {"kind", track.kind},
-                      {"composition", track.composition},
-                      {"file", track.path},
-                      {"position_only", track.position_only},
-                      {"clock", clock_of(track)},
-                      {"clock_offset_s", !track.has_reference_clock && track.clock_onsets == 0
-                                             ? files::Json(nullptr)
-                                             : files::Json(track.clock_offset_s)},
-                      {"clock_onsets", track.clock_onsets},
-                      {"findings", track.findings},
-                      {"plausibility", analysis::json_of(track.doubts)}};
+  files::Json json = {
+      {"flight", track.flight},
+      {"scenario", track.scenario},
+      {"vehicle", track.vehicle},
+      {"kind", track.kind},
+      {"composition", track.composition},
+      {"file", track.path},
+      {"position_only", track.position_only},
+      {"clock", clock_of(track)},
+      {"clock_offset_s", !track.has_reference_clock && !track.has_absolute_clock && track.clock_onsets == 0
+                             ? files::Json(nullptr)
+                             : files::Json(track.clock_offset_s)},
+      {"clock_onsets", track.clock_onsets},
+      {"findings", track.findings},
+      {"plausibility", analysis::json_of(track.doubts)}};
   files::Json& records = json["records"] = files::Json::object();
   for (std::size_t k = 0; k < track.cut.size(); ++k)
     records[residuals::name(static_cast<residuals::Cut>(k))] = track.cut[k];
@@ -234,7 +271,8 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
   json["vehicles"] = groups(comparison.vehicles);
   json["kinds"] = groups(comparison.kinds);
   json["compositions"] = groups(comparison.compositions);
-  json["mean_square_z_gf2"] = mean_squares_gf2(comparison);
+  json["mean_square_z_gf2"] =
+      inputs.rules.per_mass ? files::Json(nullptr) : files::Json(mean_squares_gf2(comparison));
   json["regions"] = files::Json::array();
   for (const residuals::RegionErrors& region : comparison.regions) {
     files::Json entry = {{"variable", residuals::variable_name(region.variable)},
@@ -274,6 +312,8 @@ void add_comparison(const Comparison& comparison, const residuals::Inputs& input
       blank_axes(json[key], comparison.judged);
   }
   json["problems"] = comparison.problems;
+  const std::vector<CollectionRow> rows = collection_rows(inputs.words, outcomes_of(comparison, inputs));
+  if (!rows.empty()) json["collections"] = json_of(rows);
   json["left_out"] = inputs.found.left_out;
   json["skipped_files"] = inputs.found.skipped;
 }
@@ -310,28 +350,24 @@ void print_trajectories(const residuals::Trajectories& all) {
   line("share of tracks that replay covers", ratio.coverage, 1);
 }
 
-void print_compositions(const Comparison& comparison, const Comparison* own) {
-  fmt::print("\n{:<28}{:>9}{:>16}{}\n", "Kinds: neighbours 2 vehicle", "records", "z, mean [gf^2]",
-             own != nullptr ? "   with own filter" : "");
+void print_compositions(const Comparison& comparison, const Comparison* own,
+                        const residuals::ForceUnit& unit) {
+  fmt::print("\n{:<28}{:>9}{:>16}{}\n", "Kinds: neighbours 2 vehicle", "records",
+             fmt::format("z, mean [{}^2]", unit.name), own != nullptr ? "   with own filter" : "");
   for (const auto& [name, group] : comparison.compositions) {
     fmt::print("{:<28}{:>9}{:>16.2f}", name, group.statistics.samples,
-               std::pow(group.statistics.rmse.z / stability::kGramForce_N, 2));
+               std::pow(group.statistics.rmse.z / unit.size_N, 2));
     if (own != nullptr) {
       const auto same = own->compositions.find(name);
       if (same != own->compositions.end())
-        fmt::print("{:>18.2f}", std::pow(same->second.statistics.rmse.z / stability::kGramForce_N, 2));
+        fmt::print("{:>18.2f}", std::pow(same->second.statistics.rmse.z / unit.size_N, 2));
     }
     fmt::print("\n");
   }
 }
 
-/// In what forces are printed.
-struct Unit {
-  const char* name;
-  double size_N;
-};
-
-void print_errors(const Comparison& comparison, const Comparison* own, const Unit& unit) {
+void print_errors(const Comparison& comparison, const Comparison* own, const residuals::ForceUnit& unit,
+                  bool per_mass) {
   print_torque(comparison);
   fmt::print("\n");
   fmt::print("{:<28}{:>9}{:>22}{:>22}{:>10}{:>9}\n", "", "records", fmt::format("RMSE x y z [{}]", unit.name),
@@ -348,10 +384,10 @@ void print_errors(const Comparison& comparison, const Comparison* own, const Uni
   for (const auto& [name, errors] : comparison.scenarios) line(name, errors);
   for (const auto& [name, errors] : comparison.vehicles) line(name, errors);
   line("all", comparison.overall);
-  print_compositions(comparison, own);
+  if (!per_mass || comparison.compositions.size() > 1) print_compositions(comparison, own, unit);
   const auto& interval = comparison.overall.rmse_interval;
   fmt::print("\nRMSE of all: {:.4f} {}, 90 % interval {:.4f} .. {:.4f}; {:.1f} % of the weight.\n",
-             comparison.overall.statistics.rmse.total, unit.size_N == 1 ? unit.name : "N", interval[3].lower,
+             comparison.overall.statistics.rmse.total, per_mass ? unit.name : "N", interval[3].lower,
              interval[3].upper, 100 * comparison.overall.nrmse.total);
   fmt::print("\nWhere it fails most:\n");
   for (std::size_t i = 0; i < comparison.regions.size() && i < 8; ++i) {
@@ -371,7 +407,7 @@ void print_errors(const Comparison& comparison, const Comparison* own, const Uni
 void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
   for (const stability::Model& model : inputs.models) {
     if (inputs.rules.per_mass) break;
-    fmt::print("Model {}: {}, {:.1f} g, {} effects\n", model.path, model.kind, 1000 * model.mass_kg,
+    fmt::print("Model {}: {}, {}, {} effects\n", model.path, model.kind, residuals::mass_text(model.mass_kg),
                model.effects.size());
   }
   fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
@@ -381,13 +417,15 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
         "so that "
         "the mean vertical force says nothing.\n");
   print_cuts(comparison);
-  const Unit unit = inputs.rules.per_mass ? Unit{"m/s^2", 1} : Unit{"gf", stability::kGramForce_N};
-  if (comparison.overall.statistics.samples > 0) print_errors(comparison, own, unit);
+  if (comparison.overall.statistics.samples > 0)
+    print_errors(comparison, own, residuals::force_unit(inputs), inputs.rules.per_mass);
   for (const std::string& left_out : inputs.found.left_out) fmt::print("left out: {}\n", left_out);
   print_doubts(comparison);
   for (const std::string& problem : comparison.problems) fmt::print("not judged: {}\n", problem);
   if (!inputs.found.skipped.empty())
     fmt::print("{} files are no logs and were skipped\n", inputs.found.skipped.size());
+  const std::vector<CollectionRow> rows = collection_rows(inputs.words, outcomes_of(comparison, inputs));
+  if (rows.size() > 1) print_collections(rows, "of the records that were compared");
 }
 
 }  // namespace swarmcert::analysis

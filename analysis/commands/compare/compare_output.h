@@ -13,7 +13,7 @@ void add_comparison(const residuals::Comparison& comparison, const residuals::In
 /// Mean square of the vertical residual by composition, in gf^2: the unit in which the networks were published.
 files::Json mean_squares_gf2(const residuals::Comparison& comparison);
 
-/// Text for people, in gram-force.
+/// Text for people, in residuals::force_unit().
 /// @param own the same flights with this project's own cuts and filters; nullptr where they are those of `comparison`.
 void print_comparison(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
                       const residuals::Comparison* own);

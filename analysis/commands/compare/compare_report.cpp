@@ -9,14 +9,21 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
+#include "analysis/residuals/force_unit.h"
 
 namespace swarmcert::analysis {
 namespace {
 
-std::string gf(double newton) { return fmt::format("{:.2f}", newton / stability::kGramForce_N); }
+using residuals::ForceUnit;
 
-std::vector<std::string> row(const std::string& name, const residuals::GroupErrors& group) {
+std::string in_unit(double newton, const ForceUnit& unit) {
+  return fmt::format("{:.2f}", newton / unit.size_N);
+}
+
+std::vector<std::string> row(const std::string& name, const residuals::GroupErrors& group,
+                             const ForceUnit& unit) {
   const residuals::ErrorStatistics& s = group.statistics;
+  const auto gf = [&unit](double newton) { return in_unit(newton, unit); };
   return {name,
           std::to_string(s.samples),
           gf(s.rmse.x),
@@ -48,7 +55,7 @@ const std::vector<std::string> kHeader = {"",
 
 /// Mean and spread of the vertical residual over the ranges of one variable.
 void add_region_plot(Report& report, const residuals::Comparison& comparison, int variable,
-                     const std::string& unit) {
+                     const std::string& variable_unit, const ForceUnit& unit) {
   std::vector<const residuals::RegionErrors*> regions;
   for (const residuals::RegionErrors& region : comparison.regions) {
     if (region.variable == variable) regions.push_back(&region);
@@ -60,20 +67,20 @@ void add_region_plot(Report& report, const residuals::Comparison& comparison, in
   for (const residuals::RegionErrors* region : regions) {
     const residuals::ErrorStatistics& s = region->statistics;
     data += fmt::format("{} {} {}\n", residuals::region_middle(variable, region->region),
-                        s.bias.z / stability::kGramForce_N, s.rmse.z / stability::kGramForce_N);
+                        s.bias.z / unit.size_N, s.rmse.z / unit.size_N);
   }
   const std::string name = fmt::format("over_{}", variable);
   const std::string label = residuals::variable_name(variable);
   report.figure(name, data,
-                "set xlabel '" + label + " " + unit + "'\nset ylabel 'vertical residual [gf]'\nplot '" +
-                    name +
+                "set xlabel '" + label + " " + variable_unit + "'\nset ylabel 'vertical residual [" +
+                    unit.name + "]'\nplot '" + name +
                     ".dat' using 1:2 with linespoints title 'mean', '' using 1:3 with linespoints title "
                     "'root mean square', 0 lc 'gray' notitle\n",
                 "Vertical residual over " + label + ".");
 }
 
 /// Mean vertical residual by the place of the nearest neighbour.
-void add_neighbour_map(Report& report, const residuals::NeighbourMap& map) {
+void add_neighbour_map(Report& report, const residuals::NeighbourMap& map, const ForceUnit& unit) {
   using Map = residuals::NeighbourMap;
   constexpr std::size_t kFewest = 20;
   std::string data;
@@ -85,7 +92,7 @@ void add_neighbour_map(Report& report, const residuals::NeighbourMap& map) {
       any = any || enough;
       data += fmt::format("{} {} {}\n", (j + 0.5) * Map::kLateralStep_m,
                           Map::kLowest_m + (i + 0.5) * Map::kHeightStep_m,
-                          enough ? gf(cell.sum_N / static_cast<double>(cell.records)) : "NaN");
+                          enough ? in_unit(cell.sum_N / static_cast<double>(cell.records), unit) : "NaN");
     }
     data += "\n";
   }
@@ -95,10 +102,12 @@ void add_neighbour_map(Report& report, const residuals::NeighbourMap& map) {
       "stats 'neighbours.dat' using 3 nooutput\n"
       "m = abs(STATS_min) > abs(STATS_max) ? abs(STATS_min) : abs(STATS_max)\n"
       "set xlabel 'lateral distance [m]'\nset ylabel 'height of the neighbour above the vehicle [m]'\n"
-      "set cblabel 'mean vertical residual [gf]'\nset palette @signed_colours\nset xrange [0:0.6]\nset "
-      "yrange [-1:1]\n"
-      "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\n"
-      "plot 'neighbours.dat' using 1:2:3 with image notitle\n",
+      "set cblabel 'mean vertical residual [" +
+          std::string(unit.name) +
+          "]'\nset palette @signed_colours\nset xrange [0:0.6]\nset "
+          "yrange [-1:1]\n"
+          "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\n"
+          "plot 'neighbours.dat' using 1:2:3 with image notitle\n",
       "Mean vertical residual over the place of the laterally nearest neighbour; cells of fewer than 20 "
       "records are empty.");
 }
@@ -239,47 +248,51 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   Report report("Model against flights");
   report.made_by(command_to_copy());
   report.result(result);
+  const ForceUnit unit = residuals::force_unit(inputs);
   for (const stability::Model& model : inputs.models) {
     std::string effects;
     for (const stability::EffectSpec& effect : model.effects)
       effects += (effects.empty() ? "" : ", ") + effect.name;
-    report.paragraph(fmt::format("Model {}: {}, {:.1f} g; effects: {}.", model.path, model.kind,
-                                 1000 * model.mass_kg, effects.empty() ? "none" : effects));
+    report.paragraph(fmt::format("Model {}: {}, {}; effects: {}.", model.path, model.kind,
+                                 residuals::mass_text(model.mass_kg), effects.empty() ? "none" : effects));
   }
   report.paragraph(
-      "Force residual: mass times measured specific force minus thrust and effects, in the world frame, in "
-      "gram-force. "
+      "Force residual: mass times measured specific force minus thrust and effects, in the world frame, in " +
+      std::string(inputs.rules.per_mass ? "m/s^2: no mass is known. "
+                  : unit.size_N == 1    ? "newton. "
+                                        : "gram-force. ") +
       "A torque residual needs logs of at least 400 Hz: slower ones alias what the attitude loop does.");
   report.heading("Scenarios and vehicles");
   std::vector<std::vector<std::string>> rows;
-  for (const auto& [name, errors] : comparison.scenarios) rows.push_back(row(name, errors));
-  for (const auto& [name, errors] : comparison.vehicles) rows.push_back(row(name, errors));
-  rows.push_back(row("all", comparison.overall));
+  for (const auto& [name, errors] : comparison.scenarios) rows.push_back(row(name, errors, unit));
+  for (const auto& [name, errors] : comparison.vehicles) rows.push_back(row(name, errors, unit));
+  rows.push_back(row("all", comparison.overall, unit));
   report.table(kHeader, rows);
   report.paragraph("By kinds of the neighbours, then of the vehicle; Ge flies alone:");
   rows.clear();
-  for (const auto& [name, errors] : comparison.compositions) rows.push_back(row(name, errors));
+  for (const auto& [name, errors] : comparison.compositions) rows.push_back(row(name, errors, unit));
   report.table(kHeader, rows);
 
   report.heading("Where the model fails");
   rows.clear();
   for (std::size_t i = 0; i < comparison.regions.size() && i < 12; ++i) {
     const residuals::RegionErrors& region = comparison.regions[i];
-    rows.push_back({region.words, std::to_string(region.statistics.samples), gf(region.statistics.rmse.total),
+    rows.push_back({region.words, std::to_string(region.statistics.samples),
+                    in_unit(region.statistics.rmse.total, unit),
                     fmt::format("{:.1f} %", 100 * region.share)});
   }
   report.table({"region", "records", "RMSE", "share of all squared residual in its mean"}, rows);
   for (int variable = 0; variable < kPlottedVariables; ++variable)
-    add_region_plot(report, comparison, variable, kVariableUnits[variable]);
-  add_neighbour_map(report, comparison.neighbours);
-  add_time_series(report, comparison, nullptr, "gf", 1 / stability::kGramForce_N);
+    add_region_plot(report, comparison, variable, kVariableUnits[variable], unit);
+  add_neighbour_map(report, comparison.neighbours, unit);
+  add_time_series(report, comparison, nullptr, unit.name, 1 / unit.size_N);
   add_trajectories(report, comparison);
   add_learning_error(report, comparison.learning_error);
 
   report.heading("Flights");
   rows.clear();
   for (const residuals::TrackErrors& track : comparison.tracks)
-    if (!track.position_only) rows.push_back(row(track.flight + " " + track.vehicle, track.errors));
+    if (!track.position_only) rows.push_back(row(track.flight + " " + track.vehicle, track.errors, unit));
   report.table(kHeader, rows);
   report.heading("What was cut, and why");
   rows.clear();
@@ -300,7 +313,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
     for (const logs::Doubt& doubt : track.doubts) findings += (findings.empty() ? "" : "; ") + doubt.words;
     rows.push_back({track.flight + " " + track.vehicle, track.position_only ? "position only" : cuts,
                     findings,
-                    track.has_reference_clock || track.clock_onsets > 0
+                    track.has_reference_clock || track.has_absolute_clock || track.clock_onsets > 0
                         ? fmt::format("{:.0f} ms", 1000 * track.clock_offset_s)
                         : "not estimated"});
   }

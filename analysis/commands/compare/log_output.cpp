@@ -13,8 +13,8 @@ using residuals::Comparison;
 using residuals::TrackErrors;
 
 struct Clocks {
-  int reference = 0, estimated = 0, unknown = 0;
-  double largest_s = 0;
+  int reference = 0, absolute = 0, estimated = 0, unknown = 0;
+  double largest_s = 0;  ///< of the estimated ones
 };
 
 Clocks clocks_of(const Comparison& comparison) {
@@ -22,22 +22,28 @@ Clocks clocks_of(const Comparison& comparison) {
   for (const TrackErrors& track : comparison.tracks) {
     if (track.has_reference_clock)
       ++clocks.reference;
+    else if (track.has_absolute_clock)
+      ++clocks.absolute;
     else if (track.clock_onsets > 0)
       ++clocks.estimated;
     else
       ++clocks.unknown;
-    clocks.largest_s = std::max(clocks.largest_s, std::abs(track.clock_offset_s));
+    if (!track.has_absolute_clock)
+      clocks.largest_s = std::max(clocks.largest_s, std::abs(track.clock_offset_s));
   }
   return clocks;
 }
 
 void print_clocks(const Comparison& comparison) {
   const Clocks clocks = clocks_of(comparison);
-  const int others = clocks.estimated + clocks.unknown;
+  const int others = clocks.absolute + clocks.estimated + clocks.unknown;
   if (others == 0) {
     fmt::print("Clocks: one log per flight, none to relate.\n");
     return;
   }
+  if (clocks.absolute > 0)
+    fmt::print("Clocks: {} of {} logs have absolute times, as the first of their flight.\n", clocks.absolute,
+               others);
   if (clocks.estimated > 0) {
     fmt::print(
         "Clocks: offsets of {} of {} logs estimated against the first of their flight, up to {:.1f} ms.\n",
@@ -56,10 +62,14 @@ void print_clocks(const Comparison& comparison) {
 
 files::Json clocks_json(const Comparison& comparison) {
   const Clocks clocks = clocks_of(comparison);
-  return {{"reference", clocks.reference}, {"estimated", clocks.estimated}, {"unknown", clocks.unknown}};
+  return {{"reference", clocks.reference},
+          {"absolute", clocks.absolute},
+          {"estimated", clocks.estimated},
+          {"unknown", clocks.unknown}};
 }
 
 const char* clock_of(const TrackErrors& track) {
+  if (track.has_absolute_clock) return "absolute";
   return track.has_reference_clock ? "reference" : track.clock_onsets > 0 ? "estimated" : "unknown";
 }
 

@@ -25,7 +25,7 @@ struct DiagnoseOptions {
 int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
-  const residuals::Inputs inputs = read_flights(options.flights);
+  const residuals::Inputs inputs = read_flights(options.flights, false, false, true);
   files::Json result = result_head("diagnose", inputs.files());
   std::vector<Diagnosis> diagnoses;
   for (const stability::Model& model : inputs.models) {

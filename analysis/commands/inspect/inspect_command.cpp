@@ -10,6 +10,8 @@
 #include "analysis/cli/host.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/inspect/inspect_log.h"
+#include "analysis/commands/inspect/inspect_report.h"
+#include "analysis/commands/shared/collection_table.h"
 #include "analysis/logs/columns_draft.h"
 #include "analysis/logs/read_log.h"
 #include "analysis/residuals/flight_set.h"
@@ -26,7 +28,7 @@ struct InspectOptions {
   std::vector<std::string> files;
   files::NetworkArguments network;  ///< key and order, of every weight file
   std::string csv;
-  std::string columns, columns_draft;
+  std::string columns, columns_draft, report;
   double t0_s = -std::numeric_limits<double>::infinity();
   double t1_s = std::numeric_limits<double>::infinity();
 };
@@ -179,8 +181,14 @@ files::Json inspect_model(const std::string& path, bool print) {
           {"effects", std::move(effects)}};
 }
 
+/// What the table of folders and the page need, log by log.
+struct Seen {
+  std::vector<LogOutcome> outcomes;
+  std::vector<InspectedLog> logs;  ///< empty without --report
+};
+
 files::Json inspect_log(const std::string& path, const InspectOptions& options, const CommonOptions& common,
-                        bool in_table) {
+                        bool in_table, Seen& seen) {
   const logs::Log log = options.columns.empty() ? logs::read_log(path)
                                                 : logs::read_log(path, logs::read_columns(options.columns));
   if (!options.csv.empty()) {
@@ -190,6 +198,8 @@ files::Json inspect_log(const std::string& path, const InspectOptions& options, 
   }
   files::Json json = {{"file", path}};
   json.update(describe_log(log));
+  seen.outcomes.push_back(outcome_of(path, log, json));
+  if (!options.report.empty()) seen.logs.push_back({path, json, logs::findings(log.health), curve_of(log)});
   if (common.prints_text()) {
     if (in_table)
       print_log_row(path, json);
@@ -200,8 +210,8 @@ files::Json inspect_log(const std::string& path, const InspectOptions& options, 
 }
 
 files::Json inspect(const std::string& path, const InspectOptions& options, const CommonOptions& common,
-                    bool in_table) {
-  if (logs::looks_like_log(path)) return inspect_log(path, options, common, in_table);
+                    bool in_table, Seen& seen) {
+  if (logs::looks_like_log(path)) return inspect_log(path, options, common, in_table, seen);
   if (is_model(path)) return inspect_model(path, common.prints_text());
   return is_json(path) ? inspect_certificate(path, common.prints_text())
                        : inspect_network(path, options.network, common.prints_text());
@@ -250,6 +260,7 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
     if (!(options.t0_s < options.t1_s)) throw UsageError("--t0 must be before --t1");
     refuse_to_replace(common, options.csv);
   }
+  refuse_folder(common, options.report);
   if (!options.columns_draft.empty()) {
     if (options.files.size() != 1) throw UsageError("--columns-draft takes one CSV");
     refuse_to_replace(common, options.columns_draft);
@@ -259,22 +270,34 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
   const std::vector<std::string> paths = expanded(options.files, flights, skipped);
   const bool in_table = paths.size() > options.files.size();
   std::vector<std::string> readable;
+  Seen seen;
   for (const std::string& path : paths) {
     try {
-      found.push_back(inspect(path, options, common, in_table));
+      found.push_back(inspect(path, options, common, in_table, seen));
     } catch (const files::InputError& error) {
+      seen.outcomes.push_back({path, false, {}, false, 0, "unreadable: " + error.fault().what});
       note(std::string("swarmcert: ") + error.what());
       found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
       continue;
     }
     readable.push_back(path);
   }
-  if (common.prints_text()) print_grouping(flights, skipped);
+  const std::vector<CollectionRow> rows = collection_rows(options.files, seen.outcomes);
+  if (common.prints_text()) {
+    print_grouping(flights, skipped);
+    print_collections(rows, "in the air");
+  }
   files::Json result = result_head("inspect", readable);
   result["files"] = std::move(found);
   if (!flights.empty()) {
     result["flights"] = std::move(flights);
     result["skipped"] = std::move(skipped);
+  }
+  if (!rows.empty()) result["collections"] = json_of(rows);
+  if (!options.report.empty()) {
+    if (seen.logs.empty()) throw UsageError("--report is a page of flight logs, and none was read");
+    const std::string page = write_inspect_report(seen.logs, rows, result, options.report, common.force);
+    if (common.prints_text()) fmt::print("Report: {}\n", page);
   }
   write_result(common, result);
   return readable.size() == paths.size() ? kDone : kBadInput;
@@ -300,6 +323,10 @@ Command inspect_command() {
         app.add_option("--t0", options->t0_s, "CSV from this time of the log's clock, in seconds");
         app.add_option("--t1", options->t1_s, "CSV to before this time, in seconds");
         app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
+        add_output(
+            app, "--report", options->report,
+            "Write an HTML page on the flight logs into this folder: phases, events, gaps, signals, what "
+            "can be judged, and what to log next time");
         add_output(app, "--columns-draft", options->columns_draft,
                    "Write a columns.toml for the one CSV: meaning, unit and frame of its columns, with the "
                    "evidence");

@@ -109,6 +109,25 @@ files::Json describe_log(const logs::Log& log) {
   return json;
 }
 
+LogOutcome outcome_of(const std::string& path, const logs::Log& log, const files::Json& described) {
+  LogOutcome outcome;
+  outcome.path = path;
+  outcome.opened = true;
+  outcome.seconds = described["in_the_air_s"].get<double>();
+  const files::Json& no_flight = described["no_flight"];
+  if (!no_flight.is_null()) outcome.left_out_why = "no flight: " + no_flight.get<std::string>();
+  for (const files::Json& doubt : described["plausibility"]) {
+    if (outcome.left_out_why.empty() && doubt["refused"].get<bool>())
+      outcome.left_out_why = "implausible: " + doubt["signal"].get<std::string>();
+  }
+  if (outcome.left_out_why.empty() && !log.signals.force)
+    outcome.left_out_why = "lacks " + log.signals.force_lacks;
+  if (!outcome.left_out_why.empty()) return outcome;
+  for (std::size_t k = 0; k < 3; ++k) outcome.force[k] = log.signals.force_axes[k];
+  outcome.torque = log.signals.torque != logs::TorqueUse::kNone;
+  return outcome;
+}
+
 void print_log(const logs::Log& log) {
   const logs::FlightStory story = logs::tell(log);
   fmt::print("{}: flight log ({}), {} records from {:.3f} to {:.3f} s, {:.1f} s in the air\n", log.path,

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "analysis/commands/shared/collection_table.h"
 #include "analysis/logs/log.h"
 #include "nn/base/json.h"
 
@@ -10,6 +11,9 @@ namespace swarmcert::analysis {
 
 /// Members format, signals[], judged, missing[], phases[], events[] and what else is known of the log.
 files::Json describe_log(const logs::Log& log);
+
+/// Of a log that was opened. @param described by describe_log().
+LogOutcome outcome_of(const std::string& path, const logs::Log& log, const files::Json& described);
 
 /// The same as text on stdout.
 void print_log(const logs::Log& log);

@@ -16,6 +16,7 @@ struct ModelOptions {
   std::vector<std::string> words;  ///< "draft", then flights
   std::string fleet, columns, base, output;
   double mass_kg = 0;
+  bool keep = false;
 };
 
 int run_model(const ModelOptions& options, const CommonOptions& common) {
@@ -44,8 +45,8 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
   inputs.push_back(base);
   const logs::SignalMap map =
       options.columns.empty() ? logs::known_columns() : logs::read_columns(options.columns);
-  const identification::ModelDraft draft =
-      identification::draft_model(found, map, masses_kg, options.mass_kg, stability::read_model(base));
+  const identification::ModelDraft draft = identification::draft_model(
+      found, map, masses_kg, options.mass_kg, options.keep, stability::read_model(base));
   std::vector<std::string> comments = {fmt::format("Drafted from {} logs.", draft.flights)};
   files::Json result = result_head("model", inputs);
   result["flights"] = draft.flights;
@@ -85,6 +86,7 @@ Command model_command() {
             app.add_option("--base", options->base,
                            "model.toml whose thrust map and shape are assumed (default: crazyflie-small)");
             app.add_option("--flights", options->fleet, "flights.toml: masses of single logs");
+            app.add_flag("--keep", options->keep, "Use damaged and implausible logs as well");
             app.add_option("--columns", options->columns, "columns.toml: what the columns of CSV logs mean");
             add_output(app, "-o,--output", options->output, "The new model.toml")->required();
             return [options](const CommonOptions& common) { return run_model(*options, common); };

@@ -20,6 +20,10 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
   }
   app.add_option("--flights", options.fleet,
                  "flights.toml: vehicles with their models (default: the published ones)");
+  app.add_flag(
+      "--keep", options.keep,
+      "Take logs that are damaged or implausible, which are otherwise named and left out: implausible ones "
+      "everywhere, damaged ones where something is fitted");
   app.add_option(
       "--columns", options.columns,
       "columns.toml: meaning of the columns of CSV logs; per signal column, unit and frame, as in position_x "
@@ -29,7 +33,8 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
       "target_velocity_x .. z");
 }
 
-residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bool may_lack_model) {
+residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bool may_lack_model,
+                               bool fits) {
   residuals::InputArguments arguments;
   arguments.models = options.models;
   for (const std::string& word : options.words) {
@@ -43,6 +48,8 @@ residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bo
   arguments.columns = options.columns;
   arguments.may_lack_model = may_lack_model;
   arguments.network = options.network;
+  arguments.rules.fits = fits;
+  arguments.rules.keep = options.keep;
   arguments.rules.published = options.published_filter;
   arguments.rules.published_signals = options.published_signals;
   arguments.rules.keep_impacts = options.published_filter || options.published_signals;

@@ -15,6 +15,7 @@ struct FlightOptions {
   std::vector<std::string> models;  ///< --model
   std::string fleet, columns, network;
   bool published_filter = false, published_signals = false;
+  bool keep = false;  ///< --keep
 };
 
 /// Declares --flights, --columns and, where `positional_models`, MODEL... FLIGHTS..., else --model and FLIGHTS...
@@ -23,9 +24,10 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
 /// Reads models and the list of flights; the bundled flights.toml where --flights is not given.
 /// @param own_models  vehicles of one kind may have models of their own (flights.toml).
 /// @throws files::InputError as residuals::read_inputs(), and where they have but may not.
+/// @param fits  the flights are fitted: damaged logs are left out unless --keep is given.
 /// @param may_lack_model  as residuals::InputArguments::may_lack_model.
 residuals::Inputs read_flights(const FlightOptions& options, bool own_models = false,
-                               bool may_lack_model = false);
+                               bool may_lack_model = false, bool fits = false);
 
 files::Json json_of(const residuals::Axes& axes);
 

@@ -49,7 +49,7 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   FlightOptions words = options.flights;
   words.words.insert(words.words.end(), options.select.begin(), options.select.end());
   words.words.insert(words.words.end(), options.test.begin(), options.test.end());
-  const residuals::Inputs inputs = read_flights(words);
+  const residuals::Inputs inputs = read_flights(words, false, false, true);
   if (inputs.models.size() != 1)
     throw UsageError("study takes one MODEL; study each kind of vehicle by itself");
   Progress progress(common.quiet);

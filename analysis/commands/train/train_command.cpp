@@ -249,7 +249,7 @@ std::optional<residuals::Inputs> others(const TrainOptions& options, const std::
   for (const std::string& word : options.flights.words) {
     if (fs::path(word).extension() == ".toml") chosen.models.push_back(word);
   }
-  return read_flights(chosen, true);
+  return read_flights(chosen, true, false, true);
 }
 
 /// A flight that is fitted and judges as well would make errors look too good without a word.
@@ -283,7 +283,7 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   if (options.run.max_lipschitz > 0 && options.gamma_mode == "equal")
     throw UsageError("--max-lipschitz scales layers, which --gamma-mode equal forbids");
 
-  const residuals::Inputs inputs = read_flights(options.flights, true);
+  const residuals::Inputs inputs = read_flights(options.flights, true, false, true);
   const std::optional<residuals::Inputs> select = others(options, options.select);
   const std::optional<residuals::Inputs> test = others(options, options.test);
   const learning::LearningFlights flights = {&inputs, select ? &*select : nullptr, test ? &*test : nullptr};

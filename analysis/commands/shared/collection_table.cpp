@@ -1,0 +1,100 @@
+#include "analysis/commands/shared/collection_table.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+namespace swarmcert::analysis {
+namespace {
+
+namespace fs = std::filesystem;
+
+void add(CollectionRow& row, const LogOutcome& log) {
+  ++row.logs;
+  row.opened += log.opened ? 1 : 0;
+  for (std::size_t k = 0; k < 3; ++k) row.force[k] += log.force[k] ? 1 : 0;
+  row.torque += log.torque ? 1 : 0;
+  row.seconds += log.seconds;
+  if (!log.left_out_why.empty()) ++row.left_out[log.left_out_why];
+}
+
+/// The first folder below `folder` on the way to `path`; empty where the log lies in `folder` itself, or elsewhere.
+std::string folder_below(const std::string& folder, const std::string& path) {
+  const fs::path way = fs::path(path).lexically_relative(folder);
+  const auto parts = std::distance(way.begin(), way.end());
+  return parts > 1 ? way.begin()->string() : "";
+}
+
+bool is_below(const std::string& folder, const std::string& path) {
+  const fs::path way = fs::path(path).lexically_relative(folder);
+  return !way.empty() && *way.begin() != "..";
+}
+
+std::string reasons(const CollectionRow& row) {
+  std::string text;
+  for (const auto& [why, count] : row.left_out)
+    text += fmt::format("{}{} {}", text.empty() ? "" : "; ", count, why);
+  return text;
+}
+
+}  // namespace
+
+std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words,
+                                           const std::vector<LogOutcome>& logs) {
+  std::vector<CollectionRow> rows;
+  CollectionRow all;
+  all.name = "all";
+  for (const std::string& word : words) {
+    if (!fs::is_directory(word)) continue;
+    std::set<std::string> below;
+    for (const LogOutcome& log : logs) {
+      if (is_below(word, log.path)) below.insert(folder_below(word, log.path));
+    }
+    std::map<std::string, CollectionRow> parts;
+    for (const LogOutcome& log : logs) {
+      if (!is_below(word, log.path)) continue;
+      const std::string part = below.size() > 1 ? folder_below(word, log.path) : "";
+      CollectionRow& row = parts[part];
+      row.name = part.empty() ? word : part;
+      add(row, log);
+      add(all, log);
+    }
+    for (auto& [part, row] : parts) rows.push_back(std::move(row));
+  }
+  if (rows.size() > 1) rows.push_back(std::move(all));
+  return rows;
+}
+
+files::Json json_of(const std::vector<CollectionRow>& rows) {
+  files::Json json = files::Json::array();
+  for (const CollectionRow& row : rows) {
+    files::Json left_out = files::Json::array();
+    for (const auto& [why, count] : row.left_out) left_out.push_back({{"why", why}, {"logs", count}});
+    json.push_back({{"name", row.name},
+                    {"logs", row.logs},
+                    {"opened", row.opened},
+                    {"force", {{"x", row.force[0]}, {"y", row.force[1]}, {"z", row.force[2]}}},
+                    {"torque", row.torque},
+                    {"seconds", row.seconds},
+                    {"left_out", std::move(left_out)}});
+  }
+  return json;
+}
+
+void print_collections(const std::vector<CollectionRow>& rows, const std::string& seconds) {
+  if (rows.empty()) return;
+  std::size_t width = 6;
+  for (const CollectionRow& row : rows) width = std::max(width, row.name.size());
+  fmt::print("\n{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>10}  left out\n", "folder", width + 1, "logs",
+             "opened", "force x", "y", "z", "torque", "seconds");
+  for (const CollectionRow& row : rows) {
+    fmt::print("{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>10.1f}  {}\n", row.name, width + 1, row.logs,
+               row.opened, row.force[0], row.force[1], row.force[2], row.torque, row.seconds,
+               row.left_out.empty() ? "-" : reasons(row));
+  }
+  fmt::print("(seconds: {}; torque: at least its mean in slow flight)\n", seconds);
+}
+
+}  // namespace swarmcert::analysis

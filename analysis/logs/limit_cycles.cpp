@@ -1,0 +1,114 @@
+#include "analysis/logs/limit_cycles.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/logs/angles.h"
+#include "analysis/logs/statistics_of_series.h"
+
+namespace swarmcert::logs {
+namespace {
+
+constexpr double kLeastTilt_rad = 0.1, kLeast_hz = 1, kSamePeriod = 0.3;
+constexpr std::size_t kLeastPeriods = 5;
+/// Half of the rate that kLeastTilt_rad needs at kLeast_hz: smaller movements about zero are no half period.
+constexpr double kLeastRate_rad_s = 0.5 * kLeastTilt_rad * 2 * kPi * kLeast_hz;
+
+struct Period {
+  double start_s = 0, length_s = 0;
+  double tilt_rad = 0;   ///< amplitude of the angle
+  bool follows = false;  ///< the one before, without a pause
+};
+
+/// Records from `first` to `end` minus their mean over 1 s about each: what is slower than kLeast_hz falls out.
+std::vector<double> fast_part(const Log& log, std::size_t first, std::size_t end, std::size_t axis) {
+  const auto time_s = [&](std::size_t i) { return 1e-6 * log.samples[i].time_us; };
+  std::vector<double> fast;
+  std::size_t low = first, high = first;
+  double sum = 0;
+  for (std::size_t i = first; i < end; ++i) {
+    while (high < end && time_s(high) <= time_s(i) + 0.5 / kLeast_hz)
+      sum += log.samples[high++].rates_rad_s[axis];
+    while (time_s(low) < time_s(i) - 0.5 / kLeast_hz) sum -= log.samples[low++].rates_rad_s[axis];
+    fast.push_back(log.samples[i].rates_rad_s[axis] - sum / static_cast<double>(high - low));
+  }
+  return fast;
+}
+
+/// From one crossing of zero upwards to the next, after an excursion to either side.
+void add_periods(const Log& log, std::size_t first, std::size_t end, std::size_t axis,
+                 std::vector<Period>& periods) {
+  const std::vector<double> rate = fast_part(log, first, end, axis);
+  double low = 0, high = 0, start_s = 0;
+  bool open = false, follows = false;
+  for (std::size_t k = 1; k < rate.size(); ++k) {
+    low = std::min(low, rate[k]);
+    high = std::max(high, rate[k]);
+    const bool goes_up = rate[k - 1] < 0 && rate[k] >= 0 && low < -kLeastRate_rad_s;
+    if (!goes_up || (open && high < kLeastRate_rad_s)) continue;
+    const double now_s = 1e-6 * log.samples[first + k].time_us;
+    if (open) {
+      const double length_s = now_s - start_s;
+      periods.push_back({start_s, length_s, 0.5 * (high - low) * length_s / (2 * kPi), follows});
+      follows = true;
+    }
+    open = true;
+    start_s = now_s;
+    low = high = 0;
+  }
+}
+
+/// The periods from `first` on that belong to one oscillation.
+std::size_t end_of_run(const std::vector<Period>& periods, std::size_t first) {
+  std::vector<double> lengths_s;
+  std::size_t end = first;
+  for (; end < periods.size(); ++end) {
+    const Period& period = periods[end];
+    if (period.tilt_rad < kLeastTilt_rad || period.length_s > 1 / kLeast_hz) break;
+    if (end > first && (!period.follows || std::abs(period.length_s / median(lengths_s) - 1) > kSamePeriod))
+      break;
+    lengths_s.push_back(period.length_s);
+  }
+  return end;
+}
+
+void add_cycles(const std::vector<Period>& periods, const char* axis, std::vector<LogEvent>& events) {
+  std::size_t first = 0;
+  while (first < periods.size()) {
+    const std::size_t end = end_of_run(periods, first);
+    if (end - first >= kLeastPeriods) {
+      double tilt_rad = 0;
+      for (std::size_t k = first; k < end; ++k)
+        tilt_rad += periods[k].tilt_rad / static_cast<double>(end - first);
+      const double length_s = periods[end - 1].start_s + periods[end - 1].length_s - periods[first].start_s;
+      events.push_back(
+          {"limit cycle", periods[first].start_s, length_s,
+           fmt::format("{} periods of {} at {:.2g} Hz, {:.2g} degrees to either side", end - first, axis,
+                       static_cast<double>(end - first) / length_s, tilt_rad / kDegree_rad)});
+    }
+    first = std::max(end, first + 1);
+  }
+}
+
+}  // namespace
+
+std::vector<LogEvent> limit_cycles(const Log& log, const std::vector<char>& air) {
+  std::vector<LogEvent> events;
+  if (!log.signals.rates) return events;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    std::vector<Period> periods;
+    std::size_t first = 0;
+    for (std::size_t i = 0; i <= log.samples.size(); ++i) {
+      const bool goes_on = i < log.samples.size() && air[i] != 0 && !(i > first && log.samples[i].restarts);
+      if (goes_on) continue;
+      add_periods(log, first, i, axis, periods);
+      first = i < log.samples.size() && air[i] != 0 ? i : i + 1;
+    }
+    add_cycles(periods, axis == 0 ? "roll" : "pitch", events);
+  }
+  return events;
+}
+
+}  // namespace swarmcert::logs

@@ -1,0 +1,33 @@
+/// @file In what forces are shown to people.
+#pragma once
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <string>
+
+#include "analysis/residuals/inputs.h"
+
+namespace swarmcert::residuals {
+
+struct ForceUnit {
+  const char* name = "N";
+  double size_N = 1;
+};
+
+/// Gram-force where every vehicle weighs less than 1 N, the unit of the published networks; else newton. Without a known
+/// mass, the residuals of a model of 1 kg are accelerations.
+inline ForceUnit force_unit(const Inputs& inputs) {
+  constexpr double kLight_N = 1;
+  if (inputs.rules.per_mass) return {"m/s^2", 1};
+  const bool light = std::all_of(inputs.models.begin(), inputs.models.end(),
+                                 [](const stability::Model& m) { return m.weight_N() < kLight_N; });
+  return light ? ForceUnit{"gf", stability::kGramForce_N} : ForceUnit{};
+}
+
+/// "34.0 g", "2.5 kg"
+inline std::string mass_text(double mass_kg) {
+  return mass_kg < 1 ? fmt::format("{:.1f} g", 1000 * mass_kg) : fmt::format("{:.4g} kg", mass_kg);
+}
+
+}  // namespace swarmcert::residuals

@@ -1,0 +1,144 @@
+/// Events of flights, and clocks that vehicles share.
+#include "analysis/logs/flight_story.h"
+
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <set>
+#include <sstream>
+
+#include "analysis/logs/absolute_time.h"
+#include "analysis/logs/limit_cycles.h"
+#include "analysis/logs/read_log.h"
+#include "data.h"
+
+namespace swarmcert::tests {
+namespace {
+
+/// A log of 12 s at 250 Hz in the air whose roll angle is `roll(t)`.
+logs::Log rolling(const std::function<double(double)>& roll_rad) {
+  logs::Log log;
+  log.signals.rates = true;
+  constexpr double kStep_s = 0.004;
+  for (int k = 0; k < 3000; ++k) {
+    logs::Sample s;
+    s.time_us = 1e6 * kStep_s * k;
+    s.restarts = k == 0;
+    const double t = kStep_s * k;
+    s.rates_rad_s = {(roll_rad(t + kStep_s) - roll_rad(t)) / kStep_s, 0, 0};
+    log.samples.push_back(s);
+  }
+  return log;
+}
+
+std::vector<logs::LogEvent> cycles_of(const std::function<double(double)>& roll_rad) {
+  const logs::Log log = rolling(roll_rad);
+  return logs::limit_cycles(log, std::vector<char>(log.samples.size(), 1));
+}
+
+constexpr double kTwoPi = 6.283185307179586;
+
+TEST(LimitCycles, ASustainedOscillationIsNamedWithItsFrequencyAndAmplitude) {
+  for (const double hz : {1.3, 2.8, 6.0}) {
+    const auto events =
+        cycles_of([hz](double t) { return t < 3 || t > 9 ? 0 : 0.15 * std::sin(kTwoPi * hz * t); });
+    ASSERT_EQ(events.size(), 1u) << hz;
+    EXPECT_NEAR(events[0].time_s, 3, 1.2 / hz);
+    EXPECT_NEAR(events[0].duration_s, 6, 2.5 / hz);
+    EXPECT_NE(events[0].what.find(fmt::format("{:.2g} Hz", hz)), std::string::npos) << events[0].what;
+    EXPECT_NE(events[0].what.find("roll"), std::string::npos) << events[0].what;
+  }
+}
+
+TEST(LimitCycles, DampedOscillationsManoeuvresAndVibrationAreNone) {
+  // Damping ratio 0.1 after a push of 0.3 rad.
+  EXPECT_TRUE(cycles_of([](double t) {
+                return t < 2 ? 0
+                             : 0.3 * std::exp(-0.1 * kTwoPi * 2 * (t - 2)) * std::sin(kTwoPi * 2 * (t - 2));
+              }).empty());
+  // A slalom of 0.4 rad at 0.4 Hz: what a trajectory asks for.
+  EXPECT_TRUE(cycles_of([](double t) { return 0.4 * std::sin(kTwoPi * 0.4 * t); }).empty());
+  // 0.02 rad at 20 Hz, whose rate is 2.5 rad/s.
+  EXPECT_TRUE(cycles_of([](double t) { return 0.02 * std::sin(kTwoPi * 20 * t); }).empty());
+  // One period of another length in four.
+  EXPECT_TRUE(cycles_of([](double t) {
+                return 0.15 * std::sin(kTwoPi * 2 * t + 2.5 * std::sin(kTwoPi * 0.5 * t));
+              }).empty());
+}
+
+TEST(LimitCycles, OfTheFlightsThatOscillateAreFoundAndOfTheirRepetitionNot) {
+  SWARMCERT_NEEDS_DATA();
+  // Named by independent scripts: 29, 76, 113, 119 and 146 oscillate, 113_2 with the same gains does not. 26, 78 and 129 do
+  // as well: more than five equal periods of 6 degrees or more, in hover and at the end of the trajectory.
+  std::set<std::string> cycling;
+  std::size_t flights = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(data_path("collections/crazyswarm2-tools/logs"))) {
+    ++flights;
+    const logs::FlightStory story = logs::tell(logs::read_log(entry.path().string()));
+    if (std::any_of(story.events.begin(), story.events.end(),
+                    [](const logs::LogEvent& event) { return event.kind == "limit cycle"; }))
+      cycling.insert(entry.path().filename().string());
+  }
+  EXPECT_GE(flights, 100u);
+  EXPECT_EQ(cycling, (std::set<std::string>{"log113", "log119", "log129", "log146", "log26", "log29", "log76",
+                                            "log78"}));
+}
+
+logs::RawLog with_receiver(const std::string& topic, const std::vector<std::string>& names,
+                           const std::vector<std::vector<double>>& rows) {
+  logs::RawLog raw;
+  raw.topics.emplace_back();
+  raw.topics[0].name = topic;
+  for (const std::string& name : names) raw.topics[0].columns.push_back({name, "", {}});
+  for (const std::vector<double>& row : rows) {
+    raw.topics[0].time_s.push_back(row[0]);
+    for (std::size_t k = 0; k < names.size(); ++k) raw.topics[0].columns[k].values.push_back(row[k + 1]);
+  }
+  return raw;
+}
+
+TEST(AbsoluteTime, ComesFromTheReceiversOfPx4AndArduPilot) {
+  // 0 where the receiver has no time yet; the vehicle's clock started 1772419700 s after 1970.
+  const logs::RawLog px4 = with_receiver("vehicle_gps_position", {"time_utc_usec"},
+                                         {{10, 0}, {20, 1772419720e6}, {30, 1772419730e6}});
+  EXPECT_NEAR(logs::receiver_offset_s(px4), 1772419700, 1e-3);
+  EXPECT_NEAR(logs::absolute_span_s(px4).first, 1772419710, 1e-3);
+  EXPECT_NEAR(logs::absolute_span_s(px4).second, 1772419730, 1e-3);
+  // 2026-03-02 02:48:40 UTC is 96538 s into week 2408 of the receivers, whose clock is 18 s ahead.
+  const logs::RawLog ardupilot =
+      with_receiver("GPS", {"GWk", "GMS"}, {{20, 2408, 96538e3}, {21, 2408, 96539e3}});
+  EXPECT_NEAR(logs::receiver_offset_s(ardupilot), 1772419720 - 20, 1e-3);
+  EXPECT_EQ(logs::absolute_span_s(with_receiver("count", {"number"}, {{1, 2}, {2, 3}})),
+            (std::pair(0.0, 0.0)));
+}
+
+TEST(Collections, DerivedAccelerationReachesTheNoiseFloorsOfCalmFlight) {
+  SWARMCERT_NEEDS_DATA();
+  // Floors of independent scripts for a velocity over 100 ms, m/s^2: calm flight with motion capture 0.02, others as flown.
+  const std::pair<const char*, double> floors_m_s2[] = {
+      {"crazyswarm2-tools/logs", 0.02}, {"crazypad", 0.13}, {"nanobench", 0.09}};
+  for (const auto& [folder, floor_m_s2] : floors_m_s2) {
+    std::vector<double> noise;
+    for (const auto& entry :
+         std::filesystem::recursive_directory_iterator(data_path(std::string("collections/") + folder))) {
+      if (!entry.is_regular_file() || entry.path().extension() == ".md" ||
+          !logs::looks_like_log(entry.path().string()))
+        continue;
+      if (noise.size() == 40) break;
+      for (const logs::SignalInfo& signal : logs::read_log(entry.path().string()).sources) {
+        if (signal.name == "acceleration") noise.push_back(signal.noise);
+      }
+    }
+    ASSERT_GE(noise.size(), 4u) << folder;
+    std::sort(noise.begin(), noise.end());
+    EXPECT_LE(noise[noise.size() / 2], 1.3 * floor_m_s2) << folder;
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
