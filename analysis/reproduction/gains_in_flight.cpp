@@ -205,18 +205,16 @@ Summary summary(const std::vector<Judged>& judged) {
   return result;
 }
 
-files::Json number(double value) { return std::isfinite(value) ? files::Json(value) : files::Json(); }
-
 files::Json summary_json(const Summary& s) {
   return {{"flights", s.flights},
           {"gain_sets", s.gain_sets},
           {"coverage", s.coverage},
           {"coverage_of_gain_sets", s.coverage_of_gain_sets},
-          {"median_ratio", number(s.median_ratio)},
-          {"blind_ratio", number(s.blind_ratio)},
+          {"median_ratio", s.median_ratio},
+          {"blind_ratio", s.blind_ratio},
           {"blind_coverage", s.blind_coverage},
-          {"rank", number(s.rank)},
-          {"rank_rms", number(s.rank_rms)}};
+          {"rank", s.rank},
+          {"rank_rms", s.rank_rms}};
 }
 
 std::vector<std::string> summary_row(const std::string& name, const Summary& s) {
@@ -281,16 +279,16 @@ void add_flight(Track track, const Judged& judged, Finding& finding) {
   finding.json["flights"].push_back({{"log", one.flight->log},
                                      {"axis", track_name(track)},
                                      {"world_axis", std::string(1, "xyz"[one.axis])},
-                                     {"bound", number(judged.bound_m)},
+                                     {"bound", judged.bound_m},
                                      {"peak", one.flown().peak_m},
                                      {"rms", one.flown().rms_m},
-                                     {"blind", number(judged.blind_m)},
+                                     {"blind", judged.blind_m},
                                      {"gain_set", one.group()},
                                      {"gain_set_left_out", judged.left_gain_set_out},
                                      {"extrapolates", judged.extrapolates},
                                      {"margins",
-                                      {{"gain", number(judged.margins.gain)},
-                                       {"delay_s", number(judged.margins.delay_s)},
+                                      {{"gain", judged.margins.gain},
+                                       {"delay_s", judged.margins.delay_s},
                                        {"damping", judged.margins.damping},
                                        {"frequency_rad_s", judged.margins.frequency_rad_s},
                                        {"verdict", name(nearness)}}}});

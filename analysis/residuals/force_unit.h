@@ -13,7 +13,16 @@ namespace swarmcert::residuals {
 struct ForceUnit {
   const char* name = "N";
   double size_N = 1;
+
+  double per_newton() const { return 1 / size_N; }
 };
+
+/// @param name "N" (shown in mN), "gf" or "m_s2" (force over the model's mass)
+inline ForceUnit chosen_force_unit(const std::string& name, const stability::Model& model) {
+  if (name == "gf") return {"gf", stability::kGramForce_N};
+  if (name == "m_s2") return {"m/s^2", model.mass_kg};
+  return {"mN", 1e-3};
+}
 
 /// Gram-force where every vehicle weighs less than 1 N, the unit of the published networks; else newton. Without a known
 /// mass, the residuals of a model of 1 kg are accelerations.

@@ -14,14 +14,12 @@
 namespace swarmcert::analysis {
 namespace {
 
-using residuals::ForceUnit;
-
-std::string in_unit(double newton, const ForceUnit& unit) {
+std::string in_unit(double newton, const residuals::ForceUnit& unit) {
   return fmt::format("{:.2f}", newton / unit.size_N);
 }
 
 std::vector<std::string> row(const std::string& name, const residuals::GroupErrors& group,
-                             const ForceUnit& unit) {
+                             const residuals::ForceUnit& unit) {
   const residuals::ErrorStatistics& s = group.statistics;
   const auto gf = [&unit](double newton) { return in_unit(newton, unit); };
   return {name,
@@ -55,7 +53,7 @@ const std::vector<std::string> kHeader = {"",
 
 /// Mean and spread of the vertical residual over the ranges of one variable.
 void add_region_plot(Report& report, const residuals::Comparison& comparison, int variable,
-                     const std::string& variable_unit, const ForceUnit& unit) {
+                     const std::string& variable_unit, const residuals::ForceUnit& unit) {
   std::vector<const residuals::RegionErrors*> regions;
   for (const residuals::RegionErrors& region : comparison.regions) {
     if (region.variable == variable) regions.push_back(&region);
@@ -80,7 +78,7 @@ void add_region_plot(Report& report, const residuals::Comparison& comparison, in
 }
 
 /// Mean vertical residual by the place of the nearest neighbour.
-void add_neighbour_map(Report& report, const residuals::NeighbourMap& map, const ForceUnit& unit) {
+void add_neighbour_map(Report& report, const residuals::NeighbourMap& map, const residuals::ForceUnit& unit) {
   using Map = residuals::NeighbourMap;
   constexpr std::size_t kFewest = 20;
   std::string data;
@@ -248,7 +246,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   Report report("Model against flights");
   report.made_by(command_to_copy());
   report.result(result);
-  const ForceUnit unit = residuals::force_unit(inputs);
+  const residuals::ForceUnit unit = residuals::force_unit(inputs);
   for (const stability::Model& model : inputs.models) {
     std::string effects;
     for (const stability::EffectSpec& effect : model.effects)

@@ -120,7 +120,7 @@ std::string study_flights(const fs::path& folder, const CommonOptions& common, c
       [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
   files::Json answer = result_head("study", inputs.files());
   add_study(study, inputs, answer);
-  const ForceUnit unit = force_unit("N", inputs.models[0]);
+  const residuals::ForceUnit unit = residuals::chosen_force_unit("N", inputs.models[0]);
   const std::string sentence = headline(study, unit);
   say("   " + sentence);
   result["study"] = {{"headline", sentence}, {"verdict", answer["verdict"]}};

@@ -58,7 +58,7 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
       [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
   files::Json result = result_head("study", inputs.files());
   add_study(study, inputs, result);
-  const ForceUnit unit = force_unit(options.unit, inputs.models[0]);
+  const residuals::ForceUnit unit = residuals::chosen_force_unit(options.unit, inputs.models[0]);
   const std::string page = write_study_folder(study, unit, result, options.output);
   write_result(common, result);
   if (common.prints_text()) {

@@ -48,14 +48,8 @@ double vertical_N(const residuals::Comparison& comparison) { return comparison.o
 
 }  // namespace
 
-ForceUnit force_unit(const std::string& name, const stability::Model& model) {
-  if (name == "gf") return {"gf", 1 / stability::kGramForce_N};
-  if (name == "m_s2") return {"m/s^2", 1 / model.mass_kg};
-  return {"mN", 1000};
-}
-
-std::string headline(const Study& study, const ForceUnit& unit) {
-  const auto shown = [&unit](double newton) { return fmt::format("{:.3g}", newton * unit.per_newton); };
+std::string headline(const Study& study, const residuals::ForceUnit& unit) {
+  const auto shown = [&unit](double newton) { return fmt::format("{:.3g}", newton * unit.per_newton()); };
   const std::vector<std::string> added = accepted_effects(study);
   const std::string left =
       leaves_something(study.diagnosis) ? "part of the error remains unexplained" : "nothing else stands out";
@@ -99,7 +93,7 @@ void add_study(const Study& study, const residuals::Inputs& inputs, files::Json&
   result["next"] = std::move(next);
 }
 
-void print_study(const Study& study, const ForceUnit& unit) {
+void print_study(const Study& study, const residuals::ForceUnit& unit) {
   fmt::print("{}\n", headline(study, unit));
   constexpr std::size_t kMostRows = 6, kMostNext = 2;
   std::size_t rows = 0;
@@ -107,8 +101,8 @@ void print_study(const Study& study, const ForceUnit& unit) {
   for (const stability::LadderRow& row : study.ladder.rows) {
     if (!row.accepted || ++rows > kMostRows) continue;
     fmt::print("  {:<24} fit {:>8.3g}  select {:>8.3g}  test {:>8.3g} {}\n",
-               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N * unit.per_newton,
-               row.select_rmse_N * unit.per_newton, row.test_rmse_N * unit.per_newton, unit.name);
+               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N * unit.per_newton(),
+               row.select_rmse_N * unit.per_newton(), row.test_rmse_N * unit.per_newton(), unit.name);
   }
   const std::vector<std::string> next = next_flights(study);
   for (std::size_t i = 0; i < next.size() && i < kMostNext; ++i) fmt::print("  fly {}\n", next[i]);

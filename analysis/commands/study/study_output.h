@@ -5,21 +5,13 @@
 #include <vector>
 
 #include "analysis/identification/study/study.h"
+#include "analysis/residuals/force_unit.h"
 #include "nn/base/json.h"
 
 namespace swarmcert::analysis {
 
-/// The unit in which people see forces; files keep newton.
-struct ForceUnit {
-  std::string name;          ///< "mN", "gf", "m/s^2"
-  double per_newton = 1000;  ///< of this unit
-};
-
-/// @param name "N" (shown in mN), "gf" or "m_s2" (force over the model's mass)
-ForceUnit force_unit(const std::string& name, const stability::Model& model);
-
 /// The whole answer in one sentence, with its numbers.
-std::string headline(const identification::Study& study, const ForceUnit& unit);
+std::string headline(const identification::Study& study, const residuals::ForceUnit& unit);
 
 /// Flights that would answer what these leave open, best first: of the rivals of each effect, then of effects that these
 /// flights could not have shown at any size.
@@ -29,6 +21,6 @@ std::vector<std::string> next_flights(const identification::Study& study);
 void add_study(const identification::Study& study, const residuals::Inputs& inputs, files::Json& result);
 
 /// Ten lines for the terminal.
-void print_study(const identification::Study& study, const ForceUnit& unit);
+void print_study(const identification::Study& study, const residuals::ForceUnit& unit);
 
 }  // namespace swarmcert::analysis

@@ -25,7 +25,7 @@ using identification::Study;
 
 /// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after).
 std::string two_maps(const std::string& name, const std::string& x, const std::string& y,
-                     const ForceUnit& unit) {
+                     const residuals::ForceUnit& unit) {
   const std::string file = "'" + name + ".dat'";
   return "stats " + file + " using 3 nooutput\nlow = STATS_min; high = STATS_max\nstats " + file +
          " using 4 nooutput\nlow = STATS_min < low ? STATS_min : low\n"
@@ -40,12 +40,12 @@ std::string two_maps(const std::string& name, const std::string& x, const std::s
          " using 1:2:4 with image\nunset multiplot\n";
 }
 
-std::string cell_text(std::size_t records, double newton, const ForceUnit& unit) {
+std::string cell_text(std::size_t records, double newton, const residuals::ForceUnit& unit) {
   constexpr std::size_t kFewest = 20;
-  return records >= kFewest ? fmt::format("{:.6g}", newton * unit.per_newton) : "NaN";
+  return records >= kFewest ? fmt::format("{:.6g}", newton * unit.per_newton()) : "NaN";
 }
 
-void add_room(Report& report, const RoomMap& map, const ForceUnit& unit) {
+void add_room(Report& report, const RoomMap& map, const residuals::ForceUnit& unit) {
   if (map.cells.empty()) return;
   std::string data = "# x_m y_m before after\n";
   for (int j = 0; j < RoomMap::kCells; ++j) {
@@ -64,7 +64,7 @@ void add_room(Report& report, const RoomMap& map, const ForceUnit& unit) {
 }
 
 void add_neighbours(Report& report, const residuals::NeighbourMap& before,
-                    const residuals::NeighbourMap& after, const ForceUnit& unit) {
+                    const residuals::NeighbourMap& after, const residuals::ForceUnit& unit) {
   using Map = residuals::NeighbourMap;
   std::string data = "# lateral_m height_m before after\n";
   bool any = false;
@@ -93,7 +93,7 @@ void add_neighbours(Report& report, const residuals::NeighbourMap& before,
 
 /// The residual's mean over the ranges of one variable, before and after.
 void add_variable(Report& report, const residuals::Comparison& before, const residuals::Comparison& after,
-                  int variable, const ForceUnit& unit) {
+                  int variable, const residuals::ForceUnit& unit) {
   const auto mean_of = [&](const residuals::Comparison& comparison,
                            int region) -> const residuals::RegionErrors* {
     for (const residuals::RegionErrors& candidate : comparison.regions)
@@ -107,8 +107,9 @@ void add_variable(Report& report, const residuals::Comparison& before, const res
     const residuals::RegionErrors* is = mean_of(after, region);
     if (was == nullptr || is == nullptr) continue;
     ++points;
-    data += fmt::format("{:.6g} {:.6g} {:.6g}\n", residuals::region_middle(variable, region),
-                        was->statistics.bias.z * unit.per_newton, is->statistics.bias.z * unit.per_newton);
+    data +=
+        fmt::format("{:.6g} {:.6g} {:.6g}\n", residuals::region_middle(variable, region),
+                    was->statistics.bias.z * unit.per_newton(), is->statistics.bias.z * unit.per_newton());
   }
   if (points < 2) return;
   const std::string label = residuals::variable_name(variable), name = fmt::format("over_{}", variable);
@@ -121,13 +122,14 @@ void add_variable(Report& report, const residuals::Comparison& before, const res
                 "Mean vertical residual over " + label + ", before and after.");
 }
 
-void add_effects(Report& report, const Study& study, const ForceUnit& unit) {
+void add_effects(Report& report, const Study& study, const residuals::ForceUnit& unit) {
   std::size_t number = 0;
   for (const EffectCurve& curve : study.pictures.effects) {
     std::string data = "# predicted measured standard_error records\n";
     for (const EffectCurve::Point& point : curve.points)
-      data += fmt::format("{:.6g} {:.6g} {:.6g} {}\n", point.predicted_N * unit.per_newton,
-                          point.measured_N * unit.per_newton, point.error_N * unit.per_newton, point.records);
+      data +=
+          fmt::format("{:.6g} {:.6g} {:.6g} {}\n", point.predicted_N * unit.per_newton(),
+                      point.measured_N * unit.per_newton(), point.error_N * unit.per_newton(), point.records);
     const std::string name = fmt::format("effect_{}", ++number);
     report.figure(
         name, data,
@@ -169,13 +171,13 @@ void add_findings(Report& report, const Study& study) {
         rows);
 }
 
-void add_moments(Report& report, const Study& study, const ForceUnit& unit) {
+void add_moments(Report& report, const Study& study, const residuals::ForceUnit& unit) {
   std::vector<ShownMoment> shown;
   for (const residuals::Moment& moment : study.before.all.moments) {
     for (const residuals::TrackErrors& track : study.before.all.tracks) {
       if (track.path != moment.path) continue;
       shown.push_back({series_name(track), moment.time_s, track.flight, moment.time_s - track.clock_offset_s,
-                       fmt::format("{:.3g} {}", moment.residual_N.norm() * unit.per_newton, unit.name)});
+                       fmt::format("{:.3g} {}", moment.residual_N.norm() * unit.per_newton(), unit.name)});
     }
   }
   if (shown.empty()) return;
@@ -189,14 +191,14 @@ std::size_t count_flights(const residuals::Comparison& comparison) {
   return flights.size();
 }
 
-void add_replay(Report& report, const Study& study, const ForceUnit& unit) {
+void add_replay(Report& report, const Study& study, const residuals::ForceUnit& unit) {
   std::vector<Replay> flights;
   for (const identification::ReplayFlight& flight : study.replay) {
     Replay replay{flight.name, {}};
     for (const identification::ReplayVehicle& vehicle : flight.vehicles) {
       replay.vehicles.push_back({vehicle.name, vehicle.rows});
       for (std::array<float, 10>& row : replay.vehicles.back().rows)
-        for (std::size_t k = 4; k < row.size(); ++k) row[k] *= static_cast<float>(unit.per_newton);
+        for (std::size_t k = 4; k < row.size(); ++k) row[k] *= static_cast<float>(unit.per_newton());
     }
     flights.push_back(std::move(replay));
   }
@@ -209,7 +211,7 @@ void add_replay(Report& report, const Study& study, const ForceUnit& unit) {
                             flights.size(), count_flights(study.before.all)));
 }
 
-std::string write_page(const Study& study, const ForceUnit& unit, const files::Json& result,
+std::string write_page(const Study& study, const residuals::ForceUnit& unit, const files::Json& result,
                        const std::string& folder) {
   Report report("What does the model lack?");
   report.made_by(command_to_copy());
@@ -226,7 +228,7 @@ std::string write_page(const Study& study, const ForceUnit& unit, const files::J
   add_effects(report, study, unit);
   add_findings(report, study);
   report.heading("How the error fell");
-  add_ladder_figure(report, study.ladder.rows, "ladder", unit.name, unit.per_newton);
+  add_ladder_figure(report, study.ladder.rows, "ladder", unit.name, unit.per_newton());
   report.heading("What is left, and what to fly next");
   add_left(report, study.diagnosis);
   add_remainder(report, study.diagnosis, 1);
@@ -234,15 +236,15 @@ std::string write_page(const Study& study, const ForceUnit& unit, const files::J
   if (next.empty())
     report.paragraph("These flights leave no question open that another flight would answer.");
   for (const std::string& flight : next) report.paragraph("Fly " + flight + ".");
-  add_time_series(report, study.after.all, &study.before.all, unit.name, unit.per_newton);
+  add_time_series(report, study.after.all, &study.before.all, unit.name, unit.per_newton());
   add_replay(report, study, unit);
   return report.write(folder, true, "study.html");
 }
 
 }  // namespace
 
-std::string write_study_folder(const Study& study, const ForceUnit& unit, const files::Json& result,
-                               const std::string& folder) {
+std::string write_study_folder(const Study& study, const residuals::ForceUnit& unit,
+                               const files::Json& result, const std::string& folder) {
   const std::filesystem::path path(folder);
   std::filesystem::create_directories(path);
   if (study.ladder.any_accepted) {

@@ -10,7 +10,7 @@ namespace swarmcert::analysis {
 
 /// Writes FOLDER/study.html with the data of its plots, FOLDER/study.json (`result`) and, if an effect was added,
 /// FOLDER/fitted.toml; makes the folder. Returns the page's path. @throws as Report::write().
-std::string write_study_folder(const identification::Study& study, const ForceUnit& unit,
+std::string write_study_folder(const identification::Study& study, const residuals::ForceUnit& unit,
                                const files::Json& result, const std::string& folder);
 
 }  // namespace swarmcert::analysis
