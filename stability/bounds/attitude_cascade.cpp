@@ -115,9 +115,9 @@ CascadeMargins cascade_margins(const Cascade& loop) {
 }
 
 Nearness nearness_to_limit_cycle(const CascadeMargins& margins) {
-  constexpr double kLeastGain = 2, kLeastDamping = 0.05;
   if (margins.gain == 0) return Nearness::kUnstable;
-  return margins.gain < kLeastGain || margins.damping < kLeastDamping ? Nearness::kClose : Nearness::kClear;
+  return margins.gain < kLeastGainMargin || margins.damping < kLeastDamping ? Nearness::kClose
+                                                                            : Nearness::kClear;
 }
 
 const char* name(Nearness nearness) {

@@ -56,6 +56,7 @@ struct CascadeMargins {
 CascadeMargins cascade_margins(const Cascade& loop);
 
 enum class Nearness { kClear, kClose, kUnstable };
+inline constexpr double kLeastGainMargin = 2, kLeastDamping = 0.05;
 
 /// Close to a limit cycle: the gain can less than double (the textbook 6 dB), or an oscillation keeps nearly three
 /// quarters of its size per cycle (damping below 0.05). Saturation, backlash and a lag that is larger than stated then

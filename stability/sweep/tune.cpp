@@ -29,18 +29,29 @@ double objective_of(const GainNorms& norms, TuneObjective objective) {
   return kWorst;
 }
 
+constexpr std::size_t kNumConstraints = 5;
+
+/// How far gains are from clear of a limit cycle; a hundredth more than it takes, so that rounding does not decide.
+double limit_cycle_excess(const std::optional<CascadeMargins>& margins) {
+  constexpr double kMore = 1.01;
+  if (!margins) return -1;
+  if (margins->gain == 0) return kWorst;
+  return std::max(kMore * kLeastGainMargin / margins->gain - 1, kMore - margins->damping / kLeastDamping);
+}
+
 /// Relative excess over each limit: at most 0 where it holds.
-std::array<double, 4> excesses(const TunedPoint& p, const TuneConstraints& c) {
+std::array<double, kNumConstraints> excesses(const TunedPoint& p, const TuneConstraints& c) {
   const auto above = [](double value, double most) {
     if (most <= 0) return -1.0;
     return std::isfinite(value) ? std::min(value / most - 1, kWorst) : kWorst;
   };
   return {above(p.noise_m_s2, c.most_noise_m_s2),
           c.least_lag_limit_s > 0 ? 1 - p.lag_limit_s / c.least_lag_limit_s : -1.0,
-          above(p.norms.rate, c.most_rate), above(p.effort, c.most_effort)};
+          above(p.norms.rate, c.most_rate), above(p.effort, c.most_effort), limit_cycle_excess(p.margins)};
 }
 
-constexpr std::array<const char*, 4> kConstraintNames = {"noise", "lag_limit", "rate", "effort"};
+constexpr std::array<const char*, kNumConstraints> kConstraintNames = {"noise", "lag_limit", "rate", "effort",
+                                                                       "limit_cycle"};
 
 class Search {
  public:
@@ -50,9 +61,14 @@ class Search {
     SampledLoop loop = loop_;
     loop.plant.Kp = std::exp(log_gains[0]);
     loop.plant.Kd = std::exp(log_gains[1]);
-    loop.plant.Ki = std::exp(log_gains[2]);
-    return judged(evaluate_gains(loop, options_.objective));
+    loop.plant.Ki = dimension() == 3 ? std::exp(log_gains[2]) : 0;
+    TunedPoint point = evaluate_gains(loop, options_.objective);
+    if (options_.attitude) point.margins = margins_of(loop, *options_.attitude);
+    return judged(std::move(point));
   }
+
+  /// Two without an integrator.
+  std::size_t dimension() const { return loop_.plant.Ki > 0 ? 3 : 2; }
 
   TunedPoint judged(TunedPoint point) const {
     const auto e = excesses(point, options_.constraints);
@@ -63,8 +79,8 @@ class Search {
 
   /// The point of the last evaluation: objective and constraints ask for the same one in turn.
   const TunedPoint& cached(const double* x) {
-    if (!std::equal(last_.begin(), last_.end(), x) || !has_last_) {
-      std::copy(x, x + 3, last_.begin());
+    if (!std::equal(x, x + dimension(), last_.begin()) || !has_last_) {
+      std::copy(x, x + dimension(), last_.begin());
       has_last_ = true;
       point_ = at(x);
       const int total = options_.global_evaluations + 3 * options_.local_evaluations;
@@ -92,13 +108,13 @@ class Search {
 
   std::string run(nlopt_algorithm algorithm, std::array<double, 3> start, const std::array<double, 3>& low,
                   const std::array<double, 3>& high, int evaluations) {
-    const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> optimiser(nlopt_create(algorithm, 3),
-                                                                           nlopt_destroy);
+    const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> optimiser(
+        nlopt_create(algorithm, static_cast<unsigned>(dimension())), nlopt_destroy);
     nlopt_set_min_objective(optimiser.get(), cost, this);
     nlopt_set_lower_bounds(optimiser.get(), low.data());
     nlopt_set_upper_bounds(optimiser.get(), high.data());
-    const std::array<double, 4> tolerance = {0, 0, 0, 0};
-    nlopt_add_inequality_mconstraint(optimiser.get(), 4, constrain, this, tolerance.data());
+    const std::array<double, kNumConstraints> tolerance{};
+    nlopt_add_inequality_mconstraint(optimiser.get(), kNumConstraints, constrain, this, tolerance.data());
     nlopt_set_maxeval(optimiser.get(), evaluations);
     nlopt_set_xtol_rel(optimiser.get(), 1e-7);
     double value = 0;
@@ -166,11 +182,19 @@ TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective) {
   return point;
 }
 
+CascadeMargins margins_of(const SampledLoop& loop, const Cascade& attitude) {
+  Cascade cascade = attitude;
+  cascade.Kp = loop.plant.Kp / attitude.ratio;
+  cascade.Kd = loop.plant.Kd / attitude.ratio;
+  cascade.Ki = effective_Ki(loop) / attitude.ratio;
+  return cascade_margins(cascade);
+}
+
 TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
   TuneResult result;
   Search search(loop, options);
   const std::array<double, 3> given = {std::log(loop.plant.Kp), std::log(loop.plant.Kd),
-                                       std::log(loop.plant.Ki)};
+                                       loop.plant.Ki > 0 ? std::log(loop.plant.Ki) : 0};
   std::array<double, 3> low = given;
   std::array<double, 3> high = given;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -178,9 +202,9 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
     high[i] += std::log(options.range);
   }
   search.cached(given.data());
-  result.shipped = search.judged(evaluate_gains(loop, options.objective));
+  result.shipped = search.at(given.data());
   const double largest_Ki = effective_Ki(loop) * options.range;
-  if (options.constraints.most_rate > 0 &&
+  if (options.constraints.most_rate > 0 && loop.plant.Ki > 0 &&
       1 / (loop.plant.mass_kg * largest_Ki) > options.constraints.most_rate) {
     result.infeasible = "the rate gain is at least 1/(m Ki), above the limit even at the largest Ki";
   }
@@ -208,7 +232,7 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
     if (e[i] > -1e-3) result.active_constraints.emplace_back(kConstraintNames[i]);
   }
   constexpr std::array<const char*, 3> kGainNames = {"Kp", "Kd", "Ki"};
-  for (std::size_t i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < search.dimension(); ++i) {
     const double x = search.best_x()[i];
     if (x < low[i] + 1e-3) result.active_constraints.push_back(std::string(kGainNames[i]) + " at its least");
     if (x > high[i] - 1e-3) result.active_constraints.push_back(std::string(kGainNames[i]) + " at its most");

@@ -214,5 +214,44 @@ TEST(TuneCommand, ConstraintsThatCannotBeMetAreRefutedOrNotFoundWithTheNearestGa
   EXPECT_GT(b["nearest"]["noise_command_m_s2"].get<double>(), 0.01);
 }
 
+TEST(TuneCommand, TunesWithoutAnIntegratorWhatHasNone) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nKp = 9\nKd = 7\nKi = 0\nrate_hz = 500\n");
+  const Json result = json_of(folder, "tune" + gains + " --axis x --objective amplitude --nodes 200");
+  EXPECT_EQ(result["verdict"], "found");
+  EXPECT_EQ(result["gains"]["Ki"], 0);
+  EXPECT_LT(result["tuned"]["amplitude"].get<double>(), result["shipped"]["amplitude"].get<double>());
+  EXPECT_LE(result["tuned"]["noise_command_m_s2"].get<double>(),
+            result["shipped"]["noise_command_m_s2"].get<double>() * (1 + 1e-8));
+  // The same is reached from gains that have an integrator.
+  const Json dropped =
+      json_of(folder, "tune" + kFlown + " --axis x --objective amplitude --no-integrator --nodes 200");
+  EXPECT_EQ(dropped["gains"]["Ki"], 0);
+  EXPECT_EQ(run_shell("swarmcert tune" + gains + " --axis x --objective rate", folder.path()).exit_code, 2);
+  EXPECT_EQ(run_shell("swarmcert tune" + gains + " --axis x --max-rate 1", folder.path()).exit_code, 2);
+}
+
+TEST(TuneCommand, ProposesNothingCloseToALimitCycleOfTheAttitudeLoop) {
+  const ScratchFolder folder;
+  const std::string attitude = " --attitude-gains 0.010,0.001125,0.040";
+  const std::string gains =
+      gains_file(folder, "[position]\nKp = 9\nKd = 7\nKi = 0\nrate_hz = 500\n[lag]\nmotor_s = 0.0575\n");
+  const std::string words = "tune" + gains + " --axis x --objective amplitude --nodes 200 --max-noise 30";
+  const auto verdict_of = [&](const Json& found) {
+    write_text(folder / "tuned.toml",
+               "schema = \"swarmcert/gains/1\"\n[position]\nKi = 0\nrate_hz = 500\nKp = " +
+                   found["gains"]["Kp"].dump() + "\nKd = " + found["gains"]["Kd"].dump() +
+                   "\n[lag]\nmotor_s = 0.0575\n");
+    return json_of(folder, "bound --gains tuned.toml" + kModel + attitude)["attitude"][0]["verdict"]
+        .get<std::string>();
+  };
+  EXPECT_NE(verdict_of(json_of(folder, words)), "clear") << "else the constraint is not tested";
+  const Json minding = json_of(folder, words + attitude);
+  EXPECT_EQ(minding["verdict"], "found");
+  EXPECT_EQ(verdict_of(minding), "clear");
+  EXPECT_EQ(minding["tuned"]["limit_cycle"]["verdict"], "clear");
+  EXPECT_EQ(run_shell("swarmcert tune" + gains + " --axis z" + attitude, folder.path()).exit_code, 2);
+}
+
 }  // namespace
 }  // namespace swarmcert::tests

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "analysis/commands/bound/bound_output.h"
-#include "stability/bounds/attitude_cascade.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -41,24 +40,28 @@ files::Json gains_json(const stability::Cascade& loop, CascadeInput input, const
 
 }  // namespace
 
-files::Json attitude_json(const Tracking& input, const std::string& words) {
+stability::Cascade attitude_cascade(const Tracking& input, const std::string& words, int axis) {
   const std::array<double, 3> gains = read_attitude_gains(words);
+  const std::optional<stability::AxisLoop> position = axis_loop(input.gains, input.plant, axis);
+  if (!position) throw UsageError("--attitude-gains: Lambda or K couples the axes; make them diagonal");
+  // axis_loop() has the thrust's scale in its gains already.
+  const double scale = input.plant.thrust_scale;
+  const double inertia = input.model.inertia_kg_m2[static_cast<std::size_t>(1 - axis)];
+  stability::Cascade loop{position->Kp / scale,
+                          position->Kd / scale,
+                          position->Ki / scale,
+                          scale,
+                          stability::AttitudeLoop{gains[0] / inertia, gains[1] / inertia, gains[2] / inertia},
+                          input.gains.motor_lag_s};
+  if (const auto sampled = sampled_axis_loop(input.gains, input.plant, axis))
+    loop.Ki = effective_Ki(*sampled) / scale;
+  return loop;
+}
+
+files::Json attitude_json(const Tracking& input, const std::string& words) {
   files::Json rows = files::Json::array();
   for (int axis = 0; axis < 2; ++axis) {
-    const std::optional<stability::AxisLoop> position = axis_loop(input.gains, input.plant, axis);
-    if (!position) throw UsageError("--attitude-gains: Lambda or K couples the axes; make them diagonal");
-    // axis_loop() has the thrust's scale in its gains already.
-    const double scale = input.plant.thrust_scale;
-    const double inertia = input.model.inertia_kg_m2[static_cast<std::size_t>(1 - axis)];
-    stability::Cascade loop{
-        position->Kp / scale,
-        position->Kd / scale,
-        position->Ki / scale,
-        scale,
-        stability::AttitudeLoop{gains[0] / inertia, gains[1] / inertia, gains[2] / inertia},
-        input.gains.motor_lag_s};
-    if (const auto sampled = sampled_axis_loop(input.gains, input.plant, axis))
-      loop.Ki = effective_Ki(*sampled) / scale;
+    const stability::Cascade loop = attitude_cascade(input, words, axis);
     stability::CascadeMargins margins = cascade_margins(loop);
     // The delay of gains.toml uses up the margin.
     margins.delay_s = std::max(0.0, margins.delay_s - input.gains.delay_s);

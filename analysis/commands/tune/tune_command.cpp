@@ -5,6 +5,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/progress.h"
+#include "analysis/commands/bound/bound_attitude.h"
 #include "analysis/commands/bound/bound_output.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/tracking_input.h"
@@ -23,6 +24,8 @@ struct TuneOptions {
   stability::TuneOptions tune;
   std::string objective = "impulse";
   std::string axis = "z";
+  bool without_integrator = false;
+  std::string attitude;  ///< empty: no attitude loop
   std::string report;
 };
 
@@ -46,6 +49,11 @@ files::Json point_json(const TunedPoint& p, const stability::GainNorms& sampled)
                       {"lag_limit_s", finite(p.lag_limit_s)},
                       {"effort", finite(p.effort)},
                       {"feasible", p.feasible}};
+  if (p.margins) {
+    json["limit_cycle"] = {{"verdict", name(nearness_to_limit_cycle(*p.margins))},
+                           {"gain_margin", finite(p.margins->gain)},
+                           {"damping", p.margins->damping}};
+  }
   json.update(norms_json(p.norms));
   return json;
 }
@@ -69,7 +77,7 @@ files::Json firmware_json(const std::string& axis, const TuneResult& found) {
                     {"axis", axis},
                     {"shipped", before},
                     {"tuned", after},
-                    {"relative_change", after / before - 1},
+                    {"relative_change", before > 0 ? files::Json(after / before - 1) : files::Json()},
                     {"unit", gain.unit}});
   }
   return rows;
@@ -123,8 +131,9 @@ void print_result(const TuneOptions& options, const TuneResult& found,
   }
   fmt::print("  {:<22} {:>12} {:>12}\n", "", "shipped", "tuned");
   for (const TunedQuantity& q : quantities(options.axis, found)) {
-    fmt::print("  {:<22} {:>12.6g} {:>12.6g} {:>+9.1f} %  {}\n", q.name, q.shipped, q.tuned,
-               100 * (q.tuned / q.shipped - 1), q.unit);
+    const double change = 100 * (q.tuned / q.shipped - 1);
+    fmt::print("  {:<22} {:>12.6g} {:>12.6g} {:>11}  {}\n", q.name, q.shipped, q.tuned,
+               std::isfinite(change) ? fmt::format("{:+.1f} %", change) : std::string("-"), q.unit);
   }
   fmt::print("\nactive constraints: {}\n", listed(found.active_constraints));
   if (!a.feasible) fmt::print("the shipped gains violate a constraint\n");
@@ -143,7 +152,17 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
     throw files::InputError({options.tracking.gains, "", "position.rate_hz", "", "is missing",
                              "the noise of the command depends on the rate of the loop"});
   }
-  if (!(loop->plant.Ki > 0)) throw UsageError("Ki of axis " + options.axis + " is 0: tune needs a PID law");
+  if (options.without_integrator) loop->plant.Ki = 0;
+  const bool integrates = loop->plant.Ki > 0;
+  if (!integrates && (options.objective == "rate" || options.tune.constraints.most_rate > 0)) {
+    throw UsageError(
+        "without an integrator (Ki = 0) the rate gain is infinite: choose another objective, and leave "
+        "--max-rate out");
+  }
+  if (!options.attitude.empty()) {
+    if (axis == 2) throw UsageError("--attitude-gains: the z axis has no attitude loop");
+    options.tune.attitude = attitude_cascade(input, options.attitude, axis);
+  }
   options.tune.objective = options.objective == "amplitude" ? stability::TuneObjective::kAmplitude
                            : options.objective == "edge"    ? stability::TuneObjective::kEdge
                            : options.objective == "rate"    ? stability::TuneObjective::kRate
@@ -154,7 +173,7 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
   constexpr double kSlack = 1e-9;
   if (limits.most_noise_m_s2 == 0) limits.most_noise_m_s2 = shipped.noise_m_s2 * (1 + kSlack);
   if (limits.least_lag_limit_s == 0) limits.least_lag_limit_s = kKeptLag * shipped.lag_limit_s;
-  if (limits.most_rate == 0) limits.most_rate = shipped.norms.rate * (1 + kSlack);
+  if (limits.most_rate == 0 && integrates) limits.most_rate = shipped.norms.rate * (1 + kSlack);
   Progress progress(common.quiet);
   options.tune.progress = [&progress](int done, int total) { progress.show(done, total, "evaluations"); };
   const TuneResult found = stability::tune(*loop, options.tune);
@@ -166,7 +185,7 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
   result["constraints"] = {
       {"most_noise_m_s2", limits.most_noise_m_s2},
       {"least_lag_limit_s", limits.least_lag_limit_s},
-      {"most_rate", finite(limits.most_rate)},
+      {"most_rate", limits.most_rate > 0 ? finite(limits.most_rate) : files::Json()},
       {"most_effort", limits.most_effort > 0 ? files::Json(limits.most_effort) : files::Json()}};
   const TunedPoint& best = found.best;
   result["verdict"] = !best.feasible ? (found.infeasible.empty() ? "none found" : "infeasible")
@@ -233,6 +252,12 @@ Command tune_command() {
             ->check(CLI::PositiveNumber);
         app.add_option("--max-effort", limits.most_effort, "Largest effort gain, N/N")
             ->check(CLI::PositiveNumber);
+        app.add_flag("--no-integrator", options->without_integrator,
+                     "Search Kp and Kd with Ki = 0, as where the gains given have Ki = 0");
+        app.add_option(
+            "--attitude-gains", options->attitude,
+            "KR,Kw,KI of the attitude law, N m, N m s, N m/s (x and y): propose nothing that bound calls "
+            "close to a limit cycle with it");
         app.add_option("--range", options->tune.range, "Gains at most this factor away (default 8)")
             ->check(CLI::Range(1.01, 100.0));
         app.add_option("--nodes", options->tune.global_evaluations, "Evaluations of the global search")
