@@ -202,7 +202,9 @@ TuneResult tune(const SampledLoop& loop, const TuneOptions& options) {
     high[i] += std::log(options.range);
   }
   search.cached(given.data());
-  result.shipped = search.at(given.data());
+  TunedPoint shipped = evaluate_gains(loop, options.objective);
+  if (options.attitude) shipped.margins = margins_of(loop, *options.attitude);
+  result.shipped = search.judged(std::move(shipped));
   const double largest_Ki = effective_Ki(loop) * options.range;
   if (options.constraints.most_rate > 0 && loop.plant.Ki > 0 &&
       1 / (loop.plant.mass_kg * largest_Ki) > options.constraints.most_rate) {

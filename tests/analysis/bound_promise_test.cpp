@@ -16,7 +16,7 @@ TEST(BoundCommand, SaysWhichGainsAreCloseToALimitCycleOfTheAttitudeLoop) {
   const ScratchFolder folder;
   std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");
   write_text(folder / "model.toml",
-             model + "\n[[effect]]\nname = \"thrust_ratio\"\nparameters = { ratio = 1.5 }\n");
+             model + "\n[[effect]]\nname = \"thrust_ratio\"\nparameters = { ratio = 0.5 }\n");
   const auto verdict = [&](const std::string& position, const std::string& attitude) {
     write_text(folder / "gains.toml",
                "schema = \"swarmcert/gains/1\"\n[position]\n" + position + "\n[lag]\nmotor_s = 0.0575\n");

@@ -233,10 +233,11 @@ TEST(TuneCommand, TunesWithoutAnIntegratorWhatHasNone) {
 
 TEST(TuneCommand, ProposesNothingCloseToALimitCycleOfTheAttitudeLoop) {
   const ScratchFolder folder;
-  const std::string attitude = " --attitude-gains 0.010,0.001125,0.040";
+  const std::string attitude = " --attitude-gains 0.007,0.001125,0.030";
   const std::string gains =
       gains_file(folder, "[position]\nKp = 9\nKd = 7\nKi = 0\nrate_hz = 500\n[lag]\nmotor_s = 0.0575\n");
-  const std::string words = "tune" + gains + " --axis x --objective amplitude --nodes 200 --max-noise 30";
+  const std::string words =
+      "tune" + gains + " --axis x --objective amplitude --nodes 200 --max-noise 30 --min-lag 0.05";
   const auto verdict_of = [&](const Json& found) {
     write_text(folder / "tuned.toml",
                "schema = \"swarmcert/gains/1\"\n[position]\nKi = 0\nrate_hz = 500\nKp = " +

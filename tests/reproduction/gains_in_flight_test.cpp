@@ -27,7 +27,7 @@ std::string info_text(double Kp, const std::string& motors = "small motors") {
 }
 
 /// A vehicle that follows a swing along x; errors of all axes are `error_m`, along x in proportion to the speed.
-std::string log_text(double error_m, double height_mm = 1000) {
+std::string log_text(double error_m, double height_mm = 2000) {
   std::string text =
       "time_s,stateEstimateZ.x,stateEstimateZ.y,stateEstimateZ.z,stateEstimateZ.vx,stateEstimateZ.vy,"
       "stateEstimateZ.vz,ctrltargetZ.x,ctrltargetZ.y,ctrltargetZ.z,ctrltargetZ.vx,ctrltargetZ.vy,"
@@ -159,7 +159,7 @@ TEST_F(GainsInFlight, RefusesWhatCannotBeJudged) {
   };
   refused("--calibrate old", "--flights");
   refused("--calibrate old --flights nowhere", "nowhere");
-  refused("--calibrate old --flights out", "logs/ and info/");
+  refused("--calibrate old --flights old/logs", "logs/ and info/");
   // Nine gain sets promise 90 % of a tenth one, but with one left out eight do not.
   refused("--calibrate old --flights old", "at least 9");
   EXPECT_EQ(run("--calibrate old --flights old --coverage 0.8").exit_code, 0);
