@@ -116,8 +116,11 @@ TEST(Notebook, EveryCommittedOneHasTheFieldsOfItsFormat) {
       for (const Json& output : cell["outputs"]) {
         if (output["output_type"] == "stream") continue;
         ++plots;
-        for (const char* kind : {"image/svg+xml", "image/png", "text/plain"})
-          EXPECT_TRUE(output["data"].contains(kind)) << kind;
+        // The guides in C++ draw with the library's own display, which has a text beside the picture.
+        const bool is_python = notebook["metadata"]["language_info"]["name"] == "python";
+        for (const char* kind : {"image/png", "image/svg+xml", "text/plain"})
+          EXPECT_TRUE(output["data"].contains(kind) || (is_python && kind != std::string("image/png")))
+              << kind;
       }
     }
   }
