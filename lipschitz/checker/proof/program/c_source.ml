@@ -38,7 +38,8 @@ let objects path text =
   let peek k = if !at + k < size then text.[!at + k] else '\000' in
   let rec skip () = match peek 0, peek 1 with
     | (' ' | '\t' | '\r' | '\n'), _ -> incr at; skip ()
-    | '/', '/' | '#', _ -> at := (match String.index_from_opt text !at '\n' with Some stop -> stop | None -> size); skip ()
+    | '/', '/' | '#', _ -> at := (match String.index_from_opt text !at '\n' with Some stop -> stop | None -> size);
+        skip ()
     | '/', '*' ->
       at := !at + 2;
       while !at < size && not (peek 0 = '*' && peek 1 = '/') do incr at done;
@@ -61,8 +62,10 @@ let objects path text =
     if not (is_digit (peek 0) || (peek 0 = '.' && is_digit (peek 1))) then fail "expected a number";
     ignore (run is_digit);
     if peek 0 = '.' then (incr at; ignore (run is_digit));
-    let is_exponent = (peek 0 = 'e' || peek 0 = 'E') && (is_digit (peek 1) || ((peek 1 = '+' || peek 1 = '-') && is_digit (peek 2))) in
-    if is_exponent then (at := !at + 2; if String.length (run is_digit) > 4 then fail "the number is beyond the range of its type");
+    let is_exponent = (peek 0 = 'e' || peek 0 = 'E') &&
+        (is_digit (peek 1) || ((peek 1 = '+' || peek 1 = '-') && is_digit (peek 2))) in
+    if is_exponent then (at := !at + 2; if String.length (run is_digit) > 4 then
+        fail "the number is beyond the range of its type");
     let digits = String.sub text first (!at - first) in
     let single = peek 0 = 'f' || peek 0 = 'F' in
     if single then incr at;
@@ -75,7 +78,8 @@ let objects path text =
   let members () =
     let rec go found =
       if accept '}' then List.rev found else begin
-        let kind = if accept_word "double" then "float64" else if accept_word "float" then "float32" else fail "a member is neither float nor double" in
+        let kind = if accept_word "double" then "float64" else if accept_word "float" then
+            "float32" else fail "a member is neither float nor double" in
         let name = word () in
         let rec sizes () =
           if accept '[' then begin
@@ -99,13 +103,15 @@ let objects path text =
   let read_object tag =
     let name = word () in
     let fresh member = { member with values = [] } in
-    let members = match Hashtbl.find_opt types tag with Some ms -> List.map fresh ms | None -> fail "is of an unknown type" in
+    let members = match Hashtbl.find_opt types tag with Some ms -> List.map fresh ms | None ->
+        fail "is of an unknown type" in
     expect '='; expect '{';
     let rec fill () =
       if not (accept '}') then begin
         expect '.';
         let field = word () in
-        let member = match List.find_opt (fun m -> m.name = field) members with Some m -> m | None -> fail "is no member of its type" in
+        let member = match List.find_opt (fun m -> m.name = field) members with Some m -> m | None ->
+            fail "is no member of its type" in
         if member.values <> [] then fail "is initialised twice";
         expect '='; array member member.shape;
         if accept ',' then fill () else expect '}'
@@ -147,8 +153,10 @@ let read path bytes ~key ~order =
     | [ (_, members) ], "" -> members
     | [], _ -> bad_input "%s: holds no network" path
     | _, "" -> bad_input "%s: holds several networks: name one with --key, or as FILE#KEY" path
-    | _ -> (match List.assoc_opt key found with Some ms -> ms | None -> bad_input "%s: \"%s\" is not in this file" path (shown key)) in
-  Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Registration ~order (List.map tensor members)
+    | _ -> (match List.assoc_opt key found with Some ms -> ms | None ->
+        bad_input "%s: \"%s\" is not in this file" path (shown key)) in
+  Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Registration ~order
+      (List.map tensor members)
 
 (* Whether the text begins as one of these files does. *)
 let looks_like bytes =
@@ -164,6 +172,7 @@ let looks_like bytes =
           | _ -> String.sub beginning at (min 7 (String.length beginning - at))
       and line at = match String.index_from_opt beginning at '\n' with Some stop -> first stop | None -> ""
       and comment at =
-        if at + 1 >= String.length beginning then "" else if beginning.[at] = '*' && beginning.[at + 1] = '/' then first (at + 2) else comment (at + 1) in
+        if at + 1 >= String.length beginning then "" else if beginning.[at] = '*' && beginning.[at + 1] = '/' then
+            first (at + 2) else comment (at + 1) in
       let word = first 0 in
       List.exists (fun w -> Weights.starts_with (w ^ " ") word) [ "struct"; "static"; "const" ])

@@ -23,9 +23,11 @@ let is_hash = function
 (* The form only: the samples are not here. *)
 let check_samples samples where =
   if samples <> Null then begin
-    require_keys where [ "sha256"; "count"; "tolerance"; "tolerance_hex"; "largest_deviation"; "largest_deviation_hex" ] samples;
+    require_keys where [ "sha256"; "count"; "tolerance"; "tolerance_hex"; "largest_deviation";
+        "largest_deviation_hex" ] samples;
     require (is_hash (find where "sha256" samples)) "%s.sha256 is no hash" where;
-    let positive = match find where "count" samples with Number { value; is_integer = true } -> value >= 1. | _ -> false in
+    let positive = match find where "count" samples with Number { value; is_integer = true } -> value >= 1. | _ ->
+        false in
     require positive "%s.count is not positive" where;
     let number key = Exact.number (where ^ "." ^ key) (find where key samples) (find where (key ^ "_hex") samples) in
     let tolerance = number "tolerance" in
@@ -36,9 +38,11 @@ let check_weights (net : Network.t) named =
   require_keys "network" [ "description_sha256"; "weights"; "as" ] named;
   let as_ = find "network" "as" named in
   require (as_ = Null || as_ = Text "float32") "network.as is unknown";
-  require (find "network" "description_sha256" named = Text net.sha256) "network.description_sha256 is of another network.toml";
+  require (find "network" "description_sha256" named = Text net.sha256)
+      "network.description_sha256 is of another network.toml";
   let weights = find "network" "weights" named in
-  require (List.length (members "network.weights" weights) = List.length net.parts) "network.weights lists another number of networks";
+  require (List.length (members "network.weights" weights) = List.length net.parts)
+      "network.weights lists another number of networks";
   List.iter (fun (name, (w : Weights.t)) ->
       let where = "network.weights." ^ name in
       let entry = find "network.weights" name weights in
@@ -54,9 +58,11 @@ let check_boxes net boxes =
   | Object (_ :: _ as boxes) ->
     List.iter (fun (part, box) ->
         let where = "box." ^ shown part in
-        require (List.mem_assoc part net.Network.parts && not (Functions.starts_with "rho:" part)) "%s is of no network with a box" where;
+        require (List.mem_assoc part net.Network.parts && not (Functions.starts_with "rho:" part))
+            "%s is of no network with a box" where;
         require_keys where [ "lower"; "upper" ] box;
-        let lower = Exact.hex_floats where (find where "lower" box) and upper = Exact.hex_floats where (find where "upper" box) in
+        let lower = Exact.hex_floats where (find where "lower" box) and upper =
+            Exact.hex_floats where (find where "upper" box) in
         let inputs = Functions.inputs net part in
         require (List.length lower = inputs && List.length upper = inputs) "%s has another size" where;
         require (List.for_all2 ( <= ) lower upper) "%s is empty" where) boxes
@@ -77,11 +83,14 @@ let check net json =
   check_weights net (member "network");
   check_boxes net (member "box");
   let state = { Claims.net; json; parts = Functions.parts net; accepted = []; log = []; norms = Hashtbl.create 8;
-                uppers = Hashtbl.create 64; spectral_norms = 0; upper_bounds = 0; lower_bounds = 0; not_checked = [] } in
+                uppers = Hashtbl.create 64; spectral_norms = 0; upper_bounds = 0; lower_bounds = 0;
+                    not_checked = [] } in
   List.iter (fun (part, (w : Weights.t)) ->
       List.iteri (fun k layer ->
-          Claims.check_layer state (element "layers" state.spectral_norms (member "layers")) part k layer) w.layers) net.parts;
-  require (List.length (list "layers" (member "layers")) = state.spectral_norms) "layers lists more than the networks have";
+          Claims.check_layer state (element "layers" state.spectral_norms (member "layers")) part k layer) w.layers)
+              net.parts;
+  require (List.length (list "layers" (member "layers")) = state.spectral_norms)
+      "layers lists more than the networks have";
   let bounds = match member "bounds" with Array (_ :: _ as bounds) -> bounds | _ -> rejected "bounds is empty" in
   let laws = match member "laws" with Array laws -> laws | _ -> rejected "laws is not an array" in
   List.iter (Claims.check_bound state) bounds;

@@ -12,7 +12,8 @@ type t = {
   mutable accepted : Proved.claim list;  (* all of these hold: theorem accepted_hold *)
   mutable log : (Proved.claim * Proved.proof) list;  (* the last one first *)
   norms : (string, Proved.dyadic) Hashtbl.t;  (* product of the norms of a network *)
-  uppers : (string * string * (string * int) list, Proved.dyadic * source) Hashtbl.t;  (* by function, block, neighbours *)
+  uppers : (string * string * (string * int) list, Proved.dyadic * source) Hashtbl.t;
+      (* by function, block, neighbours *)
   mutable spectral_norms : int;
   mutable upper_bounds : int;
   mutable lower_bounds : int;
@@ -41,7 +42,8 @@ let inequality where ~neurons ~upper json =
   let rho = Exact.of_float (Exact.hex_float where (find here "rho" json)) in
   let t = List.map Exact.of_float (Exact.hex_floats where (find here "t" json)) in
   require (List.length t = neurons) "%s: needs one multiplier t per hidden neuron" where;
-  require (Proved.is_positive rho && List.for_all Proved.is_nonnegative t) "%s: rho is not positive, or a t negative" where;
+  require (Proved.is_positive rho && List.for_all Proved.is_nonnegative t)
+      "%s: rho is not positive, or a t negative" where;
   require (at_most rho (times upper upper)) "%s: claims less than sqrt(rho)" where;
   Proved.By_inequality (rho, t, Exact.factor (where ^ ".factor") (find here "factor" json))
 
@@ -50,16 +52,20 @@ let no_factor where = where ^ ": the factor does not show that the matrix inequa
 let check_layer state entry part k (layer : Weights.layer) =
   let where = Printf.sprintf "layer %s %s" part layer.name in
   require_keys where [ "network"; "name"; "spectral_norm"; "spectral_norm_hex"; "proof" ] entry;
-  require (find where "network" entry = Text part && find where "name" entry = Text layer.name) "%s is not where it is expected" where;
-  let end_ i = Exact.number where (element where i (find where "spectral_norm" entry)) (element where i (find where "spectral_norm_hex" entry)) in
+  require (find where "network" entry = Text part && find where "name" entry = Text layer.name)
+      "%s is not where it is expected" where;
+  let end_ i = Exact.number where (element where i (find where "spectral_norm" entry))
+      (element where i (find where "spectral_norm_hex" entry)) in
   let lower = Exact.of_float (end_ 0) and upper = Exact.of_float (end_ 1) in
   let proof = find where "proof" entry in
   require_keys (where ^ ".proof") [ "lower_vector"; "upper" ] proof;
   let vector = List.map Exact.of_float (Exact.hex_floats where (find where "lower_vector" proof)) in
-  require (List.length vector = Weights.inputs layer && List.exists (fun x -> x <> Exact.zero) vector) "%s: unusable lower_vector" where;
+  require (List.length vector = Weights.inputs layer && List.exists (fun x -> x <> Exact.zero) vector)
+      "%s: unusable lower_vector" where;
   let p = Functions.index state.net part in
   prove state (Norm_at_least (p, k, lower)) (By_vector vector) (where ^ ": claims more than |W v| / |v|");
-  prove state (Norm_at_most (p, k, upper)) (inequality where ~neurons:0 ~upper (find where "upper" proof)) (no_factor where);
+  prove state (Norm_at_most (p, k, upper)) (inequality where ~neurons:0 ~upper (find where "upper" proof))
+      (no_factor where);
   let product = Option.value ~default:Exact.one (Hashtbl.find_opt state.norms part) in
   Hashtbl.replace state.norms part (times product upper);
   state.spectral_norms <- state.spectral_norms + 1
@@ -74,7 +80,8 @@ let neighbours_of state where bound =
   if not (has "neighbours" bound) then [] else begin
     let counts = List.sort compare (counts where (find where "neighbours" bound)) in
     let names = Functions.networks_of (text where (find where "function" bound)) in
-    require (List.length names = 2 && find where "domain" bound = Text "box") "%s: neighbours only of a set function on a box" where;
+    require (List.length names = 2 && find where "domain" bound = Text "box")
+        "%s: neighbours only of a set function on a box" where;
     List.iter (fun (kind, n) ->
         require (kind <> "ground" && List.mem_assoc ("phi:" ^ kind) state.net.parts && 1 <= n && n <= most_neighbours)
           "%s: impossible neighbours" where) counts;
@@ -91,25 +98,29 @@ let function_of state = function
 
 (* Neurons that a ReLU follows, where the last layer of phi and the first of rho are one. *)
 let hidden_neurons state names =
-  let hidden part = List.fold_left (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer (Functions.weights state.net part)))
+  let hidden part = List.fold_left
+      (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer (Functions.weights state.net part)))
       (Functions.weights state.net part).layers in
   List.fold_left (fun n part -> n + hidden part) 0 names
 
 let meaning state where bound names scale =
   let f = text where (find where "function" bound) and block = text where (find where "block" bound) in
-  let in_box = find where "domain" bound = Text "box" && (match find where "box" state.json with Object _ -> true | _ -> false) in
+  let in_box = find where "domain" bound = Text "box" &&
+      (match find where "box" state.json with Object _ -> true | _ -> false) in
   [ "domain", (if in_box then "box" else "global");
     "law", (if List.length names = 2 then "one_neighbour" else "none");
     "norm", (if scale = [] then "l2" else "weighted_l2");
     "unit", Functions.unit state.net f block ]
 
-let bound_keys = [ "function"; "domain"; "block"; "law"; "norm"; "scale"; "unit"; "upper"; "upper_hex"; "upper_method"; "lower";
+let bound_keys = [ "function"; "domain"; "block"; "law"; "norm"; "scale"; "unit"; "upper"; "upper_hex"; "upper_method";
+    "lower";
                    "lower_hex"; "lower_witness"; "proof"; "status" ]
 
 let check_product state where names claim scale upper =
   let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in
   let total = List.fold_left (fun total name -> match Hashtbl.find_opt state.norms name with
-      | Some norm -> times total norm | None -> rejected "%s: there is no network %s" where (shown name)) (Exact.of_float largest) names in
+      | Some norm -> times total norm | None -> rejected "%s: there is no network %s" where (shown name))
+          (Exact.of_float largest) names in
   require (at_most total upper) "%s: claims less than the product of the norms" where;
   prove state claim Proved.By_product (where ^ ": claims less than the product of the norms")
 
@@ -120,10 +131,13 @@ let check_bound state bound =
   let names = Functions.networks_of f in
   let scale = Exact.hex_floats where (find where "scale" bound) in
   require (List.for_all (fun s -> s > 0.) scale) "%s: scale is not positive" where;
-  List.iter (fun (key, text) -> require (find where key bound = Text text) "%s: %s is not %s" where key text) (meaning state where bound names scale);
-  require (scale = [] || List.length scale = Functions.inputs state.net (List.hd names)) "%s: scale has another size" where;
+  List.iter (fun (key, text) -> require (find where key bound = Text text) "%s: %s is not %s" where key text)
+      (meaning state where bound names scale);
+  require (scale = [] || List.length scale = Functions.inputs state.net (List.hd names))
+      "%s: scale has another size" where;
   let neighbours = neighbours_of state where bound in
-  let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" bound) (find where "upper_hex" bound)) in
+  let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" bound)
+      (find where "upper_hex" bound)) in
   check_status where bound;
   let moves = Functions.moves state.net f block and func = function_of state names in
   let exact_scale = List.map Exact.of_float scale in
@@ -136,17 +150,22 @@ let check_bound state bound =
       not_checked state (Printf.sprintf "%s <= %s: proved by parts of boxes" where
                            (text where (find where "upper_hex" bound)));
       Not_checked
-    | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper; Proved_here
+    | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper;
+        Proved_here
     | _ -> rejected "%s: unknown upper_method" where in
   if scale = [] then Hashtbl.replace state.uppers (f, block, neighbours) (upper, source);
   if source = Proved_here then state.upper_bounds <- state.upper_bounds + 1;
   match find where "lower_witness" bound with
-  | Null -> require (find where "lower" bound = Null && find where "lower_hex" bound = Null) "%s: lower without a witness" where
+  | Null -> require (find where "lower" bound = Null && find where "lower_hex" bound = Null)
+      "%s: lower without a witness" where
   | witness ->
-    let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound) (find where "lower_hex" bound)) in
+    let lower = Exact.of_float (Exact.number (where ^ " lower") (find where "lower" bound)
+        (find where "lower_hex" bound)) in
     let in_box = find where "domain" bound = Text "box" in
-    let proof = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours ~moves witness in
-    prove state (Slope_at_least (func, moves, exact_scale, lower)) proof (where ^ ": lower_witness: claims more than the slope between x and y");
+    let proof = Witness.read state.net state.json (where ^ ": lower_witness") names ~in_box ~neighbours ~moves
+        witness in
+    prove state (Slope_at_least (func, moves, exact_scale, lower)) proof
+        (where ^ ": lower_witness: claims more than the slope between x and y");
     state.lower_bounds <- state.lower_bounds + 1
 
 (* Laws *)

@@ -89,7 +89,8 @@ let factor where json =
   let scales = List.map exponent (Json.list where (Json.find where "scale" json)) in
   let rows = List.map (fun row -> List.map (integer where) (words (Json.text where row)))
       (Json.list where (Json.find where "rows" json)) in
-  let fits = List.length rows = List.length scales && List.for_all Fun.id (List.mapi (fun i row -> List.length row <= i + 1) rows) in
+  let fits = List.length rows = List.length scales &&
+      List.for_all Fun.id (List.mapi (fun i row -> List.length row <= i + 1) rows) in
   require fits "%s: the factor does not show that the matrix inequality holds" (Filename.chop_suffix where ".factor");
   let filled = List.mapi (fun i row -> List.init (i + 1 - List.length row) (fun _ -> Z.zero) @ row) rows in
   { Proved.unit0; scales; rows = filled }

@@ -14,7 +14,8 @@ let networks_of f =
 let weights (net : Network.t) part = match List.assoc_opt part net.parts with
   | Some w -> w | None -> rejected "there is no network %s" (shown part)
 let index (net : Network.t) part =
-  let rec go k = function [] -> rejected "there is no network %s" (shown part) | (name, _) :: rest -> if name = part then k else go (k + 1) rest in
+  let rec go k = function [] -> rejected "there is no network %s" (shown part) | (name, _) :: rest ->
+      if name = part then k else go (k + 1) rest in
   go 0 net.parts
 let inputs net part = Weights.inputs (Weights.first_layer (weights net part))
 let has_ground (net : Network.t) = List.mem_assoc "phi:ground" net.parts
@@ -47,13 +48,15 @@ let unit (net : Network.t) f block =
   let all suffix = List.for_all (Weights.ends_with suffix) names in
   let input = if names = [] then "input" else if all "_m_s" then "(m/s)" else if all "_m" then "m" else "(m, m/s)" in
   let output = if net.unit = "" then "output" else net.unit in
-  if starts_with "phi:" f then "hidden/" ^ input else if starts_with "rho:" f then output ^ "/hidden" else output ^ "/" ^ input
+  if starts_with "phi:" f then "hidden/" ^ input else if starts_with "rho:" f then
+      output ^ "/hidden" else output ^ "/" ^ input
 
 type operation = { op : string; layer : string option; from : int; onto : int }
 let chain (net : Network.t) part =
   let w = weights net part in
   let n = inputs net part in
-  let clamp = if net.clamp <> [] && Network.is_clamped part then [ { op = "clamp"; layer = None; from = n; onto = n } ] else [] in
+  let clamp = if net.clamp <> [] && Network.is_clamped part then [ { op = "clamp"; layer = None; from = n; onto = n } ]
+      else [] in
   let layer k (l : Weights.layer) =
     let from = Weights.inputs l in
     (if k = 0 then [] else [ { op = "relu"; layer = None; from; onto = from } ])
@@ -67,7 +70,8 @@ let chain_words steps =
 let words (net : Network.t) =
   let add found (name, _) =
     let words = chain_words (chain net name) in
-    if List.mem_assoc words found then List.map (fun (w, names) -> w, if w = words then names ^ ", " ^ name else names) found
+    if List.mem_assoc words found then List.map
+        (fun (w, names) -> w, if w = words then names ^ ", " ^ name else names) found
     else found @ [ words, name ] in
   match net.parts with
   | [ "network", _ ] -> chain_words (chain net "network")
@@ -80,6 +84,7 @@ let part (net : Network.t) (name, (w : Weights.t)) =
   let layers = List.map layer w.layers in
   let rec cut = function [ last ] -> [], last | l :: ls -> let h, last = cut ls in l :: h, last | [] -> assert false in
   let hidden, outer = cut layers in
-  let clamp = if Network.is_clamped name then List.map (fun (a, b) -> Exact.of_float a, Exact.of_float b) net.clamp else [] in
+  let clamp = if Network.is_clamped name then List.map (fun (a, b) -> Exact.of_float a, Exact.of_float b) net.clamp
+      else [] in
   { Proved.hidden; outer; clamp }
 let parts (net : Network.t) = List.map (part net) net.parts

@@ -137,18 +137,23 @@ let kind = function
   | Object _ -> "object"
 
 (* Members and elements; what is missing or of another type rejects the certificate. *)
-let members where = function Object members -> members | other -> rejected "%s is not an object but %s" where (kind other)
+let members where = function Object members -> members | other ->
+    rejected "%s is not an object but %s" where (kind other)
 let find where key json =
-  match List.assoc_opt key (members where json) with Some member -> member | None -> rejected "%s lacks field %s" where key
+  match List.assoc_opt key (members where json) with Some member -> member | None ->
+      rejected "%s lacks field %s" where key
 let has key = function Object members -> List.mem_assoc key members | _ -> false
 let text where = function Text s -> s | other -> rejected "%s: expected text, found %s" where (kind other)
-let list where = function Array elements -> elements | other -> rejected "%s: expected an array, found %s" where (kind other)
-let element where k json = match List.nth_opt (list where json) k with Some e -> e | None -> rejected "%s: has no element %d" where k
+let list where = function Array elements -> elements | other -> rejected
+    "%s: expected an array, found %s" where (kind other)
+let element where k json = match List.nth_opt (list where json) k with Some e -> e | None ->
+    rejected "%s: has no element %d" where k
 
 let require_keys where keys json =
   let found = members where json in
   List.iter (fun (key, _) -> require (List.mem key keys) "%s has unknown field %s" where (shown key)) found;
-  List.iter (fun key -> require (List.mem_assoc key found) "%s lacks field %s" where key) (List.sort String.compare keys)
+  List.iter (fun key -> require (List.mem_assoc key found) "%s lacks field %s" where key)
+      (List.sort String.compare keys)
 
 (* A whole number; a fraction is cut off, as the other checkers do. *)
 let whole where = function

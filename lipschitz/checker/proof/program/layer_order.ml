@@ -50,22 +50,26 @@ let orders ~by_number ~most layers =
 type listing = Evaluation | Registration | Unordered
 
 let decide path listing ~stated layers =
-  let check order = if not (fits order) then bad_input "%s: order: %s does not fit the shapes" path (words order); order in
+  let check order = if not (fits order) then bad_input "%s: order: %s does not fit the shapes" path (words order);
+      order in
   if stated <> [] then begin
     let find name = match List.find_opt (fun l -> l.name = name) layers with
       | Some l -> l | None -> bad_input "%s: order: the file has no layer \"%s\"" path (shown name) in
     let order = List.map find stated in
     if List.length (List.sort_uniq compare stated) <> List.length stated || List.length order <> List.length layers then
       bad_input "%s: order: name every layer of the file once" path;
-    if listing = Evaluation && order <> layers then bad_input "%s: order: the file itself states another order: %s" path (words layers);
+    if listing = Evaluation && order <> layers then bad_input
+        "%s: order: the file itself states another order: %s" path (words layers);
     check order
   end
   else if listing = Evaluation then check layers
   else
-    let natural = List.stable_sort (fun a b -> if naturally_before a.name b.name then -1 else if naturally_before b.name a.name then 1 else 0) layers in
+    let natural = List.stable_sort (fun a b -> if naturally_before a.name b.name then
+        -1 else if naturally_before b.name a.name then 1 else 0) layers in
     let as_listed order = listing = Unordered || order = layers in
     if all_numbered natural && fits natural && as_listed natural then natural else begin
-      let undecided () = bad_input "%s: the file does not say in which order its layers are evaluated; name them with --order" path in
+      let undecided () = bad_input
+          "%s: the file does not say in which order its layers are evaluated; name them with --order" path in
       if List.length layers > 256 then undecided ();
       match orders ~by_number:false ~most:2 layers with
       | Some [] -> check natural

@@ -32,13 +32,15 @@ let load path ~key ~order =
     load_bytes file (contents file) ~key:(String.sub path (mark + 1) (String.length path - mark - 1)) ~order
   | _ -> load_bytes path (contents path) ~key ~order
 
-let is_clamped part = part = "network" || (String.length part >= 4 && String.sub part 0 4 = "phi:" && part <> "phi:ground")
+let is_clamped part = part = "network" || (String.length part >= 4 && String.sub part 0 4 = "phi:" && part <>
+    "phi:ground")
 let sizes weights = Weights.inputs (Weights.first_layer weights), Weights.outputs (Weights.last_layer weights)
 
 (* network.toml *)
 
 let allow_only path where keys members =
-  List.iter (fun (key, _) -> if not (List.mem key keys) then bad_input "%s: %s%s is not a known key" path where (shown key)) members
+  List.iter (fun (key, _) -> if not (List.mem key keys) then bad_input
+      "%s: %s%s is not a known key" path where (shown key)) members
 let table path name = function
   | Some (Json.Object members) -> members
   | Some _ -> bad_input "%s: %s must be a table" path name
@@ -49,7 +51,8 @@ let texts path name = function
   | _ -> bad_input "%s: %s must be a list of texts in quotes" path name
 let numbers path name = function
   | Some (Json.Array elements) ->
-    List.map (function Json.Number { value; _ } -> value | _ -> bad_input "%s: %s must be a list of numbers" path name) elements
+    List.map (function Json.Number { value; _ } -> value | _ -> bad_input "%s: %s must be a list of numbers" path name)
+        elements
   | _ -> bad_input "%s: %s must be a list of numbers" path name
 
 let read_output path members =

@@ -22,9 +22,11 @@ let integer path number fields = match List.rev (all number fields) with
 let tensor path message =
   let fields = Protobuf.fields path message in
   let name = text path 8 fields and kind = integer path 2 fields in
-  let size n = if Int64.compare n 0L < 0 || Int64.compare n 0x7FFFFFFFL > 0 then bad_input "%s: %s has an impossible shape" path (shown name) else Int64.to_int n in
+  let size n = if Int64.compare n 0L < 0 || Int64.compare n 0x7FFFFFFFL > 0 then
+      bad_input "%s: %s has an impossible shape" path (shown name) else Int64.to_int n in
   let shape = List.map size (List.concat_map (Protobuf.integers path) (all 1 fields)) in
-  if all 13 fields <> [] || integer path 14 fields <> 0 then bad_input "%s: %s: its numbers lie in another file" path (shown name);
+  if all 13 fields <> [] || integer path 14 fields <> 0 then bad_input
+      "%s: %s: its numbers lie in another file" path (shown name);
   let data = List.filter (fun (n, _) -> n = 4 || n = 9 || n = 10) fields in
   let width = match kind with 1 -> 4 | 11 -> 8 | _ -> 0 in
   let raw = match data with
@@ -32,8 +34,10 @@ let tensor path message =
     | _ when width = 0 -> ""
     | [] -> ""
     | _ -> bad_input "%s: %s: its numbers are not in one piece" path (shown name) in
-  let count = List.fold_left (fun product n -> if n > 0 && product > Weights.most_numbers / n then bad_input "%s: %s is too large" path (shown name) else product * n) 1 shape in
-  if width > 0 && String.length raw <> count * width then bad_input "%s: %s holds another number of numbers than its shape" path (shown name);
+  let count = List.fold_left (fun product n -> if n > 0 && product > Weights.most_numbers / n then
+      bad_input "%s: %s is too large" path (shown name) else product * n) 1 shape in
+  if width > 0 && String.length raw <> count * width then bad_input
+      "%s: %s holds another number of numbers than its shape" path (shown name);
   { name; shape; kind; raw }
 
 let attribute path message =
@@ -49,7 +53,8 @@ let node path message =
   let domain = text path 7 fields in
   if domain <> "" && domain <> "ai.onnx" then bad_input "%s: a node is of an operator set that cannot be read" path;
   match texts path 2 fields with
-  | [ output ] -> { op = text path 4 fields; inputs = texts path 1 fields; output; attributes = List.map (attribute path) (texts path 5 fields) }
+  | [ output ] -> { op = text path 4 fields; inputs = texts path 1 fields; output;
+      attributes = List.map (attribute path) (texts path 5 fields) }
   | _ -> bad_input "%s: a node has not exactly one output" path
 
 type state = { mutable layers : affine list; mutable after_relu : bool }
@@ -81,7 +86,8 @@ let follow path kept state current node =
                   refuse "takes what is neither the value before it nor stored") inputs;
     (match op, inputs with
      | "Gemm", (first :: weight :: rest) when first = current && weight <> "" && List.length rest <= 1 ->
-       if number "alpha" 1. <> 1. || number "beta" 1. <> 1. || number "transA" 0. <> 0. then refuse "scales or transposes";
+       if number "alpha" 1. <> 1. || number "beta" 1. <> 1. || number "transA" 0. <> 0. then
+           refuse "scales or transposes";
        start (stored weight) (number "transB" 0. = 0.);
        (match rest with [ bias ] when bias <> "" -> add_bias (stored bias) | _ -> ())
      | "MatMul", [ first; weight ] when first = current -> start (stored weight) true
@@ -94,7 +100,8 @@ let follow path kept state current node =
     node.output
 
 let layer_name names k weight =
-  let name = if String.length weight > 7 && Weights.ends_with ".weight" weight then String.sub weight 0 (String.length weight - 7) else weight in
+  let name = if String.length weight > 7 && Weights.ends_with ".weight" weight then
+      String.sub weight 0 (String.length weight - 7) else weight in
   let rec free name =
     if name <> "" && not (Hashtbl.mem names name) then name
     else free (Printf.sprintf "layer%d%s" (k + 1) (if name = "" then "" else "_" ^ name)) in
@@ -126,11 +133,13 @@ let read path bytes ~order =
   if List.length nodes > 10_000 then bad_input "%s: the graph has more than 10000 nodes" path;
   let state = { layers = []; after_relu = false } in
   let last = List.fold_left (follow path kept state) input nodes in
-  if List.map name_of (texts path 12 graph) <> [ last ] then bad_input "%s: the graph's output is not where its chain of nodes ends" path;
+  if List.map name_of (texts path 12 graph) <> [ last ] then bad_input
+      "%s: the graph's output is not where its chain of nodes ends" path;
   if state.layers = [] || state.after_relu then bad_input "%s: has no linear layer, or ends in a Relu" path;
   let names = Hashtbl.create 16 in
   let tensors = List.concat (List.mapi (fun k layer ->
       let name = layer_name names k layer.weight.name in
       declared layer.weight (name ^ ".weight") layer.transposed
-      :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> [])) (List.rev state.layers)) in
+      :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> []))
+          (List.rev state.layers)) in
   Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order tensors

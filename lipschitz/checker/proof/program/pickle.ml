@@ -23,7 +23,8 @@ let parse path bytes start =
   let int16 () = String.get_uint16_le (take 2) 0 in
   let int32 () = Int32.to_int (String.get_int32_le (take 4) 0) in
   let push v = stack := v :: !stack in
-  let pop () = match !stack with v :: rest -> stack := rest; v | [] -> fail "an opcode finds too few values on the stack" in
+  let pop () = match !stack with v :: rest -> stack := rest; v | [] ->
+      fail "an opcode finds too few values on the stack" in
   let pop_marked () = match !marks with
     | saved :: rest -> let items = List.rev !stack in stack := saved; marks := rest; items
     | [] -> fail "an opcode finds no mark on the stack" in
@@ -31,26 +32,33 @@ let parse path bytes start =
     match String.index_from_opt bytes !at '\n' with
     | Some stop -> let part = String.sub bytes !at (stop - !at) in at := stop + 1; part
     | None -> fail "the pickle is cut short" in
-  let rec pairs = function a :: b :: rest -> (a, b) :: pairs rest | [] -> [] | [ _ ] -> fail "a dict with a key and no value" in
+  let rec pairs = function a :: b :: rest -> (a, b) :: pairs rest | [] -> [] | [ _ ] ->
+      fail "a dict with a key and no value" in
   let top () = match !stack with v :: _ -> v | [] -> fail "an opcode finds too few values on the stack" in
   let extend items = match top () with
     | Dict entries -> entries := List.rev_append (pairs items) !entries
     | List elements -> elements := List.rev_append items !elements
     | _ -> fail "is neither a list nor a dict" in
-  let recall k = match Hashtbl.find_opt memo k with Some v -> push v | None -> fail "an opcode recalls a value that was never stored" in
+  let recall k = match Hashtbl.find_opt memo k with Some v -> push v | None ->
+      fail "an opcode recalls a value that was never stored" in
   let ints = List.map (function Int n when n >= 0 -> n | _ -> fail "a size that is no natural number") in
   let call f args = match f, args with
     | Global "collections.OrderedDict", [] -> Dict (ref [])
-    | Global "torch._utils._rebuild_tensor_v2", (Storage _ as storage) :: Int offset :: Tuple sizes :: Tuple strides :: _
-      when offset >= 0 && List.length sizes = List.length strides -> Tensor { storage; offset; sizes = ints sizes; strides = ints strides }
+    | Global "torch._utils._rebuild_tensor_v2", (Storage _ as storage) :: Int offset :: Tuple sizes :: Tuple
+        strides :: _
+      when offset >= 0 && List.length sizes = List.length strides ->
+          Tensor { storage; offset; sizes = ints sizes; strides = ints strides }
     | Global "torch._utils._rebuild_parameter", (Tensor _ as tensor) :: _ -> tensor
     | _ -> fail "calls something that is not part of a state dict" in
   let global name = match name with
-    | "collections.OrderedDict" | "torch._utils._rebuild_tensor_v2" | "torch._utils._rebuild_parameter" -> push (Global name)
-    | _ when Weights.ends_with "Storage" name && String.length name < 40 && String.sub name 0 6 = "torch." -> push (Global name)
+    | "collections.OrderedDict" | "torch._utils._rebuild_tensor_v2" | "torch._utils._rebuild_parameter" ->
+        push (Global name)
+    | _ when Weights.ends_with "Storage" name && String.length name < 40 && String.sub name 0 6 = "torch." ->
+        push (Global name)
     | _ -> fail ("names " ^ shown name ^ ", which is not part of a state dict") in
   let persistent = function
-    | Tuple (Text "storage" :: Global kind :: Text key :: Text _ :: Int elements :: _) when elements >= 0 -> push (Storage { key; kind; elements })
+    | Tuple (Text "storage" :: Global kind :: Text key :: Text _ :: Int elements :: _) when elements >= 0 ->
+        push (Storage { key; kind; elements })
     | _ -> fail "a storage is not described as torch does" in
   let rec go () =
     incr steps;

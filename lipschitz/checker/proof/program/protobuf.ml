@@ -45,6 +45,7 @@ let integers path = function
   | Number n -> [ n ]
   | Bytes data ->
     let at = ref 0 in
-    let rec go found = if !at = String.length data then List.rev found else let n = varint path data at in go (n :: found) in
+    let rec go found = if !at = String.length data then List.rev found else let n = varint path data at in
+        go (n :: found) in
     go []
   | Fixed _ -> bad_input "%s: a number of another type" path

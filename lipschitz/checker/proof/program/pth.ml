@@ -3,7 +3,8 @@
 open Refusal
 
 let legacy_magic = "\x8a\x0a\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19."
-let part_is bytes at text = at >= 0 && String.length bytes >= at + String.length text && String.sub bytes at (String.length text) = text
+let part_is bytes at text = at >= 0 && String.length bytes >= at + String.length text &&
+    String.sub bytes at (String.length text) = text
 let is_zip bytes = part_is bytes 0 "PK\003\004"
 let looks_like bytes = is_zip bytes || (String.length bytes > 2 && bytes.[0] = '\x80' && part_is bytes 2 legacy_magic)
 
@@ -24,7 +25,8 @@ let zip_entries path bytes =
     if left = 0 then List.rev found else begin
       if not (part_is bytes at "PK\001\002") then fail "no entry where one is listed";
       let name = sub (at + 46) (u16 (at + 28)) and length = u32 (at + 24) and local = u32 (at + 42) in
-      if u16 (at + 8) land 1 <> 0 || u16 (at + 10) <> 0 || u32 (at + 20) <> length then fail "an entry is compressed or encrypted";
+      if u16 (at + 8) land 1 <> 0 || u16 (at + 10) <> 0 || u32 (at + 20) <> length then
+          fail "an entry is compressed or encrypted";
       if not (part_is bytes local "PK\003\004") then fail "no entry where one is listed";
       if sub (local + 30) (u16 (local + 26)) <> name then fail "an entry has two names";
       if List.mem_assoc name found then fail "an entry appears twice";
@@ -43,10 +45,12 @@ let rec select path root key = match root, key with
         | _ -> bad_input "%s: a key that is not text" path) !entries
   | Pickle.Dict entries, _ ->
     let fits = function
-      | Pickle.Text name, value when name <> "" && (name = key || Weights.starts_with (name ^ ".") key) -> Some (String.length name, value)
+      | Pickle.Text name, value when name <> "" && (name = key || Weights.starts_with (name ^ ".") key) ->
+          Some (String.length name, value)
       | _ -> None in
     (match List.sort (fun (a, _) (b, _) -> compare b a) (List.filter_map fits !entries) with
-     | (n, value) :: _ -> select path value (if n = String.length key then "" else String.sub key (n + 1) (String.length key - n - 1))
+     | (n, value) :: _ -> select path value (if n = String.length key then
+         "" else String.sub key (n + 1) (String.length key - n - 1))
      | [] -> bad_input "%s: the file has no key \"%s\"" path (shown key))
   | _ -> bad_input "%s: is not a state dict (names and tensors)" path
 
@@ -66,7 +70,8 @@ let tensors path root key storage_data =
   let small n = n < 1 lsl 31 in
   List.map (function
       | name, Pickle.Tensor { storage = Pickle.Storage { key; kind; elements }; offset; sizes; strides } ->
-        if not (List.for_all small (offset :: elements :: sizes @ strides)) then bad_input "%s: %s is too large" path (shown name);
+        if not (List.for_all small (offset :: elements :: sizes @ strides)) then
+            bad_input "%s: %s is too large" path (shown name);
         let kind = kind_of kind in
         let read () = numbers path name (storage_data key) kind ~offset ~sizes ~strides ~elements () in
         { Weights.tensor = name; shape = sizes; kind; numbers = read }
@@ -75,19 +80,24 @@ let tensors path root key storage_data =
 let read_zip path bytes ~key =
   let entries = zip_entries path bytes in
   let pickle = match List.find_opt (fun (name, _) ->
-      match String.index_opt name '/' with Some at -> String.sub name at (String.length name - at) = "/data.pkl" | None -> false) entries with
+      match String.index_opt name '/' with Some at -> String.sub name at (String.length name - at) = "/data.pkl"
+          | None -> false) entries with
     | Some (name, _) -> name | None -> bad_input "%s: the zip archive has no <folder>/data.pkl" path in
   let folder = String.sub pickle 0 (String.length pickle - 8) in
-  let entry name = match List.assoc_opt name entries with Some read -> read () | None -> bad_input "%s: the archive has no %s" path (shown name) in
-  if List.exists (fun (name, _) -> name = folder ^ "constants.pkl" || Weights.starts_with (folder ^ "code/") name) entries then
+  let entry name = match List.assoc_opt name entries with Some read -> read () | None ->
+      bad_input "%s: the archive has no %s" path (shown name) in
+  if List.exists (fun (name, _) -> name = folder ^ "constants.pkl" ||
+      Weights.starts_with (folder ^ "code/") name) entries then
     bad_input "%s: is a TorchScript program, not a state dict" path;
   if List.mem_assoc (folder ^ "byteorder") entries && entry (folder ^ "byteorder") <> "little" then
     bad_input "%s: the numbers are not little-endian" path;
   let root, _ = Pickle.parse path (entry pickle) 0 in
   tensors path root key (fun storage -> entry (folder ^ "data/" ^ storage))
 
-let storage_bytes = [ "torch.FloatStorage", 4; "torch.DoubleStorage", 8; "torch.HalfStorage", 2; "torch.BFloat16Storage", 2; "torch.LongStorage", 8;
-                      "torch.IntStorage", 4; "torch.ShortStorage", 2; "torch.CharStorage", 1; "torch.ByteStorage", 1; "torch.BoolStorage", 1 ]
+let storage_bytes = [ "torch.FloatStorage", 4; "torch.DoubleStorage", 8; "torch.HalfStorage", 2;
+    "torch.BFloat16Storage", 2; "torch.LongStorage", 8;
+                      "torch.IntStorage", 4; "torch.ShortStorage", 2; "torch.CharStorage", 1; "torch.ByteStorage", 1;
+                          "torch.BoolStorage", 1 ]
 
 (* Magic number, protocol, system, state, names of storages; then each storage behind its number of elements. *)
 let read_legacy path bytes ~key =
@@ -100,19 +110,22 @@ let read_legacy path bytes ~key =
   let root, at = Pickle.parse path bytes at in
   let names, at = Pickle.parse path bytes at in
   let names = match names with
-    | Pickle.List names -> List.rev_map (function Pickle.Text name -> name | _ -> bad_input "%s: a storage without a name" path) !names
+    | Pickle.List names -> List.rev_map (function Pickle.Text name -> name | _ ->
+        bad_input "%s: a storage without a name" path) !names
     | _ -> bad_input "%s: list of storages: is not a list" path in
   let widths = Hashtbl.create 16 in
   let rec collect depth = function
     | Pickle.Dict entries when depth < 16 -> List.iter (fun (_, v) -> collect (depth + 1) v) !entries
     | Pickle.Tensor { storage = Pickle.Storage { key; kind; _ }; _ } ->
       (match List.assoc_opt kind storage_bytes with
-       | Some width -> Hashtbl.replace widths key width | None -> bad_input "%s: numbers of type %s cannot be skipped" path (shown kind))
+       | Some width -> Hashtbl.replace widths key width | None ->
+           bad_input "%s: numbers of type %s cannot be skipped" path (shown kind))
     | _ -> () in
   collect 0 root;
   let located = Hashtbl.create 16 in
   let place at name =
-    let width = match Hashtbl.find_opt widths name with Some w -> w | None -> bad_input "%s: a storage belongs to no tensor" path in
+    let width = match Hashtbl.find_opt widths name with Some w -> w | None ->
+        bad_input "%s: a storage belongs to no tensor" path in
     if at + 8 > String.length bytes then bad_input "%s: is cut short" path;
     let count = Int64.to_int (String.get_int64_le bytes at) in
     if count < 0 || count > (String.length bytes - at - 8) / width then bad_input "%s: is cut short" path;

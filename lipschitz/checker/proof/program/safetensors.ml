@@ -5,7 +5,8 @@ open Refusal
 let order_key = "swarmcert.layers"
 
 let looks_like bytes =
-  String.length bytes >= 10 && Int64.unsigned_compare (String.get_int64_le bytes 0) (Int64.of_int (4 lsl 20)) <= 0 && bytes.[8] = '{'
+  String.length bytes >= 10 && Int64.unsigned_compare (String.get_int64_le bytes 0) (Int64.of_int (4 lsl 20)) <= 0 &&
+      bytes.[8] = '{'
 
 let counts path field json =
   let number = function
@@ -24,7 +25,8 @@ let stated_order path header =
      | None -> []
      | Some (Json.Text names) ->
        (match Json.parse path names with
-        | Json.Array names -> List.map (function Json.Text n -> n | _ -> bad_input "%s: %s is not a list of layers" path order_key) names
+        | Json.Array names -> List.map (function Json.Text n -> n | _ ->
+            bad_input "%s: %s is not a list of layers" path order_key) names
         | _ -> bad_input "%s: %s is not a list of layers" path order_key)
      | Some _ -> bad_input "%s: %s is not text" path order_key)
   | Some _ -> bad_input "%s: __metadata__ is not an object" path
@@ -62,7 +64,8 @@ let read path bytes ~order =
   let found = List.map tensor (List.filter (fun (name, _) -> name <> "__metadata__") header) in
   check_layout path (List.map snd found) size;
   let stated = stated_order path header in
-  let layer (t : Weights.tensor) = match String.rindex_opt t.tensor '.' with Some dot -> String.sub t.tensor 0 dot | None -> "" in
+  let layer (t : Weights.tensor) = match String.rindex_opt t.tensor '.' with Some dot ->
+      String.sub t.tensor 0 dot | None -> "" in
   let rank t =
     let rec go k = function [] -> k | name :: rest -> if name = layer t then k else go (k + 1) rest in go 0 stated in
   let before a b =
@@ -70,5 +73,6 @@ let read path bytes ~order =
     if by_rank <> 0 then by_rank
     else if Layer_order.naturally_before a.Weights.tensor b.Weights.tensor then -1 else 1 in
   let tensors = List.stable_sort before (List.map fst found) in
-  let listing = if List.for_all (fun t -> rank t < List.length stated) tensors then Layer_order.Evaluation else Unordered in
+  let listing = if List.for_all (fun t -> rank t < List.length stated) tensors then
+      Layer_order.Evaluation else Unordered in
   Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) listing ~order tensors

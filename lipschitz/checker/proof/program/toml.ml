@@ -16,7 +16,8 @@ let parse path text =
   let at = ref 0 and line = ref 1 and size = String.length text in
   let fail what = bad_input "%s: line %d: %s" path !line what in
   if not (Utf8.is_valid text) then fail "is not UTF-8";
-  String.iter (fun c -> if (c < ' ' && c <> '\t' && c <> '\n' && c <> '\r') || c = '\127' then fail "has a control character") text;
+  String.iter (fun c -> if (c < ' ' && c <> '\t' && c <> '\n' && c <> '\r') || c = '\127' then
+      fail "has a control character") text;
   let peek () = if !at < size then text.[!at] else '\000' in
   let is_end () = !at >= size in
   let expect c = if peek () = c && not (is_end ()) then incr at else fail (Printf.sprintf "expected '%c'" c) in
@@ -78,7 +79,8 @@ let parse path text =
     if peek () = '.' then (incr at; blanks (); first :: dotted ()) else [ first ] in
   let number () =
     let word = run (function '0' .. '9' | '+' | '-' | '.' | 'e' | 'E' | '_' -> true | _ -> false) in
-    let body = if word <> "" && (word.[0] = '+' || word.[0] = '-') then String.sub word 1 (String.length word - 1) else word in
+    let body = if word <> "" && (word.[0] = '+' || word.[0] = '-') then String.sub word 1 (String.length word - 1)
+        else word in
     let is_digit c = c >= '0' && c <= '9' in
     let digit k = k >= 0 && k < String.length body && is_digit body.[k] in
     let well_formed k c = match c with

@@ -28,10 +28,12 @@ let most_numbers = 1 lsl 26
 let layer_of part tensor =
   if tensor = part then Some ""
   else match String.rindex_opt tensor '.' with
-    | Some dot when String.sub tensor (dot + 1) (String.length tensor - dot - 1) = part -> Some (String.sub tensor 0 dot)
+    | Some dot when String.sub tensor (dot + 1) (String.length tensor - dot - 1) = part ->
+        Some (String.sub tensor 0 dot)
     | _ -> None
 
-let starts_with prefix text = String.length text >= String.length prefix && String.sub text 0 (String.length prefix) = prefix
+let starts_with prefix text = String.length text >= String.length prefix &&
+    String.sub text 0 (String.length prefix) = prefix
 let ends_with suffix text = String.length text >= String.length suffix
   && String.sub text (String.length text - String.length suffix) (String.length suffix) = suffix
 let contains part text =
@@ -44,10 +46,12 @@ let assemble ~path ~sha256 listing ~order tensors =
   let refuse t what = bad_input "%s: %s: %s" path (shown t.tensor) what in
   if List.length tensors > 4096 then bad_input "%s: holds more than 4096 tensors" path;
   let check t =
-    if contains "parametrizations." t.tensor then refuse t "the weight is parametrised, so the file does not hold the weight itself";
+    if contains "parametrizations." t.tensor then
+        refuse t "the weight is parametrised, so the file does not hold the weight itself";
     if t.kind <> "float32" && t.kind <> "float64" then refuse t "weights must be float32 or float64";
     if List.exists (fun n -> n <= 0) t.shape then refuse t "has a dimension of size 0";
-    if List.fold_left (fun product n -> if product > most_numbers / n then most_numbers + 1 else product * n) 1 t.shape > most_numbers
+    if List.fold_left (fun product n -> if product > most_numbers / n then
+        most_numbers + 1 else product * n) 1 t.shape > most_numbers
     then refuse t "has too many numbers" in
   List.iter check tensors;
   let names = List.map (fun t -> t.tensor) tensors in
@@ -57,7 +61,8 @@ let assemble ~path ~sha256 listing ~order tensors =
   if weights = [] then bad_input "%s: holds no tensor named \"<layer>.weight\"" path;
   let precision = (snd (List.hd weights)).kind in
   List.iter (fun t -> if t.kind <> precision then refuse t "one file has one type") tensors;
-  List.iter (fun (_, t) -> if List.length t.shape <> 2 then refuse t "a linear layer's weight has two dimensions") weights;
+  List.iter (fun (_, t) -> if List.length t.shape <> 2 then refuse t "a linear layer's weight has two dimensions")
+      weights;
   let owned t = match layer_of "bias" t.tensor with
     | Some layer -> (match List.assoc_opt layer weights with
         | Some w -> if t.shape <> [ List.hd w.shape ] then refuse t "does not fit the weight"; true
@@ -67,7 +72,8 @@ let assemble ~path ~sha256 listing ~order tensors =
                 refuse t "is neither the weight nor the bias of a linear layer") tensors;
   let shapes = List.map (fun (name, t) ->
       { Layer_order.name; outputs = List.nth t.shape 0; inputs = List.nth t.shape 1 }) weights in
-  let finite t = Array.map (fun x -> if not (Float.is_finite x) then refuse t "a number is not finite"; x) (t.numbers ()) in
+  let finite t = Array.map (fun x -> if not (Float.is_finite x) then refuse t "a number is not finite";
+      x) (t.numbers ()) in
   let layer { Layer_order.name; inputs; outputs } =
     let flat = finite (List.assoc name weights) in
     { name;

@@ -42,7 +42,8 @@ Fixpoint dominant (e : matrixD) (debts : list dyadic) : bool :=
   | [] => match debts with [] => true | _ => false end
   | row :: e' =>
       let off := map abs (tl row) in
-      is_nonnegative (add (hd zero row) (neg (add (hd zero debts) (total off)))) && dominant e' (plus add (tl debts) off)
+      is_nonnegative (add (hd zero row) (neg (add (hd zero debts) (total off)))) &&
+          dominant e' (plus add (tl debts) off)
   end.
 Definition shows_nonnegative (p : matrixD) (f : factor) : bool := dominant (remainder p f) [].
 
@@ -144,7 +145,8 @@ Proof.
     pose proof (off_diagonal a (tl row) z) as O.
     assert (hd 0 (reals row) = real (hd zero row)) as -> by (destruct row; simpl; auto using eq_sym, real_zero).
     assert (tl (reals row) = reals (tl row)) as -> by (destruct row; reflexivity).
-    assert (dotR (reals debts) (timesR (a :: z) (a :: z)) = real (hd zero debts) * (a * a) + dotR (reals (tl debts)) (timesR z z)) as ->.
+    assert (dotR (reals debts) (timesR (a :: z) (a :: z)) =
+        real (hd zero debts) * (a * a) + dotR (reals (tl debts)) (timesR z z)) as ->.
     { destruct debts; simpl; [rewrite real_zero|]; ring. }
     assert (0 <= a * a * (real (hd zero row) + - (real (hd zero debts) + real (total (map abs (tl row)))))) by nra.
     nra.
@@ -173,12 +175,14 @@ Proof.
   apply (dominant_form _ [] z) in H. change (0 <= form (realm (remainder p f)) z) in H. unfold remainder in H.
   rewrite (f_sum add Rplus real real_add), form_sum, form_congruence in H.
   set (g := gram 0%Z Z.add Z.mul (rows f)) in H.
-  assert (realm (map (map (fun g => ((- g)%Z, (2 * unit f)%Z))) g) = scale_allR (- powerRZ 2 (2 * unit f)) (map (map IZR) g)) as E.
+  assert (realm (map (map (fun g => ((- g)%Z, (2 * unit f)%Z))) g) =
+      scale_allR (- powerRZ 2 (2 * unit f)) (map (map IZR) g)) as E.
   { unfold scale_all, scale. rewrite !map_map. apply map_ext. intros r. rewrite !map_map. apply map_ext.
     intros x. unfold real. cbn [fst snd]. rewrite opp_IZR. ring. }
   rewrite E, form_scale in H. unfold g in H.
   rewrite (f_gram 0%Z Z.add Z.mul 0 Rplus Rmult IZR eq_refl plus_IZR mult_IZR), form_gram in H.
-  pose proof (Rmult_le_pos _ _ (Rlt_le _ _ (power_pos (2 * unit f))) (square_nonneg (combine_rows z (map (map IZR) (rows f))))).
+  pose proof (Rmult_le_pos _ _ (Rlt_le _ _ (power_pos (2 * unit f)))
+      (square_nonneg (combine_rows z (map (map IZR) (rows f))))).
   lra.
 Qed.
 
@@ -206,7 +210,8 @@ Qed.
 
 (** (d) *)
 Theorem check_sound hidden last upper rho t f : check hidden last upper rho t f = true ->
-  forall biases b, Forall2 (fun (m : matrixD) (c : list R) => length c = length m) hidden biases -> length b = length last ->
+  forall biases b, Forall2 (fun (m : matrixD) (c : list R) => length c = length m) hidden biases ->
+      length b = length last ->
   forall x x', length x = inputs hidden last -> length x' = inputs hidden last ->
   norm (minus (chain hidden biases last b x) (chain hidden biases last b x')) <= real upper * norm (minus x x').
 Proof.
@@ -230,11 +235,13 @@ Proof.
     set (ls := List.combine (map realm later) biases).
     assert (map fst ls = map realm later) as E.
     { unfold ls. clear -Hbs. induction Hbs; simpl; congruence. }
-    apply lmi_bounds with (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later));
+    apply lmi_bounds with
+        (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later));
       auto; try (unfold bias_fits; simpl; now rewrite map_length).
     + unfold ls. clear -Hbs. induction Hbs; simpl; constructor; auto. unfold bias_fits. simpl. now rewrite map_length.
     + now rewrite E.
-    + rewrite E. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) = List.combine (map reals ts) (map realm ms)) as Q.
+    + rewrite E. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) =
+        List.combine (map reals ts) (map realm ms)) as Q.
       { clear. induction ts as [|u ts IH]; intros [|m ms]; simpl; auto. now rewrite IH. }
       now rewrite Q in HP.
 Qed.

@@ -117,7 +117,8 @@ Fixpoint total_of (accepted : list claim) (squares : bool) (kinds : list kind) (
   | (phi, moves, n) :: kinds' =>
       match find_slope accepted phi rho moves, total_of accepted squares kinds' rho with
       | Some k, Some rest =>
-          if is_nonnegative k && (0 <=? n)%Z then Some (add (mul (n, 0%Z) (if squares then mul k k else k)) rest) else None
+          if is_nonnegative k && (0 <=? n)%Z then Some (add (mul (n, 0%Z) (if squares then mul k k else k)) rest)
+              else None
       | _, _ => None
       end
   end.

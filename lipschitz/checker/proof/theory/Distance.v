@@ -23,7 +23,8 @@ Proof.
       replace (2 * ((square v + 1) / (2 * dotR v u)) * dotR v u) with (square v + 1) in C by (field; auto). lra.
     - pose proof (completed_square (dotR v u / square u) v u) as C. rewrite (dot_comm u v).
       replace (2 * (dotR v u / square u) * dotR v u) with (2 * (dotR v u * dotR v u / square u)) in C by (field; auto).
-      replace (dotR v u / square u * (dotR v u / square u) * square u) with (dotR v u * dotR v u / square u) in C by (field; auto).
+      replace (dotR v u / square u * (dotR v u / square u) * square u) with (dotR v u * dotR v u / square u) in
+          C by (field; auto).
       assert (dotR v u * dotR v u / square u <= square v) as D by lra.
       apply (Rmult_le_compat_r (square u)) in D; [|auto]. unfold Rdiv in D.
       rewrite Rmult_assoc, Rinv_l, Rmult_1_r in D by auto. lra. }
@@ -79,7 +80,8 @@ Proof. unfold square, minus. induction s as [|a s IH]; simpl; auto. rewrite IH. 
 (** What is added to both does not matter. *)
 Lemma square_shifted u v s : length u = length v -> square (minus (plusR u s) (plusR v s)) = square (minus u v).
 Proof.
-  unfold square, minus. revert v s. induction u as [|a u IH]; intros [|b v] [|c s]; simpl; try discriminate; intros H; auto.
+  unfold square, minus. revert v s. induction u as [|a u IH]; intros [|b v] [|c s]; simpl; try discriminate;
+      intros H; auto.
   - pose proof (square_minus_same (c :: s)) as E. exact E.
   - rewrite IH by lia. ring.
 Qed.
@@ -99,7 +101,8 @@ Qed.
 Lemma square_in_clamped c scale x y : length x = length y ->
   square_in scale (minus (clamped c x) (clamped c y)) <= square_in scale (minus x y).
 Proof.
-  unfold minus. revert scale x y. induction c as [|[l h] c IH]; intros scale [|a x] [|b y]; simpl; try discriminate; intros H; try lra.
+  unfold minus. revert scale x y. induction c as [|[l h] c IH]; intros scale [|a x] [|b y]; simpl; try discriminate;
+      intros H; try lra.
   specialize (IH (tl scale) x y ltac:(lia)). set (k := Rmin _ _ + _). set (j := a + _). set (s := real _).
   assert (k * k <= j * j) as K.
   { apply square_between. unfold k, j, Rmin, Rmax. destruct (Rle_dec a b); repeat destruct (Rle_dec _ _); lra. }

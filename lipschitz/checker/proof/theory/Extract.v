@@ -2,7 +2,8 @@
 From Coq Require Import ZArith List Extraction ExtrOcamlBasic ExtrOcamlNatInt.
 From Swarmcert Require Import Algebra Checker Meaning Claims.
 Extract Inductive positive => "Big.t"
-  ["(fun p -> Big.succ (Big.shift_left p 1))" "(fun p -> Big.shift_left p 1)" "Big.one"] "(fun _ _ _ _ -> assert false)".
+  ["(fun p -> Big.succ (Big.shift_left p 1))" "(fun p -> Big.shift_left p 1)" "Big.one"]
+      "(fun _ _ _ _ -> assert false)".
 Extract Inductive Z => "Big.t" ["Big.zero" "(fun p -> p)" "Big.neg"] "(fun _ _ _ _ -> assert false)".
 Extract Inlined Constant Z.add => "Big.add".
 Extract Inlined Constant Z.sub => "Big.sub".

@@ -16,7 +16,8 @@ Proof.
   destruct c as [| |[|q k] m [|] v| |]; simpl find_slope; auto.
   destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
   destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
-  destruct (find_slope rest q k m) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst; first [exact Hc | now apply IH].
+  destruct (find_slope rest q k m) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst;
+      first [exact Hc | now apply IH].
 Qed.
 (** A term that moves: its bound, its values before and after, and how far it moves. *)
 Record moving := Moving { bound : R; before : list R; after : list R; far : R }.
@@ -40,10 +41,13 @@ Fixpoint steps_of (ps : list part) (cs : list dyadic) (groups : list (kind * lis
   | _, _ => []
   end.
 Definition law_bounds (ps : list part) (rho : nat) (cs : list dyadic) (kinds : list kind) :=
-  Forall2 (fun c (k : kind) => 0 <= real c /\ (0 <= snd k)%Z /\ holds ps (Slope_at_most (Set_of (fst (fst k)) rho) (snd (fst k)) [] c)) cs kinds.
+  Forall2 (fun c (k : kind) =>
+      0 <= real c /\ (0 <= snd k)%Z /\ holds ps (Slope_at_most (Set_of (fst (fst k)) rho) (snd (fst k)) [] c)) cs kinds.
 Lemma total_sound ps accepted squares kinds rho v : Forall (holds ps) accepted ->
   total_of accepted squares kinds rho = Some v -> exists cs, law_bounds ps rho cs kinds /\
-  real v = fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * (if squares then real (fst ck) * real (fst ck) else real (fst ck))) (combine cs kinds)).
+  real v = fold_right Rplus 0 (map
+      (fun ck : dyadic * kind => IZR (snd (snd ck)) * (if squares then
+      real (fst ck) * real (fst ck) else real (fst ck))) (combine cs kinds)).
 Proof.
   intros HA. revert v. induction kinds as [|[[phi moves] n] kinds IH]; intros v; simpl.
   - intros H. inversion H. exists []. split; [constructor|]. apply real_zero.
@@ -51,7 +55,8 @@ Proof.
     destruct (total_of accepted squares kinds rho) as [w|] eqn:Hw; [|discriminate].
     destruct (is_nonnegative k) eqn:Kn; [|discriminate]. destruct (Z.leb_spec 0 n); [|discriminate]. simpl.
     intros G. inversion G. destruct (IH w eq_refl) as (cs & B & E). exists (k :: cs). split.
-    + constructor; auto. simpl. split; [now apply real_nonnegative|]. split; auto. now apply (find_slope_sound ps accepted).
+    + constructor; auto. simpl. split; [now apply real_nonnegative|]. split; auto.
+        now apply (find_slope_sound ps accepted).
     + rewrite real_add, real_mul, E. simpl. f_equal. replace (real (n, 0%Z)) with (IZR n) by (unfold real; simpl; ring).
       destruct squares; auto. now rewrite real_mul.
 Qed.
@@ -69,8 +74,10 @@ Proof.
   intros H G. rewrite !map_app, !map_map, IH by lia. reflexivity.
 Qed.
 Lemma steps_hold ps rho cs kinds movers : law_bounds ps rho cs kinds -> Forall2 may_move kinds movers ->
-  Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g)) (combine kinds movers) ->
-  Forall (fun m => forall s, norm (minus (value (part_at ps rho) (plusR (before m) s)) (value (part_at ps rho) (plusR (after m) s)))
+  Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g))
+      (combine kinds movers) ->
+  Forall (fun m => forall s,
+      norm (minus (value (part_at ps rho) (plusR (before m) s)) (value (part_at ps rho) (plusR (after m) s)))
     <= bound m * far m) (steps_of ps cs (combine kinds movers)).
 Proof.
   intros H. revert movers. induction H as [|c k cs kinds (Hc & Hn & Hk) H IH]; intros movers M L; [constructor|].
@@ -79,7 +86,8 @@ Proof.
   rewrite Forall_forall in Hms, Lk. pose proof (Hk s (fst m) (snd m) (Hms _ Hm) (Lk _ Hm)) as B.
   unfold distance in B. rewrite square_in_one in B. exact B.
 Qed.
-Lemma dot_constants (c : R) (f : mover -> R) ms : dotR (map (fun _ => c) ms) (map f ms) = c * dotR (map (fun _ => 1) ms) (map f ms).
+Lemma dot_constants (c : R) (f : mover -> R) ms : dotR (map (fun _ => c) ms) (map f ms) =
+    c * dotR (map (fun _ => 1) ms) (map f ms).
 Proof. induction ms as [|m ms IH]; simpl; [ring|]. rewrite IH. ring. Qed.
 Lemma dot_counted (f : mover -> R) r ms : 0 <= r -> Forall (fun m => f m <= r) ms ->
   dotR (map (fun _ => 1) ms) (map f ms) <= INR (length ms) * r.
@@ -104,9 +112,11 @@ Proof.
 Qed.
 Lemma square_of_bounds ps rho cs kinds movers : law_bounds ps rho cs kinds -> Forall2 may_move kinds movers ->
   square (map bound (steps_of ps cs (combine kinds movers))) <=
-  fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * (real (fst ck) * real (fst ck))) (combine cs kinds)).
+  fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * (real (fst ck) * real (fst ck)))
+      (combine cs kinds)).
 Proof.
-  unfold square. intros H. revert movers. induction H as [|c k cs kinds (Hc & Hn & _) H IH]; intros movers M; [simpl; lra|].
+  unfold square. intros H. revert movers. induction H as [|c k cs kinds (Hc & Hn & _) H IH]; intros movers M;
+      [simpl; lra|].
   inversion M as [|? ms ? movers' Hk M']; subst. simpl. rewrite map_app, map_map, dot_app by reflexivity. simpl.
   specialize (IH _ M'). pose proof (dot_constants (real c) (fun _ => real c) ms) as D.
   pose proof (dot_counted (fun _ => real c) (real c) ms Hc) as B.
@@ -125,7 +135,8 @@ Proof.
   destruct (total_sound _ _ _ _ _ _ HA Ev) as (cs & B & E). simpl holds. intros movers M L.
   pose proof (Forall2_lengths _ _ _ B) as Lc. pose proof (Forall2_lengths _ _ _ M) as Lm.
   unfold sum_at. destruct (steps_values ps cs kinds movers Lc) as [-> ->].
-  pose proof (telescope (value (part_at ps rho)) _ _ (fun x => length_value _ x Hf) (steps_hold ps rho cs kinds movers B M L) []) as T.
+  pose proof (telescope (value (part_at ps rho)) _ _
+      (fun x => length_value _ x Hf) (steps_hold ps rho cs kinds movers B M L) []) as T.
   rewrite !plus_nil_r in T. destruct stacked.
   - eapply Rle_trans; [exact T|]. eapply Rle_trans; [apply cauchy|]. rewrite steps_far by auto.
     apply Rmult_le_compat_r; [apply norm_nonneg|]. apply sqrt_below; auto. rewrite real_mul in Ht.

@@ -24,12 +24,14 @@ Lemma real_relu x : real (reluD x) = relu (real x).
 Proof.
   unfold reluD, relu. destruct (is_nonnegative x) eqn:E.
   - apply real_nonnegative in E. now rewrite Rmax_right.
-  - assert (is_nonnegative (neg x) = true) as N by (unfold is_nonnegative, neg in *; simpl; apply Z.leb_le; apply Z.leb_gt in E; lia).
+  - assert (is_nonnegative (neg x) = true) as N by (unfold is_nonnegative, neg in *; simpl; apply Z.leb_le;
+      apply Z.leb_gt in E; lia).
     apply real_nonnegative in N. rewrite real_neg in N. rewrite Rmax_left by lra. apply real_zero.
 Qed.
 Lemma real_affine m b x : reals (affineD m b x) = affine (realm m) (reals b) (reals x).
 Proof.
-  unfold affineD, affine. now rewrite (f_plus add Rplus real real_add), (f_apply zero add mul 0 Rplus Rmult real real_zero real_add real_mul).
+  unfold affineD, affine. now rewrite (f_plus add Rplus real real_add),
+      (f_apply zero add mul 0 Rplus Rmult real real_zero real_add real_mul).
 Qed.
 Lemma real_network hidden last x :
   reals (networkD hidden last x) = network (map real_layer hidden) (real_layer last) (reals x).
@@ -48,7 +50,8 @@ Theorem check_lower_sound hidden last lower x x' : check_lower hidden last lower
   let f := network (map real_layer hidden) (real_layer last) in
   real lower * norm (minus (reals x) (reals x')) <= norm (minus (f (reals x)) (f (reals x'))).
 Proof.
-  unfold check_lower. intros H. set (f := network (map real_layer hidden) (real_layer last)). cbv zeta. apply andb_prop in H. destruct H as [Hl H]. apply real_nonnegative in Hl, H.
+  unfold check_lower. intros H. set (f := network (map real_layer hidden) (real_layer last)). cbv zeta.
+      apply andb_prop in H. destruct H as [Hl H]. apply real_nonnegative in Hl, H.
   rewrite real_add, real_neg, !real_mul, !real_square_minus, !real_network in H. fold f in H.
   unfold norm. rewrite <- (sqrt_square (real lower)) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
   apply sqrt_le_1_alt. lra.

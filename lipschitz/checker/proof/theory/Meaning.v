@@ -1,5 +1,6 @@
 (** What the claims of a certificate mean, over the real numbers. Together with `network`, `affine` and `relu` of Network.v,
-    `norm` and `minus` of Form.v and Network.v and `real` of Checker.v (mantissa times 2^exponent), this is all that has to
+    `norm` and `minus` of Form.v and Network.v and `real` of Checker.v (mantissa times 2^exponent),
+        this is all that has to
     be read to know what an accepted certificate states. *)
 From Coq Require Import List ZArith Reals.
 From Swarmcert Require Import Algebra Form Network Checker.
@@ -84,7 +85,8 @@ Definition holds (ps : list part) (c : claim) : Prop :=
   | Law stacked kinds rho u =>
       forall movers, Forall2 may_move kinds movers -> let groups := combine kinds movers in
       Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g)) groups ->
-      let change := minus (value (part_at ps rho) (sum_at ps fst groups)) (value (part_at ps rho) (sum_at ps snd groups)) in
+      let change := minus (value (part_at ps rho) (sum_at ps fst groups))
+          (value (part_at ps rho) (sum_at ps snd groups)) in
       if stacked
       then norm change <= real u * norm (map step_of (concat movers))
       else forall r, 0 <= r -> Forall (fun m => step_of m <= r) (concat movers) -> norm change <= real u * r

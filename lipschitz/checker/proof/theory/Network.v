@@ -66,7 +66,8 @@ Proof.
     rewrite form_gram_columns, form_diagonal by (unfold scale; rewrite map_length, length_minus; auto).
     apply Req_le. unfold Rminus. f_equal; [|ring].
     now rewrite times_scale, dot_scale_r.
-  - inversion Hbs as [|? ? Hc Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; subst. simpl in *. unfold bias_fits in Hc. simpl in Hc.
+  - inversion Hbs as [|? ? Hc Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; subst. simpl in *.
+      unfold bias_fits in Hc. simpl in Hc.
     set (z := map relu (affine m c h)). set (z' := map relu (affine m c h')).
     assert (length z = length m) as Hz by (unfold z; now rewrite map_length, length_affine).
     assert (length z' = length m) as Hz' by (unfold z'; now rewrite map_length, length_affine).
@@ -85,7 +86,8 @@ Qed.
 Lemma completed_square rho l x : 2 * rho * dotR l x - square l <= rho * rho * square x.
 Proof.
   pose proof (square_nonneg (minus (scaleR rho x) l)) as H. unfold square, minus in *.
-  rewrite !dot_plus_l, !dot_plus_r in H. repeat rewrite ?dot_scale_l, ?dot_scale_r in H. rewrite (dot_comm x l) in H. nra.
+  rewrite !dot_plus_l, !dot_plus_r in H. repeat rewrite ?dot_scale_l, ?dot_scale_r in H. rewrite (dot_comm x l) in
+      H. nra.
 Qed.
 
 Definition bounded rho (f : list R -> list R) := forall x x', square (minus (f x) (f x')) <= rho * square (minus x x').
@@ -138,8 +140,10 @@ Proof.
   intros Hr H HP x x' Hx Hx'. simpl. rewrite minus_affine by auto. set (d := minus x x').
   assert (length d = n) as L by (unfold d; rewrite length_minus; lia). clearbody d.
   specialize (HP d). unfold norm_lmi in HP.
-  rewrite form_sum, form_scale, <- L, form_gram_columns, form_diagonal in HP by (now rewrite map_length, length_columns).
-  assert (forall (m : matrix) (y : list R), length m = length y -> dotR y (timesR (map (fun _ => rho) m) y) = rho * square y) as T.
+  rewrite form_sum, form_scale, <- L, form_gram_columns, form_diagonal in
+      HP by (now rewrite map_length, length_columns).
+  assert (forall (m : matrix) (y : list R), length m = length y ->
+      dotR y (timesR (map (fun _ => rho) m) y) = rho * square y) as T.
   { unfold square. clear. induction m as [|r m IH]; intros [|c y]; simpl; try discriminate; intros; [ring|].
     rewrite IH by lia. ring. }
   rewrite T in HP by (now rewrite length_columns). lra.

@@ -5,7 +5,8 @@ Import ListNotations.
 
 Notation productD := (product zero add mul).
 (** The last stage of phi and the first of rho, which no ReLU separates, are one. *)
-Definition set_stages (phi : list matrixD) (w : matrixD) (rho : list matrixD) (last : matrixD) : list matrixD * matrixD :=
+Definition set_stages (phi : list matrixD) (w : matrixD) (rho : list matrixD) (last : matrixD) : list matrixD *
+    matrixD :=
   match rho with [] => (phi, productD last w) | v :: rho' => (phi ++ productD v w :: rho', last) end.
 Definition outputs (hidden : list matrixD) (n : nat) : nat := length (List.last hidden (repeat [] n)).
 Definition stack := (list matrixD * matrixD)%type.
@@ -35,10 +36,12 @@ Proof.
 Qed.
 Lemma affine_join v c w b s y : length (hd [] w) = length y ->
   affine (product 0 Rplus Rmult v w) (plusR (applyR v (plusR b s)) c) y = affine v c (plusR (affine w b y) s).
-Proof. intros H. unfold affine. now rewrite apply_product, (plus_assoc _ b s), !(apply_plus v), !plus_assoc by auto. Qed.
+Proof. intros H. unfold affine. now rewrite apply_product, (plus_assoc _ b s), !(apply_plus v),
+    !plus_assoc by auto. Qed.
 
 Lemma length_network hidden x : Forall bias_fits hidden -> forall n, length x = n ->
-  length (fold_left (fun h l => map relu (affine (fst l) (snd l) h)) hidden x) = length (List.last (map fst hidden) (repeat [] n)).
+  length (fold_left (fun h l => map relu (affine (fst l) (snd l) h)) hidden x) =
+      length (List.last (map fst hidden) (repeat [] n)).
 Proof.
   intros H. revert x. induction H as [|[m b] hidden Hb H IH]; intros x n Hn; simpl.
   - now rewrite repeat_length.
@@ -55,7 +58,8 @@ Lemma network_end h last x :
 Proof. revert x. induction h as [|[m b] h IH]; intros x; simpl; auto. Qed.
 
 (** rho(phi(x) + s) as one chain. *)
-Definition joined (phi : list (matrix * list R)) (w : matrix) (b s : list R) (rho : list (matrix * list R)) (last : matrix * list R) :=
+Definition joined (phi : list (matrix * list R)) (w : matrix) (b s : list R) (rho : list (matrix * list R))
+    (last : matrix * list R) :=
   let join l := (product 0 Rplus Rmult (fst l) w, plusR (applyR (fst l) (plusR b s)) (snd l)) in
   match rho with [] => (phi, join last) | v :: rho' => (phi ++ join v :: rho', last) end.
 Lemma network_joined phi w b s rho last x : Forall bias_fits phi ->
@@ -75,7 +79,8 @@ Definition real_stack := (list (matrix * list R) * (matrix * list R))%type.
 Definition run (l : real_stack) : list R -> list R := network (fst l) (snd l).
 Definition instance (p : stack) (l : real_stack) := exists bs c, biases_fit (fst p) bs /\ length c = length (snd p) /\
   l = (List.combine (map realm (fst p)) bs, (realm (snd p), c)).
-Definition join (l : real_stack) (s : list R) (k : real_stack) : real_stack := joined (fst l) (fst (snd l)) (snd (snd l)) s (fst k) (snd k).
+Definition join (l : real_stack) (s : list R) (k : real_stack) : real_stack := joined (fst l) (fst (snd l))
+    (snd (snd l)) s (fst k) (snd k).
 
 Lemma instance_fits p l : instance p l -> Forall bias_fits (fst l) /\ map fst (fst l) = map realm (fst p).
 Proof.
@@ -87,7 +92,8 @@ Qed.
 Lemma instance_join p l q k s : instance p l -> instance q k ->
   instance (set_stages (fst p) (snd p) (fst q) (snd q)) (join l s k).
 Proof.
-  destruct p as [phi w], q as [rho last]. intros (bp & b & Hp & Hb & ->) (br & c & Hr & Hc & ->). unfold join, instance. simpl in *.
+  destruct p as [phi w], q as [rho last]. intros (bp & b & Hp & Hb & ->) (br & c & Hr & Hc & ->). unfold join, instance.
+      simpl in *.
   assert (forall (v : matrixD) (c : list R), length c = length v ->
     length (plusR (applyR (realm v) (plusR b s)) c) = length (productD v w)) as L.
   { intros v d Hd. change (plusR _ d) with (affine (realm v) d (plusR b s)).
@@ -108,8 +114,10 @@ Lemma run_join p l s k x : instance p l -> length x = inputs (fst p) (snd p) ->
 Proof.
   intros Hl Hx Hw. destruct (instance_fits _ _ Hl) as [F M]. destruct Hl as (bs & c & _ & _ & ->). unfold run, join.
   rewrite network_joined; auto. rewrite M. simpl. unfold outputs in Hw.
-  assert (length (hd [] (realm (snd p))) = length (hd [] (snd p))) as -> by (destruct (snd p); simpl; auto using map_length).
-  rewrite Hw, <- Hx. generalize (length x). intros n. clear. induction (fst p) as [|m phi IH]; simpl; [now rewrite !repeat_length|].
+  assert (length (hd [] (realm (snd p))) = length (hd [] (snd p))) as ->
+      by (destruct (snd p); simpl; auto using map_length).
+  rewrite Hw, <- Hx. generalize (length x). intros n. clear. induction (fst p) as [|m phi IH]; simpl;
+      [now rewrite !repeat_length|].
   destruct phi; simpl in *; [now rewrite map_length | exact IH].
 Qed.
 
@@ -122,9 +130,11 @@ Theorem check_parts_sound ps p upper r t f : check_parts p ps upper r t f = true
   forall x x', length x = inputs (fst p) (snd p) -> length x' = inputs (fst p) (snd p) ->
   norm (minus (run_after ks (run l x)) (run_after ks (run l x'))) <= real upper * norm (minus x x').
 Proof.
-  revert p. induction ps as [|q ps IH]; intros p H l ks Hl Hks x x' Hx Hx'; inversion Hks as [|? [s k] ? ks' Hk Hks']; subst; simpl in *.
+  revert p. induction ps as [|q ps IH]; intros p H l ks Hl Hks x x' Hx Hx'; inversion Hks as [|? [s k] ? ks' Hk Hks'];
+      subst; simpl in *.
   - destruct Hl as (bs & c & Hbs & Hc & ->). exact (check_sound _ _ _ _ _ _ H bs c Hbs Hc x x' Hx Hx').
-  - do 3 (apply andb_prop in H; destruct H as [H ?HC]). apply andb_prop in H. destruct H as [HW HI]. apply Nat.eqb_eq in HW, HI.
+  - do 3 (apply andb_prop in H; destruct H as [H ?HC]). apply andb_prop in H. destruct H as [HW HI]. apply Nat.eqb_eq in
+      HW, HI.
     rewrite <- !(run_join p l s k) by auto.
     eapply IH; eauto using instance_join; congruence.
 Qed.

@@ -46,7 +46,8 @@ Proof.
   - rewrite map_length, H. destruct w; simpl; auto. now rewrite map_length.
   - apply sqrt_lt_R0. rewrite <- real_square. now apply real_positive.
   - apply at_most_real in H0. rewrite !real_mul, !real_square, realm_apply in H0. apply real_nonnegative in H2.
-    unfold norm. rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra. now apply sqrt_le_1_alt.
+    unfold norm. rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
+        now apply sqrt_le_1_alt.
 Qed.
 
 (** Slopes by a matrix inequality *)
@@ -80,7 +81,8 @@ Lemma moved_bound moves scale c u (g : list R -> list R) x y :
   norm (minus (g (clamped c x)) (g (clamped c y))) <= u * distance scale x y.
 Proof.
   intros Hs Hu Ha Hg. pose proof (agree_clamped c _ _ _ Ha) as Hc. destruct (agree_lengths _ _ _ Hc) as [Hx Hy].
-  rewrite <- (selected moves scale (clamped c x)), <- (selected moves scale (clamped c y)), <- (agree_staying _ _ _ Hc) by auto.
+  rewrite <- (selected moves scale (clamped c x)), <- (selected moves scale (clamped c y)),
+      <- (agree_staying _ _ _ Hc) by auto.
   eapply Rle_trans; [apply Hg; auto using length_movement, length_staying|].
   apply Rmult_le_compat_l; auto. unfold norm. rewrite square_movement by auto. apply sqrt_le_1_alt, square_in_clamped.
   destruct (agree_lengths _ _ _ Ha). congruence.
@@ -104,9 +106,11 @@ Proof.
     simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
   - both H. both H0. apply instance_matrices in H, H0.
     both Hc. unfold value at 1 3. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
-    change (network (map real_layer (hidden (part_at ps k))) (real_layer (outer (part_at ps k)))) with (run (stack_of (part_at ps k))).
+    change (network (map real_layer (hidden (part_at ps k))) (real_layer (outer (part_at ps k)))) with
+        (run (stack_of (part_at ps k))).
     rewrite !value_run.
-    apply (moved_bound moves scale _ _ (fun z => run (stack_of (part_at ps k)) (plusR (run (stack_of (part_at ps phi)) z) rest))); auto.
+    apply (moved_bound moves scale _ _
+        (fun z => run (stack_of (part_at ps k)) (plusR (run (stack_of (part_at ps phi)) z) rest))); auto.
     intros v w base Hv Hw Hb.
     pose proof (C _ [([], stack_of (part_at ps phi)); (rest, stack_of (part_at ps k))] (I base Hb)
       (Forall2_cons (matrices (part_at ps phi)) ([], stack_of (part_at ps phi)) H
@@ -143,11 +147,13 @@ Qed.
 Lemma product_nonneg ls us : Forall2 norm_bound_of ls us -> 0 <= product_R us.
 Proof. intros H. induction H as [|l u ls us [Hu _] H IH]; simpl; [lra|]. now apply Rmult_le_pos. Qed.
 Lemma affine_bound l u x y : norm_bound_of l u -> length (snd l) = length (fst l) ->
-  norm (minus (affine (fst (real_layer l)) (snd (real_layer l)) x) (affine (fst (real_layer l)) (snd (real_layer l)) y)) <= u * norm (minus x y).
+  norm (minus (affine (fst (real_layer l)) (snd (real_layer l)) x) (affine (fst (real_layer l)) (snd (real_layer l)) y))
+      <= u * norm (minus x y).
 Proof. intros [_ H] L. rewrite minus_affine by (simpl; now rewrite !map_length). apply H. Qed.
 Lemma network_bound hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
   (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
-  norm (minus (network (map real_layer hs) (real_layer l) x) (network (map real_layer hs) (real_layer l) y)) <= product_R us * norm (minus x y).
+  norm (minus (network (map real_layer hs) (real_layer l) x) (network (map real_layer hs) (real_layer l) y)) <=
+      product_R us * norm (minus x y).
 Proof.
   revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
   - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
@@ -172,7 +178,8 @@ Proof.
   intros Hl Hs Hh Hm. destruct Hl as [->|Hl].
   - rewrite square_in_one. simpl in Hh. rewrite real_one in Hh. pose proof (square_nonneg d).
     assert (1 <= m * m) by nra. nra.
-  - clear Hh. unfold square. revert scale Hl Hs Hm. induction d as [|a d IH]; intros [|s scale]; simpl; try discriminate; intros Hl Hs Hm; [lra|].
+  - clear Hh. unfold square. revert scale Hl Hs Hm. induction d as [|a d IH]; intros [|s scale]; simpl;
+      try discriminate; intros Hl Hs Hm; [lra|].
     inversion Hm as [|? ? Hms Hm']; subst. apply andb_prop in Hs. destruct Hs as [Hs Hs']. apply real_positive in Hs.
     specialize (IH scale ltac:(lia) Hs' Hm').
     assert (a * a <= m * m * (a / real s * (a / real s))); [|lra].
@@ -187,7 +194,8 @@ Proof.
   intros H0 Ha Hl Hs Hh Hm. destruct (agree_lengths _ _ _ Ha) as [Hx Hy]. unfold distance.
   rewrite <- (sqrt_square m) by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
   eapply Rle_trans; [apply (square_in_largest m scale); auto|].
-  - rewrite length_minus by (rewrite !length_clamped; congruence). rewrite length_clamped. destruct Hl; [left|right]; congruence.
+  - rewrite length_minus by (rewrite !length_clamped; congruence). rewrite length_clamped. destruct Hl; [left|right];
+      congruence.
   - apply Rmult_le_compat_l; [nra|]. apply square_in_clamped. congruence.
 Qed.
 Lemma product_sound ps accepted f moves scale u : Forall (holds ps) accepted ->
@@ -195,7 +203,8 @@ Lemma product_sound ps accepted f moves scale u : Forall (holds ps) accepted ->
 Proof.
   intros HA. unfold check_product. set (m := largest _ _). intros H rest x y Ha Hx. do 3 both H.
   unfold well_formed in H. do 4 both H. rename H3 into Hl, H4 into Hs, H6 into Hc.
-  destruct (product_of ps accepted f) as [k|] eqn:Hk; [|discriminate]. apply at_most_real in H0, H2. rewrite real_mul in H0.
+  destruct (product_of ps accepted f) as [k|] eqn:Hk; [|discriminate]. apply at_most_real in H0, H2.
+      rewrite real_mul in H0.
   assert (Forall (fun s => real s <= real m) scale) as Hm.
   { rewrite forallb_forall in H1. apply Forall_forall. intros s G. now apply at_most_real, H1. }
   destruct (positive_hd _ Hs) as [Hp _].
@@ -204,7 +213,8 @@ Proof.
   assert (forall c, norm (minus (clamped c x) (clamped c y)) <= real m * distance scale x y) as D
     by (intros c; apply (norm_in_largest _ _ moves); auto; lra).
   pose proof (distance_nonneg scale x y) as Dn.
-  assert (forall z e, 0 <= z -> 0 <= real k -> e <= real k * z -> z <= real m * distance scale x y -> e <= real u * distance scale x y) as G.
+  assert (forall z e, 0 <= z -> 0 <= real k -> e <= real k * z -> z <= real m * distance scale x y ->
+      e <= real u * distance scale x y) as G.
   { intros z e Z K E F. apply Rle_trans with (real k * (real m * distance scale x y)).
     - eapply Rle_trans; [exact E|]. now apply Rmult_le_compat_l.
     - rewrite <- Rmult_assoc, (Rmult_comm (real k)). apply Rmult_le_compat_r; auto. }
@@ -216,7 +226,8 @@ Proof.
     destruct (norm_of ps accepted r) as [b|] eqn:Eb; [|discriminate]. inversion Hk. subst k.
     destruct (part_bound _ _ _ _ HA H Ea) as [Ka Ba]. destruct (part_bound _ _ _ _ HA H3 Eb) as [Kb Bb].
     unfold value at 1 3. destruct (clamp (part_at ps r)) eqn:E; [|discriminate]. simpl clamped.
-    change (network (map real_layer (hidden (part_at ps r))) (real_layer (outer (part_at ps r)))) with (run (stack_of (part_at ps r))).
+    change (network (map real_layer (hidden (part_at ps r))) (real_layer (outer (part_at ps r)))) with
+        (run (stack_of (part_at ps r))).
     apply (G (norm (minus (clamped (clamp (part_at ps phi)) x) (clamped (clamp (part_at ps phi)) y))));
       [apply norm_nonneg | rewrite real_mul; nra | | apply D].
     rewrite real_mul, (Rmult_comm (real a)), Rmult_assoc. eapply Rle_trans; [apply Bb|]. apply Rmult_le_compat_l; auto.

@@ -1,6 +1,7 @@
 (** An accepted claim holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims Slopes Witness Laws.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims Slopes
+    Witness Laws.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -25,7 +26,8 @@ Qed.
 Theorem check_all_sound ps cs accepted : Forall (holds ps) accepted -> check_all ps accepted cs = true ->
   Forall (fun c => holds ps (fst c)) cs.
 Proof.
-  revert accepted. induction cs as [|[c p] cs IH]; intros accepted H G; [constructor|]. simpl in G. apply andb_prop in G.
+  revert accepted. induction cs as [|[c p] cs IH]; intros accepted H G; [constructor|]. simpl in G.
+      apply andb_prop in G.
   destruct G as [G1 G2]. pose proof (step_sound _ _ _ _ H G1) as S. constructor; auto. apply (IH (c :: accepted)); auto.
 Qed.
 Corollary check_all_holds ps cs : check_all ps [] cs = true -> Forall (fun c => holds ps (fst c)) cs.

@@ -23,7 +23,8 @@ Proof.
 Qed.
 Lemma real_rest ps others :
   reals (fold_right (plus add) [] (map (fun o => valueD (part_at ps (fst o)) (snd o)) others)) =
-  vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) (map (fun o : nat * list dyadic => (fst o, reals (snd o))) others)).
+  vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) (map
+      (fun o : nat * list dyadic => (fst o, reals (snd o))) others)).
 Proof.
   induction others as [|o others IH]; simpl; auto. now rewrite (f_plus add Rplus real real_add), IH, real_value.
 Qed.
@@ -57,12 +58,14 @@ Proof.
   rename H0 into Hr, H1 into Hn, H2 into Ho, H3 into Hx, H4 into Ha, H5 into Hl.
   destruct (fraction_real scale (minusD x y) H) as [Pm En]. rewrite E, real_minus in *. simpl in *.
   apply real_positive in Hn. apply real_nonnegative in Hl. apply at_most_real in Hr.
-  assert (0 < square_in scale (minus (reals x) (reals y))) as Ps by (pose proof (square_in_nonneg scale (minus (reals x) (reals y))); nra).
+  assert (0 < square_in scale (minus (reals x) (reals y))) as Ps by
+      (pose proof (square_in_nonneg scale (minus (reals x) (reals y))); nra).
   exists (map (fun o => (fst o, reals (snd o))) others), (reals x), (reals y). repeat split.
   - now apply agree_real.
   - rewrite map_length. now apply Nat.eqb_eq.
   - apply sqrt_lt_R0, Ps.
-  - rewrite forallb_forall in Ho. apply Forall_map, Forall_forall. intros o G. simpl. rewrite map_length. now apply Nat.eqb_eq, Ho.
+  - rewrite forallb_forall in Ho. apply Forall_map, Forall_forall. intros o G. simpl. rewrite map_length.
+      now apply Nat.eqb_eq, Ho.
   - rewrite <- real_rest. fold rest. rewrite <- !real_value_of.
     rewrite !real_mul, real_square, real_minus, En in Hr. unfold distance, norm.
     rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
