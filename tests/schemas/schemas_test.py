@@ -44,7 +44,7 @@ def names():
 
 
 def run(words, codes=(0,), folder=None):
-    done = subprocess.run([TOOL, *words], cwd=folder, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([TOOL, *words], cwd=folder, capture_output=True, text=True, timeout=600)
     expect(done.returncode in codes, f"{' '.join(words)}: exit code {done.returncode}: {done.stderr}")
     return done.stdout
 
