@@ -144,6 +144,25 @@ void solve_lower_transposed(const Eigen::Ref<const MatrixXd>& l, Eigen::Ref<Matr
               1.0, l.data(), stride, b.data(), static_cast<int>(b.outerStride()));
 }
 
+namespace {
+
+void divide(CBLAS_TRANSPOSE transpose, Eigen::Ref<MatrixXd> x, const Eigen::Ref<const MatrixXd>& l) {
+  const auto turn = blas_turn();
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, transpose, CblasNonUnit, static_cast<int>(x.rows()),
+              static_cast<int>(x.cols()), 1.0, l.data(), static_cast<int>(l.outerStride()), x.data(),
+              static_cast<int>(x.outerStride()));
+}
+
+}  // namespace
+
+void divide_by_lower(Eigen::Ref<MatrixXd> x, const Eigen::Ref<const MatrixXd>& l) {
+  divide(CblasNoTrans, x, l);
+}
+
+void divide_by_lower_transposed(Eigen::Ref<MatrixXd> x, const Eigen::Ref<const MatrixXd>& l) {
+  divide(CblasTrans, x, l);
+}
+
 void solve_cholesky(const MatrixXd& l, VectorXd& b) {
   const int n = static_cast<int>(l.rows());
   const auto turn = blas_turn();

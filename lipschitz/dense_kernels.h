@@ -49,6 +49,10 @@ Eigen::VectorXd congruence_times(const Eigen::MatrixXd& l, const Eigen::MatrixXd
 void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& l, Eigen::Ref<Eigen::MatrixXd> b);
 void solve_lower_transposed(const Eigen::Ref<const Eigen::MatrixXd>& l, Eigen::Ref<Eigen::MatrixXd> b);
 
+/// X <- X L^-1, and X <- X L^-T, for lower triangular L.
+void divide_by_lower(Eigen::Ref<Eigen::MatrixXd> x, const Eigen::Ref<const Eigen::MatrixXd>& l);
+void divide_by_lower_transposed(Eigen::Ref<Eigen::MatrixXd> x, const Eigen::Ref<const Eigen::MatrixXd>& l);
+
 /// Solves L L' v = b in place.
 void solve_cholesky(const Eigen::MatrixXd& l, Eigen::VectorXd& b);
 

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 
+#include "lipschitz/block_cholesky.h"
 #include "lipschitz/dense_kernels.h"
 #include "nn/base/doubles.h"
 
@@ -20,17 +22,48 @@ constexpr double kBacktrack = 0.8;
 /// Relative accuracy of that eigenvalue: for the centring parameter, which is a heuristic, and for the step.
 constexpr double kRough = 0.1, kFine = 0.02;
 
+/// The factor of S: dense, or by blocks where S has several that are narrow.
+class SlackFactor {
+ public:
+  SlackFactor() = default;
+  SlackFactor(const MatrixXd& s, const std::vector<Index>& begin) {
+    if (is_narrow(begin)) {
+      blocks_ = BlockCholesky::of(s, begin);
+    } else {
+      dense_ = cholesky(s);
+    }
+  }
+
+  bool good() const { return blocks_ || dense_.size() > 0; }
+  MatrixXd inverse() const { return blocks_ ? blocks_->inverse() : inverse_from_cholesky(dense_); }
+  VectorXd congruence(const MatrixXd& d, const VectorXd& v) const {
+    return blocks_ ? blocks_->congruence_times(d, v) : congruence_times(dense_, d, v);
+  }
+  const std::optional<BlockCholesky>& blocks() const { return blocks_; }
+
+ private:
+  /// Two neighbouring blocks are at most a fifth of the whole: below, the dense kernels are as fast.
+  static bool is_narrow(const std::vector<Index>& begin) {
+    Index widest = 0;
+    for (std::size_t k = 0; k + 2 < begin.size(); ++k) widest = std::max(widest, begin[k + 2] - begin[k]);
+    return begin.size() > 2 && 5 * widest <= begin.back();
+  }
+
+  MatrixXd dense_;
+  std::optional<BlockCholesky> blocks_;
+};
+
 /// Largest alpha <= 1 with X + alpha D >= 0 kept at a distance, from the least eigenvalue of L^-1 D L^-T by Lanczos
-/// with full reorthogonalisation, stopped at a relative accuracy. `factor` is L with X = L L'.
-double step_length(const MatrixXd& factor, const MatrixXd& direction, double fraction, double accuracy) {
-  const Index n = direction.rows();
+/// with full reorthogonalisation, stopped at a relative accuracy. `congruence` gives L^-1 D L^-T v, with X = L L'.
+template <class Congruence>
+double step_length(Index n, const Congruence& congruence, double fraction, double accuracy) {
   const int steps = static_cast<int>(std::min<Index>(n, 30));
   MatrixXd basis(n, steps + 1);
   VectorXd alpha(steps), beta(steps);
   basis.col(0) = VectorXd::LinSpaced(n, 1.0, 1.7).normalized();
   double least = 0;
   for (int k = 0; k < steps; ++k) {
-    VectorXd w = congruence_times(factor, direction, basis.col(k));
+    VectorXd w = congruence(basis.col(k));
     alpha(k) = basis.col(k).dot(w);
     w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
     w -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * w);
@@ -48,11 +81,27 @@ double step_length(const MatrixXd& factor, const MatrixXd& direction, double fra
   return least < 0 ? std::min(1.0, -fraction / least) : 1.0;
 }
 
+double step_length(const MatrixXd& factor, const MatrixXd& direction, double fraction, double accuracy) {
+  const auto congruence = [&](const VectorXd& v) { return congruence_times(factor, direction, v); };
+  return step_length(direction.rows(), congruence, fraction, accuracy);
+}
+
+double step_length(const SlackFactor& factor, const MatrixXd& direction, double fraction, double accuracy) {
+  const auto congruence = [&](const VectorXd& v) { return factor.congruence(direction, v); };
+  return step_length(direction.rows(), congruence, fraction, accuracy);
+}
+
 /// Tries `step`, then shorter ones, until `factor_at(step)` succeeds; empty if none does.
 template <class FactorAt>
-MatrixXd backtrack(double step, const FactorAt& factor_at) {
-  MatrixXd factor;
-  for (int tries = 0; tries < 10 && factor.size() == 0; ++tries) {
+auto backtrack(double step, const FactorAt& factor_at) {
+  const auto is_empty = [](const auto& factor) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(factor)>, MatrixXd>)
+      return factor.size() == 0;
+    else
+      return !factor.good();
+  };
+  decltype(factor_at(step)) factor;
+  for (int tries = 0; tries < 10 && is_empty(factor); ++tries) {
     factor = factor_at(step);
     step *= kBacktrack;
   }
@@ -162,6 +211,13 @@ void add_large_product(MatrixXd& c, const MatrixXd& a, const MatrixXd& b, const 
   }
 }
 
+/// C += A S^-1, by solving with the factor of S where it has blocks; or less than that if it has to stop.
+void add_divided(MatrixXd& c, MatrixXd a, const SlackFactor& s, const MatrixXd& s_inverse, const Stop& stop) {
+  if (!s.blocks()) return add_large_product(c, a, s_inverse, stop);
+  s.blocks()->divide(a);
+  c += a;
+}
+
 }  // namespace
 
 InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
@@ -171,14 +227,15 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
   const Index m = it.neurons();
   VectorXd y = start;
   MatrixXd s = it.slack(y);
-  MatrixXd s_factor = options.stop.now() ? MatrixXd() : cholesky(s);
-  if (s_factor.size() == 0) {
+  const std::vector<Index> begin = it.slack_blocks();
+  SlackFactor s_factor = options.stop.now() ? SlackFactor() : SlackFactor(s, begin);
+  if (!s_factor.good()) {
     InteriorPointResult result;
     result.stop = why_stopped(options.stop).value_or(LipSdpStop::kNumericalLimit);
     return result;
   }
   // Z = mu S^-1 with trace 1 over the inputs: on the central path but for the constraints of the neurons.
-  MatrixXd z = inverse_from_cholesky(s_factor);
+  MatrixXd z = s_factor.inverse();
   z /= z.diagonal().head(it.inputs()).sum();
   MatrixXd z_factor = cholesky(z);
 
@@ -200,7 +257,7 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
       return why.has_value();
     };
     if (has_to_stop()) break;
-    const MatrixXd s_inverse = inverse_from_cholesky(s_factor);
+    const MatrixXd s_inverse = s_factor.inverse();
     if (has_to_stop()) break;
     const MatrixXd z_a = it.times_a(z);
     const MatrixXd y_a = it.times_a(s_inverse);
@@ -228,7 +285,7 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
     const VectorXd dy_a = schur.solve(-b);
     const MatrixXd ds_a = it.linear(dy_a);
     MatrixXd dz_a = -z;
-    add_large_product(dz_a, it.times_patterned(-z, ds_a), s_inverse, options.stop);
+    add_divided(dz_a, it.times_patterned(-z, ds_a), s_factor, s_inverse, options.stop);
     if (has_to_stop()) break;
     symmetrise(dz_a);
     const double primal_a = step_length(z_factor, dz_a, 1.0, kRough);
@@ -247,7 +304,7 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
     const VectorXd dy = schur.solve(rhs);
     const MatrixXd ds = it.linear(dy);
     MatrixXd dz = sigma * mu * s_inverse - z;
-    add_large_product(dz, it.times_patterned(-z, ds) - q, s_inverse, options.stop);
+    add_divided(dz, it.times_patterned(-z, ds) - q, s_factor, s_inverse, options.stop);
     if (has_to_stop()) break;
     symmetrise(dz);
     const double fraction = std::min(0.98, 0.9 + 0.09 * std::min(primal_a, dual_a));
@@ -259,14 +316,14 @@ InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
     s_factor = backtrack(dual, [&](double step) {
       y = y_before + step * dy;
       s = it.slack(y);
-      return cholesky(s);
+      return SlackFactor(s, begin);
     });
     const MatrixXd z_before = z;
     z_factor = backtrack(primal, [&](double step) {
       z = z_before + step * dz;
       return cholesky(z);
     });
-    if (s_factor.size() == 0 || z_factor.size() == 0 || !y.allFinite()) {
+    if (!s_factor.good() || z_factor.size() == 0 || !y.allFinite()) {
       y = y_before;
       result.stop = LipSdpStop::kNumericalLimit;
       break;

@@ -19,6 +19,9 @@ class RankTwoInequality {
   virtual Eigen::Index inputs() const = 0;  ///< rows that A_0 touches, the first ones
   Eigen::Index neurons() const { return size() - inputs(); }
 
+  /// First index of each block in which S is block tridiagonal, and its size at the end; two entries: S is dense.
+  virtual std::vector<Eigen::Index> slack_blocks() const { return {0, size()}; }
+
   /// Sum_j y_j A_j.
   virtual Eigen::MatrixXd linear(const Eigen::VectorXd& y) const = 0;
   /// S(y).

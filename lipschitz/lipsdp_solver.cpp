@@ -72,6 +72,7 @@ class ChainInequality final : public RankTwoInequality {
 
   Index size() const override { return p_.size(); }
   Index inputs() const override { return p_.inputs(); }
+  std::vector<Index> slack_blocks() const override { return p_.begin; }
 
   MatrixXd linear(const VectorXd& y) const override {
     MatrixXd s = MatrixXd::Zero(p_.size(), p_.size());
