@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kCrashTiltCosine = 0.5;  // 60 degrees
 constexpr double kBeforeCrash_s = 0.3;
-constexpr double kLeastDuty = 0.8, kLeastDutyShare = 0.5;  // of what is common in a log
+constexpr double kLeastDuty = 0.8, kLeastDutyShare = 0.3;  // of the most in a log
 constexpr double kSettle_s = 0.15;
 constexpr double kLeastShare = 0.3;  // of the thrust that is common in a log
 constexpr double kAboveStanding_m = 0.02, kUsualWithin_m = 0.03;
@@ -131,6 +131,17 @@ void derive_specific_force(Track& track) {
   }
 }
 
+/// Whether the vehicle was at places half a metre apart.
+bool has_moved(const Track& track) {
+  constexpr double kMoved_m = 0.5;
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(INFINITY), high = -low;
+  for (const stability::Instant& now : track.instants) {
+    low = low.cwiseMin(now.p_W_m);
+    high = high.cwiseMax(now.p_W_m);
+  }
+  return !track.instants.empty() && (high - low).maxCoeff() > kMoved_m;
+}
+
 /// Whether the rotors carry next to nothing, per record.
 std::vector<char> rotors_idle(const Track& track) {
   std::vector<char> idle(track.instants.size(), 0);
@@ -141,9 +152,14 @@ std::vector<char> rotors_idle(const Track& track) {
   }
   if (thrust.empty()) return idle;
   std::vector<double> sorted = thrust;
-  const auto high = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 3 / 4);
-  std::nth_element(sorted.begin(), high, sorted.end());
-  const double least = by_duty ? std::min(kLeastDuty, kLeastDutyShare * *high) : kLeastShare * *high;
+  const auto at = [&sorted](std::size_t hundredths) {
+    const auto place = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * hundredths / 100);
+    std::nth_element(sorted.begin(), place, sorted.end());
+    return *place;
+  };
+  double least = kLeastShare * at(75);
+  // Strong rotors carry with less duty: believed of a vehicle that went somewhere.
+  if (by_duty) least = has_moved(track) ? std::min(kLeastDuty, kLeastDutyShare * at(98)) : kLeastDuty;
   for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = thrust[i] < least ? 1 : 0;
   return idle;
 }
@@ -242,9 +258,9 @@ const char* rule(Cut cut) {
   static const char* const kRules[] = {
       "everything else",
       "from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end of the log",
-      "the duties add up to less than 0.8 (where that is less: to less than half, thrust of other sources to "
-      "less "
-      "than 0.3 of what is common in the log): rotors off or idle, outside the thrust calibration",
+      "the duties add up to less than 0.8, or to less than 0.3 of the most where that is less and the "
+      "vehicle "
+      "moved; other thrust is less than 0.3 of what is common: rotors off or idle, outside the calibration",
       "at or below 2 cm above the height at which the vehicle stood with idle rotors (kind small: 0.07 m, "
       "large: "
       "0.085 m)",
@@ -300,8 +316,8 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     }
     if (rules.fits && !rules.keep && !track.position_only && !logs::is_sound(log.health)) {
       track.position_only = true;
-      problems.push_back(path + ": left out, the log is damaged: " + words_of(logs::findings(log.health)) +
-                         " (--keep takes it)");
+      problems.push_back(path + ": " + words_of(logs::findings(log.health)) +
+                         "; damaged, left out of the fit (--keep takes it)");
     }
     track.has_rates = log.signals.rates;
     track.has_height = log.signals.position;

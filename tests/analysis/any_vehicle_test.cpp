@@ -32,21 +32,27 @@ std::string hexacopter() {
       kHexMass_kg, rotors, coefficient_N);
 }
 
-/// A hover of 20 s at 100 Hz from the ground up; `front` is the command of rotor 1 over that of the others' mean.
+/// On the ground for 2 s, up by 1.2 m within 2 s, then a hover that rises and falls a little; 20 s at 100 Hz. The commands are
+/// those that this needs. `front` is the command of rotor 1 over that of the others.
 std::string hexacopter_csv(double front, double start_s = 0, double x_m = 0) {
+  constexpr double kPi = 3.14159265358979, kSlow_1_s = 0.3;
   std::string text = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,battery";
   for (int k = 1; k <= 6; ++k) text += fmt::format(",motor_command_{}", k);
   text += "\n";
   const double rear = std::sqrt(2 - front * front);  // rotor 4 takes away what rotor 1 gives
   for (int k = 0; k < 2000; ++k) {
-    const double t = 0.01 * k;
-    const bool flies = k >= 200;
-    const double z = flies ? 10 + 0.05 * std::sin(0.3 * t) : 8.8;
-    text += fmt::format("{:.3f},{:.4f},0,{:.5f},0,0,{:.5f},0,0,0,1,15.2", start_s + t, x_m, z,
-                        flies ? 0.015 * std::cos(0.3 * t) : 0);
+    const double t = 0.01 * k, rising = std::min(std::max(t - 2, 0.0), 2.0), hovering = std::max(t - 4, 0.0);
+    const double z =
+        8.8 + 0.6 * (1 - std::cos(kPi / 2 * rising)) + 0.05 * (1 - std::cos(kSlow_1_s * hovering));
+    const bool rises = rising > 0 && rising < 2;
+    const double v = (rises ? 0.3 * kPi * std::sin(kPi / 2 * rising) : 0) +
+                     0.05 * kSlow_1_s * std::sin(kSlow_1_s * hovering);
+    const double a = (rises ? 0.15 * kPi * kPi * std::cos(kPi / 2 * rising) : 0) +
+                     (hovering > 0 ? 0.05 * kSlow_1_s * kSlow_1_s * std::cos(kSlow_1_s * hovering) : 0);
+    text += fmt::format("{:.3f},{:.4f},0,{:.5f},0,0,{:.5f},0,0,0,1,15.2", start_s + t, x_m, z, v);
     for (int motor = 0; motor < 6; ++motor) {
-      const double u = kHover * (motor == 0 ? front : motor == 3 ? rear : 1);
-      text += fmt::format(",{:.6f}", flies ? u : 0.0);
+      const double u = kHover * std::sqrt(1 + a / 9.81) * (motor == 0 ? front : motor == 3 ? rear : 1);
+      text += fmt::format(",{:.6f}", t > 2 ? u : 0.0);
     }
     text += "\n";
   }
@@ -69,16 +75,16 @@ TEST(AnyVehicle, AHexacoptersForceAndTorqueFollowFromItsRotorsAndTheirCommands) 
     const files::Json json = json_of(folder, std::string("compare hexa.toml ") + log, "compare");
     EXPECT_EQ(json["unit"], "N");
     EXPECT_GT(json["overall"]["samples"].get<int>(), 1000);
-    EXPECT_LT(json["overall"]["rmse"]["z"].get<double>(), 0.05) << "newton, of a weight of 21.6 N";
+    EXPECT_LT(json["overall"]["rmse"]["z"].get<double>(), 0.1) << "newton, of a weight of 21.6 N";
     EXPECT_EQ(json["flights"][0]["judged"]["torque"], files::Json({"x", "y", "z"}));
     // Rotor 1 is in front, rotor 4 behind: with u1 = 1.1 the first gives 1.21, the other 0.79 of a sixth of the weight. The
     // residual is what else must balance them.
     const double each_N = kHexMass_kg * 9.81 / 6, more = std::string(log) == "even.csv" ? 0 : 0.21;
     const files::Json& mean = json["flights"][0]["torque"]["slow_flight"]["mean"];
     EXPECT_NEAR(mean["x"].get<double>(), 0, 1e-6);
-    EXPECT_NEAR(mean["y"].get<double>(), 0.3 * 2 * more * each_N, 1e-4);
+    EXPECT_NEAR(mean["y"].get<double>(), 0.3 * 2 * more * each_N, 0.01);
     // Rotor 1 turns counter-clockwise, its reaction is clockwise; rotor 4 the other way.
-    EXPECT_NEAR(mean["z"].get<double>(), 0.016 * 2 * more * each_N, 1e-5);
+    EXPECT_NEAR(mean["z"].get<double>(), 0.016 * 2 * more * each_N, 0.0005);
   }
 }
 
@@ -152,7 +158,7 @@ TEST(ModelDraft, OfAnyNumberOfMotorsIsAModel) {
     const stability::Model model = stability::read_model(folder / "m.toml");
     EXPECT_EQ(model.num_rotors(), 6u);
     const files::Json json = json_of(folder, "compare m.toml one.csv", "compare");
-    EXPECT_LT(json["overall"]["nrmse"]["z"].get<double>(), 0.01) << mass << ": of the weight";
+    EXPECT_LT(json["overall"]["nrmse"]["z"].get<double>(), 0.02) << mass << ": of the weight";
   }
 }
 
@@ -210,8 +216,9 @@ TEST(Keep, DamagedLogsAreLeftOutOfFitsAndNamedUnlessTheyAreKept) {
 TEST(Keep, ImplausibleLogsAreJudgedWhereTheyAreKept) {
   const ScratchFolder folder;
   std::string text = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,m1,m2,m3,m4,vbat\n";
-  for (int k = 0; k < 800; ++k)  // no duty is above 1
-    text += fmt::format("{:.2f},0,0,1,0,0,0,0,0,0,1,1.4,1.4,1.4,1.4,3.8\n", 0.01 * k);
+  for (int k = 0; k < 1500; ++k)  // the position moves 30 times as far as the velocity says
+    text += fmt::format("{:.2f},{:.5f},0,1,{:.6f},0,0,0,0,0,1,0.6,0.6,0.6,0.6,3.8\n", 0.01 * k,
+                        0.9 * std::sin(0.01 * k), 0.03 * std::cos(0.01 * k));
   write_text(folder / "log.csv", text);
   const std::string model = source_path("stability/models/crazyflie-small.toml");
   const Outcome refused = run_shell("swarmcert compare " + model + " log.csv -q", folder.path());

@@ -200,7 +200,8 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     return std::any_of(track.doubts.begin(), track.doubts.end(),
                        [](const auto& d) { return d.refuses_force; });
   });
-  return refused ? kBadInput : kInconclusive;
+  // Nothing that could be read is bad input; flights that say too little are inconclusive.
+  return refused || comparison.tracks.empty() ? kBadInput : kInconclusive;
 }
 
 }  // namespace
