@@ -111,15 +111,16 @@ void add_crazyflie(Table& t) {
 /// CSV as people write it. The first name of a group is what the tool itself would write.
 void add_generic(Table& t) {
   for (const char* group : {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#",
-                            "odom.position.#", "drone.#", "vicon.#", "mocap.#", "pos#", "#"})
+                            "odom.position.#", "drone.#", "vicon.#", "mocap.#", "pos#", "position#", "#"})
     t.push_back({kPosition, axes(group), "m"});
-  for (const char* group : {"velocity.#", "vel.#", "v#", "v.#", "vel#", "linear.velocity.#", "d#", "#dot"})
+  for (const char* group :
+       {"velocity.#", "vel.#", "v#", "v.#", "vel#", "velocity#", "linear.velocity.#", "d#", "#dot"})
     t.push_back({kVelocity, axes(group), "m/s"});
   for (const char* group : {"imu.acc.#", "accel.#", "accelerometer.#", "imu.linear.acceleration.#", "acc#",
-                            "linear.acceleration.#", "acceleration.#", "a#", "a.#"})
+                            "accel#", "linear.acceleration.#", "acceleration.#", "a#", "a.#"})
     t.push_back({kForceBody, axes(group), "", 1, 1, Ask::kAcceleration});
-  for (const char* group : {"q#", "q.#", "quat.#", "quaternion.#", "orientation.#", "pose.orientation.#",
-                            "pose.pose.orientation.#", "att.q#"})
+  for (const char* group : {"q#", "q.#", "quat.#", "quat#", "quaternion.#", "quaternion#", "orientation.#",
+                            "pose.orientation.#", "pose.pose.orientation.#", "att.q#"})
     t.push_back({kAttitude, quaternion(group), "1"});
   for (const char* group : {"q#", "q.#", "quat.#", "quaternion.#"})
     t.push_back({kAttitude, each(group, {"0", "1", "2", "3"}), "1", 1, 1, Ask::kQuaternion});
@@ -134,8 +135,8 @@ void add_generic(Table& t) {
     t.push_back({kDuty, rotors(group), "", 1, 1, Ask::kMotors});
   for (const char* group : {"rpm#", "rpm.#", "motor.rpm.#", "rotor.speed.#", "motor.speed.#", "omega.m#"})
     t.push_back({kRotorSpeed, rotors(group), "rpm"});
-  for (const char* name :
-       {"battery", "vbat", "voltage", "battery.voltage", "batt", "bat", "v.bat", "battery.v"})
+  for (const char* name : {"battery", "vbat", "voltage", "battery.voltage", "batteryvoltage", "batt", "bat",
+                           "v.bat", "battery.v"})
     t.push_back({kBattery, {name}, "V"});
   for (const char* group :
        {"target.#", "ref.#", "des.#", "setpoint.#", "sp.#", "desired.#", "target.p#", "#.ref", "#.des", "#.d",

@@ -183,7 +183,10 @@ void add_missing(const Log& log, FlightStory& story) {
     add("duty", "thrust that does not rest on the controller's own scale; mean torques");
     add("battery", "the thrust of the duties; the effect of the battery");
   }
-  if (s.thrust == ThrustSource::kHoverMultiple)
+  const bool has_battery = std::any_of(log.sources.begin(), log.sources.end(), [](const SignalInfo& info) {
+    return info.name == "battery" && info.source != SignalInfo::Source::kMissing;
+  });
+  if (s.thrust == ThrustSource::kHoverMultiple && s.motor_commands == 0 && !has_battery)
     add("battery", "a thrust in newton instead of multiples of the hover thrust");
   if (!s.attitude) add("attitude", "lateral forces");
   if (!s.position) add("position", "effects of height and of neighbours");
@@ -244,6 +247,12 @@ std::vector<char> airborne(const Log& log) {
   for (std::size_t i = 0; i < n; ++i) {
     const bool low = log.signals.position && log.samples[i].position_m[2] < standing[i] + kAboveStanding_m;
     air[i] = idle[i] == 0 && !low ? 1 : 0;
+  }
+  for (const LogEvent& event : log.events) {
+    if (event.kind != "landed") continue;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (time_s[i] >= event.time_s && time_s[i] <= event.time_s + event.duration_s) air[i] = 0;
+    }
   }
   drop_short_runs(log, air, 0, kShortestPause_s, false);
   drop_short_runs(log, air, 1, kShortestFlight_s, true);

@@ -110,6 +110,18 @@ void take_epoch_off(const RawLog& raw, SignalTable& table, Log& log) {
   }
   log.epoch_s = std::floor(table.time_us.front() * 1e-6);
   for (double& time_us : table.time_us) time_us -= 1e6 * log.epoch_s;
+  for (LogEvent& event : log.events) event.time_s -= log.epoch_s;
+}
+
+/// Events that last to the end of the log get its end.
+void end_events(const SignalTable& table, Log& log) {
+  for (LogEvent& event : log.events) {
+    if (std::isinf(event.duration_s) && table.size() > 0)
+      event.duration_s = std::max(0.0, 1e-6 * table.time_us.back() - event.time_s);
+  }
+  log.events.erase(std::remove_if(log.events.begin(), log.events.end(),
+                                  [](const LogEvent& event) { return !std::isfinite(event.duration_s); }),
+                   log.events.end());
 }
 
 void add_rest(Draft& draft) {
@@ -232,6 +244,7 @@ Log interpret(RawLog raw, const SignalMap& map) {
   for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);
   refuse_without_motion(draft);
   drop_bad_quaternions(draft);
+  add_landed(raw, log);
   take_epoch_off(raw, draft.table, log);
   for (RawTopic& topic : raw.topics) {
     for (RawColumn& column : topic.columns) column.values = {};  // they stand in the table now
@@ -243,6 +256,7 @@ Log interpret(RawLog raw, const SignalMap& map) {
   add_rest(draft);
   settle_judgement(draft);
   estimate_delays(draft);
+  end_events(draft.table, log);
   log.samples.reserve(draft.table.size());
   for (std::size_t i = 0; i < draft.table.size(); ++i)
     log.samples.push_back(sample_of(draft.table, i, log.signals));

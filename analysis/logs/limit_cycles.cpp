@@ -12,7 +12,7 @@ namespace swarmcert::logs {
 namespace {
 
 constexpr double kLeastTilt_rad = 0.1, kLeast_hz = 1, kSamePeriod = 0.3;
-constexpr std::size_t kLeastPeriods = 5;
+constexpr std::size_t kLeastPeriods = 4;
 /// Half of the rate that kLeastTilt_rad needs at kLeast_hz: smaller movements about zero are no half period.
 constexpr double kLeastRate_rad_s = 0.5 * kLeastTilt_rad * 2 * kPi * kLeast_hz;
 

@@ -187,6 +187,24 @@ void add_own_names(RawLog& log) {
   }
 }
 
+void add_landed(const RawLog& raw, Log& log) {
+  for (const RawTopic& topic : raw.topics) {
+    const RawColumn* const landed = topic.find("landed");
+    if (message_of(topic) != "vehicle_land_detected" || landed == nullptr) continue;
+    const std::size_t n = std::min(landed->values.size(), topic.time_s.size());
+    for (std::size_t i = 0; i < n;) {
+      std::size_t end = i;
+      while (end < n && landed->values[end] != 0) ++end;
+      const double start_s = topic.time_s[i];
+      // What it said last holds to the end of the log.
+      const double end_s = end < n ? topic.time_s[end] : INFINITY;
+      if (end > i) log.events.push_back({"landed", start_s, end_s - start_s, "the land detector says so"});
+      i = std::max(end, i + 1);
+    }
+    return;
+  }
+}
+
 Armed was_armed(const RawLog& log) {
   constexpr double kArmedState = 2;  // vehicle_status.ARMING_STATE_ARMED
   for (const Armed armed :

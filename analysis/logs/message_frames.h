@@ -10,6 +10,9 @@ namespace swarmcert::logs {
 /// Of several instances of a message the first counts.
 void add_own_names(RawLog& log);
 
+/// Adds events "landed" to `log`, on the clock of `raw`: when PX4's land detector says so.
+void add_landed(const RawLog& raw, Log& log);
+
 /// Whether the vehicle says that it was armed.
 Armed was_armed(const RawLog& log);
 

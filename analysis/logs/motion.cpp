@@ -150,11 +150,49 @@ void settle_accelerometer(Draft& draft) {
   for (int k = 0; k < 3; ++k) t[kForceWorld + k] = world[static_cast<std::size_t>(k)];
 }
 
+/// The derivative of the position against the velocity says where one of them is in millimetres or centimetres, unless their
+/// names state a unit.
+void settle_lengths(Draft& draft) {
+  SignalTable& t = draft.table;
+  const Carried *const position = draft.recognition.find(kPosition), *const velocity =
+                                                                         draft.recognition.find(kVelocity);
+  if (!draft.asks_physics || position == nullptr || velocity == nullptr) return;
+  const auto is_open = [&](const Carried& carried, const char* unit) {
+    return carried.unit == unit && carried.divide == 1 &&
+           names_of(draft.raw, carried).find('[') == std::string::npos;
+  };
+  std::vector<double> slopes, velocities;
+  for (int k = 0; k < 3; ++k) {
+    if (!t.has(kPosition + k) || !t.has(kVelocity + k)) continue;
+    const std::vector<double> slope =
+        local_derivative(t, t[kPosition + k], velocity_window_s(t.step_s()), 2, 1);
+    slopes.insert(slopes.end(), slope.begin(), slope.end());
+    velocities.insert(velocities.end(), t[kVelocity + k].begin(), t[kVelocity + k].end());
+  }
+  const Line line = line_through(velocities, slopes);
+  if (line.count < 100 || !(line.correlation > 0.9)) return;
+  for (const double unit : {1000.0, 100.0}) {
+    const bool small_position = std::abs(line.slope / unit - 1) < 0.2,
+               small_velocity = std::abs(line.slope * unit - 1) < 0.2;
+    const Carried& carried = small_position ? *position : *velocity;
+    if ((!small_position && !small_velocity) || !is_open(carried, small_position ? "m" : "m/s")) continue;
+    const int first = small_position ? kPosition : kVelocity;
+    for (int k = 0; k < 3; ++k) {
+      for (double& value : t[first + k]) value /= unit;
+    }
+    draft.note(fmt::format("{}: read as {}{}; the position moves {:.4g} times as far as the velocity says",
+                           names_of(draft.raw, carried), unit == 1000 ? "mm" : "cm",
+                           small_position ? "" : "/s", line.slope));
+    return;
+  }
+}
+
 }  // namespace
 
 void derive_kinematics(Draft& draft) {
   SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;
+  settle_lengths(draft);
   signals.position = t.has_group(kPosition, 3);
   const char* const axes[] = {"x", "y", "z"};
   if (t.has(kPosition) || t.has(kPosition + 1) || t.has(kPosition + 2))

@@ -24,6 +24,25 @@ std::vector<int> columns_called(const RawTopic& topic, const std::vector<std::st
   return columns;
 }
 
+/// A length whose column states a smaller unit in brackets, "X (mm)", "vx [cm/s]".
+void take_stated_unit(const RawTopic& topic, Carried& carried) {
+  if ((carried.unit != "m" && carried.unit != "m/s") || carried.multiply != 1 || carried.divide != 1) return;
+  for (const int c : carried.columns) {
+    if (c < 0) continue;
+    const std::string& name = topic.columns[static_cast<std::size_t>(c)].name;
+    const std::size_t open = name.find_last_of("[("), close = name.find_last_of("])");
+    if (open == std::string::npos || close == std::string::npos || close < open) return;
+    const std::string stated = name.substr(open + 1, close - open - 1);
+    for (const auto& [prefix, parts] : {std::pair<std::string, double>{"m", 1000}, {"c", 100}}) {
+      if (stated != prefix + carried.unit) continue;
+      carried.divide = parts;
+      carried.unit = stated;
+      return;
+    }
+    return;
+  }
+}
+
 /// Which signals need all of their columns: a vertical velocity is worth having, half a quaternion is not.
 bool may_be_partial(int signal) {
   return signal == kEuler || signal == kPosition || signal == kVelocity || signal == kTargetPosition ||
@@ -98,6 +117,7 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
                                  (is_quaternion ? ": no unit quaternions" : ": nothing but zeros"));
         continue;
       }
+      take_stated_unit(log.topics[t], carried);
       found.groups.push_back(std::move(carried));
     }
   }

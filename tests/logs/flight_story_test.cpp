@@ -73,7 +73,7 @@ TEST(LimitCycles, DampedOscillationsManoeuvresAndVibrationAreNone) {
 TEST(LimitCycles, OfTheFlightsThatOscillateAreFoundAndOfTheirRepetitionNot) {
   SWARMCERT_NEEDS_DATA();
   // Named by independent scripts: 29, 76, 113, 119 and 146 oscillate, 113_2 with the same gains does not. 26, 78 and 129 do
-  // as well: more than five equal periods of 6 degrees or more, in hover and at the end of the trajectory.
+  // as well: four and more equal periods of 6 degrees or more, in hover and at the end of the trajectory.
   std::set<std::string> cycling;
   std::size_t flights = 0;
   for (const auto& entry :

@@ -152,6 +152,24 @@ TEST(Interpretation, ReadsClocksInSecondsMillisecondsMicrosecondsAndFrom1970) {
   EXPECT_NEAR(log.samples.back().time_us, 8.24e6, 1);
 }
 
+TEST(Interpretation, LengthsInMillimetresAreSeenInBracketsAndInTheVelocities) {
+  for (const char* names : {"Position X (mm),Position Y (mm),Position Z (mm)", "PosX,PosY,PosZ"}) {
+    std::string text = std::string("Time [s],") + names + ",VelX,VelY,VelZ,BatteryVoltage\n";
+    for (int k = 0; k < 800; ++k) {
+      const Swing s(0.01 * k);
+      text += fmt::format("{:.4f},{:.4f},{:.4f},1000,{:.6f},{:.6f},0,3.8\n", s.t, 1000 * s.x, 1000 * s.y,
+                          s.vx, s.vy);
+    }
+    std::istringstream in(text);
+    const logs::Log log = logs::parse_log(in, "swing.csv");
+    for (std::size_t i = 0; i < log.samples.size(); i += 50) {
+      EXPECT_NEAR(log.samples[i].position_m[0], Swing(1e-6 * log.samples[i].time_us).x, 1e-3) << names;
+      EXPECT_NEAR(log.samples[i].position_m[2], 1, 1e-9) << names;
+    }
+    EXPECT_EQ(log.samples[0].battery_V, 3.8);
+  }
+}
+
 TEST(Interpretation, WithoutAnAttitudeOnlyTheVerticalForceIsJudged) {
   const logs::Log log = swing(std::string("mode") + kMotors, [](const Swing& s) { return "0" + motors(s); });
   EXPECT_EQ(log.signals.force_axes, (std::array<bool, 3>{false, false, true}));
