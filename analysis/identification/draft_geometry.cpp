@@ -24,7 +24,7 @@ DraftedGeometry stated_geometry(const std::map<std::string, double>& parameters,
     const double moment_m = value(k, "KM", 0.05);
     const double ax = value(k, "AX", 0), ay = value(k, "AY", 0), az = value(k, "AZ", -1);
     if (!(std::hypot(ax, ay) <= kMostTilt * std::abs(az)) || az >= 0) return {};
-    stated.rotors.push_back({value(k, "PX", 0), -value(k, "PY", 0), -value(k, "PZ", 0), moment_m >= 0});
+    stated.rotors.push_back({value(k, "PX", 0), 0 - value(k, "PY", 0), 0 - value(k, "PZ", 0), moment_m >= 0});
     stated.torque_per_thrust_m += std::abs(moment_m) / static_cast<double>(motors);
     farthest_m = std::max(farthest_m, std::hypot(stated.rotors.back().x_m, stated.rotors.back().y_m));
   }

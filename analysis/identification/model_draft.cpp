@@ -120,6 +120,26 @@ void scale_body(const stability::Model& base, ModelDraft& draft) {
         {fmt::format("inertia_{}_kg_m2", kAxes[k]), model.inertia_kg_m2[k], false, 0, 0, source});
 }
 
+/// The arm that the stated rotors have in place of the assumed one: inertia grows with its square.
+void use_stated_arm(ModelDraft& draft) {
+  stability::Model& model = draft.model;
+  double arm_m = 0;
+  for (const stability::RotorPlace& rotor : model.rotors)
+    arm_m += std::hypot(rotor.x_m, rotor.y_m) / static_cast<double>(model.rotors.size());
+  const double ratio = arm_m / model.arm_m;
+  for (double& inertia : model.inertia_kg_m2) inertia *= ratio * ratio;
+  model.arm_m = arm_m;
+  auto& parameters = draft.parameters;
+  parameters.erase(std::remove_if(parameters.begin(), parameters.end(),
+                                  [](const DraftedParameter& p) { return p.name == "arm_m"; }),
+                   parameters.end());
+  for (DraftedParameter& p : parameters) {
+    if (p.name.rfind("inertia_", 0) != 0) continue;
+    p.value *= ratio * ratio;
+    p.source += " and the stated rotors";
+  }
+}
+
 /// Rotors and their thrust from logs with the commands of the motors: the weight at the hover command.
 void set_motors(const LogFit& log, double hover_command, ModelDraft& draft) {
   stability::Model& model = draft.model;
@@ -136,6 +156,7 @@ void set_motors(const LogFit& log, double hover_command, ModelDraft& draft) {
     add(name + "spin", rotor.counterclockwise ? 1 : -1, geometry.source + "; 1: ccw, -1: cw");
   }
   if (geometry.torque_per_thrust_m > 0) {
+    use_stated_arm(draft);
     model.torque_per_thrust_m = geometry.torque_per_thrust_m;
     for (DraftedParameter& p : draft.parameters) {
       if (p.name == "torque_per_thrust_m")

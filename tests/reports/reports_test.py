@@ -120,6 +120,7 @@ Kd = {{from = 0.5, to = 10, steps = 5}}
         r.report(f"simulate-{run}", "simulate", "swap", "--vehicles", 2, "--model", model, "--gains", gains,
                  "--duration", 8, "--seed", run, "--run", run, "-o", r.folder / flights / str(run))
     r.report("compare-hostile", "compare", model, flights)
+    r.report("inspect-hostile", "inspect", flights)
     # The same logs under names with a hostile prefix.
     prefixed = r.folder / "pre\nfixed"
     for log in sorted((r.folder / flights).rglob("cf*")):

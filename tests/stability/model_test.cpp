@@ -153,7 +153,7 @@ TEST(Model, RefusesNumbersInOtherUnits) {
   has(refusal(replaced(kVehicle, "arm_m = 0.046", "arm_m = 46")), "vehicle.arm_m = 46");
   has(refusal(replaced(kVehicle, "arm_m = 0.046", "arm_m = 46")), "46 mm are 0.046");
   const std::string newton = refusal(replaced(kVehicle, "c10 = 20.0", "c10 = 0.196"));
-  has(newton, "vehicle.thrust: four rotors give 0.007691 N");
+  has(newton, "vehicle.thrust: 4 rotors give 0.007691 N");
   has(newton, "gram-force (not newton)");
   has(refusal(replaced(kVehicle, "c10 = 20.0", "c10 = 20.0e-4")), "not percent or counts");
   has(refusal(kVehicle + "[sensor]\nlog_rate_hz = 1e9\n"), "sensor.log_rate_hz = 1e+09: is above 100000 Hz");
