@@ -99,7 +99,7 @@ print(swarmcert.check(found, net).accepted)
 
 # %%
 try:
-    swarmcert.certify({**net, "fc2.weight": net["fc2.weight"].astype(np.float16)})
+    swarmcert.certify({**net, "fc2.weight": net["fc2.weight"].astype(int)})
 except swarmcert.InputError as error:
     print(error.field, "|", error.value, "|", error.what)
 

@@ -16,10 +16,11 @@ namespace {
 
 using Parts = std::map<std::string, files::Weights>;
 
-/// float32 and float64 as they are; anything else is refused by files::assemble(), which names the type.
+/// Anything else than the floating-point types of numpy is refused by files::assemble(), which names the type.
 std::optional<files::Precision> precision_of(const py::array& array) {
   if (py::isinstance<py::array_t<float>>(array)) return files::Precision::kFloat32;
   if (py::isinstance<py::array_t<double>>(array)) return files::Precision::kFloat64;
+  if (array.dtype().kind() == 'f' && array.dtype().itemsize() == 2) return files::Precision::kFloat16;
   return std::nullopt;
 }
 

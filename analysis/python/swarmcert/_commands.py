@@ -96,7 +96,7 @@ def certify(
               ReLU between the layers, none after the last;
             - a Sequential of Linear and ReLU;
             - {"phi": ..., "rho": ...}, or an object with these attributes: a deep set rho(sum_j phi(x_j)).
-            Arrays are float32 or float64.
+            Arrays are float32 or float64, or float16, which is a float32 network.
         order: names of the layers in the order of evaluation where neither names nor shapes tell it; of a pair
             {"phi": [...], "rho": [...]}.
         description: text of a network.toml; `net` is then a dict from the names under `weights` to arrays.
