@@ -24,7 +24,7 @@ files::Weights chain_of(std::vector<files::Layer> layers) {
 
 SlopeFunction slope_of(const files::Weights& weights) { return {{&weights, nullptr}, {}, nullptr}; }
 
-SlopeSearchOptions few_rounds() {
+SlopeSearchOptions few_search_rounds() {
   SlopeSearchOptions options;
   options.rounds = 2;
   return options;
@@ -64,7 +64,7 @@ TEST(SlopeSearch, StaysBelowTheProductOfSpectralNorms) {
       {1, 5, 1}, {2, 1, 3}, {6, 12, 10, 4}, {4, 9, 9, 9, 1}, {30, 8, 2}};
   for (const std::vector<int>& sizes : shapes) {
     const files::Weights net = random_network(sizes, generator);
-    const SlopeWitness found = search_slope(slope_of(net), few_rounds());
+    const SlopeWitness found = search_slope(slope_of(net), few_search_rounds());
     EXPECT_TRUE(proves_its_slope(slope_of(net), found));
     EXPECT_GT(found.slope.value(), 0);
     EXPECT_LE(found.slope.value(), product_of_norms({&net}));
@@ -76,7 +76,7 @@ TEST(SlopeSearch, FindsTheSteepestRegionOfANetworkOfOneInput) {
   // Slopes on the line, by pieces: 0, 1, -2 (on (1, 1.001), the narrow steepest piece), 0.5.
   const files::Weights net =
       chain_of({{"fc1", 3, 1, {1, 1, 1}, {0, -1, -1.001}}, {"fc2", 1, 3, {1, -3, 2.5}, {0}}});
-  EXPECT_NEAR(search_slope(slope_of(net), few_rounds()).slope.value(), 2, 1e-3);
+  EXPECT_NEAR(search_slope(slope_of(net), few_search_rounds()).slope.value(), 2, 1e-3);
 }
 
 TEST(SlopeSearch, AffineFunctionReachesItsSpectralNorm) {
@@ -85,9 +85,9 @@ TEST(SlopeSearch, AffineFunctionReachesItsSpectralNorm) {
        std::vector<std::pair<int, int>>{{1, 1}, {1, 9}, {9, 1}, {7, 5}, {20, 60}}) {
     const files::Weights net = random_network({inputs, outputs}, generator);
     const double norm = spectral_norm(net.layers[0]).norm.lower.value();
-    EXPECT_GE(search_slope(slope_of(net), few_rounds()).slope.value(), norm * (1 - 1e-7))
+    EXPECT_GE(search_slope(slope_of(net), few_search_rounds()).slope.value(), norm * (1 - 1e-7))
         << outputs << " x " << inputs;
-    SlopeSearchOptions in_box = few_rounds();
+    SlopeSearchOptions in_box = few_search_rounds();
     in_box.box = cube(inputs, 2, 3);
     const SlopeWitness found = search_slope(slope_of(net), in_box);
     EXPECT_GE(found.slope.value(), norm * (1 - 1e-7)) << outputs << " x " << inputs << " in a box";
@@ -104,7 +104,7 @@ TEST(SlopeSearch, DeadAndZeroNetworksHaveSlopeZeroAndStillAWitness) {
   for (double& weight : off.layers[1].weights) weight = 0;
   const files::Weights affine = chain_of({{"fc", 2, 2, {0, 0, 0, 0}, {1, 2}}});
   for (const files::Weights* net : std::vector<const files::Weights*>{&dead, &off, &affine}) {
-    const SlopeWitness found = search_slope(slope_of(*net), few_rounds());
+    const SlopeWitness found = search_slope(slope_of(*net), few_search_rounds());
     EXPECT_EQ(found.slope, LowerBound(0));
     EXPECT_TRUE(proves_its_slope(slope_of(*net), found));
   }
@@ -115,7 +115,7 @@ TEST(SlopeSearch, SolvesTheCounterexampleToLipSdpNetwork) {
   // "Network" variant of LipSDP claims 0.368624.
   const files::Weights net = chain_of(
       {{"fc1", 2, 1, {1.50591384, 1.0709144}, {1, -10}}, {"fc2", 1, 2, {0.84741233, -1.17624551}, {0}}});
-  const double found = search_slope(slope_of(net), few_rounds()).slope.value();
+  const double found = search_slope(slope_of(net), few_search_rounds()).slope.value();
   EXPECT_GE(found, 1.276);
   EXPECT_LE(found, 0.84741233 * 1.50591384 * (1 + 1e-12));
 }
@@ -125,8 +125,8 @@ TEST(SlopeSearch, DoesNotDependOnTheUnitsOfTheInputs) {
   const files::Weights net = random_network({3, 10, 10, 2}, generator);
   files::Weights scaled = net;  // every input in units 2^20 times smaller
   for (double& weight : scaled.layers[0].weights) weight *= 0x1p-20;
-  const double reference = search_slope(slope_of(net), few_rounds()).slope.value();
-  EXPECT_NEAR(search_slope(slope_of(scaled), few_rounds()).slope.value() * 0x1p20, reference,
+  const double reference = search_slope(slope_of(net), few_search_rounds()).slope.value();
+  EXPECT_NEAR(search_slope(slope_of(scaled), few_search_rounds()).slope.value() * 0x1p20, reference,
               1e-3 * reference);
 }
 
@@ -134,14 +134,14 @@ TEST(SlopeSearch, DuplicatedAndOppositeNeuronsAreFine) {
   // |x| = relu(x) + relu(-x), each twice; all four kinks coincide.
   const files::Weights net =
       chain_of({{"fc1", 4, 1, {1, -1, 1, -1}, {0, 0, 0, 0}}, {"fc2", 1, 4, {1, 1, 1, 1}, {0}}});
-  EXPECT_EQ(search_slope(slope_of(net), few_rounds()).slope.value(), 2);
+  EXPECT_EQ(search_slope(slope_of(net), few_search_rounds()).slope.value(), 2);
 }
 
 TEST(SlopeSearch, SameSeedGivesTheSameBits) {
   std::mt19937 generator(5);
   const files::Weights net = random_network({4, 12, 12, 3}, generator);
-  const SlopeWitness first = search_slope(slope_of(net), few_rounds());
-  const SlopeWitness second = search_slope(slope_of(net), few_rounds());
+  const SlopeWitness first = search_slope(slope_of(net), few_search_rounds());
+  const SlopeWitness second = search_slope(slope_of(net), few_search_rounds());
   EXPECT_EQ(first.x, second.x);
   EXPECT_EQ(first.y, second.y);
   EXPECT_EQ(first.slope, second.slope);
@@ -166,7 +166,7 @@ TEST(SlopeSearch, PointsStayInTheBox) {
   const double third = 1.0 / 3;  // not a float: rounding must go inwards
   const std::vector<Box> boxes = {cube(4, -third, third), {{0, 0.1, -2, 5}, {1, 0.1 + 1e-6, 1e5, 5}}};
   for (const Box& box : boxes) {
-    SlopeSearchOptions options = few_rounds();
+    SlopeSearchOptions options = few_search_rounds();
     options.box = box;
     const SlopeWitness found = search_slope(slope_of(net), options);
     EXPECT_TRUE(proves_its_slope(slope_of(net), found));
@@ -179,8 +179,8 @@ TEST(SlopeSearch, PointsStayInTheBox) {
 TEST(SlopeSearch, OnlyTheBlockMoves) {
   std::mt19937 generator(2);
   const files::Weights net = random_network({5, 12, 12, 3}, generator);
-  const double all = search_slope(slope_of(net), few_rounds()).slope.value();
-  SlopeSearchOptions options = few_rounds();
+  const double all = search_slope(slope_of(net), few_search_rounds()).slope.value();
+  SlopeSearchOptions options = few_search_rounds();
   options.block = {1, 3};
   const SlopeWitness found = search_slope(slope_of(net), options);
   EXPECT_TRUE(proves_its_slope(slope_of(net), found, options.block));
@@ -193,7 +193,7 @@ TEST(SlopeSearch, OnlyTheBlockMoves) {
 TEST(SlopeSearch, AKinkOnTheEdgeOfTheBoxIsNoObstacle) {
   // f(x, y) = 3 relu(x) where x >= 0.
   const files::Weights net = chain_of({{"fc1", 1, 2, {3, 0}, {0}}, {"fc2", 1, 1, {1}, {0}}});
-  SlopeSearchOptions options = few_rounds();
+  SlopeSearchOptions options = few_search_rounds();
   options.box = Box{{0, -1}, {0.5, -0.5}};
   const SlopeWitness found = search_slope(slope_of(net), options);
   EXPECT_NEAR(found.slope.value(), 3, 1e-6);
@@ -202,7 +202,7 @@ TEST(SlopeSearch, AKinkOnTheEdgeOfTheBoxIsNoObstacle) {
 TEST(SlopeSearch, ABoxOfOneFloatHasNoWitness) {
   std::mt19937 generator(2);
   const files::Weights net = random_network({2, 4, 1}, generator);
-  SlopeSearchOptions options = few_rounds();
+  SlopeSearchOptions options = few_search_rounds();
   for (const Box& box : {cube(2, 0.1, 0.1), cube(2, 0.5, 0.5), Box{{0.1, 0}, {0.1, 1}}}) {
     options.box = box;
     const SlopeWitness found = search_slope(slope_of(net), options);
@@ -216,10 +216,10 @@ TEST(SlopeSearch, ClampBoundsWhereItLooks) {
   const files::Weights net = random_network({2, 12, 12, 2}, generator);
   const files::InputClamp clamp = {{-1, -1}, {1, 1}};
   const SlopeFunction clamped = {{&net, &clamp}, {}, nullptr};
-  const SlopeWitness found = search_slope(clamped, few_rounds());
+  const SlopeWitness found = search_slope(clamped, few_search_rounds());
   expect_within(found.x, cube(2, -1, 1));
   EXPECT_GT(found.slope.value(), 0);
-  SlopeSearchOptions outside = few_rounds();
+  SlopeSearchOptions outside = few_search_rounds();
   outside.box = cube(2, 3, 4);
   const SlopeWitness nothing = search_slope(clamped, outside);
   EXPECT_EQ(nothing.slope, LowerBound(0));
@@ -233,7 +233,7 @@ TEST(SlopeSearch, DeepSetMovesOneNeighbourAndPlacesTheOthers) {
   const files::Weights other = chain_of({{"fc", 1, 2, {1, 0}, {0}}});  // linear, of another kind and depth
   const files::Weights rho = chain_of({{"fc1", 2, 1, {1, 1}, {-6, -7}}, {"fc2", 1, 2, {3, -3}, {0}}});
   const SlopeFunction f = {{&phi, nullptr}, {{&other, nullptr}}, &rho};
-  SlopeSearchOptions options = few_rounds();
+  SlopeSearchOptions options = few_search_rounds();
   options.box = cube(1, 0, 1);
   options.other_boxes = {cube(2, -10, 10)};
   const SlopeWitness found = search_slope(f, options);
@@ -285,7 +285,7 @@ TEST(SlopeSearch, RefusesDomainsThatDoNotFit) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   const auto with = [](const std::function<void(SlopeSearchOptions&)>& change) {
-    SlopeSearchOptions options = few_rounds();
+    SlopeSearchOptions options = few_search_rounds();
     change(options);
     return options;
   };
@@ -307,10 +307,11 @@ TEST(SlopeSearch, RefusesDomainsThatDoNotFit) {
     EXPECT_THROW(search_slope(slope_of(net), wrong[i]), std::invalid_argument) << "case " << i;
   }
   const SlopeFunction set = {{&net, nullptr}, {{&net, nullptr}}, &net};
-  EXPECT_THROW(search_slope(set, few_rounds()), std::invalid_argument) << "rho has 2 inputs, phi 1 output";
+  EXPECT_THROW(search_slope(set, few_search_rounds()), std::invalid_argument)
+      << "rho has 2 inputs, phi 1 output";
   const files::Weights rho = random_network({1, 3, 1}, generator);
   const SlopeFunction fits = {{&net, nullptr}, {{&net, nullptr}}, &rho};
-  EXPECT_NO_THROW(search_slope(fits, few_rounds()));
+  EXPECT_NO_THROW(search_slope(fits, few_search_rounds()));
   EXPECT_THROW(search_slope(fits, with([](auto& o) { o.box = cube(2, 0, 1); })), std::invalid_argument)
       << "the other neighbour's box is missing";
 }
