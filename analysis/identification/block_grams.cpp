@@ -15,6 +15,7 @@ using residuals::Track;
 struct Piece {
   std::vector<Block> blocks;
   std::vector<Support> support;
+  int tracks = 0;
 };
 
 /// @param rows [3 x records, columns + 1], the residual last.
@@ -30,11 +31,14 @@ Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows) {
   block.b = x.transpose() * rows.col(columns);
   block.y = rows.col(columns).squaredNorm();
   block.records = static_cast<int>(rows.rows() / 3);
+  block.sums = Eigen::Matrix3Xd::Zero(3, rows.cols());
+  for (int i = 0; i < block.records; ++i) block.sums += rows.middleRows<3>(Eigen::Index(3) * i);
   return block;
 }
 
 void add_track(const residuals::Inputs& inputs, const Track& track, const Grams& grams, int flight,
                Piece& piece) {
+  const int number = piece.tracks++;
   const stability::Model model = inputs.model_for(track);
   const std::vector<Eigen::Vector3d> r = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
   const TrackBlocks cut = cut_into_blocks(track);
@@ -47,6 +51,7 @@ void add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
     const TrackBlock& block = cut.blocks[static_cast<std::size_t>(current)];
     piece.blocks.push_back(condensed(rows));
     piece.blocks.back().flight = flight;
+    piece.blocks.back().track = number;
     piece.blocks.back().follows = block.follows;
     for (std::size_t s = 0; s < in_support.size(); ++s) {
       piece.support[s].records += static_cast<std::size_t>(in_support[s]);
@@ -135,8 +140,13 @@ Grams block_grams(const residuals::Inputs& inputs, const std::string& kind, std:
     }
     progress(++done, static_cast<int>(which.size()));
   });
+  int tracks = 0;
   for (Piece& piece : pieces) {
-    for (Block& block : piece.blocks) grams.blocks.push_back(std::move(block));
+    for (Block& block : piece.blocks) {
+      block.track += tracks;
+      grams.blocks.push_back(std::move(block));
+    }
+    tracks += piece.tracks;
     std::size_t index = 0;
     for (auto& thetas : grams.support) {
       for (Support& support : thetas) {

@@ -20,8 +20,10 @@ struct Block {
   Eigen::VectorXd b;
   double y = 0;
   int records = 0;
-  int flight = 0;        ///< index into Inputs::found.flights
-  bool follows = false;  ///< directly after the block before it, of the same vehicle
+  int flight = 0;              ///< index into Inputs::found.flights
+  int track = 0;               ///< counts the vehicles of all flights
+  Eigen::Matrix3Xd sums = {};  ///< [3 x columns + 1]: of the columns over the records, and of the residual
+  bool follows = false;        ///< directly after the block before it, of the same vehicle
 };
 
 /// Support of one candidate with one theta: where the effect, if it exists, acts.

@@ -166,7 +166,7 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
 }
 
 bool is_written_by_hand(const std::string& name) {
-  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque";
+  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque" || name == "rotor_thrust";
 }
 
 std::vector<std::string> candidate_names(const stability::Model& model) {

@@ -19,6 +19,19 @@ int contradicted(const std::vector<Refined>& refined,
   return -1;
 }
 
+/// A scale of the thrust beside a constant vertical force, of which set points do not say the same as least squares.
+bool has_doubtful_slope(const std::vector<Refined>& refined,
+                        const std::vector<std::vector<InstrumentedValue>>& checks) {
+  constexpr double kSurely_z = 3;
+  if (!has_vertical_push(refined)) return false;
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    if (!is_scale(refined[i].candidate.name)) continue;
+    if (checks.empty() || !checks[i][0].is_strong() || std::abs(checks[i][0].difference_z) > kSurely_z)
+      return true;
+  }
+  return false;
+}
+
 bool is_vertical_push(const stability::Parameter& parameter) {
   constexpr std::string_view kEnd = "force_z_N";
   const std::string& name = parameter.name;
@@ -100,6 +113,8 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
       erase(candidates, {name});
       continue;
     }
+    if (has_doubtful_slope(result.refined, result.checks))
+      return without_slope(passes, std::move(candidates), result.contradicted);
     std::set<std::string> now;
     bool moved = false;
     for (std::size_t i = 0; i < result.members.size(); ++i) {
@@ -120,6 +135,19 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
   return result;
 }
 
+/// What of the mean square a scale of the thrust leaves where thrust answers all that is left, against what a constant
+/// force leaves, whichever of the two is true. A disturbance d beside a constant force F makes the thrust
+/// T = m g - F - d; the scale 1 + e that gives F in the mean leaves F + d - e T = (1 + e) d. At least 1: where both leave
+/// the same, the scale stands.
+double feedback_share(const Selected& scale) {
+  for (const Refined& effect : scale.refined) {
+    if (effect.candidate.name != "thrust_ratio") continue;
+    const double factor = 1 + effect.coefficients[0];
+    return std::max(factor * factor, 1.0);
+  }
+  return 1;
+}
+
 Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
                        std::vector<std::string> contradicted) {
   constexpr double kShare = 0.5;
@@ -136,7 +164,7 @@ Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
   };
   const auto is_constant = [](const std::string& name) { return name == "constant_force"; };
   const bool has_scale = has(scale, is_scale), has_push = has(push, is_constant);
-  const bool takes_scale = has_scale && left(scale) <= alike * left(push);
+  const bool takes_scale = has_scale && left(scale) <= alike * feedback_share(scale) * left(push);
   if (takes_scale) {
     scale.instead = "constant_force";
   } else {
@@ -154,15 +182,19 @@ Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,
 
 std::set<std::string> suspects(const Selected& selected) {
   constexpr double kShare = 0.1;
+  // What halves the error is no part of a remainder that is a quarter of it.
+  constexpr double kPlain = 0.75;
   const Selection selection(selected.grams);
-  const double square = selection.mean_square(selected.members);
   std::set<std::string> names;
   for (std::size_t i = 0; i < selected.members.size(); ++i) {
     const Candidate& candidate = selected.refined[i].candidate;
-    const bool small = square > (1 - kShare) * selection.mean_square(without(selected.members, i));
-    const bool unconfirmed =
-        is_of_thrust(candidate) && (selected.checks.empty() || !is_confirmed(selected.checks[i]));
-    if (small || unconfirmed) names.insert(candidate.name);
+    const double loss = selection.loss_without(selected.members, i);
+    if (loss >= kPlain) continue;
+    // Without set points a lag has no other witness than its size. A scale has its rivals, see without_slope().
+    const bool has_check = !selected.checks.empty();
+    const bool unconfirmed = is_of_thrust(candidate) &&
+                             (has_check ? !is_confirmed(selected.checks[i]) : !candidate.info.remembers);
+    if (loss < kShare || unconfirmed) names.insert(candidate.name);
   }
   return names;
 }

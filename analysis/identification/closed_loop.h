@@ -31,7 +31,8 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
 ///
 /// Thrust that answers disturbances gives the force a slope over thrust that is not there, and a constant force beside
 /// it the intercept. Where set points do not confirm that slope, flights tell of a scale of the thrust alone or of a
-/// constant force alone: the one that leaves less, and the scale, which is one number, where both leave about the same.
+/// constant force alone: the one that leaves less, once the thrust's answer is taken off, and the scale, which is one
+/// number, where both leave about the same.
 /// The other is Selected::instead where it explains at least half as much: least squares favour neither fairly.
 /// @param contradicted begins Selected::contradicted.
 Selected without_slope(const Passes& passes, std::vector<Candidate> candidates,

@@ -14,7 +14,7 @@ namespace swarmcert::identification {
 namespace {
 
 /// Whole flights are left out where there are this many.
-constexpr std::size_t kFewestFlights = 5;
+constexpr std::size_t kFewestWholeFlights = 5;
 
 }  // namespace
 
@@ -38,7 +38,7 @@ CrossValidation::CrossValidation(const Grams& grams) : grams_(grams) {
   std::map<int, int> fold_of_flight;
   for (const Block& block : grams.blocks)
     fold_of_flight.emplace(block.flight, static_cast<int>(fold_of_flight.size()) % kFolds);
-  has_flights_ = fold_of_flight.size() >= kFewestFlights;
+  has_flights_ = fold_of_flight.size() >= kFewestWholeFlights;
   if (has_flights_) {
     for (const Block& block : grams.blocks) by_flight_.of_block.push_back(fold_of_flight[block.flight]);
     divide(by_flight_);
@@ -158,6 +158,37 @@ std::vector<double> CrossValidation::block_errors(const Members& members, const 
       error += c.dot(part_of_gram(block.gram, all) * c) - 2 * c.dot(part_of(block.b, all));
     }
     errors.push_back(std::max(error, 0.0));
+  }
+  return errors;
+}
+
+std::vector<double> CrossValidation::trimmed_errors(const Members& members, const Folds& folds) const {
+  const std::vector<int> all = columns(members);
+  std::array<Eigen::VectorXd, kFolds> fits;
+  for (std::size_t f = 0; f < kFolds && !all.empty(); ++f) fits[f] = solve(folds.outside[f], members);
+  const auto left_sum = [&](const Block& block, std::size_t fold) {
+    Eigen::Vector3d sum = block.sums.rightCols<1>();
+    for (std::size_t k = 0; k < all.size(); ++k)
+      sum -= fits[fold][static_cast<Eigen::Index>(k)] * block.sums.col(all[k]);
+    return sum;
+  };
+  std::vector<double> errors = block_errors(members, folds);
+  const std::vector<Block>& blocks = grams_.blocks;
+  for (std::size_t first = 0, end = 0; first < blocks.size(); first = end) {
+    std::array<Eigen::Vector3d, kFolds> mean;
+    mean.fill(Eigen::Vector3d::Zero());
+    double records = 0;
+    for (end = first; end < blocks.size() && blocks[end].track == blocks[first].track; ++end) {
+      if (blocks[end].sums.size() == 0) return errors;
+      records += blocks[end].records;
+      for (std::size_t f = 0; f < kFolds; ++f) mean[f] += left_sum(blocks[end], f);
+    }
+    for (std::size_t i = first; i < end; ++i) {
+      const auto fold = static_cast<std::size_t>(folds.of_block[i]);
+      const Eigen::Vector3d trim = mean[fold] / records;
+      errors[i] = std::max(
+          errors[i] - 2 * trim.dot(left_sum(blocks[i], fold)) + blocks[i].records * trim.squaredNorm(), 0.0);
+    }
   }
   return errors;
 }

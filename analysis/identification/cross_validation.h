@@ -68,6 +68,9 @@ class CrossValidation {
   const Folds& folds_for(const Members& members) const;
   double mean_square(const Members& members, const Folds& folds) const;
   std::vector<double> block_errors(const Members& members, const Folds& folds) const;
+  /// As block_errors(), about the mean residual of each track: what differs from flight to flight, as a trim does,
+  /// takes no part.
+  std::vector<double> trimmed_errors(const Members& members, const Folds& folds) const;
 
  private:
   void divide(Folds& folds) const;

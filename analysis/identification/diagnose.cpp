@@ -181,6 +181,14 @@ void doubt_answers(const Passes& passes, Explained& explained) {
   scan_what_is_left(passes, explained);
 }
 
+/// A scale of the thrust that halves the error. Where thrust hardly varies, formulas of anything can say the same.
+bool has_plain_scale(const std::vector<Missing>& ranking) {
+  constexpr double kHalf = 0.5;
+  return std::any_of(ranking.begin(), ranking.end(), [](const Missing& missing) {
+    return is_scale(missing.effect) && missing.finding.rmse_after_N <= kHalf * missing.finding.rmse_before_N;
+  });
+}
+
 /// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
 /// selection is done anew with them among the candidates, and they are what is left.
 Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
@@ -195,6 +203,7 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);
   Settled again = settle(passes, covered, rivals, names);
   if (std::all_of(again.ranking.begin(), again.ranking.end(), is_named)) return result;
+  if (has_plain_scale(result.settled.ranking) && !has_plain_scale(again.ranking)) return result;
   const double left = Selection(again.selected.grams).mean_square(again.selected.members);
   const Selection by_names(result.settled.selected.grams);
   if (!(left < kClearlyLess * by_names.mean_square(result.settled.selected.members))) return result;
@@ -255,6 +264,54 @@ void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
   }
 }
 
+/// Whether a curve of the scan explains as much as a constant share of the thrust, or more: then it is no matter of scale.
+bool is_explained_by_curve(const Scan& scan, double rmse_N) {
+  return std::any_of(scan.entries.begin(), scan.entries.end(), [&](const ScanEntry& entry) {
+    return entry.variable != "thrust" && entry.variable != "body_constant" && entry.rmse_after_N <= rmse_N;
+  });
+}
+
+/// What halves the error is named even where set points do not confirm it: at least as one of a class, with the rivals
+/// that halve it as well. Only scales of the thrust and a constant force are so plain without knowing more.
+void name_what_halves(const Passes& passes, Diagnosis& result) {
+  constexpr double kQuarter = 0.25;  // of the mean square
+  if (result.suspected.empty() && result.contradicted.empty() && result.scan.entries.empty()) return;
+  const residuals::Inputs left = inputs_with(passes, specs_of(result.ranking));
+  const std::vector<int> flights = every_flight(left);
+  const Coverage covered = coverage(left, passes.kind, flights, passes.jobs);
+  std::vector<Candidate> candidates;
+  for (const char* const name : {"thrust_ratio", "battery", "constant_force"})
+    candidates.push_back(candidate(name, *left.model_of(passes.kind), covered));
+  const Grams grams = block_grams(left, passes.kind, candidates, flights, passes.jobs, [](int, int) {});
+  const Selection selection(grams);
+  if (!selection.is_sound()) return;
+  const double before = selection.mean_square({});
+  std::vector<std::string> names;
+  double least = kQuarter * before;
+  for (int k = 0; k < static_cast<int>(candidates.size()); ++k) {
+    const double square = selection.mean_square({selection.best_theta({}, k)});
+    if (square > kQuarter * before) continue;
+    names.push_back(candidates[static_cast<std::size_t>(k)].name);
+    least = std::min(least, square);
+  }
+  if (names.empty() || is_explained_by_curve(result.scan, std::sqrt(least))) return;
+  std::vector<Missing> found =
+      fit_effects(left, passes.kind, {names[0]}, flights, passes.jobs, [](int, int) {});
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    std::vector<Rival>& rivals = found[0].finding.rivals;
+    const bool is_known = std::any_of(rivals.begin(), rivals.end(),
+                                      [&](const Rival& rival) { return rival.effect == names[i]; });
+    if (!is_known) rivals.push_back({names[i], stability::effect_info(names[i]).excitation});
+  }
+  result.ranking.insert(result.ranking.begin(), std::move(found[0]));
+  result.rmse_after_N = std::sqrt(least);
+  const auto drop = [&](std::vector<std::string>& list) {
+    list.erase(std::remove(list.begin(), list.end(), names[0]), list.end());
+  };
+  drop(result.suspected);
+  drop(result.contradicted);
+}
+
 }  // namespace
 
 std::vector<int> every_flight(const residuals::Inputs& inputs) {
@@ -303,6 +360,7 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.remainder = std::move(settled.rest);
   result.scan = std::move(explained.scan);
   result.formulas = std::move(explained.formulas);
+  name_what_halves(passes, result);
   return result;
 }
 

@@ -2,12 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "analysis/identification/covariance.h"
 #include "analysis/identification/scan/formulas.h"
 #include "nn/base/doubles.h"
 
 namespace swarmcert::identification {
+namespace {
+
+double total_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+}  // namespace
 
 bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, std::size_t blocks,
                   const Thresholds& thresholds) {
@@ -31,6 +39,18 @@ bool Selection::is_clearly_better(const Members& after, const Members& before) c
   constexpr double kClearly_z = 2;
   const Folds& folds = folds_for(after);
   return paired_z(block_errors(before, folds), block_errors(after, folds)) >= kClearly_z;
+}
+
+std::vector<double> Selection::errors(const Members& members, const Folds& folds, bool trims) const {
+  return trims ? trimmed_errors(members, folds) : block_errors(members, folds);
+}
+
+double Selection::loss_without(const Members& members, std::size_t index) const {
+  const Folds& folds = folds_for(members);
+  const Members rest = without(members, index);
+  if (candidate(members[index]).info.remembers)
+    return 1 - total_of(trimmed_errors(members, folds)) / total_of(trimmed_errors(rest, folds));
+  return 1 - mean_square(members, folds) / mean_square(rest, folds);
 }
 
 bool Selection::is_formula(const Member& member) const {
@@ -83,14 +103,22 @@ bool Selection::is_acceptable(const Members& before, const Member& added) const 
 
 bool Selection::is_acceptable(const Members& before, const Member& added, double before_square,
                               double after_square, const Folds& folds) const {
+  const Members after = with(before, added);
+  const bool trims = candidate(added).info.remembers;
+  if (!trims && !(after_square <= (1 - thresholds_.gain) * before_square)) return false;
+  const std::vector<double> errors_before = errors(before, folds, trims),
+                            errors_after = errors(after, folds, trims);
+  if (trims) {
+    before_square = total_of(errors_before);
+    after_square = total_of(errors_after);
+  }
   if (!(after_square <= (1 - thresholds_.gain) * before_square)) return false;
   const bool is_plain = after_square <= (1 - thresholds_.plain_gain) * before_square;
   const std::size_t blocks = is_plain ? thresholds_.plain_support_blocks : thresholds_.support_blocks;
   const auto k = static_cast<std::size_t>(added.candidate), t = static_cast<std::size_t>(added.theta);
   if (!is_supported(grams(), k, t, blocks, thresholds_)) return false;
-  const Members after = with(before, added);
   if (is_held(after)) return false;
-  const double z = paired_z(block_errors(before, folds), block_errors(after, folds));
+  const double z = paired_z(errors_before, errors_after);
   return z >= thresholds_.paired_z || (z >= thresholds_.least_paired_z && wald(after) >= thresholds_.wald_z);
 }
 
@@ -173,19 +201,15 @@ bool Selection::swap_one(Members& members) const {
 }
 
 bool Selection::remove_one(Members& members) const {
-  const Folds& folds = folds_for(members);
-  const double now = mean_square(members, folds);
   std::size_t least = members.size();
-  double least_square = kInfinity;
+  double least_loss = thresholds_.removal_share * thresholds_.gain;
   for (std::size_t i = 0; i < members.size(); ++i) {
-    const double square = mean_square(without(members, i), folds);
-    if (square < least_square) {
-      least_square = square;
-      least = i;
-    }
+    const double loss = loss_without(members, i);
+    if (loss >= least_loss) continue;
+    least_loss = loss;
+    least = i;
   }
-  if (least == members.size() || 1 - now / least_square >= thresholds_.removal_share * thresholds_.gain)
-    return false;
+  if (least == members.size()) return false;
   members = without(members, least);
   return true;
 }

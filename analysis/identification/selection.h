@@ -46,12 +46,16 @@ class Selection : public CrossValidation {
   Member best_theta(const Members& members, int candidate) const;
   /// True where the data show that `added` belongs to `before`.
   bool is_acceptable(const Members& before, const Member& added) const;
+  /// What of the cross-validated mean square goes away with the member at `index`: 0.1 for a tenth. Of a lag or delay,
+  /// which has no mean, about the mean of each track.
+  double loss_without(const Members& members, std::size_t index) const;
   /// Enough blocks for an answer.
   bool is_sound() const { return grams().blocks.size() >= kFewestBlocks; }
 
  private:
   bool is_acceptable(const Members& before, const Member& added, double before_square, double after_square,
                      const Folds& folds) const;
+  std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
   /// The candidate that `candidate` becomes where what it varies with stays the same; -1 if there is none.
   int plain_form(int candidate) const;
   /// Blocks that were left out prefer `after` by two standard errors.

@@ -1,5 +1,7 @@
 #include "analysis/residuals/smoothing_window.h"
 
+#include <cmath>
+
 namespace swarmcert::residuals {
 namespace {
 
@@ -17,6 +19,19 @@ Eigen::VectorXd derivative_weights(const Eigen::VectorXd& times_s, int order) {
 }
 
 }  // namespace
+
+// Fourier transforms of 3/4 (1 - u^2) and 15/16 (1 - u^2)^2 on [-1, 1]: 3 j1(x) / x and 15 j2(x) / x^2.
+double power_passed(logs::ForceSource source, double length_s, double frequency_hz) {
+  constexpr double kPi = 3.14159265358979323846, kSeries = 0.05;
+  if (source != logs::ForceSource::kVelocity && source != logs::ForceSource::kPosition) return 1;
+  const double x = kPi * frequency_hz * length_s;
+  if (x < kSeries) return 1;
+  const double s = std::sin(x), c = std::cos(x);
+  const double mean = source == logs::ForceSource::kPosition
+                          ? 15 * ((3 - x * x) * s - 3 * x * c) / (x * x * x * x * x)
+                          : 3 * (s - x * c) / (x * x * x);
+  return mean * mean;
+}
 
 SmoothingWindow::SmoothingWindow(logs::ForceSource source, double length_s, int channels)
     : order_(source == logs::ForceSource::kPosition ? 2 : 1),

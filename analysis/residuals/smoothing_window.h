@@ -13,6 +13,9 @@
 
 namespace swarmcert::residuals {
 
+/// Power that the weighted mean lets pass at `frequency_hz`; 1 where `source` is no derivative.
+double power_passed(logs::ForceSource source, double length_s, double frequency_hz);
+
 class SmoothingWindow {
  public:
   /// @param source   kVelocity: first derivative; kPosition: second.

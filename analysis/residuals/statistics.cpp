@@ -79,7 +79,8 @@ std::array<Interval, 4> bootstrap_rmse(const std::vector<BlockSum>& blocks, std:
   return intervals;
 }
 
-void Spectrum::add(const std::vector<Eigen::Vector3d>& residual, double period_s) {
+void Spectrum::add(const std::vector<Eigen::Vector3d>& residual, double period_s,
+                   const std::function<double(double)>& passes) {
   static const auto kTables = [] {
     constexpr double kTurn = 2 * 3.14159265358979323846;
     std::array<std::array<double, kWindow>, 3> tables{};  // cosine, sine, Hann
@@ -103,6 +104,7 @@ void Spectrum::add(const std::vector<Eigen::Vector3d>& residual, double period_s
         imaginary += kTables[1][phase] * piece.col(i);
       }
       power_.col(k) += real.cwiseAbs2() + imaginary.cwiseAbs2();
+      passed_[k] += passes ? passes(k / (period_s * kWindow)) : 1;
     }
     windows_ += 1;
     period_sum_s_ += period_s;
@@ -111,6 +113,7 @@ void Spectrum::add(const std::vector<Eigen::Vector3d>& residual, double period_s
 
 void Spectrum::add(const Spectrum& other) {
   power_ += other.power_;
+  passed_ += other.passed_;
   windows_ += other.windows_;
   period_sum_s_ += other.period_sum_s_;
 }
@@ -126,14 +129,14 @@ Eigen::Matrix3d Spectrum::median_and_mean() const {
     for (int k = 1; k < kWindow / 2; ++k) {
       const double frequency_hz = k * step_hz;
       if (frequency_hz >= 0.3 && frequency_hz <= 4) {
-        low += power_(axis, k);
+        low += power_(axis, k) / passed_[k];
         count += 1;
       }
-      if (frequency_hz >= 12 && frequency_hz <= 25) high.push_back(power_(axis, k));
+      if (frequency_hz >= 12 && frequency_hz <= 25) high.push_back(power_(axis, k) / passed_[k]);
     }
     if (count == 0 || high.empty()) continue;
-    result(axis, 0) = low / count / windows_;
-    result(axis, 1) = quantile(high, 0.5) / windows_;
+    result(axis, 0) = low / count;
+    result(axis, 1) = quantile(high, 0.5);
   }
   return result;
 }
@@ -145,7 +148,8 @@ Eigen::Vector3d Spectrum::low_band_to_floor() const {
 
 Eigen::Vector3d Spectrum::noise_floor_N() const {
   constexpr double kHannPower = 0.375 * kWindow;  // sum of the squared window
-  return (median_and_mean().col(1) / kHannPower).cwiseSqrt();
+  const double passed = windows_ > 0 ? passed_.tail(kWindow / 2 - 1).mean() / windows_ : 1;
+  return (median_and_mean().col(1) * (passed / kHannPower)).cwiseSqrt();
 }
 
 }  // namespace swarmcert::residuals

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace swarmcert::residuals {
@@ -44,7 +45,10 @@ double quantile(std::vector<float>& values, double p);
 class Spectrum {
  public:
   /// @param residual [records], consecutive, without gaps; `period_s` their mean distance.
-  void add(const std::vector<Eigen::Vector3d>& residual, double period_s);
+  /// @param passes power that a window let pass before, by frequency in hertz; empty: all of it. Both bands are divided by
+  /// it: a mean over 100 ms hides the floor, not what is above it.
+  void add(const std::vector<Eigen::Vector3d>& residual, double period_s,
+           const std::function<double(double)>& passes = {});
   void add(const Spectrum& other);
   /// Mean power in 0.3 .. 4 Hz over median power in 12 .. 25 Hz: about 1 where nothing but white noise is left.
   /// NaN where no piece was long enough.
@@ -56,6 +60,8 @@ class Spectrum {
   static constexpr int kWindow = 256;
   Eigen::Matrix3d median_and_mean() const;
   Eigen::Matrix<double, 3, kWindow / 2> power_ = Eigen::Matrix<double, 3, kWindow / 2>::Zero();
+  Eigen::Array<double, kWindow / 2, 1> passed_ =
+      Eigen::Array<double, kWindow / 2, 1>::Zero();  ///< sum over windows
   double windows_ = 0, period_sum_s_ = 0;
 };
 

@@ -19,6 +19,7 @@ constexpr double kLeastDuty = 0.8, kLeastDutyShare = 0.3;  // of the most in a l
 constexpr double kSettle_s = 0.15;
 constexpr double kLeastShare = 0.3;  // of the thrust that is common in a log
 constexpr double kAboveStanding_m = 0.02, kUsualWithin_m = 0.03;
+constexpr double kClear_m = 0.01;  // of the ground, wherever the vehicle stands
 
 /// Where the published vehicles stand; NaN for others, whose logs have to show it.
 double contact_height_m(const std::string& kind) {
@@ -193,7 +194,7 @@ void cut_phases(Track& track, const CutRules& rules) {
     // A height at which the vehicle stood counts where it is not the usual one within a few centimetres.
     const double usual_m = contact_height_m(track.kind), stood_m = standing_m[i] + kAboveStanding_m;
     const bool is_usual = std::isfinite(usual_m) && !(std::abs(stood_m - usual_m) > kUsualWithin_m);
-    const double contact_m = is_usual ? usual_m : stood_m;
+    const double contact_m = is_usual ? std::max(usual_m, standing_m[i] + kClear_m) : stood_m;
     Cut& cut = track.cut[i];
     if (now.time_s >= crash_s)
       cut = Cut::kCrash;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "analysis/logs/read_log.h"
 #include "analysis/residuals/force_residual.h"
@@ -62,8 +63,12 @@ std::vector<Moment> moments_of(const Track& track, const std::vector<Eigen::Vect
 void add_spectra(const Track& track, const std::vector<Eigen::Vector3d>& r, Spectrum& spectrum) {
   std::vector<Eigen::Vector3d> piece;
   double start_s = 0, end_s = 0;
+  std::function<double(double)> passes;
+  if (track.force_source != logs::ForceSource::kAccelerometer)
+    passes = [&](double hz) { return power_passed(track.force_source, track.window_s, hz); };
   const auto flush = [&] {
-    if (piece.size() > 1) spectrum.add(piece, (end_s - start_s) / static_cast<double>(piece.size() - 1));
+    if (piece.size() > 1)
+      spectrum.add(piece, (end_s - start_s) / static_cast<double>(piece.size() - 1), passes);
     piece.clear();
   };
   for (std::size_t i = 0; i < r.size(); ++i) {

@@ -125,6 +125,17 @@ void bound_drag(const std::string& name, const Values& value, const Model& model
   }
 }
 
+/// Rotors push: |sum (rotor_k - 1) f_k| <= max |rotor_k - 1| sum f_k. How fast thrust moves from rotor to rotor nobody
+/// declares.
+void bound_rotors(const Values& value, const MotionSet& m, EffectBounds& result) {
+  double most = 0;
+  for (const char* const rotor : {"rotor_1", "rotor_2", "rotor_3", "rotor_4"})
+    most = std::max(most, up(std::abs(value(rotor) - 1)));
+  set_all(result.amplitude_N, times_up(most, m.largest_thrust_N));
+  set_all(result.rate_N_s, most == 0 ? 0 : kInfinity);
+  if (most > 0) result.unbounded = "the rate of a single rotor's thrust is not bounded by that of the sum";
+}
+
 void bound_surface(const std::string& name, const Values& value, const MotionSet& m, EffectBounds& result) {
   // f = a g T b3 with g = exp(-distance/b): |f'| <= a g (|(T b3)'| + T |v_z|/b). The clamps at the surfaces only reduce.
   const double decay_m = value("decay_m");
@@ -174,6 +185,8 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
     bound_drag(name, value, model, motion, result);
   } else if (name == "ground" || name == "ceiling") {
     bound_surface(name, value, motion, result);
+  } else if (name == "rotor_thrust") {
+    bound_rotors(value, motion, result);
   } else if (name == "battery") {
     nothing_known("scales the thrust with the voltage: enclose it with --uncertain battery=A:B");
   } else {

@@ -19,6 +19,7 @@
 #include "stability/effects/ground.h"
 #include "stability/effects/inflow.h"
 #include "stability/effects/motor_lag.h"
+#include "stability/effects/rotor_thrust.h"
 #include "stability/effects/sensor_delay.h"
 #include "stability/effects/thrust_ratio.h"
 #include "stability/effects/torque_bias.h"
@@ -51,7 +52,7 @@ std::deque<Entry>& entries() {
       entry<Battery>(),       entry<DragLinear>(),    entry<DragQuadratic>(), entry<DragRotor>(),
       entry<Inflow>(),        entry<Ground>(),        entry<Ceiling>(),       entry<Downwash>(),
       entry<UpperLift>(),     entry<ConstantForce>(), entry<TorqueBias>(),    entry<DownwashTorque>(),
-      entry<DeepSetEffect>(),
+      entry<DeepSetEffect>(), entry<RotorThrust>(),
   };
   return all;
 }

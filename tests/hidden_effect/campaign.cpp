@@ -110,11 +110,13 @@ Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s
   if (hidden.size() == 1 && !hidden[0].parameter.empty() && answer.first_right) {
     const files::Json& fitted = result["ranking"][0]["parameters"][hidden[0].parameter];
     answer.has_value = true;
-    answer.value_error = fitted["value"].get<double>() / hidden[0].value - 1;
+    // Results give the ratio as a factor.
+    const double value = hidden[0].value + (hidden[0].parameter == "ratio" ? 1 : 0);
+    answer.value_error = (fitted["value"].get<double>() - value) / hidden[0].value;
     answer.value_right = std::abs(answer.value_error) <= hidden[0].tolerance;
     if (fitted.contains("interval_90")) {
-      answer.covered = fitted["interval_90"][0].get<double>() <= hidden[0].value &&
-                       hidden[0].value <= fitted["interval_90"][1].get<double>();
+      answer.covered =
+          fitted["interval_90"][0].get<double>() <= value && value <= fitted["interval_90"][1].get<double>();
     }
   }
   return answer;

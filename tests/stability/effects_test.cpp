@@ -35,9 +35,9 @@ double default_of(const std::string& effect, const std::string& parameter) {
 
 TEST(Effects, HaveTheNamesOfTheCommandLine) {
   const std::set<std::string> wanted = {
-      "motor_lag",      "delay",          "sensor_delay", "thrust_ratio", "battery",        "drag_linear",
-      "drag_quadratic", "drag_rotor",     "inflow",       "ground",       "ceiling",        "downwash",
-      "upper_lift",     "constant_force", "torque_bias",  "deep_set",     "downwash_torque"};
+      "motor_lag",      "delay",          "sensor_delay", "thrust_ratio", "battery",         "drag_linear",
+      "drag_quadratic", "drag_rotor",     "inflow",       "ground",       "ceiling",         "downwash",
+      "upper_lift",     "constant_force", "torque_bias",  "deep_set",     "downwash_torque", "rotor_thrust"};
   const std::vector<std::string> names = effect_names();
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), wanted);
 }
@@ -276,6 +276,30 @@ TEST(Downwash, HasTheSameBitsForOneVehicleAndForASwarm) {
   }
   EXPECT_GT(acting, 1000);
   EXPECT_GT(composed, 300);
+}
+
+/// A level vehicle whose rotors give `f`, as the simulator's mixing has it (swarm.cpp): arms of 0.046 m, 0.006 m of torque
+/// per thrust.
+Instant rotors_of(const Eigen::Vector4d& f_N) {
+  const double offset_m = 0.046 * std::sqrt(0.5);
+  Instant now;
+  now.thrust_N = f_N.sum();
+  now.torque_B_Nm = {offset_m * (f_N[2] + f_N[3] - f_N[0] - f_N[1]),
+                     offset_m * (f_N[1] + f_N[2] - f_N[0] - f_N[3]),
+                     0.006 * (f_N[1] + f_N[3] - f_N[0] - f_N[2])};
+  return now;
+}
+
+TEST(RotorThrust, IsTheThrustAndTorqueOfTheRotorsWithTheirFactors) {
+  const Eigen::Vector4d f_N(0.09, 0.07, 0.11, 0.08), factors(1, 0.9, 0.8, 1.05);
+  EffectSpec spec = spec_of("rotor_thrust");
+  for (int k = 0; k < 4; ++k) spec.parameters["rotor_" + std::to_string(k + 1)] = factors[k];
+  const Instant now = rotors_of(f_N), wanted = rotors_of(f_N.cwiseProduct(factors));
+  const Wrench wrench = AppliedEffect(spec, kContext).wrench(now);
+  EXPECT_NEAR(wrench.force_W_N.z(), wanted.thrust_N - now.thrust_N, 1e-15);
+  EXPECT_LT((wrench.torque_B_Nm - (wanted.torque_B_Nm - now.torque_B_Nm)).norm(), 1e-15);
+  const Wrench nominal = AppliedEffect(spec_of("rotor_thrust"), kContext).wrench(now);
+  EXPECT_LT(nominal.force_W_N.norm() + nominal.torque_B_Nm.norm(), 1e-15) << "factors of 1 change nothing";
 }
 
 /// The neighbours of a level vehicle that is moved by (x, y).

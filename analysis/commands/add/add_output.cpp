@@ -41,7 +41,7 @@ files::Json effects_json(const std::vector<stability::EffectSpec>& effects) {
   files::Json json = files::Json::array();
   for (const stability::EffectSpec& effect : effects) {
     files::Json entry = {{"effect", effect.name},
-                         {"parameters", values_json(effect.parameters, effect.fit.interval)}};
+                         {"parameters", values_json(effect.name, effect.parameters, effect.fit.interval)}};
     if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
     json.push_back(std::move(entry));
   }
@@ -83,7 +83,7 @@ void print_ladder(const Ladder& ladder) {
   print_ladder(ladder.rows);
   fmt::print("Test flights looked at: {} time{}\n", ladder.test_looks, ladder.test_looks == 1 ? "" : "s");
   for (const stability::EffectSpec& effect : ladder.model.effects) {
-    print_values(effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle) + " ",
+    print_values(effect.name, effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle) + " ",
                  effect.parameters, effect.fit.interval);
   }
 }

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/commands/shared/effect_output.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 
@@ -59,11 +60,12 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
     for (const stability::EffectSpec& effect : ladder.effects) {
       for (const auto& [name, value] : effect.parameters) {
         const auto interval = effect.fit.interval.find(name);
-        rows.push_back(
-            {effect.name, effect.vehicle, name, fmt::format("{:.6g}", value),
-             interval == effect.fit.interval.end()
-                 ? "-"
-                 : fmt::format("{:.4g} .. {:.4g}", interval->second.first, interval->second.second)});
+        const double beyond = shown_beyond_file(effect.name, name);
+        rows.push_back({effect.name, effect.vehicle, name, fmt::format("{:.6g}", beyond + value),
+                        interval == effect.fit.interval.end()
+                            ? "-"
+                            : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.first,
+                                          beyond + interval->second.second)});
       }
     }
     if (!rows.empty()) report.table({"effect", "vehicle", "parameter", "value", "90 %"}, rows);

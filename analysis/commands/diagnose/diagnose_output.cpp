@@ -22,23 +22,32 @@ constexpr const char* kDetectableMeaning =
     "bounds; "
     "nothing_missing means none above these sizes, and nothing left above three times the noise floor";
 
-files::Json json_of(const identification::InstrumentedValue& value) {
-  return {{"least_squares", value.least_squares},
-          {"instrument", value.instrument},
-          {"interval_90", {value.interval.first, value.interval.second}},
+files::Json json_of(const identification::InstrumentedValue& value, double beyond) {
+  return {{"least_squares", beyond + value.least_squares},
+          {"instrument", beyond + value.instrument},
+          {"interval_90", {beyond + value.interval.first, beyond + value.interval.second}},
           {"difference_z", value.difference_z},
           {"verdict", !value.is_strong()    ? "too_weak"
                       : value.contradicts() ? "contradicts"
                                             : "agrees"}};
 }
 
+/// What flights cannot tell apart, and what these flights cannot.
+std::string class_of(const Missing& missing) {
+  std::string all = missing.equivalence_class;
+  for (const identification::Rival& rival : missing.finding.rivals) all += " / " + rival.effect;
+  return all;
+}
+
 files::Json json_of(const Missing& missing) {
   const identification::Finding& finding = missing.finding;
   files::Json model_form = files::Json::object(), instrument = files::Json::object();
   for (std::size_t c = 0; c < missing.coefficients.size(); ++c) {
+    const std::string& name = missing.coefficients[c];
+    const double beyond = shown_beyond_file(missing.effect, name);
     if (c < finding.model_form.size())
-      model_form[missing.coefficients[c]] = {finding.model_form[c].first, finding.model_form[c].second};
-    if (c < missing.instrument.size()) instrument[missing.coefficients[c]] = json_of(missing.instrument[c]);
+      model_form[name] = {beyond + finding.model_form[c].first, beyond + finding.model_form[c].second};
+    if (c < missing.instrument.size()) instrument[name] = json_of(missing.instrument[c], beyond);
   }
   files::Json rivals = files::Json::array();
   for (const identification::Rival& rival : finding.rivals)
@@ -49,11 +58,11 @@ files::Json json_of(const Missing& missing) {
           {"rmse_after", finding.rmse_after_N},
           {"drop", 1 - finding.rmse_after_N / finding.rmse_before_N},
           {"drop_ci", {finding.drop_interval.first, finding.drop_interval.second}},
-          {"parameters", values_json(missing.parameters, missing.intervals)},
+          {"parameters", values_json(missing.effect, missing.parameters, missing.intervals)},
           {"per_vehicle", !missing.specs.empty() && !missing.specs[0].vehicle.empty()},
           {"model_form", std::move(model_form)},
           {"instrument", std::move(instrument)},
-          {"class", missing.equivalence_class},
+          {"class", class_of(missing)},
           {"confounded_with", finding.confounded_with()},
           {"rivals", std::move(rivals)},
           {"separated_by", missing.excitation},
@@ -70,12 +79,13 @@ void print(const Missing& missing, int flights) {
              finding.rmse_before_N, finding.rmse_after_N,
              100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.first,
              100 * finding.drop_interval.second);
-  print_values("    ", missing.parameters, missing.intervals);
+  print_values(missing.effect, "    ", missing.parameters, missing.intervals);
   for (std::size_t c = 0; c < missing.instrument.size(); ++c) {
     const identification::InstrumentedValue& value = missing.instrument[c];
     if (!value.is_strong()) continue;
+    const double beyond = shown_beyond_file(missing.effect, missing.coefficients[c]);
     fmt::print("    by instrument (set points) {} = {:.4g}, 90 % {:.4g} .. {:.4g}\n", missing.coefficients[c],
-               value.instrument, value.interval.first, value.interval.second);
+               beyond + value.instrument, beyond + value.interval.first, beyond + value.interval.second);
   }
   if (flights > 1 && finding.support.flights == 1) fmt::print("    seen in 1 flight of {}\n", flights);
   if (missing.equivalence_class != missing.effect)

@@ -7,6 +7,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/diagnose/remainder_output.h"
+#include "analysis/commands/shared/effect_output.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -29,9 +30,11 @@ std::string values_of(const Missing& missing) {
   std::vector<std::string> values;
   for (const auto& [name, value] : missing.parameters) {
     const auto interval = missing.intervals.find(name);
-    values.push_back(fmt::format("{} = {:.4g}", name, value));
+    const double beyond = shown_beyond_file(missing.effect, name);
+    values.push_back(fmt::format("{} = {:.4g}", name, beyond + value));
     if (interval != missing.intervals.end())
-      values.back() += fmt::format(" ({:.4g} .. {:.4g})", interval->second.first, interval->second.second);
+      values.back() += fmt::format(" ({:.4g} .. {:.4g})", beyond + interval->second.first,
+                                   beyond + interval->second.second);
   }
   return joined(values);
 }

@@ -4,24 +4,33 @@
 
 namespace swarmcert::analysis {
 
-files::Json values_json(const std::map<std::string, double>& values,
+double shown_beyond_file(const std::string& effect, const std::string& parameter) {
+  return effect == "thrust_ratio" && parameter == "ratio" ? 1 : 0;
+}
+
+files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
                         const std::map<std::string, std::pair<double, double>>& intervals) {
   files::Json json = files::Json::object();
   for (const auto& [name, value] : values) {
-    files::Json& entry = json[name] = {{"value", value}};
+    const double beyond = shown_beyond_file(effect, name);
+    files::Json& entry = json[name] = {{"value", beyond + value}};
     const auto interval = intervals.find(name);
-    if (interval != intervals.end()) entry["interval_90"] = {interval->second.first, interval->second.second};
+    if (interval != intervals.end())
+      entry["interval_90"] = {beyond + interval->second.first, beyond + interval->second.second};
   }
   return json;
 }
 
-void print_values(const std::string& prefix, const std::map<std::string, double>& values,
+void print_values(const std::string& effect, const std::string& prefix,
+                  const std::map<std::string, double>& values,
                   const std::map<std::string, std::pair<double, double>>& intervals) {
   for (const auto& [name, value] : values) {
     const auto interval = intervals.find(name);
-    fmt::print("{}{} = {:.4g}", prefix, name, value);
+    const double beyond = shown_beyond_file(effect, name);
+    fmt::print("{}{} = {:.4g}", prefix, name, beyond + value);
     if (interval != intervals.end())
-      fmt::print(", 90 % {:.4g} .. {:.4g}", interval->second.first, interval->second.second);
+      fmt::print(", 90 % {:.4g} .. {:.4g}", beyond + interval->second.first,
+                 beyond + interval->second.second);
     fmt::print("\n");
   }
 }

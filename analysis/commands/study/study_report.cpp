@@ -12,6 +12,7 @@
 #include "analysis/commands/compare/compare_report.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/remainder_output.h"
+#include "analysis/commands/shared/effect_output.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 #include "nn/base/file_io.h"
@@ -149,11 +150,12 @@ void add_findings(Report& report, const Study& study) {
   for (const stability::EffectSpec& effect : study.ladder.model.effects) {
     for (const auto& [parameter, value] : effect.parameters) {
       const auto interval = effect.fit.interval.find(parameter);
-      rows.push_back(
-          {effect.name, parameter, fmt::format("{:.4g}", value),
-           interval == effect.fit.interval.end()
-               ? "-"
-               : fmt::format("{:.4g} .. {:.4g}", interval->second.first, interval->second.second)});
+      const double beyond = shown_beyond_file(effect.name, parameter);
+      rows.push_back({effect.name, parameter, fmt::format("{:.4g}", beyond + value),
+                      interval == effect.fit.interval.end()
+                          ? "-"
+                          : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.first,
+                                        beyond + interval->second.second)});
     }
   }
   if (!rows.empty()) report.table({"effect", "parameter", "value", "90 % interval"}, rows);

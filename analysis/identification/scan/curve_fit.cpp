@@ -8,7 +8,7 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr int kFewestChunks = 20, kFewestFlights = 5;
+constexpr int kFewestChunks = 20, kFewestScanFlights = 5;
 
 void group_blocks(const ScanSamples& samples, int blocks_each, Chunks& chunks) {
   chunks.flight.clear();
@@ -55,7 +55,7 @@ Chunks chunks_of(const ScanSamples& samples) {
   Chunks chunks;
   group_blocks(samples, 2, chunks);
   if (chunks.count() < kFewestChunks) group_blocks(samples, 1, chunks);
-  const bool by_flight = samples.flights >= kFewestFlights;
+  const bool by_flight = samples.flights >= kFewestScanFlights;
   std::vector<int> order;
   for (int c = 0; c < chunks.count(); ++c) order.push_back(c % Chunks::kFolds);
   std::mt19937_64 generator(1);

@@ -1,0 +1,74 @@
+#include "analysis/identification/rotors/rotor_loads.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nn/base/parallel.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using residuals::Track;
+
+/// Means of blocks, and how they scatter.
+void summarize(const std::vector<Eigen::Vector4d>& blocks, RotorLoads& loads) {
+  const auto count = static_cast<double>(blocks.size());
+  for (const Eigen::Vector4d& block : blocks) loads.mean_N += block / count;
+  Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+  for (const Eigen::Vector4d& block : blocks) squares += (block - loads.mean_N).cwiseAbs2();
+  loads.error_N = (squares / (count * std::max(count - 1, 1.0))).cwiseSqrt();
+}
+
+RotorLoads loads_of(const Track& track, const stability::Model& model) {
+  constexpr double kBlock_s = 1;
+  RotorLoads loads;
+  loads.flight = track.flight;
+  loads.vehicle = track.vehicle;
+  double lowest_m = INFINITY, time_s = 0;
+  for (const stability::Instant& now : track.instants) lowest_m = std::min(lowest_m, now.p_W_m.z());
+  std::vector<Eigen::Vector4d> blocks;
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  double in_block = 0, in_block_s = 0;
+  for (std::size_t i = 1; i < track.instants.size(); ++i) {
+    const stability::Instant& now = track.instants[i];
+    const bool is_slow = std::abs(now.v_W_m_s.z()) < kMostClimb_m_s &&
+                         now.p_W_m.z() - lowest_m > kLeastRise_m && track.cut[i] == residuals::Cut::kNone;
+    if (!is_slow || track.restarts[i] != 0) continue;
+    for (int k = 0; k < 4; ++k)
+      sum[k] += model.thrust.force_N(track.duty[i][static_cast<std::size_t>(k)], now.battery_V);
+    in_block += 1;
+    in_block_s += now.time_s - track.instants[i - 1].time_s;
+    ++loads.records;
+    if (in_block_s < kBlock_s) continue;
+    time_s += in_block_s;
+    blocks.emplace_back(sum / in_block);
+    sum.setZero();
+    in_block = in_block_s = 0;
+  }
+  if (time_s < kLeastSlowFlight_s) loads.records = 0;
+  if (loads.records > 0) summarize(blocks, loads);
+  return loads;
+}
+
+}  // namespace
+
+std::vector<RotorLoads> rotor_loads(const residuals::Inputs& inputs, const std::string& kind, int jobs) {
+  std::vector<std::vector<RotorLoads>> parts(inputs.found.flights.size());
+  files::parallel_for(static_cast<int>(parts.size()), jobs, [&](int i) {
+    const auto flight = static_cast<std::size_t>(i);
+    std::vector<std::string> problems;
+    for (const Track& track : inputs.load(flight, problems)) {
+      if (track.position_only || track.kind != kind) continue;
+      if (track.thrust_source != logs::ThrustSource::kDuty || !track.has_height) continue;
+      const stability::Model model = inputs.model_for(track);
+      if (model.num_rotors() != 4) continue;
+      RotorLoads loads = loads_of(track, model);
+      if (loads.records > 0) parts[flight].push_back(std::move(loads));
+    }
+  });
+  std::vector<RotorLoads> all;
+  for (auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace swarmcert::identification
