@@ -37,6 +37,7 @@ inline constexpr double kLoudRatio = 25;
 
 struct Diagnosis {
   std::string kind;
+  std::string vehicle;   ///< of which alone the flights are; empty: of all of the kind
   std::string too_poor;  ///< why there is no answer; empty if there is one
   std::vector<Missing> ranking;
   std::vector<std::string> contradicted;  ///< selected, but only as the controller's answer to something else

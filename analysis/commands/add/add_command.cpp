@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <memory>
+#include <optional>
 #include <sstream>
 
 #include "analysis/cli/command_line.h"
@@ -55,10 +56,19 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
 }
 
 void report_ladders(const AddOptions& options, const CommonOptions& common, const files::Json& result,
-                    const std::vector<LadderOfModel>& ladders) {
+                    const std::vector<LadderOfModel>& ladders, const BeforeAfter* change = nullptr) {
   if (options.report.empty()) return;
-  const std::string path = write_ladder_report(ladders, result, options.report, common.force);
+  const std::string path = write_ladder_report(ladders, change, result, options.report, common.force);
   if (common.prints_text()) fmt::print("report: {}\n", path);
+}
+
+BeforeAfter before_and_after(const residuals::Inputs& inputs, const Ladder& ladder, int jobs) {
+  const auto silent = [](int, int) {};
+  residuals::Inputs fitted = inputs;
+  fitted.models[0] = ladder.model;
+  return {residuals::compare(inputs, jobs, silent), residuals::compare(fitted, jobs, silent),
+          identification::picture_data(inputs, inputs.models[0], ladder.model),
+          residuals::chosen_force_unit("N", inputs.models[0])};
 }
 
 /// `add undo`: back to the model before the last accepted effect.
@@ -144,7 +154,9 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   if (!ladder.earlier.empty())
     ladders.push_back({"The model's ladder so far, on the flights of then", ladder.earlier, {}});
   ladders.push_back({"On these flights", ladder.rows, ladder.model.effects});
-  report_ladders(options, common, result, ladders);
+  std::optional<BeforeAfter> change;
+  if (ladder.any_accepted && !options.report.empty()) change = before_and_after(inputs, ladder, common.jobs);
+  report_ladders(options, common, result, ladders, change ? &*change : nullptr);
   return kDone;
 }
 
@@ -182,8 +194,10 @@ Command add_command() {
         declare_flights(app, options->flights, false);
         add_output(app, "-o,--output", options->output, "The new model.toml");
         app.add_flag("--keep-anyway", options->keep_anyway, "Also add effects that do not reduce the error");
-        add_output(app, "--report", options->report,
-                   "Write an HTML report with the error ladder into this folder");
+        add_output(
+            app, "--report", options->report,
+            "Write an HTML report into this folder: the error ladder, and maps, curves and worst moments "
+            "before and after");
         return [options](const CommonOptions& common) { return run_add(*options, common); };
       }};
 }

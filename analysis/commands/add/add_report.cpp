@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/commands/compare/compare_report.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
@@ -43,8 +44,8 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
                cells);
 }
 
-std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const files::Json& result,
-                                const std::string& folder, bool overwrite) {
+std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,
+                                const files::Json& result, const std::string& folder, bool overwrite) {
   Report report("Error ladder");
   report.made_by(command_to_copy());
   report.result(result);
@@ -69,6 +70,16 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
       }
     }
     if (!rows.empty()) report.table({"effect", "vehicle", "parameter", "value", "90 %"}, rows);
+  }
+  if (change != nullptr) {
+    report.heading("Before and after");
+    report.paragraph("All flights, those of the fit among them: the error on test flights is in the ladder.");
+    add_before_and_after(report, change->before, change->after, change->pictures.room, change->unit);
+    report.heading("What was added");
+    add_effect_curves(report, change->pictures.effects, change->unit);
+    report.heading("Worst moments");
+    add_worst_moments(report, change->before, change->after, change->unit);
+    add_time_series(report, change->after, &change->before, change->unit.name, change->unit.per_newton());
   }
   return report.write(folder, overwrite);
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/commands/shared/before_after.h"
 #include "analysis/report/report.h"
 #include "nn/base/json.h"
 #include "stability/model.h"
@@ -17,10 +18,19 @@ struct LadderOfModel {
   std::vector<stability::EffectSpec> effects;
 };
 
+/// The flights under the model that was given, and under the one that was fitted.
+struct BeforeAfter {
+  residuals::Comparison before, after;
+  identification::PictureData pictures;
+  residuals::ForceUnit unit;
+};
+
 /// Writes FOLDER/report.html with a plot and a table per ladder, the effects' numbers and the JSON `result`; returns its
-/// path. @throws files::InputError as Report::write().
-std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const files::Json& result,
-                                const std::string& folder, bool overwrite);
+/// path.
+/// @param change where effects were added: its pictures; else null
+/// @throws files::InputError as Report::write().
+std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,
+                                const files::Json& result, const std::string& folder, bool overwrite);
 
 /// Bars and a table of the errors after each step. @param unit of what is shown, `per_newton` of it make a newton.
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,

@@ -11,6 +11,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
+#include "analysis/commands/diagnose/each_output.h"
 #include "analysis/commands/diagnose/rotor_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/identification/diagnose.h"
@@ -25,6 +26,14 @@ struct DiagnoseOptions {
   FlightOptions flights;
   std::vector<std::string> against;
   std::string report;
+  bool each = false, next = false;
+};
+
+/// What the commands' options ask for, for all kinds of vehicles.
+struct Answers {
+  std::vector<Diagnosis> diagnoses;  ///< one per kind; with --against one per vehicle
+  std::vector<identification::Difference> differences;
+  std::vector<identification::Each> each;
 };
 
 residuals::Inputs read_others(const DiagnoseOptions& options) {
@@ -48,38 +57,90 @@ void refuse_common(const residuals::Inputs& inputs, const residuals::Inputs& oth
   }
 }
 
+void print_next(const std::vector<Diagnosis>& diagnoses) {
+  for (const Diagnosis& diagnosis : diagnoses) {
+    for (const std::string& flight : next_flights(diagnosis)) fmt::print("  fly {}\n", flight);
+  }
+}
+
+void add_next(const std::vector<Diagnosis>& diagnoses, files::Json& result) {
+  result["next"] = files::Json::array();
+  for (const Diagnosis& diagnosis : diagnoses) {
+    for (const std::string& flight : next_flights(diagnosis)) result["next"].push_back(flight);
+  }
+}
+
+Answers answer(const DiagnoseOptions& options, const CommonOptions& common, const residuals::Inputs& inputs,
+               const residuals::Inputs* others) {
+  Progress progress(common.quiet);
+  const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };
+  Answers answers;
+  for (const stability::Model& model : inputs.models) {
+    const std::size_t first = answers.diagnoses.size();
+    if (others == nullptr) {
+      answers.diagnoses.push_back(identification::diagnose(
+          inputs, model.kind, identification::every_flight(inputs), common.jobs, show));
+    } else {
+      for (identification::Difference& difference :
+           identification::differences(inputs, *others, model.kind, common.jobs, show)) {
+        answers.diagnoses.push_back(difference.diagnosis);
+        answers.differences.push_back(std::move(difference));
+      }
+    }
+    if (options.each) {
+      std::vector<Diagnosis> own(answers.diagnoses.begin() + static_cast<std::ptrdiff_t>(first),
+                                 answers.diagnoses.end());
+      // Against other flights, what these have in common is not known: the model's effects alone are held.
+      const auto common_effects =
+          others == nullptr ? specs_of(own[0].ranking) : std::vector<stability::EffectSpec>{};
+      answers.each.push_back(
+          identification::each_flight(inputs, model.kind, common_effects, common.jobs, show));
+    }
+  }
+  return answers;
+}
+
+void print(const Answers& answers) {
+  for (std::size_t i = 0; i < answers.diagnoses.size(); ++i) {
+    print_diagnosis(answers.diagnoses[i]);
+    if (!answers.differences.empty()) fmt::print("  {}\n", in_words(answers.differences[i]));
+  }
+  for (const identification::Each& each : answers.each) print_each(each);
+}
+
 int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const residuals::Inputs inputs = read_flights(options.flights, false, false, true);
-  std::vector<std::string> files = inputs.files();
+  std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
     others = read_others(options);
     refuse_common(inputs, *others);
     for (const std::string& file : others->files()) {
-      if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
+      if (std::find(files.begin(), files.end(), file) != files.end()) continue;
+      files.push_back(file);
+      other_files.push_back(file);
     }
   }
   files::Json result = result_head("diagnose", files);
-  std::vector<Diagnosis> diagnoses;
-  for (const stability::Model& model : inputs.models) {
-    Progress progress(common.quiet);
-    diagnoses.push_back(
-        identification::diagnose(inputs, model.kind, identification::every_flight(inputs), common.jobs,
-                                 [&](int done, int total) { progress.show(done, total, "flights"); }));
-    if (common.prints_text()) print_diagnosis(diagnoses.back());
-  }
-  add_diagnoses(diagnoses, result);
+  const Answers answers = answer(options, common, inputs, others ? &*others : nullptr);
+  if (common.prints_text()) print(answers);
+  add_diagnoses(answers.diagnoses, result);
+  if (others) add_differences(answers.differences, other_files, result);
   const bool names_rotor = others && judge_rotors(inputs, *others, common.jobs, common.prints_text(), result);
+  if (options.each) add_each(answers.each, result);
+  if (options.next) add_next(answers.diagnoses, result);
+  if (options.next && common.prints_text()) print_next(answers.diagnoses);
   for (const files::Json& problem : result["problems"]) note("warning: " + problem.get<std::string>());
   write_result(common, result);
   std::string reason;
-  identification::Verdict verdict = identification::verdict_of(diagnoses, reason);
+  identification::Verdict verdict = identification::verdict_of(answers.diagnoses, reason);
   if (names_rotor) verdict = identification::Verdict::kMissingEffect;
   if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {
-    const std::string path = write_diagnose_report(diagnoses, result, options.report, common.force);
+    const std::string path = write_diagnose_report(answers.diagnoses, answers.differences, answers.each,
+                                                   result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (verdict != identification::Verdict::kInconclusive) return kDone;
@@ -95,13 +156,20 @@ Command diagnose_command() {
           "2 %,\n"
           "is significant across blocks of 2 s, and is not contradicted by the set points. The remainder is "
           "analysed separately.\n\n"
-          "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out",
+          "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out\n"
+          "         swarmcert diagnose model.toml today/ --against monday/ tuesday/ wednesday/",
           [](CLI::App& app) {
             const auto options = std::make_shared<DiagnoseOptions>();
             declare_flights(app, options->flights, true);
-            app.add_option("--against", options->against,
-                           "Flights of the same vehicles when they were healthy: rotors that give less now "
-                           "are named");
+            app.add_option(
+                "--against", options->against,
+                "Other flights (the healthy vehicle, the last release): what they show is held, and "
+                "the ranking is the difference of each vehicle beyond their scatter; "
+                "rotors that give less now are named");
+            app.add_flag("--each", options->each,
+                         "Also thrust ratio, drag and lag of each flight and day, with drifts and outliers");
+            app.add_flag("--next", options->next,
+                         "Also which flights would separate rivals, or show what these flights cannot");
             add_output(app, "--report", options->report, "Write an HTML report into this folder");
             return [options](const CommonOptions& common) { return run_diagnose(*options, common); };
           }};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/commands/add/add_output.h"
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/identification/verdict.h"
@@ -127,8 +128,9 @@ files::Json json_of(const identification::Detectable& entry, const std::string& 
 }  // namespace
 
 void print_diagnosis(const Diagnosis& diagnosis) {
-  fmt::print("Vehicles of kind {}: {} records, {} blocks of 2 s.\n", diagnosis.kind, diagnosis.records,
-             diagnosis.blocks);
+  fmt::print(
+      "{} {}: {} records, {} blocks of 2 s.\n", diagnosis.vehicle.empty() ? "Vehicles of kind" : "Vehicle",
+      diagnosis.vehicle.empty() ? diagnosis.kind : diagnosis.vehicle, diagnosis.records, diagnosis.blocks);
   if (!diagnosis.too_poor.empty()) {
     fmt::print("  No answer: {}.\n", diagnosis.too_poor);
     return;
@@ -179,7 +181,10 @@ void add_diagnoses(const std::vector<Diagnosis>& diagnoses, files::Json& result)
   for (const Diagnosis& diagnosis : diagnoses) {
     for (const std::string& problem : diagnosis.problems)
       if (std::find(problems.begin(), problems.end(), problem) == problems.end()) problems.push_back(problem);
-    for (const Missing& missing : diagnosis.ranking) ranking.push_back(json_of(missing));
+    for (const Missing& missing : diagnosis.ranking) {
+      ranking.push_back(json_of(missing));
+      if (!diagnosis.vehicle.empty()) ranking.back()["vehicle"] = diagnosis.vehicle;
+    }
     for (const identification::Detectable& entry : diagnosis.detectable)
       detectable.push_back(json_of(entry, diagnosis.kind));
     const identification::Remainder& rest = diagnosis.remainder;
@@ -199,6 +204,55 @@ void add_diagnoses(const std::vector<Diagnosis>& diagnoses, files::Json& result)
   result["kinds"] = std::move(kinds);
   result["problems"] = problems;
   if (!reason.empty()) result["reason"] = reason;
+}
+
+void add_differences(const std::vector<identification::Difference>& differences,
+                     const std::vector<std::string>& other_flights, files::Json& result) {
+  files::Json vehicles = files::Json::array();
+  for (const identification::Difference& difference : differences) {
+    files::Json within = files::Json::array();
+    for (const Missing& missing : difference.within_scatter) within.push_back(json_of(missing));
+    vehicles.push_back({{"vehicle", difference.vehicle},
+                        {"kind", difference.diagnosis.kind},
+                        {"same_vehicle", difference.against_itself},
+                        {"held", effects_json(difference.held)},
+                        {"grouped_by", difference.grouped_by},
+                        {"groups", difference.own_groups},
+                        {"other_groups", difference.other_groups},
+                        {"scatter_known", difference.no_scatter.empty()},
+                        {"within_scatter", std::move(within)}});
+  }
+  result["against"] = {{"flights", other_flights}, {"vehicles", std::move(vehicles)}};
+}
+
+std::string in_words(const identification::Difference& difference) {
+  std::string held;
+  for (const stability::EffectSpec& spec : difference.held) held += (held.empty() ? "" : ", ") + spec.name;
+  std::string text = fmt::format("Against {}: {} held fixed; ",
+                                 difference.against_itself ? "its own other flights" : "the other flights",
+                                 held.empty() ? "nothing beyond the model" : held);
+  if (!difference.no_scatter.empty()) return text + difference.no_scatter + ".";
+  text +=
+      fmt::format("intervals hold the scatter of {} {}s.", difference.other_groups, difference.grouped_by);
+  for (const Missing& missing : difference.within_scatter)
+    text += fmt::format(" Found, but within the scatter: {}.", missing.effect);
+  return text;
+}
+
+std::vector<std::string> next_flights(const Diagnosis& diagnosis) {
+  std::vector<std::string> next;
+  const auto add = [&next](const std::string& flight) {
+    if (!flight.empty() && std::find(next.begin(), next.end(), flight) == next.end()) next.push_back(flight);
+  };
+  for (const Missing& missing : diagnosis.ranking) {
+    for (const identification::Rival& rival : missing.finding.rivals)
+      add(fmt::format("to separate {} from {}: {}; {}", missing.effect, rival.effect, missing.excitation,
+                      rival.excitation));
+  }
+  for (const identification::Detectable& entry : diagnosis.detectable) {
+    if (!std::isfinite(entry.size)) add(fmt::format("to see {} at all: {}", entry.effect, entry.excitation));
+  }
+  return next;
 }
 
 }  // namespace swarmcert::analysis

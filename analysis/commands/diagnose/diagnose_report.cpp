@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/commands/diagnose/diagnose_output.h"
+#include "analysis/commands/diagnose/each_output.h"
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/report/report.h"
@@ -101,26 +103,34 @@ void add_left(Report& report, const Diagnosis& diagnosis) {
   report.table({"effect", "number", "size", "what would show it"}, rows);
 }
 
-std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses, const files::Json& result,
+std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses,
+                                  const std::vector<identification::Difference>& differences,
+                                  const std::vector<identification::Each>& each, const files::Json& result,
                                   const std::string& folder, bool overwrite) {
-  Report report("Which physical effect is missing");
+  Report report(differences.empty() ? "Which physical effect is missing" : "What changed");
   report.made_by(command_to_copy());
   report.result(result);
   for (std::size_t i = 0; i < diagnoses.size(); ++i) {
     const Diagnosis& diagnosis = diagnoses[i];
-    report.heading("Vehicles of kind " + diagnosis.kind);
+    report.heading(diagnosis.vehicle.empty() ? "Vehicles of kind " + diagnosis.kind
+                                             : "Vehicle " + diagnosis.vehicle);
     report.paragraph(fmt::format("{} records of {} flights, {} blocks of 2 s.", diagnosis.records,
                                  diagnosis.flights, diagnosis.blocks));
     if (!diagnosis.too_poor.empty()) {
       report.paragraph("No answer: " + diagnosis.too_poor + ".");
       continue;
     }
+    if (!differences.empty()) report.paragraph(in_words(differences[i]));
     if (diagnosis.ranking.empty())
       report.paragraph("No effect of the library is missing above the sizes below.");
     else
       add_ranking(report, diagnosis, "ranking_" + std::to_string(i + 1));
     add_left(report, diagnosis);
     add_remainder(report, diagnosis, i + 1);
+  }
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    report.heading("Flight by flight");
+    add_each(report, each[i], i + 1);
   }
   return report.write(folder, overwrite);
 }

@@ -67,29 +67,13 @@ std::string headline(const Study& study, const residuals::ForceUnit& unit) {
                      shown(vertical_N(study.after.test)), unit.name, left);
 }
 
-std::vector<std::string> next_flights(const Study& study) {
-  std::vector<std::string> next;
-  const auto add = [&next](const std::string& flight) {
-    if (!flight.empty() && std::find(next.begin(), next.end(), flight) == next.end()) next.push_back(flight);
-  };
-  for (const identification::Missing& missing : study.diagnosis.ranking) {
-    for (const identification::Rival& rival : missing.finding.rivals)
-      add(fmt::format("to separate {} from {}: {}; {}", missing.effect, rival.effect, missing.excitation,
-                      rival.excitation));
-  }
-  for (const identification::Detectable& entry : study.diagnosis.detectable) {
-    if (!std::isfinite(entry.size)) add(fmt::format("to see {} at all: {}", entry.effect, entry.excitation));
-  }
-  return next;
-}
-
 void add_study(const Study& study, const residuals::Inputs& inputs, files::Json& result) {
   result["before"] = json_of(study.before);
   result["after"] = json_of(study.after);
   add_ladder(study.ladder, inputs, result);
   add_diagnoses({study.diagnosis}, result);
   files::Json next = files::Json::array();
-  for (const std::string& flight : next_flights(study)) next.push_back(flight);
+  for (const std::string& flight : next_flights(study.diagnosis)) next.push_back(flight);
   result["next"] = std::move(next);
 }
 
@@ -104,7 +88,7 @@ void print_study(const Study& study, const residuals::ForceUnit& unit) {
                (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N * unit.per_newton(),
                row.select_rmse_N * unit.per_newton(), row.test_rmse_N * unit.per_newton(), unit.name);
   }
-  const std::vector<std::string> next = next_flights(study);
+  const std::vector<std::string> next = next_flights(study.diagnosis);
   for (std::size_t i = 0; i < next.size() && i < kMostNext; ++i) fmt::print("  fly {}\n", next[i]);
 }
 

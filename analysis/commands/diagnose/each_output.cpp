@@ -1,0 +1,163 @@
+#include "analysis/commands/diagnose/each_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <map>
+
+#include "analysis/report/report_text.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::Drift;
+using identification::Each;
+using identification::EachDay;
+using identification::EachFlight;
+using identification::FlightNumber;
+using identification::FlightNumbers;
+
+files::Json json_of(const FlightNumber& number) {
+  if (!number.is_observable) return nullptr;
+  return {{"value", number.value}, {"interval_90", {number.interval.first, number.interval.second}}};
+}
+
+void put(const FlightNumbers& numbers, files::Json& json) {
+  for (const std::string& name : identification::each_numbers()) {
+    const auto number = numbers.find(name);
+    json[name] = number == numbers.end() ? files::Json(nullptr) : json_of(number->second);
+  }
+}
+
+std::vector<std::string> outliers_of(const EachFlight& flight) {
+  std::vector<std::string> names;
+  for (const std::string& name : identification::each_numbers()) {
+    const auto number = flight.numbers.find(name);
+    if (number != flight.numbers.end() && number->second.is_outlier) names.push_back(name);
+  }
+  return names;
+}
+
+std::string cell(const FlightNumbers& numbers, const std::string& name) {
+  const auto number = numbers.find(name);
+  if (number == numbers.end() || !number->second.is_observable) return "-";
+  const FlightNumber& n = number->second;
+  return fmt::format("{:.4g} ({:.4g} .. {:.4g}){}", n.value, n.interval.first, n.interval.second,
+                     n.is_outlier ? " outlier" : "");
+}
+
+void print_row(const std::string& name, const std::string& vehicle, const FlightNumbers& numbers) {
+  fmt::print("    {:<28} {:<8}", name, vehicle);
+  for (const std::string& number : identification::each_numbers())
+    fmt::print(" {:<32}", cell(numbers, number));
+  fmt::print("\n");
+}
+
+std::string words(const Drift& drift) {
+  return fmt::format("{} of {} {}: {:.3g} per flight (90 %: {:.3g} .. {:.3g}) over {} flights", drift.number,
+                     drift.vehicle, drift.is_there ? "drifts" : "does not drift visibly", drift.per_flight,
+                     drift.interval.first, drift.interval.second, drift.flights);
+}
+
+/// `number` over the flights, one curve per vehicle; false where no flight shows it.
+bool add_plot(Report& report, const Each& each, const std::string& number, const std::string& name) {
+  std::map<std::string, std::string> curves;
+  int place = 0;
+  for (const EachFlight& flight : each.flights) {
+    ++place;
+    const auto found = flight.numbers.find(number);
+    if (found == flight.numbers.end() || !found->second.is_observable) continue;
+    const FlightNumber& n = found->second;
+    curves[flight.vehicle] +=
+        fmt::format("{} {:.6g} {:.6g} {:.6g} {} {}\n", place, n.value, n.interval.first, n.interval.second,
+                    plot_field(flight.flight), plot_field(flight.vehicle));
+  }
+  if (curves.empty()) return false;
+  std::string data = "# flight value lower upper name vehicle\n";
+  for (const auto& [vehicle, rows] : curves) data += rows + "\n\n";
+  report.figure(
+      name, data,
+      fmt::format(
+          "set ylabel '{0}'\nset xlabel 'flight'\nset xtics rotate by -60\nset offsets 0.5, 0.5, 0, 0\n"
+          "plot for [i=0:{1}] '{2}.dat' index i using 1:2:3:4:xtic(5) with yerrorbars notitle\n",
+          number, curves.size() - 1, name),
+      "The number " + number +
+          " of every flight that shows it, with 90 % intervals; one colour per vehicle, flights in order of "
+          "their names.");
+  return true;
+}
+
+}  // namespace
+
+void add_each(const std::vector<Each>& kinds, files::Json& result) {
+  files::Json flights = files::Json::array(), days = files::Json::array(), drifts = files::Json::array();
+  for (const Each& each : kinds) {
+    for (const EachFlight& flight : each.flights) {
+      files::Json row = {{"flight", flight.flight}, {"day", flight.day},       {"vehicle", flight.vehicle},
+                         {"kind", flight.kind},     {"blocks", flight.blocks}, {"too_poor", flight.too_poor}};
+      put(flight.numbers, row);
+      row["outlier"] = outliers_of(flight);
+      flights.push_back(std::move(row));
+    }
+    for (const EachDay& day : each.days) {
+      files::Json row = {
+          {"day", day.day}, {"vehicle", day.vehicle}, {"kind", day.kind}, {"flights", day.flights}};
+      put(day.numbers, row);
+      days.push_back(std::move(row));
+    }
+    for (const Drift& drift : each.drifts) {
+      drifts.push_back({{"number", drift.number},
+                        {"vehicle", drift.vehicle},
+                        {"kind", drift.kind},
+                        {"per_flight", drift.per_flight},
+                        {"interval_90", {drift.interval.first, drift.interval.second}},
+                        {"flights", drift.flights},
+                        {"drifts", drift.is_there}});
+    }
+  }
+  result["each"] = std::move(flights);
+  result["each_days"] = std::move(days);
+  result["each_drifts"] = std::move(drifts);
+}
+
+void print_each(const Each& each) {
+  fmt::print("  Each flight (90 % intervals):\n    {:<28} {:<8}", "flight", "vehicle");
+  for (const std::string& number : identification::each_numbers()) fmt::print(" {:<32}", number);
+  fmt::print("\n");
+  for (const EachFlight& flight : each.flights) {
+    if (flight.too_poor.empty())
+      print_row(flight.flight, flight.vehicle, flight.numbers);
+    else
+      fmt::print("    {:<28} {:<8} too short: {}\n", flight.flight, flight.vehicle, flight.too_poor);
+  }
+  for (const EachDay& day : each.days) {
+    if (day.flights > 1) print_row("mean of " + day.day, day.vehicle, day.numbers);
+  }
+  for (const Drift& drift : each.drifts) {
+    if (drift.is_there) fmt::print("    {}\n", words(drift));
+  }
+}
+
+void add_each(Report& report, const Each& each, std::size_t number) {
+  std::vector<std::string> header = {"flight", "vehicle"};
+  for (const std::string& name : identification::each_numbers()) header.push_back(name + ", 90 %");
+  std::vector<std::vector<std::string>> rows;
+  const auto add_row = [&rows](const std::string& name, const std::string& vehicle,
+                               const FlightNumbers& numbers) {
+    rows.push_back({name, vehicle});
+    for (const std::string& n : identification::each_numbers()) rows.back().push_back(cell(numbers, n));
+  };
+  for (const EachFlight& flight : each.flights) add_row(flight.flight, flight.vehicle, flight.numbers);
+  for (const EachDay& day : each.days) {
+    if (day.flights > 1) add_row("mean of " + day.day, day.vehicle, day.numbers);
+  }
+  report.paragraph("The same numbers of every flight; what all flights have in common besides is held:");
+  report.table(header, rows);
+  std::size_t plots = 0;
+  for (const std::string& name : identification::each_numbers()) {
+    if (add_plot(report, each, name, fmt::format("each_{}_{}", number, plots + 1))) ++plots;
+  }
+  for (const Drift& drift : each.drifts) report.paragraph(words(drift) + ".");
+}
+
+}  // namespace swarmcert::analysis

@@ -1,0 +1,172 @@
+#include "analysis/commands/shared/before_after.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "analysis/commands/compare/compare_report.h"
+#include "analysis/report/report_text.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::EffectCurve;
+using identification::RoomMap;
+
+/// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after).
+std::string two_maps(const std::string& name, const std::string& x, const std::string& y,
+                     const residuals::ForceUnit& unit) {
+  const std::string file = "'" + name + ".dat'";
+  return "stats " + file + " using 3 nooutput\nlow = STATS_min; high = STATS_max\nstats " + file +
+         " using 4 nooutput\nlow = STATS_min < low ? STATS_min : low\n"
+         "high = STATS_max > high ? STATS_max : high\nm = -low > high ? -low : high\n"
+         "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\nset palette @signed_colours\nset key off\n"
+         "set xlabel '" +
+         x + "'\nset ylabel '" + y + "'\nset xtics rotate by -45\nset cblabel 'mean vertical residual [" +
+         unit.name +
+         "]'\nif (exists('narrow')) { set multiplot layout 2,1 } else { set multiplot layout 1,2 }\n"
+         "set title 'before'\nplot " +
+         file + " using 1:2:3 with image\nset title 'after'\nplot " + file +
+         " using 1:2:4 with image\nunset multiplot\n";
+}
+
+std::string cell_text(std::size_t records, double newton, const residuals::ForceUnit& unit) {
+  constexpr std::size_t kFewest = 20;
+  return records >= kFewest ? fmt::format("{:.6g}", newton * unit.per_newton()) : "NaN";
+}
+
+void add_room(Report& report, const RoomMap& map, const residuals::ForceUnit& unit) {
+  if (map.cells.empty()) return;
+  std::string data = "# x_m y_m before after\n";
+  for (int j = 0; j < RoomMap::kCells; ++j) {
+    for (int i = 0; i < RoomMap::kCells; ++i) {
+      const RoomMap::Cell& cell = map.cells[static_cast<std::size_t>(j * RoomMap::kCells + i)];
+      data += fmt::format("{:.6g} {:.6g} {} {}\n", map.lower_m[0] + (i + 0.5) * map.step_m[0],
+                          map.lower_m[1] + (j + 0.5) * map.step_m[1],
+                          cell_text(cell.records, cell.before_N, unit),
+                          cell_text(cell.records, cell.after_N, unit));
+    }
+    data += "\n";
+  }
+  report.figure("room", data, two_maps("room", "x [m]", "y [m]", unit),
+                "Mean vertical residual over the place in the room, before and after, on one colour scale; "
+                "cells of fewer than 20 records are empty.");
+}
+
+void add_neighbours(Report& report, const residuals::NeighbourMap& before,
+                    const residuals::NeighbourMap& after, const residuals::ForceUnit& unit) {
+  using Map = residuals::NeighbourMap;
+  std::string data = "# lateral_m height_m before after\n";
+  bool any = false;
+  for (std::size_t i = 0; i < Map::kHeights; ++i) {
+    for (std::size_t j = 0; j < Map::kLateral; ++j) {
+      const auto text = [&](const Map& map) {
+        const Map::Cell& cell = map.cells[i][j];
+        return cell_text(cell.records,
+                         cell.sum_N / static_cast<double>(std::max<std::size_t>(1, cell.records)), unit);
+      };
+      const std::string shown = text(before);
+      any = any || shown != "NaN";
+      data += fmt::format("{:.6g} {:.6g} {} {}\n", (static_cast<double>(j) + 0.5) * Map::kLateralStep_m,
+                          Map::kLowest_m + (static_cast<double>(i) + 0.5) * Map::kHeightStep_m, shown,
+                          text(after));
+    }
+    data += "\n";
+  }
+  if (!any) return;
+  report.figure(
+      "neighbours", data,
+      two_maps("neighbours", "lateral distance [m]", "height of the neighbour above [m]", unit),
+      "Mean vertical residual over the place of the laterally nearest neighbour, before and after, on "
+      "one colour scale.");
+}
+
+/// The residual's mean over the ranges of one variable, before and after.
+void add_variable(Report& report, const residuals::Comparison& before, const residuals::Comparison& after,
+                  int variable, const residuals::ForceUnit& unit) {
+  const auto mean_of = [&](const residuals::Comparison& comparison,
+                           int region) -> const residuals::RegionErrors* {
+    for (const residuals::RegionErrors& candidate : comparison.regions)
+      if (candidate.variable == variable && candidate.region == region) return &candidate;
+    return nullptr;
+  };
+  std::string data = "# value before after\n";
+  int points = 0;
+  for (int region = 0; region < residuals::num_regions(variable); ++region) {
+    const residuals::RegionErrors* was = mean_of(before, region);
+    const residuals::RegionErrors* is = mean_of(after, region);
+    if (was == nullptr || is == nullptr) continue;
+    ++points;
+    data +=
+        fmt::format("{:.6g} {:.6g} {:.6g}\n", residuals::region_middle(variable, region),
+                    was->statistics.bias.z * unit.per_newton(), is->statistics.bias.z * unit.per_newton());
+  }
+  if (points < 2) return;
+  const std::string label = residuals::variable_name(variable), name = fmt::format("over_{}", variable);
+  const std::string axis = label + " " + kVariableUnits[variable];
+  report.figure(name, data,
+                "set xlabel '" + axis + "'\nset ylabel 'mean vertical residual [" + unit.name + "]'\nplot '" +
+                    name +
+                    ".dat' using 1:2 with linespoints title 'before', '' using 1:3 with linespoints title "
+                    "'after', 0 linecolor 'gray' notitle\n",
+                "Mean vertical residual over " + label + ", before and after.");
+}
+
+}  // namespace
+
+void add_before_and_after(Report& report, const residuals::Comparison& before,
+                          const residuals::Comparison& after, const RoomMap& room,
+                          const residuals::ForceUnit& unit) {
+  add_neighbours(report, before.neighbours, after.neighbours, unit);
+  add_room(report, room, unit);
+  for (int variable = 0; variable < kPlottedVariables; ++variable)
+    add_variable(report, before, after, variable, unit);
+}
+
+void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,
+                       const residuals::ForceUnit& unit) {
+  std::size_t number = 0;
+  for (const EffectCurve& curve : effects) {
+    std::string data = "# predicted measured standard_error records\n";
+    for (const EffectCurve::Point& point : curve.points)
+      data +=
+          fmt::format("{:.6g} {:.6g} {:.6g} {}\n", point.predicted_N * unit.per_newton(),
+                      point.measured_N * unit.per_newton(), point.error_N * unit.per_newton(), point.records);
+    const std::string name = fmt::format("effect_{}", ++number);
+    report.figure(
+        name, data,
+        fmt::format(
+            "set xlabel {0}\nset ylabel {1}\nset key top left\nplot x title 'the fitted formula' "
+            "linecolor 'gray', '{2}.dat' using 1:2:(1.645*$3) with yerrorbars title 'measured, 90 %'\n",
+            plot_string(fmt::format("{} as fitted, along {} [{}]", curve.effect, curve.axis, unit.name)),
+            plot_string(fmt::format("measured without it [{}]", unit.name)), name),
+        "Effect " + curve.effect +
+            ": what was measured where the model has every effect but this one, over what this one "
+            "predicts. Points on the line confirm the fit.");
+  }
+}
+
+void add_worst_moments(Report& report, const residuals::Comparison& before,
+                       const residuals::Comparison& after, const residuals::ForceUnit& unit) {
+  constexpr std::size_t kMost = 10;
+  std::vector<std::vector<std::string>> rows;
+  const auto add = [&](const char* when, const std::vector<residuals::Moment>& moments) {
+    for (std::size_t i = 0; i < std::min(kMost, moments.size()); ++i) {
+      const residuals::Moment& moment = moments[i];
+      const Eigen::Vector3d force = unit.per_newton() * moment.residual_N;
+      rows.push_back({when, moment.flight, moment.vehicle, fmt::format("{:.2f}", moment.time_s),
+                      fmt::format("{:.3g}", force.x()), fmt::format("{:.3g}", force.y()),
+                      fmt::format("{:.3g}", force.z()), fmt::format("{:.3g}", force.norm())});
+    }
+  };
+  add("before", before.moments);
+  add("after", after.moments);
+  if (rows.empty()) return;
+  const std::string in_unit = std::string(" [") + unit.name + "]";
+  report.paragraph("The moments at which the force residual (mean over 0.1 s) is largest, before and after:");
+  report.table(
+      {"", "flight", "vehicle", "time [s]", "x" + in_unit, "y" + in_unit, "z" + in_unit, "total" + in_unit},
+      rows);
+}
+
+}  // namespace swarmcert::analysis

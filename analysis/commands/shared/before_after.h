@@ -1,0 +1,28 @@
+/// @file What adding effects to a model changed: maps, curves and worst moments before and after, for reports.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analysis/identification/study/picture_data.h"
+#include "analysis/report/report.h"
+#include "analysis/residuals/comparison.h"
+#include "analysis/residuals/force_unit.h"
+
+namespace swarmcert::analysis {
+
+/// Vertical residuals over neighbours and over the room, each pair of maps on one colour scale, and over single
+/// variables. At most once per report.
+void add_before_and_after(Report& report, const residuals::Comparison& before,
+                          const residuals::Comparison& after, const identification::RoomMap& room,
+                          const residuals::ForceUnit& unit);
+
+/// What was measured of each effect, with the fitted formula as a line over it. At most once per report.
+void add_effect_curves(Report& report, const std::vector<identification::EffectCurve>& effects,
+                       const residuals::ForceUnit& unit);
+
+/// A table of the largest residuals under both models.
+void add_worst_moments(Report& report, const residuals::Comparison& before,
+                       const residuals::Comparison& after, const residuals::ForceUnit& unit);
+
+}  // namespace swarmcert::analysis

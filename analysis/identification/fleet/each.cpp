@@ -1,0 +1,259 @@
+#include "analysis/identification/fleet/each.h"
+
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+
+#include "analysis/identification/fleet/flight_groups.h"
+#include "analysis/residuals/statistics.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using residuals::Inputs;
+using stability::EffectSpec;
+
+constexpr std::size_t kFewestForOutliers = 5, kFewestForDrift = 5;
+
+/// A number of the table: which parameter of which effect it is.
+struct NumberSource {
+  const char *number, *effect, *parameter;
+  double nominal;  ///< added to the parameter
+};
+constexpr NumberSource kSources[] = {{"thrust_ratio", "thrust_ratio", "ratio", 1},
+                                     {"drag_N_s_m", "drag_linear", "drag_N_s_m", 0},
+                                     {"lag_s", "motor_lag", "tau_s", 0}};
+
+bool is_fitted(const std::string& effect) {
+  return std::any_of(std::begin(kSources), std::end(kSources),
+                     [&](const NumberSource& source) { return effect == source.effect; });
+}
+
+void erase_fitted(std::vector<EffectSpec>& effects, bool keeps_lag) {
+  effects.erase(std::remove_if(effects.begin(), effects.end(),
+                               [&](const EffectSpec& spec) {
+                                 return is_fitted(spec.name) && !(keeps_lag && spec.name == "motor_lag");
+                               }),
+                effects.end());
+}
+
+double error_of(const FlightNumber& number) {
+  static const double kNormal = boost::math::quantile(boost::math::normal(), 0.95);
+  return (number.interval.second - number.interval.first) / (2 * kNormal);
+}
+
+/// A flight shows a number where its interval says more than the bounds of the effect do: the lag where its gain is that
+/// of a lag, and the others where the error is less than a tenth of the weight, or of a speed of 1 m/s.
+bool shows(const NumberSource& source, const Missing& fit, const Interval& interval, double weight_N) {
+  const double half = (interval.second - interval.first) / 2;
+  if (!(half > 0) || !std::isfinite(half)) return false;
+  if (std::string(source.effect) == "motor_lag") {
+    const auto gain = fit.intervals.find("gain");
+    const double value = fit.parameters.at("gain");
+    const bool is_lag = std::abs(value - 1) < 0.999 * kMemoryTolerance;
+    return is_lag && half < 0.5 * fit.parameters.at(source.parameter) && gain != fit.intervals.end();
+  }
+  return half < (source.nominal == 1 ? 0.1 : 0.1 * weight_N);
+}
+
+FlightNumbers flight_numbers(const std::vector<Missing>& fitted, double weight_N) {
+  FlightNumbers numbers;
+  for (const NumberSource& source : kSources) {
+    FlightNumber& number = numbers[source.number];
+    for (const Missing& fit : fitted) {
+      const auto interval = fit.intervals.find(source.parameter);
+      if (fit.effect != source.effect || interval == fit.intervals.end()) continue;
+      number.is_observable = shows(source, fit, interval->second, weight_N);
+      number.value = source.nominal + fit.parameters.at(source.parameter);
+      number.interval = {source.nominal + interval->second.first, source.nominal + interval->second.second};
+    }
+  }
+  // The lag of r T is r (L_tau T - T), about L_(r tau) T - T: what is fitted to T is r tau.
+  FlightNumber& lag = numbers["lag_s"];
+  if (const FlightNumber& ratio = numbers["thrust_ratio"]; ratio.is_observable && ratio.value > 0) {
+    lag.value /= ratio.value;
+    lag.interval = {lag.interval.first / ratio.value, lag.interval.second / ratio.value};
+  }
+  return numbers;
+}
+
+/// One vehicle's flights with the models to fit on.
+struct Fleet {
+  Inputs bare;      ///< without any of the numbers
+  Inputs with_lag;  ///< with the lag that all flights have in common
+};
+
+/// All three where the flight shows a lag, else ratio and drag beside the lag of all flights.
+FlightNumbers fit_flight(const Fleet& own, const std::string& kind, int flight, double weight_N, int jobs) {
+  const auto silent = [](int, int) {};
+  FlightNumbers numbers = flight_numbers(
+      fit_effects(own.bare, kind, {"thrust_ratio", "drag_linear", "motor_lag"}, {flight}, jobs, silent),
+      weight_N);
+  if (numbers["lag_s"].is_observable) return numbers;
+  return flight_numbers(
+      fit_effects(own.with_lag, kind, {"thrust_ratio", "drag_linear"}, {flight}, jobs, silent), weight_N);
+}
+
+/// `number` in the flights that show it.
+std::vector<FlightNumber*> flights_with(std::vector<EachFlight>& flights, const std::string& number) {
+  std::vector<FlightNumber*> all;
+  for (EachFlight& flight : flights) {
+    const auto found = flight.numbers.find(number);
+    if (found != flight.numbers.end() && found->second.is_observable) all.push_back(&found->second);
+  }
+  return all;
+}
+
+void mark_outliers(const std::vector<FlightNumber*>& numbers) {
+  constexpr double kFar = 3.5, kDeviationOfMedian = 1.4826;
+  if (numbers.size() < kFewestForOutliers) return;
+  std::vector<double> values, distances;
+  for (const FlightNumber* number : numbers) values.push_back(number->value);
+  const double median = residuals::quantile(values, 0.5);
+  for (const double value : values) distances.push_back(std::abs(value - median));
+  const double deviation = kDeviationOfMedian * residuals::quantile(distances, 0.5);
+  for (FlightNumber* number : numbers)
+    number->is_outlier = std::abs(number->value - median) > kFar * std::hypot(deviation, error_of(*number));
+}
+
+/// Least squares over the flights that are no outliers. The scatter about the line is the error: flights differ by more
+/// than their own errors say.
+Drift drift_of(const std::vector<FlightNumber*>& numbers) {
+  Drift drift;
+  std::vector<double> at, value;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i]->is_outlier) continue;
+    at.push_back(static_cast<double>(i));
+    value.push_back(numbers[i]->value);
+  }
+  const auto n = static_cast<double>(at.size());
+  drift.flights = static_cast<int>(at.size());
+  if (at.size() < kFewestForDrift) return drift;
+  double mean_at = 0, mean = 0, along = 0, across = 0, left = 0;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    mean_at += at[i] / n;
+    mean += value[i] / n;
+  }
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    along += (at[i] - mean_at) * (at[i] - mean_at);
+    across += (at[i] - mean_at) * (value[i] - mean);
+  }
+  drift.per_flight = across / along;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const double rest = value[i] - mean - drift.per_flight * (at[i] - mean_at);
+    left += rest * rest;
+  }
+  const double error = std::sqrt(left / (n - 2) / along);
+  const boost::math::students_t student(n - 2);
+  const double half = error * boost::math::quantile(student, 0.95);
+  drift.interval = {drift.per_flight - half, drift.per_flight + half};
+  drift.is_there = std::abs(drift.per_flight) > error * boost::math::quantile(student, 0.995);
+  return drift;
+}
+
+/// Mean of numbers weighted by their errors and by the scatter between them (DerSimonian and Laird 1986).
+FlightNumber mean_of(const std::vector<FlightNumber>& numbers) {
+  FlightNumber mean;
+  if (numbers.empty()) return mean;
+  double weights = 0, squares = 0, sum = 0, heterogeneity = 0;
+  for (const FlightNumber& number : numbers) {
+    const double weight = 1 / (error_of(number) * error_of(number));
+    weights += weight;
+    squares += weight * weight;
+    sum += weight * number.value;
+  }
+  for (const FlightNumber& number : numbers) {
+    const double off = (number.value - sum / weights) / error_of(number);
+    heterogeneity += off * off;
+  }
+  const double freedom = static_cast<double>(numbers.size()) - 1;
+  const double between =
+      freedom > 0 ? std::max(0.0, (heterogeneity - freedom) / (weights - squares / weights)) : 0;
+  weights = sum = 0;
+  for (const FlightNumber& number : numbers) {
+    const double weight = 1 / (error_of(number) * error_of(number) + between);
+    weights += weight;
+    sum += weight * number.value;
+  }
+  const double half = boost::math::quantile(boost::math::normal(), 0.95) / std::sqrt(weights);
+  mean.is_observable = true;
+  mean.value = sum / weights;
+  mean.interval = {mean.value - half, mean.value + half};
+  return mean;
+}
+
+std::vector<EachDay> days_of(const std::vector<EachFlight>& flights) {
+  std::map<std::string, std::vector<const EachFlight*>> by_day;
+  for (const EachFlight& flight : flights) {
+    if (flight.too_poor.empty()) by_day[flight.day].push_back(&flight);
+  }
+  std::vector<EachDay> days;
+  for (const auto& [name, members] : by_day) {
+    EachDay day{name, members[0]->vehicle, members[0]->kind, static_cast<int>(members.size()), {}};
+    for (const std::string& number : each_numbers()) {
+      std::vector<FlightNumber> seen_on_day;
+      for (const EachFlight* flight : members) {
+        const FlightNumber& own = flight->numbers.at(number);
+        if (own.is_observable) seen_on_day.push_back(own);
+      }
+      day.numbers[number] = mean_of(seen_on_day);
+    }
+    days.push_back(std::move(day));
+  }
+  return days;
+}
+
+std::vector<EachFlight> flights_of(const Fleet& own, const std::string& vehicle, const std::string& kind,
+                                   double weight_N, int jobs) {
+  std::vector<EachFlight> flights;
+  for (const int i : every_flight(own.bare)) {
+    const residuals::FlightFiles& files = own.bare.found.flights[static_cast<std::size_t>(i)];
+    EachFlight flight{files.name, folder_of(files), vehicle, kind, 0, "", {}};
+    const Coverage covered = coverage(own.bare, kind, {i}, jobs);
+    flight.blocks = covered.blocks;
+    flight.too_poor = covered.too_poor();
+    if (flight.too_poor.empty()) flight.numbers = fit_flight(own, kind, i, weight_N, jobs);
+    flights.push_back(std::move(flight));
+  }
+  return flights;
+}
+
+}  // namespace
+
+const std::vector<std::string>& each_numbers() {
+  static const std::vector<std::string> names = {"thrust_ratio", "drag_N_s_m", "lag_s"};
+  return names;
+}
+
+Each each_flight(const Inputs& inputs, const std::string& kind, const std::vector<EffectSpec>& common,
+                 int jobs, const residuals::Progress& progress) {
+  Each result;
+  stability::Model bare = with_effects(*inputs.model_of(kind), common), with_lag = bare;
+  erase_fitted(bare.effects, false);
+  erase_fitted(with_lag.effects, true);
+  result.held = bare.effects;
+  const std::vector<std::string> vehicles = coverage(inputs, kind, every_flight(inputs), jobs).vehicles;
+  int done = 0;
+  for (const std::string& vehicle : vehicles) {
+    const Inputs own = of_one_vehicle(inputs, kind, vehicle);
+    std::vector<EachFlight> flights =
+        flights_of({with_model_of_kind(own, kind, bare), with_model_of_kind(own, kind, with_lag)}, vehicle,
+                   kind, bare.weight_N(), jobs);
+    for (const std::string& number : each_numbers()) {
+      const std::vector<FlightNumber*> numbers = flights_with(flights, number);
+      mark_outliers(numbers);
+      Drift drift = drift_of(numbers);
+      drift.number = number;
+      drift.vehicle = vehicle;
+      drift.kind = kind;
+      if (drift.flights >= static_cast<int>(kFewestForDrift)) result.drifts.push_back(std::move(drift));
+    }
+    for (EachDay& day : days_of(flights)) result.days.push_back(std::move(day));
+    result.flights.insert(result.flights.end(), flights.begin(), flights.end());
+    progress(++done, static_cast<int>(vehicles.size()));
+  }
+  return result;
+}
+
+}  // namespace swarmcert::identification
