@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "analysis/identification/column_run.h"
+#include "analysis/identification/scan/named_forms.h"
 #include "analysis/logs/read_log.h"
 #include "nn/base/parallel.h"
 #include "stability/effects/registry.h"
@@ -187,6 +188,8 @@ std::vector<Candidate> all_candidates(const stability::Model& model, const Cover
   for (const std::string& name : candidate_names(model)) {
     if (name == kVehicleOffset && coverage.vehicles.size() < 2) continue;
     if (is_taken(name, model)) continue;
+    // Of those that the model has already, what is missing of them.
+    if (needs_scan(name) && find(model, name) == nullptr) continue;
     Candidate next = candidate(name, model, coverage);
     if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
     // Nobody has felt the ground from higher up.

@@ -51,7 +51,7 @@ void hold_vertical_push(std::vector<Candidate>& candidates) {
 /// Thrust answers whatever disturbs the vehicle: what its history seems to do needs another witness.
 bool is_of_thrust(const Candidate& candidate) {
   const std::string& name = candidate.name;
-  return candidate.info.remembers || name == "thrust_ratio" || name == "battery" || name == "inflow";
+  return candidate.info.remembers || is_scale(name) || is_of_load(name) || name == "inflow";
 }
 
 /// The instrument says the same of the effect's coefficient.
@@ -72,6 +72,10 @@ void erase(std::vector<Candidate>& candidates, const std::set<std::string>& name
 }
 
 bool is_scale(const std::string& effect) { return effect == "thrust_ratio" || effect == "battery"; }
+
+bool is_of_load(const std::string& effect) {
+  return effect == "voltage_sag" || effect == "thrust_saturation";
+}
 
 bool has_vertical_push(const std::vector<Refined>& effects) {
   return std::any_of(effects.begin(), effects.end(), [](const Refined& effect) {
@@ -195,6 +199,16 @@ std::set<std::string> suspects(const Selected& selected) {
     const bool unconfirmed = is_of_thrust(candidate) &&
                              (has_check ? !is_confirmed(selected.checks[i]) : !candidate.info.remembers);
     if (loss < kShare || unconfirmed) names.insert(candidate.name);
+  }
+  return names;
+}
+
+std::set<std::string> unconfirmed_loads(const Selected& selected) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < selected.refined.size(); ++i) {
+    const std::string& name = selected.refined[i].candidate.name;
+    if (is_of_load(name) && (selected.checks.empty() || !is_confirmed(selected.checks[i])))
+      names.insert(name);
   }
   return names;
 }

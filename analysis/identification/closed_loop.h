@@ -44,11 +44,18 @@ std::vector<Candidate> candidates_of(const std::vector<Refined>& effects);
 /// thrust_ratio or battery: a scale of the thrust.
 bool is_scale(const std::string& effect);
 
+/// voltage_sag or thrust_saturation: thrust that is missing where much is asked for.
+bool is_of_load(const std::string& effect);
+
 /// True where `effects` have a constant vertical force.
 bool has_vertical_push(const std::vector<Refined>& effects);
 
 /// Names of selected effects that are no match for a large unexplained residual, see Diagnosis::suspected.
 std::set<std::string> suspects(const Selected& selected);
+
+/// Names of is_of_load() that set points do not confirm: where flights differ in how much thrust the same weight takes,
+/// whatever makes them differ looks like thrust that is missing where much is asked for.
+std::set<std::string> unconfirmed_loads(const Selected& selected);
 
 /// `names` with those that would only take the place of one that is too doubtful: for a scale one that follows the
 /// battery, for a lag or delay the others. What is in `selected` is no substitute.

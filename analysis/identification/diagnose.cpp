@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "analysis/identification/closed_loop.h"
+#include "analysis/identification/scan/named_forms.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
@@ -84,23 +86,23 @@ struct Settled {
   std::vector<std::string> suspected;
 };
 
-/// @param formulas that compete with the names
+/// @param rivals that compete with the names that are always candidates
 /// @param start effects where selection begins
-Settled settle(const Passes& passes, const Coverage& covered, const std::vector<Formula>& formulas,
+Settled settle(const Passes& passes, const Coverage& covered, const std::vector<Candidate>& rivals,
                const std::vector<std::string>& start) {
   constexpr int kMostRounds = 8;
   std::vector<Candidate> candidates = all_candidates(*passes.inputs.model_of(passes.kind), covered);
-  for (const Formula& formula : formulas)
-    candidates.push_back(candidate_of(formula, *passes.inputs.model_of(passes.kind)));
+  candidates.insert(candidates.end(), rivals.begin(), rivals.end());
   Settled result;
   bool doubts_slope = false;
   for (int round = 0; round < kMostRounds; ++round) {
     result.selected =
         doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
-    if (const std::set<std::string> outside = out_of_bounds(result.selected);
-        !outside.empty() && round + 1 < kMostRounds) {
-      result.suspected.insert(result.suspected.end(), outside.begin(), outside.end());
-      erase(candidates, outside);
+    std::set<std::string> doubtful = out_of_bounds(result.selected);
+    doubtful.merge(unconfirmed_loads(result.selected));
+    if (!doubtful.empty() && round + 1 < kMostRounds) {
+      result.suspected.insert(result.suspected.end(), doubtful.begin(), doubtful.end());
+      erase(candidates, doubtful);
       continue;
     }
     result.ranking = ranking_of(passes, result.selected);
@@ -141,6 +143,10 @@ std::vector<Formula> rivals_of_names(const Passes& passes, const Explained& expl
       if (!is_known) rivals.push_back(formulas[i]);
     }
   };
+  if (explained.settled.ranking.empty()) {
+    add(explained.formulas);
+    return rivals;
+  }
   const ScanSamples nominal = scan_samples(passes, {});
   add(find_formulas(nominal, scan(nominal, passes.jobs), kOfEach, passes.jobs));
   add(explained.formulas);
@@ -157,7 +163,8 @@ bool is_answer_of_thrust(const Missing& missing) {
   const std::vector<std::string> library = stability::effect_names();
   if (std::find(library.begin(), library.end(), missing.effect) == library.end()) return false;
   const stability::EffectInfo& info = stability::effect_info(missing.effect);
-  return info.remembers || is_scale(missing.effect) || missing.effect == "inflow";
+  return info.remembers || is_scale(missing.effect) || is_of_load(missing.effect) ||
+         missing.effect == "inflow";
 }
 
 /// Where one variable explains most of what is left, thrust and its history answer it: names of that kind that explain
@@ -190,19 +197,25 @@ bool has_plain_scale(const std::vector<Missing>& ranking) {
 }
 
 /// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
-/// selection is done anew with them among the candidates, and they are what is left.
+/// selection is done anew with them among the candidates, and they are what is left. Names that only formulas point to
+/// take part as well.
 Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   constexpr double kClearlyLess = 0.9;  // of the mean square: names are worth a little
   Explained result;
   result.settled = settle(passes, covered, {}, {});
   scan_what_is_left(passes, result);
-  if (result.settled.ranking.empty()) return result;
-  const std::vector<Formula> rivals = rivals_of_names(passes, result);
-  if (rivals.empty()) return result;
+  const std::vector<Formula> formulas = rivals_of_names(passes, result);
+  const stability::Model& model = *passes.inputs.model_of(passes.kind);
+  std::vector<Candidate> rivals = named_forms(formulas, model, covered);
+  if (rivals.empty() && (formulas.empty() || result.settled.ranking.empty())) return result;
+  for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
   std::vector<std::string> names;
   for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);
   Settled again = settle(passes, covered, rivals, names);
-  if (std::all_of(again.ranking.begin(), again.ranking.end(), is_named)) return result;
+  const auto is_known = [](const Missing& missing) {
+    return is_named(missing) && !needs_scan(missing.effect);
+  };
+  if (std::all_of(again.ranking.begin(), again.ranking.end(), is_known)) return result;
   if (has_plain_scale(result.settled.ranking) && !has_plain_scale(again.ranking)) return result;
   const double left = Selection(again.selected.grams).mean_square(again.selected.members);
   const Selection by_names(result.settled.selected.grams);
@@ -312,6 +325,21 @@ void name_what_halves(const Passes& passes, Diagnosis& result) {
   drop(result.contradicted);
 }
 
+/// candidate(), at the place where a scan of what the model leaves beside `others` finds it if that is how it is found.
+Candidate candidate_to_fit(const Passes& passes, const std::string& name, const Coverage& covered,
+                           const std::vector<stability::EffectSpec>& others) {
+  const stability::Model& model = *passes.inputs.model_of(passes.kind);
+  Candidate result = candidate(name, model, covered);
+  if (!needs_scan(name)) return result;
+  const ScanSamples samples = scan_samples(passes, others);
+  const std::vector<Formula> formulas =
+      find_formulas(samples, scan(samples, passes.jobs), kMostFormulas, passes.jobs);
+  for (Candidate& found : named_forms(formulas, model, covered)) {
+    if (found.name == name) return std::move(found);
+  }
+  return result;
+}
+
 }  // namespace
 
 std::vector<int> every_flight(const residuals::Inputs& inputs) {
@@ -353,7 +381,9 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.rmse_after_N = std::sqrt(selection.mean_square(named));
   result.detectable = detectable(selected.grams, named);
   result.detectable.erase(std::remove_if(result.detectable.begin(), result.detectable.end(),
-                                         [](const Detectable& entry) { return is_formula(entry.effect); }),
+                                         [](const Detectable& entry) {
+                                           return is_formula(entry.effect) || needs_scan(entry.effect);
+                                         }),
                           result.detectable.end());
   result.thrust_scale = thrust_scale(passes, covered);
   name_hidden_scale(*inputs.model_of(kind), result.thrust_scale, result.ranking);
@@ -377,8 +407,12 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
   const Coverage covered = coverage(inputs, kind, which, jobs);
   const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
   std::vector<Candidate> candidates;
-  for (const std::string& name : names)
-    candidates.push_back(candidate(name, *inputs.model_of(kind), covered));
+  std::vector<std::string> others;
+  std::remove_copy_if(names.begin(), names.end(), std::back_inserter(others), needs_scan);
+  std::vector<stability::EffectSpec> beside;
+  if (others.size() < names.size() && !others.empty())
+    beside = specs_of(fit_effects(inputs, kind, others, which, jobs, progress));
+  for (const std::string& name : names) candidates.push_back(candidate_to_fit(passes, name, covered, beside));
   Selected selected;
   selected.grams = block_grams(inputs, kind, candidates, which, jobs, progress);
   const Selection selection(selected.grams);

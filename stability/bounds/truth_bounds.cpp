@@ -151,6 +151,80 @@ void bound_surface(const std::string& name, const Values& value, const MotionSet
   if (std::isinf(result.rate_N_s[2])) result.unbounded = "needs --own-speed and --thrust-rate";
 }
 
+/// f = g T b3 with a factor g of the motion: |(T b3)'| bounds |T'| and T |b3'|, and every effect its own |g'|.
+void bound_thrust_factor(const std::string& name, const Values& value, const Model& model, const MotionSet& m,
+                         EffectBounds& result) {
+  constexpr double kRootOfTwoOverE = 0.8577638849607070;  // largest |2 u exp(-u^2)|, rounded up
+  constexpr double kOneOverRootOfE = 0.6065306597126335;  // largest |u exp(-u^2 / 2)|, rounded up
+  const double T = m.largest_thrust_N, rate = m.thrust_rate_N_s;
+  // T (b3'v)' and T |v - b3 (b3'v)|' alike
+  const double turning = plus(times_up(T, m.acceleration_m_s2), times_up(rate, m.speed_m_s));
+  double amplitude = 0, change = 0;
+  if (name == "voltage_sag") {
+    // g = -s ((T/W)^(3/2) - 1), and T |g'| <= s 3/2 (T/W)^(3/2) |T'|
+    const Interval load = Interval(T) / Interval(down(model.mass_kg * kGravity_m_s2));
+    const double power = load.hi > 0 ? pow(load, 1.5).hi : 0;
+    const double most = std::max(1.0, up(power - 1)), s = value("sag");
+    amplitude = times_up(s, times_up(most, T));
+    change = times_up(s, times_up(rate, plus(most, up(1.5 * power))));
+  } else if (name == "thrust_saturation") {
+    // |((T - K) b3)'|^2 = T'^2 + (T - K)^2 |b3'|^2 <= |(T b3)'|^2 for K >= 0
+    const double knee_N = down(value("knee_weights") * down(model.mass_kg * kGravity_m_s2));
+    amplitude = times_up(value("loss"), std::max(0.0, up(T - knee_N)));
+    change = times_up(value("loss"), rate);
+  } else if (name == "translational_lift") {
+    amplitude = times_up(value("gain"), T);
+    change = times_up(value("gain"),
+                      plus(rate, times_up(up(kRootOfTwoOverE * one_over(value("speed_m_s"))), turning)));
+  } else {
+    amplitude = times_up(value("loss"), T);
+    change = times_up(value("loss"),
+                      plus(rate, times_up(up(kOneOverRootOfE * one_over(value("width_m_s"))), turning)));
+  }
+  set_all(result.amplitude_N, amplitude);
+  set_all(result.rate_N_s, change);
+  if (std::isinf(change)) result.unbounded = "needs --own-speed, --own-accel and --thrust-rate";
+}
+
+/// Functions of the place: their slope times the speed, and a thrust's own rate.
+void bound_place(const std::string& name, const Values& value, const MotionSet& m, EffectBounds& result) {
+  if (name == "wall") {
+    // f = p g T n with n fixed and g = exp(-d/b)
+    const double push = std::abs(value("push"));
+    for (int i = 0; i < 2; ++i) {
+      result.amplitude_N[i] = times_up(push, m.largest_thrust_N);
+      const double along = times_up(m.largest_thrust_N, times_up(m.speed_m_s, one_over(value("decay_m"))));
+      result.rate_N_s[i] = times_up(push, plus(m.thrust_rate_N_s, along));
+    }
+  } else {
+    // The logistic function has the slope 1 / (4 d), exp(-u^2 / 2) the slope exp(-1/2).
+    constexpr double kOneOverRootOfE = 0.6065306597126335;
+    const char* const forces[] = {"shear_x_N", "shear_y_N", "thermal_N"};
+    for (int i = 0; i < 3; ++i) {
+      result.amplitude_N[i] = std::abs(value(forces[i]));
+      const double slope = i < 2 ? up(0.25 * one_over(value("thickness_m")))
+                                 : up(kOneOverRootOfE * one_over(value("radius_m")));
+      result.rate_N_s[i] = times_up(result.amplitude_N[i], times_up(slope, m.speed_m_s));
+    }
+  }
+  const double most = *std::max_element(result.rate_N_s, result.rate_N_s + 3);
+  if (std::isinf(most))
+    result.unbounded = name == "wall" ? "needs --own-speed and --thrust-rate" : "needs --own-speed";
+}
+
+/// Bounded, but for the step itself.
+void bound_step(const Values& value, EffectBounds& result) {
+  const double before = value("mass_before_kg"), after = value("mass_after_kg");
+  if (before == after) {
+    result.bias_N[2] = up(std::abs(after) * kGravity_m_s2);
+    return;
+  }
+  result.amplitude_N[2] = up(std::max(std::abs(before), std::abs(after)) * kGravity_m_s2);
+  result.rate_N_s[2] = kInfinity;
+  result.unbounded =
+      "the load changes in no time: bound the motion before and after it with a constant_force each";
+}
+
 }  // namespace
 
 EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const MotionSet& motion) {
@@ -187,6 +261,13 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
     bound_surface(name, value, motion, result);
   } else if (name == "rotor_thrust") {
     bound_rotors(value, motion, result);
+  } else if (name == "voltage_sag" || name == "thrust_saturation" || name == "translational_lift" ||
+             name == "vortex_ring") {
+    bound_thrust_factor(name, value, model, motion, result);
+  } else if (name == "wall" || name == "wind_field") {
+    bound_place(name, value, motion, result);
+  } else if (name == "payload_step") {
+    bound_step(value, result);
   } else if (name == "battery") {
     nothing_known("scales the thrust with the voltage: enclose it with --uncertain battery=A:B");
   } else {

@@ -45,6 +45,8 @@ struct EffectBounds {
 ///   downwash, upper_lift   largest slope of the field by subdivision of the plane of distance and gap, in intervals;
 ///                          N neighbours composed with the norm p give at most N^(1/p) times one (Hoelder);
 ///   drags, inflow, ground, ceiling   by the product rule, from bounds of speed, acceleration, thrust and its rate;
+///   voltage_sag, thrust_saturation, translational_lift, vortex_ring, wall, wind_field   likewise;
+///   payload_step           its weight; the step itself has no rate;
 ///   constant_force         a bias.
 /// Effects that act through the loop (motor_lag, delay, thrust_ratio) and on rotation alone add nothing here. For
 /// others (networks, formulas of the user) the bounds are infinite and `unbounded` says so.

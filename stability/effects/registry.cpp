@@ -19,11 +19,18 @@
 #include "stability/effects/ground.h"
 #include "stability/effects/inflow.h"
 #include "stability/effects/motor_lag.h"
+#include "stability/effects/payload_step.h"
 #include "stability/effects/rotor_thrust.h"
 #include "stability/effects/sensor_delay.h"
 #include "stability/effects/thrust_ratio.h"
+#include "stability/effects/thrust_saturation.h"
 #include "stability/effects/torque_bias.h"
+#include "stability/effects/translational_lift.h"
 #include "stability/effects/upper_lift.h"
+#include "stability/effects/voltage_sag.h"
+#include "stability/effects/vortex_ring.h"
+#include "stability/effects/wall.h"
+#include "stability/effects/wind_field.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -48,11 +55,15 @@ Entry entry() {
 std::deque<Entry>& entries() {
   static std::deque<Entry> all = {
       // a deque keeps references when users add theirs
-      entry<MotorLag>(),      entry<Delay>(),         entry<SensorDelay>(),   entry<ThrustRatio>(),
-      entry<Battery>(),       entry<DragLinear>(),    entry<DragQuadratic>(), entry<DragRotor>(),
-      entry<Inflow>(),        entry<Ground>(),        entry<Ceiling>(),       entry<Downwash>(),
-      entry<UpperLift>(),     entry<ConstantForce>(), entry<TorqueBias>(),    entry<DownwashTorque>(),
-      entry<DeepSetEffect>(), entry<RotorThrust>(),
+      entry<MotorLag>(),         entry<Delay>(),         entry<SensorDelay>(),
+      entry<ThrustRatio>(),      entry<Battery>(),       entry<DragLinear>(),
+      entry<DragQuadratic>(),    entry<DragRotor>(),     entry<Inflow>(),
+      entry<Ground>(),           entry<Ceiling>(),       entry<Downwash>(),
+      entry<UpperLift>(),        entry<ConstantForce>(), entry<TorqueBias>(),
+      entry<DownwashTorque>(),   entry<DeepSetEffect>(), entry<VoltageSag>(),
+      entry<ThrustSaturation>(), entry<PayloadStep>(),   entry<TranslationalLift>(),
+      entry<WindField>(),        entry<Wall>(),          entry<VortexRing>(),
+      entry<RotorThrust>(),
   };
   return all;
 }

@@ -112,9 +112,9 @@ def weak_cells(knee=3.95, slope=0.6):
 
 
 EFFECTS = {
-    "thermal": dict(force=column(), variables={"xy"}, formula=expression(
+    "thermal": dict(force=column(), variables={"xy"}, names={"wind_field"}, formula=expression(
         "force_z_N", "a_N * exp(-((x - 0.2)^2 + (y + 0.1)^2) / (2 * w_m^2))", a_N=0.03, w_m=0.25)),
-    "wall": dict(force=wall(), variables={"x"}, formula=expression(
+    "wall": dict(force=wall(), variables={"x"}, names={"wall"}, formula=expression(
         "force_x_N", "a_N * exp(-(0.6 - min(x, 0.6)) / b_m)", a_N=-0.03, b_m=0.2)),
     "lift of speed": dict(force=lift_of_speed(), variables={"speed"}, names={"translational_lift"},
                           formula=expression("force_b3_N", "a_N * (1 - exp(-(vx^2 + vy^2 + vz^2) / h_m_s^2))",

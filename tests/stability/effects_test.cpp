@@ -34,10 +34,31 @@ double default_of(const std::string& effect, const std::string& parameter) {
 }
 
 TEST(Effects, HaveTheNamesOfTheCommandLine) {
-  const std::set<std::string> wanted = {
-      "motor_lag",      "delay",          "sensor_delay", "thrust_ratio", "battery",         "drag_linear",
-      "drag_quadratic", "drag_rotor",     "inflow",       "ground",       "ceiling",         "downwash",
-      "upper_lift",     "constant_force", "torque_bias",  "deep_set",     "downwash_torque", "rotor_thrust"};
+  const std::set<std::string> wanted = {"motor_lag",
+                                        "delay",
+                                        "sensor_delay",
+                                        "thrust_ratio",
+                                        "battery",
+                                        "drag_linear",
+                                        "drag_quadratic",
+                                        "drag_rotor",
+                                        "inflow",
+                                        "ground",
+                                        "ceiling",
+                                        "downwash",
+                                        "upper_lift",
+                                        "constant_force",
+                                        "torque_bias",
+                                        "deep_set",
+                                        "downwash_torque",
+                                        "voltage_sag",
+                                        "thrust_saturation",
+                                        "payload_step",
+                                        "translational_lift",
+                                        "wind_field",
+                                        "wall",
+                                        "vortex_ring",
+                                        "rotor_thrust"};
   const std::vector<std::string> names = effect_names();
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), wanted);
 }

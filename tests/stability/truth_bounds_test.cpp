@@ -135,13 +135,22 @@ TEST(TruthBounds, LiftJumpsWhereVehiclesTouchAndIsBoundedElsewhere) {
   EXPECT_LE(seen.amplitude_N, bounds.amplitude_N[2]);
 }
 
-TEST(TruthBounds, EncloseDragInflowAndSurfacesOnRandomMotions) {
-  const char* const effects[] = {"name = \"drag_linear\"\nparameters = { drag_N_s_m = 0.02 }\n",
-                                 "name = \"drag_quadratic\"\nparameters = { drag_N_s2_m2 = 0.01 }\n",
-                                 "name = \"drag_rotor\"\nparameters = { drag_N_s_m = 0.02 }\n",
-                                 "name = \"inflow\"\nparameters = { loss_s_m = 0.05 }\n",
-                                 "name = \"ground\"\nparameters = { amplitude = 0.2 }\n",
-                                 "name = \"ceiling\"\nparameters = { amplitude = 0.2, height_m = 1.2 }\n"};
+TEST(TruthBounds, EncloseDragInflowSurfacesAndFlowOnRandomMotions) {
+  const char* const effects[] = {
+      "name = \"drag_linear\"\nparameters = { drag_N_s_m = 0.02 }\n",
+      "name = \"drag_quadratic\"\nparameters = { drag_N_s2_m2 = 0.01 }\n",
+      "name = \"drag_rotor\"\nparameters = { drag_N_s_m = 0.02 }\n",
+      "name = \"inflow\"\nparameters = { loss_s_m = 0.05 }\n",
+      "name = \"ground\"\nparameters = { amplitude = 0.2 }\n",
+      "name = \"ceiling\"\nparameters = { amplitude = 0.2, height_m = 1.2 }\n",
+      "name = \"voltage_sag\"\nparameters = { sag = 0.1 }\n",
+      "name = \"thrust_saturation\"\nparameters = { loss = 0.5 }\n",
+      "name = \"translational_lift\"\nparameters = { gain = 0.1, speed_m_s = 1 }\n",
+      "name = \"vortex_ring\"\nparameters = { loss = 0.2, descent_m_s = 0.5 }\n",
+      "name = \"wall\"\nparameters = { push = 0.1, place_m = 0.01 }\n",
+      "name = \"wind_field\"\nparameters = { shear_x_N = 0.02, shear_y_N = -0.01, thermal_N = "
+      "0.02, height_m = 1.15, "
+      "x_m = 0.3 }\n"};
   MotionSet motion;
   motion.speed_m_s = 1.5;
   motion.acceleration_m_s2 = 4;
@@ -184,6 +193,19 @@ TEST(TruthBounds, EncloseDragInflowAndSurfacesOnRandomMotions) {
     }
     EXPECT_GT(nearest, 0.4);
   }
+}
+
+TEST(TruthBounds, ALoadThatChangesHasAWeightButNoRate) {
+  const Model model = vehicle(
+      "[[effect]]\nname = \"payload_step\"\nparameters = { mass_before_kg = 0.004, mass_after_kg = 0.001 }\n"
+      "[[effect]]\nname = \"payload_step\"\nparameters = { mass_before_kg = 0.004, mass_after_kg = 0.004 "
+      "}\n");
+  const auto bounds = truth_bounds(model, MotionSet());
+  EXPECT_NEAR(bounds.at(0).amplitude_N[2], 0.004 * kGravity_m_s2, 1e-12);
+  EXPECT_TRUE(std::isinf(bounds.at(0).rate_N_s[2]));
+  EXPECT_FALSE(bounds.at(0).unbounded.empty());
+  EXPECT_NEAR(bounds.at(1).bias_N[2], 0.004 * kGravity_m_s2, 1e-12);
+  EXPECT_EQ(bounds.at(1).rate_N_s[2], 0);
 }
 
 TEST(TruthBounds, WhatIsNotEnclosedIsInfiniteAndSaysWhy) {

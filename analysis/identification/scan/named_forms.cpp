@@ -1,0 +1,205 @@
+#include "analysis/identification/scan/named_forms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace swarmcert::identification {
+namespace {
+
+constexpr double kHalfTurn = 3.141592653589793;
+constexpr double kReach = 0.3;  ///< metres
+
+/// A formula's parameter whose name begins with `word`, its unit aside.
+std::optional<double> number_of(const Formula& formula, const std::string& word) {
+  for (const auto& [name, value] : formula.effect.parameters) {
+    if (name == word || name.rfind(word + "_", 0) == 0) return value;
+  }
+  return std::nullopt;
+}
+
+/// The first of `words` that the formula has.
+std::optional<double> first_of(const Formula& formula, const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    if (const auto number = number_of(formula, word)) return number;
+  }
+  return std::nullopt;
+}
+
+bool acts_along(const Formula& formula, const std::vector<std::string>& targets) {
+  const auto& formulas = formula.effect.expression.formulas;
+  return std::any_of(formulas.begin(), formulas.end(), [&](const auto& entry) {
+    return std::find(targets.begin(), targets.end(), entry.first) != targets.end();
+  });
+}
+
+bool is_vertical(const Formula& formula) { return acts_along(formula, {"force_z_N", "force_b3_N"}); }
+bool is_horizontal(const Formula& formula) {
+  return acts_along(formula, {"force_x_N", "force_y_N", "force_b1_N", "force_b2_N"});
+}
+
+/// Takes part in the fit of an effect whose other coefficients stay zero.
+void hold_others(Candidate& candidate, const std::vector<std::string>& free) {
+  for (stability::Parameter& p : candidate.info.linear) {
+    if (std::find(free.begin(), free.end(), p.name) == free.end()) p.lower = p.upper = 0;
+  }
+}
+
+/// The shape parameters `free` may move from where they are by about kReach, if they are near zero; the others are held.
+void free_shape(Candidate& candidate, const std::vector<std::string>& free) {
+  for (std::size_t i = 0; i < candidate.info.shape.size(); ++i) {
+    stability::Parameter& p = candidate.info.shape[i];
+    const double value = candidate.thetas[0][i];
+    p.value = value;
+    if (std::find(free.begin(), free.end(), p.name) == free.end())
+      p.lower = p.upper = value;
+    else
+      p.grid = {value, std::max(std::abs(value), kReach)};
+  }
+}
+
+std::vector<Candidate> steps_in_time(const Formula& formula, Candidate candidate) {
+  const auto at_s = first_of(formula, {"at", "middle"});
+  if (!is_vertical(formula) || !at_s) return {};
+  candidate.thetas.clear();
+  for (const double off_s : {-0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4})
+    candidate.thetas.push_back({std::max(*at_s + off_s, 0.0)});
+  // A jump has no derivative with respect to its time: the best of these is it.
+  candidate.info.shape[0].lower = candidate.info.shape[0].upper = *at_s;
+  return {std::move(candidate)};
+}
+
+std::vector<Candidate> shear_layers(const Formula& formula, Candidate candidate) {
+  const auto height_m = first_of(formula, {"middle", "at", "centre"});
+  if (!is_horizontal(formula) || !height_m) return {};
+  const double width_m = number_of(formula, "width").value_or(0.1);
+  std::vector<double> theta = candidate.thetas[0];
+  candidate.thetas.clear();
+  theta[0] = *height_m;
+  for (const double factor : {1.0, 0.4, 2.0}) {
+    theta[1] = std::max(factor * width_m, 0.02);
+    candidate.thetas.push_back(theta);
+  }
+  hold_others(candidate, {"shear_x_N", "shear_y_N"});
+  free_shape(candidate, {"height_m", "thickness_m"});
+  return {std::move(candidate)};
+}
+
+std::vector<Candidate> thermals(const Formula& formula, Candidate candidate) {
+  const auto x_m = number_of(formula, "x_centre"), y_m = number_of(formula, "y_centre");
+  const auto radius_m = first_of(formula, {"width", "core"});
+  const bool is_column = formula.form == "gaussian" || formula.form == "inverse_square";
+  if (!is_vertical(formula) || !is_column || !x_m || !y_m || !radius_m) return {};
+  std::vector<double> theta = candidate.thetas[0];
+  theta[2] = *x_m;
+  theta[3] = *y_m;
+  theta[4] = *radius_m;
+  candidate.thetas = {theta};
+  hold_others(candidate, {"thermal_N"});
+  free_shape(candidate, {"x_m", "y_m", "radius_m"});
+  return {std::move(candidate)};
+}
+
+/// Where a place that a formula has may lie: half the flown range beyond both of its ends (forms.cpp).
+struct FlownRange {
+  double lower_m, upper_m, at_m;
+  double span_m() const { return upper_m - lower_m; }
+};
+
+/// Of the formula's first place; of a decay that has none, its end of the range and a length.
+std::optional<FlownRange> range_of_place(const Formula& formula) {
+  for (const auto& [name, bounds] : formula.effect.expression.bounds) {
+    const bool is_place = name == "centre_m" || name == "middle_m" || name == "at_m" || name == "from_m";
+    if (!is_place || !(bounds.first < bounds.second)) continue;
+    const double span_m = 0.5 * (bounds.second - bounds.first);
+    return FlownRange{bounds.first + 0.5 * span_m, bounds.second - 0.5 * span_m,
+                      formula.effect.parameters.at(name)};
+  }
+  const auto from_m = number_of(formula, "from"), length_m = number_of(formula, "length");
+  if (!from_m || !length_m) return std::nullopt;
+  const double span_m = 5 * *length_m;
+  if (formula.form == "growth") return FlownRange{*from_m - span_m, *from_m, *from_m};
+  return FlownRange{*from_m, *from_m + span_m, *from_m};
+}
+
+/// A force along x that stands out at one end of the flown range of x, and likewise y. Beyond the wall nothing flies:
+/// it is at that end, or where the formula has its place.
+std::vector<Candidate> walls(const Formula& formula, Candidate candidate) {
+  const bool is_x = formula.variable == "x";
+  const auto range = range_of_place(formula);
+  if (!acts_along(formula, {is_x ? "force_x_N" : "force_y_N"}) || !range) return {};
+  const double middle_m = 0.5 * (range->lower_m + range->upper_m);
+  const bool is_above = range->at_m > middle_m;
+  const double end_m = is_above ? range->upper_m : range->lower_m;
+  const double bearing = is_x ? (is_above ? 0 : kHalfTurn) : (is_above ? 0.5 : -0.5) * kHalfTurn;
+  candidate.thetas.clear();
+  for (const double place_m : {end_m, range->at_m}) {
+    for (const double share : {0.06, 0.1, 0.15, 0.25})
+      candidate.thetas.push_back({bearing, is_above ? place_m : -place_m, share * range->span_m()});
+    if (range->at_m == end_m) break;
+  }
+  free_shape(candidate, {"decay_m"});
+  return {std::move(candidate)};
+}
+
+std::vector<Candidate> vortex_rings(const Formula& formula, Candidate candidate) {
+  if (!is_vertical(formula)) return {};
+  const auto at_m_s = first_of(formula, {"centre"}), width_m_s = first_of(formula, {"width", "core"});
+  if (at_m_s && width_m_s && *at_m_s < 0) candidate.thetas.push_back({-*at_m_s, *width_m_s});
+  return {std::move(candidate)};
+}
+
+std::vector<Candidate> on_its_grid(const Formula& formula, Candidate candidate) {
+  if (!is_vertical(formula)) return {};
+  return {std::move(candidate)};
+}
+
+/// An effect with the variables that point to it.
+struct NamedForm {
+  const char* effect;
+  std::vector<std::string> variables;
+  std::vector<Candidate> (*make)(const Formula&, Candidate);
+};
+
+const std::vector<NamedForm>& all_forms() {
+  static const std::vector<NamedForm> forms = {
+      {"voltage_sag", {"thrust", "duty_1", "duty_2", "duty_3", "duty_4"}, on_its_grid},
+      {"thrust_saturation", {"thrust", "duty_1", "duty_2", "duty_3", "duty_4"}, on_its_grid},
+      {"payload_step", {"time"}, steps_in_time},
+      {"translational_lift", {"speed", "airspeed"}, on_its_grid},
+      {"wind_field", {"z"}, shear_layers},
+      {"wind_field", {"xy"}, thermals},
+      {"wall", {"x", "y"}, walls},
+      {"vortex_ring", {"vz", "climb"}, vortex_rings}};
+  return forms;
+}
+
+bool is_same(const Candidate& a, const Candidate& b) { return a.name == b.name && a.thetas == b.thetas; }
+
+}  // namespace
+
+bool needs_scan(const std::string& effect) {
+  return std::any_of(all_forms().begin(), all_forms().end(),
+                     [&](const NamedForm& form) { return effect == form.effect; });
+}
+
+std::vector<Candidate> named_forms(const std::vector<Formula>& formulas, const stability::Model& model,
+                                   const Coverage& coverage) {
+  std::vector<Candidate> all;
+  for (const Formula& formula : formulas) {
+    for (const NamedForm& form : all_forms()) {
+      const auto& names = form.variables;
+      const bool has_it = std::any_of(model.effects.begin(), model.effects.end(),
+                                      [&](const auto& spec) { return spec.name == form.effect; });
+      if (has_it || std::find(names.begin(), names.end(), formula.variable) == names.end()) continue;
+      for (Candidate& next : form.make(formula, candidate(form.effect, model, coverage))) {
+        const bool is_known =
+            std::any_of(all.begin(), all.end(), [&](const Candidate& other) { return is_same(other, next); });
+        if (!is_known) all.push_back(std::move(next));
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,31 @@
+#include "stability/effects/voltage_sag.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmcert::stability {
+
+EffectInfo VoltageSag::describe() {
+  return {"voltage_sag",
+          "f = -s T ((T / W)^(3/2) - 1) b3",
+          "the power of a rotor at rest in air grows with T^(3/2) (momentum theory), the supply's voltage "
+          "falls in "
+          "proportion to the power drawn; W is the weight: hovering is part of the thrust map",
+          "voltage_sag",
+          "thrust from half to one and a half times the weight, with the battery's voltage logged slowly or "
+          "not at all",
+          {{"sag", "share of the thrust lost per multiple of the power of hovering", 0, 0, 0.5}},
+          {}};
+}
+
+void VoltageSag::columns(const Instant& now, const double*, Wrench* columns) const {
+  const double load = std::max(now.thrust_N, 0.0) / (now.mass_kg * kGravity_m_s2);
+  columns[0] = {-now.thrust_N * (load * std::sqrt(load) - 1) * now.b3_W(), Eigen::Vector3d::Zero()};
+}
+
+bool VoltageSag::in_support(const Instant& now, const double*) const {
+  constexpr double kClear = 0.1;
+  return std::abs(now.thrust_N / (now.mass_kg * kGravity_m_s2) - 1) > kClear;
+}
+
+}  // namespace swarmcert::stability

@@ -1,0 +1,114 @@
+/// Effects of supply, propellers, loads and moving air: their formulas at hand-picked states, and where they vanish.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "stability/effects/registry.h"
+
+namespace swarmcert::stability {
+namespace {
+
+constexpr double kFlowMass_kg = 0.034, kFlowWeight_N = kFlowMass_kg * kGravity_m_s2, kFlowAccuracy_N = 1e-12;
+
+Eigen::Vector3d flow_force(const std::string& name, const std::map<std::string, double>& parameters,
+                           const Instant& now) {
+  EffectSpec spec;
+  spec.name = name;
+  spec.parameters = parameters;
+  return AppliedEffect(spec, {"small", {"small"}, ""}).wrench(now).force_W_N;
+}
+
+Instant hovering() {
+  Instant now;
+  now.mass_kg = kFlowMass_kg;
+  now.thrust_N = kFlowWeight_N;
+  now.p_W_m = {0, 0, 0.5};
+  return now;
+}
+
+TEST(VoltageSag, CostsNothingInHoverAndGrowsWithThePower) {
+  Instant now = hovering();
+  EXPECT_NEAR(flow_force("voltage_sag", {{"sag", 0.1}}, now).norm(), 0, kFlowAccuracy_N);
+  now.thrust_N = 4 * kFlowWeight_N;  // 4^(3/2) - 1 = 7
+  EXPECT_NEAR(flow_force("voltage_sag", {{"sag", 0.1}}, now).z(), -0.1 * 7 * 4 * kFlowWeight_N,
+              kFlowAccuracy_N);
+  now.thrust_N = 0;
+  EXPECT_EQ(flow_force("voltage_sag", {{"sag", 0.1}}, now).norm(), 0);
+}
+
+TEST(ThrustSaturation, ActsAboveTheKneeAlone) {
+  const std::map<std::string, double> parameters = {{"loss", 0.8}, {"knee_weights", 1.2}};
+  Instant now = hovering();
+  EXPECT_EQ(flow_force("thrust_saturation", parameters, now).norm(), 0);
+  now.thrust_N = 1.5 * kFlowWeight_N;
+  EXPECT_NEAR(flow_force("thrust_saturation", parameters, now).z(), -0.8 * 0.3 * kFlowWeight_N,
+              kFlowAccuracy_N);
+}
+
+TEST(PayloadStep, IsTheLoadsWeightBeforeAndAfterItsTime) {
+  const std::map<std::string, double> parameters = {
+      {"mass_before_kg", 0.004}, {"mass_after_kg", -0.001}, {"time_s", 14}};
+  Instant now = hovering();
+  now.time_s = 13.999;
+  EXPECT_NEAR(flow_force("payload_step", parameters, now).z(), -0.004 * kGravity_m_s2, kFlowAccuracy_N);
+  now.time_s = 14;
+  EXPECT_NEAR(flow_force("payload_step", parameters, now).z(), 0.001 * kGravity_m_s2, kFlowAccuracy_N);
+}
+
+TEST(TranslationalLift, ComesWithSpeedAcrossTheThrustAxisOnly) {
+  const std::map<std::string, double> parameters = {{"gain", 0.1}, {"speed_m_s", 0.5}};
+  Instant now = hovering();
+  now.v_W_m_s = {0, 0, 3};
+  EXPECT_EQ(flow_force("translational_lift", parameters, now).norm(), 0);
+  now.v_W_m_s = {0.3, 0.4, 3};
+  EXPECT_NEAR(flow_force("translational_lift", parameters, now).z(),
+              0.1 * kFlowWeight_N * (1 - std::exp(-1.0)), kFlowAccuracy_N);
+  now.v_W_m_s = {100, 0, 0};
+  EXPECT_NEAR(flow_force("translational_lift", parameters, now).z(), 0.1 * kFlowWeight_N, kFlowAccuracy_N);
+}
+
+TEST(VortexRing, TakesMostAtItsDescentAndNothingWhileClimbing) {
+  const std::map<std::string, double> parameters = {{"loss", 0.2}, {"descent_m_s", 0.8}, {"width_m_s", 0.2}};
+  Instant now = hovering();
+  now.v_W_m_s = {0, 0, -0.8};
+  EXPECT_NEAR(flow_force("vortex_ring", parameters, now).z(), -0.2 * kFlowWeight_N, kFlowAccuracy_N);
+  now.v_W_m_s.z() = -1;
+  EXPECT_NEAR(flow_force("vortex_ring", parameters, now).z(), -0.2 * kFlowWeight_N * std::exp(-0.5),
+              kFlowAccuracy_N);
+  now.v_W_m_s.z() = 0.8;
+  EXPECT_LT(std::abs(flow_force("vortex_ring", parameters, now).z()), 1e-12);
+}
+
+TEST(WindField, IsALayerOverTheHeightAndAColumnOverThePlace) {
+  const std::map<std::string, double> parameters = {
+      {"shear_x_N", 0.03},  {"shear_y_N", -0.01}, {"thermal_N", 0.02}, {"height_m", 0.5},
+      {"thickness_m", 0.1}, {"x_m", 0.3},         {"y_m", -0.4},       {"radius_m", 0.25}};
+  Instant now = hovering();
+  now.p_W_m = {0.3, -0.4, 0.5};
+  EXPECT_LT((flow_force("wind_field", parameters, now) - Eigen::Vector3d(0.015, -0.005, 0.02)).norm(),
+            kFlowAccuracy_N);
+  now.p_W_m = {0.3, -0.15, 2.5};
+  EXPECT_LT((flow_force("wind_field", parameters, now) - Eigen::Vector3d(0.03, -0.01, 0.02 * std::exp(-0.5)))
+                .norm(),
+            1e-9);
+  now.p_W_m = {-30, 0, -50};
+  EXPECT_LT(flow_force("wind_field", parameters, now).norm(), 1e-12);
+}
+
+TEST(Wall, PushesIntoTheRoomAndFadesAwayFromIt) {
+  const double quarter = std::acos(0.0);
+  const std::map<std::string, double> parameters = {
+      {"push", 0.1}, {"bearing_rad", quarter}, {"place_m", 1.5}, {"decay_m", 0.2}};
+  Instant now = hovering();
+  now.p_W_m = {5, 1.5, 0.5};
+  EXPECT_LT((flow_force("wall", parameters, now) - Eigen::Vector3d(0, -0.1 * kFlowWeight_N, 0)).norm(),
+            kFlowAccuracy_N);
+  now.p_W_m.y() = 1.3;
+  EXPECT_NEAR(flow_force("wall", parameters, now).y(), -0.1 * kFlowWeight_N * std::exp(-1.0),
+              kFlowAccuracy_N);
+  now.p_W_m.y() = -20;
+  EXPECT_LT(flow_force("wall", parameters, now).norm(), kFlowAccuracy_N);
+}
+
+}  // namespace
+}  // namespace swarmcert::stability
