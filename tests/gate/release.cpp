@@ -92,7 +92,7 @@ void ReleaseFolder::build_elf() const {
   }
 }
 
-void ReleaseFolder::write_facts(double flash_bytes) const {
+void ReleaseFolder::write_facts(int flash_bytes) const {
   files::NetworkArguments arguments;
   arguments.file = folder_ / "network/network.toml";
   const files::Network network = files::load_network(arguments);

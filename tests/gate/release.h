@@ -39,7 +39,7 @@ class ReleaseFolder {
   void certify_again() const;
   /// Builds the ELF from the exported source as it lies there, where the tools are installed.
   void build_elf() const;
-  void write_facts(double flash_bytes) const;
+  void write_facts(int flash_bytes) const;
 
   /// Files that the release rests on, relative to the folder.
   std::vector<std::string> files() const;

@@ -170,7 +170,9 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   for (const auto& [kind, file] : gains) files.push_back(file.path);
   files::Json result = result_head("compare", files);
   add_comparison(comparison, inputs, result);
-  if (!common.json.empty()) add_flight_errors(inputs, common.jobs, result);
+  // Nobody else reads them, and they take as long as the comparison.
+  if (!common.json.empty() || !options.report.empty() || host() != nullptr)
+    add_flight_errors(inputs, common.jobs, result);
   std::optional<residuals::Comparison> own;
   if (options.flights.published_filter) {
     FlightOptions without = options.flights;
