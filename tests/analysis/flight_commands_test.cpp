@@ -48,7 +48,7 @@ TEST(FlightCommands, CompareShowsNoErrorsWhereNothingWasCompared) {
   const ScratchFolder folder;
   ASSERT_EQ(run_shell(": > cf1_00", folder.path()).exit_code, 0);
   const Outcome outcome = run_shell("swarmcert compare " + small_model() + " cf1_00", folder.path());
-  EXPECT_EQ(outcome.exit_code, 4) << outcome.output;
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.output;
   EXPECT_NE(outcome.output.find("nothing was compared: cf1_00: offset 0: the file is empty"),
             std::string::npos)
       << outcome.output;

@@ -289,7 +289,8 @@ TEST(Plausibility, ClocksThatCouldNotBeRelatedAreSaidToBeUnknown) {
   EXPECT_NE(outcome.output.find("the offset of 2 logs could not be estimated"), std::string::npos)
       << outcome.output;
   const files::Json result = files::read_json(folder / "r.json", "swarmcert/compare/1");
-  EXPECT_EQ(result["clocks"], (files::Json{{"reference", 1}, {"estimated", 0}, {"unknown", 2}}));
+  EXPECT_EQ(result["clocks"],
+            (files::Json{{"reference", 1}, {"absolute", 0}, {"estimated", 0}, {"unknown", 2}}));
   EXPECT_EQ(result["flights"][0]["clock"], "reference");
   EXPECT_EQ(result["flights"][1]["clock"], "unknown");
   EXPECT_TRUE(result["flights"][1]["clock_offset_s"].is_null());

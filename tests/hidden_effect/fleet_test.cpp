@@ -56,8 +56,9 @@ TEST_F(FlightsOfAFleet, AgainstHealthyFlightsShowOnlyWhatChanged) {
   EXPECT_EQ(change["effect"], "thrust_ratio");
   EXPECT_EQ(change["vehicle"], "cf1");
   const files::Json& interval = change["parameters"]["ratio"]["interval_90"];
-  EXPECT_LE(interval[0].get<double>(), 0.88 - 0.95);
-  EXPECT_GE(interval[1].get<double>(), 0.88 - 0.95);
+  const double change_of_ratio = 1 + (0.88 - 0.95);  // as a factor, of the thrust that the model commands
+  EXPECT_LE(interval[0].get<double>(), change_of_ratio);
+  EXPECT_GE(interval[1].get<double>(), change_of_ratio);
   const files::Json& vehicle = json["against"]["vehicles"][0];
   EXPECT_TRUE(vehicle["same_vehicle"].get<bool>());
   EXPECT_EQ(vehicle["other_groups"], 3);

@@ -196,16 +196,20 @@ TEST(TruthBounds, EncloseDragInflowSurfacesAndFlowOnRandomMotions) {
 }
 
 TEST(TruthBounds, ALoadThatChangesHasAWeightButNoRate) {
-  const Model model = vehicle(
-      "[[effect]]\nname = \"payload_step\"\nparameters = { mass_before_kg = 0.004, mass_after_kg = 0.001 }\n"
-      "[[effect]]\nname = \"payload_step\"\nparameters = { mass_before_kg = 0.004, mass_after_kg = 0.004 "
-      "}\n");
-  const auto bounds = truth_bounds(model, MotionSet());
-  EXPECT_NEAR(bounds.at(0).amplitude_N[2], 0.004 * kGravity_m_s2, 1e-12);
-  EXPECT_TRUE(std::isinf(bounds.at(0).rate_N_s[2]));
-  EXPECT_FALSE(bounds.at(0).unbounded.empty());
-  EXPECT_NEAR(bounds.at(1).bias_N[2], 0.004 * kGravity_m_s2, 1e-12);
-  EXPECT_EQ(bounds.at(1).rate_N_s[2], 0);
+  const auto bounds_of = [](const std::string& after_kg) {
+    return truth_bounds(vehicle("[[effect]]\nname = \"payload_step\"\nparameters = { mass_before_kg = 0.004, "
+                                "mass_after_kg = " +
+                                after_kg + " }\n"),
+                        MotionSet())
+        .at(0);
+  };
+  const EffectBounds dropped = bounds_of("0.001");
+  EXPECT_NEAR(dropped.amplitude_N[2], 0.004 * kGravity_m_s2, 1e-12);
+  EXPECT_TRUE(std::isinf(dropped.rate_N_s[2]));
+  EXPECT_FALSE(dropped.unbounded.empty());
+  const EffectBounds kept = bounds_of("0.004");
+  EXPECT_NEAR(kept.bias_N[2], 0.004 * kGravity_m_s2, 1e-12);
+  EXPECT_EQ(kept.rate_N_s[2], 0);
 }
 
 TEST(TruthBounds, WhatIsNotEnclosedIsInfiniteAndSaysWhy) {

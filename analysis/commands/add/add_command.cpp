@@ -10,6 +10,7 @@
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/add/add_report.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/scan/proposal.h"

@@ -37,17 +37,6 @@ files::Json ladder_json(const std::vector<LadderRow>& rows) {
   return json;
 }
 
-files::Json effects_json(const std::vector<stability::EffectSpec>& effects) {
-  files::Json json = files::Json::array();
-  for (const stability::EffectSpec& effect : effects) {
-    files::Json entry = {{"effect", effect.name},
-                         {"parameters", values_json(effect.name, effect.parameters, effect.fit.interval)}};
-    if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
-    json.push_back(std::move(entry));
-  }
-  return json;
-}
-
 void add_ladder(const Ladder& ladder, const residuals::Inputs& inputs, files::Json& result) {
   result["ladder"] = ladder_json(ladder.rows);
   result["earlier"] = ladder_json(ladder.earlier);

@@ -11,9 +11,6 @@ namespace swarmcert::analysis {
 /// One entry per row: `effect`, `fit_rmse`, `select_rmse`, `test_rmse` in newton, `accepted`, `reason`.
 files::Json ladder_json(const std::vector<stability::LadderRow>& rows);
 
-/// One entry per effect with its parameters and their intervals.
-files::Json effects_json(const std::vector<stability::EffectSpec>& effects);
-
 /// `ladder`, `earlier`, `test_looks`, `split`, `effects`.
 void add_ladder(const identification::Ladder& ladder, const residuals::Inputs& inputs, files::Json& result);
 

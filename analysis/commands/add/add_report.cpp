@@ -3,8 +3,8 @@
 #include <fmt/core.h>
 
 #include "analysis/cli/command_line.h"
-#include "analysis/commands/compare/compare_report.h"
 #include "analysis/commands/shared/effect_output.h"
+#include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 

@@ -13,20 +13,4 @@ namespace swarmcert::analysis {
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
                                  const files::Json& result, const std::string& folder, bool overwrite);
 
-/// Units of the first kPlottedVariables of residuals::variable_name(), which are numbers; those after them are places of
-/// neighbours.
-inline constexpr int kPlottedVariables = 6;
-inline constexpr const char* kVariableUnits[kPlottedVariables] = {"[m]", "[m/s]", "[-]",
-                                                                  "[V]", "[s]",   "[degrees]"};
-
-/// The name by which time series and worst moments call a log.
-std::string series_name(const residuals::TrackErrors& track);
-
-/// Residuals over time with zoom: vehicles with the worst moments first, then the others, as far as a page can hold them.
-/// @param before the same logs under another model, whose vertical residual is shown beside and whose worst moments are
-///               marked; or null.
-/// @param unit, per_newton of the forces shown
-void add_time_series(Report& report, const residuals::Comparison& comparison,
-                     const residuals::Comparison* before, const std::string& unit, double per_newton);
-
 }  // namespace swarmcert::analysis

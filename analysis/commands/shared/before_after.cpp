@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "analysis/commands/compare/compare_report.h"
+#include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report_text.h"
 
 namespace swarmcert::analysis {

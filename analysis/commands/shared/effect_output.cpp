@@ -21,6 +21,17 @@ files::Json values_json(const std::string& effect, const std::map<std::string, d
   return json;
 }
 
+files::Json effects_json(const std::vector<stability::EffectSpec>& effects) {
+  files::Json json = files::Json::array();
+  for (const stability::EffectSpec& effect : effects) {
+    files::Json entry = {{"effect", effect.name},
+                         {"parameters", values_json(effect.name, effect.parameters, effect.fit.interval)}};
+    if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
 void print_values(const std::string& effect, const std::string& prefix,
                   const std::map<std::string, double>& values,
                   const std::map<std::string, std::pair<double, double>>& intervals) {

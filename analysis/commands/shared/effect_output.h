@@ -4,8 +4,10 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "nn/base/json.h"
+#include "stability/model.h"
 
 namespace swarmcert::analysis {
 
@@ -16,6 +18,9 @@ double shown_beyond_file(const std::string& effect, const std::string& parameter
 /// {"tau_s": {"value": 0.06, "interval_90": [0.05, 0.07]}}; without the interval where there is none.
 files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
                         const std::map<std::string, std::pair<double, double>>& intervals);
+
+/// One entry per effect with its parameters and their intervals.
+files::Json effects_json(const std::vector<stability::EffectSpec>& effects);
 
 /// A line per number, each after `prefix`: "tau_s = 0.06, 90 % 0.05 .. 0.07".
 void print_values(const std::string& effect, const std::string& prefix,

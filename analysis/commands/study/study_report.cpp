@@ -9,11 +9,11 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_report.h"
-#include "analysis/commands/compare/compare_report.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
+#include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"
 #include "analysis/report/report_text.h"
 #include "nn/base/file_io.h"
