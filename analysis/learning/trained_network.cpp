@@ -70,7 +70,7 @@ files::Network write_network(const LearningData& data, const training::Vector& t
 
 namespace {
 
-/// The residual of published signals is that of a model with their lag and no other.
+/// Residuals of the published signals contain the lag of those signals, so it replaces every lag of the model.
 void set_published_lag(stability::Model& model) {
   auto& effects = model.effects;
   effects.erase(std::remove_if(effects.begin(), effects.end(),

@@ -26,7 +26,7 @@ struct Difference {
   std::string no_scatter;               ///< why the scatter is not known; empty where it is
 };
 
-/// Days count as groups where the others have so many folders, else flights do.
+/// With at least this many folders among the other flights, each folder (day) is a group; otherwise each flight is one.
 inline constexpr std::size_t kFewestDays = 3;
 
 /// Every vehicle of `kind` in `inputs` against `others`, in order of their names. Vehicles without usable records are
