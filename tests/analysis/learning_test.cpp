@@ -4,9 +4,11 @@
 #include <numeric>
 
 #include "analysis/learning/lipschitz_limit.h"
+#include "analysis/learning/output_scale.h"
 #include "analysis/learning/weighing.h"
 #include "analysis/reproduction/nearest_labels.h"
 #include "nn/base/random.h"
+#include "nn/training/trainer.h"
 
 namespace swarmcert::learning {
 namespace {
@@ -93,6 +95,60 @@ void add_flight(LearningData& data, Use use, double offset_gf, double outwards_m
   }
   track.end = data.samples.samples();
   data.tracks.push_back(track);
+}
+
+/// Targets of the compositions are `gain` times the output of the network, with an error of their own.
+LearningData selecting(const training::Vector& theta, const std::map<std::string, double>& gains) {
+  LearningData data = two_compositions();
+  files::Random random(4);
+  for (TrackSamples& track : data.tracks) {
+    track.use = Use::kSelect;
+    for (Index s = track.begin; s < track.end; ++s) {
+      const double f = training::predict(data.layout, theta, data.samples, &s, 1)(0, 0);
+      data.samples.target[static_cast<std::size_t>(s)] =
+          static_cast<float>(gains.at(track.composition) * f + 0.1 * random.symmetric());
+    }
+  }
+  return data;
+}
+
+TEST(OutputScale, MinimisesTheErrorOfTheSelectingFlightsAndLeavesNoCompositionWorseThanWithout) {
+  const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
+  // Half of the output is right for large vehicles; for small ones the output points the wrong way.
+  const LearningData data = selecting(theta, {{"small>large", 0.5}, {"small>small", -0.3}});
+  const std::map<std::string, double> scales = output_scales(data, theta);
+  EXPECT_NEAR(scales.at("large"), 0.5, 0.02);
+  EXPECT_EQ(scales.at("small"), 0);
+
+  training::Vector scaled = theta;
+  scale_outputs(data.layout, scales, scaled);
+  for (const TrackSamples& track : data.tracks) {
+    std::vector<Index> samples(static_cast<std::size_t>(track.end - track.begin));
+    std::iota(samples.begin(), samples.end(), track.begin);
+    double nothing = 0;
+    for (const Index s : samples) nothing += data.samples.target_of(s).cast<double>().squaredNorm();
+    nothing /= static_cast<double>(samples.size());
+    const double before = training::mean_loss(data.layout, theta, data.samples, samples, 1);
+    const double after = training::mean_loss(data.layout, scaled, data.samples, samples, 1);
+    EXPECT_LT(after, before) << track.composition;
+    EXPECT_LE(after, nothing * (1 + 1e-6)) << track.composition;
+  }
+}
+
+TEST(OutputScale, OneCompositionThatTheOutputHarmsLimitsTheWholeKind) {
+  const training::Vector theta = training::initial_parameters(two_compositions().layout, 3);
+  LearningData data = selecting(theta, {{"small>large", 1.0}, {"small>small", 1.0}});
+  // Half of the large vehicles' samples become a composition in which only a tenth of the output is right.
+  TrackSamples harmed = data.tracks[0];
+  harmed.begin = (harmed.begin + harmed.end) / 2;
+  harmed.composition = "large+small>large";
+  data.tracks[0].end = harmed.begin;
+  for (Index s = harmed.begin; s < harmed.end; ++s) data.samples.target[static_cast<std::size_t>(s)] *= 0.1f;
+  data.tracks.push_back(harmed);
+  const std::map<std::string, double> scales = output_scales(data, theta);
+  EXPECT_LT(scales.at("large"), 0.25) << "twice 0.1, where the error is that of no network, and the noise";
+  EXPECT_GT(scales.at("large"), 0.15);
+  EXPECT_NEAR(scales.at("small"), 1, 0.02);
 }
 
 TEST(NearestLabels, SeeTheMeanOfAFlightThroughAnyTurnAndNothingWhereNobodyFlew) {

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -13,6 +14,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/train/train_report.h"
+#include "analysis/learning/output_scale.h"
 #include "analysis/learning/trained_network.h"
 #include "analysis/learning/training_run.h"
 #include "nn/base/input_error.h"
@@ -39,13 +41,16 @@ struct TrainOptions {
   learning::RunOptions run;
   std::string gamma_scope = "layer", gamma_mode = "clip";
   std::string weights = "errors", symmetry = "vertical";
-  bool no_ground = false;
+  bool no_ground = false, allow_worse = false;
   int teachers = 0;
 };
 
 /// Root mean square errors in the unit of the targets.
 struct Scores {
   double nothing = 0, network = 0;
+
+  /// Beyond what the order of two sums of float32 products can change.
+  bool worse_than_none() const { return network > nothing * (1 + 1e-6); }
 };
 
 std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Vector& theta,
@@ -93,10 +98,15 @@ struct Outcome {
   std::map<std::string, Scores> compositions;
   Scores select;  ///< of the flights that decide whether there is to be a network
   std::map<std::string, Scores> select_compositions;
+  std::map<std::string, double> scales;  ///< of each kind's output, see learning::output_scales()
   learning::Certified certified;
 
   /// A network that is worse than none on the selecting flights is not kept.
-  bool kept() const { return !(select.network >= select.nothing); }
+  bool kept() const {
+    const bool silent = !scales.empty() && std::all_of(scales.begin(), scales.end(),
+                                                       [](const auto& scale) { return scale.second == 0; });
+    return !silent && !(select.network >= select.nothing);
+  }
 };
 
 files::Json result_of(const TrainOptions& options, const std::vector<std::string>& inputs,
@@ -127,6 +137,7 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
         {{"vehicles", composition}, {"rmse", scores.network * SI}, {"rmse_of_nothing", scores.nothing * SI}});
   }
   json["kept"] = outcome.kept();
+  json["output_scales"] = outcome.scales;
   json["select_rmse"] = number_or_null(outcome.select.network * SI);
   json["select_rmse_of_nothing"] = number_or_null(outcome.select.nothing * SI);
   json["select"] = files::Json::array();
@@ -134,7 +145,7 @@ files::Json result_of(const TrainOptions& options, const std::vector<std::string
     json["select"].push_back({{"vehicles", composition},
                               {"rmse", scores.network * SI},
                               {"rmse_of_nothing", scores.nothing * SI},
-                              {"worse_than_none", scores.network >= scores.nothing}});
+                              {"worse_than_none", scores.worse_than_none()}});
   }
   json["bounds"] = files::Json::array();
   for (const auto& [function, upper] : outcome.certified.set_bounds)
@@ -173,7 +184,7 @@ void print_worse_than_none(const Outcome& outcome, const std::string& unit) {
         outcome.select.network, unit, outcome.select.nothing);
   }
   for (const auto& [composition, scores] : outcome.select_compositions) {
-    if (scores.network < scores.nothing) continue;
+    if (!scores.worse_than_none()) continue;
     fmt::print("warning: worse than none for {}: {:.3f} {} on the selecting flights, {:.3f} without\n",
                composition, scores.network, unit, scores.nothing);
   }
@@ -216,6 +227,16 @@ void print(const TrainOptions& options, const LearningData& data, const Outcome&
   if (options.run.max_lipschitz > 0)
     fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
                outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
+  for (const auto& [kind, scale] : outcome.scales) {
+    if (scale == 0) {
+      fmt::print("no network for {}: the selecting flights have a composition that is better off without\n",
+                 kind);
+    } else if (scale < 1) {
+      fmt::print(
+          "output for {} scaled by {:.3f}: no composition of the selecting flights is worse than without\n",
+          kind, scale);
+    }
+  }
   for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
   print_worse_than_none(outcome, target.unit);
   fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
@@ -302,13 +323,17 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   options.run.cancelled = interrupt.flag();
   Outcome outcome;
   outcome.trained = learning::run_with_teachers(data, options.run, options.teachers);
-  const learning::Run& run = outcome.trained.run;
+  learning::Run& run = outcome.trained.run;
   if (run.was_cancelled) {
     note(fmt::format("stopped after {} epochs{}; --resume goes on", run.epochs.size(),
                      options.teachers > 0 ? fmt::format(" of seed {}", run.seed) : ""));
     return kInconclusive;
   }
 
+  if (trainer.gamma.mode == files::GammaStatement::Mode::kClip && !options.allow_worse) {
+    outcome.scales = learning::output_scales(data, run.theta);
+    learning::scale_outputs(data.layout, outcome.scales, run.theta);
+  }
   const files::Network network = learning::write_network(data, run.theta, trainer.gamma, options.output);
   outcome.select = {learning::rmse_of_nothing(data, Use::kSelect),
                     learning::rmse(data, run.theta, Use::kSelect, common.jobs)};
@@ -414,6 +439,10 @@ Command train_command() {
             ->check(CLI::Range(1, 4096))
             ->capture_default_str();
         app.add_flag("--no-ground", options->no_ground, "Leave out the phi of the own state");
+        app.add_flag("--allow-worse", options->allow_worse,
+                     "Keep each kind's output as trained; without it, outputs are scaled down until no "
+                     "composition of the selecting flights is worse than without the network (not with "
+                     "--gamma-mode equal)");
         app.add_option("--epochs", options->run.epochs, "Maximum number of epochs")
             ->check(CLI::Range(1, 100000))
             ->capture_default_str();

@@ -1,0 +1,71 @@
+#include "analysis/learning/output_scale.h"
+
+#include <algorithm>
+
+#include "nn/training/deep_set_loss.h"
+
+namespace swarmcert::learning {
+namespace {
+
+/// Rounding of scaled weights to float32 must not lead across the limit.
+constexpr double kBelowTheLimit = 1 - 1e-4;
+
+/// Sums over the samples of one composition, y the target and f the network's output.
+struct Products {
+  double yf = 0, ff = 0;
+  double samples = 0;
+};
+
+std::map<std::string, Products> selecting_products(const LearningData& data, const training::Vector& theta) {
+  std::map<std::string, Products> result;
+  for (const TrackSamples& track : data.tracks) {
+    if (track.use != Use::kSelect) continue;
+    std::vector<Eigen::Index> samples;
+    for (Eigen::Index s = track.begin; s < track.end; ++s) samples.push_back(s);
+    const training::Matrix outputs = training::predict(data.layout, theta, data.samples, samples.data(),
+                                                       static_cast<Eigen::Index>(samples.size()));
+    Products& sum = result[track.composition];
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const Eigen::VectorXd f = outputs.col(static_cast<Eigen::Index>(i)).cast<double>();
+      sum.yf += data.samples.target_of(samples[i]).cast<double>().dot(f);
+      sum.ff += f.squaredNorm();
+    }
+    sum.samples += static_cast<double>(samples.size());
+  }
+  return result;
+}
+
+std::string kind_of(const std::string& composition) { return composition.substr(composition.rfind('>') + 1); }
+
+}  // namespace
+
+std::map<std::string, double> output_scales(const LearningData& data, const training::Vector& theta) {
+  struct Sums {
+    double yf = 0, ff = 0, limit = 1;
+  };
+  std::map<std::string, Sums> kinds;
+  for (const auto& [composition, products] : selecting_products(data, theta)) {
+    if (!(products.ff > 0)) continue;
+    Sums& kind = kinds[kind_of(composition)];
+    kind.yf += products.yf / products.samples;
+    kind.ff += products.ff / products.samples;
+    kind.limit = std::min(kind.limit, kBelowTheLimit * 2 * products.yf / products.ff);
+  }
+  std::map<std::string, double> result;
+  for (const auto& [kind, sums] : kinds)
+    result[kind] = std::clamp(sums.yf / sums.ff, 0.0, std::max(0.0, sums.limit));
+  return result;
+}
+
+void scale_outputs(const training::Layout& layout, const std::map<std::string, double>& scales,
+                   training::Vector& theta) {
+  for (const auto& [kind, scale] : scales) {
+    const int part = layout.find("rho:" + kind);
+    if (part < 0) continue;
+    const int last = layout.parts()[static_cast<std::size_t>(part)].layers() - 1;
+    layout.weights(theta, part, last) *= static_cast<float>(scale);
+    layout.biases(theta, part, last) *= static_cast<float>(scale);
+  }
+}
+
+}  // namespace swarmcert::learning
