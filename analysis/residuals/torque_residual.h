@@ -12,8 +12,8 @@ namespace swarmcert::residuals {
 
 /// Records of one vehicle's track.
 struct TorqueResidual {
-  /// Logs below this rate are refused: the attitude loop runs at 500 Hz, and what it does aliases. At 100 Hz the
-  /// published flights give an inertia that is wrong by a factor of 28.
+  /// Logs below this rate are refused: attitude loops run at some hundred hertz, and what they do aliases. At 100 Hz
+  /// the published flights, of a loop at 500 Hz, give an inertia that is wrong by a factor of 28.
   static constexpr double kLeastRate_hz = 400;
 
   std::string refused;  ///< why there is none; else empty

@@ -3,16 +3,15 @@
 namespace swarmcert::stability {
 
 EffectInfo TorqueBias::describe() {
-  return {
-      "torque_bias",
-      "tau = (tau_x, tau_y, tau_z) in the body",
-      "a centre of gravity 1.4 mm off gives 4.6e-4 N m on a Crazyflie",
-      "torque_bias",
-      "logs at the rate of the attitude loop: 100 Hz logs of a 500 Hz loop show nothing else of the torque",
-      {{"torque_x_Nm", "body x", 0, -0.02, 0.02},
-       {"torque_y_Nm", "body y", 0, -0.02, 0.02},
-       {"torque_z_Nm", "body z", 0, -0.02, 0.02}},
-      {}};
+  return {"torque_bias",
+          "tau = (tau_x, tau_y, tau_z) in the body",
+          "a centre of gravity 1.4 mm off gives 4.6e-4 N m on a Crazyflie",
+          "torque_bias",
+          "logs at the rate of the attitude loop: slower logs show only the mean torque",
+          {{"torque_x_Nm", "body x", 0, -0.02, 0.02},
+           {"torque_y_Nm", "body y", 0, -0.02, 0.02},
+           {"torque_z_Nm", "body z", 0, -0.02, 0.02}},
+          {}};
 }
 
 void TorqueBias::columns(const Instant&, const double*, Wrench* columns) const {
