@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 
@@ -78,9 +79,30 @@ files::Network load_net(const files::NetworkArguments& arguments) {
   return files::load_network(arguments);
 }
 
+namespace {
+
+/// `paths` with each folder, such as a bag of rosbag2, replaced by the files in it.
+std::vector<std::string> regular_files(const std::vector<std::string>& paths) {
+  std::vector<std::string> all;
+  for (const std::string& path : paths) {
+    if (!std::filesystem::is_directory(path)) {
+      all.push_back(path);
+      continue;
+    }
+    std::vector<std::string> inside;
+    for (const auto& entry : std::filesystem::directory_iterator(path))
+      if (entry.is_regular_file()) inside.push_back(entry.path().string());
+    std::sort(inside.begin(), inside.end());
+    all.insert(all.end(), inside.begin(), inside.end());
+  }
+  return all;
+}
+
+}  // namespace
+
 files::Json result_head(const std::string& command, const std::vector<std::string>& input_files) {
   files::Json inputs = files::Json::array();
-  for (const std::string& path : input_files) {
+  for (const std::string& path : regular_files(input_files)) {
     inputs.push_back({{"file", path}, {"sha256", files::sha256(files::read_file(path))}});
   }
   return {{"schema", "swarmcert/" + command + "/1"},

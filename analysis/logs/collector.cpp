@@ -7,10 +7,7 @@
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
-namespace {
 
-/// Seconds per unit of a clock, from its median step: the largest of the usual units that gives a rate which flight logs
-/// have.
 double seconds_per_unit(const std::vector<double>& clock) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < clock.size(); ++i) {
@@ -24,8 +21,7 @@ double seconds_per_unit(const std::vector<double>& clock) {
   return steps.empty() ? 1 : 1e-9;
 }
 
-/// The column that is a clock by its name; -1 if none is.
-int clock_column(const RawTopic& topic) {
+int clock_by_name(const RawTopic& topic) {
   for (const char* const name :
        {"t", "time", "timestamp", "time.s", "time.ms", "time.us", "t.s", "t.ms", "sec", "secs", "seconds",
         "stamp", "header.stamp", "time.sec", "rosbag.timestamp"}) {
@@ -36,8 +32,6 @@ int clock_column(const RawTopic& topic) {
   return -1;
 }
 
-}  // namespace
-
 void Collector::begin(const std::vector<std::string>& names) {
   log_.topics.emplace_back();
   RawTopic& topic = log_.topics.back();
@@ -47,7 +41,7 @@ void Collector::begin(const std::vector<std::string>& names) {
   if (clock >= 0)
     scale_s_ = 1e-6 * stated.multiply / stated.divide;
   else if (map_.empty())
-    clock = clock_column(topic);
+    clock = clock_by_name(topic);
   if (clock < 0) {
     throw files::InputError({log_.path, "line 1", "time", "", "no column carries it",
                              "log it, or say in a columns.toml (--columns) which column does"});

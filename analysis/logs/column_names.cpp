@@ -185,16 +185,16 @@ std::string plain_name(const std::string& column) {
   return plain;
 }
 
-bool is_called(const std::string& column, const std::string& name) {
-  if (column == name) return true;
-  if (column.size() <= name.size() + 1 || name.find('.') == std::string::npos) return false;
-  const std::size_t start = column.size() - name.size();
+std::vector<std::string> called_names(const std::string& column) {
+  std::vector<std::string> names = {column};
+  const std::size_t dot = column.find('.');
+  if (dot == std::string::npos || column.find('.', dot + 1) == std::string::npos) return names;
   for (const char* const wish : {"target.", "ref.", "reference.", "des.", "desired.", "setpoint.", "cmd.",
                                  "command.", "goal.", "error.", "err.", "initial."}) {
-    if (column.rfind(wish, 0) == 0) return false;
+    if (column.rfind(wish, 0) == 0) return names;
   }
-  return column[start - 1] == '.' && column.compare(start, name.size(), name) == 0 &&
-         column.find('.') == start - 1;
+  names.push_back(column.substr(dot + 1));
+  return names;
 }
 
 }  // namespace swarmcert::logs

@@ -38,7 +38,8 @@ const std::vector<NamedColumns>& column_names();
 /// Lower case, one dot for every run of other characters than letters and digits, without a unit in brackets.
 std::string plain_name(const std::string& column);
 
-/// True if a column of plain name `column` is called `name`, perhaps behind one further word: "att.stateestimate.qx".
-bool is_called(const std::string& column, const std::string& name);
+/// The names under which a column of plain name `column` is found: itself and, behind one further word that does not turn
+/// it into a set point, the rest: "att.stateestimate.qx" is also called "stateestimate.qx".
+std::vector<std::string> called_names(const std::string& column);
 
 }  // namespace swarmcert::logs

@@ -2,12 +2,14 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <set>
 
 #include "analysis/logs/angles.h"
 #include "analysis/logs/collector.h"
+#include "analysis/logs/column_guess.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
@@ -125,9 +127,79 @@ std::string time_unit(const RawTopic& topic, const RawColumn& column) {
   return "s";
 }
 
+/// Every column of a table as numbers, whatever it means.
+class TableSink : public RecordSink {
+ public:
+  explicit TableSink(RawTopic& topic) : topic_(topic) {}
+  void begin(const std::vector<std::string>& names) override {
+    for (const std::string& name : names) topic_.columns.push_back({name, "", {}});
+  }
+  void record(const std::vector<double>& values) override {
+    for (std::size_t c = 0; c < values.size(); ++c) topic_.columns[c].values.push_back(values[c]);
+  }
+  bool needs(std::size_t) const override { return false; }
+
+ private:
+  RawTopic& topic_;
+};
+
+/// A CSV as a log, with what was found about its clock.
+struct DraftTable {
+  RawLog raw;
+  std::size_t clock = 0;
+  bool clock_is_guessed = false;
+};
+
+std::ifstream open_table(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
+  return in;
+}
+
+/// @throws files::InputError where no column can be a clock.
+DraftTable read_table(const std::string& path) {
+  DraftTable table;
+  table.raw.path = path;
+  table.raw.format = "csv";
+  std::ifstream in = open_table(path);
+  RawTopic all;
+  TableSink sink(all);
+  LogHealth health;
+  read_csv(in, path, sink, health);
+  if (clock_by_name(all) >= 0 || time_column(all, known_columns()).columns[0] >= 0) {
+    std::ifstream again = open_table(path);
+    Collector collector(table.raw, known_columns());
+    read_csv(again, path, collector, table.raw.health);
+    collector.end();
+    table.clock = collector.time_index();
+    return table;
+  }
+  const int clock = guess_clock(all);
+  if (clock < 0) {
+    throw files::InputError({path, "", "time", "", "no column is a clock, by its name or by its values",
+                             "a clock rises with every record by nearly the same step: log it"});
+  }
+  table.clock = static_cast<std::size_t>(clock);
+  table.clock_is_guessed = true;
+  const std::vector<double>& times = all.columns[table.clock].values;
+  const double unit_s = seconds_per_unit(times);
+  for (const double time : times) all.time_s.push_back(time * unit_s);
+  table.raw.topics.push_back(std::move(all));
+  return table;
+}
+
+/// What the names leave open is interpreted where they say enough; otherwise the log stays empty.
+Log interpreted_where_possible(const RawLog& raw) {
+  try {
+    return interpret(raw, known_columns());
+  } catch (const files::InputError&) {
+    return {};
+  }
+}
+
 struct Writer {
   std::string text;
-  std::set<std::string> used;
+  std::set<std::string> used, signals;
 
   void line(const std::string& signal, const std::string& column, const std::string& unit, const char* frame,
             const std::string& evidence) {
@@ -138,30 +210,57 @@ struct Writer {
                         frame == nullptr ? "" : fmt::format(", frame = \"{}\"", frame),
                         evidence.empty() ? "" : "  # " + evidence);
     used.insert(column);
+    signals.insert(signal);
   }
 };
+
+/// Guesses from values for what names do not say, then what only the user can know.
+void add_guesses(const RawTopic& topic, Writer& writer) {
+  std::vector<char> taken;
+  for (const RawColumn& column : topic.columns)
+    taken.push_back(static_cast<char>(writer.used.count(column.name)));
+  const std::vector<std::string> known(writer.signals.begin(), writer.signals.end());
+  for (const ColumnGuess& guess : guess_columns(topic, taken, known))
+    writer.line(guess.signal, topic.columns[guess.column].name, guess.unit, guess.frame,
+                "GUESSED from values: " + guess.evidence);
+  struct Needed {
+    std::vector<const char*> any_of;
+    const char* line;
+  };
+  for (const Needed& needed :
+       {Needed{{"position_x", "position_z", "velocity_x", "velocity_z"},
+               "position_x = { column = \"?\", unit = \"m\", frame = \"world\" }, and y, z"},
+        Needed{{"attitude_w", "roll"},
+               "attitude_x = { column = \"?\", unit = \"1\" }, and y, z, w; or roll, pitch, yaw"},
+        Needed{{"duty_1", "requested_1", "motor_force_1", "thrust_command"},
+               "duty_1 = { column = \"?\", unit = \"PWM\" }, and 2 .. 4; or requested_1 .. 4, "
+               "motor_force_1 .. 4, thrust_command"}}) {
+    const bool found = std::any_of(needed.any_of.begin(), needed.any_of.end(),
+                                   [&](const char* signal) { return writer.signals.count(signal) > 0; });
+    if (!found) writer.text += std::string("# FILL IN, if it was logged: ") + needed.line + "\n";
+  }
+  for (const RawColumn& column : topic.columns) {
+    if (writer.used.count(column.name) == 0)
+      writer.text += "# not used: " + column.name + " (" + range_in_words(column) + ")\n";
+  }
+}
 
 }  // namespace
 
 std::string columns_draft(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
-  RawLog raw;
-  raw.path = path;
-  raw.format = "csv";
-  Collector collector(raw, known_columns());
-  read_csv(in, path, collector, raw.health);
-  collector.end();
-  const RawTopic& topic = raw.topics.front();
-  const Recognition recognition = recognise(raw, known_columns());
-  const Log log = interpret(raw, known_columns());
+  const DraftTable table = read_table(path);
+  const RawTopic& topic = table.raw.topics.front();
+  const Recognition recognition = recognise(table.raw, known_columns());
+  const Log log = interpreted_where_possible(table.raw);
   Writer writer;
   writer.text = "# Proposed by 'swarmcert inspect --columns-draft' for " + path +
                 ".\n# Check every line: units, frames and signs decide what the residuals mean.\n";
   for (const std::string& words : log.interpretation) writer.text += "# seen: " + words + "\n";
   writer.text += "schema = \"swarmcert/columns/1\"\n";
-  const RawColumn& clock = topic.columns[collector.time_index()];
-  writer.line("time", clock.name, time_unit(topic, clock), nullptr, "");
+  const RawColumn& clock = topic.columns[table.clock];
+  writer.line(
+      "time", clock.name, time_unit(topic, clock), nullptr,
+      table.clock_is_guessed ? "GUESSED from values: rises by nearly the same step with every record" : "");
   for (const SignalWords& words : signal_words()) {
     for (const Carried& carried : recognition.groups) {
       const int offset = words.signal - carried.signal;
@@ -181,6 +280,7 @@ std::string columns_draft(const std::string& path) {
           stored.push_back(column.values[record]);
           taken.push_back(interpreted(log, i, words.signal + static_cast<int>(k)));
         }
+        if (log.samples.empty()) stored = column.values;
         const Line line = line_through(taken, stored);
         const bool compared = line.count > 10 && std::abs(line.correlation) > 0.5;
         if (words.signal == kForceBody && !compared) continue;  // neither frame nor gravity could be settled
@@ -192,9 +292,7 @@ std::string columns_draft(const std::string& path) {
       }
     }
   }
-  for (const RawColumn& column : topic.columns) {
-    if (writer.used.count(column.name) == 0) writer.text += "# not used: " + column.name + "\n";
-  }
+  add_guesses(topic, writer);
   return writer.text;
 }
 

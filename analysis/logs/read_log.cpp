@@ -12,6 +12,7 @@
 #include "analysis/logs/collector.h"
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/interpretation.h"
+#include "analysis/logs/variable_names.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
@@ -98,11 +99,28 @@ Log parse_log(std::istream& in, const std::string& path, const SignalMap& map) {
 }
 
 Log read_log(const std::string& path, const SignalMap& map) {
-  std::ifstream in = open(path);
-  return parse_log(in, path, map);
+  RawLog raw;
+  if (std::filesystem::is_directory(path)) {
+    raw = read_raw(path);
+  } else {
+    std::ifstream in = open(path);
+    raw = raw_of(in, path, map);
+  }
+  // What a columns.toml says counts: its columns keep the names that the log itself gives.
+  const std::vector<std::string> named = map.empty() ? name_variables(raw) : std::vector<std::string>{};
+  try {
+    Log log = interpret(raw, map);
+    log.interpretation.insert(log.interpretation.begin(), named.begin(), named.end());
+    return log;
+  } catch (const files::InputError& error) {
+    files::InputFault fault = error.fault();
+    for (const std::string& note : named) fault.mend = note + "; " + fault.mend;
+    throw files::InputError(fault);
+  }
 }
 
 bool looks_like_log(const std::string& path) {
+  if (std::filesystem::is_directory(path)) return is_log_folder(path);
   if (is_log_name(std::filesystem::path(path).filename().string())) return true;
   if (std::filesystem::path(path).extension() == ".csv") return true;
   if (format_of_file(path) != nullptr) return true;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
@@ -9,20 +10,34 @@
 namespace swarmcert::logs {
 namespace {
 
-/// Columns by name within a topic; an entry is -1 where the topic has none.
-std::vector<int> columns_called(const RawTopic& topic, const std::vector<std::string>& plain,
-                                const std::vector<std::string>& names) {
-  std::vector<int> columns;
-  for (const std::string& name : names) {
-    const bool exact = name.find('[') != std::string::npos;
-    int found = -1;
-    for (std::size_t c = 0; c < plain.size() && found < 0; ++c) {
-      if (exact ? topic.columns[c].name == name : is_called(plain[c], name)) found = static_cast<int>(c);
+/// The columns of one topic by every name that they answer to. The table of names is long: one pass over the columns
+/// replaces a comparison of each column with each name.
+class ColumnIndex {
+ public:
+  explicit ColumnIndex(const RawTopic& topic) {
+    for (std::size_t c = 0; c < topic.columns.size(); ++c) {
+      const std::string& name = topic.columns[c].name;
+      const auto index = static_cast<int>(c);
+      exact_.emplace(name, index);
+      for (std::string& called : called_names(plain_name(name))) plain_.emplace(std::move(called), index);
     }
-    columns.push_back(found);
   }
-  return columns;
-}
+
+  /// One index per name; -1 where the topic has no such column. The first column of a name counts.
+  std::vector<int> columns_called(const std::vector<std::string>& names) const {
+    std::vector<int> columns;
+    for (const std::string& name : names) {
+      const Names& known = name.find('[') != std::string::npos ? exact_ : plain_;
+      const auto found = known.find(name);
+      columns.push_back(found == known.end() ? -1 : found->second);
+    }
+    return columns;
+  }
+
+ private:
+  using Names = std::unordered_map<std::string, int>;
+  Names exact_, plain_;
+};
 
 /// A length whose column states a smaller unit in brackets, "X (mm)", "vx [cm/s]".
 void take_stated_unit(const RawTopic& topic, Carried& carried) {
@@ -95,17 +110,12 @@ bool is_wish(const RawTopic& topic, int signal) {
 }
 
 void recognise_by_names(const RawLog& log, Recognition& found) {
-  std::vector<std::vector<std::string>> plain;
-  for (const RawTopic& topic : log.topics) {
-    plain.emplace_back();
-    for (const RawColumn& column : topic.columns) plain.back().push_back(plain_name(column.name));
-  }
+  const std::vector<ColumnIndex> indices(log.topics.begin(), log.topics.end());
   for (const NamedColumns& row : column_names()) {
     if (found.find(row.signal) != nullptr) continue;
     for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
-      Carried carried{
-          row.signal, t,      columns_called(log.topics[t], plain[t], row.names), row.unit, row.multiply,
-          row.divide, row.ask};
+      Carried carried{row.signal, t,      indices[t].columns_called(row.names), row.unit, row.multiply,
+                      row.divide, row.ask};
       const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
       const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
       if (missing == size || (missing > 0 && !may_be_partial(row.signal))) continue;

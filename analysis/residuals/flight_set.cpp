@@ -54,6 +54,11 @@ struct Candidates {
   std::vector<std::string> logs, skipped;
 };
 
+std::string without_slash(const std::string& folder) {
+  const fs::path path(folder);
+  return path.has_filename() ? folder : path.parent_path().string();
+}
+
 Candidates candidates_below(const std::string& path) {
   if (!fs::exists(path))
     throw files::InputError({path, "", "", "", "does not exist", "name files or folders of flights"});
@@ -66,13 +71,22 @@ Candidates candidates_below(const std::string& path) {
     }
     return {{path}, {}};
   }
+  // A bag of rosbag2 and a session of cfclient are one log in several files.
+  if (logs::looks_like_log(path)) return {{without_slash(path)}, {}};
   std::vector<std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(path)) {
-    if (entry.is_regular_file()) files.push_back(entry.path().string());
+  Candidates found;
+  for (fs::recursive_directory_iterator at(path), end; at != end; ++at) {
+    const std::string entry = at->path().string();
+    if (at->is_regular_file()) {
+      files.push_back(entry);
+    } else if (at->is_directory() && logs::looks_like_log(entry)) {
+      at.disable_recursion_pending();
+      found.logs.push_back(entry);
+    }
   }
   std::sort(files.begin(), files.end());
-  Candidates found;
   for (const std::string& file : files) (is_log(file) ? found.logs : found.skipped).push_back(file);
+  std::sort(found.logs.begin(), found.logs.end());
   return found;
 }
 

@@ -120,6 +120,31 @@ TEST(FindFlights, GroupsFilesThatWereRecordedAtTheSameTime) {
   }
 }
 
+TEST(FindFlights, AFolderInWhichCfclientRecordedIsOneLogOfAllItsBlocks) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder.path() / "monday/20260131T12-00-00");
+  std::string motion =
+                  "Timestamp,stateEstimate.x,stateEstimate.y,stateEstimate.z,stateEstimate.vx,"
+                  "stateEstimate.vy,stateEstimate.vz\n",
+              motors = "Timestamp,pwm.m1_pwm,pwm.m2_pwm,pwm.m3_pwm,pwm.m4_pwm,pm.vbat\n";
+  for (int k = 0; k < 800; ++k) {
+    motion += fmt::format("{},{:.5f},0,1,{:.5f},0,0\n", 10 * k, 0.02 * std::sin(0.02 * k),
+                          0.04 * std::cos(0.02 * k));
+    motors += fmt::format("{},40000,40000,40000,40000,3.8\n", 10 * k);
+  }
+  const std::string name = "monday/20260131T12-00-00/";
+  write_text(folder / (name + "motion-20260131T12-00-01.csv"), motion);
+  write_text(folder / (name + "motors-20260131T12-00-01.csv"), motors);
+  const residuals::FoundFlights found = residuals::find_flights({folder.path().string()});
+  ASSERT_EQ(found.flights.size(), 1u);
+  EXPECT_EQ(found.flights[0].logs[0].second, folder / "monday/20260131T12-00-00");
+  const files::Json json = result_of(folder, "inspect monday", "inspect");
+  ASSERT_EQ(json["files"].size(), 1u);
+  EXPECT_EQ(json["files"][0]["judged"]["force"].dump(), "[\"z\"]")
+      << "position and duty lie in different files";
+  EXPECT_EQ(json["inputs"].size(), 2u) << "both files are inputs of the result";
+}
+
 TEST(FlightsToml, RulesOfSingleLogsGoBeforePatternsAndAreTakenTogether) {
   const ScratchFolder folder;
   write_text(folder / "flights.toml",

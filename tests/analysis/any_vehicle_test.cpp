@@ -247,6 +247,9 @@ TEST(Inspect, AFolderEndsInATableOfWhatCanBeJudged) {
   EXPECT_EQ(json["collections"][2]["name"], "all");
   EXPECT_EQ(json["collections"][2]["logs"], 3);
   EXPECT_NEAR(json["collections"][2]["seconds"].get<double>(), 36, 1);
+  const Outcome table = run_shell("swarmcert inspect all", folder.path());
+  for (const char* words : {"flight [s]", "run [s]", "flight: seconds in the air; run: seconds that reading"})
+    EXPECT_NE(table.output.find(words), std::string::npos) << table.output;
   const files::Json compared = json_of(folder, "compare all", "compare");
   EXPECT_EQ(compared["collections"][2]["force"]["z"], 2);
   EXPECT_EQ(compared["collections"][1]["left_out"][0]["why"], "no usable record");

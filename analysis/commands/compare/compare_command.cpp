@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -151,6 +152,7 @@ void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& r
 }
 
 int run_compare(const CompareOptions& options, const CommonOptions& common) {
+  const auto start = std::chrono::steady_clock::now();
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (!options.inject.empty() &&
@@ -190,6 +192,10 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   write_result(common, result);
   if (common.prints_text()) print_comparison(comparison, inputs, own ? &*own : nullptr);
   if (common.prints_text() && budget) print(*budget);
+  if (common.prints_text() && inputs.found.flights.size() > 1) {
+    const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
+    fmt::print("Run time: {:.1f} s for {} flights.\n", run.count(), inputs.found.flights.size());
+  }
   if (!options.report.empty()) {
     const std::string path = write_compare_report(comparison, inputs, result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <chrono>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -189,6 +190,7 @@ struct Seen {
 
 files::Json inspect_log(const std::string& path, const InspectOptions& options, const CommonOptions& common,
                         bool in_table, Seen& seen) {
+  const auto start = std::chrono::steady_clock::now();
   const logs::Log log = options.columns.empty() ? logs::read_log(path)
                                                 : logs::read_log(path, logs::read_columns(options.columns));
   if (!options.csv.empty()) {
@@ -199,6 +201,8 @@ files::Json inspect_log(const std::string& path, const InspectOptions& options, 
   files::Json json = {{"file", path}};
   json.update(describe_log(log));
   seen.outcomes.push_back(outcome_of(path, log, json));
+  seen.outcomes.back().run_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!options.report.empty()) seen.logs.push_back({path, json, logs::findings(log.health), curve_of(log)});
   if (common.prints_text()) {
     if (in_table)
@@ -253,7 +257,21 @@ void print_grouping(const files::Json& flights, const files::Json& skipped) {
   if (!skipped.empty()) fmt::print("{} files are no logs and were skipped\n", skipped.size());
 }
 
-int run_inspect(const InspectOptions& options, const CommonOptions& common) {
+/// Where names alone say too little, the log is inspected as the draft describes it.
+void write_draft(InspectOptions& options, const CommonOptions& common) {
+  if (options.files.size() != 1) throw UsageError("--columns-draft takes one CSV");
+  refuse_to_replace(common, options.columns_draft);
+  files::write_file(options.columns_draft, logs::columns_draft(options.files[0]), common.force);
+  if (common.prints_text()) fmt::print("Written: {}\n", options.columns_draft);
+  if (!options.columns.empty()) return;
+  try {
+    logs::read_log(options.files[0]);
+  } catch (const files::InputError&) {
+    options.columns = options.columns_draft;
+  }
+}
+
+int run_inspect(InspectOptions options, const CommonOptions& common) {
   if (!options.csv.empty()) {
     if (options.files.size() != 1 || !logs::looks_like_log(options.files[0]))
       throw UsageError("--csv takes one flight log");
@@ -261,11 +279,7 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
     refuse_to_replace(common, options.csv);
   }
   refuse_folder(common, options.report);
-  if (!options.columns_draft.empty()) {
-    if (options.files.size() != 1) throw UsageError("--columns-draft takes one CSV");
-    refuse_to_replace(common, options.columns_draft);
-    files::write_file(options.columns_draft, logs::columns_draft(options.files[0]), common.force);
-  }
+  if (!options.columns_draft.empty()) write_draft(options, common);
   files::Json found = files::Json::array(), flights = files::Json::array(), skipped = files::Json::array();
   const std::vector<std::string> paths = expanded(options.files, flights, skipped);
   const bool in_table = paths.size() > options.files.size();
@@ -275,7 +289,7 @@ int run_inspect(const InspectOptions& options, const CommonOptions& common) {
     try {
       found.push_back(inspect(path, options, common, in_table, seen));
     } catch (const files::InputError& error) {
-      seen.outcomes.push_back({path, false, {}, false, 0, "unreadable: " + error.fault().what});
+      seen.outcomes.push_back({path, false, {}, false, 0, 0, "unreadable: " + error.fault().what});
       note(std::string("swarmcert: ") + error.what());
       found.push_back({{"file", path}, {"kind", "unreadable"}, {"reason", error.what()}});
       continue;
@@ -329,7 +343,8 @@ Command inspect_command() {
             "can be judged, and what to log next time");
         add_output(app, "--columns-draft", options->columns_draft,
                    "Write a columns.toml for the one CSV: meaning, unit and frame of its columns, with the "
-                   "evidence");
+                   "evidence; what names do not say is guessed from the values and marked, and what is left "
+                   "is listed to be filled in");
         app.add_option("--key", options->network.key,
                        "Key of the state dict inside a nested checkpoint, e.g. model");
         declare_order(app, options->network);

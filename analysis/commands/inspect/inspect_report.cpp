@@ -43,9 +43,11 @@ void add_collections(Report& report, const std::vector<CollectionRow>& rows) {
       left_out += fmt::format("{}{} {}", left_out.empty() ? "" : "; ", count, why);
     table.push_back({row.name, std::to_string(row.logs), std::to_string(row.opened),
                      std::to_string(row.force[0]), std::to_string(row.force[1]), std::to_string(row.force[2]),
-                     std::to_string(row.torque), fmt::format("{:.1f}", row.seconds), left_out});
+                     std::to_string(row.torque), fmt::format("{:.1f}", row.seconds),
+                     fmt::format("{:.2f}", row.run_s), left_out});
   }
-  report.table({"folder", "logs", "opened", "force x", "y", "z", "torque", "in the air [s]", "left out"},
+  report.table({"folder", "logs", "opened", "force x", "y", "z", "torque", "in the air [s]", "run time [s]",
+                "left out"},
                table);
 }
 

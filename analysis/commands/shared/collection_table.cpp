@@ -17,6 +17,7 @@ void add(CollectionRow& row, const LogOutcome& log) {
   for (std::size_t k = 0; k < 3; ++k) row.force[k] += log.force[k] ? 1 : 0;
   row.torque += log.torque ? 1 : 0;
   row.seconds += log.seconds;
+  row.run_s += log.run_s;
   if (!log.left_out_why.empty()) ++row.left_out[log.left_out_why];
 }
 
@@ -87,14 +88,18 @@ void print_collections(const std::vector<CollectionRow>& rows, const std::string
   if (rows.empty()) return;
   std::size_t width = 6;
   for (const CollectionRow& row : rows) width = std::max(width, row.name.size());
-  fmt::print("\n{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>10}  left out\n", "folder", width + 1, "logs",
-             "opened", "force x", "y", "z", "torque", "seconds");
+  const bool is_timed =
+      std::any_of(rows.begin(), rows.end(), [](const CollectionRow& row) { return row.run_s > 0; });
+  fmt::print("\n{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>11}{}  left out\n", "folder", width + 1, "logs",
+             "opened", "force x", "y", "z", "torque", "flight [s]", is_timed ? "   run [s]" : "");
   for (const CollectionRow& row : rows) {
-    fmt::print("{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>10.1f}  {}\n", row.name, width + 1, row.logs,
+    fmt::print("{:<{}}{:>6}{:>8}{:>9}{:>6}{:>6}{:>8}{:>11.1f}{}  {}\n", row.name, width + 1, row.logs,
                row.opened, row.force[0], row.force[1], row.force[2], row.torque, row.seconds,
+               is_timed ? fmt::format("{:>10.2f}", row.run_s) : "",
                row.left_out.empty() ? "-" : reasons(row));
   }
-  fmt::print("(seconds: {}; torque: at least its mean in slow flight)\n", seconds);
+  fmt::print("(flight: seconds {}{}; torque: at least its mean in slow flight)\n", seconds,
+             is_timed ? "; run: seconds that reading and judging took" : "");
 }
 
 }  // namespace swarmcert::analysis

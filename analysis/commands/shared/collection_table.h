@@ -15,7 +15,8 @@ struct LogOutcome {
   bool opened = false;
   bool force[3] = {};        ///< judged along x, y, z of the world
   bool torque = false;       ///< at least its mean in slow flight
-  double seconds = 0;        ///< in the air or, where a model was compared, used
+  double seconds = 0;        ///< of flight: in the air or, where a model was compared, used
+  double run_s = 0;          ///< that the program took to read and judge it; 0: not measured
   std::string left_out_why;  ///< empty where at least one axis is judged
 };
 
@@ -23,7 +24,7 @@ struct LogOutcome {
 struct CollectionRow {
   std::string name;
   std::size_t logs = 0, opened = 0, force[3] = {}, torque = 0;
-  double seconds = 0;
+  double seconds = 0, run_s = 0;
   std::map<std::string, std::size_t> left_out;  ///< by reason
 };
 
@@ -32,9 +33,10 @@ struct CollectionRow {
 std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words,
                                            const std::vector<LogOutcome>& logs);
 
+/// Without run_s: a result depends on its inputs alone.
 files::Json json_of(const std::vector<CollectionRow>& rows);
 
-/// On stdout, with what `seconds` counts.
+/// On stdout: flight seconds, with what `seconds` counts, and the run time where it was measured.
 void print_collections(const std::vector<CollectionRow>& rows, const std::string& seconds);
 
 }  // namespace swarmcert::analysis

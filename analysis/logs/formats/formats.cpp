@@ -3,14 +3,27 @@
 #include <fstream>
 
 #include "analysis/logs/formats/crazyflie_csv.h"
-#include "analysis/logs/formats/dataflash.h"
-#include "analysis/logs/formats/mcap.h"
 #include "analysis/logs/formats/rosbag_folder.h"
-#include "analysis/logs/formats/rosbag_sqlite.h"
-#include "analysis/logs/formats/ulog.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
+
+/// Every format: its name for messages, and the stem of its functions and of its source: <stem>.cpp defines
+/// looks_like_<stem>() and read_<stem>(). Formats are tried in this order.
+#define SWARMCERT_LOG_FORMATS(FORMAT)        \
+  FORMAT("PX4 ULog", ulog)                   \
+  FORMAT("rosbag2 in MCAP", mcap)            \
+  FORMAT("rosbag2 in SQLite", rosbag_sqlite) \
+  FORMAT("ArduPilot dataflash", dataflash)   \
+  FORMAT("CSV of Crazyflie log variables", crazyflie_csv)
+
+#define SWARMCERT_DECLARE(name, stem)            \
+  bool looks_like_##stem(std::string_view head); \
+  RawLog read_##stem(std::istream& in, const std::string& path);
+#define SWARMCERT_ENTRY(name, stem) {name, looks_like_##stem, read_##stem},
+
+SWARMCERT_LOG_FORMATS(SWARMCERT_DECLARE)
+
 namespace {
 
 /// The first bytes; the stream stands at its start again.
@@ -36,13 +49,7 @@ std::string head_of(std::istream& in) {
 }  // namespace
 
 const std::vector<LogFormat>& log_formats() {
-  static const std::vector<LogFormat> formats = {
-      {"PX4 ULog", looks_like_ulog, read_ulog},
-      {"rosbag2 in MCAP", looks_like_mcap, read_mcap},
-      {"rosbag2 in SQLite", looks_like_rosbag_sqlite, read_rosbag_sqlite},
-      {"ArduPilot dataflash", looks_like_dataflash, read_dataflash},
-      {"CSV of Crazyflie log variables", looks_like_crazyflie_csv, read_crazyflie_csv},
-  };
+  static const std::vector<LogFormat> formats = {SWARMCERT_LOG_FORMATS(SWARMCERT_ENTRY)};
   return formats;
 }
 
@@ -64,6 +71,10 @@ RawLog parse_raw(std::istream& in, const std::string& path) {
   return format->read(in, path);
 }
 
+bool is_log_folder(const std::string& path) {
+  return looks_like_rosbag_folder(path) || looks_like_cfclient_folder(path);
+}
+
 RawLog read_raw(const std::string& path) {
   if (looks_like_rosbag_folder(path)) return read_rosbag_folder(path);
   if (looks_like_cfclient_folder(path)) return read_cfclient_folder(path);
@@ -73,3 +84,7 @@ RawLog read_raw(const std::string& path) {
 }
 
 }  // namespace swarmcert::logs
+
+#undef SWARMCERT_LOG_FORMATS
+#undef SWARMCERT_DECLARE
+#undef SWARMCERT_ENTRY

@@ -27,6 +27,9 @@ const LogFormat* format_of(std::string_view head);
 /// As format_of(), of the file's first bytes; nullptr also where it cannot be read.
 const LogFormat* format_of_file(const std::string& path);
 
+/// True for a folder that is one log: a bag of rosbag2 with its metadata.yaml, a session of cfclient.
+bool is_log_folder(const std::string& path);
+
 /// Reads a log whose format is recognised by its content, or a folder that is one log: a bag of rosbag2,
 /// a session of cfclient.
 /// @throws files::InputError if no format fits, or the file cannot be read at all, with offset or line. Damage inside a

@@ -1,0 +1,173 @@
+/// Names of columns: the table of signals, the list of formats, and crazyflies.yaml beside a bag of Crazyswarm2.
+#include "analysis/logs/variable_names.h"
+
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "analysis/logs/column_names.h"
+#include "analysis/logs/formats/formats.h"
+#include "analysis/logs/read_log.h"
+#include "analysis/logs/recognition.h"
+#include "data.h"
+#include "logs/rosbag_writer.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::tests {
+namespace {
+
+TEST(ColumnNames, EveryRowOfTheTableIsASignalByItself) {
+  // A signal name is one line of the table: nothing else has to know it.
+  std::size_t rows = 0;
+  for (const logs::NamedColumns& row : logs::column_names()) {
+    logs::RawLog log;
+    log.topics.emplace_back();
+    logs::RawTopic& topic = log.topics.back();
+    topic.time_s = {0, 0.01, 0.02};
+    for (const std::string& name : row.names) topic.columns.push_back({name, "", {0.5, 0.5, 0.5}});
+    const logs::Recognition found = logs::recognise(log, logs::known_columns());
+    const logs::Carried* const carried = found.find(row.signal);
+    ASSERT_NE(carried, nullptr) << row.names[0];
+    for (std::size_t k = 0; k < carried->size(); ++k) EXPECT_GE(carried->columns[k], 0) << row.names[0];
+    ++rows;
+  }
+  EXPECT_GT(rows, 100u);
+}
+
+TEST(ColumnNames, OneWordBeforeANameIsPassedOverUnlessItMakesItASetPoint) {
+  EXPECT_EQ(logs::called_names("att.stateestimate.qx"),
+            (std::vector<std::string>{"att.stateestimate.qx", "stateestimate.qx"}));
+  EXPECT_EQ(logs::called_names("target.position.x"), (std::vector<std::string>{"target.position.x"}));
+  EXPECT_EQ(logs::called_names("pm.vbat"), (std::vector<std::string>{"pm.vbat"}));
+}
+
+TEST(Formats, EachIsOneLineOfTheListAndOneSource) {
+  const std::filesystem::path folder = source_path("analysis/logs/formats");
+  std::ifstream in(folder / "formats.cpp");
+  std::ostringstream text;
+  text << in.rdbuf();
+  const std::string list = text.str();
+  const std::regex line("FORMAT\\(\"([^\"]+)\", (\\w+)\\)");
+  std::size_t formats = 0;
+  for (std::sregex_iterator at(list.begin(), list.end(), line), end; at != end; ++at, ++formats) {
+    EXPECT_TRUE(std::filesystem::exists(folder / ((*at)[2].str() + ".cpp"))) << (*at)[2];
+    ASSERT_LT(formats, logs::log_formats().size());
+    EXPECT_EQ(logs::log_formats()[formats].name, (*at)[1].str());
+  }
+  EXPECT_EQ(formats, logs::log_formats().size());
+}
+
+constexpr const char* kYaml = R"(# of Crazyswarm2
+fileversion: 3
+robots:
+  cf1:
+    enabled: true
+    type: heavy  # see robot_types
+    firmware_logging:
+      custom_topics:
+        motion: {frequency: 100}
+  cf2:
+    type: light
+    firmware_logging:
+      custom_topics:
+        motion:
+          frequency: 100
+          vars: ["stateEstimate.x", 'stateEstimate.y']
+robot_types:
+  heavy:
+    motion_capture:
+      tracking: "librigidbodytracker"
+    firmware_logging:
+      custom_topics:
+        battery:
+          vars:
+            - pm.vbat
+            - pm.vbatMV
+all:
+  firmware_logging:
+    enabled: true
+    default_topics:
+      pose:
+        frequency: 10
+    custom_topics:
+      motion:
+        frequency: 100 # Hz
+        vars: ["stateEstimate.x", "stateEstimate.y", "stateEstimate.z",
+               "stateEstimate.vx", "stateEstimate.vy", "stateEstimate.vz"]  # six
+)";
+
+TEST(CrazyfliesYaml, ARobotGoesBeforeItsTypeAndItsTypeBeforeAll) {
+  const logs::CustomTopics topics = logs::parse_custom_topics(kYaml);
+  EXPECT_EQ(topics.variables("/cf2/motion"),
+            (std::vector<std::string>{"stateEstimate.x", "stateEstimate.y"}));
+  EXPECT_EQ(topics.variables("/cf1/motion").size(), 6u);
+  EXPECT_EQ(topics.variables("/cf1/motion")[5], "stateEstimate.vz");
+  EXPECT_EQ(topics.variables("/cf1/battery"), (std::vector<std::string>{"pm.vbat", "pm.vbatMV"}));
+  EXPECT_TRUE(topics.variables("/cf2/battery").empty());
+  EXPECT_TRUE(topics.variables("battery").empty());
+}
+
+TEST(CrazyfliesYaml, LinesOfAnyOtherFileAreHarmless) {
+  for (const char* const text : {"vars: [a, b", "- a\n- b", "custom_topics:\n  t:\n    vars: [", ":",
+                                 "]\n:\n\"", "robots:\n custom_topics:\n  x:\n   vars:\n   - \"\n"})
+    logs::parse_custom_topics(text);
+}
+
+/// A bag of one topic of LogDataGeneric with six values: a vehicle that climbs by 0.5 m/s.
+std::string generic_bag(const std::string& topic) {
+  std::string statements =
+      rosbag_tables() + rosbag_topic(1, topic, "crazyflie_interfaces/msg/LogDataGeneric");
+  for (int k = 0; k < 300; ++k) {
+    const double t = 0.01 * k;
+    CdrWriter message;
+    message.header(1, 0, "world").number(static_cast<std::uint32_t>(10 * k)).count(6);
+    for (const double value : {0.1, 0.2, 0.3 + 0.5 * t, 0.0, 0.0, 0.5})
+      message.number(static_cast<float>(value));
+    statements += rosbag_message(1, 1'000'000'000 + 10'000'000L * k, message.message());
+  }
+  return sqlite_bytes(statements);
+}
+
+class BagBesideYaml : public testing::Test {
+ protected:
+  BagBesideYaml() : folder_(std::filesystem::path(testing::TempDir()) / "swarmcert-crazyflies-yaml") {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  ~BagBesideYaml() override { std::filesystem::remove_all(folder_); }
+
+  logs::Log read(const std::string& topic, const std::string& yaml) {
+    std::ofstream(folder_ / "flight.db3", std::ios::binary) << generic_bag(topic);
+    std::ofstream(folder_ / "crazyflies.yaml") << yaml;
+    return logs::read_log((folder_ / "flight.db3").string());
+  }
+
+  const std::filesystem::path folder_;
+};
+
+TEST_F(BagBesideYaml, ValuesAreSignalsWithoutAColumnsToml) {
+  const logs::Log log = read("/cf1/motion", kYaml);
+  EXPECT_TRUE(log.signals.position);
+  ASSERT_EQ(log.samples.size(), 300u);
+  EXPECT_NEAR(log.samples[200].position_m[2], 1.3, 1e-6);
+  EXPECT_NEAR(log.samples[200].velocity_m_s[2], 0.5, 1e-6);
+  EXPECT_EQ(log.interpretation.at(0), "the values of /cf1/motion are named by crazyflies.yaml");
+}
+
+TEST_F(BagBesideYaml, NamesOfAnotherNumberOfValuesAreNotTaken) {
+  try {
+    read("/cf2/motion", kYaml);
+    FAIL() << "two names cannot stand for six values";
+  } catch (const files::InputError& error) {
+    EXPECT_NE(error.fault().mend.find("crazyflies.yaml names 2 variables of /cf2/motion, which has 6 values"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
