@@ -144,6 +144,39 @@ Json law_json(const CertifiedLaw& law) {
           {"upper_hex", hex_float(law.upper.value())}};
 }
 
+Json vector_json(const VectorBounds& bounds) {
+  return {{"lower", joined(bounds.lower)},
+          {"upper", joined(bounds.upper)},
+          {"error", bounds.error.empty() ? Json() : Json(joined(bounds.error))}};
+}
+
+/// A number in both notations, or null twice.
+void set_number(Json& json, const std::string& name, const std::optional<double>& number) {
+  json[name] = number ? Json(*number) : Json();
+  json[name + "_hex"] = number ? Json(hex_float(*number)) : Json();
+}
+
+Json values_json(const CertifiedValues& values) {
+  Json networks = Json::object();
+  for (const auto& [name, layers] : values.layers) {
+    networks[name] = Json::array();
+    for (const VectorBounds& layer : layers) networks[name].push_back(vector_json(layer));
+  }
+  Json input_error;
+  for (const auto& [name, errors] : values.input_error) input_error[name] = hex_floats(errors);
+  Json json = {{"function", values.function},
+               {"neighbours", values.neighbours},
+               {"domain", values.in_clamp ? "clamp" : "box"},
+               {"input_error", std::move(input_error)},
+               {"networks", std::move(networks)},
+               {"sum", values.sum ? vector_json(*values.sum) : Json()},
+               {"lower", hex_floats(values.output().lower)},
+               {"upper", hex_floats(values.output().upper)}};
+  set_number(json, "jump", values.jump);
+  set_number(json, "float32_error", values.float32_error);
+  return json;
+}
+
 }  // namespace
 
 Json summary(const files::Network& network, const CertifiedBound& bound) {
@@ -193,6 +226,8 @@ Json certificate(const files::Network& network, const Certification& certificati
   for (const CertifiedBound& bound : certification.bounds) bounds.push_back(bound_json(network, bound));
   Json laws = Json::array();
   for (const CertifiedLaw& law : certification.laws) laws.push_back(law_json(law));
+  Json values = Json::array();
+  for (const CertifiedValues& entry : certification.values) values.push_back(values_json(entry));
   Json box;
   for (const auto& [part, sides] : certification.domain)
     box[part] = {{"lower", hex_floats(sides.lower)}, {"upper", hex_floats(sides.upper)}};
@@ -206,7 +241,8 @@ Json certificate(const files::Network& network, const Certification& certificati
       {"box", std::move(box)},
       {"layers", std::move(layers)},
       {"bounds", std::move(bounds)},
-      {"laws", std::move(laws)}};
+      {"laws", std::move(laws)},
+      {"values", std::move(values)}};
   result["content_sha256"] = files::content_sha256(result);
   return result;
 }

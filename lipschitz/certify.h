@@ -15,6 +15,7 @@
 #include "lipschitz/lower_bound.h"
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/spectral_norm.h"
+#include "lipschitz/value_bounds.h"
 #include "nn/base/json.h"
 #include "nn/weights/network.h"
 #include "nn/weights/samples.h"
@@ -86,6 +87,7 @@ struct Certification {
   std::vector<CertifiedLayer> layers;
   std::vector<CertifiedBound> bounds;
   std::vector<CertifiedLaw> laws;
+  std::vector<CertifiedValues> values;  ///< for the certificate; from certified_values()
 };
 
 /// How far from gamma a norm may lie, relatively, to count as equal to it: what float32 storage costs, and a little.

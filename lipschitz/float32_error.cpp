@@ -103,16 +103,6 @@ double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, 
   return queue.top().cost;
 }
 
-/// How far an input's conversion may move it, per coordinate.
-std::vector<double> input_errors(const Box& box, double step) {
-  std::vector<double> result;
-  for (std::size_t k = 0; k < box.lower.size(); ++k) {
-    const double largest = std::max(std::abs(box.lower[k]), std::abs(box.upper[k]));
-    result.push_back(safely(step / 2 + kFloatUnit * (largest + step) + 0x1p-149));
-  }
-  return result;
-}
-
 Box inflated(const Box& box, const std::vector<double>& by) {
   Box result = box;
   for (std::size_t k = 0; k < by.size(); ++k) {
@@ -258,6 +248,15 @@ class SetError {
 };
 
 }  // namespace
+
+std::vector<double> input_errors(const Box& box, double step) {
+  std::vector<double> result;
+  for (std::size_t k = 0; k < box.lower.size(); ++k) {
+    const double largest = std::max(std::abs(box.lower[k]), std::abs(box.upper[k]));
+    result.push_back(safely(step / 2 + kFloatUnit * (largest + step) + 0x1p-149));
+  }
+  return result;
+}
 
 std::vector<Float32Error> float32_errors(const Network& network, const std::map<std::string, Box>& domain,
                                          const std::map<std::string, double>& lipschitz,

@@ -31,6 +31,9 @@ struct Float32Options {
   Stop stop;  ///< ends the semidefinite programs of the tails: bounds layer by layer in their place
 };
 
+/// How far an input's conversion may move it, per coordinate: rounding to float32, and half a step.
+std::vector<double> input_errors(const Box& box, double step);
+
 /// Bounds that hold in exact arithmetic for any order of summation and with or without fused multiply-adds.
 ///
 /// With u = 2^-24 and m inputs, a computed layer differs from the exact layer at the same computed inputs h by at most

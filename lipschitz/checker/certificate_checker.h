@@ -10,6 +10,7 @@
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/dyadic.h"
 #include "lipschitz/checker/stages.h"
+#include "lipschitz/checker/values.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::check {
@@ -60,6 +61,15 @@ class CertificateChecker {
   /// Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w), its lower triangle given row by row.
   Matrix checked_form(const Json& form, const std::string& rho, const std::string& where) const;
 
+  // check_values.cpp
+  /// Range, jump and float32 error over a box, layer by layer.
+  void check_values(const Json& entry);
+  /// |f - f'| <= jump where a neighbour comes or goes, from the bound of rho and the range of the neighbour's term.
+  void check_jump(const Json& entry, const Bounded& moved, const std::vector<std::string>& names,
+                  const std::string& where) const;
+  /// What reaches the first layer of network `name`.
+  Bounded values_input(const Json& entry, const std::string& name, const std::string& where) const;
+
   // check_lower.cpp
   /// |f(x) - f(y)| >= lower |x - y|. In a set function one neighbour moves from x to y, the others stay.
   void check_lower(const Json& bound, double lower, const std::vector<double>& scale,
@@ -71,7 +81,7 @@ class CertificateChecker {
   std::map<std::string, Dyadic> norms_;   ///< product of the verified norms, by network
   std::map<std::string, Dyadic> proved_;  ///< verified upper bounds, by key()
   std::set<std::string> local_;           ///< those of them that hold on the box only
-  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_boxes_ = 0;
+  int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_boxes_ = 0, values_ = 0;
 };
 
 }  // namespace swarmcert::check

@@ -37,10 +37,10 @@ void check_upper(const std::vector<Matrix>& chain, const files::Json& proof, dou
 }  // namespace
 
 CheckResult CertificateChecker::run() {
-  files::require_keys(
-      certificate_,
-      {"schema", "tool", "statement", "network", "box", "layers", "bounds", "laws", "content_sha256"},
-      "certificate");
+  files::require_keys(certificate_,
+                      {"schema", "tool", "statement", "network", "box", "layers", "bounds", "laws", "values",
+                       "content_sha256"},
+                      "certificate");
   require(certificate_["schema"] == kCertificateSchema, "schema is not " + std::string(kCertificateSchema));
   require(certificate_["statement"] == kStatement, "statement is not the one that is checked");
   require(certificate_["content_sha256"] == files::content_sha256(certificate_),
@@ -57,9 +57,11 @@ CheckResult CertificateChecker::run() {
   require(certificate_["laws"].is_array(), "laws is not an array");
   for (const Json& bound : certificate_["bounds"]) check_bound(bound);
   for (const Json& law : certificate_["laws"]) check_law(law);
+  require(certificate_["values"].is_array(), "values is not an array");
+  for (const Json& entry : certificate_["values"]) check_values(entry);
   std::string reason = "every statement verified in exact arithmetic";
   if (on_boxes_ > 0) reason += ", those by parts of boxes in double with every rounding accounted for";
-  return {true, reason, spectral_norms_, upper_bounds_, lower_bounds_, on_boxes_};
+  return {true, reason, spectral_norms_, upper_bounds_, lower_bounds_, on_boxes_, values_};
 }
 
 void CertificateChecker::check_weights(const Json& named) {
@@ -262,7 +264,7 @@ CheckResult check(const files::Json& certificate, const files::Network& network)
   try {
     return CertificateChecker(certificate, network).run();
   } catch (const std::exception& fault) {
-    return {false, fault.what(), 0, 0, 0, 0};
+    return {false, fault.what(), 0, 0, 0, 0, 0};
   }
 }
 

@@ -20,12 +20,14 @@ struct CheckResult {
   int upper_bounds = 0;
   int lower_bounds = 0;
   int on_a_box = 0;  ///< of the upper bounds, those proved part by part
+  int values = 0;    ///< functions whose range, jump and float32 error over a box were verified
 };
 
 /// Verifies every statement of `certificate` against the weights of `network`: content hash; no unknown field; the
 /// named weights; each spectral norm from both sides; each upper bound by its linear matrix inequality
 /// (lipschitz_lmi.h), part by part on a box (tree_proof.h), as product of norms, or by a law from bounds verified before;
-/// each lower bound by the exact slope between its two witness points. A malformed certificate is answered with a reason, not with an exception.
+/// each lower bound by the exact slope between its two witness points; ranges, jumps and float32 errors layer by layer
+/// (values.h). A malformed certificate is answered with a reason, not with an exception.
 CheckResult check(const files::Json& certificate, const files::Network& network);
 
 }  // namespace swarmcert::check

@@ -21,6 +21,12 @@ inline constexpr const char* kStatement =
     "hold for the neighbours listed and "
     "the ground's input where there is one, in the box where their domain is box: all_stacked, |df| <= upper "
     "sqrt(sum |dx_j|^2); all_max, "
-    "|df| <= upper max |dx_j|; own_state, |df| <= upper |dx| where the vehicle's own state moves by dx.";
+    "|df| <= upper max |dx_j|; own_state, |df| <= upper |dx| where the vehicle's own state moves by dx. "
+    "Values hold for inputs in the box, or in the input clamp where their domain is clamp, with up to as "
+    "many neighbours of the kind as listed and the ground's input where there is one: lower <= f <= "
+    "upper, and |df| <= jump where one more neighbour comes or goes, whatever the others are, in exact "
+    "arithmetic; and |g - f| <= float32_error for each g that float32 arithmetic may give, whose inputs "
+    "after the clamp are off by at most input_error: sums of products in any order, fused or not, each "
+    "operation rounded to nearest.";
 
 }  // namespace swarmcert::check

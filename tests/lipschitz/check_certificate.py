@@ -37,7 +37,12 @@ STATEMENT = (
     "number and the places of the others; where neighbours are listed, with at most so many of each kind, the moving one "
     "included, all in the box, and the ground's input where there is one. Laws hold for the neighbours listed and the ground's input where there is "
     "one, in the box where their domain is box: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, |df| <= upper max |dx_j|; own_state, |df| <= upper "
-    "|dx| where the vehicle's own state moves by dx.")
+    "|dx| where the vehicle's own state moves by dx. "
+    "Values hold for inputs in the box, or in the input clamp where their domain is clamp, with up to as many "
+    "neighbours of the kind as listed and the ground's input where there is one: lower <= f <= upper, and |df| <= jump "
+    "where one more neighbour comes or goes, whatever the others are, in exact arithmetic; and |g - f| <= float32_error "
+    "for each g that float32 arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of "
+    "products in any order, fused or not, each operation rounded to nearest.")
 
 
 class Rejected(Exception):
@@ -1007,6 +1012,60 @@ def add(a, b):
     return [shifted(x, a[1] - exponent) + shifted(y, b[1] - exponent) for x, y in zip(a[0], b[0])], exponent
 
 
+# --- values over boxes -------------------------------------------------------------------------------------------------
+
+class Bounded:
+    """lower <= x <= upper, entry by entry, and |computed - x| <= error where a float32 evaluation is spoken of."""
+
+    def __init__(self, lower, upper, error):
+        self.lower, self.upper, self.error = lower, upper, error
+
+    def sizes(self):
+        return [max(abs(l), abs(u)) for l, u in zip(self.lower, self.upper)]
+
+
+def layer_bounds(layer, inputs):
+    """(lower, upper, error) of W h + b; error None where it is not asked for or cannot be bounded."""
+    size = layer.inputs
+    ends, exponent = dyadics([float(x) for x in inputs.lower + inputs.upper])
+    errors, error_exponent = dyadics([float(x) for x in inputs.error or []])
+    w = Matrix.of(layer.weights, size)
+    unit = power(w.exponent + exponent)
+    lower, upper, error = [], [], []
+    for row, bias in zip(w.rows, layer.biases):
+        rising, falling = [max(x, 0) for x in row], [min(x, 0) for x in row]
+        lower.append(Fraction(bias) + unit * (sum(map(mul, rising, ends[:size])) + sum(map(mul, falling, ends[size:]))))
+        upper.append(Fraction(bias) + unit * (sum(map(mul, rising, ends[size:])) + sum(map(mul, falling, ends[:size]))))
+        if inputs.error is not None:
+            absolute = list(map(abs, row))
+            before = sum(map(mul, absolute, errors)) * power(w.exponent + error_exponent)
+            largest = sum(map(mul, absolute, map(max, map(abs, ends[:size]), map(abs, ends[size:])))) * unit
+            error.append(rounding_error(size + 1, abs(Fraction(bias)) + largest + before, before))
+    return lower, upper, error if inputs.error is not None and None not in error else None
+
+
+def rounding_error(n, size, before):
+    """Of a float32 sum of n summands whose absolute values sum up to `size`, in any order; None if it might overflow."""
+    nu = n * power(-24)
+    if n > 1 << 23 or size + n * power(-149) > power(126):
+        return None
+    return before + (nu + nu * nu) * size + n * power(-148)
+
+
+def sum_bounds(terms, size, is_float32):
+    """terms: (Bounded, at least so many, at most so many)."""
+    lower, upper, error = [Fraction(0)] * size, [Fraction(0)] * size, []
+    for i in range(size):
+        for term, fewest, most in terms:
+            lower[i] += (fewest if term.lower[i] >= 0 else most) * term.lower[i]
+            upper[i] += (most if term.upper[i] >= 0 else fewest) * term.upper[i]
+        if is_float32:
+            before = sum(most * term.error[i] for term, _, most in terms)
+            largest = sum(most * term.sizes()[i] for term, _, most in terms)
+            error.append(rounding_error(1 + sum(most for _, _, most in terms), largest + before, before))
+    return lower, upper, error if is_float32 and None not in error else None
+
+
 # --- the checker ---------------------------------------------------------------------------------------------------
 
 class Checker:
@@ -1016,7 +1075,7 @@ class Checker:
 
     def run(self):
         require_keys(self.c, ["schema", "tool", "statement", "network", "box", "layers", "bounds", "laws",
-                              "content_sha256"], "certificate")
+                              "values", "content_sha256"], "certificate")
         require(self.c["schema"] == "swarmcert/certificate/1", "another schema")
         require(self.c["statement"] == STATEMENT, "another statement")
         require(self.c["content_sha256"] == content_sha256(self.c), "content_sha256 does not match")
@@ -1032,6 +1091,8 @@ class Checker:
             self.check_bound(bound)
         for law in listed(self.c["laws"]):
             self.check_law(law)
+        for entry in listed(self.c["values"]):
+            self.check_values(entry)
 
     def check_network(self, named):
         require_keys(named, ["description_sha256", "as", "weights"], "network")
@@ -1159,15 +1220,16 @@ class Checker:
                 f"{where}: the neighbour that moves is none of those listed")
         return neighbours
 
-    def box_of(self, part, where):
-        """The part's box, or what the input clamp makes of it."""
+    def box_of(self, part, where, limited=True):
+        """The part's box, or what the input clamp makes of it. `limited`: of a size that proofs by parts can bear."""
         require(part in self.c["box"] and part in self.network.parts, f"{where}: no box for {part}")
         low, high = (hex_floats(self.c["box"][part][side]) for side in ("lower", "upper"))
         require(len(low) == len(high) == self.network.parts[part].layers[0].inputs, f"{where}: the box has another size")
         if self.network.clamp and part != "phi:ground":
             clamp = list(zip(*self.network.clamp))
             low, high = ([min(max(x, a), b) for x, (a, b) in zip(side, clamp)] for side in (low, high))
-        require(all(-2.0 ** 100 <= a <= b <= 2.0 ** 100 for a, b in zip(low, high)), f"{where}: the box is empty or too large")
+        require(not limited or all(-2.0 ** 100 <= a <= b <= 2.0 ** 100 for a, b in zip(low, high)),
+                f"{where}: the box is empty or too large")
         return [Fraction(x) for x in low], [Fraction(x) for x in high]
 
     def term_layers(self, phi, rho):
@@ -1374,6 +1436,90 @@ class Checker:
         require(law["law"] in ("all_stacked", "all_max", "own_state"), f"{where}: unknown law")
         require(upper ** 2 >= squares if law["law"] == "all_stacked" else upper >= total,
                 f"{where}: claims less than the law gives")
+
+    def check_values(self, entry):
+        """Range, jump and float32 error over a box, layer by layer."""
+        require_keys(entry, ["function", "neighbours", "domain", "input_error", "networks", "sum", "lower", "upper", "jump",
+                             "jump_hex", "float32_error", "float32_error_hex"], "values")
+        require(isinstance(entry["function"], str), "values: function is not text")
+        where, names = f"values of {entry['function']}", networks_of(entry["function"])
+        is_set, is_float32 = len(names) == 2, entry["input_error"] is not None
+        require(names[0] != "phi:ground" if is_set else names == ["network"], f"{where}: only of the network, or of a sum")
+        count = entry["neighbours"]
+        require(type(count) is int, f"{where}: neighbours is not an integer")
+        require(1 <= count <= 1000000 if is_set else count == 0, f"{where}: impossible number of neighbours")
+        inputs = names[:1] + ["phi:ground"] * (is_set and "phi:ground" in self.network.parts)
+        used = inputs + names[1:]
+        require(all(name in self.network.parts for name in used), f"{where}: no such function")
+        require(isinstance(entry["networks"], dict) and set(entry["networks"]) == set(used), f"{where}: networks lists others")
+        if is_float32:
+            require(isinstance(entry["input_error"], dict) and set(entry["input_error"]) == set(inputs),
+                    f"{where}: input_error is not of the function's inputs")
+            require(all(self.network.parts[name].precision == "float32" for name in used),
+                    f"{where}: a float32 error of weights that are not float32")
+        require((entry["sum"] is not None) == is_set, f"{where}: a sum of set functions, and only of those")
+        terms = []
+        for name in inputs:
+            result = self.follow_layers(name, entry, self.values_input(name, entry, where), where)
+            terms.append((result, 1, 1) if name == "phi:ground" else (result, 0, count))
+        if is_set:
+            size = self.network.parts[names[1]].layers[0].inputs
+            result = self.stated(entry["sum"], size, sum_bounds(terms, size, is_float32), is_float32, f"{where}: sum")
+            result = self.follow_layers(names[1], entry, result, where)
+        lower, upper = ([Fraction(x) for x in hex_floats(entry[key])] for key in ("lower", "upper"))
+        require(len(lower) == len(upper) == len(result.lower) and all(
+            a <= l and u <= b for a, l, u, b in zip(lower, result.lower, result.upper, upper)), f"{where}: the values leave the range")
+        require((entry["jump"] is not None) == (entry["jump_hex"] is not None) == is_set, f"{where}: a jump of set functions only")
+        if is_set:
+            jump = Fraction(number(entry["jump"], entry["jump_hex"], where))
+            key = (names[1], "all", frozenset())
+            require(key in self.proved, f"{where}: no bound of {names[1]}")
+            require(jump ** 2 >= self.proved[key] ** 2 * sum(x * x for x in terms[0][0].sizes()), f"{where}: claims less than the jump")
+        require((entry["float32_error"] is not None) == (entry["float32_error_hex"] is not None) == is_float32,
+                f"{where}: a float32 error where there are input errors, and only there")
+        if is_float32:
+            error = Fraction(number(entry["float32_error"], entry["float32_error_hex"], where))
+            require(error ** 2 >= sum(x * x for x in result.error), f"{where}: claims less than the float32 error")
+
+    def values_input(self, name, entry, where):
+        """What reaches the first layer of a network."""
+        if entry["domain"] == "box":
+            require(isinstance(self.c["box"], dict), f"{where}: there is no box")
+            lower, upper = self.box_of(name, where, limited=False)
+        else:
+            require(entry["domain"] == "clamp" and self.network.clamp and name != "phi:ground", f"{where}: no such domain")
+            lower, upper = ([Fraction(x) for x in side] for side in self.network.clamp)
+        error = None
+        if entry["input_error"] is not None:
+            error = [Fraction(x) for x in hex_floats(entry["input_error"][name])]
+            require(len(error) == len(lower) and min(error) >= 0, f"{where}: needs one input error per input, none negative")
+        return Bounded(lower, upper, error)
+
+    def stated(self, stated, size, found, is_float32, where):
+        """What is stated of a vector, which must enclose what was found."""
+        require_keys(stated, ["lower", "upper", "error"], where)
+        require((stated["error"] is not None) == is_float32, f"{where}: an error where there are input errors, and only there")
+        values = []
+        for key in ["lower", "upper"] + ["error"] * is_float32:
+            require(isinstance(stated[key], str), f"{where}: {key} is not text")
+            values.append([Fraction(x) for x in hex_floats([w for w in re.split("[ \t\n\v\f\r]+", stated[key]) if w])])
+            require(len(values[-1]) == size, f"{where}: needs one number per output")
+        lower, upper, error = found
+        require(all(a <= b for a, b in zip(values[0], lower)) and all(a <= b for a, b in zip(upper, values[1])),
+                f"{where}: the values leave the bounds")
+        if is_float32:
+            require(error is not None and all(a <= b for a, b in zip(error, values[2])), f"{where}: claims less than the float32 error")
+        return Bounded(values[0], values[1], values[2] if is_float32 else None)
+
+    def follow_layers(self, name, entry, inputs, where):
+        layers = self.network.parts[name].layers
+        require(isinstance(entry["networks"][name], list) and len(entry["networks"][name]) == len(layers),
+                f"{where}: {name} needs one entry per layer")
+        for k, (layer, stated) in enumerate(zip(layers, entry["networks"][name])):
+            if k > 0:
+                inputs = Bounded([max(x, Fraction(0)) for x in inputs.lower], [max(x, Fraction(0)) for x in inputs.upper], inputs.error)
+            inputs = self.stated(stated, layer.outputs, layer_bounds(layer, inputs), inputs.error is not None, f"{where}: {name}")
+        return inputs
 
 
 def check(certificate, network):

@@ -180,9 +180,14 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Ce
   output.ranges_cut_short = stop.now();
   if (output.ranges_cut_short) range.nodes = 1;  // wider, and proved all the same
   output.ranges = lipschitz::ranges(network, domain, rho_bounds, range);
-  for (const auto& [name, weights] : files::parts(network))
-    if (weights->precision != files::Precision::kFloat32)
-      return;  // what flies are other weights: --as float32
+  const std::map<std::string, const files::Weights*> parts = files::parts(network);
+  const bool is_float32 = std::all_of(parts.begin(), parts.end(), [](const auto& part) {
+    return part.second->precision == files::Precision::kFloat32;
+  });
+  output.found.values =
+      lipschitz::certified_values(network, domain, rho_bounds,
+                                  {range.neighbours, options.domain.empty(), is_float32, options.input_step});
+  if (!is_float32) return;  // what flies are other weights: --as float32
   lipschitz::Float32Options float32;
   float32.neighbours = range.neighbours;
   float32.input_step = options.input_step;

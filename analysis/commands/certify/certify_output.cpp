@@ -31,7 +31,20 @@ Json attained_json(const Attained& attained) {
   return {{"value", attained.value}, {"points", std::move(points)}};
 }
 
-Json range_json(const files::Network& network, const lipschitz::CertifiedRange& range) {
+/// What the certificate states of the function's values; nothing where it is left out.
+const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output, const std::string& function,
+                                                 int neighbours) {
+  for (const lipschitz::CertifiedValues& values : output.found.values)
+    if (values.function == function && values.neighbours == neighbours) return &values;
+  return nullptr;
+}
+
+Json number_or_null(const std::optional<double>& number) { return number ? Json(*number) : Json(); }
+
+Json range_json(const files::Network& network, const CertifyOutput& output,
+                const lipschitz::CertifiedRange& range) {
+  const auto* const stated = in_certificate(output, range.function, range.neighbours_at_most);
+  const auto index = static_cast<std::size_t>(range.output);
   return {{"function", range.function},
           {"output", range.output},
           {"domain", "box"},
@@ -42,7 +55,11 @@ Json range_json(const files::Network& network, const lipschitz::CertifiedRange& 
           {"largest_magnitude", range.largest()},
           {"lower_witness", attained_json(range.least)},
           {"upper_witness", attained_json(range.greatest)},
-          {"cut_off_jump", range.jump}};
+          {"cut_off_jump", range.jump},
+          {"arithmetic", "exact"},
+          {"lower_in_certificate", stated != nullptr ? Json(stated->output().lower[index]) : Json()},
+          {"upper_in_certificate", stated != nullptr ? Json(stated->output().upper[index]) : Json()},
+          {"jump_in_certificate", stated != nullptr ? number_or_null(stated->jump) : Json()}};
 }
 
 double slope_of(const CertifiedBound& bound) {
@@ -268,15 +285,19 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
   }
   result["range"] = Json::array();
   for (const lipschitz::CertifiedRange& range : output.ranges)
-    result["range"].push_back(range_json(network, range));
+    result["range"].push_back(range_json(network, output, range));
   result["float32_error"] = Json::array();
   for (const lipschitz::Float32Error& error : output.float32_errors) {
-    result["float32_error"].push_back({{"function", error.function},
-                                       {"neighbours", error.neighbours_at_most},
-                                       {"unit", output_unit(network)},
-                                       {"bound", error.total.value()},
-                                       {"evaluation", error.evaluation.value()},
-                                       {"inputs", error.inputs.value()}});
+    const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);
+    result["float32_error"].push_back(
+        {{"function", error.function},
+         {"neighbours", error.neighbours_at_most},
+         {"unit", output_unit(network)},
+         {"bound", error.total.value()},
+         {"evaluation", error.evaluation.value()},
+         {"inputs", error.inputs.value()},
+         {"arithmetic", "float32 against exact"},
+         {"bound_in_certificate", stated != nullptr ? number_or_null(stated->float32_error) : Json()}});
   }
   result["status"] = lipschitz::status(output.is_interrupted());
   result["verdict"] = name(output.verdict);
@@ -442,9 +463,10 @@ void print_comparisons(const CertifyOutput& output) {
 
 void print_ranges(const files::Network& network, const CertifyOutput& output) {
   if (!output.ranges.empty())
-    fmt::print("\nRange over the box, proved (attained by points in brackets), in {}{}\n",
-               output_unit(network),
-               output.ranges_cut_short ? "; interrupted: one part of the box, so that it is wide" : "");
+    fmt::print(
+        "\nRange over the box, of the exact function, proved (attained by points in brackets), in {}{}\n",
+        output_unit(network),
+        output.ranges_cut_short ? "; interrupted: one part of the box, so that it is wide" : "");
   for (const lipschitz::CertifiedRange& range : output.ranges) {
     const std::string many =
         range.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", range.neighbours_at_most) : "";
@@ -453,6 +475,12 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
     if (range.neighbours_at_most == 1)
       fmt::print("; a neighbour at a cut-off: a jump of at most {:.6g}", range.jump);
     fmt::print("\n");
+    const auto* const stated = in_certificate(output, range.function, range.neighbours_at_most);
+    if (stated == nullptr) continue;
+    const auto index = static_cast<std::size_t>(range.output);
+    fmt::print("    in the certificate: {:.6g} .. {:.6g}{}\n", stated->output().lower[index],
+               stated->output().upper[index],
+               range.neighbours_at_most == 1 ? fmt::format(", a jump of at most {:.6g}", *stated->jump) : "");
   }
   if (!output.float32_errors.empty())
     fmt::print("\nFloat32 evaluation against the exact function over the box, proved, in {}\n",
@@ -460,9 +488,21 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
   for (const lipschitz::Float32Error& error : output.float32_errors) {
     const std::string many =
         error.neighbours_at_most > 0 ? fmt::format(" up to {} neighbours", error.neighbours_at_most) : "";
-    fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})\n", error.function, many,
+    fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})", error.function, many,
                error.total.value(), error.evaluation.value(), error.inputs.value());
+    const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);
+    fmt::print("{}\n", stated != nullptr && stated->float32_error
+                           ? fmt::format("; in the certificate: {:.4g}", *stated->float32_error)
+                           : "");
   }
+}
+
+void print_arithmetic(const CertifyOutput& output) {
+  if (output.ranges.empty()) return;
+  fmt::print("\nLipschitz bounds, ranges and jumps are of the exact function of the stored weights. {}\n",
+             output.float32_errors.empty()
+                 ? "Nothing is said of a float32 evaluation."
+                 : "A float32 evaluation has steps and may\nleave them, by up to the float32 error.");
 }
 
 void print_laws(const files::Network& network, const Certification& found) {
@@ -488,6 +528,7 @@ void print_certification(const files::Network& network, const CertifyOutput& out
   print_laws(network, output.found);
   print_comparisons(output);
   print_ranges(network, output);
+  print_arithmetic(output);
 }
 
 }  // namespace swarmcert::analysis

@@ -33,11 +33,13 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
   result["spectral_norms"] = verdict.spectral_norms;
   result["upper_bounds"] = verdict.upper_bounds;
   result["lower_bounds"] = verdict.lower_bounds;
+  result["values"] = verdict.values;
   write_result(common, result);
   if (common.prints_text()) {
     if (verdict.accepted) {
-      fmt::print("accepted: {}: {} spectral norms, {} upper bounds, {} lower bounds\n", verdict.reason,
-                 verdict.spectral_norms, verdict.upper_bounds, verdict.lower_bounds);
+      fmt::print("accepted: {}: {} spectral norms, {} upper bounds, {} lower bounds{}\n", verdict.reason,
+                 verdict.spectral_norms, verdict.upper_bounds, verdict.lower_bounds,
+                 verdict.values > 0 ? fmt::format(", values of {}", verdict.values) : "");
       fmt::print("for {}\n", files::chain_words(network));
     } else {
       fmt::print("rejected: {}\n", verdict.reason);

@@ -726,7 +726,7 @@ type function0 =
 
 let moved = function
 | Alone p -> p
-| Set_of (phi, _) -> phi
+| Set_of (phi0, _) -> phi0
 
 (** val one : dyadic **)
 
@@ -735,21 +735,30 @@ let one =
 
 type kind = (int * bool list) * Big.t
 
+type box = (dyadic * dyadic) list
+
+type term = { phi : int; inputs_in : box; fewest : Big.t; most : Big.t }
+
 type claim =
 | Norm_at_most of int * int * dyadic
 | Norm_at_least of int * int * dyadic
 | Slope_at_most of function0 * bool list * dyadic list * dyadic
 | Slope_at_least of function0 * bool list * dyadic list * dyadic
 | Law of bool * kind list * int * dyadic
+| Within of int * box * box
+| Sum_within of term list * int * box
+| Jump_at_most of int * box * int * dyadic
+| Float_error of int * box * dyadic list * dyadic list * dyadic
+| Sum_float_error of (term * dyadic list) list * int * dyadic
 
 (** val set_stages :
     matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD
     list * matrixD **)
 
-let set_stages phi w rho last0 =
+let set_stages phi0 w rho last0 =
   match rho with
-  | [] -> (phi, (product zero add0 mul0 last0 w))
-  | v :: rho' -> ((app phi ((product zero add0 mul0 v w) :: rho')), last0)
+  | [] -> (phi0, (product zero add0 mul0 last0 w))
+  | v :: rho' -> ((app phi0 ((product zero add0 mul0 v w) :: rho')), last0)
 
 (** val outputs : matrixD list -> int -> int **)
 
@@ -828,17 +837,307 @@ let minusD u v =
 let squareD u =
   dot zero add0 mul0 u u
 
+(** val at_most : dyadic -> dyadic -> bool **)
+
+let at_most x y =
+  is_nonnegative (add0 y (neg x))
+
+(** val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list **)
+
+let rec clampedD c x =
+  match c with
+  | [] -> x
+  | p :: c' ->
+    let (low, high) = p in
+    (match x with
+     | [] -> x
+     | a :: x' ->
+       let b = if at_most a low then low else a in
+       (if at_most b high then b else high) :: (clampedD c' x'))
+
+(** val same : dyadic -> dyadic -> bool **)
+
+let same x y =
+  (&&) (Big.equal (fst x) (fst y)) (Big.equal (snd x) (snd y))
+
+(** val same_numbers : dyadic list -> dyadic list -> bool **)
+
+let rec same_numbers x y =
+  match x with
+  | [] -> (match y with
+           | [] -> true
+           | _ :: _ -> false)
+  | a :: x' ->
+    (match y with
+     | [] -> false
+     | b :: y' -> (&&) (same a b) (same_numbers x' y'))
+
+(** val same_box : box -> box -> bool **)
+
+let rec same_box x y =
+  match x with
+  | [] -> (match y with
+           | [] -> true
+           | _ :: _ -> false)
+  | a :: x' ->
+    (match y with
+     | [] -> false
+     | b :: y' ->
+       (&&) ((&&) (same (fst a) (fst b)) (same (snd a) (snd b)))
+         (same_box x' y'))
+
+(** val contains : box -> box -> bool **)
+
+let rec contains a b =
+  match a with
+  | [] -> (match b with
+           | [] -> true
+           | _ :: _ -> false)
+  | p :: a' ->
+    let (l, h) = p in
+    (match b with
+     | [] -> false
+     | p0 :: b' ->
+       let (l', h') = p0 in
+       (&&) ((&&) (at_most l l') (at_most h' h)) (contains a' b'))
+
+(** val clamp_ends : (dyadic * dyadic) list -> box -> box **)
+
+let clamp_ends c b =
+  combine (clampedD c (map fst b)) (clampedD c (map snd b))
+
+(** val relu_ends : (dyadic * dyadic) -> dyadic * dyadic **)
+
+let relu_ends i =
+  ((reluD (fst i)), (reluD (snd i)))
+
+(** val larger : dyadic -> dyadic -> dyadic **)
+
+let larger x y =
+  if at_most x y then y else x
+
+(** val largest_abs : (dyadic * dyadic) -> dyadic **)
+
+let largest_abs i =
+  larger (abs (fst i)) (abs (snd i))
+
+(** val row_ends : dyadic list -> box -> dyadic * dyadic **)
+
+let rec row_ends row b =
+  match row with
+  | [] -> (zero, zero)
+  | w :: row' ->
+    (match b with
+     | [] -> (zero, zero)
+     | p :: b' ->
+       let (l, h) = p in
+       let (s, t) = row_ends row' b' in
+       if is_nonnegative w
+       then ((add0 (mul0 w l) s), (add0 (mul0 w h) t))
+       else ((add0 (mul0 w h) s), (add0 (mul0 w l) t)))
+
+(** val encloses : matrixD -> dyadic list -> box -> box -> bool **)
+
+let rec encloses w c b v =
+  match w with
+  | [] ->
+    (match c with
+     | [] -> (match v with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | row :: w' ->
+    (match c with
+     | [] -> false
+     | a :: c' ->
+       (match v with
+        | [] -> false
+        | p :: v' ->
+          let (l, h) = p in
+          let (s, t) = row_ends row b in
+          (&&) ((&&) (at_most l (add0 s a)) (at_most (add0 t a) h))
+            (encloses w' c' b v')))
+
+(** val check_layers :
+    layerD list -> layerD -> box -> box list -> box -> bool **)
+
+let rec check_layers hidden0 last0 b bounds v =
+  match hidden0 with
+  | [] ->
+    (match bounds with
+     | [] -> encloses (fst last0) (snd last0) b v
+     | _ :: _ -> false)
+  | l :: hidden' ->
+    (match bounds with
+     | [] -> false
+     | c :: bounds' ->
+       (&&) (encloses (fst l) (snd l) b c)
+         (check_layers hidden' last0 (map relu_ends c) bounds' v))
+
+(** val sizes : box -> dyadic list -> dyadic list **)
+
+let rec sizes b r =
+  match b with
+  | [] -> []
+  | i :: b' ->
+    (match r with
+     | [] -> []
+     | a :: r' -> (add0 (largest_abs i) a) :: (sizes b' r'))
+
+(** val size : 'a1 list -> Big.t **)
+
+let rec size = function
+| [] -> Big.zero
+| _ :: l' -> Big.add ((fun p -> p) Big.one) (size l')
+
+(** val gammaD : Big.t -> dyadic **)
+
+let gammaD n =
+  let x = (n, (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))
+  in
+  add0 x (mul0 x x)
+
+(** val rounding_fits : Big.t -> dyadic -> dyadic -> dyadic -> bool **)
+
+let rounding_fits n m before e =
+  (&&)
+    ((&&)
+      (Big.leq n ((fun p -> p) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+        Big.one)))))))))))))))))))))))))
+      (at_most
+        (add0 m (n, (Big.neg ((fun p -> Big.succ (Big.shift_left p 1))
+          ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.succ (Big.shift_left p 1))
+          ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.succ (Big.shift_left p 1))
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          Big.one)))))))))) (((fun p -> p) Big.one), ((fun p -> p)
+        ((fun p -> Big.shift_left p 1)
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1))
+        ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))))
+    (at_most
+      (add0 before
+        (add0 (mul0 (gammaD n) m) (n, (Big.neg ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.succ (Big.shift_left p 1))
+          ((fun p -> Big.shift_left p 1)
+          ((fun p -> Big.succ (Big.shift_left p 1))
+          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+          Big.one))))))))))) e)
+
+(** val layer_fits :
+    matrixD -> dyadic list -> dyadic list -> dyadic list -> dyadic list ->
+    bool **)
+
+let rec layer_fits w c m r e =
+  match w with
+  | [] ->
+    (match c with
+     | [] -> (match e with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | row :: w' ->
+    (match c with
+     | [] -> false
+     | a :: c' ->
+       (match e with
+        | [] -> false
+        | x :: e' ->
+          let sizes_of_row = map abs row in
+          (&&)
+            (rounding_fits (Big.add ((fun p -> p) Big.one) (size row))
+              (add0 (abs a) (dot zero add0 mul0 sizes_of_row m))
+              (dot zero add0 mul0 sizes_of_row r) x) (layer_fits w' c' m r e')))
+
+(** val check_roundings :
+    layerD list -> layerD -> box -> dyadic list -> box list -> dyadic list
+    list -> dyadic list -> bool **)
+
+let rec check_roundings hidden0 last0 b r bounds errors e =
+  match hidden0 with
+  | [] ->
+    (match bounds with
+     | [] ->
+       (match errors with
+        | [] -> layer_fits (fst last0) (snd last0) (sizes b r) r e
+        | _ :: _ -> false)
+     | _ :: _ -> false)
+  | l :: hidden' ->
+    (match bounds with
+     | [] -> false
+     | c :: bounds' ->
+       (match errors with
+        | [] -> false
+        | s :: errors' ->
+          (&&)
+            ((&&) (encloses (fst l) (snd l) b c)
+              (layer_fits (fst l) (snd l) (sizes b r) r s))
+            (check_roundings hidden' last0 (map relu_ends c) s bounds'
+              errors' e)))
+
+(** val add_ends : Big.t -> Big.t -> box -> box -> box **)
+
+let rec add_ends low high v s =
+  match v with
+  | [] -> []
+  | p :: v' ->
+    let (l, h) = p in
+    (match s with
+     | [] -> []
+     | p0 :: s' ->
+       let (a, b) = p0 in
+       ((add0 (mul0 ((if is_nonnegative l then low else high), Big.zero) l) a),
+       (add0 (mul0 ((if is_nonnegative h then high else low), Big.zero) h) b)) :: 
+       (add_ends low high v' s'))
+
+(** val sum_fits :
+    Big.t -> dyadic list -> dyadic list -> dyadic list -> bool **)
+
+let rec sum_fits count0 m e errors =
+  match m with
+  | [] ->
+    (match e with
+     | [] -> (match errors with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | a :: m' ->
+    (match e with
+     | [] -> false
+     | b :: e' ->
+       (match errors with
+        | [] -> false
+        | x :: errors' ->
+          (&&) (rounding_fits count0 a b x) (sum_fits count0 m' e' errors')))
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
 | By_product
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
-
-(** val at_most : dyadic -> dyadic -> bool **)
-
-let at_most x y =
-  is_nonnegative (add0 y (neg x))
+| By_layers of box list
+| By_sum of box
+| By_norm
+| By_roundings of box list * dyadic list list
+| By_rounded_sum of box * dyadic list
 
 (** val is_nil : 'a1 list -> bool **)
 
@@ -874,7 +1173,7 @@ let matrices p =
 
 let parts_of ps = function
 | Alone p -> (part_at ps p) :: []
-| Set_of (phi, rho) -> (part_at ps phi) :: ((part_at ps rho) :: [])
+| Set_of (phi0, rho) -> (part_at ps phi0) :: ((part_at ps rho) :: [])
 
 (** val well_formed :
     part list -> function0 -> bool list -> dyadic list -> bool **)
@@ -936,8 +1235,8 @@ let rec largest m = function
 
 let product_of ps accepted = function
 | Alone p -> norm_of ps accepted p
-| Set_of (phi, rho) ->
-  (match norm_of ps accepted phi with
+| Set_of (phi0, rho) ->
+  (match norm_of ps accepted phi0 with
    | Some a ->
      (match norm_of ps accepted rho with
       | Some b -> Some (mul0 a b)
@@ -957,19 +1256,6 @@ let check_product ps accepted f moves scale0 u =
      | Some k -> at_most (mul0 m k) u
      | None -> false)
 
-(** val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list **)
-
-let rec clampedD c x =
-  match c with
-  | [] -> x
-  | p :: c' ->
-    let (low, high) = p in
-    (match x with
-     | [] -> x
-     | a :: x' ->
-       let b = if at_most a low then low else a in
-       (if at_most b high then b else high) :: (clampedD c' x'))
-
 (** val valueD : part -> dyadic list -> dyadic list **)
 
 let valueD p x =
@@ -981,8 +1267,8 @@ let valueD p x =
 let value_ofD ps f rest x =
   match f with
   | Alone p -> valueD (part_at ps p) x
-  | Set_of (phi, rho) ->
-    valueD (part_at ps rho) (plus add0 (valueD (part_at ps phi) x) rest)
+  | Set_of (phi0, rho) ->
+    valueD (part_at ps rho) (plus add0 (valueD (part_at ps phi0) x) rest)
 
 (** val agreeD : bool list -> dyadic list -> dyadic list -> bool **)
 
@@ -1052,25 +1338,25 @@ let rec same_moves a b =
 (** val find_slope :
     claim list -> int -> int -> bool list -> dyadic option **)
 
-let rec find_slope accepted phi rho moves =
+let rec find_slope accepted phi0 rho moves =
   match accepted with
   | [] -> None
   | c :: rest ->
     (match c with
      | Slope_at_most (f, m, scale0, u) ->
        (match f with
-        | Alone _ -> find_slope rest phi rho moves
+        | Alone _ -> find_slope rest phi0 rho moves
         | Set_of (q, k) ->
           (match scale0 with
            | [] ->
-             let others = find_slope rest phi rho moves in
-             if (&&) ((&&) ((=) phi q) ((=) rho k)) (same_moves moves m)
+             let others = find_slope rest phi0 rho moves in
+             if (&&) ((&&) ((=) phi0 q) ((=) rho k)) (same_moves moves m)
              then (match others with
                    | Some v -> if at_most v u then Some v else Some u
                    | None -> Some u)
              else others
-           | _ :: _ -> find_slope rest phi rho moves))
-     | _ -> find_slope rest phi rho moves)
+           | _ :: _ -> find_slope rest phi0 rho moves))
+     | _ -> find_slope rest phi0 rho moves)
 
 (** val total_of : claim list -> bool -> kind list -> int -> dyadic option **)
 
@@ -1079,8 +1365,8 @@ let rec total_of accepted squares kinds rho =
   | [] -> Some zero
   | k :: kinds' ->
     let (p, n) = k in
-    let (phi, moves) = p in
-    (match find_slope accepted phi rho moves with
+    let (phi0, moves) = p in
+    (match find_slope accepted phi0 rho moves with
      | Some k0 ->
        (match total_of accepted squares kinds' rho with
         | Some rest ->
@@ -1101,6 +1387,165 @@ let check_law ps accepted stacked kinds rho u =
     (match total_of accepted stacked kinds rho with
      | Some s -> at_most s (if stacked then mul0 u u else u)
      | None -> false)
+
+(** val find_within : claim list -> int -> box -> box option **)
+
+let rec find_within accepted p b =
+  match accepted with
+  | [] -> None
+  | c0 :: rest ->
+    (match c0 with
+     | Within (q, c, v) ->
+       if (&&) ((=) p q) (same_box b c) then Some v else find_within rest p b
+     | _ -> find_within rest p b)
+
+(** val find_error :
+    claim list -> int -> box -> dyadic list -> (dyadic list * dyadic) option **)
+
+let rec find_error accepted p b r =
+  match accepted with
+  | [] -> None
+  | c0 :: rest ->
+    (match c0 with
+     | Float_error (q, c, s, e, u) ->
+       if (&&) ((&&) ((=) p q) (same_box b c)) (same_numbers r s)
+       then Some (e, u)
+       else find_error rest p b r
+     | _ -> find_error rest p b r)
+
+(** val find_alone : claim list -> int -> int -> dyadic option **)
+
+let rec find_alone accepted p n =
+  match accepted with
+  | [] -> None
+  | c :: rest ->
+    (match c with
+     | Slope_at_most (f, moves, scale0, u) ->
+       (match f with
+        | Alone q ->
+          (match scale0 with
+           | [] ->
+             if (&&) ((&&) ((=) p q) (forallb (fun m -> m) moves))
+                  ((=) (length moves) n)
+             then Some u
+             else find_alone rest p n
+           | _ :: _ -> find_alone rest p n)
+        | Set_of (_, _) -> find_alone rest p n)
+     | _ -> find_alone rest p n)
+
+(** val sum_ends : claim list -> int -> term list -> box option **)
+
+let rec sum_ends accepted n = function
+| [] -> Some (repeat (zero, zero) n)
+| t :: terms' ->
+  let { phi = p; inputs_in = b; fewest = low; most = high } = t in
+  (match find_within accepted p b with
+   | Some v ->
+     (match sum_ends accepted n terms' with
+      | Some s ->
+        if (&&) ((&&) ((=) (length v) n) (Big.leq Big.zero low))
+             (Big.leq low high)
+        then Some (add_ends low high v s)
+        else None
+      | None -> None)
+   | None -> None)
+
+(** val check_within : part list -> int -> box -> box list -> box -> bool **)
+
+let check_within ps p b bounds v =
+  let q = part_at ps p in
+  check_layers q.hidden q.outer (clamp_ends q.clamp b) bounds v
+
+(** val check_sum_within :
+    part list -> claim list -> term list -> int -> box -> box -> bool **)
+
+let check_sum_within ps accepted terms rho v sums =
+  match sum_ends accepted (inputs_of (part_at ps rho)) terms with
+  | Some s ->
+    (match find_within accepted rho sums with
+     | Some w -> (&&) (contains sums s) (contains v w)
+     | None -> false)
+  | None -> false
+
+(** val check_jump :
+    part list -> claim list -> int -> box -> int -> dyadic -> bool **)
+
+let check_jump ps accepted p b rho u =
+  match find_within accepted p b with
+  | Some v ->
+    (match find_alone accepted rho (inputs_of (part_at ps rho)) with
+     | Some k ->
+       (&&)
+         ((&&)
+           ((&&) ((=) (length v) (inputs_of (part_at ps rho)))
+             (is_nonnegative k)) (is_nonnegative u))
+         (at_most (mul0 (mul0 k k) (squareD (map largest_abs v))) (mul0 u u))
+     | None -> false)
+  | None -> false
+
+(** val check_error :
+    part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box
+    list -> dyadic list list -> bool **)
+
+let check_error ps p b r e u bounds errors =
+  let q = part_at ps p in
+  (&&)
+    ((&&)
+      (check_roundings q.hidden q.outer (clamp_ends q.clamp b) r bounds
+        errors e) (is_nonnegative u)) (at_most (squareD e) (mul0 u u))
+
+(** val sum_errors :
+    claim list -> int -> (term * dyadic list) list -> ((Big.t * dyadic
+    list) * dyadic list) option **)
+
+let rec sum_errors accepted n = function
+| [] -> Some ((((fun p -> p) Big.one), (repeat zero n)), (repeat zero n))
+| p0 :: terms' ->
+  let (t, r) = p0 in
+  let { phi = p; inputs_in = b; fewest = _; most = high } = t in
+  (match find_within accepted p b with
+   | Some v ->
+     (match find_error accepted p b r with
+      | Some p1 ->
+        let (e, _) = p1 in
+        (match sum_errors accepted n terms' with
+         | Some p2 ->
+           let (p3, s) = p2 in
+           let (count0, m) = p3 in
+           if (&&)
+                ((&&) ((&&) ((=) (length v) n) ((=) (length e) n))
+                  (Big.leq Big.zero high)) (forallb is_nonnegative e)
+           then Some (((Big.add high count0),
+                  (plus add0 (scale mul0 (high, Big.zero) (sizes v e)) m)),
+                  (plus add0 (scale mul0 (high, Big.zero) e) s))
+           else None
+         | None -> None)
+      | None -> None)
+   | None -> None)
+
+(** val check_sum_error :
+    part list -> claim list -> (term * dyadic list) list -> int -> dyadic ->
+    box -> dyadic list -> bool **)
+
+let check_sum_error ps accepted terms rho u sums errors =
+  let n = inputs_of (part_at ps rho) in
+  (match sum_ends accepted n (map fst terms) with
+   | Some s ->
+     (match sum_errors accepted n terms with
+      | Some p ->
+        let (p0, e) = p in
+        let (count0, m) = p0 in
+        (match find_error accepted rho sums errors with
+         | Some p1 ->
+           let (_, w) = p1 in
+           (&&)
+             ((&&)
+               ((&&) ((&&) (contains sums s) (is_nil (part_at ps rho).clamp))
+                 ((=) (length errors) n)) (sum_fits count0 m e errors))
+             (at_most w u)
+         | None -> false)
+      | None -> false)
+   | None -> false)
 
 (** val check_claim : part list -> claim list -> claim -> proof -> bool **)
 
@@ -1126,6 +1571,28 @@ let check_claim ps accepted c p =
   | Law (stacked, kinds, rho, u) ->
     (match p with
      | By_triangle -> check_law ps accepted stacked kinds rho u
+     | _ -> false)
+  | Within (p0, b, v) ->
+    (match p with
+     | By_layers bounds -> check_within ps p0 b bounds v
+     | _ -> false)
+  | Sum_within (terms, rho, v) ->
+    (match p with
+     | By_sum sums -> check_sum_within ps accepted terms rho v sums
+     | _ -> false)
+  | Jump_at_most (p0, b, rho, u) ->
+    (match p with
+     | By_norm -> check_jump ps accepted p0 b rho u
+     | _ -> false)
+  | Float_error (p0, b, r, e, u) ->
+    (match p with
+     | By_roundings (bounds, errors) ->
+       check_error ps p0 b r e u bounds errors
+     | _ -> false)
+  | Sum_float_error (terms, rho, u) ->
+    (match p with
+     | By_rounded_sum (sums, errors) ->
+       check_sum_error ps accepted terms rho u sums errors
      | _ -> false)
 
 (** val step :

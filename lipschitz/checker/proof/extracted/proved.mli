@@ -202,12 +202,21 @@ val one : dyadic
 
 type kind = (int * bool list) * Big.t
 
+type box = (dyadic * dyadic) list
+
+type term = { phi : int; inputs_in : box; fewest : Big.t; most : Big.t }
+
 type claim =
 | Norm_at_most of int * int * dyadic
 | Norm_at_least of int * int * dyadic
 | Slope_at_most of function0 * bool list * dyadic list * dyadic
 | Slope_at_least of function0 * bool list * dyadic list * dyadic
 | Law of bool * kind list * int * dyadic
+| Within of int * box * box
+| Sum_within of term list * int * box
+| Jump_at_most of int * box * int * dyadic
+| Float_error of int * box * dyadic list * dyadic list * dyadic
+| Sum_float_error of (term * dyadic list) list * int * dyadic
 
 val set_stages :
   matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD list * matrixD
@@ -235,14 +244,62 @@ val minusD : dyadic list -> dyadic list -> dyadic list
 
 val squareD : dyadic list -> dyadic
 
+val at_most : dyadic -> dyadic -> bool
+
+val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list
+
+val same : dyadic -> dyadic -> bool
+
+val same_numbers : dyadic list -> dyadic list -> bool
+
+val same_box : box -> box -> bool
+
+val contains : box -> box -> bool
+
+val clamp_ends : (dyadic * dyadic) list -> box -> box
+
+val relu_ends : (dyadic * dyadic) -> dyadic * dyadic
+
+val larger : dyadic -> dyadic -> dyadic
+
+val largest_abs : (dyadic * dyadic) -> dyadic
+
+val row_ends : dyadic list -> box -> dyadic * dyadic
+
+val encloses : matrixD -> dyadic list -> box -> box -> bool
+
+val check_layers : layerD list -> layerD -> box -> box list -> box -> bool
+
+val sizes : box -> dyadic list -> dyadic list
+
+val size : 'a1 list -> Big.t
+
+val gammaD : Big.t -> dyadic
+
+val rounding_fits : Big.t -> dyadic -> dyadic -> dyadic -> bool
+
+val layer_fits :
+  matrixD -> dyadic list -> dyadic list -> dyadic list -> dyadic list -> bool
+
+val check_roundings :
+  layerD list -> layerD -> box -> dyadic list -> box list -> dyadic list list
+  -> dyadic list -> bool
+
+val add_ends : Big.t -> Big.t -> box -> box -> box
+
+val sum_fits : Big.t -> dyadic list -> dyadic list -> dyadic list -> bool
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
 | By_product
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
-
-val at_most : dyadic -> dyadic -> bool
+| By_layers of box list
+| By_sum of box
+| By_norm
+| By_roundings of box list * dyadic list list
+| By_rounded_sum of box * dyadic list
 
 val is_nil : 'a1 list -> bool
 
@@ -276,8 +333,6 @@ val check_product :
   part list -> claim list -> function0 -> bool list -> dyadic list -> dyadic
   -> bool
 
-val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list
-
 val valueD : part -> dyadic list -> dyadic list
 
 val value_ofD :
@@ -299,6 +354,35 @@ val total_of : claim list -> bool -> kind list -> int -> dyadic option
 
 val check_law :
   part list -> claim list -> bool -> kind list -> int -> dyadic -> bool
+
+val find_within : claim list -> int -> box -> box option
+
+val find_error :
+  claim list -> int -> box -> dyadic list -> (dyadic list * dyadic) option
+
+val find_alone : claim list -> int -> int -> dyadic option
+
+val sum_ends : claim list -> int -> term list -> box option
+
+val check_within : part list -> int -> box -> box list -> box -> bool
+
+val check_sum_within :
+  part list -> claim list -> term list -> int -> box -> box -> bool
+
+val check_jump :
+  part list -> claim list -> int -> box -> int -> dyadic -> bool
+
+val check_error :
+  part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box list
+  -> dyadic list list -> bool
+
+val sum_errors :
+  claim list -> int -> (term * dyadic list) list -> ((Big.t * dyadic
+  list) * dyadic list) option
+
+val check_sum_error :
+  part list -> claim list -> (term * dyadic list) list -> int -> dyadic ->
+  box -> dyadic list -> bool
 
 val check_claim : part list -> claim list -> claim -> proof -> bool
 

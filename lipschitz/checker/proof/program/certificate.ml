@@ -73,7 +73,7 @@ let check net json =
   let as_float32 = find "network" "as" (find "certificate" "network" json) = Text "float32" in
   let net = if as_float32 then Network.as_float32 net else net in
   require_keys "certificate"
-    [ "schema"; "tool"; "statement"; "network"; "box"; "layers"; "bounds"; "laws"; "content_sha256" ] json;
+    [ "schema"; "tool"; "statement"; "network"; "box"; "layers"; "bounds"; "laws"; "values"; "content_sha256" ] json;
   let member key = find "certificate" key json in
   require (member "statement" = Text Statement.text) "statement is not the one that is checked";
   let rest = List.filter (fun (key, _) -> key <> "content_sha256") (members "certificate" json) in
@@ -84,7 +84,7 @@ let check net json =
   check_boxes net (member "box");
   let state = { Claims.net; json; parts = Functions.parts net; accepted = []; log = []; norms = Hashtbl.create 8;
                 uppers = Hashtbl.create 64; spectral_norms = 0; upper_bounds = 0; lower_bounds = 0;
-                    not_checked = [] } in
+                values = 0; not_checked = [] } in
   List.iter (fun (part, (w : Weights.t)) ->
       List.iteri (fun k layer ->
           Claims.check_layer state (element "layers" state.spectral_norms (member "layers")) part k layer) w.layers)
@@ -95,4 +95,7 @@ let check net json =
   let laws = match member "laws" with Array laws -> laws | _ -> rejected "laws is not an array" in
   List.iter (Claims.check_bound state) bounds;
   List.iter (Claims.check_law state) laws;
+  (match member "values" with
+   | Array values -> List.iter (Values.check state) values
+   | _ -> rejected "values is not an array");
   state

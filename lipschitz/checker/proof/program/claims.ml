@@ -17,6 +17,7 @@ type t = {
   mutable spectral_norms : int;
   mutable upper_bounds : int;
   mutable lower_bounds : int;
+  mutable values : int;  (* functions whose values over a box were checked *)
   mutable not_checked : string list;
 }
 

@@ -18,6 +18,9 @@ let part out { Proved.hidden; outer; clamp } =
 let func out = function
   | Proved.Alone p -> Printf.bprintf out "(Alone %a)" natural p
   | Set_of (phi, rho) -> Printf.bprintf out "(Set_of %a %a)" natural phi natural rho
+let box = list (pair number number)
+let term out { Proved.phi; inputs_in; fewest; most } =
+  Printf.bprintf out "(Term %a %a (%a) (%a))" natural phi box inputs_in integer fewest integer most
 let claim out = function
   | Proved.Norm_at_most (p, k, u) -> Printf.bprintf out "Norm_at_most %a %a %a" natural p natural k number u
   | Norm_at_least (p, k, l) -> Printf.bprintf out "Norm_at_least %a %a %a" natural p natural k number l
@@ -25,6 +28,12 @@ let claim out = function
   | Slope_at_least (f, moves, scale, l) -> Printf.bprintf out "Slope_at_least %a %a %a %a" func f (list flag) moves numbers scale number l
   | Law (stacked, kinds, rho, u) ->
     Printf.bprintf out "Law %a %a %a %a" flag stacked (list (pair (pair natural (list flag)) integer)) kinds natural rho number u
+  | Within (p, b, v) -> Printf.bprintf out "Within %a %a %a" natural p box b box v
+  | Sum_within (terms, rho, v) -> Printf.bprintf out "Sum_within %a %a %a" (list term) terms natural rho box v
+  | Jump_at_most (phi, b, rho, u) -> Printf.bprintf out "Jump_at_most %a %a %a %a" natural phi box b natural rho number u
+  | Float_error (p, b, r, e, u) -> Printf.bprintf out "Float_error %a %a %a %a %a" natural p box b numbers r numbers e number u
+  | Sum_float_error (terms, rho, u) ->
+    Printf.bprintf out "Sum_float_error %a %a %a" (list (pair term numbers)) terms natural rho number u
 let proof out = function
   | Proved.By_inequality (rho, t, { unit0; scales; rows }) ->
     Printf.bprintf out "By_inequality %a %a (Factor (%a) %a %a)" number rho numbers t integer unit0 (list integer) scales (list (list integer)) rows
@@ -32,6 +41,11 @@ let proof out = function
   | By_product -> Buffer.add_string out "By_product"
   | By_points (x, y, others) -> Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
   | By_triangle -> Buffer.add_string out "By_triangle"
+  | By_layers bounds -> Printf.bprintf out "By_layers %a" (list box) bounds
+  | By_sum sums -> Printf.bprintf out "By_sum %a" box sums
+  | By_norm -> Buffer.add_string out "By_norm"
+  | By_roundings (bounds, errors) -> Printf.bprintf out "By_roundings %a %a" (list box) bounds (list numbers) errors
+  | By_rounded_sum (sums, errors) -> Printf.bprintf out "By_rounded_sum %a %a" box sums numbers errors
 
 let file parts claims =
   let out = Buffer.create (1 lsl 20) in

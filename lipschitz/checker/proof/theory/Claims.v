@@ -1,6 +1,6 @@
 (** The checker of claims, and what its acceptance means: `step_sound`. *)
 From Coq Require Import List ZArith Reals Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Blocks Lower.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Blocks Lower Values.
 Import ListNotations.
 
 Inductive proof :=
@@ -8,9 +8,13 @@ Inductive proof :=
 | By_vector (v : list dyadic)
 | By_product
 | By_points (x y : list dyadic) (others : list (nat * list dyadic))
-| By_triangle.
+| By_triangle
+| By_layers (bounds : list box)
+| By_sum (sums : box)
+| By_norm
+| By_roundings (bounds : list box) (errors : list (list dyadic))
+| By_rounded_sum (sums : box) (errors : list dyadic).
 
-Definition at_most (x y : dyadic) : bool := is_nonnegative (add y (neg x)).
 Definition is_nil {A} (l : list A) : bool := match l with [] => true | _ => false end.
 Definition matrix_at (ps : list part) (p layer : nat) : matrixD := fst (nth layer (layers (part_at ps p)) ([], [])).
 
@@ -64,12 +68,6 @@ Definition check_product ps accepted f moves scale u : bool :=
   && match product_of ps accepted f with Some k => at_most (mul m k) u | None => false end.
 
 (** Slopes from below, between two points. *)
-Fixpoint clampedD (c : list (dyadic * dyadic)) (x : list dyadic) : list dyadic :=
-  match c, x with
-  | (low, high) :: c', a :: x' =>
-      let b := if at_most a low then low else a in (if at_most b high then b else high) :: clampedD c' x'
-  | _, _ => x
-  end.
 Definition valueD (p : part) (x : list dyadic) : list dyadic := networkD (hidden p) (outer p) (clampedD (clamp p) x).
 Definition value_ofD (ps : list part) (f : function) (rest x : list dyadic) : list dyadic :=
   match f with
@@ -129,6 +127,82 @@ Definition check_law ps accepted (stacked : bool) kinds rho u : bool :=
      | None => false
      end.
 
+(** Values over boxes. *)
+Fixpoint find_within (accepted : list claim) (p : nat) (b : box) : option box :=
+  match accepted with
+  | [] => None
+  | Within q c v :: rest => if (p =? q)%nat && same_box b c then Some v else find_within rest p b
+  | _ :: rest => find_within rest p b
+  end.
+Fixpoint find_error (accepted : list claim) (p : nat) (b : box) (r : list dyadic) : option (list dyadic * dyadic) :=
+  match accepted with
+  | [] => None
+  | Float_error q c s e u :: rest =>
+      if (p =? q)%nat && same_box b c && same_numbers r s then Some (e, u) else find_error rest p b r
+  | _ :: rest => find_error rest p b r
+  end.
+(** A bound of a part by itself, for any change of its inputs. *)
+Fixpoint find_alone (accepted : list claim) (p n : nat) : option dyadic :=
+  match accepted with
+  | [] => None
+  | Slope_at_most (Alone q) moves [] u :: rest =>
+      if (p =? q)%nat && forallb (fun m => m) moves && (length moves =? n)%nat then Some u else find_alone rest p n
+  | _ :: rest => find_alone rest p n
+  end.
+(** The intervals of the terms' sum. *)
+Fixpoint sum_ends (accepted : list claim) (n : nat) (terms : list term) : option box :=
+  match terms with
+  | [] => Some (repeat (zero, zero) n)
+  | Term p b low high :: terms' =>
+      match find_within accepted p b, sum_ends accepted n terms' with
+      | Some v, Some s =>
+          if ((length v =? n)%nat && (0 <=? low)%Z && (low <=? high)%Z)%bool then Some (add_ends low high v s) else
+            None
+      | _, _ => None
+      end
+  end.
+Definition check_within ps p b bounds v : bool :=
+  let q := part_at ps p in check_layers (hidden q) (outer q) (clamp_ends (clamp q) b) bounds v.
+Definition check_sum_within ps accepted terms rho v sums : bool :=
+  match sum_ends accepted (inputs_of (part_at ps rho)) terms, find_within accepted rho sums with
+  | Some s, Some w => contains sums s && contains v w
+  | _, _ => false
+  end.
+Definition check_jump ps accepted p b rho u : bool :=
+  match find_within accepted p b, find_alone accepted rho (inputs_of (part_at ps rho)) with
+  | Some v, Some k =>
+      (length v =? inputs_of (part_at ps rho))%nat && is_nonnegative k && is_nonnegative u
+      && at_most (mul (mul k k) (squareD (map largest_abs v))) (mul u u)
+  | _, _ => false
+  end.
+Definition check_error ps p b r e u bounds errors : bool :=
+  let q := part_at ps p in
+  check_roundings (hidden q) (outer q) (clamp_ends (clamp q) b) r bounds errors e
+  && is_nonnegative u && at_most (squareD e) (mul u u).
+(** How many summands at most, the sum of their sizes and that of their errors. *)
+Fixpoint sum_errors (accepted : list claim) (n : nat) (terms : list (term * list dyadic)) :
+    option (Z * list dyadic * list dyadic) :=
+  match terms with
+  | [] => Some (1%Z, repeat zero n, repeat zero n)
+  | (Term p b low high, r) :: terms' =>
+      match find_within accepted p b, find_error accepted p b r, sum_errors accepted n terms' with
+      | Some v, Some (e, _), Some (count, m, s) =>
+          if ((length v =? n)%nat && (length e =? n)%nat && (0 <=? high)%Z && forallb is_nonnegative e)%bool then
+            Some ((high + count)%Z, plus add (scale mul (high, 0%Z) (sizes v e)) m, plus add (scale mul (high,
+              0%Z) e) s)
+          else None
+      | _, _, _ => None
+      end
+  end.
+Definition check_sum_error ps accepted terms rho u sums errors : bool :=
+  let n := inputs_of (part_at ps rho) in
+  match sum_ends accepted n (map fst terms), sum_errors accepted n terms, find_error accepted rho sums errors with
+  | Some s, Some (count, m, e), Some (_, w) =>
+      contains sums s && is_nil (clamp (part_at ps rho)) && (length errors =? n)%nat
+      && sum_fits count m e errors && at_most w u
+  | _, _, _ => false
+  end.
+
 Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p : proof) : bool :=
   match c, p with
   | Norm_at_most p layer u, By_inequality rho t f => check [] (matrix_at ps p layer) u rho t f
@@ -137,6 +211,11 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Slope_at_most f moves scale u, By_product => check_product ps accepted f moves scale u
   | Slope_at_least f moves scale l, By_points x y others => check_points ps f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u
+  | Within p b v, By_layers bounds => check_within ps p b bounds v
+  | Sum_within terms rho v, By_sum sums => check_sum_within ps accepted terms rho v sums
+  | Jump_at_most p b rho u, By_norm => check_jump ps accepted p b rho u
+  | Float_error p b r e u, By_roundings bounds errors => check_error ps p b r e u bounds errors
+  | Sum_float_error terms rho u, By_rounded_sum sums errors => check_sum_error ps accepted terms rho u sums errors
   | _, _ => false
   end.
 (** The claims accepted so far with one more, if it is proved. *)

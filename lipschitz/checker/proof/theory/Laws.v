@@ -1,6 +1,6 @@
 (** An accepted law for several terms that move holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims Slopes.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Values Claims Slopes.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -13,7 +13,7 @@ Lemma find_slope_sound ps accepted phi rho moves u : Forall (holds ps) accepted 
   find_slope accepted phi rho moves = Some u -> holds ps (Slope_at_most (Set_of phi rho) moves [] u).
 Proof.
   intros H. revert u. induction H as [|c rest Hc H IH]; intros u; [discriminate|].
-  destruct c as [| |[|q k] m [|] v| |]; simpl find_slope; auto.
+  destruct c as [| |[|q k] m [|] v| | | | | | |]; simpl find_slope; auto.
   destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
   destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
   destruct (find_slope rest q k m) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst;

@@ -1,9 +1,10 @@
-(** What the claims of a certificate mean, over the real numbers. Together with `network`, `affine` and `relu` of Network.v,
-    `norm` and `minus` of Form.v and Network.v and `real` of Checker.v (mantissa times 2^exponent),
-        this is all that has to
-    be read to know what an accepted certificate states. *)
+(** What the claims of a certificate mean, over the real numbers.
+  Together with `network`, `affine` and `relu` of Network.v,
+    `norm` and `minus` of Form.v and Network.v, `real` of Checker.v (mantissa times 2^exponent) and,
+      for what is said of float32,
+    the first definitions of Float.v, this is all that has to be read to know what an accepted certificate states. *)
 From Coq Require Import List ZArith Reals.
-From Swarmcert Require Import Algebra Form Network Checker.
+From Swarmcert Require Import Algebra Form Network Checker Float.
 Import ListNotations.
 
 (** Weights by rows, biases. *)
@@ -45,7 +46,8 @@ Fixpoint agree (moves : list bool) (x y : list R) : Prop :=
 (** The sum of ((x_k - y_k) / scale_k)^2, its root; a scale that is left out is 1. *)
 Definition one : dyadic := (1, 0)%Z.
 Fixpoint square_in (scale : list dyadic) (d : list R) : R :=
-  match d with [] => 0 | a :: d' => (a / real (hd one scale)) * (a / real (hd one scale)) + square_in (tl scale) d' end.
+  match d with [] => 0 | a :: d' => (a / real (hd one scale)) * (a / real (hd one scale)) + square_in (tl scale) d'
+    end.
 Definition distance (scale : list dyadic) (x y : list R) : R := sqrt (square_in scale (minus x y)).
 
 (** Several terms of the sum move: of kind k (phi, moves, count) at most `count`, each from `fst` to `snd`. *)
@@ -59,12 +61,50 @@ Definition sum_at (ps : list part) (side : mover -> list R) (groups : list (kind
   vector_sum (flat_map (terms ps side) groups).
 Definition step_of (m : mover) : R := norm (minus (fst m) (snd m)).
 
+(** Values over boxes of inputs: an interval for each number. *)
+Definition box := list (dyadic * dyadic).
+Fixpoint within (b : box) (x : list R) : Prop :=
+  match b, x with
+  | (low, high) :: b', a :: x' => real low <= a <= real high /\ within b' x'
+  | [], [] => True
+  | _, _ => False
+  end.
+(** Each number of y off by at most that of r. *)
+Fixpoint close (r : list dyadic) (x y : list R) : Prop :=
+  match r, x, y with
+  | e :: r', a :: x', b :: y' => Rabs (b - a) <= real e /\ close r' x' y'
+  | [], [], [] => True
+  | _, _, _ => False
+  end.
+(** Terms of a sum: of part `phi`, each input in the box, between `fewest` and `most` of them. *)
+Record term := Term { phi : nat; inputs_in : box; fewest : Z; most : Z }.
+Definition may_stand (t : term) (xs : list (list R)) : Prop :=
+  (fewest t <= Z.of_nat (length xs) <= most t)%Z /\ Forall (within (inputs_in t)) xs.
+Definition zeros (n : nat) : list R := repeat 0 n.
+Definition sum_of_terms (ps : list part) (rho : nat) (groups : list (term * list (list R))) : list R :=
+  vector_sum (zeros (inputs_of (part_at ps rho)) ::
+    flat_map (fun g => map (value (part_at ps (phi (fst g)))) (snd g)) groups).
+(** v is what the float32 evaluation of part p returns for inputs x,
+  if what reaches its first layer differs from the clamped x
+    by at most r, number by number. *)
+Definition evaluates (p : part) (r : list dyadic) (x v : list R) : Prop :=
+  exists h, close r (clamped (clamp p) x) h /\
+    float_network (map real_layer (hidden p)) (real_layer (outer p)) h v.
+(** Number by number a float32 sum of these vectors, starting from zero. *)
+Definition float_vector_sum (n : nat) (us : list (list R)) (s : list R) : Prop :=
+  length s = n /\ forall i, (i < n)%nat -> float_sum (0 :: map (fun u => nth i u 0) us) (nth i s 0).
+
 Inductive claim :=
 | Norm_at_most (p layer : nat) (u : dyadic)
 | Norm_at_least (p layer : nat) (l : dyadic)
 | Slope_at_most (f : function) (moves : list bool) (scale : list dyadic) (u : dyadic)
 | Slope_at_least (f : function) (moves : list bool) (scale : list dyadic) (l : dyadic)
-| Law (stacked : bool) (kinds : list kind) (rho : nat) (u : dyadic).
+| Law (stacked : bool) (kinds : list kind) (rho : nat) (u : dyadic)
+| Within (p : nat) (b v : box)
+| Sum_within (terms : list term) (rho : nat) (v : box)
+| Jump_at_most (phi : nat) (b : box) (rho : nat) (u : dyadic)
+| Float_error (p : nat) (b : box) (r e : list dyadic) (u : dyadic)
+| Sum_float_error (terms : list (term * list dyadic)) (rho : nat) (u : dyadic).
 
 Definition weights_at (ps : list part) (p layer : nat) : list (list R) :=
   map (map real) (fst (nth layer (layers (part_at ps p)) ([], []))).
@@ -84,10 +124,30 @@ Definition holds (ps : list part) (c : claim) : Prop :=
         real l * distance scale x y <= norm (minus (value_of ps f rest x) (value_of ps f rest y))
   | Law stacked kinds rho u =>
       forall movers, Forall2 may_move kinds movers -> let groups := combine kinds movers in
-      Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g)) groups ->
+      Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g))
+        groups ->
       let change := minus (value (part_at ps rho) (sum_at ps fst groups))
           (value (part_at ps rho) (sum_at ps snd groups)) in
       if stacked
       then norm change <= real u * norm (map step_of (concat movers))
       else forall r, 0 <= r -> Forall (fun m => step_of m <= r) (concat movers) -> norm change <= real u * r
+  | Within p b v => forall x, within b x -> within v (value (part_at ps p) x)
+  | Sum_within terms rho v =>
+      forall inputs, Forall2 may_stand terms inputs ->
+        within v (value (part_at ps rho) (sum_of_terms ps rho (combine terms inputs)))
+  | Jump_at_most phi b rho u =>
+      forall x rest, within b x -> length rest = inputs_of (part_at ps rho) ->
+        norm (minus (value (part_at ps rho) (plusR (value (part_at ps phi) x) rest)) (value (part_at ps rho) rest))
+          <= real u
+  | Float_error p b r e u =>
+      forall x v, within b x -> evaluates (part_at ps p) r x v ->
+        close e (value (part_at ps p) x) v /\ norm (minus v (value (part_at ps p) x)) <= real u
+  | Sum_float_error terms rho u =>
+      forall inputs computed s v, Forall2 may_stand (map fst terms) inputs ->
+        Forall2 (fun t_xs vs => Forall2 (evaluates (part_at ps (phi (fst (fst t_xs)))) (snd (fst t_xs))) (snd t_xs)
+          vs)
+          (combine terms inputs) computed ->
+        float_vector_sum (inputs_of (part_at ps rho)) (concat computed) s ->
+        float_network (map real_layer (hidden (part_at ps rho))) (real_layer (outer (part_at ps rho))) s v ->
+        norm (minus v (value (part_at ps rho) (sum_of_terms ps rho (combine (map fst terms) inputs)))) <= real u
   end.

@@ -1,6 +1,6 @@
 (** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Values Claims.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -1,7 +1,7 @@
 (** An accepted claim holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims Slopes
-    Witness Laws.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Values Claims Slopes
+    Witness Laws Ranges Roundings.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -14,6 +14,11 @@ Proof.
   - now apply product_sound in H.
   - now apply points_sound in H.
   - now apply law_sound in H.
+  - now apply within_sound in H.
+  - now apply sum_within_sound in H.
+  - now apply jump_sound in H.
+  - now apply error_sound in H.
+  - now apply sum_error_sound in H.
 Qed.
 (** What the program does claim by claim. *)
 Theorem accepted_hold ps accepted c p accepted' : Forall (holds ps) accepted -> step ps accepted c p = Some accepted' ->

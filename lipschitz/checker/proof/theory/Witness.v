@@ -1,6 +1,6 @@
 (** A slope from below, accepted for two points, holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Claims Slopes.
+From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Values Claims Slopes.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -1,0 +1,157 @@
+#include <algorithm>
+
+#include "lipschitz/checker/certificate_checker.h"
+#include "lipschitz/checker/values.h"
+
+namespace swarmcert::check {
+namespace {
+
+using Row = std::vector<double>;
+
+constexpr const char* kNotFloat32 = ": a float32 error of weights that are not float32";
+
+std::vector<Dyadic> exact(const Row& values) { return {values.begin(), values.end()}; }
+
+/// Entry by entry a <= b.
+bool at_most(const std::vector<Dyadic>& a, const std::vector<Dyadic>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Dyadic& x, const Dyadic& y) { return y >= x; });
+}
+
+/// What is stated of one layer, or of a sum.
+Bounded stated(const files::Json& json, std::size_t size, bool with_error, const std::string& where) {
+  files::require_keys(json, {"lower", "upper", "error"}, where);
+  require(json["error"].is_null() != with_error,
+          where + ": an error where there are input errors, and only there");
+  Bounded result{{exact(hex_floats_in(json["lower"])), exact(hex_floats_in(json["upper"]))}, {}};
+  if (with_error) result.error = exact(hex_floats_in(json["error"]));
+  require(result.values.lower.size() == size && result.values.upper.size() == size &&
+              result.error.size() == (with_error ? size : 0),
+          where + ": needs one number per output");
+  return result;
+}
+
+void require_encloses(const Bounded& stated, const Intervals& values,
+                      const std::optional<std::vector<Dyadic>>& error, const std::string& where) {
+  require(at_most(stated.values.lower, values.lower) && at_most(values.upper, stated.values.upper),
+          where + ": the values leave the bounds");
+  if (!stated.error.empty())
+    require(error && at_most(*error, stated.error), where + ": claims less than the float32 error");
+}
+
+/// Verifies what is stated of every layer of a network; returns that of the last one.
+Bounded check_layers(const files::Weights& weights, const files::Json& json, Bounded input,
+                     const std::string& where) {
+  require(json.is_array() && json.size() == weights.layers.size(), where + ": needs one entry per layer");
+  const bool with_error = !input.error.empty();
+  for (std::size_t k = 0; k < weights.layers.size(); ++k) {
+    const files::Layer& layer = weights.layers[k];
+    if (k > 0) input.values = relu_intervals(std::move(input.values));
+    Bounded output = stated(json[k], static_cast<std::size_t>(layer.outputs), with_error, where);
+    require_encloses(output, layer_intervals(layer, input.values),
+                     with_error ? layer_error(layer, input.values, input.error) : std::nullopt, where);
+    input = std::move(output);
+  }
+  return input;
+}
+
+}  // namespace
+
+void CertificateChecker::check_values(const Json& entry) {
+  files::require_keys(entry,
+                      {"function", "neighbours", "domain", "input_error", "networks", "sum", "lower", "upper",
+                       "jump", "jump_hex", "float32_error", "float32_error_hex"},
+                      "values");
+  const std::string function = entry["function"].get<std::string>();
+  const std::string where = "values of " + function;
+  const std::vector<std::string> names = files::networks_of(function);
+  const bool is_set = names.size() == 2;
+  require(is_set ? names[0] != files::kGroundPhi : function == "network",
+          where + ": only of the network, or of a sum over neighbours");
+  const bool has_ground = is_set && parts_.count(files::kGroundPhi) == 1;
+  require(entry["neighbours"].is_number_integer(), where + ": neighbours is not an integer");
+  const long neighbours = entry["neighbours"].get<long>();
+  require(is_set ? 1 <= neighbours && neighbours <= kMostNeighbours : neighbours == 0,
+          where + ": impossible number of neighbours");
+  std::vector<std::string> inputs = {names[0]};
+  if (has_ground) inputs.emplace_back(files::kGroundPhi);
+  require(entry["networks"].is_object() && entry["networks"].size() == inputs.size() + (is_set ? 1 : 0),
+          where + ": networks lists others than the function has");
+  const bool with_error = !entry["input_error"].is_null();
+  if (with_error)
+    require(entry["input_error"].is_object() && entry["input_error"].size() == inputs.size(),
+            where + ": input_error is not of the function's inputs");
+
+  Bounded result;
+  std::vector<SumTerm> terms;
+  for (const std::string& name : inputs) {
+    require(parts_.count(name) == 1, where + ": there is no network " + name);
+    Bounded input = values_input(entry, name, where);
+    result =
+        check_layers(*parts_.at(name), entry["networks"].at(name), std::move(input), where + ": " + name);
+    const bool is_ground = name == files::kGroundPhi;
+    terms.push_back({result, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
+  }
+  require(entry["sum"].is_null() != is_set, where + ": a sum of set functions, and only of those");
+  if (is_set) {
+    require(parts_.count(names[1]) == 1, where + ": there is no network " + names[1]);
+    const files::Weights& rho = *parts_.at(names[1]);
+    require(!with_error || rho.precision == files::Precision::kFloat32, where + kNotFloat32);
+    const auto size = static_cast<std::size_t>(rho.inputs());
+    Bounded sum = stated(entry["sum"], size, with_error, where + ": sum");
+    require_encloses(sum, sum_intervals(terms, size), with_error ? sum_error(terms, size) : std::nullopt,
+                     where + ": sum");
+    result = check_layers(rho, entry["networks"].at(names[1]), std::move(sum), where + ": " + names[1]);
+  }
+  const std::vector<Dyadic> lower = exact(files::parse_hex_floats(entry["lower"]));
+  const std::vector<Dyadic> upper = exact(files::parse_hex_floats(entry["upper"]));
+  require(at_most(lower, result.values.lower) && at_most(result.values.upper, upper),
+          where + ": the values leave the range");
+  check_jump(entry, terms.front(), names, where);
+  require(
+      entry["float32_error"].is_null() != with_error && entry["float32_error_hex"].is_null() != with_error,
+      where + ": a float32 error where there are input errors, and only there");
+  if (with_error) {
+    const Dyadic claimed =
+        number(entry["float32_error"], entry["float32_error_hex"], where + " float32_error");
+    require(claimed * claimed >= square(result.error), where + ": claims less than the float32 error");
+  }
+  ++values_;
+}
+
+void CertificateChecker::check_jump(const Json& entry, const Bounded& moved,
+                                    const std::vector<std::string>& names, const std::string& where) const {
+  const bool is_set = names.size() == 2;
+  require(entry["jump"].is_null() != is_set && entry["jump_hex"].is_null() != is_set,
+          where + ": a jump of set functions, and only of those");
+  if (!is_set) return;
+  const Dyadic jump = number(entry["jump"], entry["jump_hex"], where + " jump");
+  const auto bound = proved_.find(key(names[1], "all", {}));
+  require(bound != proved_.end(), where + ": rests on a bound of " + names[1] + " that is not there");
+  require(jump * jump >= bound->second * bound->second * largest_square(moved.values),
+          where + ": claims less than the jump");
+}
+
+Bounded CertificateChecker::values_input(const Json& entry, const std::string& name,
+                                         const std::string& where) const {
+  Row lower, upper;
+  if (entry["domain"] == "box") {
+    require(certificate_["box"].is_object(), where + ": there is no box");
+    read_box(name, lower, upper, where);
+  } else {
+    require(entry["domain"] == "clamp" && network_.clamp && files::is_clamped(name),
+            where + ": the domain is neither the box nor a clamp of this input");
+    lower = network_.clamp->lower;
+    upper = network_.clamp->upper;
+  }
+  Bounded input{{exact(lower), exact(upper)}, {}};
+  if (entry["input_error"].is_null()) return input;
+  require(parts_.at(name)->precision == files::Precision::kFloat32, where + kNotFloat32);
+  input.error = exact(files::parse_hex_floats(entry["input_error"].at(name)));
+  require(input.error.size() == lower.size() && std::all_of(input.error.begin(), input.error.end(),
+                                                            [](const Dyadic& x) { return x.sign() >= 0; }),
+          where + ": needs one input error per input, none negative");
+  return input;
+}
+
+}  // namespace swarmcert::check
