@@ -26,7 +26,8 @@ def main():
         folder = Path(name)
         common.heterogeneous(folder, generator)
         certificate, net = folder / "certificate.json", ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
-        subprocess.run([SWARMCERT, "certify", *net, "--neighbours", "2", "--nodes", "1", "-q", "-o", certificate], check=True,
+        subprocess.run([SWARMCERT, "certify", *net, "--neighbours", "2", "--nodes", "1", "--method", "sdp", "--as", "float32", "--domain",
+                        folder / "box.toml", "-q", "-o", certificate], check=True,
                        capture_output=True)
         text = subprocess.run([CHECKER, "--coq", certificate, *net], check=True, capture_output=True, text=True).stdout
         done = kernel(folder / "Sound.v", text)
@@ -34,7 +35,8 @@ def main():
         axioms = set(re.findall(r"^([A-Z]\w*\.\w+)", done.stdout, re.M))
         assert axioms == {"ClassicalDedekindReals.sig_not_dec", "ClassicalDedekindReals.sig_forall_dec",
                           "FunctionalExtensionality.functional_extensionality_dep"}, done.stdout
-        for kind in "Norm_at_most", "Norm_at_least", "Slope_at_most", "Slope_at_least", "Law":
+        for kind in "Norm_at_most", "Norm_at_least", "Slope_at_most", "Slope_at_least", "Law", "Within", "Sum_within", "Jump_at_most", \
+                "Float_error", "Sum_float_error":
             assert f": claim := {kind}" in text, kind
         # The last number of a claim is its bound.
         claims = re.findall(r"claim := ((?:Slope_at_most|Norm_at_most) .*)\((\d+),(-?\d+)\)\.", text)

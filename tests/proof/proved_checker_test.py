@@ -3,19 +3,20 @@
 certify writes without a box is accepted by all, with nothing left unchecked; mutations of every field are decided alike;
 malformed files are refused by each.
 
-    proved_checker_test.py SWARMCERT SOURCE_DIR MUTATIONS CHECKER    MUTATIONS: 0, one for every kind of field
+    proved_checker_test.py SWARMCERT SOURCE_DIR MUTATIONS CHECKER CHECK_MANY    MUTATIONS: 0, one for every kind of field
 """
 import json
+import math
 import random
+import select
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-SOURCE, MUTATIONS, CHECKER = Path(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]).resolve()
+SOURCE, MUTATIONS, CHECKER, MANY = Path(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]).resolve(), Path(sys.argv[5]).resolve()
 sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
 import check_certificate as second  # noqa: E402
 import check_certificate_test as common  # noqa: E402
@@ -37,6 +38,34 @@ def proved(certificate, net):
     return run([CHECKER, certificate, *net])
 
 
+class Server:
+    """A checker that decides many certificates of one NET in one process."""
+
+    def __init__(self, command):
+        self.process = subprocess.Popen(list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                                        errors="replace")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.stdin.close()
+        self.process.wait(SECONDS)
+        self.process.stdout.close()
+
+    def ask(self, path):
+        print(path, file=self.process.stdin, flush=True)
+
+    def answer(self):
+        """Exit code and reason."""
+        ready, _, _ = select.select([self.process.stdout], [], [], SECONDS)
+        if not ready:
+            self.process.kill()
+            raise TimeoutError(self.process.args)
+        code, _, reason = self.process.stdout.readline().rstrip("\n").partition("\t")
+        return int(code), reason
+
+
 def pattern(path):
     return tuple("*" if isinstance(key, int) else key for key in path)
 
@@ -51,17 +80,24 @@ def kinds(folder, generator):
     ordered = [square, "--order", "first,after,last"]
     samples = folder / "square.json"
     samples.write_text(common.recorded(second.Network(**arguments(ordered)).parts["network"], generator))
+    (folder / "plane.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, 0.5]\nupper = [1, 0.75]\n')
+    clamped = folder / "clamped.toml"  # the neighbours' inputs are all bounded by the clamp, and there is no ground
+    text = hetero[0].read_text()
+    clamped.write_text(text.replace('[phi.ground]\nweights = "ground.safetensors"\n', ""))
+    float32 = ["--as", "float32"]
     pair = ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
     parts = ["--method", "branch", "--cuts", "20"]
     slow = [("kinds by parts of a box", hetero, ["--neighbours", "2", "--domain", folder / "part.toml", *parts], 0.01)]
     return [
-        ("plain", [tiny], [], 0.2),
+        ("plain", [tiny], [], 0.16),
         ("one layer", [line], ["--blocks"], 0.2),
         ("order and samples", ordered, ["--samples", samples], 0.2),
         ("kinds, blocks, laws, scale", hetero, ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"], 0.05),
         ("float32 and products", hetero, ["--as", "float32", "--neighbours", "2", "--method", "product"], 0.1),
-        ("kinds on a box", hetero, ["--neighbours", "small=3", "--domain", folder / "box.toml", "--method", "sdp"], 0.05),
-        ("pair", pair, ["--blocks=velocity"], 0.16),
+        ("kinds and values on a box", hetero, [*float32, "--neighbours", "small=3", "--domain", folder / "box.toml", "--method", "sdp"], 0.05),
+        ("pair", pair, ["--blocks=velocity"], 0.1),
+        ("values of a network", [tiny], [*float32, "--domain", folder / "plane.toml"], 0.1),
+        ("values on a clamp", [clamped], [*float32, "--range", "--neighbours", "2", "--input-step", "0.001"], 0.05),
         ("by parts", [tiny], parts, 0.03),
     ] + slow * (MUTATIONS > 0)
 
@@ -89,30 +125,24 @@ def mutate(name, net, certificate, folder, generator, count):
     chosen = [generator.choice(some) for some in by_pattern.values()]
     chosen += [generator.choice(by_pattern[p]) for p in generator.choices(list(by_pattern), k=max(0, count - len(chosen)))]
     network = second.Network(**arguments(net))
-
-    def decide(job):
-        number, changed = job
-        path = folder / f"mutation{number}.json"
-        path.write_text(json.dumps(changed))
-        results = first(path, net), proved(path, net)
-        path.unlink()
-        return results
-
-    table = Counter()
-    with ThreadPoolExecutor(2) as pool:
-        for begin in range(0, len(chosen), 1000):
-            part = chosen[begin:begin + 1000]
-            changed = [common.forged(certificate, path, generator)[0] for path in part]
-            for path, mutation, (one, three) in zip(part, changed, pool.map(decide, enumerate(changed))):
-                assert one.returncode in (0, 1, 3), one
-                assert three.returncode in (0, 1, 3, 4), three
-                if "as" in mutation.get("network", {}) and mutation["network"]["as"] != certificate["network"]["as"]:
-                    network = second.Network(**arguments(net))  # the second checker rounds it in place
-                reason = second.check(mutation, network) if mutation.get("schema") == certificate["schema"] else "schema"
-                alike = decided_alike(three.returncode, one.returncode == 0, not reason, by_parts)
-                assert alike, (f"{name}, {path}: first {one.returncode} {one.stdout} {one.stderr}, second {reason!r}, "
-                               f"proved {three.returncode} {three.stdout} {three.stderr}")
-                table["accepted" if one.returncode == 0 else "rejected" if three.returncode != 4 else "beyond"] += 1
+    words = list(map(str, net))
+    pair = words[:1] == ["--phi"]
+    one_command = [MANY, words[1], words[3], "--pair"] if pair else [MANY, words[0], *words[2:]]
+    table, path = Counter(), folder / "mutation.json"
+    with Server(one_command) as one, Server([CHECKER, "--many", *words]) as three:
+        for place in chosen:
+            mutation = common.forged(certificate, place, generator)[0]
+            path.write_text(json.dumps(mutation))
+            one.ask(path)
+            three.ask(path)
+            if "as" in mutation.get("network", {}) and mutation["network"]["as"] != certificate["network"]["as"]:
+                network = second.Network(**arguments(net))  # the second checker rounds it in place
+            reason = second.check(mutation, network) if mutation.get("schema") == certificate["schema"] else "schema"
+            (code, words_of_one), (code_of_three, words_of_three) = one.answer(), three.answer()
+            assert code in (0, 1, 3) and code_of_three in (0, 1, 3, 4), (words_of_one, words_of_three)
+            assert decided_alike(code_of_three, code == 0, not reason, by_parts), (
+                f"{name}, {place}: first {code} {words_of_one}, second {reason!r}, proved {code_of_three} {words_of_three}")
+            table["accepted" if code == 0 else "rejected" if code_of_three != 4 else "beyond"] += 1
     assert table["rejected"] + table["beyond"] > 0.5 * len(chosen), table
     print(f"{name:28} {len(by_pattern):4} kinds of fields {len(chosen):7} mutations: {table['rejected']:7} rejected by all, "
           f"{table['accepted']:6} accepted by all, {table['beyond']:6} beyond the proved one")
@@ -141,6 +171,49 @@ def short_scale(certificate, net, folder):
     reason = second.check(certificate, second.Network(**arguments(net)))
     for said in first(path, net).stdout, reason, proved(path, net).stdout:
         assert "scale has another size" in said, said
+
+
+def values_are_tight(certificate, net, folder):
+    """Each bound of values that is a unit in the last place smaller is refused by all, for its own reason."""
+    entry = certificate["values"][-1]
+    assert entry["float32_error"] > 0
+    tried = Counter()
+    for name in entry["networks"]:
+        for k in range(len(entry["networks"][name])):
+            for key, down in ("lower", False), ("upper", True), ("error", True):
+                tried[key] += refused_one_unit_less(certificate, net, folder, ["networks", name, k, key], down)
+    if entry["sum"]:
+        for key, down in ("lower", False), ("upper", True), ("error", True):
+            tried[key] += refused_one_unit_less(certificate, net, folder, ["sum", key], down)
+    for key in ["jump"] * (entry["jump"] is not None) + ["float32_error"]:
+        changed = json.loads(json.dumps(certificate))
+        smaller = math.nextafter(entry[key], 0)
+        changed["values"][-1].update({key: smaller, key + "_hex": smaller.hex()})
+        refused_by_all(changed, net, folder, key)
+    assert min(tried.values()) >= 2 and len(tried) == 3, tried
+
+
+def refused_one_unit_less(certificate, net, folder, path, down):
+    """Of the first number of a list."""
+    changed = json.loads(json.dumps(certificate))
+    place = changed["values"][-1]
+    for key in path[:-1]:
+        place = place[key]
+    words = place[path[-1]].split()
+    words[0] = math.nextafter(float.fromhex(words[0]), -math.inf if down else math.inf).hex()
+    place[path[-1]] = " ".join(words)
+    refused_by_all(changed, net, folder, path)
+    return 1
+
+
+def refused_by_all(changed, net, folder, what):
+    changed["content_sha256"] = second.content_sha256(changed)
+    path = folder / "smaller.json"
+    path.write_text(json.dumps(changed))
+    one, two, three = first(path, net), second.check(changed, second.Network(**arguments(net))), proved(path, net)
+    for said in one.stdout, two, three.stdout:
+        assert "values" in said and ("bounds" in said or "range" in said or "less than" in said), f"{what}: {said}"
+    assert one.returncode == three.returncode == 1, f"{what}: {one} {three}"
 
 
 def malformed(certificate, net, folder):
@@ -255,6 +328,8 @@ def main():
             if index == 0:
                 malformed(certificate, net, folder)
                 layer_by_layer(certificate, net, folder)
+            if "values" in name:
+                values_are_tight(certificate, net, folder)
             if "scale" in name:
                 short_scale(json.loads(json.dumps(certificate)), net, folder)
             total += mutate(name, net, certificate, folder, generator, int(share * MUTATIONS))
