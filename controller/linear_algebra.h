@@ -1,6 +1,8 @@
 /// @file Vectors and matrices of three dimensions: plain data, sums from x to z, no heap.
 #pragma once
 
+#include <cstddef>
+
 #include "controller/scalar.h"
 
 namespace swarmcert::controller {
@@ -8,6 +10,10 @@ namespace swarmcert::controller {
 template <typename Scalar>
 struct Vector3 {
   Scalar x{}, y{}, z{};
+
+  /// Component `axis`: 0, 1, 2 for x, y, z.
+  constexpr const Scalar& operator[](std::size_t axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+  constexpr Scalar& operator[](std::size_t axis) { return axis == 0 ? x : axis == 1 ? y : z; }
 };
 
 template <typename Scalar>
@@ -72,6 +78,12 @@ inline bool is_within(const Vector3<Scalar>& a, Scalar limit) {
 template <typename Scalar>
 struct Matrix3 {
   Vector3<Scalar> x, y, z;
+
+  /// Row `row`: m[i][j] is the entry in row i and column j.
+  constexpr const Vector3<Scalar>& operator[](std::size_t row) const {
+    return row == 0 ? x : row == 1 ? y : z;
+  }
+  constexpr Vector3<Scalar>& operator[](std::size_t row) { return row == 0 ? x : row == 1 ? y : z; }
 };
 
 template <typename Scalar>
@@ -94,6 +106,11 @@ template <typename Scalar>
 inline Matrix3<Scalar> from_columns(const Vector3<Scalar>& x, const Vector3<Scalar>& y,
                                     const Vector3<Scalar>& z) {
   return transpose(Matrix3<Scalar>{x, y, z});
+}
+
+template <typename Scalar>
+inline Matrix3<Scalar> scaled(const Scalar& factor, const Matrix3<Scalar>& a) {
+  return {scaled(factor, a.x), scaled(factor, a.y), scaled(factor, a.z)};
 }
 
 /// The third column: where a rotation R_WB sends the body's z axis, along which rotors push.

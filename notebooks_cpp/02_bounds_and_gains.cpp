@@ -38,13 +38,13 @@ int main() {
   std::string data;
   for (int step = 0; step <= 30; ++step) {
     const double c = 0.8 + 0.1 * step;
-    stability::Gains scaled = gains;
-    for (double& x : scaled.composite->Lambda) x *= c;
-    for (double& x : scaled.composite->K) x *= c;
-    const double ball = stability::check_theorem(scaled, mass_kg, {}).ball_per_rate() * rate_N_s;
-    const double lag_limit = stability::lag_limit(*stability::axis_loop(scaled, {mass_kg, 1, 0}, 2));
-    scaled.motor_lag_s = 0.057;
-    const stability::AxisLoop lagged = *stability::axis_loop(scaled, {mass_kg, 1, 0}, 2);
+    stability::Gains both = gains;
+    both.composite->Lambda_1_s = controller::scaled(c, both.composite->Lambda_1_s);
+    both.composite->K_kg_s = controller::scaled(c, both.composite->K_kg_s);
+    const double ball = stability::check_theorem(both, mass_kg, {}).ball_per_rate() * rate_N_s;
+    const double lag_limit = stability::lag_limit(*stability::axis_loop(both, {mass_kg, 1, 0}, 2));
+    both.motor_lag_s = 0.057;
+    const stability::AxisLoop lagged = *stability::axis_loop(both, {mass_kg, 1, 0}, 2);
     const double error = stability::continuous_norms(lagged, stability::Channel::kCommand).rate * rate_N_s;
     data += fmt::format("{:.2f} {:.4g} {:.4g}\n", c, 1000 * ball, 1000 * error);
     if (step % 10 == 0) {

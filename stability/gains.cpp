@@ -108,7 +108,7 @@ PerAxis per_axis(const TomlTable& table, const std::string& key, bool may_be_zer
 Matrix3 read_matrix(const TomlTable& table, const std::string& key) {
   Matrix3 result{};
   if (!table.is_list(key)) {
-    for (std::size_t i = 0; i < 3; ++i) result[4 * i] = table.number(key);
+    for (std::size_t i = 0; i < 3; ++i) result[i][i] = table.number(key);
     return result;
   }
   if (!table.is_list_of_lists(key)) {
@@ -117,7 +117,7 @@ Matrix3 read_matrix(const TomlTable& table, const std::string& key) {
       table.refuse(key, std::to_string(diagonal.size()) + " numbers", "must be three numbers, the diagonal",
                    "or three rows of three, or one number");
     }
-    for (std::size_t i = 0; i < 3; ++i) result[4 * i] = diagonal[i];
+    for (std::size_t i = 0; i < 3; ++i) result[i][i] = diagonal[i];
     return result;
   }
   const std::vector<std::vector<double>> rows = table.rows(key);
@@ -127,16 +127,19 @@ Matrix3 read_matrix(const TomlTable& table, const std::string& key) {
       table.refuse(key, std::to_string(rows[i].size()) + " numbers in row " + std::to_string(i + 1),
                    "must have three numbers in each row");
     }
-    for (std::size_t j = 0; j < 3; ++j) result[3 * i + j] = rows[i][j];
+    for (std::size_t j = 0; j < 3; ++j) result[i][j] = rows[i][j];
   }
   return result;
 }
 
 Matrix3 matrix(const TomlTable& table, const std::string& key, double largest, const std::string& unit) {
   const Matrix3 result = read_matrix(table, key);
-  for (const double value : result) check_size(table, key, value, largest, unit);
+  for (const auto& row : {result.x, result.y, result.z})
+    for (const double value : {row.x, row.y, row.z}) check_size(table, key, value, largest, unit);
   return result;
 }
+
+controller::Vector3<double> vector(const PerAxis& v) { return {v[0], v[1], v[2]}; }
 
 void read_position(const TomlTable& position, Gains& gains) {
   position.allow_only({"Kp", "Kd", "Ki", "Lambda", "K", "integrator_limit", "rate_hz", "integrator_step_s"});
@@ -148,9 +151,9 @@ void read_position(const TomlTable& position, Gains& gains) {
   }
   if (!is_pid && !is_composite) position.refuse("", "", "has no gains", "give Kp, Kd, Ki or Lambda, K");
   if (is_pid) {
-    gains.pid = PidGains{per_axis(position, "Kp", false, kLargestKp_1_s2, "1/s^2"),
-                         per_axis(position, "Kd", false, kLargestKd_1_s, "1/s"),
-                         per_axis(position, "Ki", true, kLargestKi_1_s3, "1/s^3")};
+    gains.pid = PidGains{vector(per_axis(position, "Kp", false, kLargestKp_1_s2, "1/s^2")),
+                         vector(per_axis(position, "Kd", false, kLargestKd_1_s, "1/s")),
+                         vector(per_axis(position, "Ki", true, kLargestKi_1_s3, "1/s^3"))};
   } else {
     gains.composite = CompositeGains{matrix(position, "Lambda", kLargestLambda_1_s, "1/s"),
                                      matrix(position, "K", kLargestK_kg_s, "kg/s")};

@@ -6,27 +6,17 @@
 #include <optional>
 #include <string>
 
+#include "controller/flight_controller.h"
+
 namespace swarmcert::stability {
 
 /// One number per world axis x, y, z.
 using PerAxis = std::array<double, 3>;
-/// A 3x3 matrix, row by row.
-using Matrix3 = std::array<double, 9>;
-
-/// PID gains as firmware has them: accelerations, u = -(Kp e + Kd e' + Ki int e), so force is mass times u.
-struct PidGains {
-  PerAxis Kp;  ///< 1/s^2
-  PerAxis Kd;  ///< 1/s
-  PerAxis Ki;  ///< 1/s^3
-};
-
-/// Gains of the composite variable s = e' + 2 Lambda e + Lambda^2 int e, force -K s.
-struct CompositeGains {
-  Matrix3 Lambda;  ///< 1/s
-  Matrix3 K;       ///< kg/s
-};
-
-enum class AttitudeLaw { kLee, kRobust };
+/// A 3x3 matrix; m[i][j] is the entry in row i and column j.
+using Matrix3 = controller::Matrix3<double>;
+using PidGains = controller::PidGains<double>;
+using CompositeGains = controller::CompositeGains<double>;
+using controller::AttitudeLaw;
 
 /// Everything gains.toml says. Exactly one of `pid` and `composite` is present.
 struct Gains {

@@ -21,11 +21,11 @@ bool as_pid(const TrackingSetup& setup, Gains& gains) {
   PidGains pid{};
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    const std::optional<AxisGains> one = axis_gains(setup.gains, setup.plant.mass_kg, axis);
+    const std::optional<controller::AxisPid<double>> one = axis_gains(setup.gains, setup.plant.mass_kg, axis);
     if (!one) return false;
-    pid.Kp[i] = one->Kp;
-    pid.Kd[i] = one->Kd;
-    pid.Ki[i] = one->Ki;
+    pid.Kp_1_s2[i] = one->Kp_1_s2;
+    pid.Kd_1_s[i] = one->Kd_1_s;
+    pid.Ki_1_s3[i] = one->Ki_1_s3;
   }
   gains = setup.gains;
   gains.composite.reset();
@@ -67,8 +67,8 @@ double nominal_bound(const Gains& gains, const Plant& plant, const DisturbanceSo
 bool repeats(const Gains& pid, const DisturbanceSource& source, int axis) {
   if (axis == 0) return false;
   const auto i = static_cast<std::size_t>(axis);
-  return pid.pid->Kp[i] == pid.pid->Kp[i - 1] && pid.pid->Kd[i] == pid.pid->Kd[i - 1] &&
-         pid.pid->Ki[i] == pid.pid->Ki[i - 1] &&
+  return pid.pid->Kp_1_s2[i] == pid.pid->Kp_1_s2[i - 1] && pid.pid->Kd_1_s[i] == pid.pid->Kd_1_s[i - 1] &&
+         pid.pid->Ki_1_s3[i] == pid.pid->Ki_1_s3[i - 1] &&
          pid.integrator_limit_m_s[i] == pid.integrator_limit_m_s[i - 1] &&
          (axis < 2 || pid.attitude_lag_s == 0) && source.axis[axis] == source.axis[axis - 1] &&
          source.bias_N[axis] == source.bias_N[axis - 1];
@@ -107,7 +107,7 @@ double times(double gain, double size) { return size == 0 ? 0 : gain * size; }  
 
 bool has_clamp(const Gains& pid, int axis) {
   const auto i = static_cast<std::size_t>(axis);
-  return pid.pid->Ki[i] > 0 && std::isfinite(pid.integrator_limit_m_s[i]);
+  return pid.pid->Ki_1_s3[i] > 0 && std::isfinite(pid.integrator_limit_m_s[i]);
 }
 
 UncertainNorms norms_over(const Gains& pid, const AxisLoop& loop, const UncertainPlant& box,

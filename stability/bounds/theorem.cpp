@@ -4,12 +4,10 @@
 #include <cmath>
 #include <cstdio>
 
-#include "controller/gain_conversion.h"
+#include "stability/gains_matrices.h"
 
 namespace swarmcert::stability {
 namespace {
-
-using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// How far gains, printed with few digits, may be from a (Lambda, K) form: relative, in Ki.
 constexpr double kFormTolerance = 1e-9;
@@ -24,14 +22,15 @@ std::string number(double value) {
 /// Smallest eigenvalue, where `m` is symmetric; else objects.
 std::optional<double> positive_definite(const Matrix3& m, const char* name,
                                         std::vector<std::string>& why_not) {
-  const Matrix matrix = Eigen::Map<const Matrix>(m.data());
+  const Eigen::Matrix3d matrix = to_eigen(m);
   const double asymmetry = (matrix - matrix.transpose()).cwiseAbs().maxCoeff();
   if (asymmetry > 1e-12 * matrix.cwiseAbs().maxCoeff()) {
     why_not.push_back(std::string(name) + " is not symmetric: entries differ by " + number(asymmetry) +
                       ". For such gains the ball can be exceeded");
     return std::nullopt;
   }
-  const double least = Eigen::SelfAdjointEigenSolver<Matrix>(matrix, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  const double least =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly).eigenvalues()[0];
   if (least > 0) return least;
   why_not.push_back(std::string(name) + " is not positive definite: its smallest eigenvalue is " +
                     number(least));
@@ -39,23 +38,23 @@ std::optional<double> positive_definite(const Matrix3& m, const char* name,
 }
 
 /// Diagonal (Lambda, K) of PID gains whose Ki acts as `share` of what is written; else objects.
-std::optional<Composite> composite_of(const PidGains& pid, double share, double mass_kg,
-                                      std::vector<std::string>& why_not) {
-  Composite result{};
+std::optional<CompositeGains> composite_of(const PidGains& pid, double share, double mass_kg,
+                                           std::vector<std::string>& why_not) {
+  CompositeGains result{};
   bool has_form = true;
   for (std::size_t i = 0; i < 3; ++i) {
-    const controller::AxisPid<double> pid_axis = {pid.Kp[i], pid.Kd[i], pid.Ki[i] * share};
+    const controller::AxisPid<double> pid_axis = {pid.Kp_1_s2[i], pid.Kd_1_s[i], pid.Ki_1_s3[i] * share};
     const controller::AxisComposite<double> axis =
         controller::to_composite(pid_axis, mass_kg, kFormTolerance);
     if (axis.status == controller::ConversionStatus::kOk) {
-      result.Lambda[4 * i] = axis.lambda_1_s;
-      result.K[4 * i] = axis.k_kg_s;
+      result.Lambda_1_s[i][i] = axis.lambda_1_s;
+      result.K_kg_s[i][i] = axis.k_kg_s;
       continue;
     }
     has_form = false;
     std::string why = std::string("the gains of axis ") + kAxes[i] + " have no (Lambda, K) form: ";
     if (axis.status == controller::ConversionStatus::kOtherIntegralGain) {
-      why += "Ki = " + number(pid.Ki[i] * share) + ", and Kp, Kd would need " + number(axis.needed_Ki_1_s3);
+      why += "Ki = " + number(pid_axis.Ki_1_s3) + ", and Kp, Kd would need " + number(axis.needed_Ki_1_s3);
     } else {
       why += controller::to_text(axis.status);
     }
@@ -75,7 +74,7 @@ Theorem check_theorem(const Gains& gains, double mass_kg,
   if (gains.pid) {
     theorem.composite = composite_of(*gains.pid, share, mass_kg, theorem.why_not);
   } else {
-    theorem.composite = Composite{gains.composite->Lambda, gains.composite->K};
+    theorem.composite = gains.composite;
     if (!acts_as_written) {
       theorem.why_not.push_back("the integrator adds " + number(gains.integrator_step_s) +
                                 " s per cycle of " + number(1 / gains.rate_hz) + " s: Lambda^2 acts " +
@@ -83,8 +82,8 @@ Theorem check_theorem(const Gains& gains, double mass_kg,
     }
   }
   if (theorem.composite) {
-    const auto least_Lambda = positive_definite(theorem.composite->Lambda, "Lambda", theorem.why_not);
-    const auto least_K = positive_definite(theorem.composite->K, "K", theorem.why_not);
+    const auto least_Lambda = positive_definite(theorem.composite->Lambda_1_s, "Lambda", theorem.why_not);
+    const auto least_K = positive_definite(theorem.composite->K_kg_s, "K", theorem.why_not);
     if (least_Lambda && least_K) {
       theorem.min_Lambda = *least_Lambda;
       theorem.min_K = *least_K;
@@ -119,18 +118,16 @@ Theorem check_theorem(const Gains& gains, double mass_kg,
   return theorem;
 }
 
-std::optional<AxisGains> axis_gains(const Gains& gains, double mass_kg, int axis) {
+std::optional<controller::AxisPid<double>> axis_gains(const Gains& gains, double mass_kg, int axis) {
   const auto i = static_cast<std::size_t>(axis);
-  if (gains.pid) return AxisGains{gains.pid->Kp[i], gains.pid->Kd[i], gains.pid->Ki[i]};
+  if (gains.pid)
+    return controller::AxisPid<double>{gains.pid->Kp_1_s2[i], gains.pid->Kd_1_s[i], gains.pid->Ki_1_s3[i]};
+  const Matrix3 &Lambda = gains.composite->Lambda_1_s, &K = gains.composite->K_kg_s;
   for (std::size_t j = 0; j < 3; ++j) {
-    if (j == i) continue;
-    for (const Matrix3* m : {&gains.composite->Lambda, &gains.composite->K}) {
-      if ((*m)[3 * i + j] != 0 || (*m)[3 * j + i] != 0) return std::nullopt;
-    }
+    if (j != i && (Lambda[i][j] != 0 || Lambda[j][i] != 0 || K[i][j] != 0 || K[j][i] != 0))
+      return std::nullopt;
   }
-  const auto pid =
-      controller::to_pid<double>(gains.composite->Lambda[4 * i], gains.composite->K[4 * i], mass_kg);
-  return AxisGains{pid.Kp_1_s2, pid.Kd_1_s, pid.Ki_1_s3};
+  return controller::to_pid<double>(Lambda[i][i], K[i][i], mass_kg);
 }
 
 namespace {

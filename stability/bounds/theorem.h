@@ -11,22 +11,17 @@
 #include <string>
 #include <vector>
 
+#include "controller/gain_conversion.h"
 #include "stability/gains.h"
 
 namespace swarmcert::stability {
-
-/// Gains as the theorem wants them.
-struct Composite {
-  Matrix3 Lambda;  ///< 1/s
-  Matrix3 K;       ///< kg/s
-};
 
 struct Theorem {
   bool applies = false;
   /// One sentence for each hypothesis that fails: what, by how much.
   std::vector<std::string> why_not;
   /// The gains in (Lambda, K) form, where they have one with symmetric positive definite matrices.
-  std::optional<Composite> composite;
+  std::optional<CompositeGains> composite;
   double min_Lambda = 0;  ///< lambda_min(Lambda), 1/s; where `composite`
   double min_K = 0;       ///< lambda_min(K), kg/s
   /// Ball per unit of d_m, m per N/s, from `composite`: true of the loop only where `applies`.
@@ -39,10 +34,7 @@ struct Theorem {
 Theorem check_theorem(const Gains& gains, double mass_kg, const std::optional<PerAxis>& integrator_needs_m_s);
 
 /// PID gains of one axis of `gains`, with the integrator as written; nothing where Lambda or K couples axes.
-struct AxisGains {
-  double Kp, Kd, Ki;
-};
-std::optional<AxisGains> axis_gains(const Gains& gains, double mass_kg, int axis);
+std::optional<controller::AxisPid<double>> axis_gains(const Gains& gains, double mass_kg, int axis);
 
 /// The closed-form transient, valid for all t >= 0:
 ///   |e(t)| <= (1 + lt) e^(-lt) |e(0)| + t e^(-lt) |e'(0)| + m h(t) |s'(0)| + d_m int_0^t h.

@@ -204,13 +204,11 @@ void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const Disturban
 }
 
 /// Largest sum of the absolute values of a row, an upper bound of the 2-norm of a symmetric matrix.
-double row_sum_norm(const Matrix3& matrix) {
-  double norm = 0;
-  for (std::size_t r = 0; r < 3; ++r) {
-    norm =
-        std::max(norm, std::abs(matrix[3 * r]) + std::abs(matrix[3 * r + 1]) + std::abs(matrix[3 * r + 2]));
-  }
-  return norm;
+double row_sum_norm(const Matrix3& m) {
+  const auto sum = [](const controller::Vector3<double>& row) {
+    return std::abs(row.x) + std::abs(row.y) + std::abs(row.z);
+  };
+  return std::max({sum(m.x), sum(m.y), sum(m.z)});
 }
 
 Transient transient_of(const Theorem& theorem, const Plant& plant, const DisturbanceSource& source,
@@ -225,8 +223,8 @@ Transient transient_of(const Theorem& theorem, const Plant& plant, const Disturb
   // m s' = -K (e' + 2 Lambda e) - eps(0).
   const double bias_N = std::hypot(source.bias_N[0], source.bias_N[1], source.bias_N[2]);
   transient.s_dot_m_s2 =
-      (row_sum_norm(theorem.composite->K) *
-           (initial.velocity_m_s + 2 * row_sum_norm(theorem.composite->Lambda) * initial.position_m) +
+      (row_sum_norm(theorem.composite->K_kg_s) *
+           (initial.velocity_m_s + 2 * row_sum_norm(theorem.composite->Lambda_1_s) * initial.position_m) +
        std::max(initial.learning_error_N, bias_N)) /
       plant.mass_kg;
   transient.rate_N_s =
@@ -248,7 +246,7 @@ void add_theorem(const Plant& plant, const DisturbanceSource& source, const Init
   }
   if (source.has_estimate_errors()) object("the estimated position or velocity errs, as declared");
   if (!theorem.composite) return;
-  report.vector = vector_peak_gain(theorem.composite->Lambda, theorem.composite->K, plant.mass_kg);
+  report.vector = vector_peak_gain(theorem.composite->Lambda_1_s, theorem.composite->K_kg_s, plant.mass_kg);
   report.transient = transient_of(theorem, plant, source, initial);
   if (theorem.applies && source.bounds_learning_error() && std::isfinite(source.rate_norm_N_s)) {
     report.ball_m = source.rate_norm_N_s * theorem.ball_per_rate();
@@ -263,13 +261,13 @@ const char* name(Estimate estimate) { return estimate == Estimate::kVelocity ? "
 const char* name(Loop loop) { return loop == Loop::kContinuous ? "continuous" : "sampled"; }
 
 std::optional<AxisLoop> axis_loop(const Gains& gains, const Plant& plant, int axis) {
-  const std::optional<AxisGains> pid = axis_gains(gains, plant.mass_kg, axis);
+  const std::optional<controller::AxisPid<double>> pid = axis_gains(gains, plant.mass_kg, axis);
   if (!pid) return std::nullopt;
   AxisLoop loop;
   loop.mass_kg = plant.mass_kg;
-  loop.Kp = pid->Kp * plant.thrust_scale;
-  loop.Kd = pid->Kd * plant.thrust_scale;
-  loop.Ki = pid->Ki * plant.thrust_scale;
+  loop.Kp = pid->Kp_1_s2 * plant.thrust_scale;
+  loop.Kd = pid->Kd_1_s * plant.thrust_scale;
+  loop.Ki = pid->Ki_1_s3 * plant.thrust_scale;
   if (gains.motor_lag_s > 0) loop.lags_s.push_back(gains.motor_lag_s);
   if (axis < 2 && gains.attitude_lag_s > 0) loop.lags_s.push_back(gains.attitude_lag_s);
   loop.delay_s = gains.delay_s;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stability/bounds/sampled_model.h"
+#include "stability/gains_matrices.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -219,9 +220,7 @@ double sphere_bound(const Partition& p, double lower, double gap) {
 }  // namespace
 
 VectorGain vector_peak_gain(const Matrix3& Lambda, const Matrix3& K, double mass_kg) {
-  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const Matrix3d L = Eigen::Map<const RowMajor>(Lambda.data());
-  const Matrix3d gain = Eigen::Map<const RowMajor>(K.data());
+  const Matrix3d L = to_eigen(Lambda), gain = to_eigen(K);
   const Partition p = partition(L, gain, mass_kg, kFine);
   const Partition coarse = partition(L, gain, mass_kg, kCoarse);
 

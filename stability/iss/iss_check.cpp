@@ -10,6 +10,7 @@
 
 #include "nn/base/parallel.h"
 #include "nn/base/random.h"
+#include "stability/gains_matrices.h"
 #include "stability/iss/iss_judge.h"
 
 namespace swarmcert::stability {
@@ -181,16 +182,11 @@ double slowest_decay(const PositionLoop& loop) {
 /// What one would take for the ball without asking whether the theorem applies.
 double naive_ball(const Gains& gains, double mass_kg) {
   if (gains.composite) {
-    const auto least = [](const Matrix3& m) {
-      return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data())
-          .eigenvalues()
-          .real()
-          .minCoeff();
-    };
-    const double lambda = least(gains.composite->Lambda), k = least(gains.composite->K);
+    const auto least = [](const Matrix3& m) { return to_eigen(m).eigenvalues().real().minCoeff(); };
+    const double lambda = least(gains.composite->Lambda_1_s), k = least(gains.composite->K_kg_s);
     return 1 / (lambda * lambda * k);
   }
-  const double least_Ki = *std::min_element(gains.pid->Ki.begin(), gains.pid->Ki.end());
+  const double least_Ki = to_eigen(gains.pid->Ki_1_s3).minCoeff();
   return 1 / (mass_kg * least_Ki);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stability/gains_matrices.h"
 #include "stability/simulation/ode_integrator.h"
 
 namespace swarmcert::stability {
@@ -106,8 +107,7 @@ std::array<double, 4> IssJudge::start_sizes(const IssRun& run, const PositionLoo
   double derivative[PositionLoop::kSize];
   loop_.derivative(state.data(), run.disturbance.bias_W_N, derivative);
   const Eigen::Map<const Eigen::Vector3d> acceleration(derivative + 3);
-  const Eigen::Matrix3d lambda =
-      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(theorem_.composite->Lambda.data());
+  const Eigen::Matrix3d lambda = to_eigen(theorem_.composite->Lambda_1_s);
   const Eigen::Vector3d s_dot =
       acceleration + 2 * lambda * run.velocity_m_s + lambda * lambda * run.position_m;
   return {run.position_m.norm(), run.velocity_m_s.norm(), s_dot.norm(), check_.rate_N_s};

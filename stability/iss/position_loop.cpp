@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stability/gains_matrices.h"
+
 namespace swarmcert::stability {
 namespace {
 
 using Map = Eigen::Map<const Eigen::Vector3d>;
 
 enum Block : int { kP = 0, kV = 3, kI = 6, kMotor = 9, kAttitude = 12 };
-
-Eigen::Matrix3d matrix_of(const Matrix3& m) {
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data());
-}
 
 }  // namespace
 
@@ -24,14 +22,15 @@ PositionLoop::PositionLoop(const Gains& gains, const Model& model)
       largest_N_(model.largest_thrust_N(kFullBattery_V)) {
   if (gains.composite) {
     // f_d = m v_r' - K s: -(m Lambda^2 + 2 K Lambda) p~ - (2 m Lambda + K) v - K Lambda^2 I.
-    const Eigen::Matrix3d lambda = matrix_of(gains.composite->Lambda), k = matrix_of(gains.composite->K);
+    const Eigen::Matrix3d lambda = to_eigen(gains.composite->Lambda_1_s),
+                          k = to_eigen(gains.composite->K_kg_s);
     position_ = mass_kg_ * lambda * lambda + 2 * k * lambda;
     velocity_ = 2 * mass_kg_ * lambda + k;
     integral_ = k * lambda * lambda;
   } else {
-    position_ = mass_kg_ * Map(gains.pid->Kp.data()).asDiagonal().toDenseMatrix();
-    velocity_ = mass_kg_ * Map(gains.pid->Kd.data()).asDiagonal().toDenseMatrix();
-    integral_ = mass_kg_ * Map(gains.pid->Ki.data()).asDiagonal().toDenseMatrix();
+    position_ = mass_kg_ * to_eigen(gains.pid->Kp_1_s2).asDiagonal().toDenseMatrix();
+    velocity_ = mass_kg_ * to_eigen(gains.pid->Kd_1_s).asDiagonal().toDenseMatrix();
+    integral_ = mass_kg_ * to_eigen(gains.pid->Ki_1_s3).asDiagonal().toDenseMatrix();
     // A loop that adds another step than its period has, in effect, another Ki.
     if (gains.rate_hz > 0 && gains.integrator_step_s > 0)
       integral_ *= gains.integrator_step_s * gains.rate_hz;

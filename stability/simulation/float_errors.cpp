@@ -11,9 +11,6 @@ namespace swarmcert::stability {
 namespace {
 
 controller::Vector3<double> vector(const PerAxis& v) { return {v[0], v[1], v[2]}; }
-controller::Matrix3<double> matrix(const Matrix3& m) {
-  return {{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}};
-}
 
 /// Cycle of a loop whose rate is not given: that of the fastest position loop of the published firmware.
 constexpr double kUnstatedPeriod_s = 0.002;
@@ -26,11 +23,8 @@ FloatErrors float_errors(const TrackingSetup& input, const TrackingReport& repor
   controller::RoundedLaw law;
   law.mass_kg = input.plant.mass_kg;
   law.is_composite = gains.composite.has_value();
-  if (law.is_composite) {
-    law.composite = {matrix(gains.composite->Lambda), matrix(gains.composite->K)};
-  } else {
-    law.pid = {vector(gains.pid->Kp), vector(gains.pid->Kd), vector(gains.pid->Ki)};
-  }
+  if (gains.composite) law.composite = *gains.composite;
+  if (gains.pid) law.pid = *gains.pid;
   law.integrator = {vector(gains.integrator_limit_m_s),
                     gains.rate_hz > 0 ? gains.integrator_step_s : kUnstatedPeriod_s};
   constexpr double kAttitudePeriod_s = 0.002;
@@ -56,11 +50,12 @@ FloatErrors float_errors(const TrackingSetup& input, const TrackingReport& repor
     errors.integral_m_s[i] = integral[i];
     errors.torque_N_m[i] = torque[i];
     errors.tracking_error_m[i] = std::numeric_limits<double>::infinity();
-    const std::optional<AxisGains> pid = axis_gains(gains, input.plant.mass_kg, static_cast<int>(i));
+    const std::optional<controller::AxisPid<double>> pid =
+        axis_gains(gains, input.plant.mass_kg, static_cast<int>(i));
     for (const ExactGains& row : report.exact) {
       if (!pid || row.axis != static_cast<int>(i) || row.channel != Channel::kCommand || row.loop != flown)
         continue;
-      const double rate_N_s = input.plant.mass_kg * pid->Ki * integral[i] / period_s;
+      const double rate_N_s = input.plant.mass_kg * pid->Ki_1_s3 * integral[i] / period_s;
       errors.tracking_error_m[i] = row.all_times.amplitude * std::max(force[i], bounds.thrust_N) +
                                    (rate_N_s > 0 ? row.all_times.rate * rate_N_s : 0);
     }

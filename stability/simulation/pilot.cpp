@@ -7,14 +7,18 @@ namespace {
 constexpr double kPublishedInertia_kg_m2[3] = {16.571710e-6, 16.655602e-6, 29.261652e-6};
 
 template <typename Scalar>
-controller::Vector3<Scalar> vector(const PerAxis& values) {
-  return {static_cast<Scalar>(values[0]), static_cast<Scalar>(values[1]), static_cast<Scalar>(values[2])};
+controller::Vector3<Scalar> vector(const PerAxis& v) {
+  return {static_cast<Scalar>(v[0]), static_cast<Scalar>(v[1]), static_cast<Scalar>(v[2])};
+}
+
+template <typename Scalar>
+controller::Vector3<Scalar> vector(const controller::Vector3<double>& v) {
+  return vector<Scalar>(PerAxis{v.x, v.y, v.z});
 }
 
 template <typename Scalar>
 controller::Matrix3<Scalar> matrix(const Matrix3& m) {
-  return {vector<Scalar>({m[0], m[1], m[2]}), vector<Scalar>({m[3], m[4], m[5]}),
-          vector<Scalar>({m[6], m[7], m[8]})};
+  return {vector<Scalar>(m.x), vector<Scalar>(m.y), vector<Scalar>(m.z)};
 }
 
 /// All but the position gains.
@@ -26,16 +30,15 @@ void fill(const Gains& gains, const Model& model, double attitude_step_s,
   settings->inertia_kg_m2 = diagonal(vector<Scalar>(model.inertia_kg_m2));
   const double step_s = attitude_step_s > 0 ? gains.integrator_step_s : 0;
   settings->integrator = {vector<Scalar>(gains.integrator_limit_m_s), static_cast<Scalar>(step_s)};
-  settings->attitude_law = gains.attitude_law == AttitudeLaw::kRobust ? controller::AttitudeLaw::kRobust
-                                                                      : controller::AttitudeLaw::kLee;
+  settings->attitude_law = gains.attitude_law;
   PerAxis scale;
   for (std::size_t i = 0; i < 3; ++i) scale[i] = model.inertia_kg_m2[i] / kPublishedInertia_kg_m2[i];
   const auto scaled = [&scale](double xy, double z) {
-    return vector<Scalar>({xy * scale[0], xy * scale[1], z * scale[2]});
+    return vector<Scalar>(PerAxis{xy * scale[0], xy * scale[1], z * scale[2]});
   };
   settings->lee = {scaled(7e-3, 8e-3), scaled(1.15e-3, 2e-3)};
-  settings->robust = {vector<Scalar>({10, 10, 4}), scaled(2e-3, 1e-3), scaled(2e-3, 4e-3),
-                      vector<Scalar>({2, 2, 2})};
+  settings->robust = {vector<Scalar>(PerAxis{10, 10, 4}), scaled(2e-3, 1e-3), scaled(2e-3, 4e-3),
+                      vector<Scalar>(PerAxis{2, 2, 2})};
   settings->attitude_step_s = static_cast<Scalar>(attitude_step_s);
   settings->allocation = allocation(controller::crazyflie_rotors(
       static_cast<Scalar>(model.arm_m), static_cast<Scalar>(model.torque_per_thrust_m)));
@@ -55,13 +58,14 @@ template <typename Scalar>
 Pilot<Scalar>::Pilot(const Gains& gains, const Model& model, double attitude_step_s) {
   if (gains.composite) {
     Settings<controller::CompositeGains<Scalar>> settings;
-    settings.position = {matrix<Scalar>(gains.composite->Lambda), matrix<Scalar>(gains.composite->K)};
+    settings.position = {matrix<Scalar>(gains.composite->Lambda_1_s),
+                         matrix<Scalar>(gains.composite->K_kg_s)};
     fill(gains, model, attitude_step_s, &settings);
     settings_ = settings;
   } else {
     Settings<controller::PidGains<Scalar>> settings;
-    settings.position = {vector<Scalar>(gains.pid->Kp), vector<Scalar>(gains.pid->Kd),
-                         vector<Scalar>(gains.pid->Ki)};
+    settings.position = {vector<Scalar>(gains.pid->Kp_1_s2), vector<Scalar>(gains.pid->Kd_1_s),
+                         vector<Scalar>(gains.pid->Ki_1_s3)};
     fill(gains, model, attitude_step_s, &settings);
     settings_ = settings;
   }
@@ -118,7 +122,7 @@ controller::Vector3<Scalar> Pilot<Scalar>::rate_error(const controller::FlightMe
                                                       const controller::Measured<Scalar>& measured) const {
   return std::visit(
       [&](const auto& settings) -> controller::Vector3<Scalar> {
-        if (settings.attitude_law == controller::AttitudeLaw::kLee) return {};
+        if (settings.attitude_law == AttitudeLaw::kLee) return {};
         const auto error =
             attitude_error(measured.attitude, controller::AttitudeReference<Scalar>{memory.R_WR, {}, {}});
         return measured.attitude.omega_B_rad_s -

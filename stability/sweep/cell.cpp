@@ -24,11 +24,11 @@ Variant variant_of(const Grid& grid, const std::vector<double>& values) {
   for (std::size_t k = 0; k < values.size(); ++k) {
     const std::string& name = grid.axes[k].name;
     const double value = values[k];
-    if (name == "Kp") v.gains.pid->Kp[i] = value;
-    if (name == "Kd") v.gains.pid->Kd[i] = value;
-    if (name == "Ki") v.gains.pid->Ki[i] = value;
-    if (name == "Lambda") v.gains.composite->Lambda[4 * i] = value;
-    if (name == "K") v.gains.composite->K[4 * i] = value;
+    if (name == "Kp") v.gains.pid->Kp_1_s2[i] = value;
+    if (name == "Kd") v.gains.pid->Kd_1_s[i] = value;
+    if (name == "Ki") v.gains.pid->Ki_1_s3[i] = value;
+    if (name == "Lambda") v.gains.composite->Lambda_1_s[i][i] = value;
+    if (name == "K") v.gains.composite->K_kg_s[i][i] = value;
     if (name == "mass_kg") v.plant.mass_kg = value;
     if (name == "thrust_scale") v.plant.thrust_scale = value;
     if (name == "battery_V") battery_V = value;

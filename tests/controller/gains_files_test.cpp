@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "data.h"
-#include "stability/gains.h"
+#include "stability/gains_matrices.h"
 
 namespace swarmcert::controller {
 namespace {
@@ -23,18 +23,18 @@ TEST(ShippedGains, AllCanBeRead) {
   EXPECT_GE(files, 5);
 }
 
-// shared reference, firmware.md section 4 and stability.md headline 4.
+// The expected numbers have the source that the comments of the gains files name.
 TEST(ShippedGains, SmallCrazyflieIsTheOneThatFlew) {
   const stability::Gains gains = shipped("crazyflie-small.toml");
   ASSERT_TRUE(gains.pid.has_value());
-  EXPECT_EQ(gains.pid->Kp, (stability::PerAxis{20, 20, 10}));
-  EXPECT_EQ(gains.pid->Kd, (stability::PerAxis{10, 10, 5}));
-  EXPECT_EQ(gains.pid->Ki, (stability::PerAxis{3, 3, 10}));
+  EXPECT_EQ(stability::to_eigen(gains.pid->Kp_1_s2), Eigen::Vector3d(20, 20, 10));
+  EXPECT_EQ(stability::to_eigen(gains.pid->Kd_1_s), Eigen::Vector3d(10, 10, 5));
+  EXPECT_EQ(stability::to_eigen(gains.pid->Ki_1_s3), Eigen::Vector3d(3, 3, 10));
   EXPECT_EQ(gains.integrator_limit_m_s, (stability::PerAxis{0.1, 0.1, 0.1}));
   EXPECT_DOUBLE_EQ(gains.rate_hz * gains.integrator_step_s, 0.2) << "Ki acts five times weaker";
   const stability::Gains nominal = shipped("crazyflie-small-nominal.toml");
   EXPECT_DOUBLE_EQ(nominal.rate_hz * nominal.integrator_step_s, 1.0);
-  EXPECT_EQ(nominal.pid->Kp, gains.pid->Kp);
+  EXPECT_EQ(stability::to_eigen(nominal.pid->Kp_1_s2), stability::to_eigen(gains.pid->Kp_1_s2));
 }
 
 }  // namespace

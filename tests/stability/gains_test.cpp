@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "nn/refusal.h"
+#include "stability/gains_matrices.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -39,9 +40,9 @@ latency_s = 0.01
                                   "gains.toml");
   ASSERT_TRUE(gains.pid.has_value());
   EXPECT_FALSE(gains.composite.has_value());
-  EXPECT_EQ(gains.pid->Kp, (PerAxis{20, 21, 10}));
-  EXPECT_EQ(gains.pid->Kd, (PerAxis{5.5, 5.5, 5.5}));
-  EXPECT_EQ(gains.pid->Ki, (PerAxis{3, 3, 0}));
+  EXPECT_EQ(to_eigen(gains.pid->Kp_1_s2), Eigen::Vector3d(20, 21, 10));
+  EXPECT_EQ(to_eigen(gains.pid->Kd_1_s), Eigen::Vector3d(5.5, 5.5, 5.5));
+  EXPECT_EQ(to_eigen(gains.pid->Ki_1_s3), Eigen::Vector3d(3, 3, 0));
   EXPECT_EQ(gains.integrator_limit_m_s, (PerAxis{0.1, 0.2, 0.3}));
   EXPECT_EQ(gains.rate_hz, 100);
   EXPECT_EQ(gains.integrator_step_s, 0.002);
@@ -58,10 +59,11 @@ TEST(Gains, ReadsCompositeGainsAsMatrixDiagonalOrNumber) {
       std::string(kHead) + "[position]\nLambda = [[4, 1, 0], [1, 4, 0], [0, 0, 2]]\nK = [0.1, 0.2, 0.3]\n",
       "g");
   ASSERT_TRUE(gains.composite.has_value());
-  EXPECT_EQ(gains.composite->Lambda, (Matrix3{4, 1, 0, 1, 4, 0, 0, 0, 2}));
-  EXPECT_EQ(gains.composite->K, (Matrix3{0.1, 0, 0, 0, 0.2, 0, 0, 0, 0.3}));
+  EXPECT_EQ(to_eigen(gains.composite->Lambda_1_s),
+            (Eigen::Matrix3d() << 4, 1, 0, 1, 4, 0, 0, 0, 2).finished());
+  EXPECT_EQ(to_eigen(gains.composite->K_kg_s), Eigen::Matrix3d(Eigen::Vector3d(0.1, 0.2, 0.3).asDiagonal()));
   const Gains isotropic = parse_gains(std::string(kHead) + "[position]\nLambda = 4\nK = 0.136\n", "g");
-  EXPECT_EQ(isotropic.composite->Lambda, (Matrix3{4, 0, 0, 0, 4, 0, 0, 0, 4}));
+  EXPECT_EQ(to_eigen(isotropic.composite->Lambda_1_s), Eigen::Matrix3d(4 * Eigen::Matrix3d::Identity()));
 }
 
 TEST(Gains, WhatTheFileLeavesOutIsNoneOrWhatFirmwareWouldDo) {

@@ -14,7 +14,7 @@ namespace {
 
 using tests::kMass_kg;
 
-Matrix3 diagonal(double x, double y, double z) { return {x, 0, 0, 0, y, 0, 0, 0, z}; }
+Matrix3 diagonal(double x, double y, double z) { return {{x, 0, 0}, {0, y, 0}, {0, 0, z}}; }
 
 void expect_gain(const Matrix3& Lambda, const Matrix3& K, double expected) {
   const VectorGain gain = vector_peak_gain(Lambda, K, kMass_kg);
@@ -38,17 +38,18 @@ TEST(VectorGain, ARotatingDisturbanceBeatsEveryAxis) {
 
 Matrix3 rotated(const Matrix3& m, double angle, bool about_z) {
   const double c = std::cos(angle), s = std::sin(angle);
-  const Matrix3 R = about_z ? Matrix3{c, -s, 0, s, c, 0, 0, 0, 1} : Matrix3{1, 0, 0, 0, c, -s, 0, s, c};
+  const Matrix3 R =
+      about_z ? Matrix3{{c, -s, 0}, {s, c, 0}, {0, 0, 1}} : Matrix3{{1, 0, 0}, {0, c, -s}, {0, s, c}};
   Matrix3 result{};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      for (int a = 0; a < 3; ++a) {
-        for (int b = 0; b < 3; ++b) result[3 * i + j] += R[3 * i + a] * m[3 * a + b] * R[3 * j + b];
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t b = 0; b < 3; ++b) result[i][j] += R[i][a] * m[a][b] * R[j][b];
       }
     }
   }
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < i; ++j) result[3 * i + j] = result[3 * j + i];
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < i; ++j) result[i][j] = result[j][i];
   }
   return result;
 }
@@ -81,9 +82,9 @@ double simulated(const Matrix3& Lambda, const Matrix3& K, const std::vector<std:
       d[3 + i] = x[6 + i];
       d[6 + i] = w[i] / kMass_kg;
       for (int j = 0; j < 3; ++j) {
-        d[i] -= Lambda[3 * i + j] * x[j];
-        d[3 + i] -= Lambda[3 * i + j] * x[3 + j];
-        d[6 + i] -= K[3 * i + j] / kMass_kg * x[6 + j];
+        d[i] -= Lambda[i][j] * x[j];
+        d[3 + i] -= Lambda[i][j] * x[3 + j];
+        d[6 + i] -= K[i][j] / kMass_kg * x[6 + j];
       }
     }
     return d;
@@ -134,7 +135,7 @@ TEST(VectorGain, NoRandomDisturbanceExceedsItAndARampReachesTheIsotropicBall) {
 
 /// A non-symmetric Lambda can exceed d/(l^2 k); check_theorem() refuses it (theorem_test.cpp).
 TEST(VectorGain, ANonSymmetricLambdaExceedsTheBallThatItsEigenvaluesSuggest) {
-  const Matrix3 Lambda = {2, 8, 0, 0, 2, 0, 0, 0, 2};  // eigenvalues 2
+  const Matrix3 Lambda = {{2, 8, 0}, {0, 2, 0}, {0, 0, 2}};  // eigenvalues 2
   const std::vector<std::array<double, 3>> ramp(4000, {0, 1, 0});
   EXPECT_GT(simulated(Lambda, diagonal(.2, .2, .2), ramp, 0.005), 1.5 / (4 * .2));
 }

@@ -91,8 +91,8 @@ TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
 
 TEST(LocalTube, GainsTooWeakForTheForceAreInconclusiveAndSayHowMuchComesBack) {
   stability::TrackingSetup loop = tests::loop_of("composite");
-  for (double& x : loop.gains.composite->Lambda) x *= 0.03;
-  for (double& x : loop.gains.composite->K) x *= 0.05;
+  loop.gains.composite->Lambda_1_s = scaled(0.03, loop.gains.composite->Lambda_1_s);
+  loop.gains.composite->K_kg_s = scaled(0.05, loop.gains.composite->K_kg_s);
   const auto task = stability::make_task("swap", {2, 9, 0});
   const LocalTube tube = local_tube(loop, truth_for(loop.gains), tests::demo_network(), *task, 2, quick());
   EXPECT_FALSE(tube.proved);
