@@ -78,7 +78,7 @@ def objects(schema, place=""):
 
 
 def test_schemas_are_valid_and_closed():
-    """reproduce writes the fields of the chosen experiment; every other object lists what it may hold."""
+    """Every object lists what it may hold, and every field at the top says what it means."""
     expect(len(names()) >= 35, f"only {len(names())} schemas")
     for name in names():
         schema = read_schema(name)
@@ -86,8 +86,10 @@ def test_schemas_are_valid_and_closed():
         expect(schema["$schema"] == "https://json-schema.org/draft/2020-12/schema", f"{name}: another draft")
         expect(schema["$id"] == f"urn:swarmcert:schema:{name}:1", f"{name}: $id {schema['$id']}")
         expect("title" in schema and "description" in schema, f"{name}: no title or description")
+        silent = [field for field, rule in schema["properties"].items() if not rule.get("description")]
+        expect(not silent, f"{name}: no description of {', '.join(silent)}")
         for place, inner in objects(schema):
-            if "properties" not in inner or (name == "reproduce" and place == ""):
+            if "properties" not in inner:
                 continue
             expect(inner.get("additionalProperties") is not True, f"{name}{place} is open")
             expect("additionalProperties" in inner, f"{name}{place} does not say whether it is closed")
