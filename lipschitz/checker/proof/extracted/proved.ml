@@ -38,6 +38,10 @@ let compOpp = function
 
 let rec add = (+)
 
+(** val sub : int -> int -> int **)
+
+let rec sub = fun n m -> Stdlib.max 0 (n-m)
+
 (** val eqb : bool -> bool -> bool **)
 
 let eqb b1 b2 =
@@ -525,13 +529,42 @@ let lmi zero0 add1 mul1 minus_one two_rho minus_rho t first later last0 =
       (gram zero0 add1 mul1 (scale_rows mul1 t first)))
     (band zero0 add1 mul1 two_rho minus_rho t later last0)
 
-(** val norm_lmi :
-    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1
-    list list -> 'a1 list list **)
+(** val dotZ : Big.t list -> Big.t list -> Big.t **)
 
-let norm_lmi zero0 add1 mul1 minus_one rho m =
-  sum add1 (diagonal zero0 (map (fun _ -> rho) m))
-    (scale_all mul1 minus_one (gram zero0 add1 mul1 m))
+let rec dotZ u v =
+  match u with
+  | [] -> Big.zero
+  | a :: u' ->
+    (match v with
+     | [] -> Big.zero
+     | b :: v' -> Big.add (Big.mul a b) (dotZ u' v'))
+
+(** val strip : Big.t list -> int * Big.t list **)
+
+let rec strip row = match row with
+| [] -> (0, [])
+| a :: row' ->
+  if Big.equal a Big.zero
+  then let (n, rest) = strip row' in ((Stdlib.Int.succ n), rest)
+  else (0, row)
+
+(** val dot_stripped : (int * Big.t list) -> (int * Big.t list) -> Big.t **)
+
+let dot_stripped u v =
+  let (i, a) = u in
+  let (j, b) = v in
+  if (<=) i j then dotZ (skipn (sub j i) a) b else dotZ a (skipn (sub i j) b)
+
+(** val gram_stripped : (int * Big.t list) list -> Big.t list list **)
+
+let rec gram_stripped rows0 = match rows0 with
+| [] -> []
+| row :: rows' -> (map (dot_stripped row) rows0) :: (gram_stripped rows')
+
+(** val gramZ : Big.t list list -> Big.t list list **)
+
+let gramZ rows0 =
+  gram_stripped (map strip rows0)
 
 type dyadic = Big.t * Big.t
 
@@ -611,7 +644,7 @@ let remainder p f =
     (map
       (map (fun g -> ((Big.neg g),
         (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one))
-          f.unit0)))) (gram Big.zero Big.add Big.mul f.rows))
+          f.unit0)))) (gramZ f.rows))
 
 (** val total : dyadic list -> dyadic **)
 
@@ -637,6 +670,35 @@ let rec dominant e debts =
 let shows_nonnegative p f =
   dominant (remainder p f) []
 
+(** val lowest : matrixD -> Big.t **)
+
+let lowest m =
+  fold_right (fun row e ->
+    fold_right (fun x e0 -> if Big.leq (snd x) e0 then snd x else e0) e row)
+    Big.zero m
+
+(** val in_units : Big.t -> dyadic -> Big.t **)
+
+let in_units e x =
+  (fun a n -> Big.shift_left a (Big.to_int n)) (fst x) (Big.sub (snd x) e)
+
+(** val gramD : matrixD -> matrixD **)
+
+let gramD m =
+  let e = lowest m in
+  if forallb (forallb (fun x -> Big.leq e (snd x))) m
+  then map
+         (map (fun g -> (g,
+           (Big.mul ((fun p -> p) ((fun p -> Big.shift_left p 1) Big.one)) e))))
+         (gramZ (map (map (in_units e)) m))
+  else gram zero add0 mul0 m
+
+(** val norm_inequality : dyadic -> matrixD -> matrixD **)
+
+let norm_inequality rho m =
+  sum add0 (diagonal zero (map (fun _ -> rho) m))
+    (scale_all mul0 ((Big.neg Big.one), Big.zero) (gramD m))
+
 (** val split : dyadic list -> matrixD list -> dyadic list list **)
 
 let rec split t = function
@@ -660,7 +722,7 @@ let matrix_inequality hidden0 last0 rho t =
   match hidden0 with
   | [] ->
     let n = length (hd [] last0) in
-    norm_lmi zero add0 mul0 ((Big.neg Big.one), Big.zero) rho
+    norm_inequality rho
       (if (<=) (length last0) n then last0 else columns zero n last0)
   | first :: later ->
     lmi zero add0 mul0 ((Big.neg Big.one), Big.zero)

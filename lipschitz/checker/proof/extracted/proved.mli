@@ -16,6 +16,8 @@ val compOpp : comparison -> comparison
 
 val add : int -> int -> int
 
+val sub : int -> int -> int
+
 val eqb : bool -> bool -> bool
 
 module Nat :
@@ -127,9 +129,15 @@ val lmi :
   'a1 list -> 'a1 list list -> ('a1 list * 'a1 list list) list -> 'a1 list
   list -> 'a1 list list
 
-val norm_lmi :
-  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 list
-  list -> 'a1 list list
+val dotZ : Big.t list -> Big.t list -> Big.t
+
+val strip : Big.t list -> int * Big.t list
+
+val dot_stripped : (int * Big.t list) -> (int * Big.t list) -> Big.t
+
+val gram_stripped : (int * Big.t list) list -> Big.t list list
+
+val gramZ : Big.t list list -> Big.t list list
 
 type dyadic = Big.t * Big.t
 
@@ -164,6 +172,14 @@ val total : dyadic list -> dyadic
 val dominant : matrixD -> dyadic list -> bool
 
 val shows_nonnegative : matrixD -> factor -> bool
+
+val lowest : matrixD -> Big.t
+
+val in_units : Big.t -> dyadic -> Big.t
+
+val gramD : matrixD -> matrixD
+
+val norm_inequality : dyadic -> matrixD -> matrixD
 
 val split : dyadic list -> matrixD list -> dyadic list list
 

@@ -1,6 +1,6 @@
 (** The executable checker over dyadic numbers, and what its acceptance means. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
-From Swarmcert Require Import Algebra Form Network.
+From Swarmcert Require Import Algebra Form Network Gram.
 Import ListNotations.
 Open Scope Z_scope.
 
@@ -34,7 +34,7 @@ Fixpoint congruence (s : list Z) (p : matrixD) : matrixD :=
   match p with [] => [] | row :: p' => shift_row (hd 0 s) s row :: congruence (tl s) p' end.
 (** D P D - R R'. *)
 Definition remainder (p : matrixD) (f : factor) : matrixD :=
-  sum add (congruence (scales f) p) (map (map (fun g => (- g, 2 * unit f))) (gram 0 Z.add Z.mul (rows f))).
+  sum add (congruence (scales f) p) (map (map (fun g => (- g, 2 * unit f))) (gramZ (rows f))).
 Definition total (u : list dyadic) : dyadic := fold_right add zero u.
 (** Diagonally dominant; debts: what rows above have already taken from the diagonal. *)
 Fixpoint dominant (e : matrixD) (debts : list dyadic) : bool :=
@@ -47,6 +47,19 @@ Fixpoint dominant (e : matrixD) (debts : list dyadic) : bool :=
   end.
 Definition shows_nonnegative (p : matrixD) (f : factor) : bool := dominant (remainder p f) [].
 
+(** m m' through integers, over the smallest exponent. *)
+Definition lowest (m : matrixD) : Z :=
+  fold_right (fun row e => fold_right (fun x e => if snd x <=? e then snd x else e) e row) 0 m.
+Definition in_units (e : Z) (x : dyadic) : Z := Z.shiftl (fst x) (snd x - e).
+Definition gramD (m : matrixD) : matrixD :=
+  let e := lowest m in
+  if forallb (forallb (fun x => e <=? snd x)) m
+  then map (map (fun g => (g, 2 * e))) (gramZ (map (map (in_units e)) m))
+  else gram zero add mul m.
+(** rho I - m m'. *)
+Definition norm_inequality (rho : dyadic) (m : matrixD) : matrixD :=
+  sum add (diagonal zero (map (fun _ => rho) m)) (scale_all mul (-1, 0) (gramD m)).
+
 Fixpoint split (t : list dyadic) (ms : list matrixD) : list (list dyadic) :=
   match ms with [] => [] | m :: ms' => firstn (length m) t :: split (skipn (length m) t) ms' end.
 Definition neurons (ms : list matrixD) : nat := fold_right (fun m n => (length m + n)%nat) O ms.
@@ -56,7 +69,7 @@ Definition matrix_inequality (hidden : list matrixD) (last : matrixD) (rho : dya
   match hidden with
   | [] =>
       let n := length (hd [] last) in
-      norm_lmi zero add mul (-1, 0) rho (if (length last <=? n)%nat then last else columns zero n last)
+      norm_inequality rho (if (length last <=? n)%nat then last else columns zero n last)
   | first :: later =>
       lmi zero add mul (-1, 0) (mul (1, 1) rho) (neg rho) (firstn (length first) t) first
         (List.combine (split (skipn (length first) t) later) later) last
@@ -68,7 +81,8 @@ Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
   | m :: hidden' => forallb (fun row => length row =? n)%nat m && shapes (length m) hidden' last
   end.
 (** Accepts |f(x) - f(x')| <= upper |x - x'| of the chain with these stages. *)
-Definition check (hidden : list matrixD) (last : matrixD) (upper rho : dyadic) (t : list dyadic) (f : factor) : bool :=
+Definition check (hidden : list matrixD) (last : matrixD) (upper rho : dyadic) (t : list dyadic) (f : factor) :
+  bool :=
   shapes (inputs hidden last) hidden last &&
   ((length t =? neurons hidden)%nat && forallb is_nonnegative t && is_positive rho && is_nonnegative upper
   && is_nonnegative (add (mul upper upper) (neg rho))
@@ -111,7 +125,8 @@ Lemma real_shift k x : real (shift k x) = powerRZ 2 k * real x.
 Proof. unfold real, shift. simpl. rewrite powerRZ_add by apply two_neq. ring. Qed.
 Lemma real_nonnegative x : is_nonnegative x = true -> 0 <= real x.
 Proof.
-  unfold is_nonnegative, real. intros H. apply Rmult_le_pos; [|left; apply power_pos]. apply IZR_le. now apply Z.leb_le.
+  unfold is_nonnegative, real. intros H. apply Rmult_le_pos; [|left;
+    apply power_pos]. apply IZR_le. now apply Z.leb_le.
 Qed.
 Lemma real_positive x : is_positive x = true -> 0 < real x.
 Proof.
@@ -168,13 +183,48 @@ Proof.
   destruct row as [|x row]; simpl; [ring|]. rewrite E, real_shift, powerRZ_add by apply two_neq. ring.
 Qed.
 
+Lemma real_gram m : realm (gramD m) = gramR (realm m).
+Proof.
+  unfold gramD. set (e := lowest m). match goal with |- context [if ?c then _ else _] => destruct c eqn:E end.
+  2:{ apply (f_gram zero add mul 0 Rplus Rmult real real_zero real_add real_mul). }
+  assert (map (map IZR) (map (map (in_units e)) m) = scale_allR (powerRZ 2 (- e)) (realm m)) as U.
+  { rewrite forallb_forall in E. unfold scale_all, scale. rewrite !map_map. apply map_ext_in. intros row Hr.
+    rewrite !map_map. apply map_ext_in. intros [a k] Hx. specialize (E row Hr). rewrite forallb_forall in E.
+    specialize (E _ Hx). apply Z.leb_le in E. cbn [snd] in E. unfold in_units. cbn [fst snd].
+    pose proof (real_shiftl a (k - e) 0 ltac:(lia)) as S. unfold real in S |- *. cbn [fst snd] in *.
+      simpl (powerRZ 2 0) in S.
+    rewrite Z.add_0_r, Rmult_1_r in S. rewrite S. unfold Z.sub. rewrite powerRZ_add by apply two_neq. ring. }
+  rewrite gramZ_gram. set (g := gram 0%Z Z.add Z.mul _).
+  assert (realm (map (map (fun x => (x, (2 * e)%Z))) g) = scale_allR (powerRZ 2 (2 * e)) (map (map IZR) g)) as ->.
+  { unfold scale_all, scale. rewrite !map_map. apply map_ext. intros r. rewrite !map_map. apply map_ext.
+    intros x. unfold real. cbn [fst snd]. ring. }
+  unfold g. rewrite (f_gram 0%Z Z.add Z.mul 0 Rplus Rmult IZR eq_refl plus_IZR mult_IZR), U.
+  assert (forall c u v, dotR (scaleR c u) (scaleR c v) = c * c * dotR u v) as D
+    by (intros; rewrite dot_scale_l, dot_scale_r; ring).
+  assert (powerRZ 2 (2 * e) * (powerRZ 2 (- e) * powerRZ 2 (- e)) = 1) as P.
+  { rewrite <- !powerRZ_add by apply two_neq. replace (2 * e + (- e + - e))%Z with 0%Z by lia. reflexivity. }
+  clear -D P. generalize (realm m). intros rows. unfold scale_all, scale. induction rows as [|r rows IH]; auto.
+  assert (forall u v, powerRZ 2 (2 * e) * dotR (scaleR (powerRZ 2 (- e)) u) (scaleR (powerRZ 2 (- e)) v) = dotR u
+    v) as F
+    by (intros u v; rewrite D, <- Rmult_assoc, P; ring).
+  cbn [map gram]. rewrite IH. f_equal. f_equal; [apply F|]. rewrite !map_map. apply map_ext. intros v. apply F.
+Qed.
+Lemma real_norm_inequality rho m :
+  realm (norm_inequality rho m) = norm_lmi 0 Rplus Rmult (-1) (real rho) (realm m).
+Proof.
+  unfold norm_inequality, norm_lmi.
+  rewrite (f_sum add Rplus real real_add), (f_diagonal zero 0 real real_zero),
+    (f_scale_all mul Rmult real real_mul), real_gram.
+  rewrite !map_map. replace (real (-1, 0)%Z) with (-1) by (unfold real; simpl; ring). reflexivity.
+Qed.
+
 (** (a) *)
 Theorem shows_nonnegative_sound p f : shows_nonnegative p f = true -> nonnegative (realm p).
 Proof.
   intros H w. destruct (scaled_onto (scales f) w) as [z <-].
   apply (dominant_form _ [] z) in H. change (0 <= form (realm (remainder p f)) z) in H. unfold remainder in H.
   rewrite (f_sum add Rplus real real_add), form_sum, form_congruence in H.
-  set (g := gram 0%Z Z.add Z.mul (rows f)) in H.
+  rewrite gramZ_gram in H. set (g := gram 0%Z Z.add Z.mul (rows f)) in H.
   assert (realm (map (map (fun g => ((- g)%Z, (2 * unit f)%Z))) g) =
       scale_allR (- powerRZ 2 (2 * unit f)) (map (map IZR) g)) as E.
   { unfold scale_all, scale. rewrite !map_map. apply map_ext. intros r. rewrite !map_map. apply map_ext.
@@ -224,7 +274,7 @@ Proof.
   assert (bias_fits (realm last, b)) as Hl by (unfold bias_fits; simpl; now rewrite map_length).
   assert (real (-1, 0)%Z = -1) as M by (unfold real; simpl; ring).
   destruct Hbs as [|first c later biases Hc Hbs]; simpl in HP |- *.
-  - rewrite (f_norm_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M in HP.
+  - rewrite real_norm_inequality in HP.
     destruct (length last <=? _)%nat.
     + now apply norm_lmi_bounds.
     + rewrite (f_columns zero 0 real real_zero) in HP. eapply norm_lmi_columns_bounds; eauto.
