@@ -5,6 +5,7 @@
 
 #include "analysis/gate/baseline.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/flight_peaks.h"
 #include "analysis/residuals/inputs.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
@@ -146,14 +147,23 @@ const stability::TrackingSetup& Evidence::tracking() {
   return *tracking_;
 }
 
-void Evidence::load_comparison(bool with_loop) {
+residuals::Inputs Evidence::read_flights() const {
   residuals::InputArguments arguments;
   arguments.models = {release().model};
   arguments.flights = release().flights;
   arguments.fleet = release().vehicles;
   arguments.columns = release().columns;
   if (release().feed_forward) arguments.network = release().network.file;
-  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  return residuals::read_inputs(arguments);
+}
+
+std::vector<residuals::FlightPeak> Evidence::flight_peaks() {
+  residual_comparison();
+  return residuals::flight_peaks(read_flights(), settings_.jobs);
+}
+
+void Evidence::load_comparison(bool with_loop) {
+  const residuals::Inputs inputs = read_flights();
   std::size_t logs = 0;
   for (const residuals::FlightFiles& flight : inputs.found.flights) logs += flight.logs.size();
   if (logs != static_cast<std::size_t>(release().logs)) {

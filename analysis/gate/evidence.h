@@ -20,7 +20,9 @@ struct Box;
 }
 namespace swarmcert::residuals {
 struct Comparison;
-}
+struct FlightPeak;
+struct Inputs;
+}  // namespace swarmcert::residuals
 namespace swarmcert::stability {
 struct TrackingSetup;
 }
@@ -86,10 +88,14 @@ class Evidence {
   /// As comparison(), but without the closed loop where that cannot be flown.
   const residuals::Comparison& residual_comparison();
 
+  /// Largest tracking errors of the reference flights, which comparison() has found sound.
+  std::vector<residuals::FlightPeak> flight_peaks();
+
   /// Values and limits of the last release; nothing where there is no baseline and none is needed.
   const Baseline* baseline();
 
  private:
+  residuals::Inputs read_flights() const;
   void load_comparison(bool with_loop);
   void compute_bounds();
 

@@ -75,6 +75,7 @@ std::vector<EvidenceFile> evidence_files(const Policy& policy, const std::string
   list.add("elf", release.elf);
   list.add("facts", release.facts);
   list.add("swarm", release.swarm);
+  list.add("promise", release.promise);
   list.add("columns", release.columns);
   if (!release.vehicles.empty()) {
     list.add("vehicles", release.vehicles);

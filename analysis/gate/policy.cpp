@@ -25,7 +25,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
                     "certificate", "box",       "gains",     "model",        "source",
                     "elf",         "facts",     "swarm",     "vehicles",     "columns",
                     "flights",     "logs",      "battery_V", "feed_forward", "most_neighbours",
-                    "order",       "phi_order", "rho_order"});
+                    "order",       "phi_order", "rho_order", "promise"});
   Release release;
   const auto file = [&](const char* key) {
     if (!table.has(key)) return std::string();
@@ -59,6 +59,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   release.elf = file("elf");
   release.facts = file("facts");
   release.swarm = file("swarm");
+  release.promise = file("promise");
   release.vehicles = file("vehicles");
   release.columns = file("columns");
   if (table.has("flights")) {

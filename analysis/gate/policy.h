@@ -22,6 +22,7 @@ struct Release {
   files::NetworkArguments network;
   bool is_float32 = true;  ///< what flies: float32, whatever the file stores
   std::string certificate, box, gains, model, source, elf, facts, swarm;
+  std::string promise;               ///< result of bound --coverage
   std::string vehicles, columns;     ///< flights.toml and columns.toml
   std::vector<std::string> flights;  ///< reference flights
   int logs = 0;                      ///< how many logs they are: a folder does not show that one is missing

@@ -1,9 +1,35 @@
 #include "analysis/residuals/flight_errors.h"
 
 #include "analysis/residuals/force_residual.h"
+#include "analysis/residuals/log_cache.h"
 #include "nn/base/parallel.h"
 
 namespace swarmcert::residuals {
+
+namespace {
+
+ErrorOfFlight error_of(const Track& track, const std::vector<Eigen::Vector3d>& error) {
+  ErrorOfFlight result;
+  result.windows = error_windows(track, error);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t n = 0; n < error.size(); ++n)
+    if (track.cut[n] == Cut::kNone) sum += error[n];
+  result.bias = with_norm(sum / static_cast<double>(track.used));
+  return result;
+}
+
+}  // namespace
+
+ErrorWindow ErrorOfFlight::largest() const {
+  ErrorWindow most = windows.front();
+  for (const ErrorWindow& window : windows) {
+    most.amplitude = most.amplitude.cwiseMax(window.amplitude);
+    most.rate = most.rate.cwiseMax(window.rate);
+    most.variation = most.variation.cwiseMax(window.variation);
+    most.impulse = most.impulse.cwiseMax(window.impulse);
+  }
+  return most;
+}
 
 std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs) {
   const std::size_t count = inputs.found.flights.size();
@@ -15,22 +41,12 @@ std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs) {
       if (track.position_only || track.used == 0) continue;
       const std::vector<Eigen::Vector3d> r =
           force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
-      const std::vector<ErrorWindow> windows = error_windows(track, r);
-      if (windows.empty()) continue;
       FlightError error;
       error.path = track.path;
-      error.windows = windows.size();
-      error.largest = windows.front();
-      for (const ErrorWindow& window : windows) {
-        error.largest.amplitude = error.largest.amplitude.cwiseMax(window.amplitude);
-        error.largest.rate = error.largest.rate.cwiseMax(window.rate);
-        error.largest.variation = error.largest.variation.cwiseMax(window.variation);
-        error.largest.impulse = error.largest.impulse.cwiseMax(window.impulse);
-      }
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      for (std::size_t n = 0; n < r.size(); ++n)
-        if (track.cut[n] == Cut::kNone) sum += r[n];
-      error.bias = with_norm(sum / static_cast<double>(track.used));
+      error.force = error_of(track, r);
+      if (error.force.windows.empty()) continue;
+      if (measures_velocity(*inputs.cache->log(track.path, inputs.map)))
+        error.velocity = error_of(track, velocity_error(track));
       by_flight[k].push_back(std::move(error));
     }
   });

@@ -5,16 +5,23 @@
 #include <vector>
 
 #include "analysis/residuals/inputs.h"
-#include "analysis/residuals/learning_error.h"
+#include "analysis/residuals/velocity_error.h"
 
 namespace swarmcert::residuals {
 
-/// Of one vehicle in one flight, in newton, axes x, y, z and the vector.
-struct FlightError {
-  std::string path;  ///< of the log
-  std::size_t windows = 0;
+/// Of one error of one vehicle in one flight, axes x, y, z and the vector.
+struct ErrorOfFlight {
+  std::vector<ErrorWindow> windows;
   Eigen::Vector4d bias = Eigen::Vector4d::Zero();  ///< |mean|
-  ErrorWindow largest{};                           ///< of each number the largest over the windows
+
+  /// Of each number the largest over the windows; there is one at least.
+  ErrorWindow largest() const;
+};
+
+struct FlightError {
+  std::string path;        ///< of the log
+  ErrorOfFlight force;     ///< in newton
+  ErrorOfFlight velocity;  ///< velocity_error(), in m/s; no windows where the log does not measure it
 };
 
 /// One per vehicle whose force is judged and whose log holds a window at least, in the order of flights. The logs are taken

@@ -1,8 +1,10 @@
 #include "analysis/tracking/flight_promise.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 
+#include "analysis/tracking/measured_source.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
 
@@ -12,8 +14,9 @@ namespace {
 using files::Json;
 
 /// |number| of an axis; infinite where it was not judged.
-double size_along(const Json& error, const char* key, int axis, const std::string& path) {
-  const std::string field = std::string("flights.learning_error.") + key;
+double size_along(const Json& error, const std::string& of, const char* key, int axis,
+                  const std::string& path) {
+  const std::string field = of + "." + key;
   if (!error.contains(key) || !error[key].is_object() || !error[key].contains(stability::axis_name(axis))) {
     throw files::InputError(
         {path, "", field, "", "is missing", "write the file with swarmcert compare --json"});
@@ -25,32 +28,32 @@ double size_along(const Json& error, const char* key, int axis, const std::strin
   return std::abs(value.get<double>());
 }
 
-stability::DisturbanceSource source_of(const Json& error, double window_s, const std::string& path) {
-  stability::DisturbanceSource source;
-  source.kind = "measured";
-  for (int axis = 0; axis < 3; ++axis) {
-    stability::Disturbance& d = source.axis[axis];
-    d.rate_N_s = size_along(error, "rate", axis, path);
-    d.amplitude_N = size_along(error, "amplitude", axis, path);
-    d.variation_N = size_along(error, "variation", axis, path);
-    d.impulse_N_s = size_along(error, "impulse", axis, path);
-    d.passes = stability::Disturbance::kManyPasses;
-    d.pass_period_s = d.pass_length_s = window_s;
-    d.variation_per_pass = true;
-    const double bias_N = size_along(error, "bias", axis, path);
-    source.bias_N[axis] = std::isfinite(bias_N) ? bias_N : 0;
+MeasuredAxis measured_axis(const Json& error, const std::string& field, int axis, const std::string& path) {
+  const auto size = [&](const char* key) { return size_along(error, field, key, axis, path); };
+  return {size("bias"), size("amplitude"), size("rate"), size("variation"), size("impulse")};
+}
+
+/// @param velocity null where the log does not measure it.
+stability::DisturbanceSource source_of(const Json& force, const Json& velocity, double window_s,
+                                       const std::string& path) {
+  std::array<MeasuredAxis, 3> axes;
+  for (int axis = 0; axis < 3; ++axis)
+    axes[static_cast<std::size_t>(axis)] = measured_axis(force, "flights.learning_error", axis, path);
+  stability::DisturbanceSource source = measured_source(axes, window_s);
+  for (int axis = 0; axis < 3 && velocity.is_object(); ++axis) {
+    source.velocity_error[axis] =
+        measured_estimate(measured_axis(velocity, "flights.velocity_error", axis, path), window_s);
   }
-  source.classes_contain_bias = source.amplitudes_reach_bias();
   return source;
 }
 
-/// Adds what acts beside the class.
+/// Adds what acts beside the class; a declared error of the velocity takes the place of the measured one.
 void add_declared(const stability::DisturbanceSource& declared, stability::DisturbanceSource& source) {
   for (int axis = 0; axis < 3; ++axis) {
     if (declared.bias_N[axis] != 0) source.classes_contain_bias = false;
     source.bias_N[axis] += std::abs(declared.bias_N[axis]);
-    source.velocity_error_m_s[axis] = declared.velocity_error_m_s[axis];
-    source.position_error_m[axis] = declared.position_error_m[axis];
+    if (declared.declares_velocity_error) source.velocity_error[axis] = declared.velocity_error[axis];
+    source.position_error[axis] = declared.position_error[axis];
   }
 }
 
@@ -92,7 +95,8 @@ std::vector<FlightClass> read_flight_classes(const std::string& path) {
       refuse("flights.learning_error", "is missing: the file is of an older version");
     if (!flight["learning_error"].is_object()) continue;
     flights.push_back({flight.value("flight", ""), flight.value("vehicle", ""),
-                       source_of(flight["learning_error"], (*summary)["window_s"].get<double>(), path)});
+                       source_of(flight["learning_error"], flight.value("velocity_error", Json()),
+                                 (*summary)["window_s"].get<double>(), path)});
   }
   return flights;
 }

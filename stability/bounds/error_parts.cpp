@@ -5,8 +5,10 @@
 #include <cmath>
 
 #include "nn/base/doubles.h"
+#include "stability/bounds/disturbance_bounds.h"
 #include "stability/bounds/kernel_sum.h"
 #include "stability/bounds/sampled_adjoint.h"
+#include "stability/bounds/sampled_bounds.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -35,7 +37,78 @@ InitialResponse initial_response(const SampledAdjoint& adjoint, const Eigen::Row
   return most;
 }
 
+/// The error n of the velocity as one of the command, -m Kd n.
+Disturbance as_command(const EstimateError& n, double scale_N) {
+  Disturbance error;
+  error.rate_N_s = scale_N * n.rate;
+  error.amplitude_N = scale_N * n.amplitude;
+  error.variation_N = scale_N * n.variation;
+  error.impulse_N_s = scale_N * n.impulse;
+  if (n.window_s > 0) {
+    error.passes = Disturbance::kManyPasses;
+    error.pass_period_s = error.pass_length_s = n.window_s;
+    error.variation_per_pass = true;
+  }
+  return error;
+}
+
+/// @param norms gains from the error of an estimate. @param by_command bounds from a class of errors of the command.
+template <class Norms, class ByCommand>
+double velocity_part(const AxisLoop& plant, const EstimateError& n, const Norms& norms,
+                     const ByCommand& by_command) {
+  if (n.is_zero()) return 0;
+  const GainNorms gains = norms(Estimate::kVelocity);
+  const double by_amplitude = times_known(gains.amplitude, n.amplitude);
+  const bool has_more = std::isfinite(std::min({n.rate, n.variation, n.impulse}));
+  if (!has_more || plant.Kd == 0) return by_amplitude;
+  const DisturbanceBounds bounds = by_command(as_command(n, plant.mass_kg * plant.Kd));
+  const double constant_m = part(n.constant, [&] { return gains.edge; });
+  // Edges per window count the first rise by the amplitude, which contains the constant part.
+  const double at_first_m = n.window_s > 0 ? 0 : constant_m;
+  return std::min({by_amplitude, bounds.by_impulse, bounds.by_edges + at_first_m,
+                   std::min(bounds.by_rate, bounds.by_both) + constant_m});
+}
+
+template <class AnyLoop, class Norms>
+double position_part(const AnyLoop& loop, const EstimateError& n, const Norms& norms) {
+  if (n.is_zero()) return 0;
+  const GainNorms gains = norms(Estimate::kPosition);
+  double least = times_known(gains.amplitude, n.largest());
+  if (n.window_s == 0) {
+    least =
+        std::min(least, times_known(gains.edge, n.variation) + part(n.constant, [&] { return gains.edge; }));
+    least = std::min(least, times_known(gains.impulse, n.impulse));
+  }
+  if (std::isfinite(n.rate) && std::isfinite(n.largest())) {
+    // A constant error is that of a start away from the set point.
+    least = std::min(least, n.largest() + part(n.rate, [&] { return drift_gain(loop); }) +
+                                part(n.constant, [&] { return initial_position_gain(loop); }));
+  }
+  return least;
+}
+
+/// The least of what the classes of an error of an estimate demand; windows count by their amplitude.
+/// @param amplitude, edge, impulse gains, evaluated where needed.
+template <class Amplitude, class Edge, class Impulse>
+double least_demand(const EstimateError& n, const Amplitude& amplitude, const Edge& edge,
+                    const Impulse& impulse) {
+  if (n.is_zero()) return 0;
+  double least = std::isfinite(n.largest()) ? n.largest() * amplitude() : kInfinity;
+  if (n.window_s > 0) return least;
+  if (std::isfinite(n.variation)) least = std::min(least, (n.variation + std::abs(n.constant)) * edge());
+  if (std::isfinite(n.impulse)) least = std::min(least, n.impulse * impulse());
+  return least;
+}
+
 }  // namespace
+
+bool EstimateError::is_zero() const {
+  return impulse == 0 || largest() == 0 || (rate == 0 && constant == 0);
+}
+
+double EstimateError::largest() const {
+  return window_s > 0 ? amplitude : std::min(amplitude, variation + std::abs(constant));
+}
 
 double OtherErrors::step_N() const { return std::max(std::abs(bias_N), start_N); }
 
@@ -46,10 +119,12 @@ ErrorParts error_parts(const AxisLoop& loop, double step_gain, const OtherErrors
   parts.initial_m = part(errors.position_m, [&] { return initial_position_gain(loop); }) +
                     part(errors.velocity_m_s,
                          [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).impulse; });
-  parts.velocity_error_m =
-      part(errors.velocity_error_m_s, [&] { return continuous_norms(loop, Estimate::kVelocity).amplitude; });
-  parts.position_error_m =
-      part(errors.position_error_m, [&] { return continuous_norms(loop, Estimate::kPosition).amplitude; });
+  const auto norms = [&loop](Estimate estimate) { return continuous_norms(loop, estimate); };
+  const auto by_command = [&loop](const Disturbance& error) {
+    return disturbance_bounds(loop, Channel::kCommand, error);
+  };
+  parts.velocity_error_m = velocity_part(loop, errors.velocity_error, norms, by_command);
+  parts.position_error_m = position_part(loop, errors.position_error, norms);
   return parts;
 }
 
@@ -60,13 +135,39 @@ ErrorParts error_parts(const SampledLoop& loop, double step_gain, const OtherErr
       part(errors.position_m, [&] { return initial_position_gain(loop); }) + part(errors.velocity_m_s, [&] {
         return loop.plant.mass_kg * sampled_norms(loop, Channel::kForce, Instants::kAll).impulse;
       });
-  parts.velocity_error_m = part(errors.velocity_error_m_s, [&] {
-    return sampled_norms(loop, Estimate::kVelocity, Instants::kAll).amplitude;
-  });
-  parts.position_error_m = part(errors.position_error_m, [&] {
-    return sampled_norms(loop, Estimate::kPosition, Instants::kAll).amplitude;
-  });
+  const auto norms = [&loop](Estimate estimate) { return sampled_norms(loop, estimate, Instants::kAll); };
+  const auto by_command = [&loop](const Disturbance& error) {
+    const GainNorms gains = sampled_norms(loop, Channel::kCommand, Instants::kAll);
+    return disturbance_bounds(loop, Channel::kCommand, gains, error);
+  };
+  parts.velocity_error_m = velocity_part(loop.plant, errors.velocity_error, norms, by_command);
+  parts.position_error_m = position_part(loop, errors.position_error, norms);
   return parts;
+}
+
+double drift_gain(const AxisLoop& loop) {
+  // (s^2 L + s Kd exp(-Ts)) / D of n'; with a delay as in initial_position_gain().
+  const double together = response_norms(initial_position_transfer(loop)).integral_abs;
+  if (loop.delay_s == 0 || !std::isfinite(together)) return together;
+  const ResponseNorms command = response_norms(impulse_transfer(loop, Channel::kCommand));
+  return together + loop.delay_s * loop.mass_kg * loop.Kd * command.variation;
+}
+
+double drift_gain(const SampledLoop& loop) {
+  const SampledAdjoint adjoint(loop);
+  if (!adjoint.is_stable()) return kInfinity;
+  const Eigen::VectorXd input = adjoint.model().measured_position();
+  const auto rate_at = [&](double phase_s) {
+    return input_gains(adjoint, adjoint.output_after_control(phase_s), input, true, 1).rate;
+  };
+  constexpr int kPhases = 8;
+  const double step_s = loop.period_s / kPhases;
+  double most = 0;
+  for (int i = 0; i <= kPhases; ++i) most = std::max(most, rate_at(i * step_s));
+  // Between two phases e leaves its chord as in initial_position_gain(); n is that of the last sample throughout.
+  const Eigen::Index command = adjoint.model().command_index();
+  const Eigen::RowVectorXd commanded = Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, command);
+  return most + step_s * step_s / 8 * input_gains(adjoint, commanded, input).rate;
 }
 
 double initial_position_gain(const AxisLoop& loop) {
@@ -99,8 +200,13 @@ double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErr
       part(errors.step_N(), [&] { return response_norms(step_transfer(loop, channel)).step_max_abs; });
   const double speed =
       part(errors.velocity_m_s, [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).edge; });
-  const double velocity_error =
-      part(errors.velocity_error_m_s, [&] { return continuous_norms(loop, Estimate::kVelocity).rate; });
+  const double velocity_error = least_demand(
+      errors.velocity_error, [&] { return continuous_norms(loop, Estimate::kVelocity).rate; },
+      [&] {
+        const ResponseNorms h = response_norms(step_transfer(loop, Channel::kCommand));
+        return loop.mass_kg * loop.Kd * h.step_max_abs;
+      },
+      [&] { return continuous_norms(loop, Estimate::kVelocity).edge; });
   // int e after e(0) = 1, and int (e + n) under |n| <= 1, are the integral and the absolute integral of one response:
   // (s^2 L + s Kd exp(-Ts)) / D, bounded with a delay as in initial_position_gain().
   const auto position = [&] {
@@ -108,13 +214,10 @@ double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErr
     return response_norms(initial_position_transfer(loop)).step_max_abs +
            loop.delay_s * loop.mass_kg * loop.Kd * command.impulse;
   };
-  const auto position_error = [&] {
-    const ResponseNorms command = response_norms(impulse_transfer(loop, Channel::kCommand));
-    return response_norms(initial_position_transfer(loop)).integral_abs +
-           (loop.delay_s == 0 ? 0 : loop.delay_s * loop.mass_kg * loop.Kd * command.variation);
-  };
-  return step + speed + velocity_error + part(errors.position_m, position) +
-         part(errors.position_error_m, position_error);
+  const double position_error = least_demand(
+      errors.position_error, [&] { return drift_gain(loop); }, position,
+      [&] { return initial_position_gain(loop); });
+  return step + speed + velocity_error + part(errors.position_m, position) + position_error;
 }
 
 double integral_demand_m_s(const SampledLoop& loop, Channel channel, const OtherErrors& errors) {
@@ -134,14 +237,15 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
   };
   const auto speed = [&] { return initial_response(adjoint, integral).to_velocity; };
   const auto position = [&] { return initial_response(adjoint, integral).to_position; };
-  const auto velocity_error = [&] {
-    return input_gains(adjoint, integral, adjoint.model().measured_velocity()).amplitude;
-  };
-  const auto position_error = [&] {
-    return input_gains(adjoint, integral, adjoint.model().measured_position()).amplitude;
+  const auto demand = [&](const EstimateError& n, const Eigen::VectorXd& input) {
+    if (n.is_zero()) return 0.0;
+    const GainNorms gains = input_gains(adjoint, integral, input);
+    return least_demand(
+        n, [&] { return gains.amplitude; }, [&] { return gains.edge; }, [&] { return gains.impulse; });
   };
   return part(errors.step_N(), step) + part(errors.velocity_m_s, speed) + part(errors.position_m, position) +
-         part(errors.velocity_error_m_s, velocity_error) + part(errors.position_error_m, position_error);
+         demand(errors.velocity_error, adjoint.model().measured_velocity()) +
+         demand(errors.position_error, adjoint.model().measured_position());
 }
 
 double effort_N(const AxisLoop& loop, const OtherErrors& errors) {
@@ -166,8 +270,9 @@ double effort_N(const AxisLoop& loop, const OtherErrors& errors) {
     return most;
   };
   return part(errors.step_N(), [&] { return effort; }) +
-         loop.mass_kg * (part(errors.velocity_error_m_s, velocity_error) +
-                         part(errors.position_error_m, position_error) + part(errors.position_m, position)) +
+         loop.mass_kg *
+             (part(errors.velocity_error.largest(), velocity_error) +
+              part(errors.position_error.largest(), position_error) + part(errors.position_m, position)) +
          part(errors.velocity_m_s, speed);
 }
 

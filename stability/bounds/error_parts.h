@@ -2,25 +2,49 @@
 /// law is given, and the error at the start. Their worst errors add to the bound of any class.
 #pragma once
 
+#include <limits>
+
 #include "stability/bounds/sampled_loop.h"
 
 namespace swarmcert::stability {
 
+/// What is known of the error n(t) of an estimate, in m/s for a velocity and m for a position. Infinite: nothing.
+/// n is zero before t = 0, and rises from zero at the stated rate but for its constant part. A loop that samples sees
+/// n once per period: `impulse` is then the period times the sum of |n| over its samples.
+struct EstimateError {
+  double amplitude = 0;                                        ///< sup |n|
+  double rate = std::numeric_limits<double>::infinity();       ///< sup |n'|
+  double variation = std::numeric_limits<double>::infinity();  ///< total variation, rise from zero included
+  double impulse = std::numeric_limits<double>::infinity();    ///< int |n| dt
+  /// A part that acts from t = 0 on: amplitude and impulse contain it, rate and variation do not.
+  double constant = 0;
+  double window_s =
+      0;  ///< variation and impulse are those of any window of this length; 0: of the whole flight
+
+  bool is_zero() const;
+  /// The least bound on |n| that follows.
+  double largest() const;
+  bool operator==(const EstimateError& o) const {
+    return amplitude == o.amplitude && rate == o.rate && variation == o.variation && impulse == o.impulse &&
+           constant == o.constant && window_s == o.window_s;
+  }
+};
+
 /// Of one axis. All but the bias are sizes: the signs and the course over time are the worst ones.
 struct OtherErrors {
-  double bias_N = 0;              ///< constant part of the force error, from t = 0 on
-  double start_N = 0;             ///< |force error| at t = 0, bias included
-  double position_m = 0;          ///< |e| at t = 0
-  double velocity_m_s = 0;        ///< |e'| at t = 0
-  double velocity_error_m_s = 0;  ///< sup |estimated - true velocity|
-  double position_error_m = 0;    ///< sup |estimated - true position|
+  double bias_N = 0;               ///< constant part of the force error, from t = 0 on
+  double start_N = 0;              ///< |force error| at t = 0, bias included
+  double position_m = 0;           ///< |e| at t = 0
+  double velocity_m_s = 0;         ///< |e'| at t = 0
+  EstimateError velocity_error{};  ///< estimated - true velocity
+  EstimateError position_error{};  ///< estimated - true position
 
   /// The step that the force error makes at t = 0.
   double step_N() const;
   bool operator==(const OtherErrors& o) const {
     return bias_N == o.bias_N && start_N == o.start_N && position_m == o.position_m &&
-           velocity_m_s == o.velocity_m_s && velocity_error_m_s == o.velocity_error_m_s &&
-           position_error_m == o.position_error_m;
+           velocity_m_s == o.velocity_m_s && velocity_error == o.velocity_error &&
+           position_error == o.position_error;
   }
 };
 
@@ -34,7 +58,8 @@ struct ErrorParts {
 };
 
 /// Bounds for all t >= 0 from zero integral and lags at rest; infinite where a part is not zero and the loop unstable.
-/// Those of the bias and of the estimates are exact; that of the initial position is without a delay.
+/// Those of the bias are exact; that of the initial position is without a delay. Those of the estimates are the least of
+/// what amplitude, rate, both together, variation and impulse of their errors give, each exact for its class alone.
 /// @param step_gain m/N: the edge gain of the channel by which the force error enters.
 ErrorParts error_parts(const AxisLoop& loop, double step_gain, const OtherErrors& errors);
 /// t = 0 is a sampling instant.
@@ -47,8 +72,14 @@ double initial_position_gain(const SampledLoop& loop);
 
 /// What they ask of the integrator: sup |int (e + error of the estimated position) dt|, m s. Needs Ki > 0.
 double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErrors& errors);
-/// Of the state that firmware keeps.
+/// Of the state that firmware keeps. Windows of variation and impulse count by the amplitude of the error alone.
 double integral_demand_m_s(const SampledLoop& loop, Channel channel, const OtherErrors& errors);
+
+/// sup |e + n| per unit of rate of an error n of the estimated position, s: with a slow n the vehicle follows the wrong
+/// position, so |e| <= sup |n| + drift_gain() sup |n'|.
+double drift_gain(const AxisLoop& loop);
+/// n is the error at the last sample.
+double drift_gain(const SampledLoop& loop);
 
 /// What they ask of the feedback, N: sup of its part of the commanded force, force channel.
 double effort_N(const AxisLoop& loop, const OtherErrors& errors);

@@ -54,7 +54,7 @@ GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd&
 }
 
 GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after,
-                      const Eigen::VectorXd& input, bool with_own) {
+                      const Eigen::VectorXd& input, bool with_own, double at_once) {
   const double period_s = adjoint.period_s();
   GainNorms gains;
   double step = 0;
@@ -68,7 +68,7 @@ GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& a
     gains.amplitude += std::abs(kernel);
     gains.impulse = std::max(gains.impulse, std::abs(kernel) / period_s);
     gains.edge = std::max(gains.edge, std::abs(step));
-    gains.rate += std::abs(step) * period_s;
+    gains.rate += std::abs(step + at_once) * period_s;
   };
   adjoint.input_kernel(after, input, add, [&](double kernel, double ratio) {
     // What is left falls in proportion, and so does the way of the step to its limit.

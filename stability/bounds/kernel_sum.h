@@ -74,7 +74,8 @@ void add_force_kernel(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& a
 /// @param with_own whether the error of the output's own period counts.
 GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after, bool with_own = true);
 /// The same for what adds `input` [size + 1] to the state after control, once per period.
+/// @param at_once as in KernelSum: `rate` is that to the output plus at_once times the latest input.
 GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after,
-                      const Eigen::VectorXd& input, bool with_own = true);
+                      const Eigen::VectorXd& input, bool with_own = true, double at_once = 0);
 
 }  // namespace swarmcert::stability

@@ -63,7 +63,9 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
           ? "under all that is declared, about hover, by the effort gain of the continuous loop"
           : "");
   if (source.has_estimate_errors()) {
-    add("errors of the estimated position and velocity", "assumed", "as declared");
+    const bool is_measured = source.kind == "measured" && !source.declares_velocity_error;
+    add("errors of the estimated position and velocity", is_measured ? "measured" : "assumed",
+        is_measured ? "of the velocity, over the same windows" : "as declared");
   } else {
     add("exact position and velocity", "assumed",
         "--velocity-error and --position-error bound what errors of the estimates add");
@@ -199,8 +201,10 @@ void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const Disturban
   OtherErrors other = source.other(2, initial);
   if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
   const double weight_N = plant.mass_kg * kGravity_m_s2;
+  const double others_N = effort_N(loop, other);
+  if (!std::isfinite(others_N)) return;
   report.thrust_margin_N = std::min(plant.thrust_scale * plant.largest_thrust_N - weight_N, weight_N) -
-                           report.facts.back().effort_gain * amplitude_N - effort_N(loop, other);
+                           report.facts.back().effort_gain * amplitude_N - others_N;
 }
 
 /// Largest sum of the absolute values of a row, an upper bound of the 2-norm of a symmetric matrix.
@@ -281,9 +285,9 @@ std::optional<SampledLoop> sampled_axis_loop(const Gains& gains, const Plant& pl
 }
 
 bool DisturbanceSource::has_estimate_errors() const {
-  const auto is_given = [](double size) { return size != 0; };
-  return std::any_of(std::begin(velocity_error_m_s), std::end(velocity_error_m_s), is_given) ||
-         std::any_of(std::begin(position_error_m), std::end(position_error_m), is_given);
+  const auto is_given = [](const EstimateError& error) { return !error.is_zero(); };
+  return std::any_of(std::begin(velocity_error), std::end(velocity_error), is_given) ||
+         std::any_of(std::begin(position_error), std::end(position_error), is_given);
 }
 
 bool DisturbanceSource::amplitudes_reach_bias() const {
@@ -299,8 +303,8 @@ OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial) c
   errors.start_N = initial.learning_error_N;
   errors.position_m = initial.position_m;
   errors.velocity_m_s = initial.velocity_m_s;
-  errors.velocity_error_m_s = velocity_error_m_s[of_axis];
-  errors.position_error_m = position_error_m[of_axis];
+  errors.velocity_error = velocity_error[of_axis];
+  errors.position_error = position_error[of_axis];
   return errors;
 }
 

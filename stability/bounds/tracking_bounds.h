@@ -42,8 +42,9 @@ struct DisturbanceSource {
   double bias_N[3] = {0, 0, 0};
   /// Whether amplitude and impulse were measured with the bias in them; else it comes on top of every class.
   bool classes_contain_bias = false;
-  double velocity_error_m_s[3] = {0, 0, 0};  ///< sup |estimated - true velocity|
-  double position_error_m[3] = {0, 0, 0};    ///< sup |estimated - true position|
+  EstimateError velocity_error[3];       ///< estimated - true velocity
+  EstimateError position_error[3];       ///< estimated - true position
+  bool declares_velocity_error = false;  ///< velocity_error was stated, not measured
   bool has_estimate_errors() const;
   /// Whether the amplitude is at least the bias on every axis, as one is that was measured with the bias in it.
   bool amplitudes_reach_bias() const;

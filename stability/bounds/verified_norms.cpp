@@ -167,12 +167,17 @@ std::optional<VerifiedNorms> norms_over(const TransferFunction& y, const Interva
   return Enclosure(*system).run(1, Interval(y.numerator[0]) / Interval(y.feedback[0]));
 }
 
-}  // namespace
+VerifiedNorms times(VerifiedNorms norms, Interval factor) {
+  for (const auto gain :
+       {&VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse}) {
+    if (std::isfinite((norms.*gain).hi)) norms.*gain = norms.*gain * factor;
+  }
+  return norms;
+}
 
-std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel) {
-  const bool integrates = loop.Ki > 0;
-  const TransferFunction y = integrates ? step_transfer(loop, channel) : impulse_transfer(loop, channel);
-  if (loop.delay_s == 0) return norms_over(y, intervals(sum(y.denominator, y.feedback)), integrates);
+/// @param integrates y is the response to a step, else that to an impulse.
+std::optional<VerifiedNorms> norms_of(const TransferFunction& y, bool integrates) {
+  if (y.delay_s == 0) return norms_over(y, intervals(sum(y.denominator, y.feedback)), integrates);
   // A delay that is short against the slowest mode takes many steps, but may be sharp by its expansion.
   constexpr long kFewPieces = 30'000;
   constexpr long kMostPieces = 400'000;
@@ -201,6 +206,19 @@ std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channe
   }
   norms->delay_gain = rest;
   return norms;
+}
+
+}  // namespace
+
+std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel) {
+  const bool integrates = loop.Ki > 0;
+  return norms_of(integrates ? step_transfer(loop, channel) : impulse_transfer(loop, channel), integrates);
+}
+
+std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Estimate estimate) {
+  if (estimate == Estimate::kPosition) return norms_of(position_error_transfer(loop), false);
+  std::optional<VerifiedNorms> norms = verified_norms(loop, Channel::kCommand);
+  return norms ? std::optional(times(*norms, Interval(loop.mass_kg) * Interval(loop.Kd))) : std::nullopt;
 }
 
 }  // namespace swarmcert::stability

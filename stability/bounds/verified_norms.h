@@ -32,4 +32,8 @@ struct VerifiedNorms {
 /// of y lies between those of y0 over 1 + lambda and over 1 - lambda. Lower degrees are tried where that is above 0.001.
 std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel);
 
+/// The same for errors of an estimate, as continuous_norms(): for the doubles of position_error_transfer(), or those of the
+/// command channel times m Kd.
+std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Estimate estimate);
+
 }  // namespace swarmcert::stability

@@ -106,9 +106,11 @@ struct Output {
 
 class SampledEnclosure {
  public:
-  SampledEnclosure(const SampledLoop& loop, Channel channel, const IntervalSampledModel& model,
-                   ContractingSampledSystem system)
-      : h_(loop.period_s), channel_(channel), integrates_(loop.plant.Ki > 0), system_(std::move(system)) {
+  /// @param input what is added to the state after control once per period; empty: a force.
+  /// @param integrates whether the output follows a constant input no more in the end.
+  SampledEnclosure(const SampledLoop& loop, const IntervalVector& input, bool integrates,
+                   const IntervalSampledModel& model, ContractingSampledSystem system)
+      : h_(loop.period_s), is_force_(input.empty()), integrates_(integrates), system_(std::move(system)) {
     const std::size_t n = model.size();
     A_.resize(n * n);
     Interval radius;
@@ -127,19 +129,18 @@ class SampledEnclosure {
     gap_ = Interval(1) - Interval(system_.gamma);
     IntervalVector k0(n);
     IntervalVector k1(n);
-    if (channel == Channel::kForce) {
+    if (is_force_) {
       for (std::size_t i = 0; i < n; ++i) {
         k0[i] = system_.R(static_cast<Index>(i), 1);
         k1[i] = system_.R(static_cast<Index>(i), 0);
       }
     } else {
       // An error of one period, as a force held for it.
-      for (std::size_t i = 0; i < n; ++i) {
-        for (std::size_t k = 0; k < n; ++k) {
-          k0[i] += Interval(system_.R(static_cast<Index>(i), static_cast<Index>(k))) *
-                   model.hold()(k, model.command_index());
-        }
-        k0[i] = k0[i] / Interval(h_);
+      for (std::size_t k = 0; k < n; ++k) {
+        Interval held;
+        for (std::size_t j = 0; j < input.size(); ++j) held += model.hold()(k, j) * input[j];
+        for (std::size_t i = 0; i < n; ++i)
+          k0[i] += Interval(system_.R(static_cast<Index>(i), static_cast<Index>(k))) * held / Interval(h_);
       }
     }
     const Interval h(h_);
@@ -148,9 +149,8 @@ class SampledEnclosure {
     const IntervalVector rest = summed(cell);  // of all periods from this one on
     IntervalVector second(n);                  // integral of S over a period, or h S at its end for commands
     for (std::size_t i = 0; i < n; ++i) {
-      second[i] = channel == Channel::kForce
-                      ? h * (h * (k0[i] / Interval(2) + h * k1[i] / Interval(6)) - rest[i])
-                      : h * (cell[i] - rest[i]);
+      second[i] = is_force_ ? h * (h * (k0[i] / Interval(2) + h * k1[i] / Interval(6)) - rest[i])
+                            : h * (cell[i] - rest[i]);
     }
     k0_ = Linear(k0), k1_ = Linear(k1), rest_ = Linear(rest);
     if (integrates_) second_rest_ = Linear(summed(second));
@@ -251,7 +251,7 @@ class SampledEnclosure {
   VerifiedNorms own_period(const Output& output) const {
     const Interval p(output.phase_s);
     const Interval own = abs(output.own);
-    if (channel_ == Channel::kForce) {
+    if (is_force_) {
       return {p * p * p / Interval(6), p * p / Interval(2), p * p / Interval(2), p};
     }
     return {own * Interval(h_), own, own, own / Interval(h_)};
@@ -287,7 +287,7 @@ class SampledEnclosure {
   }
 
   void add_second(const Cell& cell, double k_most, Runs& runs) const {
-    if (channel_ == Channel::kCommand) {
+    if (!is_force_) {
       const Interval at_end = cell.S(h_);
       if (at_end.lo > 0 || at_end.hi < 0) {
         runs.add(at_end.lo > 0 ? 1 : -1, [&] { return cell.Q(0); });
@@ -331,7 +331,7 @@ class SampledEnclosure {
   }
 
   double h_;
-  Channel channel_;
+  bool is_force_;
   bool integrates_;
   ContractingSampledSystem system_;
   Interval gap_;
@@ -343,21 +343,25 @@ class SampledEnclosure {
 constexpr std::array<Interval VerifiedNorms::*, 4> kSampledGains = {
     &VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse};
 
-}  // namespace
+Interval dot(const IntervalVector& row, const IntervalVector& column) {
+  Interval total;
+  for (std::size_t i = 0; i < row.size(); ++i) total += row[i] * column[i];
+  return total;
+}
 
-std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& loop, Channel channel) {
-  const IntervalSampledModel model(loop);
+/// @param input as in SampledEnclosure. @param at_rest what a constant input does to e in the end.
+std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, const IntervalSampledModel& model,
+                                                   const IntervalVector& input, bool integrates,
+                                                   Interval at_rest) {
   std::optional<ContractingSampledSystem> system = contracting(model);
   if (!system) return std::nullopt;
-  const bool is_force = channel == Channel::kForce;
-  const bool integrates = loop.plant.Ki > 0;
-  const SampledEnclosure enclosure(loop, channel, model, *std::move(system));
+  const bool is_force = input.empty();
+  const SampledEnclosure enclosure(loop, input, integrates, model, *std::move(system));
   // Of a row over the state after control.
   const auto output = [&](const IntervalVector& after, double phase_s, Interval settled) {
     return enclosure.run({(after * model.control()) * enclosure.system().R_inverse, phase_s,
-                          is_force ? Interval(0) : after[model.command_index()], settled});
+                          is_force ? Interval(0) : dot(after, input), settled});
   };
-  const Interval at_rest = integrates ? Interval(0) : Interval(1) / Interval(loop.plant.Kp);
   VerifiedSampledNorms result;
   for (int i = 0; i < kVerifiedPhases; ++i) {
     const double phase_s = loop.period_s * i / kVerifiedPhases;
@@ -381,19 +385,53 @@ std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& lo
     // The force changes by less than this from the sample at which a command was made until it acts.
     bend.rate = bend.rate + Interval(static_cast<double>(model.past() + 2)) * Interval(loop.period_s);
   }
-  bend.edge = bend.amplitude;  // a force of variation 1 from rest stays below 1
+  bend.edge = bend.amplitude;  // an input of variation 1 from rest stays below 1
   const double step_s = up(loop.period_s / kVerifiedPhases * (1 + 1e-15));
   for (const auto gain : kSampledGains) {
     Interval& all = result.all_times.*gain;
     if (std::isfinite(all.hi))
       all.hi = (Interval(all.hi) + Interval(step_s) * step_s / Interval(8) * (bend.*gain).hi).hi;
   }
+  return result;
+}
+
+/// Every finite gain over `divisor`.
+VerifiedSampledNorms over(VerifiedSampledNorms result, Interval divisor) {
   for (VerifiedNorms* const norms : {&result.at_samples, &result.all_times}) {
     for (const auto gain : kSampledGains) {
-      if (std::isfinite((norms->*gain).hi)) norms->*gain = norms->*gain / Interval(loop.plant.mass_kg);
+      if (std::isfinite((norms->*gain).hi)) norms->*gain = norms->*gain / divisor;
     }
   }
   return result;
+}
+
+}  // namespace
+
+std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& loop, Channel channel) {
+  const IntervalSampledModel model(loop);
+  IntervalVector input;
+  if (channel == Channel::kCommand) {
+    input.resize(model.size() + 1);
+    input[model.command_index()] = 1;
+  }
+  const bool integrates = loop.plant.Ki > 0;
+  const Interval at_rest = integrates ? Interval(0) : Interval(1) / Interval(loop.plant.Kp);
+  const auto norms = enclosed_norms(loop, model, input, integrates, at_rest);
+  return norms ? std::optional(over(*norms, Interval(loop.plant.mass_kg))) : std::nullopt;
+}
+
+std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& loop, Estimate estimate) {
+  const IntervalSampledModel model(loop);
+  const std::size_t measured = estimate == Estimate::kPosition ? 0 : 1;
+  IntervalVector input(model.size() + 1);
+  for (std::size_t i = 0; i < input.size(); ++i)
+    input[i] = model.control()(i, measured) - Interval(i == measured ? 1.0 : 0.0);
+  // A wrong position is followed: e goes to its negative.
+  if (estimate == Estimate::kPosition) return enclosed_norms(loop, model, input, false, Interval(-1));
+  const bool integrates = loop.plant.Ki > 0;
+  const Interval at_rest =
+      integrates ? Interval(0) : Interval(0) - Interval(loop.plant.Kd) / Interval(loop.plant.Kp);
+  return enclosed_norms(loop, model, input, integrates, at_rest);
 }
 
 }  // namespace swarmcert::stability

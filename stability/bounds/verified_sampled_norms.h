@@ -23,4 +23,7 @@ struct VerifiedSampledNorms {
 /// disturbance, its gain is that of the largest of them.
 std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& loop, Channel channel);
 
+/// The same for errors of an estimate, read once per period.
+std::optional<VerifiedSampledNorms> verified_sampled_norms(const SampledLoop& loop, Estimate estimate);
+
 }  // namespace swarmcert::stability

@@ -127,6 +127,45 @@ TEST(BoundCommand, ErrorsOfTheEstimatesEnterWhereTheyActAndAreInEveryTotal) {
   EXPECT_FALSE(result["theorem"]["applies"].get<bool>());
 }
 
+TEST(BoundCommand, EveryClassOfAnErrorOfAnEstimateCounts) {
+  const ScratchFolder folder;
+  const std::string gains =
+      gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\nrate_hz = 100\n[lag]\nmotor_s = 0.0575\n");
+  const auto part_of = [&](const std::string& options, const char* channel) {
+    const Json result = json_of(folder, "bound" + gains + " --amplitude 0.01" + options);
+    for (const Json& row : result["bounds"]) {
+      if (row["axis"] == "z" && row["loop"] == "sampled" && row["channel"] == "force")
+        return row["parts"][channel].get<double>();
+    }
+    return -1.0;
+  };
+  const double amplitude_m = part_of(" --velocity-error 0.1", "velocity_error");
+  EXPECT_GT(amplitude_m, 0.05);
+  // Per unit: the gains that are printed.
+  const Json exact = json_of(folder, "bound" + gains)["exact"];
+  for (const Json& row : exact) {
+    if (row["axis"] != "z" || row["loop"] != "sampled" || row["channel"] != "velocity") continue;
+    const Json& g = row["between_samples"];
+    EXPECT_NEAR(part_of(" --velocity-error-rate 0.02", "velocity_error"), 0.02 * g["rate"].get<double>(),
+                1e-9);
+    EXPECT_NEAR(part_of(" --velocity-error-edge 0.02", "velocity_error"), 0.02 * g["edge"].get<double>(),
+                1e-9);
+    EXPECT_NEAR(part_of(" --velocity-error-impulse 0.02", "velocity_error"),
+                0.02 * g["impulse"].get<double>(), 1e-9);
+  }
+  const double both_m = part_of(" --velocity-error 0.1 --velocity-error-rate 0.1", "velocity_error");
+  EXPECT_LT(both_m, amplitude_m);
+  // Who follows a wrong position that drifts slowly is off by little more than that.
+  const double drift_m = part_of(" --position-error 0.02 --position-error-rate 0.001", "position_error");
+  EXPECT_LT(drift_m, part_of(" --position-error 0.02", "position_error"));
+  EXPECT_GT(drift_m, 0.02);
+  EXPECT_EQ(part_of(" --velocity-error 0,0,0 --velocity-error-rate 0.1", "velocity_error"), 0);
+  const Json told = json_of(folder, "bound" + gains + " --velocity-error-rate 0,0,0.02");
+  ASSERT_EQ(told["disturbance"]["of_estimates"].size(), 1u);
+  EXPECT_EQ(told["disturbance"]["of_estimates"][0]["rate_per_s"], 0.02);
+  EXPECT_TRUE(told["disturbance"]["of_estimates"][0]["amplitude"].is_null());
+}
+
 TEST(BoundCommand, TheTheoremsBallIsWithheldWhereTheEstimatesErr) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");

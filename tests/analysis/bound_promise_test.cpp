@@ -44,7 +44,9 @@ TEST(BoundCommand, SaysWhichGainsAreCloseToALimitCycleOfTheAttitudeLoop) {
 }
 
 /// A result of compare whose flights had these amplitudes along all axes, and otherwise anything.
-std::string compared_flights(const ScratchFolder& folder, const std::vector<double>& amplitudes) {
+/// @param velocity_m_s amplitude of the error of the velocity of every flight; 0: not measured.
+std::string compared_flights(const ScratchFolder& folder, const std::vector<double>& amplitudes,
+                             double velocity_m_s = 0) {
   Json flights = Json::array();
   for (std::size_t k = 0; k < amplitudes.size(); ++k) {
     const auto axes = [](double x) { return Json{{"x", x}, {"y", x}, {"z", x}, {"total", x}}; };
@@ -57,6 +59,9 @@ std::string compared_flights(const ScratchFolder& folder, const std::vector<doub
                          {"rate", axes(1e6)},
                          {"variation", axes(1e6)},
                          {"impulse", axes(1e6)}}}});
+    if (velocity_m_s == 0) continue;
+    flights.back()["velocity_error"] = flights.back()["learning_error"];
+    flights.back()["velocity_error"]["amplitude"] = axes(velocity_m_s);
   }
   const Json compare = {{"schema", "swarmcert/compare/1"},
                         {"unit", "N"},
@@ -97,7 +102,47 @@ TEST(BoundCommand, APromiseContainsWhatIsDeclaredBesideTheFlights) {
   };
   const double alone = total("");
   EXPECT_NEAR(total(" --bias 0.1") - alone, 0.1 / 0.034 / 9, 1e-6);
-  EXPECT_GT(total(" --velocity-error 0.1"), alone + 0.05);
+  const double declared = total(" --velocity-error 0.1");
+  EXPECT_GT(declared, alone + 0.05);
+  compared_flights(folder, std::vector<double>(9, 0.01), 0.1);
+  EXPECT_NEAR(total(""), declared, 1e-9) << "measured in every flight";
+  EXPECT_EQ(total(" --velocity-error 0"), alone) << "what is declared takes its place";
+}
+
+TEST(CompareCommand, SaysHowOftenAPromiseHeldOnFlightsThatItWasNotMadeFrom) {
+  const ScratchFolder folder;
+  const std::string model = kSourceFolder + "/stability/models/crazyflie-small.toml";
+  const std::string gains = kSourceFolder + "/controller/gains/crazyflie-small.toml";
+  for (const std::string seed : {"1", "2"}) {
+    json_of(folder, "simulate swap --vehicles 2 --model " + model + " --gains " + gains + " --seed " + seed +
+                        " -o flights/" + seed);
+  }
+  const Json first = json_of(folder, "compare " + model + " flights/1");
+  const auto row = [](const char* axis, double total) {
+    return Json{{"axis", axis}, {"channel", "force"}, {"loop", "sampled"}, {"total", total}, {"unit", "m"}};
+  };
+  Json made_from = Json::array();
+  for (const Json& input : first["inputs"]) made_from.push_back(input["sha256"]);
+  const Json bound = {
+      {"schema", "swarmcert/bound/1"},
+      {"coverage",
+       {{"level", 0.9}, {"made_from", made_from}, {"bounds", {row("x", 10), row("y", 10), row("z", 1e-9)}}}}};
+  write_text(folder / "bound.json", bound.dump());
+  const Json result = json_of(folder, "compare " + model + " flights --promise bound.json");
+  const Json& promise = result["promise"];
+  EXPECT_EQ(promise["level"], 0.9);
+  EXPECT_EQ(promise["left_out"].size(), 2u) << "both vehicles of the flight that it was made from";
+  for (const Json& axis : promise["axes"]) {
+    EXPECT_EQ(axis["flights"], 1) << axis;
+    EXPECT_EQ(axis["held"], axis["axis"] == "z" ? 0 : 1) << axis;
+  }
+  const Outcome text =
+      run_shell("swarmcert compare " + model + " flights --promise bound.json", folder.path());
+  EXPECT_NE(text.output.find("x: held in 1 of 1 flights"), std::string::npos) << text.output;
+  EXPECT_NE(text.output.find("left out: 2 logs"), std::string::npos) << text.output;
+  EXPECT_EQ(
+      run_shell("swarmcert compare " + model + " flights --promise compare.json", folder.path()).exit_code,
+      3);
 }
 
 TEST(BoundCommand, RefusesAPromiseThatTheFlightsCannotCarry) {

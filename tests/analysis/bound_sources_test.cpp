@@ -40,6 +40,67 @@ TEST(BoundCommand, MeasuredQuantilesAreTaggedMeasured) {
       3);
 }
 
+TEST(BoundCommand, TheErrorOfTheVelocityThatFlightsShowedIsAChannelOfItsOwn) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\nrate_hz = 100\n");
+  const auto at = [](double x, double y, double z) {
+    return Json{{"p95", {{"x", x / 2}, {"y", y / 2}, {"z", z / 2}}}, {"p99", {{"x", x}, {"y", y}, {"z", z}}}};
+  };
+  Json compare = {{"schema", "swarmcert/compare/1"},
+                  {"learning_error",
+                   {{"window_s", 4.5},
+                    {"bias", at(0, 0, 0)},
+                    {"amplitude", at(0.01, 0.01, 0.01)},
+                    {"rate", at(1, 1, 1)}}}};
+  write_text(folder / "force.json", compare.dump());
+  compare["velocity_error"] = {
+      {"window_s", 4.5},         {"bias", at(0.01, 0, 0)},     {"amplitude", at(0.12, 0.02, 0)},
+      {"rate", at(0.05, 100, 0)}, {"variation", at(0.6, 1, 0)}, {"impulse", at(0.2, 1, 0)}};
+  write_text(folder / "both.json", compare.dump());
+  const auto rows_of = [&](const std::string& from) {
+    return json_of(folder, "bound" + gains + " --from " + from);
+  };
+  const Json force = rows_of("force.json"), both = rows_of("both.json");
+  const Json declared = rows_of("both.json --velocity-error 0"), low = rows_of("both.json --quantile p95");
+  ASSERT_EQ(both["disturbance"]["of_estimates"].size(), 2u);
+  EXPECT_EQ(both["disturbance"]["of_estimates"][0]["rate_per_s"], 0.05);
+  EXPECT_EQ(low["disturbance"]["of_estimates"][0]["amplitude"], 0.06);
+  for (std::size_t k = 0; k < both["bounds"].size(); ++k) {
+    const Json& row = both["bounds"][k];
+    const double part_m = row["parts"]["velocity_error"].get<double>();
+    EXPECT_NEAR(row["amplitude"].get<double>(), force["bounds"][k]["amplitude"].get<double>() + part_m,
+                1e-12);
+    EXPECT_EQ(declared["bounds"][k], force["bounds"][k]);
+    if (row["axis"] == "x") {
+      EXPECT_GT(part_m, 0.02);
+    } else if (row["axis"] == "z") {
+      EXPECT_EQ(part_m, 0);
+    }
+  }
+  // A fast error of y counts by its amplitude, a slow one of x by less than that.
+  for (const Json& exact : both["exact"]) {
+    if (exact["channel"] != "velocity" || exact["loop"] != "continuous") continue;
+    const auto part_of = [&](const char* axis) {
+      for (const Json& row : both["bounds"]) {
+        if (row["axis"] == axis && row["loop"] == "continuous")
+          return row["parts"]["velocity_error"].get<double>();
+      }
+      return -1.0;
+    };
+    const double gain = exact["amplitude"].get<double>();
+    if (exact["axis"] == "x") {
+      EXPECT_LT(part_of("x"), 0.12 * gain);
+    } else if (exact["axis"] == "y") {
+      EXPECT_NEAR(part_of("y"), 0.02 * gain, 1e-6);
+    }
+  }
+  EXPECT_EQ(run_shell("swarmcert bound" + gains + " --from both.json --tube", folder.path()).exit_code, 2);
+  EXPECT_EQ(
+      run_shell("swarmcert bound" + gains + " --from both.json --tube --velocity-error 0", folder.path())
+          .exit_code,
+      0);
+}
+
 /// Flights with an effect that the model lacks; what compare says of them bounds the errors that they had.
 TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
   const ScratchFolder folder;
@@ -70,6 +131,13 @@ TEST(BoundCommand, MeasuredNumbersOfRealFlightsBoundTheErrorsOfThoseFlights) {
   const double one = result["exact"][9]["between_samples"]["impulse"].get<double>();
   const Json compare = files::parse_json(read_text(folder / "compare.json"), "compare.json");
   const double J = compare["learning_error"]["impulse"]["max"]["z"].get<double>();
+  const Json& velocity = compare["velocity_error"];
+  EXPECT_EQ(velocity["windows"], compare["learning_error"]["windows"]);
+  double largest_speed = 0;
+  for (const Json& flight : compare["flights"])
+    largest_speed = std::max(largest_speed, flight["velocity_error"]["amplitude"]["z"].get<double>());
+  EXPECT_EQ(velocity["amplitude"]["max"]["z"].get<double>(), largest_speed);
+  EXPECT_GT(result["bounds"][9]["parts"]["velocity_error"].get<double>(), 0);
   double largest_of_flights = 0;
   for (const Json& flight : compare["flights"])
     largest_of_flights = std::max(largest_of_flights, flight["learning_error"]["impulse"]["z"].get<double>());
@@ -221,7 +289,7 @@ TEST(BoundCommand, CoupledAxesAreNamedAndWhatNeedsASingleAxisIsRefused) {
   const Json one_axis = json_of(folder, "bound" + two + " --verified");
   EXPECT_EQ(one_axis["coupled_axes"], Json({"x", "y"}));
   for (const Json& row : one_axis["verified"]) EXPECT_EQ(row["axis"], "z");
-  EXPECT_EQ(one_axis["verified"].size(), 2u);
+  EXPECT_EQ(one_axis["verified"].size(), 4u);
 }
 
 TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {

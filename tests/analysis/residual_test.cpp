@@ -7,6 +7,7 @@
 #include "analysis/log_writer.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
+#include "analysis/residuals/velocity_error.h"
 #include "analysis/run.h"
 #include "data.h"
 #include "nn/base/input_error.h"
@@ -34,6 +35,33 @@ TEST(AccelerometerFilter, DelaysARampByTheTwoPolesAndKeepsItsSlope) {
     output = filtered(filter, time_s, 3 * time_s);
   }
   EXPECT_NEAR(output, 3 * (time_s - delay_s), 1e-9);
+}
+
+TEST(VelocityError, IsWhatTheEstimatedVelocityHasMoreThanTheSlopeOfThePosition) {
+  // x swings with 0.3 m at 3 rad/s, its estimated velocity is 1.1 times too large; z stands, its velocity is off by 0.05.
+  residuals::Track track;
+  double pause_s = 0;
+  for (int i = 0; i < 2000; ++i) {
+    if (i == 1200) pause_s = 5;  // the vehicle is elsewhere afterwards
+    stability::Instant now;
+    now.time_s = 0.01 * i + pause_s;
+    now.p_W_m = {0.3 * std::sin(3 * now.time_s) + pause_s, 0, 1};
+    now.v_W_m_s = {1.1 * 0.9 * std::cos(3 * now.time_s), 0, 0.05};
+    track.instants.push_back(now);
+    const bool restarts = i == 0 || i == 1200;
+    track.restarts.push_back(restarts ? 1 : 0);
+    const bool settles = i < 20 || (i >= 1200 && i < 1220);
+    track.cut.push_back(settles ? residuals::Cut::kSettling : residuals::Cut::kNone);
+  }
+  const std::vector<residuals::ErrorWindow> windows =
+      residuals::error_windows(track, residuals::velocity_error(track));
+  ASSERT_GE(windows.size(), 3u);
+  for (const residuals::ErrorWindow& window : windows) {
+    EXPECT_NEAR(window.amplitude[0], 0.09, 0.005);
+    EXPECT_NEAR(window.rate[0], 0.27, 0.02);
+    EXPECT_NEAR(window.amplitude[1], 0, 1e-9);
+    EXPECT_NEAR(window.amplitude[2], 0.05, 1e-6);
+  }
 }
 
 TEST(AccelerometerFilter, StepsOfAnyLengthGiveTheSameResponse) {

@@ -7,6 +7,7 @@
 
 #include "data.h"
 #include "gate/release.h"
+#include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::tests {
@@ -106,6 +107,45 @@ TEST(GateChecks, TheGuardFactorOfTheFlightsWidensTheMeasuredBound) {
   EXPECT_LT(
       *bare.value,
       *row_of("guard_factor = 1\nquantile = \"max\"\n[tracking.uncertainty]\nmass_kg = [0.03, 0.04]").value);
+}
+
+TEST(GateChecks, APromiseHasToHoldOnReferenceFlightsThatItWasNotMadeFrom) {
+  const ReleaseFolder release;
+  const auto row_of = [&](double bound_m, const std::string& made_from) {
+    std::string rows;
+    for (const std::string axis : {"x", "y", "z"}) {
+      rows += std::string(rows.empty() ? "" : ", ") + R"({"axis": ")" + axis +
+              R"(", "channel": "force", "loop": "sampled", "unit": "m", "total": )" +
+              std::to_string(bound_m) + "}";
+    }
+    write_text(release / "bound.json",
+               R"({"schema": "swarmcert/bound/1", "coverage": {"level": 0.9, "made_from": [)" + made_from +
+                   R"(], "bounds": [)" + rows + "]}}");
+    std::string text = read_text(release.policy_of(
+        {"tracking\namplitude_N = 0.02\nguard_factor = 1.1\nmax_error_m = 10\nmin_promise_kept = 0.85"}));
+    const std::size_t at = text.find("[release]\n") + 10;
+    write_text(release / "policy.toml", text.insert(at, "promise = \"bound.json\"\n"));
+    const gate::GateResult result = release.judge(release / "policy.toml");
+    EXPECT_EQ(result.checks.size(), 2u);
+    return result.checks.at(1);
+  };
+  const gate::Check wide = row_of(10, ""), narrow = row_of(1e-6, "");
+  EXPECT_EQ(wide.name, "tracking.promise_kept");
+  EXPECT_EQ(wide.verdict, gate::Verdict::kPass) << wide.reason;
+  EXPECT_EQ(*wide.value, 1);
+  EXPECT_NE(wide.witness.find("promised 0.9"), std::string::npos) << wide.witness;
+  EXPECT_EQ(narrow.verdict, gate::Verdict::kFail);
+  EXPECT_EQ(*narrow.value, 0);
+  // Flights from which it was made say nothing.
+  std::string hashes;
+  for (const std::string& file : release.files()) {
+    if (file.rfind("flights/", 0) != 0) continue;
+    hashes += std::string(hashes.empty() ? "" : ", ") + '"' + files::sha256(read_text(release / file)) + '"';
+  }
+  ASSERT_FALSE(hashes.empty());
+  const gate::Check used = row_of(10, hashes);
+  EXPECT_NE(used.verdict, gate::Verdict::kPass);
+  EXPECT_NE(used.reason.find("made from the reference flights"), std::string::npos) << used.reason;
 }
 
 TEST(GateChecks, CornersPassForTheWholeBoxOnlyWhereThePolicySaysSo) {

@@ -72,6 +72,26 @@ TEST(VerifiedNorms, WithoutIntegralTheOtherGainsAreEnclosed) {
   EXPECT_TRUE(encloses(norms->edge, 1 / (kMass_kg * 9), 1e-8));
 }
 
+TEST(VerifiedNorms, GainsOfErrorsOfTheEstimatesAreEnclosed) {
+  for (const AxisLoop& loop :
+       {AxisLoop{kMass_kg, 10, 5, 10, {1 / 17.4}, 0}, AxisLoop{kMass_kg, 30, 9, 0, {}, 0},
+        AxisLoop{kMass_kg, 20, 10, 12, {1 / 17.4, 0.03}, 0.015}}) {
+    for (const Estimate estimate : {Estimate::kVelocity, Estimate::kPosition}) {
+      const auto norms = verified_norms(loop, estimate);
+      ASSERT_TRUE(norms.has_value());
+      const GainNorms exact = continuous_norms(loop, estimate);
+      EXPECT_TRUE(tests::encloses(norms->amplitude, exact.amplitude, 1e-5, 1e-7));
+      EXPECT_TRUE(tests::encloses(norms->edge, exact.edge, 1e-5, 1e-7));
+      EXPECT_TRUE(tests::encloses(norms->impulse, exact.impulse, 1e-5, 1e-7));
+      if (std::isinf(exact.rate)) {
+        EXPECT_TRUE(std::isinf(norms->rate.hi));
+      } else {
+        EXPECT_TRUE(tests::encloses(norms->rate, exact.rate, 1e-5, 1e-7));
+      }
+    }
+  }
+}
+
 TEST(VerifiedNorms, ADelayIsEnclosedNarrowlyUpToTheStabilityLimit) {
   // No, one and two lags, no integral, and long delays: half and nine tenths of what destabilises.
   std::vector<AxisLoop> loops = {

@@ -19,7 +19,9 @@ testing::AssertionResult encloses_estimate(const Interval& interval, double valu
   return tests::encloses(interval, value, relative_width, estimate_error);
 }
 
-void expect_enclosures(const SampledLoop& loop, Channel channel, double width, double width_between) {
+/// @param channel or the estimate that errs.
+template <class Input>
+void expect_enclosures(const SampledLoop& loop, Input channel, double width, double width_between) {
   const auto norms = verified_sampled_norms(loop, channel);
   ASSERT_TRUE(norms.has_value());
   const GainNorms at = sampled_norms(loop, channel, Instants::kSampling);
@@ -30,7 +32,7 @@ void expect_enclosures(const SampledLoop& loop, Channel channel, double width, d
   EXPECT_TRUE(encloses_estimate(norms->all_times.amplitude, all.amplitude, width_between));
   EXPECT_TRUE(encloses_estimate(norms->all_times.edge, all.edge, width_between));
   EXPECT_TRUE(encloses_estimate(norms->all_times.impulse, all.impulse, width_between));
-  if (loop.plant.Ki == 0) {
+  if (std::isinf(at.rate)) {
     EXPECT_TRUE(std::isinf(norms->at_samples.rate.lo));
     return;
   }
@@ -80,6 +82,15 @@ TEST(VerifiedSampledNorms, TheEstimateLiesInsideForAnyLagDelayAndStep) {
     ++done;
   }
   EXPECT_EQ(done, 16);
+}
+
+TEST(VerifiedSampledNorms, GainsOfErrorsOfTheEstimatesAreEnclosed) {
+  for (const SampledLoop& loop : {SampledLoop{{kMass_kg, 10, 5, 10, {1 / 17.4}, 0.015}, 0.01, 0.002},
+                                  SampledLoop{{kMass_kg, 30, 9, 0, {}, 0}, 0.01, 0.01},
+                                  SampledLoop{{kMass_kg, 20, 10, 12, {1 / 17.4, 0.03}, 0}, 0.002, 0.002}}) {
+    expect_enclosures(loop, Estimate::kVelocity, 1e-6, 1e-2);
+    expect_enclosures(loop, Estimate::kPosition, 1e-6, 1e-2);
+  }
 }
 
 TEST(VerifiedSampledNorms, AnUnstableLoopIsNotVerified) {

@@ -63,8 +63,10 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
   };
   const bool has_task = !options.task.task.empty();
   const char* const asked = has_task ? "--tube --task" : options.tube ? "--tube" : nullptr;
-  if (asked != nullptr && source.has_estimate_errors())
-    refuse(asked, "--velocity-error and --position-error");
+  const char* const estimates = source.kind == "measured" && !source.declares_velocity_error
+                                    ? "the error of the velocity that was measured (--velocity-error 0)"
+                                    : "--velocity-error and --position-error";
+  if (asked != nullptr && source.has_estimate_errors()) refuse(asked, estimates);
   if (asked != nullptr && has_initial(options.initial)) {
     refuse(asked, "--initial-error, --initial-speed and --initial-learning-error, as it starts from rest");
   }
@@ -72,7 +74,7 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
     refuse(asked, "the force error of --rate, --amplitude, --edge, --impulse, --bias or --from");
   }
   if (!options.swarm.empty() && source.has_estimate_errors()) {
-    refuse("--swarm", "--velocity-error and --position-error");
+    refuse("--swarm", estimates);
   }
 }
 

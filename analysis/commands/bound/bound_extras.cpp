@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/commands/bound/bound_output.h"
+#include "analysis/tracking/usual_uncertainty.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
 #include "stability/bounds/uncertain_norms.h"
@@ -34,8 +35,6 @@ Range range_of(const std::string& word, const std::string& text) {
   return range;
 }
 
-Range about(double value, double share) { return {value * (1 - share), value * (1 + share)}; }
-
 /// Refuses an interval in another unit: battery in mV, times in ms, the thrust's scale in percent.
 void check_range(const std::string& word, const std::string& name, const Range& range, const Model& model) {
   constexpr double kLongest_s = 1, kLargestScale = 10;
@@ -53,8 +52,7 @@ void check_range(const std::string& word, const std::string& name, const Range& 
 
 /// The vehicle's intervals; those of the battery act on the thrust.
 UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string>& words) {
-  UncertainPlant plant = {about(input.plant.mass_kg, 0.05), about(input.plant.thrust_scale, 0.1),
-                          about(input.gains.motor_lag_s, 0.2), about(input.gains.delay_s, 0.2)};
+  UncertainPlant plant = usual_uncertainty(input.gains, input.plant);
   for (const std::string& word : words) {
     if (word == "default") continue;
     const std::size_t equals = word.find('=');
@@ -285,47 +283,55 @@ Json verified_gains_json(const VerifiedNorms& norms) {
           {"impulse", enclosure_json(norms.impulse)}};
 }
 
+/// @param input a channel of the force error, or an estimate.
+template <class Input>
+void add_verified_rows(const AxisLoop& loop, const std::optional<SampledLoop>& sampled, int axis, Input input,
+                       Json& rows) {
+  Json row = {{"axis", axis_name(axis)}, {"channel", name(input)}, {"loop", "continuous"}};
+  const std::optional<VerifiedNorms> norms = verified_norms(loop, input);
+  row["status"] = norms ? "proved" : "inconclusive";
+  if (norms) {
+    row.update(verified_gains_json(*norms));
+    if (loop.delay_s > 0) row["delay_gain"] = norms->delay_gain;
+  } else {
+    row["why"] = is_stable(loop)    ? "stability could not be verified in intervals"
+                 : loop.delay_s > 0 ? "the loop is unstable: a shorter delay or lower gains would be needed"
+                                    : "the loop is unstable";
+  }
+  rows.push_back(std::move(row));
+  if (!sampled) return;
+  row = {{"axis", axis_name(axis)}, {"channel", name(input)}, {"loop", "sampled"}};
+  const std::optional<VerifiedSampledNorms> held = verified_sampled_norms(*sampled, input);
+  row["status"] = held ? "proved" : "inconclusive";
+  if (held) {
+    row.update(verified_gains_json(held->at_samples));
+    row["between_samples"] = verified_gains_json(held->all_times);
+  } else {
+    row["why"] = "stability could not be verified in intervals";
+  }
+  rows.push_back(std::move(row));
+}
+
 }  // namespace
 
 Json verified_json(const Tracking& input) {
-  Json rows = Json::array();
+  Json rows = Json::array(), of_estimates = Json::array();
   std::optional<AxisLoop> last;
   for (int axis = 0; axis < 3; ++axis) {
     const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
     if (!loop) continue;
     const std::optional<SampledLoop> sampled = sampled_axis_loop(input.gains, input.plant, axis);
     if (axis > 0 && last && is_same(*loop, *last)) {
-      repeat_rows(rows, sampled ? 4 : 2, axis);
+      for (Json* const repeated : {&rows, &of_estimates}) repeat_rows(*repeated, sampled ? 4 : 2, axis);
       continue;
     }
     last = loop;
-    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-      Json row = {{"axis", axis_name(axis)}, {"channel", name(channel)}, {"loop", "continuous"}};
-      const std::optional<VerifiedNorms> norms = verified_norms(*loop, channel);
-      row["status"] = norms ? "proved" : "inconclusive";
-      if (norms) {
-        row.update(verified_gains_json(*norms));
-        if (loop->delay_s > 0) row["delay_gain"] = norms->delay_gain;
-      } else {
-        row["why"] = is_stable(*loop) ? "stability could not be verified in intervals"
-                     : loop->delay_s > 0
-                         ? "the loop is unstable: a shorter delay or lower gains would be needed"
-                         : "the loop is unstable";
-      }
-      rows.push_back(std::move(row));
-      if (!sampled) continue;
-      row = {{"axis", axis_name(axis)}, {"channel", name(channel)}, {"loop", "sampled"}};
-      const std::optional<VerifiedSampledNorms> held = verified_sampled_norms(*sampled, channel);
-      row["status"] = held ? "proved" : "inconclusive";
-      if (held) {
-        row.update(verified_gains_json(held->at_samples));
-        row["between_samples"] = verified_gains_json(held->all_times);
-      } else {
-        row["why"] = "stability could not be verified in intervals";
-      }
-      rows.push_back(std::move(row));
-    }
+    for (const Channel channel : {Channel::kForce, Channel::kCommand})
+      add_verified_rows(*loop, sampled, axis, channel, rows);
+    for (const Estimate estimate : {Estimate::kVelocity, Estimate::kPosition})
+      add_verified_rows(*loop, sampled, axis, estimate, of_estimates);
   }
+  for (Json& row : of_estimates) rows.push_back(std::move(row));
   return rows;
 }
 

@@ -101,6 +101,33 @@ Json facts_json(const AxisFacts& f) {
           {"noise_command_m_s2", finite(f.noise.command_m_s2)}};
 }
 
+Json amplitudes_json(const EstimateError (&errors)[3]) {
+  return {finite(errors[0].amplitude), finite(errors[1].amplitude), finite(errors[2].amplitude)};
+}
+
+/// All that is known of the errors of both estimates, one row per axis that errs.
+Json estimate_errors_json(const DisturbanceSource& source) {
+  Json rows = Json::array();
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const auto& [estimate, unit] :
+         {std::pair(Estimate::kVelocity, "m/s"), std::pair(Estimate::kPosition, "m")}) {
+      const EstimateError& n =
+          estimate == Estimate::kVelocity ? source.velocity_error[axis] : source.position_error[axis];
+      if (n.is_zero()) continue;
+      rows.push_back({{"axis", axis_name(axis)},
+                      {"channel", name(estimate)},
+                      {"unit", unit},
+                      {"amplitude", finite(n.amplitude)},
+                      {"rate_per_s", finite(n.rate)},
+                      {"variation", finite(n.variation)},
+                      {"impulse_s", finite(n.impulse)},
+                      {"constant", n.constant},
+                      {"window_s", n.window_s > 0 ? Json(n.window_s) : Json()}});
+    }
+  }
+  return rows;
+}
+
 /// Axes that Lambda or K couples to others: they have no loops, and so no rows, of their own.
 std::vector<std::string> coupled_axes(const TrackingReport& report) {
   std::vector<std::string> names;
@@ -248,8 +275,9 @@ void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSou
   result["disturbance"] = {{"source", source.kind},
                            {"f_hat_rate_N_s", source.f_hat_rate_known ? Json(source.f_hat_rate_N_s) : Json()},
                            {"bias_N", source.bias_N},
-                           {"velocity_error_m_s", source.velocity_error_m_s},
-                           {"position_error_m", source.position_error_m}};
+                           {"velocity_error_m_s", amplitudes_json(source.velocity_error)},
+                           {"position_error_m", amplitudes_json(source.position_error)},
+                           {"of_estimates", estimate_errors_json(source)}};
   result["theorem"] = theorem_json(report);
   result["exact"] = Json::array();
   for (const ExactGains& row : report.exact) {

@@ -10,6 +10,21 @@
 
 namespace swarmcert::analysis {
 
+namespace {
+
+/// sha256 of every file that compare read, the flights' logs among them.
+files::Json logs_of(const std::string& compared) {
+  files::Json hashes = files::Json::array();
+  for (const files::Json& input :
+       files::read_json(compared, "swarmcert/compare/1").value("inputs", files::Json::array())) {
+    if (input.is_object() && input.contains("sha256") && input["sha256"].is_string())
+      hashes.push_back(input["sha256"]);
+  }
+  return hashes;
+}
+
+}  // namespace
+
 files::Json promise_json(const Tracking& input, const stability::TrackingReport& report,
                          const stability::DisturbanceSource& declared, const stability::InitialError& initial,
                          const std::string& from, double level) {
@@ -23,6 +38,7 @@ files::Json promise_json(const Tracking& input, const stability::TrackingReport&
                              "compare more flights, or ask for less with --coverage"});
   }
   files::Json json = {{"level", level}, {"flights", names.size()}, {"vehicles", flights.size()}};
+  json["made_from"] = logs_of(from);
   json["bounds"] = files::Json::array();
   for (const PromisedBound& row :
        promised_bounds(input.gains, input.plant, report, flights, declared, initial, level)) {

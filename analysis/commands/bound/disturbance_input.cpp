@@ -3,10 +3,13 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "analysis/tracking/measured_source.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/checker/check.h"
+#include "nn/base/doubles.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 
@@ -40,6 +43,33 @@ void read_axes(const char* option, const std::string& text, bool is_signed, doub
   if (count == 1) values[1] = values[2] = values[0];
 }
 
+/// Whatever is given of an error of an estimate takes the place of what was measured of it.
+void read_estimate(const std::string& option, const EstimateArguments& arguments,
+                   stability::EstimateError (&errors)[3]) {
+  if (!arguments.are_given()) return;
+  const auto read = [&](const char* suffix, const std::string& text, double stability::EstimateError::*of) {
+    double values[3] = {kInfinity, kInfinity, kInfinity};
+    read_axes((option + suffix).c_str(), text, false, values);
+    for (int axis = 0; axis < 3; ++axis) errors[axis].*of = values[axis];
+  };
+  for (stability::EstimateError& error : errors) error = {};
+  read("", arguments.amplitude, &stability::EstimateError::amplitude);
+  read("-rate", arguments.rate, &stability::EstimateError::rate);
+  read("-edge", arguments.edge, &stability::EstimateError::variation);
+  read("-impulse", arguments.impulse, &stability::EstimateError::impulse);
+}
+
+void declare_estimate(CLI::App& app, const std::string& estimate, const std::string& unit, const char* law,
+                      EstimateArguments& arguments) {
+  const std::string option = "--" + estimate + "-error", error = "(estimated - true " + estimate + ")";
+  const std::string axes = "; for all axes, or X,Y,Z";
+  app.add_option(option, arguments.amplitude, "sup |" + error + "|, " + unit + ", which " + law + axes);
+  app.add_option(option + "-rate", arguments.rate,
+                 "sup |d/dt " + error + "|, " + unit + "/s, from zero at the start" + axes);
+  app.add_option(option + "-edge", arguments.edge, "Total variation of " + error + ", " + unit + axes);
+  app.add_option(option + "-impulse", arguments.impulse, "int |" + error + "| dt, " + unit + " s" + axes);
+}
+
 /// A number for `axis` in what compare wrote: a number, or an object with axes, with quantiles, or with both.
 double measured_number(const Json& value, const std::string& axis, const std::string& quantile,
                        const std::string& path, const std::string& field) {
@@ -55,47 +85,51 @@ double measured_number(const Json& value, const std::string& axis, const std::st
                     "--quantile names one that is there"});
 }
 
+/// The quantiles that are asked for of one error; what is missing is not known, a bias none.
+MeasuredAxis measured_axis(const Json& document, const std::string& field, int axis,
+                           const DisturbanceArguments& arguments) {
+  const Json& error = document[field];
+  const auto get = [&](const char* key) {
+    if (!error.contains(key)) return kInfinity;
+    return std::abs(measured_number(error[key], stability::axis_name(axis), arguments.quantile,
+                                    arguments.from, field + "." + key));
+  };
+  return {error.contains("bias") ? get("bias") : 0, get("amplitude"), get("rate"), get("variation"),
+          get("impulse")};
+}
+
+/// Zero where the file does not say.
+double window_of(const Json& document, const std::string& field, const std::string& path) {
+  const Json& error = document[field];
+  if (!error.contains("window_s") || !error["window_s"].is_number()) return 0;
+  const double window_s = error["window_s"].get<double>();
+  if (!(window_s > 0)) {
+    throw InputError({path, "", field + ".window_s", error["window_s"].dump(), "must be positive", ""});
+  }
+  return window_s;
+}
+
 void read_measured(const DisturbanceArguments& arguments, DisturbanceSource& source) {
   const Json document = files::read_json(arguments.from, "swarmcert/compare/1");
   if (!document.contains("learning_error") || !document["learning_error"].is_object()) {
     throw InputError(
         {arguments.from, "", "learning_error", "", "is missing", "write it with swarmcert compare --json"});
   }
-  const Json& error = document["learning_error"];
-  double square = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::string name = stability::axis_name(axis);
-    const auto get = [&](const char* key) {
-      if (!error.contains(key)) return std::numeric_limits<double>::infinity();
-      return std::abs(measured_number(error[key], name, arguments.quantile, arguments.from,
-                                      std::string("learning_error.") + key));
-    };
-    stability::Disturbance& d = source.axis[axis];
-    d.rate_N_s = get("rate");
-    d.amplitude_N = get("amplitude");
-    d.variation_N = get("variation");
-    d.impulse_N_s = get("impulse");
-    source.bias_N[axis] = error.contains("bias") ? get("bias") : 0;
-    square += d.rate_N_s * d.rate_N_s;
-  }
-  // Of quantiles per axis: at least the vector's where they coincide.
-  source.rate_norm_N_s = std::sqrt(square);
-  source.kind = "measured";
-  source.classes_contain_bias = source.amplitudes_reach_bias();
-  source.note = arguments.quantile + " over windows of flights, of which one follows the other";
+  const double window_s = window_of(document, "learning_error", arguments.from);
+  std::array<MeasuredAxis, 3> axes;
+  for (int axis = 0; axis < 3; ++axis)
+    axes[static_cast<std::size_t>(axis)] = measured_axis(document, "learning_error", axis, arguments);
+  source = measured_source(axes, window_s);
   // Variation and impulse are those of one window: every window of the flight brings as much again.
-  if (!error.contains("window_s") || !error["window_s"].is_number()) return;
-  const double window_s = error["window_s"].get<double>();
-  if (!(window_s > 0)) {
-    throw InputError(
-        {arguments.from, "", "learning_error.window_s", error["window_s"].dump(), "must be positive", ""});
-  }
-  source.note =
-      fmt::format("{} over windows of {} s, each of which may bring as much", arguments.quantile, window_s);
-  for (stability::Disturbance& d : source.axis) {
-    d.passes = stability::Disturbance::kManyPasses;
-    d.pass_period_s = d.pass_length_s = window_s;
-    d.variation_per_pass = true;
+  source.note = window_s > 0
+                    ? fmt::format("{} over windows of {} s, each of which may bring as much",
+                                  arguments.quantile, window_s)
+                    : arguments.quantile + " over windows of flights, of which one follows the other";
+  if (!document.contains("velocity_error") || !document["velocity_error"].is_object()) return;
+  const double slopes_s = window_of(document, "velocity_error", arguments.from);
+  for (int axis = 0; axis < 3; ++axis) {
+    source.velocity_error[axis] =
+        measured_estimate(measured_axis(document, "velocity_error", axis, arguments), slopes_s);
   }
 }
 
@@ -209,12 +243,8 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--bias", arguments.bias,
                  "Constant part of the force error, N, on top of the rest; for all axes, or X,Y,Z");
-  app.add_option(
-      "--velocity-error", arguments.velocity_error,
-      "sup |estimated - true velocity|, m/s, which the law sees through Kd; for all axes, or X,Y,Z");
-  app.add_option("--position-error", arguments.position_error,
-                 "sup |estimated - true position|, m, which the law sees through Kp and Ki; for all axes, or "
-                 "X,Y,Z");
+  declare_estimate(app, "velocity", "m/s", "the law sees through Kd", arguments.velocity_error);
+  declare_estimate(app, "position", "m", "the law sees through Kp and Ki", arguments.position_error);
   auto* passes = app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
                      ->check(CLI::PositiveNumber);
   app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
@@ -330,8 +360,9 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
       source.bias_N[axis] = std::abs(source.bias_N[axis]) + std::abs(bias_N[axis]);
     source.classes_contain_bias = false;
   }
-  read_axes("--velocity-error", arguments.velocity_error, false, source.velocity_error_m_s);
-  read_axes("--position-error", arguments.position_error, false, source.position_error_m);
+  source.declares_velocity_error = arguments.velocity_error.are_given();
+  read_estimate("--velocity-error", arguments.velocity_error, source.velocity_error);
+  read_estimate("--position-error", arguments.position_error, source.position_error);
   const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
   if (!arguments.certificate.empty() || has_network) {
     read_lipschitz(arguments, source, result.inputs, source.further_assumptions);
@@ -342,7 +373,7 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
     add_truth(*result.truth, source);
   }
   const bool has_others =
-      !arguments.bias.empty() || !arguments.velocity_error.empty() || !arguments.position_error.empty();
+      !arguments.bias.empty() || arguments.velocity_error.are_given() || arguments.position_error.are_given();
   if (has_others && source.kind == "none") declare_no_class(source);
   return result;
 }

@@ -9,9 +9,16 @@
 
 namespace swarmcert::analysis {
 
+/// Each a number for all axes, or X,Y,Z; empty: not given.
+struct EstimateArguments {
+  std::string amplitude, rate, edge, impulse;
+  bool are_given() const { return !amplitude.empty() || !rate.empty() || !edge.empty() || !impulse.empty(); }
+};
+
 struct DisturbanceArguments {
   double rate = -1, amplitude = -1, edge = -1, impulse = -1;  ///< negative: not given
-  std::string bias, velocity_error, position_error;  ///< a number for all axes, or X,Y,Z; empty: not given
+  std::string bias;  ///< a number for all axes, or X,Y,Z; empty: not given
+  EstimateArguments velocity_error, position_error;
   int passes = 1;
   double every_s = 0, pass_s = 0;
   std::string from;  ///< compare.json

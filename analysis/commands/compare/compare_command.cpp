@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -18,9 +20,12 @@
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/flight_errors.h"
+#include "analysis/residuals/flight_peaks.h"
 #include "analysis/residuals/injected_log.h"
+#include "analysis/tracking/kept_promise.h"
 #include "nn/base/file_io.h"
 #include "nn/base/suggest.h"
+#include "stability/bounds/tracking_bounds.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -32,6 +37,7 @@ struct CompareOptions {
   std::vector<std::string> budget;
   std::string fitted;
   std::string inject;
+  std::string promise;
 };
 
 /// "FILE" for every kind, "KIND=FILE" for one.
@@ -121,7 +127,37 @@ files::Json inject(const residuals::Inputs& inputs, const std::string& folder, b
           {"unchanged", std::move(unchanged)}};
 }
 
-/// flights[].learning_error: the largest values over a flight's windows, from which bound --coverage makes its promise.
+/// The largest values over a flight's windows; axes that are not judged are null.
+files::Json largest_json(const residuals::ErrorOfFlight& error, const std::function<bool(int)>& is_judged) {
+  const auto axes = [&is_judged](const Eigen::Vector4d& v) {
+    files::Json json = files::Json::object();
+    for (int k = 0; k < 4; ++k) {
+      const char* const kNames[] = {"x", "y", "z", "total"};
+      json[kNames[k]] = is_judged(k) ? files::Json(v[k]) : files::Json();
+    }
+    return json;
+  };
+  const residuals::ErrorWindow largest = error.largest();
+  return {{"windows", error.windows.size()},      {"bias", axes(error.bias)},
+          {"amplitude", axes(largest.amplitude)}, {"rate", axes(largest.rate)},
+          {"variation", axes(largest.variation)}, {"impulse", axes(largest.impulse)}};
+}
+
+/// Quantiles over the windows of all flights; null where no log measures the velocity.
+files::Json velocity_error_json(const std::map<std::string, residuals::FlightError>& errors) {
+  std::vector<Eigen::Vector4d> bias;
+  std::vector<residuals::ErrorWindow> windows;
+  for (const auto& [path, error] : errors) {
+    if (error.velocity.windows.empty()) continue;
+    bias.push_back(error.velocity.bias);
+    windows.insert(windows.end(), error.velocity.windows.begin(), error.velocity.windows.end());
+  }
+  if (windows.empty()) return nullptr;
+  return json_of(residuals::velocity_error(bias, windows));
+}
+
+/// flights[].learning_error and flights[].velocity_error, from which bound --coverage makes its promise, and the quantiles
+/// of the velocity's error over all windows.
 void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& result) {
   std::map<std::string, residuals::FlightError> errors;
   for (residuals::FlightError& error : residuals::flight_errors(inputs, jobs)) {
@@ -129,26 +165,57 @@ void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& r
     errors[path] = std::move(error);
   }
   for (files::Json& flight : result["flights"]) {
+    flight["learning_error"] = flight["velocity_error"] = nullptr;
     const auto found = errors.find(flight["file"].get<std::string>());
-    if (found == errors.end()) {
-      flight["learning_error"] = nullptr;
+    if (found == errors.end()) continue;
+    // As in the errors of the flight.
+    const auto is_judged = [&flight](int k) {
+      const char* const kNames[] = {"x", "y", "z"};
+      return k == 3 || !flight["rmse"][kNames[k]].is_null();
+    };
+    flight["learning_error"] = largest_json(found->second.force, is_judged);
+    if (!found->second.velocity.windows.empty())
+      flight["velocity_error"] = largest_json(found->second.velocity, [](int) { return true; });
+  }
+  result["velocity_error"] = velocity_error_json(errors);
+}
+
+/// How often a promise held on FLIGHTS, and where.
+files::Json kept_promise_json(const residuals::Inputs& inputs, const std::string& path, int jobs) {
+  const Promise promise = read_promise(path);
+  const KeptPromise kept = kept_promise(promise, residuals::flight_peaks(inputs, jobs));
+  files::Json axes = files::Json::array();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const KeptAlong& along = kept.axes[i];
+    axes.push_back(
+        {{"axis", stability::axis_name(axis)},
+         {"bound", std::isfinite(promise.bound_m[i]) ? files::Json(promise.bound_m[i]) : files::Json()},
+         {"unit", "m"},
+         {"flights", along.flights},
+         {"held", along.held},
+         {"share", along.flights > 0 ? files::Json(along.share()) : files::Json()},
+         {"interval_90", along.interval_90}});
+  }
+  return {{"file", path}, {"level", promise.level}, {"axes", axes}, {"left_out", kept.used}};
+}
+
+void print_promise_kept(const files::Json& promise) {
+  fmt::print("\nThe promise of {} (probability {:g}) on flights that it was not made from\n",
+             promise["file"].get<std::string>(), promise["level"].get<double>());
+  for (const files::Json& row : promise["axes"]) {
+    if (row["flights"] == 0) {
+      fmt::print("  {}: no flight has a set point\n", row["axis"].get<std::string>());
       continue;
     }
-    // Axes along which no force can be judged are null, as in the errors of the flight.
-    const auto axes = [&flight](const Eigen::Vector4d& v) {
-      files::Json json = files::Json::object();
-      for (int k = 0; k < 4; ++k) {
-        const char* const kNames[] = {"x", "y", "z", "total"};
-        const bool is_judged = k == 3 || !flight["rmse"][kNames[k]].is_null();
-        json[kNames[k]] = is_judged ? files::Json(v[k]) : files::Json();
-      }
-      return json;
-    };
-    const residuals::ErrorWindow& largest = found->second.largest;
-    flight["learning_error"] = {{"windows", found->second.windows},     {"bias", axes(found->second.bias)},
-                                {"amplitude", axes(largest.amplitude)}, {"rate", axes(largest.rate)},
-                                {"variation", axes(largest.variation)}, {"impulse", axes(largest.impulse)}};
+    fmt::print("  {}: held in {} of {} flights ({:.3g}, 90 % interval {:.3f} to {:.3f})\n",
+               row["axis"].get<std::string>(), row["held"].get<int>(), row["flights"].get<int>(),
+               row["share"].get<double>(), row["interval_90"][0].get<double>(),
+               row["interval_90"][1].get<double>());
   }
+  if (!promise["left_out"].empty())
+    fmt::print("  left out: {} logs that it was made from, and all of their flights\n",
+               promise["left_out"].size());
 }
 
 int run_compare(const CompareOptions& options, const CommonOptions& common) {
@@ -170,6 +237,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   const residuals::Comparison comparison = residuals::compare(inputs, common.jobs, show, gains);
   std::vector<std::string> files = inputs.files();
   for (const auto& [kind, file] : gains) files.push_back(file.path);
+  if (!options.promise.empty()) files.push_back(options.promise);
   files::Json result = result_head("compare", files);
   add_comparison(comparison, inputs, result);
   // Nobody else reads them, and they take as long as the comparison.
@@ -189,8 +257,10 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     if (!options.fitted.empty()) write_fitted(*budget, options.fitted, common.force);
   }
   if (!options.inject.empty()) result["injected"] = inject(inputs, options.inject, common.force);
+  if (!options.promise.empty()) result["promise"] = kept_promise_json(inputs, options.promise, common.jobs);
   write_result(common, result);
   if (common.prints_text()) print_comparison(comparison, inputs, own ? &*own : nullptr);
+  if (common.prints_text() && !options.promise.empty()) print_promise_kept(result["promise"]);
   if (common.prints_text() && budget) print(*budget);
   if (common.prints_text() && inputs.found.flights.size() > 1) {
     const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
@@ -244,6 +314,10 @@ Command compare_command() {
             ->allow_extra_args(false);
         add_output(app, "--fitted", options->fitted,
                    "Folder for the models fitted by --budget, one per vehicle, and their flights.toml");
+        app.add_option(
+            "--promise", options->promise,
+            "Result of bound --coverage: how often its promise holds on those of FLIGHTS that it was "
+            "not made from");
         add_output(app, "--inject", options->inject,
                    "Write FLIGHTS into this folder with the force of the model's effects added to the "
                    "accelerometer (open loop: nothing else changes)");

@@ -261,6 +261,18 @@ files::Json groups(const std::map<std::string, residuals::GroupErrors>& members)
 
 }  // namespace
 
+files::Json json_of(const residuals::VelocityError& error) {
+  return {{"windows", error.windows},
+          {"window_s", residuals::LearningError::kWindow_s},
+          {"slope_s", residuals::kSlopeWindow_s},
+          {"bandwidth_hz", residuals::LearningError::kBandwidth_hz},
+          {"bias", json_of(error.bias_m_s)},
+          {"amplitude", json_of(error.amplitude_m_s)},
+          {"rate", json_of(error.rate_m_s2)},
+          {"variation", json_of(error.variation_m_s)},
+          {"impulse", json_of(error.impulse_m)}};
+}
+
 void add_comparison(const Comparison& comparison, const residuals::Inputs& inputs, files::Json& json) {
   json["unit"] = inputs.rules.per_mass ? "m/s^2" : "N";
   json["judged"] = {{"force", axes_of(comparison.judged)}};

@@ -2,9 +2,12 @@
 #pragma once
 
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/velocity_error.h"
 #include "nn/base/json.h"
 
 namespace swarmcert::analysis {
+
+files::Json json_of(const residuals::VelocityError& error);
 
 /// Fields of the result of compare, in newton and metres; without its head.
 void add_comparison(const residuals::Comparison& comparison, const residuals::Inputs& inputs,

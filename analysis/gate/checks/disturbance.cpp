@@ -3,9 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "analysis/residuals/comparison.h"
+#include "analysis/tracking/measured_source.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::gate {
@@ -22,27 +24,15 @@ double of_axis(const residuals::Axes& axes, int axis) {
 }
 
 stability::DisturbanceSource measured(const LearningError& error, const std::string& quantile) {
-  stability::DisturbanceSource source;
-  double square = 0;
+  std::array<analysis::MeasuredAxis, 3> axes;
   for (int axis = 0; axis < 3; ++axis) {
     const auto get = [&](const LearningError::Quantiles& all) {
       return std::abs(of_axis(quantile_of(all, quantile), axis));
     };
-    stability::Disturbance& d = source.axis[axis];
-    d.rate_N_s = get(error.rate_N_s);
-    d.amplitude_N = get(error.amplitude_N);
-    d.variation_N = get(error.variation_N);
-    d.impulse_N_s = get(error.impulse_N_s);
-    // Variation and impulse are those of one window, and every window of the flight may bring as much again.
-    d.passes = stability::Disturbance::kManyPasses;
-    d.pass_period_s = d.pass_length_s = LearningError::kWindow_s;
-    d.variation_per_pass = true;
-    source.bias_N[axis] = get(error.bias_N);
-    square += d.rate_N_s * d.rate_N_s;
+    axes[static_cast<std::size_t>(axis)] = {get(error.bias_N), get(error.amplitude_N), get(error.rate_N_s),
+                                            get(error.variation_N), get(error.impulse_N_s)};
   }
-  source.rate_norm_N_s = std::sqrt(square);  // at least the vector's where the axes' largest rates coincide
-  source.kind = "measured";
-  source.classes_contain_bias = source.amplitudes_reach_bias();
+  stability::DisturbanceSource source = analysis::measured_source(axes, LearningError::kWindow_s);
   source.note = fmt::format("{} over windows of {} s", quantile, LearningError::kWindow_s);
   return source;
 }

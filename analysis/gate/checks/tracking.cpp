@@ -8,6 +8,9 @@
 #include "analysis/gate/checks/disturbance.h"
 #include "analysis/gate/plant_box.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/flight_peaks.h"
+#include "analysis/tracking/kept_promise.h"
+#include "analysis/tracking/usual_uncertainty.h"
 #include "nn/base/toml.h"
 
 namespace swarmcert::gate {
@@ -47,13 +50,9 @@ Uncertainty read_uncertainty(const files::TomlTable& table) {
 }
 
 stability::UncertainPlant box_of(const stability::TrackingSetup& setup, const Uncertainty& stated) {
-  const auto about = [](double value, double share) {
-    return Range{value * (1 - share), value * (1 + share)};
-  };
-  return {stated.mass_kg.value_or(about(setup.plant.mass_kg, 0.05)),
-          stated.thrust_scale.value_or(about(setup.plant.thrust_scale, 0.1)),
-          stated.lag_s.value_or(about(setup.gains.motor_lag_s, 0.2)),
-          stated.delay_s.value_or(about(setup.gains.delay_s, 0.2))};
+  const stability::UncertainPlant usual = analysis::usual_uncertainty(setup.gains, setup.plant);
+  return {stated.mass_kg.value_or(usual.mass_kg), stated.thrust_scale.value_or(usual.thrust_scale),
+          stated.lag_s.value_or(usual.lag_s), stated.delay_s.value_or(usual.delay_s)};
 }
 
 /// How far peaks that were measured exceed those of the loop pushed by the measured residual; at least 1.
@@ -117,11 +116,33 @@ void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const 
   checks.push_back(std::move(check));
 }
 
+/// How often the promise held on reference flights that it was not made from, along the worst axis.
+void judge_promise(Evidence& evidence, const Limit& limit, Checks& checks) {
+  const analysis::Promise promise = analysis::read_promise(evidence.release().promise);
+  const analysis::KeptPromise kept = analysis::kept_promise(promise, evidence.flight_peaks());
+  Check check = row("tracking.promise_kept", limit);
+  const int axis = kept.worst_axis();
+  if (axis < 0) {
+    check.reason = kept.used.empty()
+                       ? "no reference flight has a set point"
+                       : "the promise was made from the reference flights: none is left to judge it";
+  } else {
+    const analysis::KeptAlong& along = kept.axes[static_cast<std::size_t>(axis)];
+    judge(check, limit, along.share(), along.share());
+    check.witness = fmt::format(
+        "axis {}: below {:.4g} m in {} of {} flights (90 % interval {:.3f} to {:.3f}), promised {:g}",
+        stability::axis_name(axis), promise.bound_m[static_cast<std::size_t>(axis)], along.held,
+        along.flights, along.interval_90[0], along.interval_90[1], promise.level);
+  }
+  checks.push_back(std::move(check));
+}
+
 }  // namespace
 
 Run read_tracking(const files::TomlTable& table, Policy& policy) {
   std::vector<std::string> known = disturbance_keys();
-  known.insert(known.end(), {"max_error_m", "guard_factor", "guard_quantile", "over", "uncertainty"});
+  known.insert(known.end(),
+               {"max_error_m", "guard_factor", "guard_quantile", "over", "uncertainty", "min_promise_kept"});
   table.allow_only(known);
   require_file(table, policy.release.gains, "gains");
   require_file(table, policy.release.model, "model");
@@ -145,11 +166,17 @@ Run read_tracking(const files::TomlTable& table, Policy& policy) {
                  "flights (or state guard_factor here)");
     policy.wants_guard_factor = true;
   }
+  const std::optional<Limit> kept = gate::limit(table, "min_promise_kept", "", false);
+  if (kept) {
+    require_file(table, policy.release.promise, "promise");
+    require_file(table, policy.release.flights.empty() ? "" : policy.release.flights.front(), "flights");
+  }
   const Over over =
       table.has("over") && table.choice("over", {"box", "corners"}) == 1 ? Over::kCorners : Over::kBox;
-  return [declared, over, uncertainty = read_uncertainty(table), guard, limit = *limit](Evidence& evidence,
-                                                                                        Checks& checks) {
+  return [declared, over, uncertainty = read_uncertainty(table), guard, limit = *limit, kept](
+             Evidence& evidence, Checks& checks) {
     judge_tracking(evidence, declared, uncertainty, guard, over, limit, checks);
+    if (kept) judge_promise(evidence, *kept, checks);
   };
 }
 
