@@ -102,9 +102,7 @@ double least_demand(const EstimateError& n, const Amplitude& amplitude, const Ed
 
 }  // namespace
 
-bool EstimateError::is_zero() const {
-  return impulse == 0 || largest() == 0 || (rate == 0 && constant == 0);
-}
+bool EstimateError::is_zero() const { return impulse == 0 || largest() == 0 || (rate == 0 && constant == 0); }
 
 double EstimateError::largest() const {
   return window_s > 0 ? amplitude : std::min(amplitude, variation + std::abs(constant));

@@ -54,7 +54,7 @@ TEST(BoundCommand, TheErrorOfTheVelocityThatFlightsShowedIsAChannelOfItsOwn) {
                     {"rate", at(1, 1, 1)}}}};
   write_text(folder / "force.json", compare.dump());
   compare["velocity_error"] = {
-      {"window_s", 4.5},         {"bias", at(0.01, 0, 0)},     {"amplitude", at(0.12, 0.02, 0)},
+      {"window_s", 4.5},          {"bias", at(0.01, 0, 0)},     {"amplitude", at(0.12, 0.02, 0)},
       {"rate", at(0.05, 100, 0)}, {"variation", at(0.6, 1, 0)}, {"impulse", at(0.2, 1, 0)}};
   write_text(folder / "both.json", compare.dump());
   const auto rows_of = [&](const std::string& from) {
