@@ -167,7 +167,8 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
 }
 
 bool is_written_by_hand(const std::string& name) {
-  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque" || name == "rotor_thrust";
+  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque" || name == "rotor_thrust" ||
+         name == "com_offset" || name == "accelerometer_scale";
 }
 
 std::vector<std::string> candidate_names(const stability::Model& model) {

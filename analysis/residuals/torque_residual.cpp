@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/residuals/torque_blocks.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::residuals {
@@ -110,6 +111,41 @@ TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds
                               (modelled[i - 1] + 2 * modelled[i] + modelled[i + 1]) / 4;
   }
   return residual;
+}
+
+std::vector<TorqueBlock> torque_blocks(const stability::Model& model, const Kinds& kinds, const Track& track,
+                                       double duration_s) {
+  std::vector<TorqueBlock> blocks;
+  if (!why_no_rotor_forces(model, track).empty()) return blocks;
+  const std::vector<Eigen::Vector3d> modelled = modelled_torque_B_Nm(model, kinds, track);
+  const Eigen::Vector3d inertia(model.inertia_kg_m2[0], model.inertia_kg_m2[1], model.inertia_kg_m2[2]);
+  TorqueBlock sum;
+  std::size_t first = 0, count = 0;
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    const stability::Instant& now = track.instants[i];
+    if (track.cut[i] != Cut::kNone || track.restarts[i] != 0) {
+      sum = {};
+      count = 0;
+      continue;
+    }
+    if (count == 0) first = i;
+    const Eigen::Vector3d momentum = inertia.cwiseProduct(now.omega_B_rad_s);
+    sum.thrust_N += now.thrust_N;
+    sum.torque_B_Nm -= modelled[i];
+    if (track.has_rates) sum.torque_B_Nm += now.omega_B_rad_s.cross(momentum);
+    ++count;
+    const double length_s = now.time_s - track.instants[first].time_s;
+    if (length_s < duration_s) continue;
+    sum.thrust_N /= static_cast<double>(count);
+    sum.torque_B_Nm /= static_cast<double>(count);
+    if (track.has_rates)
+      sum.torque_B_Nm +=
+          inertia.cwiseProduct(now.omega_B_rad_s - track.instants[first].omega_B_rad_s) / length_s;
+    blocks.push_back(sum);
+    sum = {};
+    count = 0;
+  }
+  return blocks;
 }
 
 namespace {

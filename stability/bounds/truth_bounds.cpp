@@ -244,9 +244,9 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
   const Values value(effect, info);
   if (name == "motor_lag" || name == "delay" || name == "thrust_ratio") {
     result.note = "acts through the loop";
-  } else if (name == "torque_bias" || name == "downwash_torque") {
+  } else if (name == "torque_bias" || name == "downwash_torque" || name == "com_offset") {
     result.note = "a torque: no force";
-  } else if (name == "sensor_delay") {
+  } else if (name == "sensor_delay" || name == "accelerometer_scale") {
     result.note = "of the accelerometer: no force";
   } else if (name == "constant_force") {
     const char* const axes[] = {"force_x_N", "force_y_N", "force_z_N"};

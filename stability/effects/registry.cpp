@@ -5,8 +5,10 @@
 #include <functional>
 #include <stdexcept>
 
+#include "stability/effects/accelerometer_scale.h"
 #include "stability/effects/battery.h"
 #include "stability/effects/ceiling.h"
+#include "stability/effects/com_offset.h"
 #include "stability/effects/constant_force.h"
 #include "stability/effects/deep_set.h"
 #include "stability/effects/delay.h"
@@ -63,7 +65,7 @@ std::deque<Entry>& entries() {
       entry<DownwashTorque>(),   entry<DeepSetEffect>(), entry<VoltageSag>(),
       entry<ThrustSaturation>(), entry<PayloadStep>(),   entry<TranslationalLift>(),
       entry<WindField>(),        entry<Wall>(),          entry<VortexRing>(),
-      entry<RotorThrust>(),
+      entry<RotorThrust>(),      entry<ComOffset>(),     entry<AccelerometerScale>(),
   };
   return all;
 }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "stability/effects/registry.h"
+
 namespace swarmcert::stability {
 namespace {
 
@@ -74,6 +76,15 @@ void disturb(files::Random& random, double angle_rad, double* q) {
                        q[2] + q[0] * y - q[1] * z + q[3] * x, q[3] + q[0] * z + q[1] * y - q[2] * x};
   const double length = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
   for (int i = 0; i < 4; ++i) q[i] = w[i] / length;
+}
+
+/// Product of the model's accelerometer_scale effects.
+double accelerometer_scale(const Model& model) {
+  double scale = 1;
+  for (const EffectSpec& spec : model.effects) {
+    if (spec.name == "accelerometer_scale") scale *= effect_values(effect_info(spec.name), spec).linear[0];
+  }
+  return scale;
 }
 
 }  // namespace
@@ -150,7 +161,7 @@ LogRecord FlightRecorder::record(int index, Vehicle& vehicle, const Eigen::Vecto
   record.quaternion = compress_quaternion(q);
   Eigen::Matrix3d R_WB;
   rotation_of(q, &R_WB);
-  Eigen::Vector3d acceleration_B = specific_force_B;
+  Eigen::Vector3d acceleration_B = accelerometer_scale(model) * specific_force_B;
   for (int i = 0; i < 3; ++i) acceleration_B[i] += sensor.accelerometer_noise_m_s2 * random.bell();
   const Eigen::Vector3d acceleration_W = R_WB * acceleration_B;
   auto& kinematics = record.position_mm_velocity_mm_s_acceleration_mm_s2;

@@ -226,7 +226,7 @@ class Vehicle:
         m = MASS_KG
         specific = [x / m for x in felt]
         s.a = [specific[0], specific[1], specific[2] - GRAVITY]
-        self.sensors.feel(s.to_body(specific))
+        self.sensors.feel(s.to_body([truth.get("accelerometer_scale", 1.0) * x for x in specific]))
         for i in range(3):
             s.v[i] += STEP_S * s.a[i]
             s.p[i] += STEP_S * s.v[i]
@@ -256,7 +256,7 @@ def wrapped(angle):
 
 def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
     """Flies and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the body, both in SI
-    units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s."""
+    units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale."""
     rng = random.Random(seed * 1000 + run)
     scale = truth.get("speed", 1.0)
     fleet = []

@@ -58,7 +58,9 @@ TEST(Effects, HaveTheNamesOfTheCommandLine) {
                                         "wind_field",
                                         "wall",
                                         "vortex_ring",
-                                        "rotor_thrust"};
+                                        "rotor_thrust",
+                                        "com_offset",
+                                        "accelerometer_scale"};
   const std::vector<std::string> names = effect_names();
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), wanted);
 }

@@ -1,6 +1,7 @@
 /// Effects of supply, propellers, loads and moving air: their formulas at hand-picked states, and where they vanish.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "stability/effects/registry.h"
@@ -108,6 +109,20 @@ TEST(Wall, PushesIntoTheRoomAndFadesAwayFromIt) {
               kFlowAccuracy_N);
   now.p_W_m.y() = -20;
   EXPECT_LT(flow_force("wall", parameters, now).norm(), kFlowAccuracy_N);
+}
+
+TEST(ComOffset, LeversTheThrustAboutTheCentreOfMass) {
+  EffectSpec spec;
+  spec.name = "com_offset";
+  spec.parameters = {{"offset_x_m", 0.002}, {"offset_y_m", -0.001}};
+  Instant now = hovering();
+  now.R_WB = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  const Wrench wrench = AppliedEffect(spec, {"small", {"small"}, ""}).wrench(now);
+  // The rotors' centre is at -c from the centre of mass, where they push along the body's z.
+  const Eigen::Vector3d expected =
+      Eigen::Vector3d(-0.002, 0.001, 0).cross(Eigen::Vector3d(0, 0, kFlowWeight_N));
+  EXPECT_LT((wrench.torque_B_Nm - expected).norm(), 1e-15);
+  EXPECT_EQ(wrench.force_W_N.norm(), 0);
 }
 
 }  // namespace

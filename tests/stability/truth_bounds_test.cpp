@@ -119,6 +119,16 @@ TEST(TruthBounds, EncloseTheDownwashThatIsSimulatedForAnyGapSpeedAndNumberAndAre
   }
 }
 
+TEST(TruthBounds, KnowTorquesAndSensorsAsNoForce) {
+  const MotionSet motion;
+  for (const char* const none : {"com_offset", "accelerometer_scale"}) {
+    const EffectBounds bounds =
+        truth_bounds(vehicle(std::string("[[effect]]\nname = \"") + none + "\"\n"), motion).at(0);
+    EXPECT_EQ(bounds.amplitude_N[2], 0) << none;
+    EXPECT_FALSE(bounds.note.empty()) << none;
+  }
+}
+
 TEST(TruthBounds, LiftJumpsWhereVehiclesTouchAndIsBoundedElsewhere) {
   const Model model = vehicle("[[effect]]\nname = \"upper_lift\"\nparameters = { amplitude_N = 0.02 }\n");
   MotionSet motion;

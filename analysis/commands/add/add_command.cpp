@@ -12,6 +12,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/identification/balance_ladder.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/scan/proposal.h"
 #include "nn/base/file_io.h"
@@ -41,10 +42,14 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
   if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
   const std::vector<std::string> known = identification::candidate_names(model);
   std::vector<std::string> all = known;
-  all.insert(all.end(),
-             {"auto", "deep_set", "downwash_torque", "formula", "shape", "show", "torque_bias", "undo"});
+  all.insert(all.end(), {"auto", "com_offset", "deep_set", "downwash_torque", "formula", "shape", "show",
+                         "torque_bias", "undo"});
   for (const std::string& name : names) {
     if (identification::is_proposal(name)) continue;
+    if (identification::is_balanced(name)) {
+      if (names.size() > 1) throw UsageError("add " + name + " by itself: it is fitted to torques");
+      continue;
+    }
     if (identification::is_written_by_hand(name))
       throw UsageError("the effect " + name +
                        " cannot be fitted to the force of a flight; write it into the model file");
@@ -125,8 +130,12 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   }
   what.keep_anyway = options.keep_anyway;
   Progress progress(common.quiet);
-  const Ladder ladder = identification::climb(
-      inputs, what, common.jobs, [&](int done, int total) { progress.show(done, total, "flights"); });
+  const bool is_balanced = !what.automatic && identification::is_balanced(what.effects[0]);
+  const Ladder ladder =
+      is_balanced ? identification::balance_ladder(inputs, what.effects[0], what.keep_anyway, common.jobs)
+                  : identification::climb(inputs, what, common.jobs, [&](int done, int total) {
+                      progress.show(done, total, "flights");
+                    });
   if (ladder.any_accepted) {
     files::write_file(options.output,
                       stability::to_toml(ladder.model, {"Effects fitted to flights by swarmcert add."}),
@@ -181,7 +190,8 @@ Command add_command() {
       "formula is the best formula for what the model leaves, as diagnose shows it (formula:2 the second); "
       "shape\n"
       "is a smooth or monotone curve where no formula holds. "
-      "vehicle_offset is a constant force of each vehicle. undo goes back by one accepted effect; show "
+      "vehicle_offset is a constant force of each vehicle; com_offset and torque_bias are fitted to the "
+      "rotors' mean torques. undo goes back by one accepted effect; show "
       "prints "
       "the\n"
       "ladders of all --model files.\n\n"

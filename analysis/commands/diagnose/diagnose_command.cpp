@@ -9,6 +9,7 @@
 #include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/diagnose/balance_output.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/each_output.h"
@@ -129,6 +130,10 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   add_diagnoses(answers.diagnoses, result);
   if (others) add_differences(answers.differences, other_files, result);
   const bool names_rotor = others && judge_rotors(inputs, *others, common.jobs, common.prints_text(), result);
+  // Against healthy flights the rotors are compared one by one.
+  const bool names_torque = !others && judge_torques(inputs, common.jobs, common.prints_text(), result);
+  const bool names_sensor =
+      !others && judge_accelerometers(inputs, common.jobs, common.prints_text(), result);
   if (options.each) add_each(answers.each, result);
   if (options.next) add_next(answers.diagnoses, result);
   if (options.next && common.prints_text()) print_next(answers.diagnoses);
@@ -136,7 +141,8 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   write_result(common, result);
   std::string reason;
   identification::Verdict verdict = identification::verdict_of(answers.diagnoses, reason);
-  if (names_rotor) verdict = identification::Verdict::kMissingEffect;
+  if (names_rotor || ((names_torque || names_sensor) && verdict != identification::Verdict::kInconclusive))
+    verdict = identification::Verdict::kMissingEffect;
   if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {
     const std::string path = write_diagnose_report(answers.diagnoses, answers.differences, answers.each,
@@ -155,7 +161,9 @@ Command diagnose_command() {
           "Every known effect is a candidate; one counts as found if it lowers the cross-validated error by "
           "2 %,\n"
           "is significant across blocks of 2 s, and is not contradicted by the set points. The remainder is "
-          "analysed separately.\n\n"
+          "analysed separately. Means over a second show a centre of mass off the centre and an "
+          "accelerometer\n"
+          "that reads too much.\n\n"
           "Example: swarmcert diagnose stability/models/crazyflie-small.toml flights/ --report out\n"
           "         swarmcert diagnose model.toml today/ --against monday/ tuesday/ wednesday/",
           [](CLI::App& app) {

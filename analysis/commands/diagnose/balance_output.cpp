@@ -1,0 +1,166 @@
+#include "analysis/commands/diagnose/balance_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/identification/accelerometer_balance.h"
+#include "analysis/identification/torque_balance.h"
+#include "analysis/identification/verdict.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::AccelerometerBalance;
+using identification::TorqueBalance;
+
+files::Json value_json(double value, double half) {
+  return {{"value", value}, {"interval_90", {value - half, value + half}}};
+}
+
+files::Json offset_json(const TorqueBalance& balance) {
+  return {{"offset_x_m", value_json(balance.offset_m.x(), balance.offset_half_m.x())},
+          {"offset_y_m", value_json(balance.offset_m.y(), balance.offset_half_m.y())}};
+}
+
+files::Json torque_json(const TorqueBalance& balance) {
+  return {{"torque_x_Nm", value_json(balance.torque_Nm.x(), balance.torque_half_Nm.x())},
+          {"torque_y_Nm", value_json(balance.torque_Nm.y(), balance.torque_half_Nm.y())}};
+}
+
+/// As an entry of the ranking: errors are forces by which each rotor is off balance.
+files::Json ranking_entry_of(const TorqueBalance& balance) {
+  const stability::EffectInfo& info = stability::effect_info(balance.effect);
+  files::Json rivals = files::Json::array();
+  for (const std::string& rival : balance.rivals)
+    rivals.push_back({{"effect", rival}, {"fly", stability::effect_info(rival).excitation}});
+  const bool is_offset = balance.effect == "com_offset";
+  const bool is_ambiguous = !balance.rivals.empty() && balance.rivals.front() == "torque_bias";
+  return {{"effect", balance.effect},
+          {"kind", balance.kind},
+          {"vehicle", balance.vehicle},
+          {"rmse_before", balance.rmse_before_N},
+          {"rmse_after", balance.rmse_after_N},
+          {"drop", 1 - balance.rmse_after_N / balance.rmse_before_N},
+          {"drop_ci", {nullptr, nullptr}},
+          {"parameters", is_offset ? offset_json(balance) : torque_json(balance)},
+          {"per_vehicle", true},
+          {"model_form", files::Json::object()},
+          {"instrument", files::Json::object()},
+          {"class",
+           is_offset && is_ambiguous ? "centre of mass / torque bias / weak rotor" : info.equivalence_class},
+          {"confounded_with", balance.rivals},
+          {"rivals", rivals},
+          {"separated_by", info.excitation},
+          {"paired_z", balance.z},
+          {"wald_z", nullptr},
+          {"records_in_support", balance.blocks},
+          {"blocks_in_support", balance.blocks},
+          {"flights_in_support", balance.flights},
+          {"statement", identification::in_words(balance)}};
+}
+
+files::Json scale_json(const AccelerometerBalance& balance) {
+  return {{"scale", value_json(balance.scale.value, balance.scale.half)}};
+}
+
+files::Json ranking_entry_of(const AccelerometerBalance& balance) {
+  const stability::EffectInfo& info = stability::effect_info("accelerometer_scale");
+  files::Json rivals = files::Json::array(), names = files::Json::array();
+  if (balance.may_be_offset()) {
+    names.push_back("constant_force");
+    rivals.push_back({{"effect", "constant_force"}, {"fly", info.excitation}});
+  }
+  return {{"effect", info.name},
+          {"kind", balance.kind},
+          {"vehicle", balance.vehicle},
+          {"rmse_before", balance.rmse_before_N},
+          {"rmse_after", balance.rmse_after_N},
+          {"drop", 1 - balance.rmse_after_N / balance.rmse_before_N},
+          {"drop_ci", {nullptr, nullptr}},
+          {"parameters", scale_json(balance)},
+          {"per_vehicle", true},
+          {"model_form", files::Json::object()},
+          {"instrument", files::Json::object()},
+          {"class", balance.may_be_offset() ? "accelerometer scale / IMU bias" : info.equivalence_class},
+          {"confounded_with", names},
+          {"rivals", rivals},
+          {"separated_by", info.excitation},
+          {"paired_z", balance.z},
+          {"wald_z", nullptr},
+          {"records_in_support", balance.blocks},
+          {"blocks_in_support", balance.blocks},
+          {"flights_in_support", balance.flights},
+          {"statement", identification::in_words(balance)}};
+}
+
+/// The force of a flight shows a scale of its accelerometer as one of its thrust.
+bool is_explained_ratio(const files::Json& entry, const AccelerometerBalance& balance) {
+  constexpr double kAlike = 0.02;
+  if (entry["effect"] != "thrust_ratio" || entry["kind"] != balance.kind) return false;
+  const files::Json& ratio = entry["parameters"]["ratio"]["value"];
+  return ratio.is_number() && std::abs(ratio.get<double>() - balance.scale.value) < kAlike;
+}
+
+void name_missing(files::Json& result) {
+  if (result["verdict"] == identification::name(identification::Verdict::kInconclusive)) return;
+  result["verdict"] = identification::name(identification::Verdict::kMissingEffect);
+  result.erase("reason");
+}
+
+}  // namespace
+
+bool judge_accelerometers(const residuals::Inputs& inputs, int jobs, bool prints, files::Json& result) {
+  files::Json ranking = files::Json::array();
+  std::vector<AccelerometerBalance> named;
+  result["sensors"] = files::Json::array();
+  for (const stability::Model& model : inputs.models) {
+    for (AccelerometerBalance& balance : identification::accelerometer_balances(inputs, model.kind, jobs)) {
+      result["sensors"].push_back({{"vehicle", balance.vehicle},
+                                   {"flights", balance.flights},
+                                   {"blocks", balance.blocks},
+                                   {"accelerometer_scale", scale_json(balance)},
+                                   {"statement", identification::in_words(balance)}});
+      if (!balance.is_named) continue;
+      ranking.push_back(ranking_entry_of(balance));
+      if (prints) fmt::print("  {}: {}\n", balance.vehicle, identification::in_words(balance));
+      named.push_back(std::move(balance));
+    }
+  }
+  if (named.empty()) return false;
+  for (const files::Json& entry : result["ranking"]) {
+    const bool is_explained =
+        std::any_of(named.begin(), named.end(),
+                    [&](const AccelerometerBalance& balance) { return is_explained_ratio(entry, balance); });
+    if (!is_explained) ranking.push_back(entry);
+  }
+  result["ranking"] = std::move(ranking);
+  name_missing(result);
+  return true;
+}
+
+bool judge_torques(const residuals::Inputs& inputs, int jobs, bool prints, files::Json& result) {
+  bool is_named = false;
+  result["torque_balance"] = files::Json::array();
+  for (const stability::Model& model : inputs.models) {
+    for (const TorqueBalance& balance : identification::torque_balances(inputs, model.kind, jobs)) {
+      result["torque_balance"].push_back({{"vehicle", balance.vehicle},
+                                          {"flights", balance.flights},
+                                          {"blocks", balance.blocks},
+                                          {"com_offset", offset_json(balance)},
+                                          {"torque_bias", torque_json(balance)},
+                                          {"least_offset_m", balance.least_offset_m},
+                                          {"statement", identification::in_words(balance)}});
+      if (!balance.is_named()) continue;
+      is_named = true;
+      result["ranking"].push_back(ranking_entry_of(balance));
+      if (prints) fmt::print("  {}: {}\n", balance.vehicle, identification::in_words(balance));
+    }
+  }
+  if (is_named) name_missing(result);
+  return is_named;
+}
+
+}  // namespace swarmcert::analysis

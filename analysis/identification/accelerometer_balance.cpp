@@ -1,0 +1,133 @@
+#include "analysis/identification/accelerometer_balance.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <map>
+
+#include "nn/base/parallel.h"
+
+namespace swarmcert::identification {
+namespace {
+
+using residuals::Track;
+
+constexpr double kMotionBlock_s = 1, kOffset_z = 2;
+constexpr std::size_t kFewestMotionBlocks = 10;
+
+/// Means over a second without a cut.
+struct MotionBlock {
+  Eigen::Vector3d of_velocity_m_s2, measured_m_s2;
+};
+
+/// The trapezoidal rule integrates the measured force over the same time as the velocity changes in.
+std::vector<MotionBlock> motion_blocks(const Track& track) {
+  std::vector<MotionBlock> blocks;
+  Eigen::Vector3d integral = Eigen::Vector3d::Zero();
+  std::size_t first = 0;
+  bool is_open = false;
+  for (std::size_t i = 0; i < track.instants.size(); ++i) {
+    if (track.cut[i] != residuals::Cut::kNone || track.restarts[i] != 0) {
+      is_open = false;
+      continue;
+    }
+    const stability::Instant& now = track.instants[i];
+    if (!is_open) {
+      first = i;
+      integral.setZero();
+      is_open = true;
+      continue;
+    }
+    const double step_s = now.time_s - track.instants[i - 1].time_s;
+    integral += step_s / 2 * (track.specific_force_m_s2[i - 1] + track.specific_force_m_s2[i]);
+    const double length_s = now.time_s - track.instants[first].time_s;
+    if (length_s < kMotionBlock_s) continue;
+    const Eigen::Vector3d gained_m_s = now.v_W_m_s - track.instants[first].v_W_m_s;
+    blocks.push_back(
+        {gained_m_s / length_s + stability::kGravity_m_s2 * Eigen::Vector3d::UnitZ(), integral / length_s});
+    first = i;
+    integral.setZero();
+  }
+  return blocks;
+}
+
+/// Along the vertical, where gravity shows the scale.
+void fit_scale(const std::vector<MotionBlock>& blocks, double mass_kg, AccelerometerBalance& balance) {
+  std::vector<double> x, y, gains;
+  double offset_m_s2 = 0;
+  for (const MotionBlock& block : blocks) {
+    x.push_back(block.of_velocity_m_s2.z());
+    y.push_back(block.measured_m_s2.z());
+    offset_m_s2 += (y.back() - x.back()) / static_cast<double>(blocks.size());
+  }
+  balance.scale = fit_through_origin(x, y);
+  double before = 0, after = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double off = y[i] - x[i], by_scale = y[i] - balance.scale.value * x[i],
+                 by_offset = off - offset_m_s2;
+    gains.push_back(by_offset * by_offset - by_scale * by_scale);
+    before += off * off;
+    after += by_scale * by_scale;
+  }
+  balance.z = mean_z(gains);
+  const double count = static_cast<double>(x.size());
+  balance.rmse_before_N = mass_kg * std::sqrt(before / count);
+  balance.rmse_after_N = mass_kg * std::sqrt(after / count);
+  balance.is_named =
+      std::abs(balance.scale.value - 1) - balance.scale.half > kOrdinaryScaleError && balance.z >= -kOffset_z;
+}
+
+}  // namespace
+
+bool AccelerometerBalance::may_be_offset() const { return z < kOffset_z; }
+
+std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs& inputs,
+                                                         const std::string& kind, int jobs) {
+  struct OneLog {
+    std::string vehicle;
+    std::vector<MotionBlock> blocks;
+  };
+  std::vector<std::vector<OneLog>> parts(inputs.found.flights.size());
+  files::parallel_for(static_cast<int>(parts.size()), jobs, [&](int i) {
+    const auto flight = static_cast<std::size_t>(i);
+    std::vector<std::string> problems;
+    for (const Track& track : inputs.load(flight, problems)) {
+      const bool measures = track.force_source == logs::ForceSource::kAccelerometer && track.judged.z() > 0;
+      if (track.position_only || track.kind != kind || !measures) continue;
+      parts[flight].push_back({track.vehicle, motion_blocks(track)});
+    }
+  });
+  struct Vehicle {
+    int flights = 0;
+    std::vector<MotionBlock> blocks;
+  };
+  std::map<std::string, Vehicle> vehicles;
+  for (const auto& part : parts) {
+    for (const OneLog& log : part) {
+      Vehicle& vehicle = vehicles[log.vehicle];
+      ++vehicle.flights;
+      vehicle.blocks.insert(vehicle.blocks.end(), log.blocks.begin(), log.blocks.end());
+    }
+  }
+  std::vector<AccelerometerBalance> all;
+  for (const auto& [name, vehicle] : vehicles) {
+    if (vehicle.blocks.size() < kFewestMotionBlocks) continue;
+    AccelerometerBalance balance;
+    balance.kind = kind;
+    balance.vehicle = name;
+    balance.flights = vehicle.flights;
+    balance.blocks = vehicle.blocks.size();
+    fit_scale(vehicle.blocks, inputs.model_of(kind)->mass_kg, balance);
+    all.push_back(std::move(balance));
+  }
+  return all;
+}
+
+std::string in_words(const AccelerometerBalance& balance) {
+  return fmt::format(
+      "the accelerometer reads {:.3f} times what the velocity says (90 %: {:.3f} .. {:.3f}){}",
+      balance.scale.value, balance.scale.value - balance.scale.half, balance.scale.value + balance.scale.half,
+      balance.is_named && balance.may_be_offset() ? ", or has an offset along the vertical" : "");
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,17 @@
+/// @file Adding what the rotors balance on average to a model: com_offset or torque_bias.
+#pragma once
+
+#include <string>
+
+#include "analysis/identification/ladder.h"
+
+namespace swarmcert::identification {
+
+/// Whether `effect` is fitted to mean torques (torque_balance.h) and not to the force of a flight.
+bool is_balanced(const std::string& effect);
+
+/// As climb(), for the one effect. Errors of the rows are forces by which the rotors are off balance, rms over blocks of 1 s and
+/// rotors. Where several vehicles fly each gets an effect of its own. Precondition: is_balanced(effect).
+Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect, bool keep_anyway, int jobs);
+
+}  // namespace swarmcert::identification
