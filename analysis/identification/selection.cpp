@@ -24,13 +24,14 @@ bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, 
   return telling_blocks(grams, candidate, theta) >= static_cast<double>(blocks);
 }
 
-/// Where the voltage falls by little, its effect is a change of scale: that is what flights show unless they clearly say
-/// more.
+/// Where the voltage falls by little, its effect is a change of scale, and a wake whose neighbours move slowly has no
+/// delay: that is what flights show unless they clearly say more.
 int Selection::plain_form(int which) const {
   const std::string& name = grams().candidates[static_cast<std::size_t>(which)].name;
-  if (name != "battery") return -1;
+  if (name != "battery" && name != "wake_delay") return -1;
+  const char* const plain = name == "battery" ? "thrust_ratio" : "downwash";
   for (int k = 0; k < static_cast<int>(grams().candidates.size()); ++k) {
-    if (grams().candidates[static_cast<std::size_t>(k)].name == "thrust_ratio") return k;
+    if (grams().candidates[static_cast<std::size_t>(k)].name == plain) return k;
   }
   return -1;
 }

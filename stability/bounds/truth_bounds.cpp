@@ -72,8 +72,30 @@ void field_bounds(const WakeField& field, double strength_N, double composition,
   }
 }
 
+/// How neighbours move that are seen where they were at their velocity `delay_s` ago: dp - d v_j has the rate dv - d v_j'.
+MotionSet seen_late(MotionSet motion, double delay_s) {
+  const double moved_m = times_up(delay_s, motion.speed_m_s);
+  motion.relative_speed_m_s = plus(motion.relative_speed_m_s, times_up(delay_s, motion.acceleration_m_s2));
+  motion.least_gap_m = std::max(0.0, down(motion.least_gap_m - moved_m));
+  motion.largest_gap_m = plus(motion.largest_gap_m, moved_m);
+  return motion;
+}
+
 void bound_wake(const std::string& name, const Values& value, const MotionSet& motion, EffectBounds& result) {
   WakeField field;
+  if (name == "wake_delay") {
+    // Of rotors of equal area: the mass enters as for downwash with the exponent 1/2.
+    field.decay = value("decay_exponent");
+    field.spread_m = value("spread_m");
+    field.spread_slope = value("spread_slope");
+    field.fades = true;
+    const Interval mass = Interval(motion.neighbour_mass_kg) / Interval(0.034);
+    const double strength_N = times_up(value("amplitude_N"), pow(mass, 0.5).hi);
+    field_bounds(field, strength_N, composed(motion.neighbours, value("norm_exponent")),
+                 seen_late(motion, value("delay_s")), result);
+    result.reached_rate_N_s = 0;
+    return;
+  }
   const bool is_downwash = name == "downwash";
   field.decay = value("decay_exponent");
   field.spread_m = value("spread_m");
@@ -149,6 +171,23 @@ void bound_surface(const std::string& name, const Values& value, const MotionSet
           times_up(strength, plus(m.thrust_rate_N_s,
                                   times_up(m.largest_thrust_N, times_up(m.speed_m_s, one_over(decay_m))))));
   if (std::isinf(result.rate_N_s[2])) result.unbounded = "needs --own-speed and --thrust-rate";
+}
+
+/// f = T R w with w fixed in the body: how fast the body yaws nobody declares.
+void bound_tilt(const Values& value, const MotionSet& m, EffectBounds& result) {
+  const double x = value("tilt_x_rad"), y = value("tilt_y_rad");
+  const double tilt = up(std::sqrt(plus(up(x * x), up(y * y))));
+  set_all(result.amplitude_N, times_up(tilt, m.largest_thrust_N));
+  set_all(result.rate_N_s, tilt == 0 ? 0 : kInfinity);
+  if (tilt > 0) result.unbounded = "turns with the body, whose yaw rate is not bounded";
+}
+
+/// The pull is a convex function's gradient with the slope k at most, and grows with the distance.
+void bound_tether(const Values& value, const MotionSet& m, EffectBounds& result) {
+  const double k = value("stiffness_N_m");
+  set_all(result.amplitude_N, k == 0 ? 0 : kInfinity);
+  set_all(result.rate_N_s, times_up(k, m.speed_m_s));
+  if (k > 0) result.unbounded = "the pull grows with the distance from the anchor, which nothing here limits";
 }
 
 /// f = g T b3 with a factor g of the motion: |(T b3)'| bounds |T'| and T |b3'|, and every effect its own |g'|.
@@ -253,7 +292,7 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
     for (int i = 0; i < 3; ++i) result.bias_N[i] = std::abs(value(axes[i]));
   } else if ((name == "downwash" || name == "ceiling") && value("tail") != 0) {
     nothing_known("a wake or ceiling with a tail has no enclosure here: only tail = 0");
-  } else if (name == "downwash" || name == "upper_lift") {
+  } else if (name == "downwash" || name == "upper_lift" || name == "wake_delay") {
     bound_wake(name, value, motion, result);
   } else if (name == "drag_linear" || name == "drag_quadratic" || name == "drag_rotor" || name == "inflow") {
     bound_drag(name, value, model, motion, result);
@@ -266,6 +305,10 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
     bound_thrust_factor(name, value, model, motion, result);
   } else if (name == "wall" || name == "wind_field") {
     bound_place(name, value, motion, result);
+  } else if (name == "imu_tilt") {
+    bound_tilt(value, motion, result);
+  } else if (name == "tether") {
+    bound_tether(value, motion, result);
   } else if (name == "payload_step") {
     bound_step(value, result);
   } else if (name == "battery") {

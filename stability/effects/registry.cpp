@@ -19,11 +19,13 @@
 #include "stability/effects/drag_rotor.h"
 #include "stability/effects/expression.h"
 #include "stability/effects/ground.h"
+#include "stability/effects/imu_tilt.h"
 #include "stability/effects/inflow.h"
 #include "stability/effects/motor_lag.h"
 #include "stability/effects/payload_step.h"
 #include "stability/effects/rotor_thrust.h"
 #include "stability/effects/sensor_delay.h"
+#include "stability/effects/tether.h"
 #include "stability/effects/thrust_ratio.h"
 #include "stability/effects/thrust_saturation.h"
 #include "stability/effects/torque_bias.h"
@@ -31,6 +33,7 @@
 #include "stability/effects/upper_lift.h"
 #include "stability/effects/voltage_sag.h"
 #include "stability/effects/vortex_ring.h"
+#include "stability/effects/wake_delay.h"
 #include "stability/effects/wall.h"
 #include "stability/effects/wind_field.h"
 
@@ -65,7 +68,8 @@ std::deque<Entry>& entries() {
       entry<DownwashTorque>(),   entry<DeepSetEffect>(), entry<VoltageSag>(),
       entry<ThrustSaturation>(), entry<PayloadStep>(),   entry<TranslationalLift>(),
       entry<WindField>(),        entry<Wall>(),          entry<VortexRing>(),
-      entry<RotorThrust>(),      entry<ComOffset>(),     entry<AccelerometerScale>(),
+      entry<RotorThrust>(),      entry<ComOffset>(),     entry<ImuTilt>(),
+      entry<WakeDelay>(),        entry<Tether>(),        entry<AccelerometerScale>(),
   };
   return all;
 }

@@ -6,6 +6,7 @@ Prints a line per case; exits 1 where a name is not first, a value is outside, o
 
 import argparse
 import json
+import math
 import os
 import shutil
 import sys
@@ -22,12 +23,44 @@ def com_offset(x, y):
     return lambda s: (-y * s.thrust, x * s.thrust, 0.0)
 
 
+def tilted(x, y):
+    return lambda s: tuple(s.to_world([y * s.thrust, -x * s.thrust, 0.0]))
+
+
+def late_wake(amplitude, delay, spread, slope):
+    def force(s):
+        total = 0.0
+        for other in s.others:
+            p = other(delay)
+            dz = p[2] - s.p[2]
+            if dz > 0.12:
+                width = spread + slope * dz
+                r2 = (p[0] - s.p[0]) ** 2 + (p[1] - s.p[1]) ** 2
+                total -= amplitude * (0.3 / dz) ** 0.44 * math.exp(-r2 / (2 * width * width))
+        return (0.0, 0.0, total)
+    return force
+
+
+def tether(k, anchor, slack):
+    def force(s):
+        out = [s.p[i] - anchor[i] for i in range(3)]
+        length = math.sqrt(sum(x * x for x in out))
+        taut = max(0.0, length - slack)
+        return tuple(-k * taut * x / max(length, 1e-9) for x in out)
+    return force
+
+
 # truth: as foreign_simulator.fly() takes it; values: parameters that flights show; rivals: what must or must not be one.
 NAMED = {
     "com_offset": dict(truth=dict(torque=com_offset(0.004, -0.002)), values={"offset_x_m": 0.004, "offset_y_m": -0.002},
                        not_rivals=["torque_bias"], is_added=True),
+    "imu_tilt": dict(truth=dict(force=tilted(0.03, -0.04), yaw_reach=3.0),
+                     values={"tilt_x_rad": 0.03, "tilt_y_rad": -0.04}, not_rivals=["constant_force"]),
     "accelerometer_scale": dict(truth=dict(accelerometer_scale=1.08), values={"scale": 1.08},
                                 not_rivals=["thrust_ratio", "constant_force"]),
+    "wake_delay": dict(truth=dict(force=late_wake(0.09, 0.25, 0.06, 0.06)), vehicles=2, values={"delay_s": 0.25}),
+    "tether": dict(truth=dict(force=tether(0.15, (0.1, -0.1, 0.0), 0.9)),
+                   values={"stiffness_N_m": 0.15, "slack_m": 0.9}),
     "torque_bias": dict(truth=dict(torque=lambda s: (8e-4, 1.2e-3, 0.0)),
                         values={"torque_x_Nm": 8e-4, "torque_y_Nm": 1.2e-3}),
 }

@@ -60,6 +60,9 @@ TEST(Effects, HaveTheNamesOfTheCommandLine) {
                                         "vortex_ring",
                                         "rotor_thrust",
                                         "com_offset",
+                                        "imu_tilt",
+                                        "wake_delay",
+                                        "tether",
                                         "accelerometer_scale"};
   const std::vector<std::string> names = effect_names();
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), wanted);

@@ -125,5 +125,43 @@ TEST(ComOffset, LeversTheThrustAboutTheCentreOfMass) {
   EXPECT_EQ(wrench.force_W_N.norm(), 0);
 }
 
+TEST(ImuTilt, TiltsTheThrustInTheBody) {
+  Instant now = hovering();
+  now.R_WB = Eigen::AngleAxisd(std::acos(0.0), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  // Rotors that are turned about body x by t push along -y of the body, here along x of the world.
+  const Eigen::Vector3d of_x = flow_force("imu_tilt", {{"tilt_x_rad", 0.03}}, now);
+  EXPECT_LT((of_x - Eigen::Vector3d(0.03 * kFlowWeight_N, 0, 0)).norm(), kFlowAccuracy_N);
+  const Eigen::Vector3d of_y = flow_force("imu_tilt", {{"tilt_y_rad", 0.03}}, now);
+  EXPECT_LT((of_y - Eigen::Vector3d(0, 0.03 * kFlowWeight_N, 0)).norm(), kFlowAccuracy_N);
+}
+
+TEST(WakeDelay, IsTheDownwashOfNeighboursWhereTheyWere) {
+  const std::map<std::string, double> shape = {
+      {"amplitude_N", 0.1}, {"decay_exponent", 1}, {"spread_m", 0.05}, {"spread_slope", 0.1}};
+  std::map<std::string, double> late = shape;
+  late["delay_s"] = 0.2;
+  Neighbour crossing = {{0.2, 0, 0.4}, Eigen::Vector3d::Zero(), {1, 0, 0}, kFlowMass_kg, 0};
+  Instant now = hovering();
+  now.neighbours = &crossing;
+  now.num_neighbours = 1;
+  const double of_late = flow_force("wake_delay", late, now).z();
+  EXPECT_NEAR(of_late, -0.1 * 0.3 / 0.4, 1e-9) << "0.2 s ago it was straight above";
+  EXPECT_NEAR(flow_force("wake_delay", shape, now).z(), flow_force("downwash", shape, now).z(), 1e-12);
+  crossing.dp_W_m.x() = 0;
+  EXPECT_NEAR(flow_force("downwash", shape, now).z(), of_late, 1e-9);
+}
+
+TEST(Tether, PullsTowardsTheAnchorWhereItIsTaut) {
+  const std::map<std::string, double> parameters = {
+      {"stiffness_N_m", 0.2}, {"anchor_x_m", 1}, {"anchor_z_m", 0.5}, {"slack_m", 0.5}};
+  Instant now = hovering();
+  now.p_W_m = {1, 0.4, 0.5};
+  EXPECT_EQ(flow_force("tether", parameters, now).norm(), 0);
+  now.p_W_m = {1, 0.8, 0.5};
+  EXPECT_LT((flow_force("tether", parameters, now) - Eigen::Vector3d(0, -0.06, 0)).norm(), kFlowAccuracy_N);
+  now.p_W_m = {1, 0, 0.5};
+  EXPECT_EQ(flow_force("tether", parameters, now).norm(), 0) << "at the anchor itself";
+}
+
 }  // namespace
 }  // namespace swarmcert::stability

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "stability/bounds/interval_functions.h"
@@ -119,8 +120,45 @@ TEST(TruthBounds, EncloseTheDownwashThatIsSimulatedForAnyGapSpeedAndNumberAndAre
   }
 }
 
-TEST(TruthBounds, KnowTorquesAndSensorsAsNoForce) {
-  const MotionSet motion;
+TEST(TruthBounds, EncloseALateWakeOfNeighboursThatChangeTheirVelocity) {
+  const Model model = vehicle(
+      "[[effect]]\nname = \"wake_delay\"\nparameters = { delay_s = 0.2, amplitude_N = 0.1, spread_m = 0.06 "
+      "}\n");
+  MotionSet motion;
+  motion.relative_speed_m_s = 1.3;
+  motion.neighbours = 2;
+  motion.neighbour_mass_kg = 0.067;
+  motion.least_gap_m = 0.3;
+  motion.largest_gap_m = 0.9;
+  motion.speed_m_s = 0.5;
+  motion.acceleration_m_s2 = 2;
+  const EffectBounds bounds = truth_bounds(model, motion).at(0);
+  const Seen seen = seen_of_wake(model.effects[0], motion, 1, 10000);
+  EXPECT_LE(seen.amplitude_N, bounds.amplitude_N[2]);
+  EXPECT_LE(seen.rate_N_s, bounds.rate_N_s[2] * (1 + 1e-4));
+  EXPECT_GT(seen.amplitude_N, 0.4 * bounds.amplitude_N[2]);
+  EXPECT_GT(seen.rate_N_s, 0.2 * bounds.rate_N_s[2]);
+  motion.acceleration_m_s2 = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(std::isinf(truth_bounds(model, motion).at(0).rate_N_s[2]));
+}
+
+TEST(TruthBounds, SayWhatOfATiltAndOfATetherNothingDeclaredLimits) {
+  MotionSet motion;
+  motion.speed_m_s = 1.5;
+  motion.largest_thrust_N = 0.5;
+  const EffectBounds tilt =
+      truth_bounds(
+          vehicle("[[effect]]\nname = \"imu_tilt\"\nparameters = { tilt_x_rad = 0.03, tilt_y_rad = 0.04 }\n"),
+          motion)
+          .at(0);
+  EXPECT_NEAR(tilt.amplitude_N[0], 0.05 * 0.5, 1e-12);
+  EXPECT_TRUE(std::isinf(tilt.rate_N_s[0]));
+  EXPECT_FALSE(tilt.unbounded.empty());
+  const EffectBounds tether =
+      truth_bounds(vehicle("[[effect]]\nname = \"tether\"\nparameters = { stiffness_N_m = 0.2 }\n"), motion)
+          .at(0);
+  EXPECT_TRUE(std::isinf(tether.amplitude_N[2]));
+  EXPECT_NEAR(tether.rate_N_s[2], 0.2 * 1.5, 1e-12);
   for (const char* const none : {"com_offset", "accelerometer_scale"}) {
     const EffectBounds bounds =
         truth_bounds(vehicle(std::string("[[effect]]\nname = \"") + none + "\"\n"), motion).at(0);

@@ -142,6 +142,23 @@ std::vector<Candidate> walls(const Formula& formula, Candidate candidate) {
   return {std::move(candidate)};
 }
 
+/// Anchors below the middle of the flown range, which the fit then moves.
+std::vector<Candidate> tethers(const Formula& formula, Candidate candidate) {
+  const auto range = range_of_place(formula);
+  const double middle_m = range ? 0.5 * (range->lower_m + range->upper_m) : 0;
+  const double x_m = number_of(formula, "x_centre").value_or(formula.variable == "x" ? middle_m : 0);
+  const double y_m = number_of(formula, "y_centre").value_or(formula.variable == "y" ? middle_m : 0);
+  candidate.thetas.clear();
+  for (const double z_m : {0.0, 0.8}) {
+    for (const double slack_m : {0.2, 0.4, 0.6, 0.9, 1.2})
+      candidate.thetas.push_back({x_m, y_m, z_m, slack_m});
+  }
+  free_shape(candidate, {"anchor_x_m", "anchor_y_m", "anchor_z_m", "slack_m"});
+  return {std::move(candidate)};
+}
+
+std::vector<Candidate> tilts(const Formula&, Candidate candidate) { return {std::move(candidate)}; }
+
 std::vector<Candidate> vortex_rings(const Formula& formula, Candidate candidate) {
   if (!is_vertical(formula)) return {};
   const auto at_m_s = first_of(formula, {"centre"}), width_m_s = first_of(formula, {"width", "core"});
@@ -170,6 +187,8 @@ const std::vector<NamedForm>& all_forms() {
       {"wind_field", {"z"}, shear_layers},
       {"wind_field", {"xy"}, thermals},
       {"wall", {"x", "y"}, walls},
+      {"tether", {"x", "y", "z", "xy"}, tethers},
+      {"imu_tilt", {"body_constant"}, tilts},
       {"vortex_ring", {"vz", "climb"}, vortex_rings}};
   return forms;
 }

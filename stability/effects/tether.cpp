@@ -1,0 +1,40 @@
+#include "stability/effects/tether.h"
+
+#include <algorithm>
+
+namespace swarmcert::stability {
+namespace {
+
+enum TetherShape { kAnchorX, kAnchorY, kAnchorZ, kSlack };
+
+Eigen::Vector3d from_anchor(const Instant& now, const double* shape) {
+  return now.p_W_m - Eigen::Vector3d(shape[kAnchorX], shape[kAnchorY], shape[kAnchorZ]);
+}
+
+}  // namespace
+
+EffectInfo Tether::describe() {
+  return {"tether",
+          "f = -k max(0, |p - a| - l) (p - a) / |p - a|",
+          "an elastic line, or a cable whose slope grows as it is drawn up",
+          "tether",
+          "slow flight in all directions from the anchor, to where the line is taut and half as far again",
+          {{"stiffness_N_m", "k", 0, 0, 10}},
+          {{"anchor_x_m", "a", 0, -1000, 1000, {}},
+           {"anchor_y_m", "", 0, -1000, 1000, {}},
+           {"anchor_z_m", "", 0, -1000, 1000, {}},
+           {"slack_m", "l: the line's free length", 1, 0, 1000, {}}}};
+}
+
+void Tether::columns(const Instant& now, const double* shape, Wrench* columns) const {
+  const Eigen::Vector3d out_m = from_anchor(now, shape);
+  const double length_m = out_m.norm(), taut_m = length_m - shape[kSlack];
+  columns[0] = {};
+  if (taut_m > 0 && length_m > 0) columns[0].force_W_N = -taut_m / length_m * out_m;
+}
+
+bool Tether::in_support(const Instant& now, const double* shape) const {
+  return from_anchor(now, shape).norm() > shape[kSlack];
+}
+
+}  // namespace swarmcert::stability
