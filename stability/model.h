@@ -8,22 +8,23 @@
 #include <utility>
 #include <vector>
 
+#include "controller/battery.h"
+#include "controller/position_law.h"
+
 namespace swarmcert::stability {
 
-inline constexpr double kGravity_m_s2 = 9.81;
+using controller::kGravity_m_s2;
 /// One gram-force: the unit of the thrust map and of the published networks.
 inline constexpr double kGramForce_N = 1e-3 * kGravity_m_s2;
 /// The battery voltage to which the thrust map and the effect `battery` refer.
-inline constexpr double kFullBattery_V = 4.2;
+inline constexpr double kFullBattery_V = controller::kReferenceVoltage_V;
 /// Voltages of one lithium-polymer cell: empty under load, and full of the high-voltage kind with a reading's error.
 inline constexpr std::pair<double, double> kOneCell_V = {2.5, 4.5};
 
 /// Force of one rotor: g = c00 + c10 p + c01 v + c20 p^2 + c11 p v in gram-force, with p = PWM / 65536 in [0, 1]
 /// and v = battery voltage / 4.2 V. Increasing in p where the calibration holds; read_model() checks that at full
-/// battery.
-struct ThrustMap {
-  double c00 = 0, c10 = 0, c01 = 0, c20 = 0, c11 = 0;
-
+/// battery. Unlike force_of_pwm(), which the flight code uses, force_N() is not held above zero.
+struct ThrustMap : controller::ThrustMap<double> {
   double force_N(double pwm, double battery_V) const {
     const double v = battery_V / kFullBattery_V;
     return kGramForce_N * (c00 + c01 * v + pwm * (c10 + c11 * v + c20 * pwm));
@@ -117,7 +118,7 @@ struct Model {
   double arm_m = 0;                                 ///< from the centre to the rotors; their mean distance
   double torque_per_thrust_m = 0;                   ///< yaw torque of a rotor per newton of its thrust
   std::pair<double, double> battery_range_V = kOneCell_V;  ///< voltages at which the vehicle can be
-  ThrustMap thrust;
+  ThrustMap thrust{};
   /// Force of one rotor at command u in [0, 1], whatever the voltage: a + b u + c u^2, in newton. Where a file states it,
   /// `thrust` is the same polynomial in gram-force.
   std::optional<std::array<double, 3>> thrust_curve_N;

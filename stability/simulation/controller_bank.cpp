@@ -344,8 +344,7 @@ class Bank : public ControllerBank {
 
   void report(int vehicle, ControlRecord* record) const override {
     const auto i = static_cast<std::size_t>(vehicle);
-    const ThrustMap& map = swarm_.model(vehicle).thrust;
-    const controller::ThrustMap<double> thrust_map = {map.c00, map.c10, map.c01, map.c20, map.c11};
+    const ThrustMap& thrust_map = swarm_.model(vehicle).thrust;
     if (group_of_[i] != nullptr) {
       read_rest(thrust_map, group_of_[i]->slot, lane_of_[i], record);
     } else {
