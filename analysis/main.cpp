@@ -25,7 +25,7 @@ void hold_standard_streams() {
   if (descriptor >= 0) ::close(descriptor);
 }
 
-/// A verdict that nobody could read is none.
+/// If standard output could not be written, a success becomes a failure.
 int after_printing(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   fmt::print(stderr, "swarmcert: standard output: cannot be written ({})\n", std::strerror(errno));
