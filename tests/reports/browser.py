@@ -1,5 +1,6 @@
 """A headless Chromium that loads pages and says what is wrong with them. Python's standard library only."""
 
+import base64
 import json
 import os
 import pathlib
@@ -17,6 +18,13 @@ CHECK = r"""
     const wide = [...document.body.querySelectorAll('*')].find(
         e => !e.closest('.scroll') && e.getBoundingClientRect().right > innerWidth + 1);
     fault('overflow', `${page.scrollWidth} px on a screen of ${innerWidth}: ${wide ? wide.outerHTML : '?'}`);
+  }
+  for (const table of document.querySelectorAll('table')) {
+    const box = table.closest('.scroll');
+    if (!box) fault('wide table', 'it has no box of its own: ' + table.outerHTML);
+    else if (box.getBoundingClientRect().right > innerWidth + 1) fault('wide table', 'its box is wider than the screen');
+    else if (box.scrollWidth > box.clientWidth + 1 && !/auto|scroll/.test(getComputedStyle(box).overflowX))
+      fault('wide table', 'its last columns are hidden: ' + table.outerHTML);
   }
   const shown = e => e.getClientRects().length > 0;
   const middle = r => ({x: (r.left + r.right) / 2, y: (r.top + r.bottom) / 2});
@@ -222,16 +230,25 @@ class Browser:
         found = self._evaluate("axe.run().then(all => all.violations.map(v => [v.id, v.nodes[0].html.slice(0, 200)]))")
         return [["accessibility", rule, what] for rule, what in found]
 
-    def faults(self, page, widths=(390, 768, 1280), schemes=("light", "dark")):
-        """[kind, width, what] of all that is wrong with a report: console, policy (of content), network, overflow, missing
-        plot, empty plot, no caption, small text, contrast, no name, no result, no command, injection. The page is loaded at every
-        width; colour schemes and print are looked at on the widest."""
+    def picture(self, path, width, most_px=4000):
+        """The page that is loaded, from its top, as PNG. Returns the number of bytes."""
+        height = min(most_px, self._evaluate("document.documentElement.scrollHeight"))
+        clip = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
+        shot = self._call("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)
+        return pathlib.Path(path).write_bytes(base64.b64decode(shot["data"]))
+
+    def faults(self, page, widths=(390, 768, 1280), schemes=("light", "dark"), pictures=None):
+        """[kind, width, what] of all that is wrong with a report: console, policy (of content), network, overflow, wide
+        table, missing plot, empty plot, no caption, small text, contrast, no name, no result, no command, injection. The page is loaded at every
+        width, and pictured there as <pictures>-<width>.png; colour schemes and print are looked at on the widest."""
         found = []
         for width in widths:
             self._call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
             self._load(page)
             found += [[kind, width, what] for kind, what in self._evaluate(CHECK)]
             found += [[kind, width, what] for kind, what in self._heard(page)]
+            if pictures and self.picture(f"{pictures}-{width}.png", width) < 4000:
+                found.append(["no picture", width, "a screenshot of so few bytes shows nothing"])
         for scheme in schemes:
             self._call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
             found += [[kind, scheme, what] for kind, what in self._evaluate(CHECK)]

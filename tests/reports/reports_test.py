@@ -1,6 +1,6 @@
-"""Every command's report, in a browser: reports_test.py TOOL SOURCE_FOLDER [AXE]
+"""Every command's report, in a browser: reports_test.py TOOL SOURCE_FOLDER SCREENSHOTS [AXE]
 
-AXE is axe.min.js of the npm package axe-core; without it only names of controls and headings are checked.
+SCREENSHOTS is a folder for pictures of the top of every page at three widths. AXE is axe.min.js of the npm package axe-core; without it only names of controls and headings are checked.
 
 Ends with 77 (skipped) where there is no Chromium. First a good report is damaged in every way that the browser must see.
 """
@@ -10,6 +10,7 @@ import os
 import pathlib
 import random
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -172,6 +173,7 @@ def planted(good):
     yield "policy", text.replace(end, "<p style='color:red'>planted</p>" + end)
     yield "policy", text.replace(end, "<script>1</script>" + end)
     yield "network", lax.replace(end, "<img src='http://127.0.0.1:9/planted.png'>" + end)
+    yield "wide table", re.sub(r'<div class="scroll"[^>]*>', "<div>", text)
     yield "overflow", text.replace(end, "<canvas width='2000'></canvas>" + end)
     yield "missing plot", text.replace(drawing, "")
     yield "empty plot", text.replace(drawing, without_curves)
@@ -187,7 +189,10 @@ def planted(good):
 
 def main():
     tool, source = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve()
-    axe = pathlib.Path(sys.argv[3]).read_text() if len(sys.argv) > 3 else None
+    shots = pathlib.Path(sys.argv[3])
+    shutil.rmtree(shots, ignore_errors=True)
+    shots.mkdir(parents=True)
+    axe = pathlib.Path(sys.argv[4]).read_text() if len(sys.argv) > 4 else None
     chromium = browser.find()
     if chromium is None:
         print("skipped: no Chromium here (package chromium); reports were not looked at")
@@ -211,7 +216,7 @@ def main():
                     print("not seen: a planted picture without a text")
                     faults += 1
             for name, page in reports.pages.items():
-                found = tab.faults(page) + (tab.accessibility(page, axe) if axe else [])
+                found = tab.faults(page, pictures=shots / name) + (tab.accessibility(page, axe) if axe else [])
                 faults += len(found)
                 print(f"{name}: {len(found)} faults, {page.stat().st_size // 1024} kB")
                 for fault in found:
