@@ -397,8 +397,7 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
 std::vector<Missing> missing_effects(const residuals::Inputs& inputs, const std::string& kind,
                                      const std::vector<int>& which, int jobs,
                                      const residuals::Progress& progress) {
-  const Coverage covered = coverage(inputs, kind, which, jobs);
-  return explain({inputs, kind, which, covered.records, jobs, progress}, covered).settled.ranking;
+  return diagnose(inputs, kind, which, jobs, progress).ranking;
 }
 
 std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::string& kind,
