@@ -17,11 +17,12 @@ struct ForceUnit {
   double per_newton() const { return 1 / size_N; }
 };
 
-/// @param name "N" (shown in mN), "gf" or "m_s2" (force over the model's mass)
+/// @param name "N" (mN for vehicles that weigh less than 10 N), "gf" or "m_s2" (force over the model's mass)
 inline ForceUnit chosen_force_unit(const std::string& name, const stability::Model& model) {
+  constexpr double kHeavy_N = 10;
   if (name == "gf") return {"gf", stability::kGramForce_N};
   if (name == "m_s2") return {"m/s^2", model.mass_kg};
-  return {"mN", 1e-3};
+  return model.weight_N() < kHeavy_N ? ForceUnit{"mN", 1e-3} : ForceUnit{"N", 1};
 }
 
 /// Gram-force where every vehicle weighs less than 1 N, the unit of the published networks; else newton. Without a known

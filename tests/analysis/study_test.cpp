@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "analysis/run.h"
 #include "data.h"
@@ -77,11 +79,84 @@ TEST_F(Study, FlightsThatAreNamedForTheTestDecideNothing) {
   EXPECT_EQ(one["split"]["test"].size(), 1U);
 }
 
+TEST_F(Study, SaysWhatChangedAgainstOtherFlights) {
+  for (int run = 1; run <= 3; ++run) {
+    for (const auto& [when, model] :
+         {std::pair("before", "crazyflie-small"), {"now", "crazyflie-small-effects"}}) {
+      const Outcome outcome =
+          run_shell(fmt::format("swarmcert simulate random-walk -q --duration 25 --seed {0}{1} --model {2} "
+                                "--gains {3} -o {4}/{0}",
+                                run, std::string(when) == "now" ? 1 : 0,
+                                source_path(fmt::format("stability/models/{}.toml", model)),
+                                source_path("controller/gains/crazyflie-small.toml"), when),
+                    folder_.path());
+      ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+    }
+  }
+  const Outcome outcome = study("now --against before -o out");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json json = result("out");
+  // Alone in the air the second model differs by motor lag and drag; a lag needs faster set points than these to show.
+  EXPECT_EQ(json["changed"]["verdict"], "missing_effect");
+  std::set<std::string> changed;
+  for (const files::Json& entry : json["changed"]["ranking"])
+    changed.insert(entry["effect"].get<std::string>());
+  EXPECT_EQ(changed.count("drag_linear"), 1U) << json["changed"]["ranking"].dump(1);
+  EXPECT_EQ(json["against"]["flights"].size(), 3U);
+  EXPECT_NE(outcome.output.find("Against the other flights, cf1: "), std::string::npos) << outcome.output;
+  EXPECT_NE(read_text(folder_ / "out/study.html").find("What changed against the other flights"),
+            std::string::npos);
+  EXPECT_EQ(study("now --against now/1 -o other").exit_code, 2) << "a flight is not held against itself";
+}
+
+TEST_F(Study, EveryPageShowsForcesInTheOneUnitThatIsAsked) {
+  fly(2);
+  const std::string model = source_path("stability/models/crazyflie-small.toml");
+  struct Page {
+    std::string command, option, shown;
+  };
+  for (const Page& page :
+       {Page{"compare " + model + " flights", "N", "[mN]"},
+        {"compare " + model + " flights", "m_s2", "[m/s^2]"},
+        {"diagnose " + model + " flights", "gf", "[gf]"},
+        {"add drag_linear --model " + model + " flights -o fitted.toml", "m_s2", "[m/s^2]"}}) {
+    const Outcome outcome = run_shell(
+        "swarmcert " + page.command + " -q --force --report page --unit " + page.option, folder_.path());
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    const std::string text = read_text(folder_ / "page/report.html");
+    for (const char* const unit : {"[mN]", "[gf]", "[N]", "[m/s^2]"})
+      EXPECT_EQ(text.find(unit) != std::string::npos, unit == page.shown) << page.command << " and " << unit;
+  }
+}
+
 TEST_F(Study, WordsThatMakeNoSenseAreExplained) {
   fly(1);
   EXPECT_EQ(study("flights -o out --test flights").exit_code, 2);
   EXPECT_EQ(study("flights -o out --unit lbf").exit_code, 2);
   EXPECT_EQ(study("nowhere -o out").exit_code, 3);
+  std::string ground = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,m1,m2,m3,m4,vbat\n";
+  for (int k = 0; k < 500; ++k)
+    ground += fmt::format("{:.2f},0.1,0,0.05,0,0,0,0,0,0,1,0,0,0,0,4.1\n", 0.01 * k);
+  write_text(folder_ / "ground.csv", ground);
+  const Outcome nothing = study("ground.csv -o nothing");
+  EXPECT_EQ(nothing.exit_code, 4);
+  EXPECT_NE(nothing.output.find("No record of these flights can be judged: "), std::string::npos)
+      << nothing.output;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "nothing/study.html")) << "the page says the same";
+}
+
+TEST_F(Study, AddsTheThrustRatioThatDiagnoseNamesOfAWholeCollection_slow) {
+  SWARMCERT_NEEDS_DATA();
+  // Most of these flights have upgraded motors, some fly with a payload: a scale of the thrust leads the ranking.
+  const Outcome outcome = run_shell(
+      "swarmcert add auto -q --model " + source_path("stability/models/crazyflie-small.toml") + " " +
+          data_path("collections/crazyswarm2-tools/logs") + " -o fitted.toml --json added.json",
+      folder_.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json json = files::read_json(folder_ / "added.json", "swarmcert/add/1");
+  ASSERT_GE(json["ladder"].size(), 2U);
+  EXPECT_EQ(json["ladder"][1]["effect"], "thrust_ratio");
+  EXPECT_TRUE(json["ladder"][1]["accepted"].get<bool>());
 }
 
 TEST(Demo, CertifiesANetworkAndFindsWhatAModelLacks) {

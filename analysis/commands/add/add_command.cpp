@@ -62,9 +62,10 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
 }
 
 void report_ladders(const AddOptions& options, const CommonOptions& common, const files::Json& result,
-                    const std::vector<LadderOfModel>& ladders, const BeforeAfter* change = nullptr) {
+                    const std::vector<LadderOfModel>& ladders, const residuals::ForceUnit& unit,
+                    const BeforeAfter* change = nullptr) {
   if (options.report.empty()) return;
-  const std::string path = write_ladder_report(ladders, change, result, options.report, common.force);
+  const std::string path = write_ladder_report(ladders, change, unit, result, options.report, common.force);
   if (common.prints_text()) fmt::print("report: {}\n", path);
 }
 
@@ -73,8 +74,7 @@ BeforeAfter before_and_after(const residuals::Inputs& inputs, const Ladder& ladd
   residuals::Inputs fitted = inputs;
   fitted.models[0] = ladder.model;
   return {residuals::compare(inputs, jobs, silent), residuals::compare(fitted, jobs, silent),
-          identification::picture_data(inputs, inputs.models[0], ladder.model),
-          residuals::chosen_force_unit("N", inputs.models[0])};
+          identification::picture_data(inputs, inputs.models[0], ladder.model)};
 }
 
 /// `add undo`: back to the model before the last accepted effect.
@@ -93,7 +93,8 @@ int undo(const AddOptions& options, const CommonOptions& common) {
     print_ladder(model.ladder);
     fmt::print("Written: {}\n", options.output);
   }
-  report_ladders(options, common, result, {{model.path, model.ladder, model.effects}});
+  report_ladders(options, common, result, {{model.path, model.ladder, model.effects}},
+                 residuals::chosen_force_unit(options.flights.unit, model));
   return kDone;
 }
 
@@ -102,8 +103,11 @@ int show(const AddOptions& options, const CommonOptions& common) {
   files::Json result = result_head("add", options.flights.models);
   result["ladders"] = files::Json::array();
   std::vector<LadderOfModel> ladders;
+  residuals::ForceUnit unit;
   for (const std::string& path : options.flights.models) {
     const stability::Model model = stability::read_model(path);
+    // One page, one unit: that of the first model.
+    if (ladders.empty()) unit = residuals::chosen_force_unit(options.flights.unit, model);
     result["ladders"].push_back(
         {{"model", path}, {"ladder", ladder_json(model.ladder)}, {"effects", effects_json(model.effects)}});
     ladders.push_back({path, model.ladder, model.effects});
@@ -112,7 +116,7 @@ int show(const AddOptions& options, const CommonOptions& common) {
     if (!model.ladder.empty()) print_ladder(model.ladder);
   }
   write_result(common, result);
-  report_ladders(options, common, result, ladders);
+  report_ladders(options, common, result, ladders, unit);
   return kDone;
 }
 
@@ -166,7 +170,8 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   ladders.push_back({"On these flights", ladder.rows, ladder.model.effects});
   std::optional<BeforeAfter> change;
   if (ladder.any_accepted && !options.report.empty()) change = before_and_after(inputs, ladder, common.jobs);
-  report_ladders(options, common, result, ladders, change ? &*change : nullptr);
+  report_ladders(options, common, result, ladders, page_unit(options.flights, inputs),
+                 change ? &*change : nullptr);
   return kDone;
 }
 
@@ -209,6 +214,7 @@ Command add_command() {
             app, "--report", options->report,
             "Write an HTML report into this folder: the error ladder, and maps, curves and worst moments "
             "before and after");
+        declare_unit(app, options->flights);
         return [options](const CommonOptions& common) { return run_add(*options, common); };
       }};
 }

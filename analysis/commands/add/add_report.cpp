@@ -18,7 +18,9 @@ std::string step(const stability::LadderRow& row) {
 }  // namespace
 
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
-                       const std::string& unit, double per_newton) {
+                       const residuals::ForceUnit& force) {
+  const std::string unit = force.name;
+  const double per_newton = force.per_newton();
   std::string data = "# fit select test step\n";
   std::vector<std::vector<std::string>> cells;
   for (const stability::LadderRow& row : rows) {
@@ -45,7 +47,8 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
 }
 
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,
-                                const files::Json& result, const std::string& folder, bool overwrite) {
+                                const residuals::ForceUnit& unit, const files::Json& result,
+                                const std::string& folder, bool overwrite) {
   Report report("Error ladder");
   report.made_by(command_to_copy());
   report.result(result);
@@ -55,7 +58,7 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
     if (ladder.rows.empty()) {
       report.paragraph("No ladder is kept.");
     } else {
-      add_ladder_figure(report, ladder.rows, fmt::format("ladder_{}", ++number), "N", 1);
+      add_ladder_figure(report, ladder.rows, fmt::format("ladder_{}", ++number), unit);
     }
     std::vector<std::vector<std::string>> rows;
     for (const stability::EffectSpec& effect : ladder.effects) {
@@ -74,12 +77,12 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
   if (change != nullptr) {
     report.heading("Before and after");
     report.paragraph("All flights, those of the fit among them: the error on test flights is in the ladder.");
-    add_before_and_after(report, change->before, change->after, change->pictures.room, change->unit);
+    add_before_and_after(report, change->before, change->after, change->pictures.room, unit);
     report.heading("What was added");
-    add_effect_curves(report, change->pictures.effects, change->unit);
+    add_effect_curves(report, change->pictures.effects, unit);
     report.heading("Worst moments");
-    add_worst_moments(report, change->before, change->after, change->unit);
-    add_time_series(report, change->after, &change->before, change->unit.name, change->unit.per_newton());
+    add_worst_moments(report, change->before, change->after, unit);
+    add_time_series(report, change->after, &change->before, unit.name, unit.per_newton());
   }
   return report.write(folder, overwrite);
 }

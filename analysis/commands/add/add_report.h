@@ -22,7 +22,6 @@ struct LadderOfModel {
 struct BeforeAfter {
   residuals::Comparison before, after;
   identification::PictureData pictures;
-  residuals::ForceUnit unit;
 };
 
 /// Writes FOLDER/report.html with a plot and a table per ladder, the effects' numbers and the JSON `result`; returns its
@@ -30,10 +29,11 @@ struct BeforeAfter {
 /// @param change where effects were added: its pictures; else null
 /// @throws files::InputError as Report::write().
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,
-                                const files::Json& result, const std::string& folder, bool overwrite);
+                                const residuals::ForceUnit& unit, const files::Json& result,
+                                const std::string& folder, bool overwrite);
 
-/// Bars and a table of the errors after each step. @param unit of what is shown, `per_newton` of it make a newton.
+/// Bars and a table of the errors after each step.
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
-                       const std::string& unit, double per_newton);
+                       const residuals::ForceUnit& unit);
 
 }  // namespace swarmcert::analysis

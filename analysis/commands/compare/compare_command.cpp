@@ -231,6 +231,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   }
   const residuals::GainsOfKinds gains = read_gains(options.gains);
   const residuals::Inputs inputs = read_flights(options.flights, true, true);
+  const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   check_kinds(gains, inputs);
   Progress progress(common.quiet);
   const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };
@@ -267,7 +268,8 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     fmt::print("Run time: {:.1f} s for {} flights.\n", run.count(), inputs.found.flights.size());
   }
   if (!options.report.empty()) {
-    const std::string path = write_compare_report(comparison, inputs, result, options.report, common.force);
+    const std::string path =
+        write_compare_report(comparison, inputs, unit, result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
   if (comparison.overall.statistics.samples > 0) return kDone;
@@ -300,6 +302,7 @@ Command compare_command() {
         const auto options = std::make_shared<CompareOptions>();
         declare_flights(app, options->flights, true);
         add_output(app, "--report", options->report, "Write an HTML report into this folder");
+        declare_unit(app, options->flights, "");
         app.add_option(
                "--gains", options->gains,
                "gains.toml, or KIND=gains.toml for each kind: also simulates the closed loop from the "

@@ -15,8 +15,16 @@
 namespace swarmcert::analysis {
 namespace {
 
+/// Two decimals, or three digits where these would lose too much.
 std::string in_unit(double newton, const residuals::ForceUnit& unit) {
-  return fmt::format("{:.2f}", newton / unit.size_N);
+  const double value = newton / unit.size_N;
+  return std::abs(value) < 1 ? fmt::format("{:.3g}", value) : fmt::format("{:.2f}", value);
+}
+
+std::string words_of(const residuals::RegionErrors& region, const residuals::ForceUnit& unit) {
+  const residuals::Axes& bias = region.statistics.bias;
+  return fmt::format("{}: {} {} up, {} sideways", residuals::region_name(region.variable, region.region),
+                     in_unit(bias.z, unit), unit.name, in_unit(std::hypot(bias.x, bias.y), unit));
 }
 
 std::vector<std::string> row(const std::string& name, const residuals::GroupErrors& group,
@@ -137,35 +145,38 @@ void add_trajectories(Report& report, const residuals::Comparison& comparison) {
   report.table({"", "x", "y", "z", "vector"}, rows);
 }
 
-void add_learning_error(Report& report, const residuals::LearningError& learning) {
+void add_learning_error(Report& report, const residuals::LearningError& learning,
+                        const residuals::ForceUnit& unit) {
   report.heading("What bound --from takes from these flights");
   report.paragraph(fmt::format(
       "Quantiles over {} windows of {} s of the residual behind a low-pass of {} Hz; bias: "
       "mean of a flight.",
       learning.windows, residuals::LearningError::kWindow_s, residuals::LearningError::kBandwidth_hz));
   std::vector<std::vector<std::string>> rows;
-  const auto add = [&rows](const std::string& name, const residuals::LearningError::Quantiles& q) {
-    const auto cell = [](const residuals::Axes& a) {
-      return fmt::format("{:.4f} {:.4f} {:.4f}", a.x, a.y, a.z);
+  const auto add = [&rows, &unit](const std::string& name, const residuals::LearningError::Quantiles& q) {
+    const auto cell = [&unit](const residuals::Axes& a) {
+      const double factor = unit.per_newton();
+      return fmt::format("{:.3g} {:.3g} {:.3g}", factor * a.x, factor * a.y, factor * a.z);
     };
     rows.push_back({name, cell(q.p50), cell(q.p95), cell(q.p99), cell(q.max)});
   };
-  add("bias [N]", learning.bias_N);
-  add("amplitude [N]", learning.amplitude_N);
-  add("rate [N/s]", learning.rate_N_s);
-  add("variation per pass [N]", learning.variation_N);
-  add("impulse per pass [N s]", learning.impulse_N_s);
+  const std::string force = unit.name;
+  add("bias [" + force + "]", learning.bias_N);
+  add("amplitude [" + force + "]", learning.amplitude_N);
+  add("rate [(" + force + ")/s]", learning.rate_N_s);
+  add("variation per pass [" + force + "]", learning.variation_N);
+  add("impulse per pass [" + force + " s]", learning.impulse_N_s);
   report.table({"x y z", "median", "95 %", "99 %", "largest"}, rows);
 }
 
 }  // namespace
 
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
-                                 const files::Json& result, const std::string& folder, bool overwrite) {
+                                 const residuals::ForceUnit& unit, const files::Json& result,
+                                 const std::string& folder, bool overwrite) {
   Report report("Model against flights");
   report.made_by(command_to_copy());
   report.result(result);
-  const residuals::ForceUnit unit = residuals::force_unit(inputs);
   for (const stability::Model& model : inputs.models) {
     std::string effects;
     for (const stability::EffectSpec& effect : model.effects)
@@ -175,9 +186,7 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   }
   report.paragraph(
       "Force residual: mass times measured specific force minus thrust and effects, in the world frame, in " +
-      std::string(inputs.rules.per_mass ? "m/s^2: no mass is known. "
-                  : unit.size_N == 1    ? "newton. "
-                                        : "gram-force. ") +
+      std::string(unit.name) + (inputs.rules.per_mass ? ": no mass is known. " : ". ") +
       "A torque residual needs logs of at least 400 Hz: slower ones alias what the attitude loop does.");
   report.heading("Scenarios and vehicles");
   std::vector<std::vector<std::string>> rows;
@@ -194,17 +203,19 @@ std::string write_compare_report(const residuals::Comparison& comparison, const 
   rows.clear();
   for (std::size_t i = 0; i < comparison.regions.size() && i < 12; ++i) {
     const residuals::RegionErrors& region = comparison.regions[i];
-    rows.push_back({region.words, std::to_string(region.statistics.samples),
+    rows.push_back({words_of(region, unit), std::to_string(region.statistics.samples),
                     in_unit(region.statistics.rmse.total, unit),
                     fmt::format("{:.1f} %", 100 * region.share)});
   }
-  report.table({"region", "records", "RMSE", "share of all squared residual in its mean"}, rows);
+  report.table({"region", "records", std::string("RMSE [") + unit.name + "]",
+                "share of all squared residual in its mean"},
+               rows);
   for (int variable = 0; variable < kPlottedVariables; ++variable)
     add_region_plot(report, comparison, variable, kVariableUnits[variable], unit);
   add_neighbour_map(report, comparison.neighbours, unit);
   add_time_series(report, comparison, nullptr, unit.name, 1 / unit.size_N);
   add_trajectories(report, comparison);
-  add_learning_error(report, comparison.learning_error);
+  add_learning_error(report, comparison.learning_error, unit);
 
   report.heading("Flights");
   rows.clear();

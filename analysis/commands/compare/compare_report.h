@@ -5,12 +5,14 @@
 
 #include "analysis/report/report.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/force_unit.h"
 #include "nn/base/json.h"
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with plots and the JSON `result`; returns its path. @throws as Report::write().
+/// Writes FOLDER/report.html, with forces in `unit`, with plots and the JSON `result`; returns its path. @throws as Report::write().
 std::string write_compare_report(const residuals::Comparison& comparison, const residuals::Inputs& inputs,
-                                 const files::Json& result, const std::string& folder, bool overwrite);
+                                 const residuals::ForceUnit& unit, const files::Json& result,
+                                 const std::string& folder, bool overwrite);
 
 }  // namespace swarmcert::analysis

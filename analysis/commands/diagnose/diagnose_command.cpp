@@ -1,7 +1,5 @@
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -36,27 +34,6 @@ struct Answers {
   std::vector<identification::Difference> differences;
   std::vector<identification::Each> each;
 };
-
-residuals::Inputs read_others(const DiagnoseOptions& options) {
-  FlightOptions others = options.flights;
-  others.words.erase(std::remove_if(others.words.begin(), others.words.end(),
-                                    [](const std::string& word) {
-                                      return std::filesystem::path(word).extension() != ".toml";
-                                    }),
-                     others.words.end());
-  others.words.insert(others.words.end(), options.against.begin(), options.against.end());
-  return read_flights(others, false, false, true);
-}
-
-/// Flights that are on both sides would be held against themselves.
-void refuse_common(const residuals::Inputs& inputs, const residuals::Inputs& others) {
-  for (const residuals::FlightFiles& flight : inputs.found.flights) {
-    for (const residuals::FlightFiles& other : others.found.flights) {
-      if (flight.logs == other.logs)
-        throw UsageError("the flight " + flight.name + " is on both sides of --against");
-    }
-  }
-}
 
 void print_next(const std::vector<Diagnosis>& diagnoses) {
   for (const Diagnosis& diagnosis : diagnoses) {
@@ -113,16 +90,12 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
-    others = read_others(options);
-    refuse_common(inputs, *others);
-    for (const std::string& file : others->files()) {
-      if (std::find(files.begin(), files.end(), file) != files.end()) continue;
-      files.push_back(file);
-      other_files.push_back(file);
-    }
+    others = read_others(options.flights, options.against, inputs);
+    other_files = add_files_of(*others, files);
   }
   files::Json result = result_head("diagnose", files);
   const Answers answers = answer(options, common, inputs, others ? &*others : nullptr);
@@ -145,7 +118,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
     verdict = identification::Verdict::kMissingEffect;
   if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {
-    const std::string path = write_diagnose_report(answers.diagnoses, answers.differences, answers.each,
+    const std::string path = write_diagnose_report(answers.diagnoses, answers.differences, answers.each, unit,
                                                    result, options.report, common.force);
     if (common.prints_text()) fmt::print("Report: {}\n", path);
   }
@@ -179,6 +152,7 @@ Command diagnose_command() {
             app.add_flag("--next", options->next,
                          "Also which flights would separate rivals, or show what these flights cannot");
             add_output(app, "--report", options->report, "Write an HTML report into this folder");
+            declare_unit(app, options->flights);
             return [options](const CommonOptions& common) { return run_diagnose(*options, common); };
           }};
 }

@@ -41,15 +41,18 @@ std::string values_of(const Missing& missing) {
   return joined(values);
 }
 
-/// @param name of the figure.
-void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& name) {
+}  // namespace
+
+void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& name,
+                 const residuals::ForceUnit& unit) {
   std::vector<std::vector<std::string>> rows;
   std::vector<Bar> bars;
   for (const Missing& missing : diagnosis.ranking) {
     const identification::Finding& finding = missing.finding;
     const bool each = !missing.specs.empty() && !missing.specs[0].vehicle.empty();
     rows.push_back({missing.effect + (each ? " of each vehicle" : ""),
-                    fmt::format("{:.5f} -> {:.5f}", finding.rmse_before_N, finding.rmse_after_N),
+                    fmt::format("{:.4g} -> {:.4g}", unit.per_newton() * finding.rmse_before_N,
+                                unit.per_newton() * finding.rmse_after_N),
                     fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * drop(missing),
                                 100 * finding.drop_interval.first, 100 * finding.drop_interval.second),
                     values_of(missing),
@@ -58,8 +61,8 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
     bars.push_back({missing.effect, 100 * drop(missing), 100 * finding.drop_interval.first,
                     100 * finding.drop_interval.second});
   }
-  report.table({"effect", "RMSE [N]", "fall, 90 %", "values, 90 %", "flights cannot tell apart",
-                "these flights cannot tell it from", "what separates them"},
+  report.table({"effect", std::string("RMSE [") + unit.name + "]", "fall, 90 %", "values, 90 %",
+                "flights cannot tell apart", "these flights cannot tell it from", "what separates them"},
                rows);
   // Kinds come from users: figures are numbered.
   report.bars(name, bars, "fall of the error [%]",
@@ -67,14 +70,13 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
               "90 % intervals from resampled blocks.");
 }
 
-}  // namespace
-
-void add_left(Report& report, const Diagnosis& diagnosis) {
+void add_left(Report& report, const Diagnosis& diagnosis, const residuals::ForceUnit& unit) {
   const identification::Remainder& rest = diagnosis.remainder;
-  report.paragraph(fmt::format(
-      "Left: {:.5f} N; low frequencies {:.1f} times the noise floor: {}{}", diagnosis.rmse_after_N,
-      rest.ratio, rest.flag ? "not everything is explained" : "nothing stands out",
-      rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
+  report.paragraph(
+      fmt::format("Left: {:.4g} {}; low frequencies {:.1f} times the noise floor: {}{}",
+                  unit.per_newton() * diagnosis.rmse_after_N, unit.name, rest.ratio,
+                  rest.flag ? "not everything is explained" : "nothing stands out",
+                  rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
   if (!diagnosis.contradicted.empty()) {
     report.paragraph(
         "Not counted, because set points contradict them (the controller's answer to something "
@@ -105,7 +107,8 @@ void add_left(Report& report, const Diagnosis& diagnosis) {
 
 std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses,
                                   const std::vector<identification::Difference>& differences,
-                                  const std::vector<identification::Each>& each, const files::Json& result,
+                                  const std::vector<identification::Each>& each,
+                                  const residuals::ForceUnit& unit, const files::Json& result,
                                   const std::string& folder, bool overwrite) {
   Report report(differences.empty() ? "Which physical effect is missing" : "What changed");
   report.made_by(command_to_copy());
@@ -124,9 +127,9 @@ std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses,
     if (diagnosis.ranking.empty())
       report.paragraph("No effect of the library is missing above the sizes below.");
     else
-      add_ranking(report, diagnosis, "ranking_" + std::to_string(i + 1));
-    add_left(report, diagnosis);
-    add_remainder(report, diagnosis, i + 1);
+      add_ranking(report, diagnosis, "ranking_" + std::to_string(i + 1), unit);
+    add_left(report, diagnosis, unit);
+    add_remainder(report, diagnosis, i + 1, unit);
   }
   for (std::size_t i = 0; i < each.size(); ++i) {
     report.heading("Flight by flight");

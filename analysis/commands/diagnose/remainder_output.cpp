@@ -65,18 +65,21 @@ std::string place_of(const ScanEntry& entry) {
 }
 
 /// @param name of the figure.
-void add_curve(Report& report, const ScanEntry& entry, const std::string& name) {
+void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
+               const residuals::ForceUnit& force) {
   const bool is_map = entry.curve[0].at.size() == 2;
-  std::string data = is_map ? "# at_1 at_2 force_N\n" : "# at force_N lower upper\n";
+  std::string data = is_map ? "# at_1 at_2 force\n" : "# at force lower upper\n";
   double last = NAN;
   for (const CurvePoint& point : entry.curve) {
     if (is_map) {
       if (point.at[0] != last && !std::isnan(last)) data += "\n";
       last = point.at[0];
-      data += fmt::format("{:.6g} {:.6g} {:.6g}\n", point.at[0], point.at[1], point.force_N);
+      data +=
+          fmt::format("{:.6g} {:.6g} {:.6g}\n", point.at[0], point.at[1], force.per_newton() * point.force_N);
     } else {
-      data += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", point.at[0], point.force_N, point.interval.first,
-                          point.interval.second);
+      data +=
+          fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", point.at[0], force.per_newton() * point.force_N,
+                      force.per_newton() * point.interval.first, force.per_newton() * point.interval.second);
     }
   }
   const std::string unit =
@@ -84,11 +87,11 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name) 
   const std::string label = is_map ? "[m]" : entry.variable + (unit.empty() ? "" : " [" + unit + "]");
   std::string script = "set xlabel '" + label + "'\n";
   if (is_map) {
-    script += "set ylabel '[m]'\nset cblabel 'force " + entry.axis +
-              " [N]'\nset palette @signed_colours\nplot '" + name +
+    script += "set ylabel '[m]'\nset cblabel 'force " + entry.axis + " [" + force.name +
+              "]'\nset palette @signed_colours\nplot '" + name +
               ".dat' using 1:2:3 with points pointtype 5 pointsize 3 palette notitle\n";
   } else {
-    script += "set ylabel 'force " + entry.axis + " [N]'\nplot '" + name +
+    script += "set ylabel 'force " + entry.axis + " [" + force.name + "]'\nplot '" + name +
               ".dat' using 1:3:4 with filledcurves fillcolor rgb '#cccccc' title '90 %', '' using 1:2 with "
               "linespoints linetype 1 title 'what is left'\n";
   }
@@ -130,7 +133,8 @@ void print_remainder(const Diagnosis& diagnosis) {
   }
 }
 
-void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t number) {
+void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t number,
+                   const residuals::ForceUnit& unit) {
   const std::vector<ScanEntry>& entries = diagnosis.scan.entries;
   if (entries.empty()) {
     report.paragraph("What is left varies with no variable of the scan.");
@@ -141,17 +145,19 @@ void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t numbe
     rows.push_back({place_of(entry),
                     fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * entry.share,
                                 100 * entry.share_interval.first, 100 * entry.share_interval.second),
-                    fmt::format("{:.5f} -> {:.5f}", entry.rmse_before_N, entry.rmse_after_N),
+                    fmt::format("{:.4g} -> {:.4g}", unit.per_newton() * entry.rmse_before_N,
+                                unit.per_newton() * entry.rmse_after_N),
                     verdict_of(entry)});
   }
   report.paragraph("What is left of the force varies with:");
-  report.table({"force", "share of what is left, 90 %", "RMSE [N]", "set points"}, rows);
+  report.table(
+      {"force", "share of what is left, 90 %", std::string("RMSE [") + unit.name + "]", "set points"}, rows);
   std::size_t shown = 0;
   for (const ScanEntry& entry : entries) {
     if (shown == kShownCurves) break;
     if (entry.curve.size() < 2) continue;
     ++shown;
-    add_curve(report, entry, fmt::format("remainder_{}_{}", number, shown));
+    add_curve(report, entry, fmt::format("remainder_{}_{}", number, shown), unit);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "analysis/identification/diagnose.h"
 #include "analysis/report/report.h"
+#include "analysis/residuals/force_unit.h"
 #include "nn/base/json.h"
 
 namespace swarmcert::analysis {
@@ -16,6 +17,7 @@ files::Json remainder_json(const identification::Diagnosis& diagnosis);
 void print_remainder(const identification::Diagnosis& diagnosis);
 
 /// A table of them, with a figure for the first few. @param number of the kind, for the figures' names.
-void add_remainder(Report& report, const identification::Diagnosis& diagnosis, std::size_t number);
+void add_remainder(Report& report, const identification::Diagnosis& diagnosis, std::size_t number,
+                   const residuals::ForceUnit& unit);
 
 }  // namespace swarmcert::analysis

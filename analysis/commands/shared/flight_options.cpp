@@ -1,5 +1,6 @@
 #include "analysis/commands/shared/flight_options.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "analysis/cli/bundled.h"
@@ -61,6 +62,60 @@ residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bo
                              "this command works on one model per kind: name it on the command line"});
   }
   return inputs;
+}
+
+void declare_unit(CLI::App& app, FlightOptions& options, const std::string& standard) {
+  options.unit = standard;
+  CLI::Option* const unit =
+      app.add_option(
+             "--unit", options.unit,
+             std::string("Unit of forces on the page: N (mN below a weight of 10 N), gf, or m_s2 (over the "
+                         "mass)") +
+                 (standard.empty() ? "; default gf for vehicles below 1 N, else N" : ""))
+          ->check(CLI::IsMember({"N", "gf", "m_s2"}));
+  if (!standard.empty()) unit->capture_default_str();
+}
+
+residuals::ForceUnit page_unit(const FlightOptions& options, const residuals::Inputs& inputs) {
+  const bool is_acceleration = options.unit == "m_s2";
+  if (inputs.rules.per_mass) {
+    if (!options.unit.empty() && !is_acceleration)
+      throw UsageError("--unit " + options.unit + ": no mass is known, so forces are in m/s^2; name a model");
+    return residuals::force_unit(inputs);
+  }
+  if (options.unit.empty()) return residuals::force_unit(inputs);
+  if (is_acceleration && inputs.models.size() > 1)
+    throw UsageError("--unit m_s2: the kinds of vehicles differ in mass; take N or gf, or one kind");
+  return residuals::chosen_force_unit(options.unit, inputs.models[0]);
+}
+
+residuals::Inputs read_others(const FlightOptions& options, const std::vector<std::string>& against,
+                              const residuals::Inputs& inputs) {
+  FlightOptions words = options;
+  words.words.erase(std::remove_if(words.words.begin(), words.words.end(),
+                                   [](const std::string& word) {
+                                     return std::filesystem::path(word).extension() != ".toml";
+                                   }),
+                    words.words.end());
+  words.words.insert(words.words.end(), against.begin(), against.end());
+  residuals::Inputs others = read_flights(words, false, false, true);
+  for (const residuals::FlightFiles& flight : inputs.found.flights) {
+    for (const residuals::FlightFiles& other : others.found.flights) {
+      if (flight.logs == other.logs)
+        throw UsageError("the flight " + flight.name + " is on both sides of --against");
+    }
+  }
+  return others;
+}
+
+std::vector<std::string> add_files_of(const residuals::Inputs& others, std::vector<std::string>& files) {
+  std::vector<std::string> added;
+  for (const std::string& file : others.files()) {
+    if (std::find(files.begin(), files.end(), file) != files.end()) continue;
+    files.push_back(file);
+    added.push_back(file);
+  }
+  return added;
 }
 
 files::Json json_of(const residuals::Axes& axes) {

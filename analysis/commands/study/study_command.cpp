@@ -16,8 +16,8 @@ namespace {
 
 struct StudyOptions {
   FlightOptions flights;
-  std::vector<std::string> select, test;
-  std::string output, unit = "N";
+  std::vector<std::string> select, test, against;
+  std::string output;
 };
 
 bool names(const residuals::FoundFlights& found, const residuals::FlightFiles& flight) {
@@ -43,6 +43,25 @@ std::optional<identification::Split> split_of(const StudyOptions& options, const
   return split;
 }
 
+/// What changed against the flights of --against, by the flights that do not only test.
+Changes changes_against(const residuals::Inputs& others, const identification::Study& study,
+                        const residuals::Inputs& inputs, int jobs) {
+  residuals::Inputs own = inputs;
+  const identification::Split& split = study.ladder.split;
+  if (split.by_flight && !split.fit.empty()) {
+    own.found.flights.clear();
+    for (std::size_t i = 0; i < inputs.found.flights.size(); ++i) {
+      if (std::find(split.test.begin(), split.test.end(), static_cast<int>(i)) == split.test.end())
+        own.found.flights.push_back(inputs.found.flights[i]);
+    }
+  }
+  Changes changes;
+  changes.differences =
+      identification::differences(own, others, inputs.models[0].kind, jobs, [](int, int) {});
+  changes.judged = changed_json(changes.differences, own, others, jobs);
+  return changes;
+}
+
 int run_study(const StudyOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.output);
@@ -52,17 +71,30 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   const residuals::Inputs inputs = read_flights(words, false, false, true);
   if (inputs.models.size() != 1)
     throw UsageError("study takes one MODEL; study each kind of vehicle by itself");
+  const residuals::ForceUnit unit = page_unit(options.flights, inputs);
+  std::vector<std::string> files = inputs.files(), other_files;
+  std::optional<residuals::Inputs> others;
+  if (!options.against.empty()) {
+    others = read_others(words, options.against, inputs);
+    other_files = add_files_of(*others, files);
+  }
   Progress progress(common.quiet);
   const identification::Study study = identification::study(
       inputs, split_of(options, inputs), common.jobs,
       [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
-  files::Json result = result_head("study", inputs.files());
+  files::Json result = result_head("study", files);
   add_study(study, inputs, result);
-  const residuals::ForceUnit unit = residuals::chosen_force_unit(options.unit, inputs.models[0]);
-  const std::string page = write_study_folder(study, unit, result, options.output);
+  std::optional<Changes> changes;
+  if (others) {
+    changes = changes_against(*others, study, inputs, common.jobs);
+    add_changes(*changes, other_files, result);
+  }
+  const std::string page =
+      write_study_folder(study, changes ? &*changes : nullptr, unit, result, options.output);
   write_result(common, result);
   if (common.prints_text()) {
     print_study(study, unit);
+    if (changes) print_changes(*changes);
     fmt::print("Page: {}\n", page);
   }
   if (study.ladder.too_poor.empty()) return kDone;
@@ -79,7 +111,8 @@ Command study_command() {
           "compares again, on flights that nothing was fitted to as well. Writes DIR/study.html, "
           "DIR/study.json,\n"
           "DIR/fitted.toml (if an effect was added) and the data of every plot.\n\n"
-          "Example: swarmcert study stability/models/crazyflie-small.toml flights/ -o study",
+          "Example: swarmcert study stability/models/crazyflie-small.toml flights/ -o study\n"
+          "         swarmcert study model.toml today/ --against monday/ tuesday/ -o study",
           [](CLI::App& app) {
             const auto options = std::make_shared<StudyOptions>();
             declare_flights(app, options->flights, true);
@@ -87,9 +120,10 @@ Command study_command() {
                 ->allow_extra_args(false);
             app.add_option("--test", options->test, "Flights that only test, and decide nothing")
                 ->allow_extra_args(false);
-            app.add_option("--unit", options->unit, "Unit of forces on the page: N (shown in mN), gf or m_s2")
-                ->check(CLI::IsMember({"N", "gf", "m_s2"}))
-                ->capture_default_str();
+            app.add_option("--against", options->against,
+                           "Other flights (the healthy vehicle, the last release): the page also says what "
+                           "changed since, beyond their scatter, as diagnose --against does");
+            declare_unit(app, options->flights);
             add_output(app, "-o,--output", options->output, "Folder for page, result and fitted model")
                 ->required();
             return [options](const CommonOptions& common) { return run_study(*options, common); };

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/commands/shared/before_after.h"
+#include "analysis/identification/fleet/difference.h"
 #include "analysis/identification/study/study.h"
 #include "analysis/residuals/force_unit.h"
 #include "nn/base/json.h"
@@ -19,5 +20,23 @@ void add_study(const identification::Study& study, const residuals::Inputs& inpu
 
 /// Ten lines for the terminal.
 void print_study(const identification::Study& study, const residuals::ForceUnit& unit);
+
+/// What differs from the flights of --against.
+struct Changes {
+  std::vector<identification::Difference> differences;  ///< one per vehicle
+  files::Json judged;                                   ///< of changed_json()
+};
+
+/// `verdict`, `ranking` and `rotors`, as diagnose --against writes them.
+files::Json changed_json(const std::vector<identification::Difference>& differences,
+                         const residuals::Inputs& inputs, const residuals::Inputs& others, int jobs);
+
+/// `against` and `changed`.
+void add_changes(const Changes& changes, const std::vector<std::string>& other_files, files::Json& result);
+
+/// One sentence per vehicle, and one per rotor that is named.
+std::vector<std::string> in_words(const Changes& changes);
+
+void print_changes(const Changes& changes);
 
 }  // namespace swarmcert::analysis

@@ -91,8 +91,20 @@ void add_replay(Report& report, const Study& study, const residuals::ForceUnit& 
                             flights.size(), count_flights(study.before.all)));
 }
 
-std::string write_page(const Study& study, const residuals::ForceUnit& unit, const files::Json& result,
-                       const std::string& folder) {
+void add_changes(Report& report, const Changes& changes, const residuals::ForceUnit& unit) {
+  report.heading("What changed against the other flights");
+  for (const std::string& sentence : in_words(changes)) report.paragraph(sentence + ".");
+  std::size_t number = 0;
+  for (const identification::Difference& difference : changes.differences) {
+    report.paragraph(difference.vehicle + ". " + in_words(difference));
+    ++number;
+    if (!difference.diagnosis.ranking.empty())
+      add_ranking(report, difference.diagnosis, fmt::format("changed_{}", number), unit);
+  }
+}
+
+std::string write_page(const Study& study, const Changes* changes, const residuals::ForceUnit& unit,
+                       const files::Json& result, const std::string& folder) {
   Report report("What does the model lack?");
   report.made_by(command_to_copy());
   report.result(result);
@@ -105,14 +117,15 @@ std::string write_page(const Study& study, const residuals::ForceUnit& unit, con
   add_effect_curves(report, study.pictures.effects, unit);
   add_findings(report, study);
   report.heading("How the error fell");
-  add_ladder_figure(report, study.ladder.rows, "ladder", unit.name, unit.per_newton());
+  add_ladder_figure(report, study.ladder.rows, "ladder", unit);
   report.heading("What is left, and what to fly next");
-  add_left(report, study.diagnosis);
-  add_remainder(report, study.diagnosis, 1);
+  add_left(report, study.diagnosis, unit);
+  add_remainder(report, study.diagnosis, 1, unit);
   const std::vector<std::string> next = next_flights(study.diagnosis);
   if (next.empty())
     report.paragraph("These flights leave no question open that another flight would answer.");
   for (const std::string& flight : next) report.paragraph("Fly " + flight + ".");
+  if (changes != nullptr) add_changes(report, *changes, unit);
   add_time_series(report, study.after.all, &study.before.all, unit.name, unit.per_newton());
   add_replay(report, study, unit);
   return report.write(folder, true, "study.html");
@@ -120,7 +133,7 @@ std::string write_page(const Study& study, const residuals::ForceUnit& unit, con
 
 }  // namespace
 
-std::string write_study_folder(const Study& study, const residuals::ForceUnit& unit,
+std::string write_study_folder(const Study& study, const Changes* changes, const residuals::ForceUnit& unit,
                                const files::Json& result, const std::string& folder) {
   const std::filesystem::path path(folder);
   std::filesystem::create_directories(path);
@@ -130,7 +143,7 @@ std::string write_study_folder(const Study& study, const residuals::ForceUnit& u
         stability::to_toml(study.ladder.model, {"Effects fitted to flights by swarmcert study."}), true);
   }
   files::write_file((path / "study.json").string(), files::to_text(result), true);
-  return write_page(study, unit, result, folder);
+  return write_page(study, changes, unit, result, folder);
 }
 
 }  // namespace swarmcert::analysis

@@ -9,8 +9,10 @@
 namespace swarmcert::analysis {
 
 /// Writes FOLDER/study.html with the data of its plots, FOLDER/study.json (`result`) and, if an effect was added,
-/// FOLDER/fitted.toml; makes the folder. Returns the page's path. @throws as Report::write().
-std::string write_study_folder(const identification::Study& study, const residuals::ForceUnit& unit,
-                               const files::Json& result, const std::string& folder);
+/// FOLDER/fitted.toml; makes the folder. Returns the page's path.
+/// @param changes of --against; may be null. @throws as Report::write().
+std::string write_study_folder(const identification::Study& study, const Changes* changes,
+                               const residuals::ForceUnit& unit, const files::Json& result,
+                               const std::string& folder);
 
 }  // namespace swarmcert::analysis
