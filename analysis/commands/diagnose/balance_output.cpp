@@ -134,7 +134,10 @@ bool judge_accelerometers(const residuals::Inputs& inputs, int jobs, bool prints
     const bool is_explained =
         std::any_of(named.begin(), named.end(),
                     [&](const AccelerometerBalance& balance) { return is_explained_ratio(entry, balance); });
-    if (!is_explained) ranking.push_back(entry);
+    if (!is_explained)
+      ranking.push_back(entry);
+    else if (prints)
+      fmt::print("  the accelerometer explains the thrust_ratio: it is not in the ranking\n");
   }
   result["ranking"] = std::move(ranking);
   name_missing(result);
