@@ -10,6 +10,7 @@
 #include "analysis/identification/column_run.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/logs/read_log.h"
+#include "analysis/residuals/thrust_stage.h"
 #include "nn/base/parallel.h"
 #include "stability/effects/registry.h"
 
@@ -43,6 +44,21 @@ void make_change(Candidate& candidate, const EffectSpec& present) {
   for (std::size_t i = 0; i < values.shape.size(); ++i) {
     candidate.info.shape[i].lower = candidate.info.shape[i].upper = values.shape[i];
     candidate.info.shape[i].grid.clear();
+  }
+}
+
+/// A ceiling that decays over more than half of the heights of a flight acts about equally on all of it: a scale of the
+/// thrust, which differs from flight to flight as their heights do, says the same without one.
+void hold_within_flights(Candidate& ceiling, double height_span_m) {
+  constexpr double kDecays = 2;
+  for (std::size_t i = 0; i < ceiling.info.shape.size(); ++i) {
+    stability::Parameter& decay_m = ceiling.info.shape[i];
+    if (decay_m.name != "decay_m" || decay_m.grid.empty()) continue;
+    decay_m.upper = std::min(decay_m.upper, height_span_m / kDecays);
+    std::vector<std::vector<double>>& thetas = ceiling.thetas;
+    thetas.erase(std::remove_if(thetas.begin(), thetas.end(),
+                                [&](const std::vector<double>& theta) { return theta[i] > decay_m.upper; }),
+                 thetas.end());
   }
 }
 
@@ -102,11 +118,14 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
         part.covered.problems.push_back(track.path + ": " + text);
       }
       if (track.position_only || track.kind != kind) continue;
+      double lowest_m = INFINITY, highest_m = -INFINITY;
       part.covered.blocks += cut_into_blocks(track).blocks.size();
       for (std::size_t s = 0; s < track.instants.size(); ++s) {
         if (track.cut[s] != residuals::Cut::kNone) continue;
         const stability::Instant& now = track.instants[s];
         stability::FlightRange& range = part.covered.range;
+        lowest_m = std::min(lowest_m, now.p_W_m.z());
+        highest_m = std::max(highest_m, now.p_W_m.z());
         range.z_min_m = std::min(range.z_min_m, now.p_W_m.z());
         range.z_max_m = std::max(range.z_max_m, now.p_W_m.z());
         part.covered.most_neighbours = std::max(part.covered.most_neighbours, now.num_neighbours);
@@ -114,6 +133,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
         part.vehicles.insert(track.vehicle);
         ++part.covered.records;
       }
+      part.covered.height_span_m = std::max(part.covered.height_span_m, highest_m - lowest_m);
     }
   });
   Coverage all;
@@ -123,6 +143,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   for (const Part& part : parts) {
     all.range.z_min_m = std::min(all.range.z_min_m, part.covered.range.z_min_m);
     all.range.z_max_m = std::max(all.range.z_max_m, part.covered.range.z_max_m);
+    all.height_span_m = std::max(all.height_span_m, part.covered.height_span_m);
     all.most_neighbours = std::max(all.most_neighbours, part.covered.most_neighbours);
     all.records += part.covered.records;
     all.blocks += part.covered.blocks;
@@ -157,6 +178,11 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
     result.info.linear[0].lower = 1 - kMemoryTolerance;
     result.info.linear[0].upper = 1 + kMemoryTolerance;
   }
+  if (residuals::is_thrust_stage(name)) {
+    const EffectSpec* ratio = find(model, "thrust_ratio");
+    if (ratio != nullptr)
+      result.scale = 1 + stability::effect_values(info_of(*ratio, model.path), *ratio).linear[0];
+  }
   if (present == nullptr) return result;
   const stability::EffectValues values = stability::effect_values(result.info, *present);
   const bool is_switched_off =
@@ -164,6 +190,17 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
       std::all_of(values.linear.begin(), values.linear.end(), [](double value) { return value == 0; });
   if (!is_switched_off) make_change(result, *present);
   return result;
+}
+
+std::vector<ScaledStage> scaled_stages(const std::vector<const Candidate*>& effects) {
+  std::vector<ScaledStage> pairs;
+  for (std::size_t scale = 0; scale < effects.size(); ++scale) {
+    if (effects[scale]->name != "thrust_ratio") continue;
+    for (std::size_t stage = 0; stage < effects.size(); ++stage) {
+      if (residuals::is_thrust_stage(effects[stage]->name)) pairs.push_back({stage, scale});
+    }
+  }
+  return pairs;
 }
 
 bool is_written_by_hand(const std::string& name) {
@@ -195,6 +232,8 @@ std::vector<Candidate> all_candidates(const stability::Model& model, const Cover
     if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
     // Nobody has felt the ground from higher up.
     if (name == "ground" && coverage.range.z_min_m > kGroundReach_m) continue;
+    if (name == "ceiling") hold_within_flights(next, coverage.height_span_m);
+    if (next.thetas.empty()) continue;
     all.push_back(std::move(next));
   }
   return all;

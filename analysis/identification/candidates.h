@@ -17,6 +17,8 @@ struct Candidate {
   std::vector<std::vector<double>> thetas;
   std::vector<std::string> vehicles = {};  ///< each has coefficients of its own; empty: all have the same
   std::size_t refined_thetas = 0;          ///< so many at the end of `thetas` come from a refinement
+  /// Of a lag or delay of the thrust, which the model's own thrust_ratio c acts on: 1 + c, a factor of its column.
+  double scale = 1;
 
   int columns() const { return static_cast<int>(info.linear.size()); }
 };
@@ -27,6 +29,7 @@ inline constexpr std::size_t kFewestBlocks = 10;
 /// What the flights of one kind of vehicle cover.
 struct Coverage {
   stability::FlightRange range;
+  double height_span_m = 0;  ///< the most that one vehicle moved up and down in one flight
   int most_neighbours = 0;
   double speed_rms_m_s = 0;
   std::size_t records = 0;
@@ -44,7 +47,7 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
                   int jobs);
 
 /// Every effect of the registry that a force can reveal, with its grid fitted to the coverage, and those that the
-/// model file defines by formulas. Effects of neighbours are left out where nobody has one, lags and delays where
+/// model file defines by formulas. Of the ceiling only thetas that a flight comes away from. Effects of neighbours are left out where nobody has one, lags and delays where
 /// `model` has them; deep sets always, because a network must be named; those of needs_scan() where `model` has none.
 /// Where several vehicles flew, also a constant force of each.
 std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage);
@@ -68,6 +71,14 @@ bool is_taken(const std::string& name, const stability::Model& model);
 inline bool is_held_at_zero(const stability::Parameter& coefficient) {
   return coefficient.lower == 0 && coefficient.upper == 0;
 }
+
+/// A lag or delay of the thrust, and a thrust_ratio, by their places in a list of effects.
+struct ScaledStage {
+  std::size_t stage, scale;
+};
+/// The ratio acts on the thrust behind the lag: (1 + c) L T = T + c T + (1 + c) (L T - T). Where a column of c stands, that
+/// of the lag, over Candidate::scale, goes with it.
+std::vector<ScaledStage> scaled_stages(const std::vector<const Candidate*>& effects);
 
 /// A lag or delay whose gain would be further from 1 than this is something else.
 inline constexpr double kMemoryTolerance = 0.3;

@@ -1,8 +1,11 @@
 #include "analysis/identification/closed_loop.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+
+#include "analysis/identification/scan/formulas.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -221,6 +224,38 @@ std::set<std::string> with_substitutes(std::set<std::string> names, const std::v
   }
   for (const Refined& effect : selected) substitutes.erase(effect.candidate.name);
   names.merge(substitutes);
+  return names;
+}
+
+std::set<std::string> substitutes_of_scales(const Selected& selected) {
+  constexpr double kAlike = 0.9;  // of the square of the scale's column
+  const Grams& grams = selected.grams;
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(Eigen::Index(grams.columns) * (grams.columns + 1) / 2);
+  for (const Block& block : grams.blocks) sum += block.gram;
+  const auto columns_of_member = [&](const Member& member) {
+    const auto k = static_cast<std::size_t>(member.candidate), t = static_cast<std::size_t>(member.theta);
+    std::vector<int> columns;
+    for (int c = 0; c < grams.candidates[k].columns(); ++c) columns.push_back(grams.first_column[k][t] + c);
+    return columns;
+  };
+  const auto name_of = [&](const Member& member) {
+    return grams.candidates[static_cast<std::size_t>(member.candidate)].name;
+  };
+  std::set<std::string> names;
+  for (const Member& scale : selected.members) {
+    if (!is_scale(name_of(scale))) continue;
+    const int at = columns_of_member(scale)[0];
+    for (const Member& formula : selected.members) {
+      if (!is_formula(name_of(formula))) continue;
+      const std::vector<int> columns = columns_of_member(formula);
+      Eigen::VectorXd along(static_cast<Eigen::Index>(columns.size()));
+      for (std::size_t c = 0; c < columns.size(); ++c)
+        along[static_cast<Eigen::Index>(c)] = sum[Grams::packed(columns[c], at)];
+      const Eigen::MatrixXd gram = part_of_gram(sum, columns);
+      const double shared = along.dot(gram.completeOrthogonalDecomposition().solve(along));
+      if (shared > kAlike * sum[Grams::packed(at, at)]) names.insert(name_of(formula));
+    }
+  }
   return names;
 }
 

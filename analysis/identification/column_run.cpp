@@ -18,6 +18,7 @@ struct ColumnRun::Stream {
   const stability::Effect* effect;
   const double* theta;
   int first, columns;
+  double scale;
   std::size_t index;  ///< among candidates and thetas
 };
 
@@ -44,7 +45,7 @@ ColumnRun::ColumnRun(const Grams& grams, const residuals::Inputs& inputs, const 
     for (std::size_t t = 0; t < candidate.thetas.size(); ++t) {
       const double* theta = candidate.thetas[t].data();
       streams_.push_back({effect.stream(theta), &effect, theta, grams.first_column[k][t] + offset,
-                          effect.num_columns(), index++});
+                          effect.num_columns(), candidate.scale, index++});
     }
   }
 }
@@ -60,7 +61,7 @@ const Eigen::Matrix3Xd& ColumnRun::advance(const stability::Instant& now, bool r
   stability::Wrench columns[stability::kMostColumns];
   for (const Stream& s : streams_) {
     s.stream->advance(now, columns);
-    for (int c = 0; c < s.columns; ++c) values_.col(s.first + c) = columns[c].force_W_N;
+    for (int c = 0; c < s.columns; ++c) values_.col(s.first + c) = s.scale * columns[c].force_W_N;
   }
   // Columns of other vehicles' candidates are zero, and stay zero behind the filter.
   if (filtered_) measured_.apply(now, values_);

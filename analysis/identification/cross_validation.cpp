@@ -114,7 +114,31 @@ Eigen::VectorXd CrossValidation::solve(const Sum& sum, const Members& members) c
       upper[i++] = p.upper;
     }
   }
-  return box_least_squares(part_of_gram(sum.gram, all), part_of(sum.b, all), lower, upper);
+  const Eigen::MatrixXd to = from_model(members);
+  return to * box_least_squares(to.transpose() * part_of_gram(sum.gram, all) * to,
+                                to.transpose() * part_of(sum.b, all), lower, upper);
+}
+
+Eigen::MatrixXd CrossValidation::from_model(const Members& members) const {
+  std::vector<const Candidate*> effects;
+  std::vector<Eigen::Index> first;
+  Eigen::Index n = 0;
+  for (const Member& m : members) {
+    effects.push_back(&candidate(m));
+    first.push_back(n);
+    n += candidate(m).columns();
+  }
+  Eigen::MatrixXd to = Eigen::MatrixXd::Identity(n, n);
+  for (const ScaledStage& pair : scaled_stages(effects))
+    to(first[pair.stage], first[pair.scale]) = 1 / effects[pair.stage]->scale;
+  return to;
+}
+
+Eigen::VectorXd CrossValidation::in_model(const Members& members, const Eigen::VectorXd& coefficients) const {
+  if (coefficients.size() == 0) return coefficients;
+  // The inverse of I + N with N N = 0: no effect is a scale and a stage.
+  const Eigen::MatrixXd to = from_model(members);
+  return 2 * coefficients - to * coefficients;
 }
 
 Eigen::VectorXd CrossValidation::coefficients(const Members& members) const { return solve(total_, members); }

@@ -36,9 +36,12 @@ class CrossValidation {
   std::vector<double> block_errors(const Members& members) const;
   /// Coefficients of the fits without one fold each.
   std::vector<Eigen::VectorXd> fold_coefficients(const Members& members) const;
-  /// Coefficients of the fit on all blocks, within their bounds.
+  /// Coefficients of the fit on all blocks, within their bounds: factors of the columns. Of a lag or delay beside a
+  /// thrust_ratio c that is its gain plus c, since the ratio acts on the thrust behind it: (1 + c) L T for a gain of 1.
   Eigen::VectorXd coefficients(const Members& members) const;
   Fit fit(const Members& members) const;
+  /// `coefficients` as the model file has them: a lag or delay by its own gain.
+  Eigen::VectorXd in_model(const Members& members, const Eigen::VectorXd& coefficients) const;
   /// Cluster-robust, of the last member, on the scale of one coefficient: comparable whatever its number of columns.
   double wald(const Members& members) const;
 
@@ -76,6 +79,8 @@ class CrossValidation {
   void divide(Folds& folds) const;
   std::vector<int> columns(const Members& members) const;
   Eigen::VectorXd solve(const Sum& sum, const Members& members) const;
+  /// T of c = T c_model: ones on the diagonal, and where a stage of the thrust meets its scale.
+  Eigen::MatrixXd from_model(const Members& members) const;
 
   const Grams& grams_;
   Folds random_, by_flight_;

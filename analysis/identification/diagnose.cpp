@@ -196,6 +196,20 @@ bool has_plain_scale(const std::vector<Missing>& ranking) {
   });
 }
 
+/// settle() without formulas that only take back what a scale of the thrust says too much.
+Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std::vector<Candidate> rivals,
+                             const std::vector<std::string>& names) {
+  constexpr int kMostRounds = 4;
+  Settled result = settle(passes, covered, rivals, names);
+  for (int round = 1; round < kMostRounds; ++round) {
+    const std::set<std::string> substitutes = substitutes_of_scales(result.selected);
+    if (substitutes.empty()) break;
+    erase(rivals, substitutes);
+    result = settle(passes, covered, rivals, names);
+  }
+  return result;
+}
+
 /// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
 /// selection is done anew with them among the candidates, and they are what is left. Names that only formulas point to
 /// take part as well.
@@ -211,7 +225,7 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
   std::vector<std::string> names;
   for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);
-  Settled again = settle(passes, covered, rivals, names);
+  Settled again = settle_with_formulas(passes, covered, rivals, names);
   const auto is_known = [](const Missing& missing) {
     return is_named(missing) && !needs_scan(missing.effect);
   };

@@ -77,7 +77,8 @@ void find_rivals(const Selection& selection, const Members& members, Finding& fi
                                       [&](const Rival& r) { return r.effect == other.name; });
     if (!is_known && paired_z(selection.block_errors(instead), full_errors) < kClearlyBetter_z)
       finding.rivals.push_back({other.name, other.info.excitation});
-    widen(finding.model_form, selection.fit(with(instead, members.back())).coefficients.tail(p));
+    const Members both = with(instead, members.back());
+    widen(finding.model_form, selection.in_model(both, selection.coefficients(both)).tail(p));
   }
 }
 
@@ -107,10 +108,10 @@ std::vector<Finding> findings(const Selection& selection, const Members& members
     finding.paired_z = paired_z(selection.block_errors(rest), selection.block_errors(last));
     finding.wald_z = selection.wald(last);
     const Eigen::Index p = selection.candidate(members[i]).columns();
-    const Eigen::VectorXd own = selection.fit(last).coefficients.tail(p);
+    const Eigen::VectorXd own = selection.in_model(last, selection.coefficients(last)).tail(p);
     for (Eigen::Index c = 0; c < p; ++c) finding.model_form.emplace_back(own[c], own[c]);
     for (const Eigen::VectorXd& fold : selection.fold_coefficients(last))
-      widen(finding.model_form, fold.tail(p));
+      widen(finding.model_form, selection.in_model(last, fold).tail(p));
     find_rivals(selection, last, finding);
     result.push_back(std::move(finding));
   }

@@ -96,6 +96,22 @@ class Injector {
     return true;
   }
 
+  /// Factor of the column of a lag whose gain is 1, beside the members.
+  double lag_factor() const {
+    if (members_.empty()) return 1;
+    const Eigen::VectorXd c = Selection(base_).coefficients(members_);
+    std::vector<const Candidate*> effects;
+    for (const Candidate& candidate : base_.candidates) effects.push_back(&candidate);
+    double factor = 1;
+    for (const ScaledStage& pair : scaled_stages(effects)) {
+      if (pair.stage + 1 != effects.size() || pair.scale + 1 == effects.size()) continue;
+      Eigen::Index at = 0;
+      for (std::size_t i = 0; i < pair.scale; ++i) at += effects[i]->columns();
+      factor += c[at] / effects[pair.stage]->scale;
+    }
+    return factor;
+  }
+
   /// Thetas with enough samples, those nearest to the effect's own first.
   std::vector<int> supported_thetas() const {
     const Thresholds thresholds;
@@ -192,8 +208,9 @@ std::vector<Detectable> detectable(const Grams& grams, const Members& members) {
         return candidate.thetas[static_cast<std::size_t>(a)][0] <
                candidate.thetas[static_cast<std::size_t>(b)][0];
       });
+      const double factor = injector.lag_factor();
       for (const int theta : by_time) {
-        if (!injector.is_shown(0, 1, theta)) continue;
+        if (!injector.is_shown(0, factor, theta)) continue;
         entry.size = candidate.thetas[static_cast<std::size_t>(theta)][0];
         break;
       }

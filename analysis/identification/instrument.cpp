@@ -107,6 +107,17 @@ std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& colu
   return values;
 }
 
+/// Coefficients in `mix` become those of the model: see scaled_stages().
+void scale_stages(const std::vector<Candidate>& effects, const Grams& columns, Eigen::MatrixXd& mix) {
+  std::vector<const Candidate*> all;
+  for (const Candidate& effect : effects) all.push_back(&effect);
+  for (const ScaledStage& pair : scaled_stages(all)) {
+    const Eigen::Index scale = columns.first_column[pair.scale][0];
+    const Eigen::Index stage = columns.first_column[pair.stage][0];
+    mix.row(stage) += mix.row(scale) / effects[pair.stage].scale;
+  }
+}
+
 /// A shape that is estimated as well: its derivative is a difference of columns.
 struct FreeShape {
   std::size_t effect, index;
@@ -170,6 +181,7 @@ std::vector<std::vector<InstrumentedValue>> instrument(const Passes& passes,
   for (Eigen::Index i = 0, to = 0; i < columns.columns; ++i) {
     if (varies[static_cast<std::size_t>(i)] != 0) mix(i, to++) = 1;
   }
+  scale_stages(effects, columns, mix);
   const std::vector<InstrumentedValue> values = estimates(passes, columns, mix);
   if (values.empty()) return {};
   std::vector<std::vector<InstrumentedValue>> result;
@@ -214,6 +226,7 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
   for (std::size_t e = 0; e < around.size(); ++e) {
     for (int c = 0; c < around[e].columns(); ++c) mix(columns.first_column[e][0] + c, at++) = 1;
   }
+  scale_stages(around, columns, mix);
   for (const FreeShape& shape : free) {
     for (int c = 0; c < around[shape.effect].columns(); ++c) {
       const double slope = refined[shape.effect].coefficients[static_cast<std::size_t>(c)] / shape.width;

@@ -118,7 +118,8 @@ class Refinement {
     for (int m = 0; m < static_cast<int>(around.size()); ++m) members.push_back({m, 0});
     Point point;
     point.thetas = thetas;
-    const Eigen::VectorXd c = Selection(full).fit(members).coefficients;
+    const Selection selection(full);
+    const Eigen::VectorXd c = selection.coefficients(members), in_model = selection.in_model(members, c);
     // Column of unknown k = sum over the columns of `full`.
     Eigen::MatrixXd mix = Eigen::MatrixXd::Zero(full.columns, static_cast<Eigen::Index>(unknowns_.size()));
     point.coefficients = Eigen::VectorXd::Zero(mix.cols());
@@ -132,7 +133,7 @@ class Refinement {
       const Eigen::Index first = first_coefficient[u.member];
       const std::vector<int>& columns = full.first_column[u.member];
       if (!u.is_shape) {
-        point.coefficients[column] = c[first + static_cast<Eigen::Index>(u.index)];
+        point.coefficients[column] = in_model[first + static_cast<Eigen::Index>(u.index)];
         mix(columns[0] + static_cast<int>(u.index), column) = 1;
         continue;
       }
@@ -141,6 +142,14 @@ class Refinement {
       for (int i = 0; i < around[u.member].columns(); ++i) {
         mix(columns[upper] + i, column) = c[first + i] / width;
         mix(columns[lower] + i, column) = -c[first + i] / width;
+      }
+    }
+    std::vector<const Candidate*> effects;
+    for (const Candidate& candidate : around) effects.push_back(&candidate);
+    for (const ScaledStage& pair : scaled_stages(effects)) {
+      for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+        if (unknowns_[k].member == pair.scale && !unknowns_[k].is_shape)
+          mix(full.first_column[pair.stage][0], static_cast<Eigen::Index>(k)) = 1 / around[pair.stage].scale;
       }
     }
     const Eigen::Index n = mix.cols();

@@ -11,6 +11,8 @@
 namespace swarmcert::identification {
 namespace {
 
+constexpr double kClearly_z = 2;
+
 double total_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
@@ -24,22 +26,39 @@ bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, 
   return telling_blocks(grams, candidate, theta) >= static_cast<double>(blocks);
 }
 
-/// Where the voltage falls by little, its effect is a change of scale, and a wake whose neighbours move slowly has no
-/// delay: that is what flights show unless they clearly say more.
+/// Where the voltage falls by little, its effect is a change of scale; where speed or thrust vary by little, every drag is
+/// a linear one; and a wake whose neighbours move slowly has no delay. The plain form is what flights show unless they
+/// clearly say more.
 int Selection::plain_form(int which) const {
   const std::string& name = grams().candidates[static_cast<std::size_t>(which)].name;
-  if (name != "battery" && name != "wake_delay") return -1;
-  const char* const plain = name == "battery" ? "thrust_ratio" : "downwash";
+  if (name == "battery") return index_of("thrust_ratio");
+  if (name == "drag_quadratic" || name == "drag_rotor") return index_of("drag_linear");
+  if (name == "wake_delay") return index_of("downwash");
+  return -1;
+}
+
+int Selection::index_of(const char* name) const {
   for (int k = 0; k < static_cast<int>(grams().candidates.size()); ++k) {
-    if (grams().candidates[static_cast<std::size_t>(k)].name == plain) return k;
+    if (grams().candidates[static_cast<std::size_t>(k)].name == name) return k;
   }
   return -1;
 }
 
-bool Selection::is_clearly_better(const Members& after, const Members& before) const {
-  constexpr double kClearly_z = 2;
+/// Flights differ in their scale of the thrust, and in their heights: only what changes within flights is a ceiling.
+bool Selection::is_shown_within_flights(const Members& before, const Member& added) const {
+  if (candidate(added).name != "ceiling") return true;
+  Members rest = before;
+  const int scale = index_of("thrust_ratio");
+  if (scale >= 0 && !is_present(before, scale)) rest.push_back({scale, 0});
+  const Members after = with(rest, added);
   const Folds& folds = folds_for(after);
-  return paired_z(block_errors(before, folds), block_errors(after, folds)) >= kClearly_z;
+  return paired_z(trimmed_errors(rest, folds), trimmed_errors(after, folds)) >= kClearly_z;
+}
+
+bool Selection::is_clearly_better(const Members& after, const Members& before) const {
+  const Folds& folds = folds_for(after);
+  return mean_square(after, folds) <= (1 - thresholds_.gain) * mean_square(before, folds) &&
+         paired_z(block_errors(before, folds), block_errors(after, folds)) >= kClearly_z;
 }
 
 std::vector<double> Selection::errors(const Members& members, const Folds& folds, bool trims) const {
@@ -70,7 +89,7 @@ bool Selection::formula_wins(const Members& rest, const Member& formula, const M
 
 bool Selection::is_held(const Members& members) const {
   if (!candidate(members.back()).info.remembers) return false;
-  const Eigen::VectorXd c = coefficients(members);
+  const Eigen::VectorXd c = in_model(members, coefficients(members));
   return std::abs(c[c.size() - 1] - 1) > 0.999 * kMemoryTolerance;
 }
 
@@ -118,7 +137,7 @@ bool Selection::is_acceptable(const Members& before, const Member& added, double
   const std::size_t blocks = is_plain ? thresholds_.plain_support_blocks : thresholds_.support_blocks;
   const auto k = static_cast<std::size_t>(added.candidate), t = static_cast<std::size_t>(added.theta);
   if (!is_supported(grams(), k, t, blocks, thresholds_)) return false;
-  if (is_held(after)) return false;
+  if (is_held(after) || !is_shown_within_flights(before, added)) return false;
   const double z = paired_z(errors_before, errors_after);
   return z >= thresholds_.paired_z || (z >= thresholds_.least_paired_z && wald(after) >= thresholds_.wald_z);
 }

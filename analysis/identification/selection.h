@@ -58,7 +58,11 @@ class Selection : public CrossValidation {
   std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
   /// The candidate that `candidate` becomes where what it varies with stays the same; -1 if there is none.
   int plain_form(int candidate) const;
-  /// Blocks that were left out prefer `after` by two standard errors.
+  /// Of the candidate with this name; -1 if there is none.
+  int index_of(const char* name) const;
+  /// Of a ceiling: about the mean of each track, beside a scale of the thrust, it lowers the error of blocks left out.
+  bool is_shown_within_flights(const Members& before, const Member& added) const;
+  /// Blocks that were left out prefer `after` by two standard errors, and by as much as an effect must gain.
   bool is_clearly_better(const Members& after, const Members& before) const;
   /// A formula of the scan (scan/formulas.h), which stands for whatever has no name.
   bool is_formula(const Member& member) const;

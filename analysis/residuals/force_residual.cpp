@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "analysis/residuals/published_lag.h"
+#include "analysis/residuals/thrust_stage.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::residuals {
@@ -31,8 +32,6 @@ void pass_stage(const stability::AppliedEffect& stage, Track& track) {
     now.thrust_N += stage.coefficients()[0] * change.force_W_N.dot(now.b3_W());
   }
 }
-
-bool is_stage(const std::string& effect) { return effect == "delay" || effect == "motor_lag"; }
 
 /// The model says what its motors give at the commands of the log, which are those of as many motors.
 bool knows_motors(const stability::Model& model, const Track& track) {
@@ -146,7 +145,7 @@ std::vector<Eigen::Vector3d> force_residual(const stability::Model& model, const
   std::vector<std::unique_ptr<stability::AppliedEffect>> effects;
   std::vector<std::unique_ptr<stability::ColumnStream>> streams;
   for (const stability::EffectSpec& spec : model.effects) {
-    if (is_stage(spec.name) || !spec.acts_on(track.vehicle)) continue;
+    if (is_thrust_stage(spec.name) || !spec.acts_on(track.vehicle)) continue;
     effects.push_back(std::make_unique<stability::AppliedEffect>(spec, context_of(model, kinds)));
     streams.push_back(effects.back()->effect().stream(effects.back()->shape().data()));
   }

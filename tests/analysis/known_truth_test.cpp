@@ -53,9 +53,12 @@ TEST(KnownTruth, WornMotorsAreAThrustRatioAndNoConstantForce) {
   EXPECT_GT(1 + ratio.parameters.at("ratio"), 0.69);
   EXPECT_LT(1 + ratio.parameters.at("ratio"), 0.76);
   EXPECT_EQ(ratio.equivalence_class, "mass / payload / thrust scale");
-  EXPECT_GT(place_of(diagnosis, "drag_rotor"), 0) << "or its rival drag_linear";
-  EXPECT_GT(place_of(diagnosis, "motor_lag"), 0)
-      << "which trims that differ from flight to flight had hidden";
+  EXPECT_GT(place_of(diagnosis, "drag_linear"), 0);
+  const int lag = place_of(diagnosis, "motor_lag");
+  ASSERT_GT(lag, 0) << "which trims that differ from flight to flight had hidden";
+  const double tau_s = diagnosis.ranking[static_cast<std::size_t>(lag)].parameters.at("tau_s");
+  EXPECT_GT(tau_s, 0.05) << "of the thrust behind the ratio: 70 ms by an independent program";
+  EXPECT_LT(tau_s, 0.09);
 }
 
 TEST(KnownTruth, StrongerMotorsAreAThrustRatioThenDrag) {
@@ -65,7 +68,12 @@ TEST(KnownTruth, StrongerMotorsAreAThrustRatioThenDrag) {
     double mass_kg;
   };
   for (const Case& c :
-       {Case{{"log08", "log09", "log11"}, 0.0333}, {{"log52", "log57", "log63", "log58"}, 0.0375}}) {
+       {Case{{"log08", "log09", "log11"}, 0.0333},
+        {{"log12", "log13", "log14", "log16", "log17"}, 0.0368},  // 1.41 m high, give or take 2 cm
+        {{"log36", "log37", "log38", "log39", "log41", "log42", "log43"}, 0.0375},
+        {{"log52", "log57", "log63", "log58"}, 0.0375},
+        {{"log71", "log72", "log73", "log74", "log77", "log78", "log79"}, 0.0375},
+        {{"log121", "log122", "log123", "log124", "log126", "log127", "log129"}, 0.0375}}) {
     std::vector<std::string> flights;
     for (const std::string& log : c.logs) flights.push_back("crazyswarm2-tools/logs/" + log);
     const Diagnosis diagnosis = diagnosis_of(flights, c.mass_kg);
@@ -74,7 +82,11 @@ TEST(KnownTruth, StrongerMotorsAreAThrustRatioThenDrag) {
     EXPECT_EQ(diagnosis.ranking[0].effect, "thrust_ratio");
     EXPECT_GT(1 + diagnosis.ranking[0].parameters.at("ratio"), 1.38);
     EXPECT_LT(1 + diagnosis.ranking[0].parameters.at("ratio"), 1.62);
-    EXPECT_EQ(diagnosis.ranking[1].effect.substr(0, 4), "drag");
+    EXPECT_EQ(diagnosis.ranking[1].effect, "drag_linear");
+    EXPECT_GT(diagnosis.ranking[1].intervals.at("drag_N_s_m").second, 0.009)
+        << "at 52 to 63 the value is 0.0084";
+    EXPECT_LT(diagnosis.ranking[1].parameters.at("drag_N_s_m"), 0.014);
+    EXPECT_EQ(place_of(diagnosis, "ceiling"), -1) << "flights that never come away from one show none";
   }
 }
 

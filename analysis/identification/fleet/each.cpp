@@ -69,12 +69,6 @@ FlightNumbers flight_numbers(const std::vector<Missing>& fitted, double weight_N
       number.interval = {source.nominal + interval->second.first, source.nominal + interval->second.second};
     }
   }
-  // The lag of r T is r (L_tau T - T), about L_(r tau) T - T: what is fitted to T is r tau.
-  FlightNumber& lag = numbers["lag_s"];
-  if (const FlightNumber& ratio = numbers["thrust_ratio"]; ratio.is_observable && ratio.value > 0) {
-    lag.value /= ratio.value;
-    lag.interval = {lag.interval.first / ratio.value, lag.interval.second / ratio.value};
-  }
   return numbers;
 }
 
