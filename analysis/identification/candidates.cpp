@@ -204,14 +204,14 @@ std::vector<ScaledStage> scaled_stages(const std::vector<const Candidate*>& effe
 }
 
 bool is_written_by_hand(const std::string& name) {
-  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque" || name == "rotor_thrust" ||
-         name == "com_offset" || name == "accelerometer_scale";
+  return name == "deep_set" || name == "torque_bias" || name == "downwash_torque" || name == "com_offset" ||
+         name == "accelerometer_scale";
 }
 
 std::vector<std::string> candidate_names(const stability::Model& model) {
   std::vector<std::string> names;
   for (const std::string& name : stability::effect_names()) {
-    if (!is_written_by_hand(name)) names.push_back(name);
+    if (!is_written_by_hand(name) && name != kRotorThrust) names.push_back(name);
   }
   for (const EffectSpec& spec : model.effects) {
     if (spec.is_expression()) names.push_back(spec.name);

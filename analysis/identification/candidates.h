@@ -61,6 +61,9 @@ Candidate candidate(const std::string& name, const stability::Model& model, cons
 /// Whether an effect of this name cannot be fitted to the force of a flight: it acts as a torque, or is a network.
 bool is_written_by_hand(const std::string& name);
 
+/// Fitted to the loads of the rotors in slow flight (rotors/rotor_fit.h); the force of a flight shows their sum only.
+inline constexpr char kRotorThrust[] = "rotor_thrust";
+
 /// Names that candidate() knows for `model`.
 std::vector<std::string> candidate_names(const stability::Model& model);
 

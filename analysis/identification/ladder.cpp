@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/identification/rotors/rotor_fit.h"
 #include "analysis/identification/scan/proposal.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/force_residual.h"
@@ -44,13 +45,18 @@ double rmse(residuals::Inputs inputs, const stability::Model& model, const std::
   return count > 0 ? std::sqrt(sum / count) : 0;
 }
 
-/// What no model can remove from the flights `which`: the white part of the spectrum.
-double noise_floor_N(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
-                     int jobs) {
-  inputs.models = {model};
+residuals::Inputs only_flights(residuals::Inputs inputs, const std::vector<int>& which) {
   std::vector<residuals::FlightFiles> flights;
   for (const int i : which) flights.push_back(inputs.found.flights[static_cast<std::size_t>(i)]);
   inputs.found.flights = std::move(flights);
+  return inputs;
+}
+
+/// What no model can remove from the flights `which`: the white part of the spectrum.
+double noise_floor_N(residuals::Inputs inputs, const stability::Model& model, const std::vector<int>& which,
+                     int jobs) {
+  inputs = only_flights(std::move(inputs), which);
+  inputs.models = {model};
   const double floor_N = residuals::compare(inputs, jobs, [](int, int) {}).overall.noise_floor_N.norm();
   return std::isfinite(floor_N) ? floor_N : 0;
 }
@@ -138,6 +144,31 @@ void withdraw(residuals::Inputs& inputs, const std::string& name) {
   });
 }
 
+/// `names` fitted jointly; the factors of the rotors, if they are among them, on top of the others and last.
+std::vector<Missing> fit_with_rotors(const residuals::Inputs& inputs, const std::string& kind,
+                                     std::vector<std::string> names, const std::vector<int>& which, int jobs,
+                                     const residuals::Progress& progress) {
+  const auto rotors = std::remove(names.begin(), names.end(), kRotorThrust);
+  const bool has_rotors = rotors != names.end();
+  names.erase(rotors, names.end());
+  std::vector<Missing> fitted;
+  if (!names.empty()) fitted = fit_effects(inputs, kind, names, which, jobs, progress);
+  if (!has_rotors) return fitted;
+  residuals::Inputs held = inputs;
+  const std::vector<stability::EffectSpec> beside = specs_of(fitted);
+  change_models(held, [&](stability::Model& model) { model = with_effects(model, beside); });
+  for (Missing& found : fit_rotors(held, kind, which, jobs)) fitted.push_back(std::move(found));
+  return fitted;
+}
+
+/// How far the rotors of the flights `which` are from balance under `model`; empty where no flight shows it.
+std::optional<double> imbalance_N(const residuals::Inputs& inputs, const stability::Model& model,
+                                  const std::vector<int>& which, int jobs) {
+  const std::vector<RotorLoads> loads = rotor_loads(only_flights(inputs, which), model.kind, jobs);
+  if (loads.empty()) return std::nullopt;
+  return rotor_imbalance_N(loads, rotor_factors_of(model));
+}
+
 /// One candidate on top of the model of the last accepted row.
 struct Trial {
   LadderRow row;
@@ -207,18 +238,39 @@ Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int 
     }
     std::vector<std::string> names = accepted;
     names.push_back(name);
-    std::vector<Missing> fitted = fit_effects(working, kind, names, ladder.split.fit, jobs, progress);
+    const bool is_rotors = name == kRotorThrust;
+    std::vector<Missing> fitted = fit_with_rotors(working, kind, names, ladder.split.fit, jobs, progress);
+    const auto fresh = std::find_if(fitted.rbegin(), fitted.rend(), [&](const Missing& missing) {
+      return (missing.effect == kRotorThrust) == is_rotors;
+    });
+    if (fresh == fitted.rend()) {
+      trials.push_back(trials[best]);
+      trials.back().row.effect = name;
+      trials.back().row.accepted = false;
+      trials.back().row.note = "no flight of the fit has slow flight with the duty of each of four motors";
+      continue;
+    }
     Trial next = trial(name, with_effects(working.models[0], specs_of(fitted)));
     const double before_N = trials[best].row.select_rmse_N, after_N = next.row.select_rmse_N;
-    const bool helps = after_N <= (1 - kLeastFall) * before_N;
-    if (!helps)
+    bool helps = after_N <= (1 - kLeastFall) * before_N;
+    if (is_rotors) {
+      const auto off_before_N = imbalance_N(inputs, trials[best].model, ladder.split.select, jobs);
+      const auto off_after_N = imbalance_N(inputs, next.model, ladder.split.select, jobs);
+      helps = off_before_N && *off_after_N <= (1 - kLeastFall) * *off_before_N;
+      next.row.note =
+          off_before_N ? fmt::format("rotors of the select flights are {:.5f} N, then {:.5f} N off balance",
+                                     *off_before_N, *off_after_N)
+                       : "the select flights have no slow flight with the duty of each motor";
+      if (helps) next.row.note.clear();
+    } else if (!helps) {
       next.row.note =
           fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N", before_N, after_N);
+    }
     next.row.accepted = helps || options.keep_anyway;
     if (next.row.accepted) {
-      for (const stability::EffectSpec& fresh : fitted.back().specs) {
+      for (const stability::EffectSpec& spec : fresh->specs) {
         for (stability::EffectSpec& effect : next.model.effects) {
-          if (effect.name != fresh.name || effect.vehicle != fresh.vehicle) continue;
+          if (effect.name != spec.name || effect.vehicle != spec.vehicle) continue;
           effect.fit.select_rmse_before_N = before_N;
           effect.fit.select_rmse_after_N = after_N;
           if (!helps) effect.fit.note = "kept although " + next.row.note;

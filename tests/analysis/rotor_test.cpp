@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 
 #include "analysis/identification/rotors/rotor_balance.h"
+#include "analysis/identification/rotors/rotor_fit.h"
 #include "data.h"
 #include "stability/model.h"
 
@@ -75,6 +77,31 @@ TEST(RotorBalance, ComparesAVehicleWithItselfOnly) {
   EXPECT_TRUE(rotor_balances(other, healthy(), small()).empty());
 }
 
+TEST(RotorFit, GivesTheFactorsThatCarryTheWeightWithoutATorque) {
+  const Eigen::Vector4d factors(0.95, 1.02, 0.8, 1.0);
+  const stability::Model model = small();
+  const double each_N = model.weight_N() / 4;
+  const RotorLoads flight = loads(each_N * factors.cwiseInverse());
+  const double scale = model.weight_N() / flight.mean_N.sum();
+  const RotorFactors found = rotor_factors({flight, flight}, {scale, scale}, model);
+  for (std::size_t k = 0; k < 4; ++k)
+    EXPECT_NEAR(found[k].value, factors[static_cast<Eigen::Index>(k)], 1e-12);
+  EXPECT_NEAR(rotor_imbalance_N({flight}, found), 0, 1e-12);
+  EXPECT_GT(rotor_imbalance_N({flight}, RotorFactors{}), 1e-3);
+  const RotorFactors beside_a_scale = rotor_factors(flight);
+  for (std::size_t k = 0; k < 4; ++k)
+    EXPECT_NEAR(beside_a_scale[k].value, found[k].value / scale, 1e-12) << "each has the sum of the map";
+}
+
+TEST(RotorFit, OfOneFlightIsAsUncertainAsTheBatterysPlace) {
+  const stability::Model model = small();
+  const RotorFactors one = rotor_factors({loads(kHealthy_N)}, {1}, model);
+  const double lever_m = model.arm_m * std::sqrt(0.5);
+  for (const RotorFactor& factor : one)
+    EXPECT_NEAR((factor.interval.second - factor.interval.first) / 2, factor.value * kBatteryPlay_m / lever_m,
+                1e-12);
+}
+
 /// CrazyPAD, vehicle E8: propellers cut by so many millimetres, both blades together, and flights of whole propellers.
 struct Condition {
   const char* folder;
@@ -118,6 +145,73 @@ TEST(RotorBalance, NamesCutPropellersAndNothingElseInRecordedFlights_slow) {
     }
   }
   EXPECT_EQ(others, 6 + 2 + 3 + 1 + 6 + 2);
+}
+
+/// What was cut off both blades, in millimetres: all but the last length in the name of a folder that has several.
+double removed_mm(const std::string& folder) {
+  std::vector<double> lengths;
+  for (std::size_t at = folder.find("_M3_"); at != std::string::npos; at = folder.find('_', at + 1)) {
+    const std::string text = folder.substr(at + 1);
+    if (text.rfind("M3", 0) != 0) lengths.push_back(std::stod(text));
+  }
+  constexpr double kShortestBlade_mm = 30;
+  double sum = 0;
+  for (const double length : lengths) sum += length < kShortestBlade_mm ? length : 0;
+  return sum;
+}
+
+std::vector<double> ranks_of(const std::vector<double>& values) {
+  std::vector<double> ranks;
+  for (const double value : values) {
+    double below = 0, alike = 0;
+    for (const double other : values) {
+      below += other < value ? 1 : 0;
+      alike += other == value ? 1 : 0;
+    }
+    ranks.push_back(below + (alike - 1) / 2);
+  }
+  return ranks;
+}
+
+double spearman(const std::vector<double>& a, const std::vector<double>& b) {
+  const std::vector<double> x = ranks_of(a), y = ranks_of(b);
+  const double middle = (static_cast<double>(x.size()) - 1) / 2;
+  double xx = 0, yy = 0, xy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    xx += (x[i] - middle) * (x[i] - middle);
+    yy += (y[i] - middle) * (y[i] - middle);
+    xy += (x[i] - middle) * (y[i] - middle);
+  }
+  return xy / std::sqrt(xx * yy);
+}
+
+/// Factors of `add rotor_thrust` and of `diagnose --against` on the same flights.
+TEST(RotorFit, WeaknessGrowsWithWhatWasCutOffInRecordedFlights_slow) {
+  const std::string collection = tests::data_path("collections/crazypad");
+  if (!std::filesystem::exists(collection)) GTEST_SKIP() << "no recorded data";
+  const std::vector<RotorLoads> whole = loads_of("normal_flight");
+  std::vector<double> removed, weakness, weakness_against;
+  for (const auto& entry : std::filesystem::directory_iterator(collection)) {
+    const std::string folder = entry.path().filename().string();
+    if (folder.rfind("cut_propeller_M3_", 0) != 0) continue;
+    std::vector<RotorLoads> own = loads_of(folder);
+    own.erase(std::remove_if(own.begin(), own.end(),
+                             [](const RotorLoads& flight) { return flight.vehicle != "E8"; }),
+              own.end());
+    if (own.empty()) continue;
+    removed.push_back(removed_mm(folder));
+    weakness.push_back(1 - rotor_factors(own, std::vector<double>(own.size(), 1), small())[2].value);
+    for (const RotorBalance& balance : rotor_balances(own, whole, small())) {
+      if (balance.flight.empty()) weakness_against.push_back(1 - balance.factors[2].value);
+    }
+  }
+  ASSERT_GE(removed.size(), 15u);
+  ASSERT_EQ(weakness_against.size(), removed.size());
+  const double fitted = spearman(removed, weakness), against = spearman(removed, weakness_against);
+  std::printf("Spearman over %zu conditions: %.3f as fitted, %.3f against healthy flights\n", removed.size(),
+              fitted, against);
+  EXPECT_GT(fitted, 0.9);
+  EXPECT_GT(against, 0.9);
 }
 
 }  // namespace

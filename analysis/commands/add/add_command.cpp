@@ -40,7 +40,8 @@ std::vector<std::string> split_names(const std::string& text) {
 
 void check(const std::vector<std::string>& names, const stability::Model& model) {
   if (names.empty()) throw UsageError("no effect is named: add EFFECT[,EFFECT], auto, undo or show");
-  const std::vector<std::string> known = identification::candidate_names(model);
+  std::vector<std::string> known = identification::candidate_names(model);
+  known.emplace_back(identification::kRotorThrust);
   std::vector<std::string> all = known;
   all.insert(all.end(), {"auto", "com_offset", "deep_set", "downwash_torque", "formula", "shape", "show",
                          "torque_bias", "undo"});
@@ -195,8 +196,11 @@ Command add_command() {
       "formula is the best formula for what the model leaves, as diagnose shows it (formula:2 the second); "
       "shape\n"
       "is a smooth or monotone curve where no formula holds. "
-      "vehicle_offset is a constant force of each vehicle; com_offset and torque_bias are fitted to the "
-      "rotors' mean torques. undo goes back by one accepted effect; show "
+      "vehicle_offset is a constant force of each vehicle; rotor_thrust a factor for each rotor, from its "
+      "duty in slow
+"
+      "flight; com_offset and torque_bias are fitted to the rotors' mean torques. undo goes back by one "
+      "accepted effect; show "
       "prints "
       "the\n"
       "ladders of all --model files.\n\n"

@@ -46,10 +46,22 @@ std::string cell(const FlightNumbers& numbers, const std::string& name) {
                      n.is_outlier ? " outlier" : "");
 }
 
-void print_row(const std::string& name, const std::string& vehicle, const FlightNumbers& numbers) {
+/// Those that some flight shows: logs without duties show no rotor.
+std::vector<std::string> shown_numbers(const Each& each) {
+  std::vector<std::string> shown;
+  for (const std::string& name : identification::each_numbers()) {
+    const bool is_shown =
+        std::any_of(each.flights.begin(), each.flights.end(),
+                    [&](const EachFlight& flight) { return cell(flight.numbers, name) != "-"; });
+    if (is_shown || name.rfind("rotor_", 0) != 0) shown.push_back(name);
+  }
+  return shown;
+}
+
+void print_row(const std::string& name, const std::string& vehicle, const FlightNumbers& numbers,
+               const std::vector<std::string>& shown) {
   fmt::print("    {:<28} {:<8}", name, vehicle);
-  for (const std::string& number : identification::each_numbers())
-    fmt::print(" {:<32}", cell(numbers, number));
+  for (const std::string& number : shown) fmt::print(" {:<32}", cell(numbers, number));
   fmt::print("\n");
 }
 
@@ -122,16 +134,17 @@ void add_each(const std::vector<Each>& kinds, files::Json& result) {
 
 void print_each(const Each& each) {
   fmt::print("  Each flight (90 % intervals):\n    {:<28} {:<8}", "flight", "vehicle");
-  for (const std::string& number : identification::each_numbers()) fmt::print(" {:<32}", number);
+  const std::vector<std::string> shown = shown_numbers(each);
+  for (const std::string& number : shown) fmt::print(" {:<32}", number);
   fmt::print("\n");
   for (const EachFlight& flight : each.flights) {
     if (flight.too_poor.empty())
-      print_row(flight.flight, flight.vehicle, flight.numbers);
+      print_row(flight.flight, flight.vehicle, flight.numbers, shown);
     else
       fmt::print("    {:<28} {:<8} too short: {}\n", flight.flight, flight.vehicle, flight.too_poor);
   }
   for (const EachDay& day : each.days) {
-    if (day.flights > 1) print_row("mean of " + day.day, day.vehicle, day.numbers);
+    if (day.flights > 1) print_row("mean of " + day.day, day.vehicle, day.numbers, shown);
   }
   for (const Drift& drift : each.drifts) {
     if (drift.is_there) fmt::print("    {}\n", words(drift));
@@ -140,12 +153,13 @@ void print_each(const Each& each) {
 
 void add_each(Report& report, const Each& each, std::size_t number) {
   std::vector<std::string> header = {"flight", "vehicle"};
-  for (const std::string& name : identification::each_numbers()) header.push_back(name + ", 90 %");
+  const std::vector<std::string> shown = shown_numbers(each);
+  for (const std::string& name : shown) header.push_back(name + ", 90 %");
   std::vector<std::vector<std::string>> rows;
-  const auto add_row = [&rows](const std::string& name, const std::string& vehicle,
-                               const FlightNumbers& numbers) {
+  const auto add_row = [&rows, &shown](const std::string& name, const std::string& vehicle,
+                                       const FlightNumbers& numbers) {
     rows.push_back({name, vehicle});
-    for (const std::string& n : identification::each_numbers()) rows.back().push_back(cell(numbers, n));
+    for (const std::string& n : shown) rows.back().push_back(cell(numbers, n));
   };
   for (const EachFlight& flight : each.flights) add_row(flight.flight, flight.vehicle, flight.numbers);
   for (const EachDay& day : each.days) {

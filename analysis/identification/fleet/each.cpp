@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/identification/fleet/flight_groups.h"
+#include "analysis/identification/rotors/rotor_fit.h"
 #include "analysis/residuals/statistics.h"
 
 namespace swarmcert::identification {
@@ -87,6 +88,24 @@ FlightNumbers fit_flight(const Fleet& own, const std::string& kind, int flight, 
   if (numbers["lag_s"].is_observable) return numbers;
   return flight_numbers(
       fit_effects(own.with_lag, kind, {"thrust_ratio", "drag_linear"}, {flight}, jobs, silent), weight_N);
+}
+
+/// The factor of each rotor in one flight of one vehicle, which shows them where it flies slowly.
+void add_rotors(const Inputs& own, const std::string& kind, const std::string& vehicle, int flight,
+                FlightNumbers& numbers) {
+  constexpr double kMostHalfWidth = 0.1;
+  Inputs one = own;
+  one.found.flights = {own.found.flights[static_cast<std::size_t>(flight)]};
+  for (const RotorLoads& loads : rotor_loads(one, kind, 1)) {
+    if (loads.vehicle != vehicle) continue;
+    const RotorFactors factors = rotor_factors(loads);
+    for (std::size_t k = 0; k < factors.size(); ++k) {
+      const Interval interval = factors[k].interval;
+      const double half = (interval.second - interval.first) / 2;
+      numbers["rotor_" + std::to_string(k + 1)] = {half > 0 && half < kMostHalfWidth, factors[k].value,
+                                                   interval};
+    }
+  }
 }
 
 /// `number` in the flights that show it.
@@ -188,8 +207,8 @@ std::vector<EachDay> days_of(const std::vector<EachFlight>& flights) {
     for (const std::string& number : each_numbers()) {
       std::vector<FlightNumber> seen_on_day;
       for (const EachFlight* flight : members) {
-        const FlightNumber& own = flight->numbers.at(number);
-        if (own.is_observable) seen_on_day.push_back(own);
+        const auto own = flight->numbers.find(number);
+        if (own != flight->numbers.end() && own->second.is_observable) seen_on_day.push_back(own->second);
       }
       day.numbers[number] = mean_of(seen_on_day);
     }
@@ -207,7 +226,10 @@ std::vector<EachFlight> flights_of(const Fleet& own, const std::string& vehicle,
     const Coverage covered = coverage(own.bare, kind, {i}, jobs);
     flight.blocks = covered.blocks;
     flight.too_poor = covered.too_poor();
-    if (flight.too_poor.empty()) flight.numbers = fit_flight(own, kind, i, weight_N, jobs);
+    if (flight.too_poor.empty()) {
+      flight.numbers = fit_flight(own, kind, i, weight_N, jobs);
+      add_rotors(own.bare, kind, vehicle, i, flight.numbers);
+    }
     flights.push_back(std::move(flight));
   }
   return flights;
@@ -216,7 +238,8 @@ std::vector<EachFlight> flights_of(const Fleet& own, const std::string& vehicle,
 }  // namespace
 
 const std::vector<std::string>& each_numbers() {
-  static const std::vector<std::string> names = {"thrust_ratio", "drag_N_s_m", "lag_s"};
+  static const std::vector<std::string> names = {"thrust_ratio", "drag_N_s_m", "lag_s",  "rotor_1",
+                                                 "rotor_2",      "rotor_3",    "rotor_4"};
   return names;
 }
 

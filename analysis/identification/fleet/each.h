@@ -1,7 +1,7 @@
 /// @file The same few numbers of every flight: which differ from the others, and which drift.
 ///
 /// What all flights of a kind have in common is held; thrust ratio, linear drag and motor lag are then fitted to each
-/// flight of each vehicle alone.
+/// flight of each vehicle alone, and the factors of its rotors to its slow flight (rotors/rotor_fit.h).
 #pragma once
 
 #include <map>
@@ -20,8 +20,8 @@ struct FlightNumber {
   bool is_outlier = false;  ///< among the flights of its vehicle, see each_flight()
 };
 
-/// The numbers by name: `thrust_ratio` as a factor, 1 is nominal; `drag_N_s_m`; `lag_s`. Whole values, not changes of
-/// the model's.
+/// The numbers by name: `thrust_ratio` as a factor, 1 is nominal; `drag_N_s_m`; `lag_s`; `rotor_1` .. `rotor_4`,
+/// factors of each rotor beside the thrust ratio that they share. Whole values, not changes of the model's.
 using FlightNumbers = std::map<std::string, FlightNumber>;
 
 /// One vehicle in one flight.
