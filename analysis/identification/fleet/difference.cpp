@@ -50,16 +50,61 @@ std::vector<EffectSpec> without_vehicles(const std::vector<EffectSpec>& specs) {
   return shared;
 }
 
-/// What `others` show of `kind`: named effects, and the best formula for what they leave.
-std::vector<EffectSpec> baseline(const Inputs& others, const std::string& kind, bool one_vehicle, int jobs,
-                                 const residuals::Progress& progress) {
-  const Diagnosis diagnosis = diagnose(others, kind, every_flight(others), jobs, progress);
-  std::vector<EffectSpec> specs = specs_of(diagnosis.ranking);
-  if (!one_vehicle) specs = without_vehicles(specs);
-  // What happened at some time of the others' flights says nothing of these.
+/// The first formula that lasts, where something is left: what happened at some time of the others' flights says nothing
+/// of these. Null if there is none.
+const Formula* lasting_formula(const Diagnosis& diagnosis) {
+  if (!leaves_something(diagnosis)) return nullptr;
   const auto lasting = std::find_if(diagnosis.formulas.begin(), diagnosis.formulas.end(),
                                     [](const Formula& formula) { return formula.variable != "time"; });
-  if (leaves_something(diagnosis) && lasting != diagnosis.formulas.end()) specs.push_back(lasting->effect);
+  return lasting == diagnosis.formulas.end() ? nullptr : &*lasting;
+}
+
+/// What more than half of the groups show, each by itself.
+struct Common {
+  std::vector<std::string> names;  ///< for fit_effects(), in the order of the first group that shows them
+  bool has_formula = false;
+};
+
+Common common_of(const Inputs& others, const std::string& kind, const std::vector<FlightGroup>& groups,
+                 int jobs) {
+  std::map<std::string, std::size_t> counts;
+  std::vector<std::string> order;
+  std::size_t formulas = 0;
+  for (const FlightGroup& group : groups) {
+    const Diagnosis diagnosis = diagnose(others, kind, group.flights, jobs, [](int, int) {});
+    formulas += lasting_formula(diagnosis) != nullptr ? 1 : 0;
+    for (const Missing& missing : diagnosis.ranking) {
+      const bool each = !missing.specs.empty() && !missing.specs[0].vehicle.empty();
+      const std::string name = each ? kVehicleOffset : missing.effect;
+      if (counts[name]++ == 0) order.push_back(name);
+    }
+  }
+  Common common;
+  common.has_formula = 2 * formulas > groups.size();
+  for (const std::string& name : order) {
+    if (2 * counts[name] > groups.size()) common.names.push_back(name);
+  }
+  return common;
+}
+
+/// What `others` show of `kind`: named effects, and the best formula for what they leave. Numbers that differ from day to
+/// day look like effects where the days are taken together: where there are groups, only what most of them show by
+/// themselves counts, with the numbers of all.
+std::vector<EffectSpec> baseline(const Inputs& others, const std::string& kind, bool one_vehicle,
+                                 const std::vector<FlightGroup>& groups, int jobs,
+                                 const residuals::Progress& progress) {
+  const bool has_groups = groups.size() >= 2;
+  const Common common = has_groups ? common_of(others, kind, groups, jobs) : Common{};
+  std::vector<EffectSpec> specs;
+  if (has_groups && !common.names.empty())
+    specs = specs_of(fit_effects(others, kind, common.names, every_flight(others), jobs, progress));
+  if (!has_groups || common.has_formula) {
+    const Inputs held = with_model_of_kind(others, kind, with_effects(*others.model_of(kind), specs));
+    const Diagnosis diagnosis = diagnose(held, kind, every_flight(held), jobs, progress);
+    if (!has_groups) specs = specs_of(diagnosis.ranking);
+    if (const Formula* const formula = lasting_formula(diagnosis)) specs.push_back(formula->effect);
+  }
+  if (!one_vehicle) specs = without_vehicles(specs);
   return specs;
 }
 
@@ -170,10 +215,13 @@ std::vector<Difference> differences(const Inputs& inputs, const Inputs& others, 
     }
     const Inputs own = of_one_vehicle(inputs, kind, vehicle);
     const Inputs base = difference.against_itself ? of_one_vehicle(others, kind, vehicle) : others;
+    const bool by_day = by_folder(base.found).size() >= kFewestDays;
+    difference.grouped_by = by_day ? "folder" : "flight";
+    const std::vector<FlightGroup> groups = rich_groups(base, kind, by_day, jobs);
     if (difference.against_itself) {
-      difference.held = baseline(base, kind, true, jobs, progress);
+      difference.held = baseline(base, kind, true, groups, jobs, progress);
     } else {
-      if (!has_all) of_all = baseline(others, kind, there.vehicles.size() == 1, jobs, progress);
+      if (!has_all) of_all = baseline(others, kind, there.vehicles.size() == 1, groups, jobs, progress);
       has_all = true;
       difference.held = of_all;
     }
@@ -181,10 +229,7 @@ std::vector<Difference> differences(const Inputs& inputs, const Inputs& others, 
     difference.diagnosis =
         diagnose(with_model_of_kind(own, kind, held), kind, every_flight(own), jobs, progress);
     difference.diagnosis.vehicle = vehicle;
-    const bool by_day = by_folder(base.found).size() >= kFewestDays;
-    difference.grouped_by = by_day ? "folder" : "flight";
     const Inputs base_held = with_model_of_kind(base, kind, held);
-    const std::vector<FlightGroup> groups = rich_groups(base_held, kind, by_day, jobs);
     difference.other_groups = static_cast<int>(groups.size());
     difference.own_groups = static_cast<int>(rich_groups(own, kind, by_day, jobs).size());
     judge(base_held, kind, groups, jobs, difference);
