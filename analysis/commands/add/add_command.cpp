@@ -197,8 +197,7 @@ Command add_command() {
       "shape\n"
       "is a smooth or monotone curve where no formula holds. "
       "vehicle_offset is a constant force of each vehicle; rotor_thrust a factor for each rotor, from its "
-      "duty in slow
-"
+      "duty in slow\n"
       "flight; com_offset and torque_bias are fitted to the rotors' mean torques. undo goes back by one "
       "accepted effect; show "
       "prints "

@@ -287,10 +287,8 @@ void refuse_twice(const learning::LearningFlights& flights) {
   }
 }
 
-int run_train(TrainOptions options, const CommonOptions& common) {
-  refuse_to_replace(common, common.json);
-  choose_beginning(common, options);
-  refuse_folder(common, options.report);
+/// Sets the options of the trainer that the command line gives as words.
+void choose_trainer(const CommonOptions& common, TrainOptions& options) {
   options.sizes.ground = !options.no_ground;
   training::TrainerOptions& trainer = options.run.trainer;
   trainer.gamma.scope = options.gamma_scope == "layer" ? files::GammaStatement::Scope::kLayer
@@ -303,7 +301,39 @@ int run_train(TrainOptions options, const CommonOptions& common) {
       options.weights == "errors" ? learning::Weighing::kErrors : learning::Weighing::kGroups;
   if (options.run.max_lipschitz > 0 && options.gamma_mode == "equal")
     throw UsageError("--max-lipschitz scales layers, which --gamma-mode equal forbids");
+}
 
+/// Certifies the network that was written, and scores it on the flights of the test.
+void certify_and_score(const TrainOptions& options, int jobs, const LearningData& data,
+                       const files::Network& network, Outcome& outcome) {
+  const learning::Run& run = outcome.trained.run;
+  lipschitz::CertifyOptions certify_options;
+  certify_options.jobs = jobs;
+  certify_options.lower.seed = options.run.trainer.seed;
+  outcome.certified = learning::write_certificate(network, options.output, certify_options);
+  outcome.all = {learning::rmse_of_nothing(data, Use::kTest),
+                 learning::rmse(data, run.theta, Use::kTest, jobs)};
+  if (data.samples.outputs > 1) outcome.components = scores_by_component(data, run.theta);
+  outcome.compositions = scores_by_composition(data, run.theta, Use::kTest, jobs);
+}
+
+/// Every file that was read, each once.
+std::vector<std::string> files_of(const learning::LearningFlights& flights) {
+  std::vector<std::string> files = flights.fit->files();
+  for (const residuals::Inputs* more : {flights.select, flights.test}) {
+    if (more == nullptr) continue;
+    for (const std::string& file : more->files()) {
+      if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
+    }
+  }
+  return files;
+}
+
+int run_train(TrainOptions options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  choose_beginning(common, options);
+  refuse_folder(common, options.report);
+  choose_trainer(common, options);
   const residuals::Inputs inputs = read_flights(options.flights, true, false, true);
   const std::optional<residuals::Inputs> select = others(options, options.select);
   const std::optional<residuals::Inputs> test = others(options, options.test);
@@ -330,32 +360,19 @@ int run_train(TrainOptions options, const CommonOptions& common) {
     return kInconclusive;
   }
 
-  if (trainer.gamma.mode == files::GammaStatement::Mode::kClip && !options.allow_worse) {
+  if (options.run.trainer.gamma.mode == files::GammaStatement::Mode::kClip && !options.allow_worse) {
     outcome.scales = learning::output_scales(data, run.theta);
     learning::scale_outputs(data.layout, outcome.scales, run.theta);
   }
-  const files::Network network = learning::write_network(data, run.theta, trainer.gamma, options.output);
+  const files::Network network =
+      learning::write_network(data, run.theta, options.run.trainer.gamma, options.output);
   outcome.select = {learning::rmse_of_nothing(data, Use::kSelect),
                     learning::rmse(data, run.theta, Use::kSelect, common.jobs)};
   outcome.select_compositions = scores_by_composition(data, run.theta, Use::kSelect, common.jobs);
   learning::write_models(inputs, data.layout, options.output, outcome.kept());
-  lipschitz::CertifyOptions certify_options;
-  certify_options.jobs = common.jobs;
-  certify_options.lower.seed = trainer.seed;
-  outcome.certified = learning::write_certificate(network, options.output, certify_options);
-  outcome.all = {learning::rmse_of_nothing(data, Use::kTest),
-                 learning::rmse(data, run.theta, Use::kTest, common.jobs)};
-  if (data.samples.outputs > 1) outcome.components = scores_by_component(data, run.theta);
-  outcome.compositions = scores_by_composition(data, run.theta, Use::kTest, common.jobs);
+  certify_and_score(options, common.jobs, data, network, outcome);
 
-  std::vector<std::string> files = inputs.files();
-  for (const residuals::Inputs* more : {flights.select, flights.test}) {
-    if (more == nullptr) continue;
-    for (const std::string& file : more->files()) {
-      if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
-    }
-  }
-  const files::Json result = result_of(options, files, data, outcome);
+  const files::Json result = result_of(options, files_of(flights), data, outcome);
   write_result(common, result);
   if (common.prints_text()) print(options, data, outcome);
   if (!options.report.empty()) {

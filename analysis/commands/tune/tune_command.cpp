@@ -101,14 +101,14 @@ std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult&
   return all;
 }
 
-std::string listed(const std::vector<std::string>& names) {
+std::string constraint_names(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text.empty() ? "none" : text;
 }
 
-void print_result(const TuneOptions& options, const TuneResult& found,
-                  const stability::TuneConstraints& limits) {
+void print_result(const TuneOptions& options, const TuneResult& found) {
+  const stability::TuneConstraints& limits = options.tune.constraints;
   const TunedPoint& a = found.shipped;
   const TunedPoint& b = found.best;
   fmt::print("Axis {}, least {} gain under: noise at most {:.6g} m/s^2, further lag of {:.6g} s borne",
@@ -126,7 +126,7 @@ void print_result(const TuneOptions& options, const TuneResult& found,
       fmt::print("INFEASIBLE: {}\n", found.infeasible);
     }
     fmt::print("nearest: Kp {:.6g}, Kd {:.6g}, Ki {:.6g}; violates {} by {:.3g} %\nsearch: {}\n", b.Kp, b.Kd,
-               b.Ki, listed(found.violated), 100 * b.excess, found.stopped);
+               b.Ki, constraint_names(found.violated), 100 * b.excess, found.stopped);
     return;
   }
   fmt::print("  {:<22} {:>12} {:>12}\n", "", "shipped", "tuned");
@@ -135,16 +135,13 @@ void print_result(const TuneOptions& options, const TuneResult& found,
     fmt::print("  {:<22} {:>12.6g} {:>12.6g} {:>11}  {}\n", q.name, q.shipped, q.tuned,
                std::isfinite(change) ? fmt::format("{:+.1f} %", change) : std::string("-"), q.unit);
   }
-  fmt::print("\nactive constraints: {}\n", listed(found.active_constraints));
+  fmt::print("\nactive constraints: {}\n", constraint_names(found.active_constraints));
   if (!a.feasible) fmt::print("the shipped gains violate a constraint\n");
   fmt::print("search: {}; good gains, not proved to be the best\n", found.stopped);
 }
 
-int run_tune(TuneOptions options, const CommonOptions& common) {
-  refuse_to_replace(common, common.json);
-  refuse_folder(common, options.report);
-  const Tracking input = load_tracking(options.tracking);
-  const int axis = options.axis == "x" ? 0 : options.axis == "y" ? 1 : 2;
+/// The sampled loop of the axis whose gains are searched.
+stability::SampledLoop loop_of(const TuneOptions& options, const Tracking& input, int axis) {
   std::optional<stability::SampledLoop> loop = sampled_axis_loop(input.gains, input.plant, axis);
   if (!loop) {
     const std::optional<stability::AxisLoop> continuous = axis_loop(input.gains, input.plant, axis);
@@ -153,12 +150,17 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
                              "the noise of the command depends on the rate of the loop"});
   }
   if (options.without_integrator) loop->plant.Ki = 0;
-  const bool integrates = loop->plant.Ki > 0;
-  if (!integrates && (options.objective == "rate" || options.tune.constraints.most_rate > 0)) {
+  if (!(loop->plant.Ki > 0) && (options.objective == "rate" || options.tune.constraints.most_rate > 0)) {
     throw UsageError(
         "without an integrator (Ki = 0) the rate gain is infinite: choose another objective, and leave "
         "--max-rate out");
   }
+  return *loop;
+}
+
+/// Sets the objective and, where the command line left them out, the limits: by default nothing may get worse than the
+/// given gains are, except the lag that is borne.
+void set_limits(const stability::SampledLoop& loop, const Tracking& input, int axis, TuneOptions& options) {
   if (!options.attitude.empty()) {
     if (axis == 2) throw UsageError("--attitude-gains: the z axis has no attitude loop");
     options.tune.attitude = attitude_cascade(input, options.attitude, axis);
@@ -167,17 +169,16 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
                            : options.objective == "edge"    ? stability::TuneObjective::kEdge
                            : options.objective == "rate"    ? stability::TuneObjective::kRate
                                                             : stability::TuneObjective::kImpulse;
-  const TunedPoint shipped = evaluate_gains(*loop, options.tune.objective);
+  const TunedPoint shipped = evaluate_gains(loop, options.tune.objective);
   stability::TuneConstraints& limits = options.tune.constraints;
-  // By default nothing may get worse than it is, except the lag that is borne; the slack is for rounding.
-  constexpr double kSlack = 1e-9;
+  constexpr double kSlack = 1e-9;  // for rounding
   if (limits.most_noise_m_s2 == 0) limits.most_noise_m_s2 = shipped.noise_m_s2 * (1 + kSlack);
   if (limits.least_lag_limit_s == 0) limits.least_lag_limit_s = kKeptLag * shipped.lag_limit_s;
-  if (limits.most_rate == 0 && integrates) limits.most_rate = shipped.norms.rate * (1 + kSlack);
-  Progress progress(common.quiet);
-  options.tune.progress = [&progress](int done, int total) { progress.show(done, total, "evaluations"); };
-  const TuneResult found = stability::tune(*loop, options.tune);
+  if (limits.most_rate == 0 && loop.plant.Ki > 0) limits.most_rate = shipped.norms.rate * (1 + kSlack);
+}
 
+files::Json result_of(const TuneOptions& options, const TuneResult& found) {
+  const stability::TuneConstraints& limits = options.tune.constraints;
   files::Json result = result_head("tune", {options.tracking.gains, options.tracking.model});
   result["seed"] = options.tune.seed;
   result["axis"] = options.axis;
@@ -202,19 +203,34 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
   result["why_infeasible"] = found.infeasible;
   result["active_constraints"] = found.active_constraints;
   result["stopped"] = found.stopped;
+  return result;
+}
+
+int run_tune(TuneOptions options, const CommonOptions& common) {
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  const Tracking input = load_tracking(options.tracking);
+  const int axis = options.axis == "x" ? 0 : options.axis == "y" ? 1 : 2;
+  const stability::SampledLoop loop = loop_of(options, input, axis);
+  set_limits(loop, input, axis, options);
+  Progress progress(common.quiet);
+  options.tune.progress = [&progress](int done, int total) { progress.show(done, total, "evaluations"); };
+  const TuneResult found = stability::tune(loop, options.tune);
+
+  const files::Json result = result_of(options, found);
   write_result(common, result);
-  if (common.prints_text()) print_result(options, found, limits);
+  if (common.prints_text()) print_result(options, found);
   if (!options.report.empty()) {
     const std::string verdict = fmt::format(
         "Axis {}, least {} gain: {}. Active constraints: {}. Good gains, not proved to be the best.",
         options.axis, options.objective, result["verdict"].get<std::string>(),
-        listed(found.active_constraints));
+        constraint_names(found.active_constraints));
     const std::string path = write_tune_report(
-        verdict, best.feasible ? quantities(options.axis, found) : std::vector<TunedQuantity>(), result,
+        verdict, found.best.feasible ? quantities(options.axis, found) : std::vector<TunedQuantity>(), result,
         options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
-  if (!best.feasible) return found.infeasible.empty() ? kInconclusive : kViolated;
+  if (!found.best.feasible) return found.infeasible.empty() ? kInconclusive : kViolated;
   return kDone;
 }
 
