@@ -7,6 +7,9 @@
 #include <cmath>
 #include <complex>
 #include <memory>
+#include <new>
+#include <stdexcept>
+#include <string>
 
 #include "nn/base/doubles.h"
 
@@ -14,6 +17,11 @@ namespace swarmcert::stability {
 namespace {
 
 constexpr double kWorst = 1e6;  ///< stands for infinity, which optimisers cannot add up
+
+/// Settings that the optimiser refuses are a fault of this program: no input reaches them.
+void require(nlopt_result result) {
+  if (result < 0) throw std::logic_error(std::string("NLopt: ") + nlopt_result_to_string(result));
+}
 
 double objective_of(const GainNorms& norms, TuneObjective objective) {
   switch (objective) {
@@ -110,13 +118,15 @@ class Search {
                   const std::array<double, 3>& high, int evaluations) {
     const std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)> optimiser(
         nlopt_create(algorithm, static_cast<unsigned>(dimension())), nlopt_destroy);
-    nlopt_set_min_objective(optimiser.get(), cost, this);
-    nlopt_set_lower_bounds(optimiser.get(), low.data());
-    nlopt_set_upper_bounds(optimiser.get(), high.data());
+    if (optimiser == nullptr) throw std::bad_alloc();
+    require(nlopt_set_min_objective(optimiser.get(), cost, this));
+    require(nlopt_set_lower_bounds(optimiser.get(), low.data()));
+    require(nlopt_set_upper_bounds(optimiser.get(), high.data()));
     const std::array<double, kNumConstraints> tolerance{};
-    nlopt_add_inequality_mconstraint(optimiser.get(), kNumConstraints, constrain, this, tolerance.data());
-    nlopt_set_maxeval(optimiser.get(), evaluations);
-    nlopt_set_xtol_rel(optimiser.get(), 1e-7);
+    require(nlopt_add_inequality_mconstraint(optimiser.get(), kNumConstraints, constrain, this,
+                                             tolerance.data()));
+    require(nlopt_set_maxeval(optimiser.get(), evaluations));
+    require(nlopt_set_xtol_rel(optimiser.get(), 1e-7));
     double value = 0;
     const nlopt_result result = nlopt_optimize(optimiser.get(), start.data(), &value);
     return nlopt_result_to_string(result);
