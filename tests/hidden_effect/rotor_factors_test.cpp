@@ -23,7 +23,7 @@ class WeakRotor : public testing::Test {
       const std::string number = std::to_string(run);
       const Outcome outcome =
           run_shell("swarmcert simulate takeoff -q --vehicles 1 --duration 30 --seed " + number + " --run " +
-                        number + " --model truth.toml --gains " +
+                        number + " --force --model truth.toml --gains " +
                         source_path("controller/gains/crazyflie-small.toml") + " -o flights",
                     folder_.path());
       EXPECT_EQ(outcome.exit_code, 0) << outcome.output;

@@ -36,7 +36,9 @@ struct Flight {
 class ColumnsDraftOfValues : public testing::Test {
  protected:
   ColumnsDraftOfValues()
-      : path_((std::filesystem::path(testing::TempDir()) / "swarmcert-column-guess.csv").string()) {}
+      : path_((std::filesystem::path(testing::TempDir()) /
+               (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".csv"))
+                  .string()) {}
   ~ColumnsDraftOfValues() override { std::filesystem::remove(path_); }
 
   const std::string path_;

@@ -129,6 +129,10 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
   const int components = data.samples.outputs;
   for (int c = 0; c < components; ++c) add_histogram(report, data, run, c);
   report.heading(std::string("The learned ") + learning::info(data.target).words);
+  for (const auto& [kind, scale] : result["output_scales"].items()) {
+    if (scale == 0.0)
+      report.paragraph("No network for " + kind + ": the selecting flights are better off without.");
+  }
   // By symmetry nothing else can be in the plane y = 0.
   std::vector<int> in_plane = {0};
   if (data.target == learning::Target::kForce) in_plane = {0, 2};
@@ -138,6 +142,7 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
     if (parts[phi].name.rfind("phi:", 0) != 0 || parts[phi].name == "phi:ground") continue;
     for (std::size_t rho = 0; rho < parts.size(); ++rho) {
       if (parts[rho].name.rfind("rho:", 0) != 0) continue;
+      if (result["output_scales"].value(parts[rho].name.substr(4), 1.0) == 0) continue;
       for (const int c : in_plane)
         add_map(report, data, run, static_cast<int>(phi), static_cast<int>(rho), c);
     }
