@@ -58,7 +58,7 @@ class Selection : public CrossValidation {
   std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
   /// The candidate that `candidate` becomes where what it varies with stays the same; -1 if there is none.
   int plain_form(int candidate) const;
-  /// Of the candidate with this name; -1 if there is none.
+  /// Index of the candidate with this name; -1 if no candidate has it.
   int index_of(const char* name) const;
   /// Of a ceiling: about the mean of each track, beside a scale of the thrust, it lowers the error of blocks left out.
   bool is_shown_within_flights(const Members& before, const Member& added) const;

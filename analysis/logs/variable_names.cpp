@@ -109,7 +109,7 @@ class YamlReader {
   bool in_brackets_ = false;
 };
 
-/// The crazyflies.yaml that belongs to the log; empty if there is none.
+/// Path of the crazyflies.yaml that belongs to the log; empty if no such file exists.
 fs::path yaml_beside(const std::string& log) {
   std::error_code error;
   const fs::path path = fs::absolute(log, error).lexically_normal();

@@ -80,7 +80,7 @@ double position_part(const AnyLoop& loop, const EstimateError& n, const Norms& n
     least = std::min(least, times_known(gains.impulse, n.impulse));
   }
   if (std::isfinite(n.rate) && std::isfinite(n.largest())) {
-    // A constant error is that of a start away from the set point.
+    // A constant error of the estimate acts like an initial position error of the same size.
     least = std::min(least, n.largest() + part(n.rate, [&] { return drift_gain(loop); }) +
                                 part(n.constant, [&] { return initial_position_gain(loop); }));
   }

@@ -51,7 +51,10 @@ TEST_F(WeakRotor, HasItsFactorInTheModelThatAddWrites) {
   for (int k = 1; k <= 4; ++k) {
     const std::string name = "rotor_" + std::to_string(k);
     EXPECT_NEAR(numbers[name]["value"].get<double>(), k == 3 ? kWeakFactor : 1, 0.02) << name;
-    EXPECT_TRUE(numbers[name].contains("interval_90")) << name;
+    const files::Json& interval = numbers[name]["interval_90"];
+    EXPECT_LE(interval[0].get<double>(), k == 3 ? kWeakFactor : 1)
+        << name << " of flights that repeat each other";
+    EXPECT_GE(interval[1].get<double>(), k == 3 ? kWeakFactor : 1) << name;
   }
   EXPECT_NE(read_text(folder_ / "fitted.toml").find("rotor_3"), std::string::npos);
   const files::Json again = result("add rotor_thrust --model fitted.toml flights -o again.toml", "add", 0);

@@ -1053,7 +1053,7 @@ def rounding_error(n, size, before):
 
 
 def sum_bounds(terms, size, is_float32):
-    """terms: (Bounded, at least so many, at most so many)."""
+    """Bounds on a sum of terms, each given as (Bounded, minimum count, maximum count)."""
     lower, upper, error = [Fraction(0)] * size, [Fraction(0)] * size, []
     for i in range(size):
         for term, fewest, most in terms:

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "analysis/commands/shared/effect_output.h"
+#include "analysis/identification/balance_ladder.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -61,13 +62,19 @@ void print_ladder(const std::vector<LadderRow>& rows) {
   }
 }
 
+std::string what_rows_measure(const std::vector<stability::LadderRow>& rows) {
+  const bool is_balance = !rows.empty() && identification::is_balanced(rows.back().effect);
+  return is_balance ? "force by which each rotor is off balance" : "force residual";
+}
+
 void print_ladder(const Ladder& ladder) {
   if (!ladder.earlier.empty()) {
     fmt::print("The model's ladder so far, on the flights of then:\n");
     print_ladder(ladder.earlier);
   }
-  fmt::print("RMSE of the force residual, in newton; flights for fit / select / test: {} / {} / {}{}\n",
-             ladder.split.fit.size(), ladder.split.select.size(), ladder.split.test.size(),
+  fmt::print("RMSE of the {}, in newton; flights for fit / select / test: {} / {} / {}{}\n",
+             what_rows_measure(ladder.rows), ladder.split.fit.size(), ladder.split.select.size(),
+             ladder.split.test.size(),
              ladder.split.by_flight ? "" : " (too few to split: all for everything)");
   print_ladder(ladder.rows);
   fmt::print("Test flights looked at: {} time{}\n", ladder.test_looks, ladder.test_looks == 1 ? "" : "s");

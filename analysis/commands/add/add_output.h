@@ -1,6 +1,7 @@
 /// @file An error ladder as JSON and as text.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "analysis/identification/ladder.h"
@@ -16,6 +17,8 @@ void add_ladder(const identification::Ladder& ladder, const residuals::Inputs& i
 
 /// Text for people.
 void print_ladder(const std::vector<stability::LadderRow>& rows);
+/// What the errors of the rows are of: the force residual, or the rotors' balance where that is what was fitted.
+std::string what_rows_measure(const std::vector<stability::LadderRow>& rows);
 void print_ladder(const identification::Ladder& ladder);
 
 }  // namespace swarmcert::analysis

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/commands/add/add_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"
@@ -35,8 +36,9 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
   report.figure(
       name, data,
       "set style data histograms\nset style fill solid 0.9 noborder\nset boxwidth 0.9\n"
-      "set ylabel 'RMSE of the force residual [" +
-          unit + "]'\nset yrange [0:*]\nset xtics rotate by -30\nplot '" + name +
+      "set ylabel 'RMSE of the " +
+          what_rows_measure(rows) + " [" + unit + "]'\nset yrange [0:*]\nset xtics rotate by -30\nplot '" +
+          name +
           ".dat' using 1:xtic(4) title 'flights to fit' linecolor rgb '#999999', "
           "'' using 2 title 'flights to select' linetype 6, '' using 3 title 'test flights' linetype 1\n",
       "Error ladder: how the error falls from the nominal model on, effect by effect, on the flights of "

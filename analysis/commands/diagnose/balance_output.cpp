@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "analysis/identification/accelerometer_balance.h"
 #include "analysis/identification/torque_balance.h"
@@ -30,36 +32,51 @@ files::Json torque_json(const TorqueBalance& balance) {
           {"torque_y_Nm", value_json(balance.torque_Nm.y(), balance.torque_half_Nm.y())}};
 }
 
-/// As an entry of the ranking: errors are forces by which each rotor is off balance.
-files::Json ranking_entry_of(const TorqueBalance& balance) {
-  const stability::EffectInfo& info = stability::effect_info(balance.effect);
+/// What tells entries of the two balances apart.
+struct Entry {
+  std::string effect, equivalence_class;
+  files::Json parameters;
+  std::vector<std::string> rivals;
+};
+
+/// What a balance of means finds, as an entry of the ranking. Errors are those of the balance, in newton: of torques, the
+/// force by which each rotor is off balance; of the accelerometer, mass times the error of its mean.
+template <class Balance>
+files::Json ranking_entry(const Balance& balance, const Entry& entry) {
   files::Json rivals = files::Json::array();
-  for (const std::string& rival : balance.rivals)
+  for (const std::string& rival : entry.rivals)
     rivals.push_back({{"effect", rival}, {"fly", stability::effect_info(rival).excitation}});
-  const bool is_offset = balance.effect == "com_offset";
-  const bool is_ambiguous = !balance.rivals.empty() && balance.rivals.front() == "torque_bias";
-  return {{"effect", balance.effect},
+  return {{"effect", entry.effect},
           {"kind", balance.kind},
           {"vehicle", balance.vehicle},
           {"rmse_before", balance.rmse_before_N},
           {"rmse_after", balance.rmse_after_N},
           {"drop", 1 - balance.rmse_after_N / balance.rmse_before_N},
           {"drop_ci", {nullptr, nullptr}},
-          {"parameters", is_offset ? offset_json(balance) : torque_json(balance)},
+          {"parameters", entry.parameters},
           {"per_vehicle", true},
           {"model_form", files::Json::object()},
           {"instrument", files::Json::object()},
-          {"class",
-           is_offset && is_ambiguous ? "centre of mass / torque bias / weak rotor" : info.equivalence_class},
-          {"confounded_with", balance.rivals},
+          {"class", entry.equivalence_class},
+          {"confounded_with", entry.rivals},
           {"rivals", rivals},
-          {"separated_by", info.excitation},
+          {"separated_by", stability::effect_info(entry.effect).excitation},
           {"paired_z", balance.z},
           {"wald_z", nullptr},
           {"records_in_support", balance.blocks},
           {"blocks_in_support", balance.blocks},
           {"flights_in_support", balance.flights},
           {"statement", identification::in_words(balance)}};
+}
+
+files::Json ranking_entry_of(const TorqueBalance& balance) {
+  const bool is_offset = balance.effect == "com_offset";
+  const bool is_ambiguous = !balance.rivals.empty() && balance.rivals.front() == "torque_bias";
+  return ranking_entry(balance,
+                       {balance.effect,
+                        is_offset && is_ambiguous ? "centre of mass / torque bias / weak rotor"
+                                                  : stability::effect_info(balance.effect).equivalence_class,
+                        is_offset ? offset_json(balance) : torque_json(balance), balance.rivals});
 }
 
 files::Json scale_json(const AccelerometerBalance& balance) {
@@ -67,33 +84,14 @@ files::Json scale_json(const AccelerometerBalance& balance) {
 }
 
 files::Json ranking_entry_of(const AccelerometerBalance& balance) {
-  const stability::EffectInfo& info = stability::effect_info("accelerometer_scale");
-  files::Json rivals = files::Json::array(), names = files::Json::array();
-  if (balance.may_be_offset()) {
-    names.push_back("constant_force");
-    rivals.push_back({{"effect", "constant_force"}, {"fly", info.excitation}});
-  }
-  return {{"effect", info.name},
-          {"kind", balance.kind},
-          {"vehicle", balance.vehicle},
-          {"rmse_before", balance.rmse_before_N},
-          {"rmse_after", balance.rmse_after_N},
-          {"drop", 1 - balance.rmse_after_N / balance.rmse_before_N},
-          {"drop_ci", {nullptr, nullptr}},
-          {"parameters", scale_json(balance)},
-          {"per_vehicle", true},
-          {"model_form", files::Json::object()},
-          {"instrument", files::Json::object()},
-          {"class", balance.may_be_offset() ? "accelerometer scale / IMU bias" : info.equivalence_class},
-          {"confounded_with", names},
-          {"rivals", rivals},
-          {"separated_by", info.excitation},
-          {"paired_z", balance.z},
-          {"wald_z", nullptr},
-          {"records_in_support", balance.blocks},
-          {"blocks_in_support", balance.blocks},
-          {"flights_in_support", balance.flights},
-          {"statement", identification::in_words(balance)}};
+  const bool is_ambiguous = balance.may_be_offset();
+  const std::string effect = "accelerometer_scale";
+  return ranking_entry(
+      balance,
+      {effect,
+       is_ambiguous ? "accelerometer scale / IMU bias" : stability::effect_info(effect).equivalence_class,
+       scale_json(balance),
+       is_ambiguous ? std::vector<std::string>{"constant_force"} : std::vector<std::string>{}});
 }
 
 /// The force of a flight shows a scale of its accelerometer as one of its thrust.

@@ -51,7 +51,7 @@ std::vector<EffectSpec> without_vehicles(const std::vector<EffectSpec>& specs) {
 }
 
 /// The first formula that lasts, where something is left: what happened at some time of the others' flights says nothing
-/// of these. Null if there is none.
+/// of these. Null if no such formula exists.
 const Formula* lasting_formula(const Diagnosis& diagnosis) {
   if (!leaves_something(diagnosis)) return nullptr;
   const auto lasting = std::find_if(diagnosis.formulas.begin(), diagnosis.formulas.end(),

@@ -73,12 +73,17 @@ RotorFactors rotor_factors(const std::vector<RotorLoads>& flights, const std::ve
   const auto count = static_cast<double>(flights.size());
   std::vector<Eigen::Vector4d> of_flight;
   Eigen::Vector4d mean = Eigen::Vector4d::Zero(), squares = Eigen::Vector4d::Zero();
+  // Flights that repeat each other exactly say less than their scatter: each is known only to its own standard error.
+  Eigen::Vector4d within_squares = Eigen::Vector4d::Zero();
   for (std::size_t f = 0; f < flights.size(); ++f) {
     const Eigen::Vector4d& mapped_N = flights[f].mean_N;
     of_flight.emplace_back(scale[f] * mapped_N.mean() * mapped_N.cwiseInverse());
     mean += of_flight.back() / count;
+    within_squares +=
+        (of_flight.back().array() * flights[f].error_N.array() / mapped_N.array()).square().matrix();
   }
   for (const Eigen::Vector4d& one : of_flight) squares += (one - mean).cwiseAbs2();
+  const Eigen::Vector4d within = within_squares.cwiseSqrt();
   const double battery = kBatteryPlay_m / (model.arm_m * std::sqrt(0.5));
   RotorFactors factors;
   for (std::size_t k = 0; k < kRotorCount; ++k) {
@@ -86,7 +91,8 @@ RotorFactors rotor_factors(const std::vector<RotorLoads>& flights, const std::ve
     const double value = mean[i];
     const double half = flights.size() < 2
                             ? battery * value
-                            : student_95(count - 1) * std::sqrt(squares[i] / (count - 1) / count);
+                            : student_95(count - 1) *
+                                  std::max(std::sqrt(squares[i] / (count - 1) / count), within[i] / count);
     factors[k] = {value, {value - half, value + half}};
   }
   return factors;
