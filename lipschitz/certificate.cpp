@@ -27,7 +27,10 @@ Json hex_floats(const std::vector<float>& values) {
   return hex_floats(std::vector<double>(values.begin(), values.end()));
 }
 
-Json factor_json(const check::Factor& factor) {
+/// Null where the checker finds the factor itself.
+Json factor_json(const std::optional<check::Factor>& found) {
+  if (!found) return nullptr;
+  const check::Factor& factor = *found;
   Json rows = Json::array();
   for (const std::vector<mpz_class>& entries : factor.rows) {
     std::string row;

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/witness.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
@@ -17,19 +18,19 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+mpq_class squared_norm(const check::Matrix& m) {
+  check::Dyadic sum;
+  for (const check::Dyadic& x : m.entries) sum += x * x;
+  mpq_class result(sum.mantissa);
+  if (sum.exponent < 0) return result >> static_cast<mp_bitcnt_t>(-sum.exponent);
+  return result << static_cast<mp_bitcnt_t>(sum.exponent);
+}
+
 /// sqrt(|W v|^2 / |v|^2), rounded down; v is not zero.
 LowerBound rayleigh_root(const files::Layer& layer, const std::vector<double>& v) {
-  mpq_class image = 0;
-  mpq_class length = 0;
-  for (int i = 0; i < layer.outputs; ++i) {
-    mpq_class sum = 0;
-    for (int j = 0; j < layer.inputs; ++j) {
-      sum += mpq_class(layer.weights[static_cast<std::size_t>(i) * layer.inputs + j]) * mpq_class(v[j]);
-    }
-    image += sum * sum;
-  }
-  for (const double x : v) length += mpq_class(x) * mpq_class(x);
-  return LowerBound(sqrt_down(image / length));
+  const check::Matrix w(layer.outputs, layer.inputs, layer.weights);
+  const check::Matrix column(layer.inputs, 1, v);
+  return LowerBound(sqrt_down(squared_norm(check::product(w, column)) / squared_norm(column)));
 }
 
 }  // namespace

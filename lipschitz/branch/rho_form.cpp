@@ -39,7 +39,7 @@ std::optional<RhoForm> rho_form(const std::vector<check::Matrix>& stages, const 
         form.q(j, i) = form.q(i, j);
         exact(i, j) = exact(j, i) = check::Dyadic(form.q(i, j));
       }
-    std::optional<check::Factor> proof = find_factor(check::quadratic_lmi(stages, exact, exact_t));
+    std::optional<check::Factor> proof = check::proposed_factor(check::quadratic_lmi(stages, exact, exact_t));
     if (!proof) continue;
     form.factor = std::move(*proof);
     return form;

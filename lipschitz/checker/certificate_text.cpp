@@ -51,7 +51,8 @@ std::vector<Conflict> conflicts_in(const Json& json) {
   return conflicts;
 }
 
-Factor parse_factor(const Json& json, const std::string& where) {
+std::optional<Factor> parse_factor(const Json& json, const std::string& where) {
+  if (json.is_null()) return std::nullopt;
   files::require_keys(json, {"unit_exponent", "scale", "rows"}, where);
   Factor factor;
   factor.unit_exponent = json["unit_exponent"].get<long>();

@@ -1,6 +1,7 @@
 /// @file Encoding of numbers, proofs and errors in a certificate.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,7 @@ std::vector<double> hex_floats_in(const files::Json& json);
 /// Conflicts in one text, each as "<neuron><+ or -> <neuron><+ or -> <lambda> <multiplier>"; + is on.
 std::vector<Conflict> conflicts_in(const files::Json& json);
 
-/// What shows that a matrix is positive semidefinite.
-Factor parse_factor(const files::Json& json, const std::string& where);
+/// What shows that a matrix is positive semidefinite; nothing for null, where the checker finds a factor itself.
+std::optional<Factor> parse_factor(const files::Json& json, const std::string& where);
 
 }  // namespace swarmcert::check

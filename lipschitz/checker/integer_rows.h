@@ -7,13 +7,15 @@
 
 namespace swarmcert::check {
 
-/// Rows of integers. Where every entry has at most kWordBits bits, inner products are summed in machine words, about ten
-/// times faster than by GMP; nothing is rounded either way.
+/// Rows of integers, each cut into words of kWordBits bits with its sign, as many as the longest entry needs. Inner
+/// products are summed in machine words, ten to fifty times faster than by GMP; beyond kMostWords words GMP takes over.
+/// Nothing is rounded either way.
 class IntegerRows {
  public:
-  /// Bits of an entry, without its sign: kAtOnce products of two of them fit into 127 bits.
+  /// Bits of a word, without its sign: kAtOnce products of two of them fit into 127 bits.
   static constexpr int kWordBits = 60;
   static constexpr int kAtOnce = 64;
+  static constexpr int kMostWords = 4;
 
   explicit IntegerRows(std::vector<std::vector<mpz_class>> rows);
 
@@ -21,8 +23,11 @@ class IntegerRows {
   mpz_class inner(int i, int from_i, const IntegerRows& other, int j, int from_j, int count) const;
 
  private:
-  std::vector<std::vector<mpz_class>> rows_;
-  std::vector<std::vector<long>> words_;  ///< the same entries; empty where one does not fit
+  mpz_class entry(int i, int k) const;
+
+  std::vector<std::vector<mpz_class>> rows_;  ///< empty where the words hold the entries
+  /// words_[w][i][k]: an entry is the sum over w of its words times 2^(w kWordBits); empty where that are too many
+  std::vector<std::vector<std::vector<long>>> words_;
 };
 
 }  // namespace swarmcert::check

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "lipschitz/checker/integer_rows.h"
+#include "lipschitz/checker/proposed_factor.h"
 
 namespace swarmcert::check {
 namespace {
@@ -73,7 +74,39 @@ std::size_t hidden_neurons(const std::vector<Matrix>& stages) {
   return neurons;
 }
 
-Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const std::vector<Dyadic>& t) {
+SymmetricMatrix::SymmetricMatrix(std::vector<int> first) : first_(std::move(first)) {
+  for (std::size_t i = 0; i < first_.size(); ++i)
+    rows_.emplace_back(i + 1 - static_cast<std::size_t>(first_[i]));
+}
+
+SymmetricMatrix::SymmetricMatrix(const Matrix& dense) {
+  for (int i = 0; i < dense.rows; ++i) {
+    int first = 0;
+    while (first < i && dense(i, first).sign() == 0) ++first;
+    first_.push_back(first);
+    rows_.emplace_back();
+    for (int j = first; j <= i; ++j) rows_.back().push_back(dense(i, j));
+  }
+}
+
+namespace {
+
+/// The first column of each row of the chain's inequality: where the layer before begins.
+std::vector<int> chain_envelope(const std::vector<Matrix>& stages) {
+  std::vector<int> first;
+  int before = 0, begin = 0;
+  for (std::size_t k = 0; k + 1 < stages.size(); ++k) {
+    first.insert(first.end(), static_cast<std::size_t>(stages[k].rows), before);
+    before = begin;
+    begin += stages[k].rows;
+  }
+  return first;
+}
+
+}  // namespace
+
+SymmetricMatrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho,
+                              const std::vector<Dyadic>& t) {
   const std::size_t hidden = stages.size() - 1;
   const Matrix& first = stages.front();
   const Matrix& last = stages.back();
@@ -83,28 +116,26 @@ Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const
     for (int i = 0; i < p.rows; ++i) p(i, i) += rho;
     return p;
   }
-  Matrix p(static_cast<int>(t.size()), static_cast<int>(t.size()));
-  for (int i = 0; i < p.rows; ++i) p(i, i) = Dyadic(2.0) * rho * t[i];
+  SymmetricMatrix p(chain_envelope(stages));
+  for (int i = 0; i < p.size(); ++i) p.at(i, i) = Dyadic(2.0) * rho * t[i];
 
   const Matrix first_gram = row_gram(first);
   for (int i = 0; i < first.rows; ++i) {
-    for (int j = 0; j < first.rows; ++j) p(i, j) += -(t[i] * first_gram(i, j) * t[j]);
+    for (int j = 0; j <= i; ++j) p.at(i, j) += -(t[i] * first_gram(i, j) * t[j]);
   }
   int before = 0;  // index of the first neuron of layer k - 1
   for (std::size_t k = 1; k < hidden; ++k) {
     const Matrix& m = stages[k];
     const int begin = before + m.cols;
     for (int i = 0; i < m.rows; ++i) {
-      for (int j = 0; j < m.cols; ++j) {
-        p(begin + i, before + j) = -(rho * t[begin + i] * m(i, j));
-        p(before + j, begin + i) = p(begin + i, before + j);
-      }
+      const Dyadic factor = -(rho * t[begin + i]);
+      for (int j = 0; j < m.cols; ++j) p.at(begin + i, before + j) = factor * m(i, j);
     }
     before = begin;
   }
   const Matrix last_gram = row_gram(transposed(last));
   for (int i = 0; i < last.cols; ++i) {
-    for (int j = 0; j < last.cols; ++j) p(before + i, before + j) += -(rho * last_gram(i, j));
+    for (int j = 0; j <= i; ++j) p.at(before + i, before + j) += -(rho * last_gram(i, j));
   }
   return p;
 }
@@ -136,28 +167,60 @@ Matrix quadratic_lmi(const std::vector<Matrix>& stages, const Matrix& q, const s
   return p;
 }
 
-bool shows_positive_semidefinite(const Matrix& p, const Factor& factor) {
-  const auto size = static_cast<std::size_t>(p.rows);
+namespace {
+
+/// The least exponent of an entry of D P D and of R R'.
+long least_exponent(const SymmetricMatrix& p, const Factor& factor) {
+  long least = 2 * factor.unit_exponent;
+  for (int i = 0; i < p.size(); ++i)
+    for (int j = p.first(i); j <= i; ++j)
+      if (p.at(i, j).sign() != 0)
+        least = std::min(least, p.at(i, j).exponent + factor.scale[i] + factor.scale[j]);
+  return least;
+}
+
+}  // namespace
+
+bool shows_positive_semidefinite(const SymmetricMatrix& p, const Factor& factor) {
+  const auto size = static_cast<std::size_t>(p.size());
   if (factor.rows.size() != size || factor.scale.size() != size) return false;
   std::vector<int> first;  // column of the first entry of each row
-  for (int i = 0; i < p.rows; ++i) first.push_back(i + 1 - static_cast<int>(factor.rows[i].size()));
+  for (int i = 0; i < p.size(); ++i) first.push_back(i + 1 - static_cast<int>(factor.rows[i].size()));
   if (!std::all_of(first.begin(), first.end(), [](int column) { return column >= 0; })) return false;
   const IntegerRows r(factor.rows);
-  std::vector<Dyadic> slack(size);  // E_ii - sum_{j != i} |E_ij|
-  for (int i = 0; i < p.rows; ++i) {
-    for (int j = 0; j <= i; ++j) {
+  const long unit = least_exponent(p, factor);
+  std::vector<mpz_class> slack(size);  // E_ii - sum_{j != i} |E_ij|, in units of 2^unit
+  mpz_class e, gram;
+  for (int i = 0; i < p.size(); ++i) {
+    for (int j = std::min(p.first(i), first[i]); j <= i; ++j) {
+      e = 0;
+      if (j >= p.first(i)) {
+        const Dyadic& entry = p.at(i, j);
+        if (entry.sign() != 0)
+          e = entry.mantissa << static_cast<mp_bitcnt_t>(entry.exponent + factor.scale[i] + factor.scale[j] -
+                                                         unit);
+      }
       const int from = std::max(first[i], first[j]);
-      if (from > j && p(i, j).sign() == 0) continue;
-      Dyadic e = p(i, j);
-      e.exponent += factor.scale[i] + factor.scale[j];
-      const mpz_class gram = r.inner(i, from - first[i], r, j, from - first[j], j - from + 1);
-      e += Dyadic(-gram, 2 * factor.unit_exponent);
-      if (i != j) e.mantissa = -abs(e.mantissa);
-      slack[i] += e;
-      if (i != j) slack[j] += e;
+      if (from <= j) {
+        gram = r.inner(i, from - first[i], r, j, from - first[j], j - from + 1);
+        gram <<= static_cast<mp_bitcnt_t>(2 * factor.unit_exponent - unit);
+        e -= gram;
+      }
+      if (i == j) {
+        slack[i] += e;
+        continue;
+      }
+      e = abs(e);
+      slack[i] -= e;
+      slack[j] -= e;
     }
   }
-  return std::all_of(slack.begin(), slack.end(), [](const Dyadic& s) { return s.sign() >= 0; });
+  return std::all_of(slack.begin(), slack.end(), [](const mpz_class& s) { return s >= 0; });
+}
+
+bool shows_positive_semidefinite(const SymmetricMatrix& p, const std::optional<Factor>& factor) {
+  // A proposal comes back only after the test above has accepted it.
+  return factor ? shows_positive_semidefinite(p, *factor) : proposed_factor(p).has_value();
 }
 
 }  // namespace swarmcert::check

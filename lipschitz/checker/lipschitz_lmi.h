@@ -1,6 +1,7 @@
 /// @file The one matrix inequality that every upper bound rests on, and how a factor shows it.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "lipschitz/checker/dyadic.h"
@@ -13,6 +14,30 @@ struct Factor {
   long unit_exponent = 0;
   std::vector<long> scale;
   std::vector<std::vector<mpz_class>> rows;
+};
+
+/// A symmetric matrix as its lower triangle, each row from its first column that may be nonzero: what a chain's
+/// inequality, which is block tridiagonal, needs of it grows linearly with depth.
+class SymmetricMatrix {
+ public:
+  /// @param first one column per row, at most the row's own.
+  explicit SymmetricMatrix(std::vector<int> first);
+  /// The lower triangle of a dense one.
+  SymmetricMatrix(const Matrix& dense);  // NOLINT(google-explicit-constructor): nothing is lost
+
+  int size() const { return static_cast<int>(rows_.size()); }
+  int first(int i) const { return first_[static_cast<std::size_t>(i)]; }
+  /// Precondition: first(i) <= j <= i.
+  Dyadic& at(int i, int j) {
+    return rows_[static_cast<std::size_t>(i)][static_cast<std::size_t>(j - first(i))];
+  }
+  const Dyadic& at(int i, int j) const {
+    return rows_[static_cast<std::size_t>(i)][static_cast<std::size_t>(j - first(i))];
+  }
+
+ private:
+  std::vector<int> first_;
+  std::vector<std::vector<Dyadic>> rows_;
 };
 
 /// A B.
@@ -36,7 +61,8 @@ std::size_t hidden_neurons(const std::vector<Matrix>& stages);
 /// @param stages M_1 .. M_K, at least one, each with as many columns as its predecessor has rows.
 /// @param rho    positive.
 /// @param t      one nonnegative multiplier per hidden neuron, first layer first.
-Matrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho, const std::vector<Dyadic>& t);
+SymmetricMatrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho,
+                              const std::vector<Dyadic>& t);
 
 /// The symmetric matrix whose positive semidefiniteness proves |g(v) - g(w)|^2 <= (v - w)' Q (v - w) for the same kind
 /// of chain g: the form above with Q in place of rho I, over (dv, dz_1, ..., dz_{K-1}), nothing minimised out. Blocks:
@@ -47,6 +73,8 @@ Matrix quadratic_lmi(const std::vector<Matrix>& stages, const Matrix& q, const s
 /// True only if P is positive semidefinite, shown by E = D P D - R R' being diagonally dominant with a nonnegative
 /// diagonal: then E >= 0 (Gershgorin), D P D = R R' + E >= 0, and P >= 0 since D is invertible. False means that
 /// this factor does not show it, or has another shape than P; not that P is indefinite.
-bool shows_positive_semidefinite(const Matrix& p, const Factor& factor);
+bool shows_positive_semidefinite(const SymmetricMatrix& p, const Factor& factor);
+/// The same with a factor that the certificate leaves out, as it does for large matrices: proposed_factor() then.
+bool shows_positive_semidefinite(const SymmetricMatrix& p, const std::optional<Factor>& factor);
 
 }  // namespace swarmcert::check

@@ -7,25 +7,40 @@
 #include "nn/weights/functions.h"
 
 namespace swarmcert::check {
+namespace {
+
+/// The columns of W of these inputs, each times its scale where there is one.
+Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const std::vector<double>& scale) {
+  Matrix result(w.rows, static_cast<int>(inputs.size()));
+  for (int j = 0; j < result.cols; ++j) {
+    const int input = inputs[static_cast<std::size_t>(j)];
+    for (int i = 0; i < w.rows; ++i)
+      result(i, j) =
+          scale.empty() ? w(i, input) : w(i, input) * Dyadic(scale[static_cast<std::size_t>(input)]);
+  }
+  return result;
+}
+
+}  // namespace
 
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block, const std::vector<double>& scale) {
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
   const std::vector<int> coordinates = files::block_coordinates(network, function, block);
-  Matrix selector(parts.at(names.front())->inputs(), static_cast<int>(coordinates.size()));
-  if (!scale.empty() && scale.size() != static_cast<std::size_t>(selector.rows)) {
+  const int inputs = parts.at(names.front())->inputs();
+  if (!scale.empty() && scale.size() != static_cast<std::size_t>(inputs)) {
     throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function +
-                                " has " + std::to_string(selector.rows) + " inputs");
+                                " has " + std::to_string(inputs) + " inputs");
   }
-  for (int j = 0; j < selector.cols; ++j)
-    selector(coordinates[j], j) = scale.empty() ? 1.0 : scale[coordinates[j]];
-  std::vector<Matrix> chain = {selector};
+  std::vector<Matrix> chain;
   for (const std::string& name : names) {
     bool joins = true;  // the first layer acts on the selected inputs, and that of rho on the last of phi
     for (const files::Layer& layer : parts.at(name)->layers) {
       const Matrix w(layer.outputs, layer.inputs, layer.weights);
-      if (joins) {
+      if (chain.empty()) {
+        chain.push_back(selected_columns(w, coordinates, scale));
+      } else if (joins) {
         chain.back() = product(w, chain.back());
       } else {
         chain.push_back(w);

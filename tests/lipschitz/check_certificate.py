@@ -639,6 +639,9 @@ def lmi(chain, rho, t):
 
 
 def parse_factor(factor, where):
+    """None where the certificate leaves the factor to its reader."""
+    if factor is None:
+        return None
     require_keys(factor, ["unit_exponent", "scale", "rows"], where)
     unit, scale = integer(factor["unit_exponent"]), [integer(s) for s in listed(factor["scale"])]
     require(all(abs(e) <= 8192 for e in [unit] + scale), f"{where}: exponent out of range")
@@ -693,6 +696,58 @@ def shows_positive_semidefinite(p, unit, scale, rows):
                 slack[i] -= abs(e)
                 slack[j] -= abs(e)
     return all(s >= 0 for s in slack)
+
+
+def scaled_double(integer, exponent):
+    """integer 2^exponent as a double, roughly."""
+    excess = max(integer.bit_length() - 64, 0)
+    return math.ldexp(integer >> excess, exponent + excess)
+
+
+def factorised(rows, first, shift):
+    """R with R R' = the matrix with these lower rows - shift I, in floating point; rows with an empty diagonal stay empty.
+    None if that breaks down."""
+    result = []
+    for i, row in enumerate(rows):
+        if row[-1] == 0:
+            result.append([0.0] * len(row))
+            continue
+        out = []
+        for j in range(first[i], i):
+            begin, other = max(first[i], first[j]), result[j]
+            rest = row[j - first[i]] - sum(map(mul, out[begin - first[i]:], other[begin - first[j]:-1]))
+            out.append(rest / other[-1] if other[-1] else 0.0)
+        square = row[-1] - shift - sum(x * x for x in out)
+        if not 0 < square < math.inf:
+            return None
+        result.append(out + [math.sqrt(square)])
+    return result
+
+
+def shows_or_finds(p, factor):
+    """What a certificate leaves out, floating point proposes; exact integers decide in either case."""
+    if factor is not None:
+        return shows_positive_semidefinite(p, *factor)
+    n = len(p.rows)
+    if any(p.rows[i][i] < 0 for i in range(n)):
+        return False
+    scale = [-((p.rows[i][i].bit_length() + p.exponent + 1) // 2) if p.rows[i][i] else 0 for i in range(n)]
+    first = [next(j for j in range(i + 1) if p.rows[i][j] or j == i) for i in range(n)]
+    try:
+        rows = [[scaled_double(p.rows[i][j], p.exponent + scale[i] + scale[j]) for j in range(first[i], i + 1)]
+                for i in range(n)]
+    except OverflowError:
+        return False
+    shift = 2.0 ** -53 * (n + max(sum(map(abs, row)) for row in rows) * 2)
+    while shift < 1e-7:
+        found = factorised(rows, first, shift)
+        if found is None:
+            return False
+        integers = [[round(math.ldexp(x, 60)) for x in row] for row in found]
+        if shows_positive_semidefinite(p, -60, scale, integers):
+            return True
+        shift *= 8
+    return False
 
 
 def rounded_up(x):
@@ -1162,8 +1217,7 @@ class Checker:
         require(rho > 0 and all(x >= 0 for x in t), f"{where}: rho is not positive, or a t negative")
         require(len(t) == sum(len(m.rows) for m in chain[:-1]), f"{where}: needs one t per hidden neuron")
         require(Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
-        unit, scale, rows = parse_factor(factor, where)
-        require(shows_positive_semidefinite(lmi(chain, rho, t), unit, scale, rows),
+        require(shows_or_finds(lmi(chain, rho, t), parse_factor(factor, where)),
                 f"{where}: the factor does not show that the matrix inequality holds")
 
     def check_bound(self, bound):
@@ -1354,8 +1408,7 @@ class Checker:
         require([len(row) for row in triangle] == list(range(1, size + 1)), f"{where}: q is not a lower triangle")
         require(len(t) == sum(len(m.rows) for m in chain[:-1]) and all(x >= 0 for x in t), f"{where}: unusable t")
         q = Matrix.of([triangle[max(i, j)][min(i, j)] for i in range(size) for j in range(size)], size)
-        unit, scale, rows = parse_factor(form["factor"], where)
-        require(shows_positive_semidefinite(quadratic_lmi(chain, q, t), unit, scale, rows),
+        require(shows_or_finds(quadratic_lmi(chain, q, t), parse_factor(form["factor"], where)),
                 f"{where}: the factor does not show that the matrix inequality holds")
         return q
 

@@ -351,6 +351,46 @@ TEST(Checker, FactorMustFitTheMatrix) {
   EXPECT_FALSE(check::shows_positive_semidefinite(p, factor));
 }
 
+/// 2 I - a path's adjacency matrix: eigenvalues 2 - 2 cos(pi k / (n + 1)), the least one about 1e-3 for n = 100.
+check::Matrix path_matrix(int n, double diagonal) {
+  check::Matrix p(n, n);
+  for (int i = 0; i < n; ++i) {
+    p(i, i) = diagonal;
+    if (i > 0) p(i, i - 1) = p(i - 1, i) = -1.0;
+  }
+  return p;
+}
+
+TEST(Checker, FindsAFactorThatIsLeftOutExactlyWhereThereIsOne) {
+  const std::optional<check::Factor> left_out;
+  EXPECT_TRUE(check::shows_positive_semidefinite(path_matrix(100, 2), left_out));
+  EXPECT_TRUE(check::shows_positive_semidefinite(path_matrix(100, 1.9991), left_out));
+  EXPECT_FALSE(check::shows_positive_semidefinite(path_matrix(100, 1.999), left_out));
+  EXPECT_FALSE(check::shows_positive_semidefinite(path_matrix(100, -1), left_out));
+  EXPECT_TRUE(check::shows_positive_semidefinite(check::Matrix(3, 3), left_out)) << "zero is semidefinite";
+}
+
+TEST(Checker, CertificatesOfWideNetworksAreNoLongerThanTwiceTheWeightsAndHold) {
+  std::mt19937 generator(8);
+  files::Network wide;
+  wide.plain = tests::random_network({6, 90, 90, 2}, generator);
+  lipschitz::CertifyOptions options;
+  options.method = lipschitz::UpperMethod::kEclipseFast;
+  options.lower.rounds = 0;
+  const files::Json certificate = lipschitz::certificate(wide, lipschitz::certify(wide, options));
+  EXPECT_TRUE(certificate["bounds"][0]["proof"]["factor"].is_null());
+  std::size_t weights = 0;
+  for (const files::Layer& layer : wide.plain->layers) weights += sizeof(double) * layer.weights.size();
+  EXPECT_LT(certificate.dump().size(), 2 * weights);
+  EXPECT_TRUE(check::check(certificate, wide).accepted) << check::check(certificate, wide).reason;
+  files::Json changed = certificate;
+  const double smaller = 0.99 * changed["bounds"][0]["upper"].get<double>();
+  changed["bounds"][0]["upper"] = smaller;
+  changed["bounds"][0]["upper_hex"] = files::hex_float(smaller);
+  changed["bounds"][0]["proof"]["rho"] = files::hex_float(smaller * smaller * (1 - 1e-15));
+  EXPECT_FALSE(check::check(rehashed(changed), wide).accepted);
+}
+
 TEST(Checker, NoFactorShowsAnIndefiniteMatrix) {
   const check::Matrix p(2, 2, {1, 2, 2, 1});  // eigenvalues 3 and -1
   std::mt19937 generator(3);

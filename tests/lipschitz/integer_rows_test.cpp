@@ -37,13 +37,14 @@ TEST(IntegerRows, AreExactWithinWordsBeyondThemAndBetweenBoth) {
     std::vector<mpz_class> entries;
     for (int k = 0; k < 150; ++k) {
       mpz_class entry = 0;
-      for (int words = 0; words < 3; ++words) entry = (entry << 32) + static_cast<unsigned long>(generator());
-      entry >>= static_cast<mp_bitcnt_t>(96 - bits);
+      for (int words = 0; words < 10; ++words)
+        entry = (entry << 32) + static_cast<unsigned long>(generator());
+      entry >>= static_cast<mp_bitcnt_t>(320 - bits);
       entries.push_back(generator() % 2 == 0 ? entry : mpz_class(-entry));
     }
     return entries;
   };
-  for (const int bits : {3, 59, 60, 61, 64, 96}) {
+  for (const int bits : {3, 59, 60, 61, 64, 96, 121, 239, 241, 300}) {
     const std::vector<mpz_class> a = row(bits), b = row(60);
     const IntegerRows left(Rows{a}), right(Rows{b});
     for (const int from : {0, 1, 70}) {

@@ -260,7 +260,7 @@ def malformed(certificate, net, folder):
         "trailing comma": text[:-1] + ",}", "leading zero": with_number("01"), "plus sign": with_number("+1"),
         "ragged factor": with_bound(ragged), "a row less": with_bound(one_row_less), "long integer": with_bound(long_word),
         "huge unit": with_bound(set_("unit_exponent", 10 ** 18)), "huge scale": with_bound(set_("scale", [10 ** 9] * len(scale))),
-        "scale is text": with_bound(set_("scale", "1")), "factor is null": with_bound(lambda b: b["proof"].update(factor=None)),
+        "scale is text": with_bound(set_("scale", "1")), "factor is text": with_bound(lambda b: b["proof"].update(factor="null")),
         "hex exponent": hex_upper("0x1p999999999"), "long hex": hex_upper("0x" + "1" * 100000 + "p0"),
         "hex nan": hex_upper("nan"), "hex inf": hex_upper("inf"), "hex blank": hex_upper(" 0x1p0"), "hex plus": hex_upper("+0x1p0"),
         "more bits than a double": hex_upper("0x1.000000000000001p3"),

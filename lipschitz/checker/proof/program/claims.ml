@@ -21,10 +21,24 @@ type t = {
   mutable not_checked : string list;
 }
 
-let prove state claim proof reason =
-  match Proved.step state.parts state.accepted claim proof with
-  | Some accepted -> state.accepted <- accepted; state.log <- (claim, proof) :: state.log
-  | None -> rejected "%s" reason
+(* By the first of these proofs that the extracted checker accepts. *)
+let rec prove_by state claim proofs reason = match proofs () with
+  | Seq.Nil -> rejected "%s" reason
+  | Seq.Cons (proof, others) ->
+    match Proved.step state.parts state.accepted claim proof with
+    | Some accepted -> state.accepted <- accepted; state.log <- (claim, proof) :: state.log
+    | None -> prove_by state claim others reason
+
+let prove state claim proof reason = prove_by state claim (Seq.return proof) reason
+
+(* The chain of matrices that a bound is about. *)
+let stages state claim = match claim with
+  | Proved.Norm_at_most (p, k, _) -> [], Proved.matrix_at state.parts p k
+  | Slope_at_most (f, moves, scale, _) ->
+    List.fold_left (fun (hidden, last) part ->
+        let w, v = Proved.matrices part in Proved.set_stages hidden last w v)
+      ([], Proved.selector moves scale) (Proved.parts_of state.parts f)
+  | _ -> assert false
 
 let not_checked state what = state.not_checked <- what :: state.not_checked
 
@@ -36,8 +50,9 @@ let check_status where json =
   let status = text where (find where "status" json) in
   require (status = "finished" || status = "interrupted") "%s: unknown status" where
 
-(* A proof by a matrix inequality. `neurons`: hidden ones of the chain. *)
-let inequality where ~neurons ~upper json =
+(* Proofs of a claim by a matrix inequality: one, or where the certificate leaves out the factor, those to try. `neurons`:
+   hidden ones of the chain. *)
+let inequality state claim where ~neurons ~upper json =
   let here = where ^ ".proof" in
   require_keys here [ "rho"; "t"; "factor" ] json;
   let rho = Exact.of_float (Exact.hex_float where (find here "rho" json)) in
@@ -46,7 +61,12 @@ let inequality where ~neurons ~upper json =
   require (Proved.is_positive rho && List.for_all Proved.is_nonnegative t)
       "%s: rho is not positive, or a t negative" where;
   require (at_most rho (times upper upper)) "%s: claims less than sqrt(rho)" where;
-  Proved.By_inequality (rho, t, Exact.factor (where ^ ".factor") (find here "factor" json))
+  let by factor = Proved.By_inequality (rho, t, factor) in
+  match find here "factor" json with
+  | Null ->
+    let hidden, last = stages state claim in
+    Seq.map by (Proposal.factors (Proved.matrix_inequality hidden last rho t))
+  | factor -> Seq.return (by (Exact.factor (where ^ ".factor") factor))
 
 let no_factor where = where ^ ": the factor does not show that the matrix inequality holds"
 
@@ -65,8 +85,8 @@ let check_layer state entry part k (layer : Weights.layer) =
       "%s: unusable lower_vector" where;
   let p = Functions.index state.net part in
   prove state (Norm_at_least (p, k, lower)) (By_vector vector) (where ^ ": claims more than |W v| / |v|");
-  prove state (Norm_at_most (p, k, upper)) (inequality where ~neurons:0 ~upper (find where "upper" proof))
-      (no_factor where);
+  let at_most = Proved.Norm_at_most (p, k, upper) in
+  prove_by state at_most (inequality state at_most where ~neurons:0 ~upper (find where "upper" proof)) (no_factor where);
   let product = Option.value ~default:Exact.one (Hashtbl.find_opt state.norms part) in
   Hashtbl.replace state.norms part (times product upper);
   state.spectral_norms <- state.spectral_norms + 1
@@ -145,8 +165,8 @@ let check_bound state bound =
   let claim = Proved.Slope_at_most (func, moves, exact_scale, upper) in
   let source = match find where "upper_method" bound with
     | Text ("sdp" | "eclipse_fast") ->
-      let proof = inequality where ~neurons:(hidden_neurons state names) ~upper (find where "proof" bound) in
-      prove state claim proof (no_factor where); Proved_here
+      let proofs = inequality state claim where ~neurons:(hidden_neurons state names) ~upper (find where "proof" bound) in
+      prove_by state claim proofs (no_factor where); Proved_here
     | Text "branch" ->
       not_checked state (Printf.sprintf "%s <= %s: proved by parts of boxes" where
                            (text where (find where "upper_hex" bound)));
