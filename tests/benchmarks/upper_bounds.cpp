@@ -99,8 +99,8 @@ void compare(const files::Network& network, const std::string& title) {
       continue;
     }
     const double check_time = seconds([&] {
-      const check::Matrix lmi = check::lipschitz_lmi(check::stages(network, function), bound.proof->rho,
-                                                     {bound.proof->t.begin(), bound.proof->t.end()});
+      const check::SymmetricMatrix lmi = check::lipschitz_lmi(
+          check::stages(network, function), bound.proof->rho, {bound.proof->t.begin(), bound.proof->t.end()});
       if (!check::shows_positive_semidefinite(lmi, bound.proof->factor)) std::exit(1);
     });
     std::vector<lipschitz::UpperBound> norms;
