@@ -172,13 +172,13 @@ class SchurSolver {
   MatrixXd factor_;
 };
 
+}  // namespace
+
 std::optional<LipSdpStop> why_stopped(const Stop& stop) {
   if (stop.is_out_of_time()) return LipSdpStop::kTimeLimit;
   if (stop.is_cancelled()) return LipSdpStop::kCancelled;
   return std::nullopt;
 }
-
-}  // namespace
 
 const char* name(LipSdpStop stop) {
   switch (stop) {

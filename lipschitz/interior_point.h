@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "lipschitz/stop.h"
@@ -50,6 +51,9 @@ const char* name(LipSdpStop stop);
 constexpr bool is_interrupted(LipSdpStop stop) {
   return stop == LipSdpStop::kCancelled || stop == LipSdpStop::kTimeLimit;
 }
+
+/// Why a search has to end now, if it has to.
+std::optional<LipSdpStop> why_stopped(const Stop& stop);
 
 struct InteriorPointResult {
   LipSdpStop stop = LipSdpStop::kNothingRun;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lipschitz/chain_newton.h"
 #include "lipschitz/dense_kernels.h"
 
 namespace swarmcert::lipschitz {
@@ -133,13 +134,25 @@ class ChainInequality final : public RankTwoInequality {
   MatrixXd last_gram_;
 };
 
-}  // namespace
-
-std::vector<int> balancing_exponents(const ReluChain& chain) { return scale(chain).exponents; }
-
-LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) {
-  use_one_blas_thread();
-  const ScaledProblem problem = scale(chain);
+/// Long chains by minimise_chain(), whose steps cost less; short ones, and what stops there short of the optimum, by
+/// minimise(), whose steps gain more.
+InteriorPointResult minimise(const ScaledProblem& problem, const LipSdpOptions& options) {
+  constexpr Index kMostDense = 300, kMostAgain = 1500;
+  constexpr int kMoreIterations = 3;
+  constexpr double kEnough = 1e-6, kLongGap = 5e-7;
+  InteriorPointOptions inner;
+  inner.relative_gap = options.relative_gap;
+  inner.stop = options.stop;
+  if (problem.neurons() > kMostDense) {
+    inner.max_iterations = kMoreIterations * options.max_iterations;
+    inner.relative_gap = std::max(options.relative_gap, kLongGap);
+    InteriorPointResult found = minimise_chain(problem.stages, inner);
+    const bool is_enough =
+        found.stop == LipSdpStop::kGapReached || (!found.gaps.empty() && found.gaps.back() < kEnough);
+    if (is_enough || is_interrupted(found.stop) || problem.size() > kMostAgain) return found;
+  }
+  inner.relative_gap = options.relative_gap;
+  inner.max_iterations = options.max_iterations;
   const ChainInequality inequality(problem);
 
   // Within rounding to powers of two all-ones is feasible or nearly so; scaling (rho, t) up moves inside the cone.
@@ -154,11 +167,17 @@ LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) 
   double shrink = 0.5;
   while (!options.stop.now() && cholesky(inequality.slack(scaled_up(shrink))).size() == 0) shrink *= 0.5;
 
-  InteriorPointOptions inner;
-  inner.relative_gap = options.relative_gap;
-  inner.max_iterations = options.max_iterations;
-  inner.stop = options.stop;
-  const InteriorPointResult found = minimise(inequality, scaled_up(shrink), inner);
+  return minimise(inequality, scaled_up(shrink), inner);
+}
+
+}  // namespace
+
+std::vector<int> balancing_exponents(const ReluChain& chain) { return scale(chain).exponents; }
+
+LipSdpResult solve_lipsdp(const ReluChain& chain, const LipSdpOptions& options) {
+  use_one_blas_thread();
+  const ScaledProblem problem = scale(chain);
+  const InteriorPointResult found = minimise(problem, options);
 
   // z_k of the scaled chain is z_k of the chain over 2^(e_1 + ... + e_k), and its output over 2^(sum of all e).
   int total = 0;

@@ -45,7 +45,7 @@ struct LipSdpResult {
 /// in the variables (x, z_1, ..., z_{K-1}); e_i selects neuron i and a_i = (its row of M_k in the columns of
 /// z_{k-1}) - e_i. sqrt(rho) bounds the Lipschitz constant of the chain.
 ///
-/// Solved by minimise() of interior_point.h. Chains are scaled by powers of two per layer first, and wide inputs
+/// Solved by minimise() of interior_point.h, chains of more than 300 neurons by minimise_chain() of chain_newton.h. Chains are scaled by powers of two per layer first, and wide inputs
 /// (n_0 > n_1) reduced to n_1 by a QR factorisation of M_1'.
 ///
 /// @param chain at least two matrices (one hidden layer), finite entries, matching sizes.

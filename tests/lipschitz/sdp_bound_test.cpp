@@ -188,6 +188,37 @@ TEST(SdpBound, DeadAndDuplicatedNeuronsChangeNothing) {
   EXPECT_LE(proved(sdp_bound_of(plain(twins))), before * (1 + kOptimality));
 }
 
+/// Every hidden neuron so many times, each copy with its share of the effect: the same function.
+files::Weights repeated(const files::Weights& net, int copies) {
+  files::Weights result = net;
+  for (std::size_t k = 0; k < net.layers.size(); ++k) {
+    const files::Layer& layer = net.layers[k];
+    files::Layer& wide = result.layers[k];
+    const int down = k + 1 < net.layers.size() ? copies : 1, across = k > 0 ? copies : 1;
+    wide.outputs = layer.outputs * down;
+    wide.inputs = layer.inputs * across;
+    wide.weights.clear();
+    wide.biases.clear();
+    for (int i = 0; i < wide.outputs; ++i) {
+      wide.biases.push_back(layer.biases[i / down]);
+      for (int j = 0; j < wide.inputs; ++j)
+        wide.weights.push_back(layer.weights[i / down * layer.inputs + j / across] / across);
+    }
+  }
+  return result;
+}
+
+TEST(SdpBound, RepeatingEveryNeuronLeavesTheBoundUnchangedForLargeNetworksToo) {
+  std::mt19937 generator(16);
+  const files::Weights net = random_network({3, 12, 10, 2}, generator);
+  const files::Weights large = repeated(net, 16);
+  ASSERT_EQ(large.layers[1].outputs + large.layers[0].outputs, 352) << "beyond what minimise() is given";
+  const double before = proved(sdp_bound_of(plain(net)));
+  const lipschitz::SdpBound bound = sdp_bound_of(plain(large));
+  EXPECT_EQ(bound.stop, lipschitz::LipSdpStop::kGapReached);
+  EXPECT_NEAR(proved(bound), before, kOptimality * before);
+}
+
 TEST(SdpBound, ChainsOfDeadNeuronsAreCovered) {
   // Of two neurons per layer one has input but no way out, the other a way out but no input: f is constant.
   const files::Weights constant =

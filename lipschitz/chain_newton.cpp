@@ -1,0 +1,362 @@
+#include "lipschitz/chain_newton.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "lipschitz/dense_kernels.h"
+#include "nn/base/doubles.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// S of a chain in blocks 0 (the inputs), 1 .. K - 1 (the hidden layers).
+class ChainSlack {
+ public:
+  explicit ChainSlack(const std::vector<MatrixXd>& stages) : stages_(stages) {
+    begin_ = {0, stages.front().cols()};
+    for (std::size_t k = 0; k + 1 < stages.size(); ++k) begin_.push_back(begin_.back() + stages[k].rows());
+    last_gram_ = stages.back().transpose() * stages.back();
+  }
+
+  std::size_t blocks() const { return begin_.size() - 1; }
+  Index size() const { return begin_.back(); }
+  Index inputs() const { return begin_[1]; }
+  Index begin(std::size_t k) const { return begin_[k]; }
+  Index width(std::size_t k) const { return begin_[k + 1] - begin_[k]; }
+  /// Of y = (rho, t): where the multipliers of block k >= 1 begin.
+  Index place(std::size_t k) const { return 1 + begin_[k] - inputs(); }
+  /// M_k, from block k - 1 to block k.
+  const MatrixXd& stage(std::size_t k) const { return stages_[k - 1]; }
+  const MatrixXd& last_gram() const { return last_gram_; }
+
+ private:
+  const std::vector<MatrixXd>& stages_;
+  std::vector<Index> begin_;
+  MatrixXd last_gram_;
+};
+
+/// S = L D L' with unit lower bidiagonal L.
+struct ChainFactor {
+  std::vector<MatrixXd> inverse;  ///< D_k^-1
+  std::vector<MatrixXd> left;     ///< W_k, of block row k of L left of the diagonal; the first is empty
+  double log_determinant = 0;     ///< of S
+};
+
+/// Nothing if S(y) is not safely positive definite.
+std::optional<ChainFactor> factorise(const ChainSlack& chain, const VectorXd& y) {
+  ChainFactor result;
+  if (!(y(0) > 0)) return std::nullopt;
+  result.inverse.push_back(MatrixXd::Identity(chain.inputs(), chain.inputs()) / y(0));
+  result.left.emplace_back();
+  result.log_determinant = static_cast<double>(chain.inputs()) * std::log(y(0));
+  for (std::size_t k = 1; k < chain.blocks(); ++k) {
+    const auto t = y.segment(chain.place(k), chain.width(k));
+    const MatrixXd off = -(t.asDiagonal() * chain.stage(k));
+    MatrixXd left = MatrixXd::Zero(off.rows(), off.cols());
+    if (k == 1)
+      left = off / y(0);
+    else
+      add_product(left, off, result.inverse.back());
+    MatrixXd d = (2.0 * t).asDiagonal();
+    if (k + 1 == chain.blocks()) d -= chain.last_gram();
+    add_product_transposed(d, -left, off);
+    if (!cholesky_in_place(d)) return std::nullopt;
+    result.log_determinant += 2 * d.diagonal().array().log().sum();
+    invert_from_cholesky(d);
+    result.inverse.push_back(std::move(d));
+    result.left.push_back(std::move(left));
+  }
+  return result;
+}
+
+/// The blocks of Y = S^-1 on the diagonal and left of it.
+struct InverseBlocks {
+  std::vector<MatrixXd> diagonal, left;
+};
+
+InverseBlocks inverse_blocks(const ChainFactor& factor) {
+  const std::size_t blocks = factor.inverse.size();
+  InverseBlocks result;
+  result.diagonal = factor.inverse;
+  result.left.resize(blocks);
+  for (std::size_t k = blocks; --k > 0;) {  // Y_k,k-1 = - Y_kk W_k, Y_k-1,k-1 = D_k-1^-1 - W_k' Y_k,k-1
+    result.left[k] = MatrixXd::Zero(factor.left[k].rows(), factor.left[k].cols());
+    add_product(result.left[k], -result.diagonal[k], factor.left[k]);
+    add_transposed_product(result.diagonal[k - 1], -factor.left[k], result.left[k]);
+  }
+  return result;
+}
+
+/// The gradient of log det S.
+VectorXd gradient(const ChainSlack& chain, const InverseBlocks& y) {
+  VectorXd result(1 + chain.size() - chain.inputs());
+  result(0) = y.diagonal[0].trace();
+  for (std::size_t k = 1; k < chain.blocks(); ++k)
+    result.segment(chain.place(k), chain.width(k)) =
+        2.0 * (y.diagonal[k].diagonal() - chain.stage(k).cwiseProduct(y.left[k]).rowwise().sum());
+  return result;
+}
+
+/// Rows from block `from` on of M_i X_{i-1} - X_i, for X with rows from block from - 1 on.
+MatrixXd times_a_transposed(const ChainSlack& chain, std::size_t from, const MatrixXd& x) {
+  const Index skipped = chain.begin(from - 1);
+  MatrixXd result = -x.bottomRows(chain.size() - chain.begin(from));
+  for (std::size_t i = from; i < chain.blocks(); ++i)
+    add_product(result.middleRows(chain.begin(i) - chain.begin(from), chain.width(i)), chain.stage(i),
+                x.middleRows(chain.begin(i - 1) - skipped, chain.width(i - 1)));
+  return result;
+}
+
+/// The negative Hessian of log det S, its lower triangle: H_ij = tr(Y A_i Y A_j) =
+/// 2 (a_i' Y a_j)(e_i' Y e_j) + 2 (a_i' Y e_j)(e_i' Y a_j) for neurons i and j.
+/// Less than that if it has to stop.
+MatrixXd hessian(const ChainSlack& chain, const ChainFactor& factor, const InverseBlocks& blocks,
+                 const Stop& stop) {
+  const Index size = chain.size();
+  MatrixXd h(1 + size - chain.inputs(), 1 + size - chain.inputs());
+  // Columns of Y of the block at hand, from its row on; those of the block before follow from them.
+  MatrixXd column = blocks.diagonal.back();
+  for (std::size_t j = chain.blocks(); --j > 0 && !stop.now();) {
+    const Index above = chain.width(j - 1), rows = size - chain.begin(j - 1), width = chain.width(j);
+    MatrixXd before(rows, above);
+    before.topRows(above) = blocks.diagonal[j - 1];
+    before.bottomRows(rows - above).setZero();
+    add_product(before.bottomRows(rows - above), -column, factor.left[j]);
+    MatrixXd here(rows, width);
+    here.topRows(above) = before.middleRows(above, width).transpose();
+    here.bottomRows(rows - above) = column;
+    MatrixXd y_a = -here;
+    add_product_transposed(y_a, before, chain.stage(j));
+    const MatrixXd a_y_a = times_a_transposed(chain, j, y_a);
+    const MatrixXd a_y = times_a_transposed(chain, j, here);
+    h.block(chain.place(j), chain.place(j), rows - above, width).array() =
+        2.0 * (a_y_a.array() * column.array() + a_y.array() * y_a.bottomRows(rows - above).array());
+    column = std::move(before);
+  }
+  if (stop.now()) return h;
+  const MatrixXd a_y = times_a_transposed(chain, 1, column);
+  h(0, 0) = column.topRows(chain.inputs()).squaredNorm();
+  h.col(0).tail(h.rows() - 1) =
+      -2.0 * a_y.cwiseProduct(column.bottomRows(size - chain.inputs())).rowwise().sum();
+  return h;
+}
+
+/// Solves with the Hessian, scaled to a unit diagonal and factorised in place.
+class NewtonMatrix {
+ public:
+  explicit NewtonMatrix(MatrixXd h)
+      : factor_(std::move(h)), scale_(factor_.diagonal().cwiseSqrt().cwiseInverse()) {
+    constexpr double kRegularisation = 1e-13;
+    for (Index j = 0; j < factor_.cols(); ++j) {
+      factor_.col(j).tail(factor_.rows() - j).array() *= scale_(j) * scale_.tail(factor_.rows() - j).array();
+      factor_(j, j) += kRegularisation;
+    }
+    good_ = scale_.allFinite() && cholesky_in_place(factor_);
+  }
+  bool good() const { return good_; }
+  VectorXd solve(const VectorXd& rhs) const {
+    VectorXd v = scale_.cwiseProduct(rhs);
+    solve_cholesky(factor_, v);
+    return scale_.cwiseProduct(v);
+  }
+
+ private:
+  MatrixXd factor_;
+  VectorXd scale_;
+  bool good_ = false;
+};
+
+/// The point of ECLipsE-Fast, scaled up: every Schur complement of S is then a multiple of I up to a factor of three.
+VectorXd layerwise_start(const ChainSlack& chain) {
+  constexpr double kInside = 1.5;
+  VectorXd y(1 + chain.size() - chain.inputs());
+  y(0) = 1;
+  MatrixXd inverse = MatrixXd::Identity(chain.inputs(), chain.inputs());
+  double largest = 1;
+  for (std::size_t k = 1; k <= chain.blocks(); ++k) {
+    MatrixXd half = MatrixXd::Zero(chain.stage(k).rows(), inverse.cols());
+    add_product(half, chain.stage(k), inverse);
+    MatrixXd through = MatrixXd::Zero(half.rows(), half.rows());
+    add_product_transposed(through, half, chain.stage(k));
+    largest = largest_eigenvalue(through);
+    if (k == chain.blocks()) break;
+    const double t = 1 / largest;
+    y.segment(chain.place(k), chain.width(k)).setConstant(t);
+    inverse = -t * t * through;
+    inverse.diagonal().array() += 2 * t;
+    if (!cholesky_in_place(inverse)) break;  // cannot be: the least eigenvalue is t
+    invert_from_cholesky(inverse);
+  }
+  return kInside * largest * y;
+}
+
+/// A point with what is known of S there.
+struct PathPoint {
+  VectorXd y;
+  ChainFactor factor;
+  InverseBlocks blocks;
+  VectorXd log_gradient;  ///< of log det S
+};
+
+std::optional<PathPoint> path_point(const ChainSlack& chain, VectorXd y) {
+  std::optional<ChainFactor> factor = factorise(chain, y);
+  if (!factor) return std::nullopt;
+  PathPoint point;
+  point.blocks = inverse_blocks(*factor);
+  point.log_gradient = gradient(chain, point.blocks);
+  point.factor = std::move(*factor);
+  point.y = std::move(y);
+  return point;
+}
+
+/// Minimises rho / mu - log det S by the BFGS method with limited memory, from Newton's matrix of a point nearby.
+class Centring {
+ public:
+  Centring(const ChainSlack& chain, const NewtonMatrix& newton, double mu, double scale)
+      : chain_(chain), newton_(newton), mu_(mu), scale_(scale) {}
+
+  VectorXd residual(const PathPoint& at) const {
+    VectorXd r = -at.log_gradient;
+    r(0) += 1 / mu_;
+    return r;
+  }
+  double value(const PathPoint& at) const { return at.y(0) / mu_ - at.factor.log_determinant; }
+  /// The norm of the residual by the inverse of Newton's matrix, about the distance from the path.
+  double distance(const VectorXd& r) const {
+    return std::sqrt(std::max(0.0, scale_ * r.dot(newton_.solve(r))));
+  }
+
+  /// Until the distance is estimated as `enough`, or for so many steps.
+  PathPoint run(PathPoint at, double enough, const Stop& stop) const {
+    constexpr int kSteps = 12;
+    std::vector<VectorXd> moves, changes;
+    VectorXd r = residual(at);
+    for (int step = 0; step < kSteps && !stop.now(); ++step) {
+      const VectorXd d = -preconditioned(r, moves, changes);
+      const double slope = r.dot(d);
+      if (!(slope < 0) || -slope < enough * enough) break;
+      std::optional<PathPoint> next;
+      double length = 1;
+      for (; length > 1e-7; length *= 0.5) {
+        next = path_point(chain_, at.y + length * d);
+        if (next && value(*next) <= value(at) + 1e-4 * length * slope) break;
+        next.reset();
+      }
+      if (!next) break;
+      const VectorXd after = residual(*next);
+      moves.push_back(next->y - at.y);
+      changes.push_back(after - r);
+      if (!(moves.back().dot(changes.back()) > 0)) {
+        moves.pop_back();
+        changes.pop_back();
+      }
+      r = after;
+      at = std::move(*next);
+    }
+    return at;
+  }
+
+ private:
+  VectorXd preconditioned(VectorXd r, const std::vector<VectorXd>& moves,
+                          const std::vector<VectorXd>& changes) const {
+    std::vector<double> shares(moves.size());
+    for (std::size_t i = moves.size(); i-- > 0;) {
+      shares[i] = moves[i].dot(r) / moves[i].dot(changes[i]);
+      r -= shares[i] * changes[i];
+    }
+    VectorXd d = scale_ * newton_.solve(r);
+    for (std::size_t i = 0; i < moves.size(); ++i)
+      d += (shares[i] - changes[i].dot(d) / moves[i].dot(changes[i])) * moves[i];
+    return d;
+  }
+
+  const ChainSlack& chain_;
+  const NewtonMatrix& newton_;
+  double mu_, scale_;
+};
+
+/// The tangent of the path: u and v solve Newton's system for the cost and for the gradient of log det S.
+struct Tangent {
+  VectorXd u, v;
+  double mu;
+};
+
+/// Moves along the tangent, to mu (1 - alpha), and back to the path: alpha is what the last step reached and somewhat more,
+/// or less until the end is near enough to the path. Nothing if no alpha will do.
+std::optional<PathPoint> follow(const ChainSlack& chain, const NewtonMatrix& newton, const PathPoint& at,
+                                const Tangent& tangent, double& reach, const Stop& stop) {
+  constexpr double kLeastStep = 0.02, kFarthest = 4, kShorter = 0.8, kNear = 0.05;
+  for (double alpha = 1 - (1 - reach) / 2; alpha > kLeastStep && !stop.now(); alpha *= kShorter) {
+    std::optional<PathPoint> next =
+        path_point(chain, at.y + tangent.v - (1 + alpha) / tangent.mu * tangent.u);
+    if (!next) continue;
+    // What S has near its boundary shrinks with mu, and its part of Newton's matrix grows with the square.
+    const Centring centring(chain, newton, tangent.mu * (1 - alpha), (1 - alpha) * (1 - alpha));
+    if (!(centring.distance(centring.residual(*next)) < kFarthest)) continue;
+    reach = alpha;
+    return centring.run(std::move(*next), kNear, stop);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+InteriorPointResult minimise_chain(const std::vector<MatrixXd>& stages, const InteriorPointOptions& options) {
+  use_one_blas_thread();
+  // Below kStalledGap a step that gains nothing says that rounding has taken over.
+  constexpr double kStalledGap = 1e-4, kFirstGap = 0.5, kOnPath = 1.5, kNear = 0.3, kFirstReach = 0.7;
+  const ChainSlack chain(stages);
+  const auto size = static_cast<double>(chain.size());
+  InteriorPointResult result;
+  std::optional<PathPoint> at;
+  if (!options.stop.now()) at = path_point(chain, layerwise_start(chain));
+  result.stop =
+      at ? LipSdpStop::kIterationLimit : why_stopped(options.stop).value_or(LipSdpStop::kNumericalLimit);
+  if (!at) return result;
+  result.points.push_back(at->y);
+  result.gaps.push_back(kInfinity);
+  const VectorXd cost = VectorXd::Unit(at->y.size(), 0);
+  const double first_mu = kFirstGap * at->y(0) / size;
+  double reach = kFirstReach;
+  bool is_on_path = false;
+  for (; result.iterations < options.max_iterations; ++result.iterations) {
+    MatrixXd matrix = hessian(chain, at->factor, at->blocks, options.stop);
+    if (options.stop.now()) break;
+    const NewtonMatrix newton(std::move(matrix));
+    result.stop = LipSdpStop::kNumericalLimit;
+    if (!newton.good()) break;
+    Tangent tangent = {newton.solve(cost), newton.solve(at->log_gradient), first_mu};
+    if (is_on_path) tangent.mu = tangent.u(0) / tangent.v(0);  // the nearest point of the path
+    const double mu = tangent.mu;
+    const double distance = std::sqrt(
+        std::max(0.0, at->log_gradient.dot(tangent.v) - 2 * tangent.v(0) / mu + tangent.u(0) / (mu * mu)));
+    if (!(mu > 0) || !std::isfinite(distance)) break;
+    const double gap = size * mu / at->y(0);
+    if (distance < 1) result.best_dual = std::max(result.best_dual, at->y(0) - size * mu * (1 + distance));
+    if (gap < options.relative_gap && distance < 1) {
+      result.stop = LipSdpStop::kGapReached;
+      break;
+    }
+    is_on_path = is_on_path || distance < kOnPath;
+    const double before = at->y(0);
+    if (distance < kOnPath) {
+      at = follow(chain, newton, *at, tangent, reach, options.stop);
+      if (!at) break;
+    } else {
+      at = Centring(chain, newton, mu, 1).run(std::move(*at), kNear, options.stop);
+    }
+    if (gap < kStalledGap && !(at->y(0) < before)) break;
+    result.points.push_back(at->y);
+    result.gaps.push_back(gap);
+    result.stop = LipSdpStop::kIterationLimit;
+  }
+  result.stop = why_stopped(options.stop).value_or(result.stop);
+  return result;
+}
+
+}  // namespace swarmcert::lipschitz

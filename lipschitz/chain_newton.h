@@ -1,0 +1,26 @@
+/// @file A path-following method for LipSDP-Neuron of large chains, whose memory is one matrix over the neurons.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "lipschitz/interior_point.h"
+
+namespace swarmcert::lipschitz {
+
+/// Minimises rho over (rho, t) subject to S(rho, t) >= 0, the program of solve_lipsdp(), by following the path of the
+/// minimisers of rho / mu - log det S as mu goes to zero.
+///
+/// S is block tridiagonal with one block per layer, so that its factor and the blocks of its inverse that the gradient needs
+/// cost time and memory that grow linearly with depth. Newton's matrix H is dense over the n neurons. It is built block
+/// column by block column from those of S^-1, for 4 n^2 times the width, and factorised in place. One H per step serves the
+/// correction towards the path, the extrapolation along its tangent, and the test how far that may go.
+///
+/// Compared with minimise(): a fifth of the memory, a quarter to a twentieth of the time per step, at the price of less
+/// accuracy near the optimum: meant for a relative gap of 1e-6.
+/// @param stages M_1 .. M_K of order one, at least two.
+/// @returns floating point estimates without a guarantee: verify them.
+InteriorPointResult minimise_chain(const std::vector<Eigen::MatrixXd>& stages,
+                                   const InteriorPointOptions& options);
+
+}  // namespace swarmcert::lipschitz
