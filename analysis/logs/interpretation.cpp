@@ -57,7 +57,7 @@ void keep_one_vehicle(RawLog& raw, Log& log) {
 }
 
 /// A signal of the table or, where it has none, `otherwise`.
-double value_of(const SignalTable& table, int signal, std::size_t record, double otherwise) {
+double signal_value(const SignalTable& table, int signal, std::size_t record, double otherwise) {
   return table.has(signal) ? table[signal][record] : otherwise;
 }
 
@@ -66,27 +66,27 @@ Sample sample_of(const SignalTable& t, std::size_t i, const Signals& signals) {
   sample.time_us = t.time_us[i];
   sample.restarts = t.restarts[i] != 0;
   const auto three = [&](int first, double otherwise) {
-    return Vector{value_of(t, first, i, otherwise), value_of(t, first + 1, i, otherwise),
-                  value_of(t, first + 2, i, otherwise)};
+    return Vector{signal_value(t, first, i, otherwise), signal_value(t, first + 1, i, otherwise),
+                  signal_value(t, first + 2, i, otherwise)};
   };
   sample.position_m = three(kPosition, 0);
   sample.velocity_m_s = three(kVelocity, 0);
   for (int k = 0; k < 4; ++k) {
     const auto at = static_cast<std::size_t>(k);
     if (t.has(kAttitude)) sample.attitude[at] = t[kAttitude + k][i];
-    sample.duty[at] = value_of(t, kDuty + k, i, signals.force ? 0 : kNaN);
-    sample.motor_force_N[at] = value_of(t, kMotorForce + k, i, kNaN);
+    sample.duty[at] = signal_value(t, kDuty + k, i, signals.force ? 0 : kNaN);
+    sample.motor_force_N[at] = signal_value(t, kMotorForce + k, i, kNaN);
   }
   if (signals.force) sample.specific_force_m_s2 = three(kForceWorld, 0);
   for (int k = 0; k < signals.motor_commands; ++k)
     sample.motor_command[static_cast<std::size_t>(k)] = static_cast<float>(t[kMotorCommand + k][i]);
-  if (signals.thrust != ThrustSource::kDuty) sample.given_thrust = value_of(t, kThrust, i, 0);
-  sample.battery_V = value_of(t, kBattery, i, 0);
+  if (signals.thrust != ThrustSource::kDuty) sample.given_thrust = signal_value(t, kThrust, i, 0);
+  sample.battery_V = signal_value(t, kBattery, i, 0);
   sample.rates_rad_s = three(kRates, kNaN);
   sample.target_position_m = three(kTargetPosition, kNaN);
   sample.target_velocity_m_s = three(kTargetVelocity, kNaN);
   sample.thrust_command_N =
-      signals.thrust == ThrustSource::kHoverMultiple ? kNaN : value_of(t, kThrust, i, kNaN);
+      signals.thrust == ThrustSource::kHoverMultiple ? kNaN : signal_value(t, kThrust, i, kNaN);
   sample.torque_command_Nm = three(kTorque, kNaN);
   return sample;
 }

@@ -6,7 +6,7 @@
 namespace swarmcert::stability {
 namespace {
 
-enum Shape { kDecay, kHeight, kTail };
+enum CeilingShape { kCeilingDecay, kCeilingHeight, kCeilingTail };
 
 }  // namespace
 
@@ -24,21 +24,21 @@ EffectInfo Ceiling::describe() {
 }
 
 void Ceiling::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  const double gap_m = std::max(shape[kHeight] - now.p_W_m.z(), 0.0);
-  const double x = gap_m / shape[kDecay], tail = shape[kTail];
+  const double gap_m = std::max(shape[kCeilingHeight] - now.p_W_m.z(), 0.0);
+  const double x = gap_m / shape[kCeilingDecay], tail = shape[kCeilingTail];
   const double gain = tail == 0 ? std::exp(-x) : std::exp(-std::log1p(tail * x) / tail);
   columns[0] = {now.thrust_N * gain * now.b3_W(), Eigen::Vector3d::Zero()};
 }
 
 bool Ceiling::in_support(const Instant& now, const double* shape) const {
-  return now.p_W_m.z() > shape[kHeight] - 2 * shape[kDecay];
+  return now.p_W_m.z() > shape[kCeilingHeight] - 2 * shape[kCeilingDecay];
 }
 
 std::vector<std::vector<double>> Ceiling::grid(const FlightRange& range) const {
   // Flights cannot tell the ceiling's height from the amplitude: the height is taken just above the highest point.
   std::vector<std::vector<double>> thetas;
-  for (const double tail : info().shape[kTail].grid) {
-    for (const double decay_m : info().shape[kDecay].grid)
+  for (const double tail : info().shape[kCeilingTail].grid) {
+    for (const double decay_m : info().shape[kCeilingDecay].grid)
       thetas.push_back({decay_m, range.z_max_m + 0.05, tail});
   }
   return thetas;

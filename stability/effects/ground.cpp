@@ -6,7 +6,7 @@
 namespace swarmcert::stability {
 namespace {
 
-enum Shape { kDecay, kReference };
+enum GroundShape { kGroundDecay, kGroundReference };
 
 }  // namespace
 
@@ -24,12 +24,13 @@ EffectInfo Ground::describe() {
 }
 
 void Ground::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  const double height_m = std::max(now.p_W_m.z(), 0.0) - shape[kReference];
-  columns[0] = {now.thrust_N * std::exp(-height_m / shape[kDecay]) * now.b3_W(), Eigen::Vector3d::Zero()};
+  const double height_m = std::max(now.p_W_m.z(), 0.0) - shape[kGroundReference];
+  columns[0] = {now.thrust_N * std::exp(-height_m / shape[kGroundDecay]) * now.b3_W(),
+                Eigen::Vector3d::Zero()};
 }
 
 bool Ground::in_support(const Instant& now, const double* shape) const {
-  return now.p_W_m.z() < shape[kReference] + 2 * shape[kDecay];
+  return now.p_W_m.z() < shape[kGroundReference] + 2 * shape[kGroundDecay];
 }
 
 }  // namespace swarmcert::stability

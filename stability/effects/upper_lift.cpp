@@ -8,7 +8,7 @@
 namespace swarmcert::stability {
 namespace {
 
-enum Shape { kSpread, kExponent };
+enum UpperLiftShape { kSpread, kExponent };
 
 /// Lift per newton of amplitude from one neighbour; 0 for those that are not below.
 double lift(const Neighbour& neighbour, const double* shape) {

@@ -6,11 +6,11 @@
 namespace swarmcert::stability {
 namespace {
 
-enum WallShape { kBearing, kPlace, kWallDecay };
+enum WallShape { kBearing, kWallPlace, kWallDecay };
 
 double wall_gap_m(const Instant& now, const double* shape) {
   const double along = std::cos(shape[kBearing]) * now.p_W_m.x() + std::sin(shape[kBearing]) * now.p_W_m.y();
-  return std::max(shape[kPlace] - along, 0.0);
+  return std::max(shape[kWallPlace] - along, 0.0);
 }
 
 }  // namespace
