@@ -25,6 +25,25 @@ check::Dyadic power(double base, std::size_t exponent) {
   return result;
 }
 
+/// Bounds on a box and branch and bound are for ReLU. @throws std::invalid_argument.
+void require_relu_on_a_box(const std::map<std::string, const Weights*>& parts,
+                           const CertifyOptions& options) {
+  if (options.domain.empty() && options.method != UpperMethod::kBranch) return;
+  for (const auto& [name, weights] : parts) {
+    if (weights->is_relu()) continue;
+    throw std::invalid_argument(std::string(options.domain.empty() ? "--method branch" : "bounds on a box") +
+                                ": for ReLU networks only; " + name + " has " +
+                                files::function_of(weights->activation).words +
+                                " between its layers, so that only bounds for all inputs can be proved");
+  }
+}
+
+/// The largest slopes of what lies between the layers of `weights`; nothing where they are 1.
+void add_steepest_slopes(const Weights& weights, std::vector<UpperBound>& factors) {
+  const double steepest = files::function_of(weights.activation).steepest();
+  for (std::size_t k = 1; k < weights.layers.size() && steepest != 1; ++k) factors.emplace_back(steepest);
+}
+
 /// The law's bound from those of its terms, and whether one of them was cut short.
 void settle(const Network& network, const std::vector<CertifiedBound>& bounds, CertifiedLaw& law) {
   Neighbours neighbours = law.neighbours;
@@ -102,6 +121,7 @@ Certification certify(const Network& network, const CertifyOptions& options) {
   }
   require_moderate(network);
   const std::map<std::string, const Weights*> parts = files::parts(network);
+  require_relu_on_a_box(parts, options);
   std::vector<const files::Layer*> layers;
   for (const auto& [name, weights] : parts) {
     for (const files::Layer& layer : weights->layers) {
@@ -149,6 +169,10 @@ Certification certify(const Network& network, const CertifyOptions& options) {
       for (const CertifiedLayer& layer : result.layers) {
         if (layer.network == name) norms.push_back(layer.norm.norm.upper);
       }
+      add_steepest_slopes(*parts.at(name), norms);
+      const files::ActivationFunction& function = files::function_of(parts.at(name)->activation);
+      bound.is_relu = bound.is_relu && parts.at(name)->is_relu();
+      bound.has_program = bound.has_program && function.is_monotone();
     }
     bound.product = bound.upper = product_up(norms);
   }

@@ -23,11 +23,11 @@ std::string called(const CertifiedBound& bound) {
 }
 
 bool has_program(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method != UpperMethod::kProduct && bound.neighbours.empty();
+  return options.method != UpperMethod::kProduct && bound.neighbours.empty() && bound.has_program;
 }
 
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method == UpperMethod::kBranch && bound.function.rfind("rho:", 0) != 0;
+  return options.method == UpperMethod::kBranch && bound.function.rfind("rho:", 0) != 0 && bound.is_relu;
 }
 
 /// The sooner of a limit of its own, 0: none, and a stop, in seconds; 0: no limit.
@@ -163,8 +163,9 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
     CertifiedBound& bound = bounds[static_cast<std::size_t>(i % count)];
     const Stop share = shares.next();
     if (i < count) {
-      progress.run("search for steep slopes of " + called(bound),
-                   [&] { search_below(network, options, share, options.lower.starts, bound); });
+      progress.run("search for steep slopes of " + called(bound), [&] {
+        if (bound.is_relu) search_below(network, options, share, options.lower.starts, bound);
+      });
     } else {
       progress.run("semidefinite program of " + called(bound), [&] {
         if (has_program(options, bound)) solve_program(network, options, share, bound);

@@ -58,13 +58,26 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   rho->needs(phi)->excludes(file);
   app.add_option("--key", arguments.key, "Key of the state dict inside a nested checkpoint, e.g. model");
   app.add_option("--activation", arguments.activation,
-                 std::string("Between the layers, which a state dict does not tell: ") + files::kActivations)
-      ->capture_default_str();
+                 "Between the layers, which a state dict does not tell (default: relu). Smooth ones can be "
+                 "certified and checked: " +
+                     files::activations());
   declare_order(app, arguments);
 }
 
 files::Network load_net(const files::NetworkArguments& arguments) {
-  if (host() != nullptr && host()->network) return *host()->network;
+  files::Network network = load_any_net(arguments);
+  files::require_relu(network, "this command is for ReLU networks");
+  return network;
+}
+
+files::Network load_any_net(const files::NetworkArguments& arguments) {
+  if (!arguments.activation.empty() && !files::is_activation(arguments.activation))
+    throw UsageError("--activation " + arguments.activation +
+                     ": is none of those whose slopes are known: " + files::activations());
+  if (host() != nullptr && host()->network) {
+    return arguments.activation.empty() ? *host()->network
+                                        : files::with_activation(*host()->network, arguments.activation);
+  }
   if (arguments.file.empty() && arguments.phi.empty()) {
     throw UsageError("no network: name a network.toml, one weight file, or --phi F --rho F");
   }
@@ -72,11 +85,7 @@ files::Network load_net(const files::NetworkArguments& arguments) {
   if (has_pair ? !arguments.order.empty() : !arguments.phi_order.empty() || !arguments.rho_order.empty())
     throw UsageError(has_pair ? "--order: say of which file: --order phi=fc1,fc2 or rho=fc1,fc2"
                               : "--order phi=... and rho=... go with --phi and --rho");
-  if (!files::is_activation(arguments.activation))
-    throw UsageError("--activation " + arguments.activation +
-                     ": only piecewise linear functions, which ReLU can express, can be certified: " +
-                     files::kActivations);
-  return files::load_network(arguments);
+  return files::load_any_network(arguments);
 }
 
 namespace {

@@ -54,8 +54,10 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments);
 /// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Loads NET, or takes the host's. @throws UsageError if nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
+/// Loads NET, whose activation is ReLU, or takes the host's. @throws UsageError if nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
 files::Network load_net(const files::NetworkArguments& arguments);
+/// The same of networks with any activation.
+files::Network load_any_net(const files::NetworkArguments& arguments);
 
 /// Head of a result: schema "swarmcert/<command>/1", tool version, sha256 of every input, and the command line
 /// without what may not change the result (--jobs, -q, --force and where output goes). `seed` is null until it is set.

@@ -97,7 +97,8 @@ files::Network network_of(const py::dict& source) {
 
 std::string save_network(const py::dict& source, const std::string& folder, bool overwrite) {
   namespace fs = std::filesystem;
-  network_of(source);  // what cannot be loaded is not written
+  files::require_relu(network_of(source),
+                      "files are written of ReLU networks");  // what cannot be loaded is refused as well
   const auto description = source["description"].cast<std::string>();
   std::string last;
   for (const auto& [name, weights] : parts_of(source)) {

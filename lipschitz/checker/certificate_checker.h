@@ -39,6 +39,12 @@ class CertificateChecker {
   static void check_samples(const Json& samples, const std::string& where);
   void check_layer(const Json& entry, const std::string& network, const files::Layer& layer);
   void check_bound(const Json& bound);
+  /// By the product of the norms and of the activations' steepest slopes.
+  void check_product(const Json& bound, const std::vector<std::string>& names, double upper,
+                     const std::vector<double>& scale, const std::string& where) const;
+  /// What is stated of functions with other activations than ReLU: nothing on a box, no witness.
+  void check_activations(const Json& bound, const std::vector<std::string>& names,
+                         const std::string& where) const;
   /// Of a set function, at most how many of each kind there are; empty: any number.
   Neighbours neighbours_of(const Json& bound, const std::string& where) const;
   static std::string key(const std::string& function, const std::string& block, const Neighbours& neighbours);

@@ -174,18 +174,13 @@ void CertificateChecker::check_bound(const Json& bound) {
   const Neighbours neighbours = neighbours_of(bound, where);
   const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
   check_status(bound, where);
+  check_activations(bound, names, where);
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(stages(network_, function, block, scale), bound["proof"], upper, where);
   } else if (bound["upper_method"] == "branch") {
     check_local(bound, upper, scale, where);
   } else {
-    require(bound["upper_method"] == "product" && bound["proof"].is_null(), where + ": unknown upper_method");
-    Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
-    for (const std::string& name : names) {
-      require(norms_.count(name) == 1, where + ": there is no network " + name);
-      total = total * norms_.at(name);
-    }
-    require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
+    check_product(bound, names, upper, scale, where);
   }
   if (scale.empty()) {
     proved_[key(function, block, neighbours)] = upper;
@@ -199,6 +194,36 @@ void CertificateChecker::check_bound(const Json& bound) {
   const double lower = number(bound["lower"], bound["lower_hex"], where + " lower");
   check_lower(bound, lower, scale, where + ": lower_witness");
   ++lower_bounds_;
+}
+
+void CertificateChecker::check_product(const Json& bound, const std::vector<std::string>& names, double upper,
+                                       const std::vector<double>& scale, const std::string& where) const {
+  require(bound["upper_method"] == "product" && bound["proof"].is_null(), where + ": unknown upper_method");
+  Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
+  for (const std::string& name : names) {
+    require(norms_.count(name) == 1, where + ": there is no network " + name);
+    total = total * norms_.at(name);
+    const files::Weights& weights = *parts_.at(name);
+    const Dyadic steepest = files::function_of(weights.activation).steepest();
+    for (std::size_t k = 1; k < weights.layers.size(); ++k) total = total * steepest;
+  }
+  require(Dyadic(upper) >= total, where + ": claims less than the product of the norms");
+}
+
+void CertificateChecker::check_activations(const Json& bound, const std::vector<std::string>& names,
+                                           const std::string& where) const {
+  for (const std::string& name : names) {
+    require(parts_.count(name) == 1, where + ": there is no network " + name);
+    const files::ActivationFunction& function = files::function_of(parts_.at(name)->activation);
+    if (function.activation == files::Activation::kRelu) continue;
+    const std::string with = std::string(" of a network with ") + function.words;
+    require(bound["domain"] == "global" && bound["upper_method"] != "branch",
+            where + ": a bound on a box" + with);
+    require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
+            where + ": a lower bound" + with);
+    require(function.is_monotone() || bound["upper_method"] == "product",
+            where + ": a matrix inequality" + with + ", which is not monotone");
+  }
 }
 
 CertificateChecker::Neighbours CertificateChecker::neighbours_of(const Json& bound,
@@ -258,6 +283,26 @@ void CertificateChecker::check_law(const Json& law) {
   require(stacked ? Dyadic(upper) * upper >= sum_of_squares : Dyadic(upper) >= sum,
           where + ": claims less than the law gives");
   ++upper_bounds_;
+}
+
+files::Network with_stated_activations(const files::Json& certificate, files::Network network) {
+  const auto adopt = [&certificate](const std::string& part, files::Weights& weights) {
+    if (weights.states_activation() || weights.layers.size() == 1) return;
+    try {
+      for (const files::Json& step : certificate.at("network").at("weights").at(part).at("chain")) {
+        const auto activation = files::activation_called(step.at("op").get<std::string>());
+        if (!activation) continue;
+        weights.activation = *activation;
+        return;
+      }
+    } catch (const files::Json::exception&) {
+      return;  // check() says what is wrong with it
+    }
+  };
+  if (network.plain) adopt("network", *network.plain);
+  for (auto& [kind, weights] : network.phi) adopt("phi:" + kind, weights);
+  for (auto& [kind, weights] : network.rho) adopt("rho:" + kind, weights);
+  return network;
 }
 
 CheckResult check(const files::Json& certificate, const files::Network& network) {

@@ -66,6 +66,8 @@ void CertificateChecker::check_values(const Json& entry) {
   const std::string where = "values of " + function;
   const std::vector<std::string> names = files::networks_of(function);
   const bool is_set = names.size() == 2;
+  for (const std::string& name : names)
+    require(parts_.count(name) == 1 && parts_.at(name)->is_relu(), where + ": only of ReLU networks");
   require(is_set ? names[0] != files::kGroundPhi : function == "network",
           where + ": only of the network, or of a sum over neighbours");
   const bool has_ground = is_set && parts_.count(files::kGroundPhi) == 1;
@@ -85,7 +87,7 @@ void CertificateChecker::check_values(const Json& entry) {
   Bounded result;
   std::vector<SumTerm> terms;
   for (const std::string& name : inputs) {
-    require(parts_.count(name) == 1, where + ": there is no network " + name);
+    require(parts_.count(name) == 1 && parts_.at(name)->is_relu(), where + ": only of ReLU networks");
     Bounded input = values_input(entry, name, where);
     result =
         check_layers(*parts_.at(name), entry["networks"].at(name), std::move(input), where + ": " + name);

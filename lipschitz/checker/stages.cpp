@@ -21,6 +21,14 @@ Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const s
   return result;
 }
 
+/// Slopes of the activation lie between 0 and this.
+double greatest_slope(const files::Weights& weights) {
+  const files::ActivationFunction& function = files::function_of(weights.activation);
+  if (!function.is_monotone())
+    throw std::domain_error(std::string(function.words) + " is not monotone: there is no matrix inequality");
+  return function.greatest_slope;
+}
+
 }  // namespace
 
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
@@ -35,9 +43,12 @@ std::vector<Matrix> stages(const files::Network& network, const std::string& fun
   }
   std::vector<Matrix> chain;
   for (const std::string& name : names) {
+    const Dyadic slope = greatest_slope(*parts.at(name));
     bool joins = true;  // the first layer acts on the selected inputs, and that of rho on the last of phi
     for (const files::Layer& layer : parts.at(name)->layers) {
-      const Matrix w(layer.outputs, layer.inputs, layer.weights);
+      Matrix w(layer.outputs, layer.inputs, layer.weights);
+      for (Dyadic& entry : w.entries)
+        if (!joins) entry = entry * slope;
       if (chain.empty()) {
         chain.push_back(selected_columns(w, coordinates, scale));
       } else if (joins) {
@@ -55,6 +66,13 @@ namespace {
 
 HiddenLayer hidden_layer(const files::Layer& layer, bool has_relu) {
   return {layer.outputs, layer.inputs, layer.weights, layer.biases, has_relu ? 0 : layer.outputs};
+}
+
+/// Parts of a box are decided for ReLU.
+const std::vector<files::Layer>& relu_layers(const files::Network& network, const std::string& part) {
+  const files::Weights& weights = *files::parts(network).at(part);
+  if (!weights.is_relu()) throw std::invalid_argument(part + " is no ReLU network");
+  return weights.layers;
 }
 
 /// The moving coordinates of `part` and their weights.
@@ -80,7 +98,7 @@ Matrix gram(const files::Layer& last, const Matrix& q) {
 
 LocalFunction local_function(const files::Network& network, const std::string& part, const std::string& block,
                              const std::vector<double>& scale, const Matrix& q) {
-  const std::vector<files::Layer>& layers = files::parts(network).at(part)->layers;
+  const std::vector<files::Layer>& layers = relu_layers(network, part);
   const files::Layer& last = layers.back();
   if (layers.size() < 2) throw std::invalid_argument(part + " has no hidden layer");
   if (q.rows != 0 && q.rows != last.outputs)
@@ -94,11 +112,10 @@ LocalFunction local_function(const files::Network& network, const std::string& p
 
 std::vector<HiddenLayer> term_layers(const files::Network& network, const std::string& phi,
                                      const std::string& rho) {
-  const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  const std::vector<files::Layer>& behind = parts.at(rho)->layers;
+  const std::vector<files::Layer>& behind = relu_layers(network, rho);
   if (behind.size() < 2) throw std::invalid_argument(rho + " has no hidden layer");
   std::vector<HiddenLayer> result;
-  for (const files::Layer& layer : parts.at(phi)->layers) result.push_back(hidden_layer(layer, true));
+  for (const files::Layer& layer : relu_layers(network, phi)) result.push_back(hidden_layer(layer, true));
   result.back().without_relu = result.back().outputs;
   result.push_back(hidden_layer(behind.front(), false));
   result.back().biases.assign(result.back().biases.size(), 0.0);

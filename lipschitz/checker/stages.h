@@ -1,4 +1,4 @@
-/// @file The functions of NET as chains of exact matrices with ReLU in between.
+/// @file The functions of NET as chains of exact matrices with activations of slopes between 0 and 1 in between.
 #pragma once
 
 #include <string>
@@ -12,8 +12,10 @@ namespace swarmcert::check {
 
 /// M_1 .. M_K of `function` ("network", "phi:<kind>", "rho:<kind>", "set:<phi kind>:<rho kind>"), exactly, as they act
 /// on the input coordinates of `block`, each in units of its `scale` (empty: 1). In a set function the last layer of
-/// phi and the first of rho, which no ReLU separates, are one stage: their product.
-/// @throws std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` has not one
+/// phi and the first of rho, which no activation separates, are one stage: their product.
+/// An activation s of slopes in [0, b] is b times one of slopes in [0, 1]: the stage behind it is multiplied by b. ReLU
+/// has b = 1.
+/// @throws std::domain_error if an activation of `function` is not monotone; std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` has not one
 ///   number per input.
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});

@@ -205,7 +205,9 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
                              const std::vector<std::string>& others) {
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
+  if (!files::is_relu(network, function)) refuse(function + " is no ReLU network");
   const auto term = [&](const std::string& name) {
+    if (!parts.at(name)->is_relu()) refuse(name + " is no ReLU network");
     const bool clamped = network.clamp && files::is_clamped(name);
     return Term{parts.at(name), clamped ? &*network.clamp : nullptr};
   };

@@ -79,15 +79,31 @@ AffineMap activated(ReluChain& chain, const AffineMap& before, const ActivationT
 
 }  // namespace
 
-bool is_activation(const std::string& name) { return name == "relu" || terms_of(name).has_value(); }
+std::string activations() {
+  return "relu, leaky_relu (slope 0.01), leaky_relu:SLOPE, relu6, hardtanh, " + smooth_activations();
+}
+
+bool is_activation(const std::string& name) {
+  return activation_called(name).has_value() || terms_of(name).has_value();
+}
 
 Weights with_activation(Weights weights, const std::string& activation) {
-  if (activation == "relu") return weights;
+  const std::optional<Activation> as_is = activation_called(activation);
   const std::optional<ActivationTerms> terms = terms_of(activation);
-  if (!terms) throw std::invalid_argument("with_activation: " + activation + " is unknown");
-  if (weights.order_source == OrderSource::kFile)
+  if (!as_is && !terms) throw std::invalid_argument("with_activation: " + activation + " is unknown");
+  if (weights.layers.size() == 1) return weights;  // nothing is between its layers
+  if (weights.states_activation()) {
+    if (as_is == weights.activation) return weights;
     throw InputError({weights.path, "", "--activation", activation,
-                      "the file itself states the activation between its layers", "leave --activation out"});
+                      (weights.activation_is_given ? "network.toml states " : "the file itself states ") +
+                          std::string(function_of(weights.activation).words) + " between its layers",
+                      "leave --activation out"});
+  }
+  weights.activation_is_given = true;
+  if (as_is) {
+    weights.activation = *as_is;
+    return weights;
+  }
   double scales = 0, factors = 0;
   for (const ActivationTerms::Term& term : terms->terms) {
     scales += term.scale * term.scale;

@@ -1,4 +1,4 @@
-/// @file State dicts of networks with another piecewise linear activation than ReLU, as ReLU networks.
+/// @file The activation of weight files that state none: ReLU, another piecewise linear one, or a smooth one.
 #pragma once
 
 #include <string>
@@ -7,15 +7,16 @@
 
 namespace swarmcert::files {
 
-/// What stated_activation() knows, for help and messages.
-inline constexpr char kActivations[] = "relu, leaky_relu (slope 0.01), leaky_relu:SLOPE, relu6, hardtanh";
+/// What with_activation() knows, for help and messages.
+std::string activations();
 
-/// Whether `name` is one of kActivations.
+/// Whether `name` is one of activations().
 bool is_activation(const std::string& name);
 
-/// The network whose layers are those of `weights` with `activation` between them, written with ReLU, the same function:
+/// The network whose layers are those of `weights` with `activation` between them. Smooth activations
+/// (activation_function.h) stay what they are; piecewise linear ones are written with ReLU, the same function:
 /// leaky_relu(x) = relu(x) - a relu(-x), relu6(x) = relu(x) - relu(x - 6), hardtanh(x) = -1 + relu(x + 1) - relu(x - 1).
-/// @throws InputError if the file itself states ReLU, or the network becomes too large.
+/// @throws InputError if the file itself or network.toml states another activation, or the network becomes too large.
 /// @throws std::invalid_argument if `activation` is unknown.
 Weights with_activation(Weights weights, const std::string& activation);
 

@@ -11,7 +11,8 @@ std::vector<ChainStep> chain(const Network& network, const std::string& name) {
   std::vector<ChainStep> result;
   if (network.clamp && is_clamped(name)) result.push_back({"clamp", "", weights.inputs(), weights.inputs()});
   for (const Layer& layer : weights.layers) {
-    if (&layer != &weights.layers.front()) result.push_back({"relu", "", layer.inputs, layer.inputs});
+    if (&layer != &weights.layers.front())
+      result.push_back({function_of(weights.activation).op, "", layer.inputs, layer.inputs});
     result.push_back({"linear", layer.name, layer.inputs, layer.outputs});
   }
   return result;
@@ -32,7 +33,8 @@ std::string chain_words(const std::vector<ChainStep>& chain) {
   std::string text;
   for (const ChainStep& step : chain) {
     if (!text.empty()) text += " - ";
-    text += step.op == "relu"    ? "ReLU"
+    const std::optional<Activation> activation = activation_called(step.op);
+    text += activation           ? function_of(*activation).words
             : step.op == "clamp" ? "clamp"
             : step.layer.empty() ? "linear"
                                  : step.layer;

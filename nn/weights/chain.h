@@ -10,13 +10,13 @@
 namespace swarmcert::files {
 
 struct ChainStep {
-  std::string op;     ///< "clamp", "linear" (y = W x + b) or "relu"
+  std::string op;     ///< "clamp", "linear" (y = W x + b), or what ActivationFunction::op says
   std::string layer;  ///< of "linear": its name in the file, which may be empty
   int inputs = 0, outputs = 0;
 };
 
-/// The operations of part `name` of NET, first applied first: the clamp where one acts on it, then its layers with ReLU
-/// after each but the last.
+/// The operations of part `name` of NET, first applied first: the clamp where one acts on it, then its layers with its
+/// activation after each but the last.
 /// @throws std::out_of_range if NET has no such part.
 std::vector<ChainStep> chain(const Network& network, const std::string& name);
 

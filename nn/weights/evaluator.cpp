@@ -1,6 +1,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "nn/base/input_error.h"
 #include "nn/weights/weights.h"
@@ -42,7 +43,10 @@ Weights as_float32(Weights weights) {
 }
 
 template <typename Scalar>
-Evaluator<Scalar>::Evaluator(const Weights& weights) {
+Evaluator<Scalar>::Evaluator(const Weights& weights) : activation_(weights.activation) {
+  if (sizeof(Scalar) < sizeof(double) && !weights.is_relu())
+    throw InputError({weights.path, "", "activation", function_of(activation_).op,
+                      "float32 evaluates ReLU networks only", "evaluate this network in float64"});
   arrays_.reserve(2 * weights.layers.size());
   for (const Layer& layer : weights.layers) {
     arrays_.push_back(converted<Scalar>(layer.weights, weights.path, layer.name + ".weight"));
@@ -53,12 +57,35 @@ Evaluator<Scalar>::Evaluator(const Weights& weights) {
 }
 
 template <typename Scalar>
-std::vector<Scalar> Evaluator<Scalar>::operator()(const std::vector<Scalar>& input) const {
-  const nn::Mlp<Scalar> network = mlp();
-  if (input.size() != static_cast<std::size_t>(network.inputs())) {
-    throw std::invalid_argument("Evaluator: input has " + std::to_string(input.size()) +
-                                " entries, the network has " + std::to_string(network.inputs()) + " inputs");
+nn::Mlp<Scalar> Evaluator<Scalar>::mlp() const {
+  if (activation_ != Activation::kRelu) throw std::logic_error("Evaluator: this is no ReLU network");
+  return {layers_.data(), static_cast<int>(layers_.size())};
+}
+
+/// Layer by layer, for any activation.
+template <typename Scalar>
+std::vector<Scalar> Evaluator<Scalar>::smooth_value(const std::vector<Scalar>& input) const {
+  std::vector<Scalar> x = input;
+  for (const nn::DenseLayer<Scalar>& layer : layers_) {
+    std::vector<Scalar> y(static_cast<std::size_t>(layer.outputs));
+    nn::apply<1>(layer, x.data(), y.data(), nn::Activation::kNone);
+    const bool is_last = &layer == &layers_.back();
+    for (Scalar& t : y)
+      if (!is_last) t = static_cast<Scalar>(function_of(activation_).value(static_cast<double>(t)));
+    x = std::move(y);
   }
+  return x;
+}
+
+template <typename Scalar>
+std::vector<Scalar> Evaluator<Scalar>::operator()(const std::vector<Scalar>& input) const {
+  if (input.size() != static_cast<std::size_t>(layers_.front().inputs)) {
+    throw std::invalid_argument("Evaluator: input has " + std::to_string(input.size()) +
+                                " entries, the network has " + std::to_string(layers_.front().inputs) +
+                                " inputs");
+  }
+  if (activation_ != Activation::kRelu) return smooth_value(input);
+  const nn::Mlp<Scalar> network = mlp();
   std::vector<Scalar> output(static_cast<std::size_t>(network.outputs()));
   std::vector<Scalar> scratch(static_cast<std::size_t>(nn::scratch_size(network)));
   nn::evaluate(network, input.data(), output.data(), scratch.data());

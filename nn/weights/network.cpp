@@ -8,6 +8,7 @@
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
+#include "nn/weights/functions.h"
 
 namespace swarmcert::files {
 namespace {
@@ -100,7 +101,7 @@ class NetworkReader {
     if (kinds.keys().empty()) kinds.refuse("", "", "names no kind of vehicle", "add [" + role + ".<kind>]");
     for (const std::string& kind : kinds.keys()) {
       const TomlTable entry = kinds.table(kind);
-      entry.allow_only({"weights", "order"});
+      entry.allow_only({"weights", "order", "activation"});
       // "set:<kind>:<kind>" names a function.
       if (kind.find(':') != std::string::npos)
         kinds.refuse(in_quotes(kind), "", "a kind's name must not contain ':'", "rename the kind");
@@ -113,8 +114,24 @@ class NetworkReader {
       if (entry.has("order")) order = entry.texts("order");
       if (entry.has("order") && order.empty())
         entry.refuse("order", "[]", "names no layer", "leave it out, or name every layer once");
-      weights.emplace(kind, load_((folder / file).string(), order));
+      Weights read = load_((folder / file).string(), order);
+      if (entry.has("activation")) {
+        const std::string activation = activation_of(entry);
+        const std::string stated = function_of(read.activation).op;
+        if (read.layers.size() > 1 && read.states_activation() && activation != stated)
+          entry.refuse("activation", in_quotes(activation), "the weight file itself states " + stated);
+        read = with_activation(std::move(read), activation);
+      }
+      weights.emplace(kind, std::move(read));
     }
+  }
+
+  /// As certificates name it: what is written with ReLU instead is stated by --activation.
+  static std::string activation_of(const TomlTable& entry) {
+    const std::string activation = entry.text("activation");
+    if (!activation_called(activation))
+      entry.refuse("activation", in_quotes(activation), "must be one of relu, " + smooth_activations());
+    return activation;
   }
 
   /// What kind's network has, against what it must have.
@@ -232,7 +249,7 @@ Network as_float32(Network network) {
 
 namespace {
 
-Network load_with_relu(const NetworkArguments& arguments) {
+Network load_as_stated(const NetworkArguments& arguments) {
   const bool is_pair = !arguments.phi.empty() && !arguments.rho.empty();
   if (arguments.file.empty() ? !is_pair : !(arguments.phi.empty() && arguments.rho.empty())) {
     throw std::invalid_argument("load_network: name one file, or a phi and a rho");
@@ -262,15 +279,41 @@ Network load_with_relu(const NetworkArguments& arguments) {
 
 }  // namespace
 
+void require_relu(const Network& network, const std::string& what) {
+  for (const auto& [part, weights] : parts(network)) {
+    if (weights->is_relu()) continue;
+    throw InputError({weights->path, "", "activation", in_quotes(function_of(weights->activation).op),
+                      "is between the layers of " + part + ", but " + what,
+                      "bounds for all inputs are what can be said of this network: certify it"});
+  }
+}
+
+bool is_relu(const Network& network, const std::string& function) {
+  const std::map<std::string, const Weights*> stored = parts(network);
+  const std::vector<std::string> names = networks_of(function);
+  return std::all_of(names.begin(), names.end(),
+                     [&stored](const std::string& name) { return stored.at(name)->is_relu(); });
+}
+
 Network load_network(const NetworkArguments& arguments) {
-  Network network = load_with_relu(arguments);
-  const auto set = [&arguments](Weights& weights) {
-    weights = with_activation(std::move(weights), arguments.activation);
+  Network network = load_any_network(arguments);
+  require_relu(network, "this command is for ReLU networks");
+  return network;
+}
+
+Network with_activation(Network network, const std::string& activation) {
+  const auto set = [&activation](Weights& weights) {
+    weights = with_activation(std::move(weights), activation);
   };
   if (network.plain) set(*network.plain);
   for (auto& [kind, weights] : network.phi) set(weights);
   for (auto& [kind, weights] : network.rho) set(weights);
   return network;
+}
+
+Network load_any_network(const NetworkArguments& arguments) {
+  Network network = load_as_stated(arguments);
+  return arguments.activation.empty() ? network : with_activation(std::move(network), arguments.activation);
 }
 
 }  // namespace swarmcert::files

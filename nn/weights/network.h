@@ -68,12 +68,28 @@ struct NetworkArguments {
   std::string key;       ///< see load_weights(); holds for every weight file
   /// Orders of layers as load_weights() takes them: of `file`, where that is one plain weight file, of `phi` and `rho`.
   std::vector<std::string> order = {}, phi_order = {}, rho_order = {};
-  std::string activation = "relu";  ///< between the layers of every weight file: see with_activation()
+  std::string activation =
+      {};  ///< between the layers of every weight file: see with_activation(); empty: not stated
 };
 
-/// Loads NET. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files
+/// @throws InputError that names the part, if a part of NET has another activation than ReLU; `what` says what is for ReLU
+///   networks only.
+void require_relu(const Network& network, const std::string& what);
+
+/// Whether every network that `function` passes through has ReLU (functions.h).
+/// @throws std::out_of_range if NET has no such part.
+bool is_relu(const Network& network, const std::string& function);
+
+/// with_activation() of every part (activation.h).
+Network with_activation(Network network, const std::string& activation);
+
+/// load_network() of networks with any activation. What evaluates, exports or searches a network is for ReLU: call
+/// load_network() there.
+Network load_any_network(const NetworkArguments& arguments);
+
+/// Loads NET, whose activation is ReLU. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files
 /// named in a network.toml are relative to its folder; the orders of their layers stand there as well.
-/// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean.
+/// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean. As require_relu().
 Network load_network(const NetworkArguments& arguments);
 
 /// as_float32() of every part.
@@ -82,7 +98,7 @@ Network as_float32(Network network);
 /// Reads the weight file at a path; `order` as in load_weights().
 using WeightsLoader = std::function<Weights(const std::string& path, const std::vector<std::string>& order)>;
 
-/// A network.toml from memory: `path` gives its folder and the name in messages, `load` reads the weight files.
+/// A network.toml from memory, with any activation: `path` gives its folder and the name in messages, `load` reads the weight files.
 /// @throws InputError as load_network().
 Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load);
 

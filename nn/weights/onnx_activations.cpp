@@ -30,11 +30,9 @@ std::vector<Enclosed> negated(std::vector<Enclosed> numbers) {
 /// Adds a ReLU layer; every value that a later node takes is carried along.
 AffineMap OnnxGraph::relu(const Node& node, const AffineMap& rows, const std::string& name,
                           const std::vector<AffineMap*>& also_carried) {
+  require_activation(node, Activation::kRelu);
   std::vector<AffineMap*> carried = also_carried;
-  for (auto& [value_name, value] : values_) {
-    const auto own = std::count(node.inputs.begin(), node.inputs.end(), value_name);
-    if (uses_[value_name] > own) carried.push_back(&value.map);
-  }
+  for (AffineMap* const needed : needed_after(node)) carried.push_back(needed);
   const std::string layer = layer_name(name);
   AffineMap result = chain_.relu(rows, carried, layer);
   for (auto& [value_name, value] : values_) value.name.clear();

@@ -13,17 +13,17 @@ namespace {
 constexpr char kOperators[] =
     "is none of the operators that can be read: Gemm, MatMul, Conv, BatchNormalization, AveragePool, "
     "MaxPool, "
-    "Add, Sub, Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Flatten, Reshape, "
+    "Add, Sub, Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Tanh, Sigmoid, Softplus, "
+    "Elu, Selu, Gelu, Flatten, Reshape, "
     "Transpose, "
     "Concat and the like";
 constexpr char kSmooth[] =
     "leave it out of the exported model where it is the last node; a network with it between its layers "
     "cannot "
-    "be read yet: train with ReLU, LeakyReLU or Hardtanh";
+    "be read: train with ReLU, LeakyReLU, Hardtanh, tanh, sigmoid, softplus, ELU, SELU, SiLU or GELU";
 
-bool is_smooth(const std::string& type) {
-  static const std::set<std::string> kTypes = {"Tanh", "Sigmoid", "Elu",  "Selu", "Softplus",  "Gelu",
-                                               "Erf",  "Exp",     "Mish", "Celu", "HardSwish", "Softsign"};
+bool is_unread_activation(const std::string& type) {
+  static const std::set<std::string> kTypes = {"Erf", "Exp", "Mish", "HardSwish", "Softsign"};
   return kTypes.count(type) == 1;
 }
 
@@ -47,6 +47,7 @@ Weights OnnxGraph::run() {
   if (!count || *count > kMostRows) refuse(0, in_quotes(model_.input.name), "has more than 2^20 entries");
   chain_ = ReluChain(static_cast<int>(*count));
   values_[model_.input.name] = {identity_map(static_cast<int>(*count)), shape, ""};
+  join_smooth_activations();
   count_uses();
   for (const Node& node : model_.nodes) follow(node);
   const auto output = values_.find(model_.output);
@@ -55,8 +56,10 @@ Weights OnnxGraph::run() {
   OnnxValue& last = output->second;
   if (!chain_.has_layers() && last.map.is_identity()) refuse(0, "", "the graph has no linear layer");
   if (chain_.has_layers() && last.map.is_identity())
-    notes_.insert("the network ends in a ReLU, which an identity layer follows");
+    notes_.insert(std::string("the network ends in a ") + function_of(activation_).words +
+                  ", which an identity layer follows");
   Weights weights;
+  weights.activation = activation_;
   try {
     weights.layers = chain_.finished(last.map, layer_name(last.name));
   } catch (const FoldingLimit& limit) {
@@ -224,13 +227,16 @@ OnnxValue OnnxGraph::computed(const Node& node) {
       "Relu", "LeakyRelu", "PRelu", "Clip", "Abs", "Max", "Min", "HardSigmoid", "MaxPool", "GlobalMaxPool"};
   if (kAffine.count(node.type) == 1) return computed_affine(node);
   if (kLayout.count(node.type) == 1) return computed_layout(node);
+  static const std::set<std::string> kSmoothRead = {"Tanh", "Sigmoid", "Softplus", "Elu",
+                                                    "Celu", "Selu",    "Gelu",     "Swish"};
   if (kActivation.count(node.type) == 1) return computed_activation(node);
+  if (kSmoothRead.count(node.type) == 1) return computed_smooth(node);
   const bool is_last = node.outputs[0] == model_.output;
   if (is_last && (node.type == "Softmax" || node.type == "LogSoftmax")) {
     notes_.insert("the last " + node.type + " is left out: everything is said of the logits");
     return value(node, 0);
   }
-  throw OperatorRefusal{kOperators, is_smooth(node.type) ? kSmooth : kReexportOnnx};
+  throw OperatorRefusal{kOperators, is_unread_activation(node.type) ? kSmooth : kReexportOnnx};
 }
 
 OnnxValue OnnxGraph::applied(const Node& node, const AffineMap& map, const OnnxShape& shape,

@@ -1,4 +1,4 @@
-/// @file Follows an ONNX graph from its input to its output and builds the ReLU chain that is the same function.
+/// @file Follows an ONNX graph from its input to its output and builds the chain that is the same function.
 #pragma once
 
 #include <functional>
@@ -38,6 +38,7 @@ class OnnxGraph {
   OnnxValue computed_affine(const Node& node);
   OnnxValue computed_layout(const Node& node);
   OnnxValue computed_activation(const Node& node);
+  OnnxValue computed_smooth(const Node& node);
 
   const OnnxTensor* constant(const Node& node, std::size_t k) const;
   const OnnxTensor& needed_constant(const Node& node, std::size_t k) const;
@@ -56,6 +57,11 @@ class OnnxGraph {
                          const std::vector<Enclosed>& shift);
   AffineMap relu(const Node& node, const AffineMap& rows, const std::string& name,
                  const std::vector<AffineMap*>& also_carried);
+  OnnxNode* only_user(const std::string& name);
+  bool holds(const std::string& name, double wanted) const;
+  void join_smooth_activations();
+  std::vector<AffineMap*> needed_after(const Node& node);
+  void require_activation(const Node& node, Activation activation);
   std::string layer_name(const std::string& weight);
   void require_finite(const Node& node, const AffineMap& map) const;
 
@@ -67,6 +73,8 @@ class OnnxGraph {
   std::set<std::string> names_;
   int layers_ = 0;
   std::set<std::string> notes_;
+  Activation activation_ = Activation::kRelu;
+  std::string activated_by_;  ///< the first node with an activation; empty: none yet
 };
 
 }  // namespace swarmcert::files

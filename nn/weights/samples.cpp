@@ -58,7 +58,7 @@ struct Worst {
                     is_clamped_there ? "this input lies outside input.clamp: record inputs inside it"
                                      : "the file is of another network than the one recorded: another order "
                                        "of layers (--order), another "
-                                       "activation than ReLU, a skip connection, or other weights"});
+                                       "activation (--activation), a skip connection, or other weights"});
 }
 
 }  // namespace

@@ -61,6 +61,7 @@ double rounding_of_slope(const Weights& weights) {
     const double norm = norm_up(layer.weights);
     product *= norm * kUp;
     if (layer.weight_rounding > 0) share += layer.weight_rounding / norm * kUp;
+    if (&layer != &weights.layers.front()) product *= function_of(weights.activation).steepest() * kUp;
   }
   if (!(share > 0)) return 0;
   return product * std::expm1(share * kUp) * kUp * kUp;  // 1 + s <= exp(s)

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nn/mlp.h"
+#include "nn/weights/activation_function.h"
 
 namespace swarmcert::files {
 
@@ -16,8 +17,8 @@ enum class Precision { kFloat32, kFloat64, kFloat16, kBfloat16 };
 /// "float32", "float64", "float16", "bfloat16".
 const char* name(Precision precision);
 
-/// What the order of the layers rests on. A file that states it states ReLU between the layers as well; in every other
-/// case the activation is assumed.
+/// What the order of the layers rests on. A file that states it states the activation between the layers as well; in
+/// every other case the activation is given (`activation_is_given`) or assumed to be ReLU.
 enum class OrderSource {
   kFile,    ///< the file states it: ONNX, our safetensors
   kNames,   ///< numbers in the names, which agree with the order of registration where there is one
@@ -41,24 +42,29 @@ struct Layer {
   double bias_rounding = 0;
 };
 
-/// A ReLU multilayer perceptron: ReLU after every layer but the last.
+/// A multilayer perceptron: the activation, ReLU unless stated otherwise, after every layer but the last.
 /// Class invariant after load_weights(): at least one layer, every size positive, layers[k].inputs ==
-/// layers[k - 1].outputs, all entries finite.
+/// layers[k - 1].outputs, all entries finite; the activation is ReLU where there is one layer.
 struct Weights {
   std::string path;    ///< as the user gave it
   std::string sha256;  ///< of the file's bytes, lower-case hex
   Precision precision = Precision::kFloat32;
   std::vector<Layer> layers;
   OrderSource order_source = OrderSource::kFile;
-  std::vector<std::string> notes;  ///< what was folded, rewritten, left out or assumed; one clause each
+  Activation activation = Activation::kRelu;
+  bool activation_is_given = false;  ///< by `activation` in network.toml, or by --activation
+  std::vector<std::string> notes;    ///< what was folded, rewritten, left out or assumed; one clause each
 
   int inputs() const { return layers.front().inputs; }
   int outputs() const { return layers.back().outputs; }
+  bool is_relu() const { return activation == Activation::kRelu; }
+  /// Whether the file itself, network.toml or the user states the activation.
+  bool states_activation() const { return order_source == OrderSource::kFile || activation_is_given; }
 };
 
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
 /// and legacy pickle, strided views, weights under spectral_norm and weight_norm), safetensors, ONNX models of affine
-/// and piecewise linear operations, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and the C source that the networks'
+/// and piecewise linear operations or with one smooth activation, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and the C source that the networks'
 /// authors generate.
 /// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. Which layer follows which, ONNX models,
 /// .nnet and our safetensors state; for other files see decide_layer_order().
@@ -75,12 +81,14 @@ Weights parse_weights(const std::string& bytes, const std::string& path, const s
                       const std::vector<std::string>& order = {});
 
 /// Writes safetensors with tensors `<name>.weight` and `<name>.bias` in the network's precision.
-/// @throws InputError if the file exists and `overwrite` is false, or if the name of a layer is not UTF-8.
+/// @throws InputError if the file exists and `overwrite` is false, if the name of a layer is not UTF-8, or if the
+///   activation is not ReLU, which this format states.
 void save_safetensors(const Weights& weights, const std::string& path, bool overwrite);
 
 /// How much larger than the Lipschitz constant of the network as it was read that of the file's own function can be,
-/// where its folded weights are no doubles: the product of |W|_F + weight_rounding less the product of |W|_F. It may be
-/// added to every bound that holds for all slopes of the activations between 0 and 1. 0 where nothing was rounded.
+/// where its folded weights are no doubles: the product of |W|_F + weight_rounding less the product of |W|_F, times the
+/// activations' steepest slopes. It may be
+/// added to every bound that holds for all slopes that the activations can have. 0 where nothing was rounded.
 double rounding_of_slope(const Weights& weights);
 
 /// Every number rounded to the nearest float32, ties to even: what a C compiler makes of a float64 file's numbers.
@@ -89,23 +97,28 @@ double rounding_of_slope(const Weights& weights);
 Weights as_float32(Weights weights);
 
 /// The evaluator's view of a network, with the arrays it points to.
-/// In float each weight is rounded to nearest: for a float32 file that is exact.
+/// In float each weight is rounded to nearest: for a float32 file that is exact. Float evaluates ReLU networks only, as
+/// firmware does.
 template <typename Scalar>
 class Evaluator {
  public:
-  /// @throws InputError if a weight is beyond the range of Scalar.
+  /// @throws InputError if a weight is beyond the range of Scalar, or Scalar is float and the activation not ReLU.
   explicit Evaluator(const Weights& weights);
   Evaluator(const Evaluator&) = delete;
   Evaluator& operator=(const Evaluator&) = delete;
   Evaluator(Evaluator&&) = default;
 
-  nn::Mlp<Scalar> mlp() const { return {layers_.data(), static_cast<int>(layers_.size())}; }
+  /// The ReLU network. @throws std::logic_error if the activation is another one.
+  nn::Mlp<Scalar> mlp() const;
 
-  /// f(x); `input` has mlp().inputs() entries, the result mlp().outputs().
+  /// f(x); `input` has as many entries as the network has inputs, the result as many as it has outputs.
   /// @throws std::invalid_argument if `input` has another length.
   std::vector<Scalar> operator()(const std::vector<Scalar>& input) const;
 
  private:
+  std::vector<Scalar> smooth_value(const std::vector<Scalar>& input) const;
+
+  Activation activation_;
   std::vector<std::vector<Scalar>> arrays_;
   std::vector<nn::DenseLayer<Scalar>> layers_;
 };

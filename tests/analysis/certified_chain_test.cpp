@@ -81,7 +81,7 @@ TEST_F(CertifiedChain, OrdersThatDoNotFitTheCommandAreUsageErrors) {
   expect("certify --phi net.pth --rho net.pth --order head,steep", 2, {"phi=fc1,fc2"});
   expect("certify net.pth --order ''", 2, {"--order"});
   expect("certify net.pth --order head,tail", 3, {"left out"});
-  expect("certify net.pth --activation gelu", 2, {"--activation gelu", "ReLU"});
+  expect("certify net.pth --activation mish", 2, {"--activation mish", "silu"});
 }
 
 TEST_F(CertifiedChain, SamplesMustBeReproducedAndTheCertificateNamesThem) {
@@ -114,6 +114,40 @@ TEST_F(CertifiedChain, SamplesOfAnExportAreReproduced) {
   ASSERT_EQ(run("export " + net + " -o firmware").exit_code, 0);
   expect("certify " + net + " --samples firmware/samples.json --nodes 0 --method product", 0,
          {"reproduces 64 samples of firmware/samples.json"});
+}
+
+TEST_F(CertifiedChain, ASmoothActivationIsCertifiedCheckedAndHeldAgainstSamples) {
+  write_square("turn", "steep");
+  const std::string net = "net.pth --order head,steep,turn,tail";
+  const std::string chain = "for head - tanh - steep - tanh - turn - tanh - tail";
+  expect(
+      "certify " + net + " --activation tanh -o cert.json --json out.json", 0,
+      {"verdict: proved " + chain, "activation as given", "lower bounds and bounds on a box are for ReLU"});
+  const Json result = Json::parse(read_text(folder_ / "out.json"));
+  EXPECT_EQ(result["chain"][1]["op"], "tanh");
+  EXPECT_EQ(result["chain_source"]["network"]["activation"], "user");
+  EXPECT_TRUE(result["bounds"][0]["lower"].is_null());
+  EXPECT_NE(result["bounds"][0]["lower_reason"].get<std::string>().find("ReLU"), std::string::npos);
+  EXPECT_GE(result["bounds"][0]["upper"].get<double>(), 1e4);  // all slopes are 1 at the origin
+  expect("check cert.json " + net, 0, {"accepted", "0 lower bounds", chain});  // as the certificate states
+  expect("check cert.json " + net + " --activation tanh", 0, {"accepted", chain});
+  expect("check cert.json " + net + " --activation relu", 1, {"rejected", "chain", "ReLU"});
+  expect("certify " + net + " --activation sigmoid --max-lipschitz 160", 0,
+         {"verdict: proved"});  // 10^4 / 4^3
+  expect("certify " + net + " --activation sigmoid --max-lipschitz 150", 4, {"verdict: inconclusive"});
+  // head: (0, 10 x), and so on as above, through tanh: 10 tanh(10 tanh(10 tanh(10 x))).
+  write_text(folder_ / "tanh.csv", "0.01,9.9999950\n-0.002,-9.6210649\n0.1,10.0\n");
+  expect("certify " + net + " --activation tanh --samples tanh.csv", 0, {"reproduces 3"});
+  expect("certify " + net + " --activation relu --samples tanh.csv", 3, {"--activation"});
+}
+
+TEST_F(CertifiedChain, WhatIsForReluRefusesASmoothActivation) {
+  write_square("turn", "steep");
+  write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1]\nupper = [1]\n");
+  const std::string net = " net.pth --order head,steep,turn,tail --activation tanh";
+  for (const char* const option : {"--domain box.toml", "--range", "--explain", "--method branch"})
+    expect("certify" + net + " " + option, 3, {"\"tanh\"", "net.pth", "is for ReLU networks"});
+  expect("export" + net + " -o firmware", 3, {"\"tanh\"", "ReLU networks"});
 }
 
 TEST_F(CertifiedChain, BlocksTakeTheirValueWithAndWithoutAnEqualsSign) {

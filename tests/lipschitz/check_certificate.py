@@ -3,7 +3,7 @@
 library only. It shares no line with the C++ checker, reads the weight files itself, and must accept and reject the
 same certificates.
 
-    check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C]
+    check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C] [--activation OP]
 
 Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a weight file or network.toml that cannot be read.
 
@@ -28,8 +28,10 @@ from pathlib import Path
 
 STATEMENT = (
     "The functions are the operations listed under chain, in that order, with the weights stored in the files named by "
-    "sha256, rounded to float32 where `as` says so: linear is W x + b, relu takes the positive part, clamp is the input "
-    "clamp of network.toml. Where samples are named, they were reproduced up to largest_deviation when this was written; "
+    "sha256, rounded to float32 where `as` says so: linear is W x + b; of each number t, relu is the positive part, tanh "
+    "and sigmoid, 1 / (1 + e^-t), are the functions of these names, softplus is ln(1 + e^t), elu is max(0, t) + "
+    "min(0, e^t - 1), selu is 1.0507009873554805 max(0, t) + 1.0507009873554805 * 1.6732632423543772 min(0, e^t - 1), "
+    "silu is t / (1 + e^-t), gelu is t/2 (1 + erf(t / sqrt 2)); clamp is the input clamp of network.toml. Where samples are named, they were reproduced up to largest_deviation when this was written; "
     "checking does not repeat that. Every bound holds in exact arithmetic: |f(x) - f(y)| <= upper |x - y| for all x and y "
     "that differ in the block only, and |f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x "
     "and y in the box. So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
@@ -43,6 +45,14 @@ STATEMENT = (
     "where one more neighbour comes or goes, whatever the others are, in exact arithmetic; and |g - f| <= float32_error "
     "for each g that float32 arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of "
     "products in any order, fused or not, each operation rounded to nearest.")
+
+
+# What lies between layers, by the name that a chain gives it: its slopes are in [0, steepest] where it is monotone,
+# else in [-steepest, steepest].
+MONOTONE = {"relu": Fraction(1), "tanh": Fraction(1), "sigmoid": Fraction(1, 4), "softplus": Fraction(1), "elu": Fraction(1),
+            # at least 1.0507009873554805 * 1.6732632423543772
+            "selu": Fraction(0x1c212cc640f031, 2 ** 52)}
+STEEPEST = {**MONOTONE, "silu": 1 + Fraction(0x1999, 2 ** 16), "gelu": 1 + Fraction(0x211, 2 ** 12)}
 
 
 class Rejected(Exception):
@@ -252,6 +262,8 @@ class Weights:
         self.layers = in_order(self.layers, listing, order)
         assert all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:]))
         self.precision = "float32" if precision in ("float16", "bfloat16") else precision
+        # None: the file does not state it. One that states the order of the layers states ReLU unless its reader says more.
+        self.activation = "relu" if listing == "evaluation" and len(self.layers) > 1 else None
         self.sha256 = hashlib.sha256(data).hexdigest()
 
     def round_to_float32(self):
@@ -406,7 +418,7 @@ def read_onnx(data, order):
         raw = next((v for n, v in fields if n in (4, 9, 10)), b"")
         return name, shape, kind, raw
     graph = next(v for n, v in protobuf(data) if n == 7)
-    stored, tensors, transposed_of, names = {}, [], {}, set()
+    stored, tensors, names, activations, users, is_open = {}, [], set(), set(), {}, False
     precision = None
 
     def add(name, part, source, is_transposed):
@@ -431,10 +443,12 @@ def read_onnx(data, order):
         if number_ == 5:
             t = tensor(value)
             stored[t[0]] = t
-    for number_, value in protobuf(graph):
-        if number_ != 1:
-            continue
-        fields = list(protobuf(value))
+    graph_nodes = [list(protobuf(value)) for number_, value in protobuf(graph) if number_ == 1]
+    for fields in graph_nodes:
+        for name in (v.decode() for n, v in fields if n == 1):
+            users[name] = users.get(name, 0) + 1
+    sigmoid_of = {}  # what a Sigmoid gives, by what it takes, where only a product with the latter takes it: SiLU
+    for fields in graph_nodes:
         inputs = [v.decode() for n, v in fields if n == 1]
         output = next(v.decode() for n, v in fields if n == 2)
         kind = next(v.decode() for n, v in fields if n == 4)
@@ -448,17 +462,36 @@ def read_onnx(data, order):
         elif kind == "Identity" and inputs[0] in stored:
             stored[output] = (output,) + stored[inputs[0]][1:]
         elif kind in ("Gemm", "MatMul"):
-            current = layer_name(stored[inputs[1]][0])
+            current, is_open = layer_name(stored[inputs[1]][0]), False
             add(current, "weight", stored[inputs[1]], kind == "MatMul" or attributes.get("transB", {}).get(3, 0) == 0)
             if len(inputs) == 3 and inputs[2]:
                 add(current, "bias", stored[inputs[2]], False)
         elif kind == "Add":
             add(current, "bias", stored[inputs[0] if inputs[0] in stored else inputs[1]], False)
-        elif kind not in ("Relu", "Identity"):
+        elif kind == "Sigmoid" and users[inputs[0]] == 2 and users.get(output) == 1:
+            sigmoid_of[inputs[0]] = output
+        elif kind == "Mul" and len(inputs) == 2 and sigmoid_of.get(inputs[0], sigmoid_of.get(inputs[1])) in inputs:
+            sigmoid_of.clear()
+            activations.add("silu")
+            is_open = True
+        elif kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Gelu", "Selu"):
+            if attributes.get("approximate", {}).get(4, b"none") != b"none" or kind == "Selu" and attributes:
+                raise ValueError(f"this checker does not read ONNX's {kind} with attributes")
+            activations.add(kind.lower())
+            is_open = True
+        elif kind != "Identity":
             raise ValueError(f"this checker does not read ONNX's {kind}")
         if any(attributes.get(factor, {}).get(2) not in (None, b"\0\0\x80?") for factor in ("alpha", "beta")):
-            raise ValueError("this checker does not read Gemm with factors")
-    return Weights(tensors, precision, data, "evaluation", order)
+            raise ValueError("this checker does not read factors of Gemm or Elu")
+    if len(activations) > 1 or sigmoid_of:
+        raise ValueError("this checker reads ONNX models with one activation")
+    if is_open:  # what ends in an activation is followed by the identity
+        size = [shape[0] for name, shape, _ in tensors if name.endswith(".weight")][-1]
+        tensors.append((f"{layer_name('')}.weight", [size, size], [float(i == j) for i in range(size) for j in range(size)]))
+    result = Weights(tensors, precision, data, "evaluation", order)
+    if len(result.layers) > 1:
+        (result.activation,) = activations
+    return result
 
 
 def read_c_source(data, key, order):
@@ -483,7 +516,17 @@ def read_c_source(data, key, order):
     return Weights(tensors, precision, data, "registration", order)
 
 
-def read_weights(path, key="", order=None):
+def read_weights(path, key="", order=None, activation=None):
+    """`activation` is what network.toml or the user states."""
+    weights = read_file(path, key, order)
+    assert activation in (None, *STEEPEST), "no such activation"
+    assert activation in (None, weights.activation) or weights.activation is None, "the file states another activation"
+    if len(weights.layers) > 1:
+        weights.activation = weights.activation or activation
+    return weights
+
+
+def read_file(path, key, order):
     path = str(path)
     if "#" in path and not Path(path).exists():
         path, key = path.rsplit("#", 1)
@@ -502,12 +545,12 @@ def read_weights(path, key="", order=None):
 class Network:
     """parts by name ("network", "phi:<kind>", "rho:<kind>"), and what network.toml states."""
 
-    def __init__(self, net="", phi="", rho="", key="", orders=None):
+    def __init__(self, net="", phi="", rho="", key="", orders=None, activation=None):
         """orders: of layers, by "network", "phi" and "rho"; those of a network.toml stand there."""
         orders = orders or {}
         self.sha256, self.unit, self.order, self.clamp = "", "", [], None
         if phi:
-            self.parts = {f"{role}:default": read_weights(file, key, orders.get(role))
+            self.parts = {f"{role}:default": read_weights(file, key, orders.get(role), activation)
                           for role, file in (("phi", phi), ("rho", rho))}
         elif net.endswith(".toml"):
             data = Path(net).read_bytes()
@@ -517,10 +560,11 @@ class Network:
             self.order = document.get("input", {}).get("order", [])
             clamp = document.get("input", {}).get("clamp")
             self.clamp = clamp and (clamp["lower"], clamp["upper"])
-            self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key, entry.get("order"))
+            self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key, entry.get("order"),
+                                                          entry.get("activation", activation))
                           for role in ("phi", "rho") for kind, entry in sorted(document[role].items())}
         else:
-            self.parts = {"network": read_weights(net, key, orders.get("network"))}
+            self.parts = {"network": read_weights(net, key, orders.get("network"), activation)}
 
     def chain(self, part):
         """(op, layer, inputs, outputs) of each operation."""
@@ -528,7 +572,7 @@ class Network:
         clamps = self.clamp and part != "phi:ground" and not part.startswith("rho:")
         result = [("clamp", None, layers[0].inputs, layers[0].inputs)] if clamps else []
         for k, layer in enumerate(layers):
-            result += [("relu", None, layer.inputs, layer.inputs)] * (k > 0)
+            result += [(self.parts[part].activation, None, layer.inputs, layer.inputs)] * (k > 0)
             result.append(("linear", layer.name, layer.inputs, layer.outputs))
         return result
 
@@ -579,7 +623,8 @@ def unit_of(network, function, block):
 # --- the mathematics -----------------------------------------------------------------------------------------------
 
 def stages(network, function, block, scale):
-    """The matrices between the ReLUs, from the block's inputs in units of their scale to the output."""
+    """The matrices between the activations, from the block's inputs in units of their scale to the output. An activation
+    of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it."""
     names = networks_of(function)
     require(all(name in network.parts for name in names), f"there is no {function}")
     inputs = network.parts[names[0]].layers[0].inputs
@@ -595,7 +640,9 @@ def stages(network, function, block, scale):
             if index == 0:
                 chain[-1] = w @ chain[-1]
             else:
-                chain.append(w)
+                b = MONOTONE[network.parts[name].activation]
+                chain.append(Matrix([[x * b.numerator for x in row] for row in w.rows],
+                                    w.exponent + 1 - b.denominator.bit_length()))
     return chain
 
 
@@ -1162,6 +1209,10 @@ class Checker:
             require_keys(entry, ["sha256", "precision", "chain", "samples"], where)
             require((entry["sha256"], entry["precision"]) == (weights.sha256, weights.precision),
                     f"{where} is of another file")
+            if weights.activation is None and len(weights.layers) > 1:  # the file does not state it: the chain does
+                ops = [step["op"] for step in entry["chain"] if step["op"] not in ("clamp", "linear")]
+                require(ops and ops[0] in STEEPEST, f"{where}: unknown activation")
+                weights.activation = ops[0]
             self.check_chain(entry["chain"], name, where)
             self.check_samples(entry["samples"], where)
 
@@ -1238,6 +1289,14 @@ class Checker:
         neighbours = self.neighbours_of(bound, where)
         upper = number(bound["upper"], bound["upper_hex"], where)
         require(bound["status"] in ("finished", "interrupted"), f"{where}: unknown status")
+        require(all(name in self.network.parts for name in names), f"{where}: no such function")
+        activations = {self.network.parts[name].activation or "relu" for name in names}
+        if activations != {"relu"}:
+            require(not boxed and bound["upper_method"] != "branch", f"{where}: a bound on a box is for ReLU only")
+            require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
+                    f"{where}: a lower bound is for ReLU only")
+            require(bound["upper_method"] == "product" or all(a in MONOTONE for a in activations),
+                    f"{where}: a matrix inequality is for monotone activations only")
         if bound["upper_method"] in ("sdp", "eclipse_fast"):
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where)
         elif bound["upper_method"] == "branch":
@@ -1247,7 +1306,8 @@ class Checker:
             require(all(name in self.norms for name in names), f"{where}: no such function")
             total = Fraction(max(scale)) if scale else Fraction(1)
             for name in names:
-                total *= self.norms[name]
+                weights = self.network.parts[name]
+                total *= self.norms[name] * STEEPEST[weights.activation or "relu"] ** (len(weights.layers) - 1)
             require(Fraction(upper) >= total, f"{where}: claims less than the product of the norms")
         if not scale:
             key = (function, block, frozenset(neighbours.items()))
@@ -1504,6 +1564,7 @@ class Checker:
         inputs = names[:1] + ["phi:ground"] * (is_set and "phi:ground" in self.network.parts)
         used = inputs + names[1:]
         require(all(name in self.network.parts for name in used), f"{where}: no such function")
+        require(all(self.network.parts[name].activation in (None, "relu") for name in used), f"{where}: values are for ReLU only")
         require(isinstance(entry["networks"], dict) and set(entry["networks"]) == set(used), f"{where}: networks lists others")
         if is_float32:
             require(isinstance(entry["input_error"], dict) and set(entry["input_error"]) == set(inputs),
@@ -1605,7 +1666,7 @@ def main(arguments):
     options, positional = {}, []
     while arguments:
         word = arguments.pop(0)
-        if word in ("--phi", "--rho", "--key") and arguments:
+        if word in ("--phi", "--rho", "--key", "--activation") and arguments:
             options[word[2:]] = arguments.pop(0)
         elif word == "--order" and arguments:
             part, _, order = arguments.pop(0).rpartition("=")

@@ -58,6 +58,15 @@ weights = "rho.safetensors"
     return net
 
 
+def smooth(folder):
+    """A network.toml with the parts of heterogeneous(), each with another activation between its layers."""
+    net, text = folder / "smooth.toml", (folder / "network.toml").read_text()
+    for part, activation in (("small", "tanh"), ("large", "sigmoid"), ("ground", "softplus"), ("rho", "selu")):
+        text = text.replace(f'weights = "{part}.safetensors"', f'weights = "{part}.safetensors"\nactivation = "{activation}"')
+    net.write_text(text)
+    return net
+
+
 def recorded(network, generator):
     """Samples of a plain network as JSON, evaluated here in double."""
     inputs = [[generator.uniform(-1, 1) for _ in range(network.layers[0].inputs)] for _ in range(30)]
@@ -228,6 +237,41 @@ def check_fixed(certificate, net, folder):
     assert second.main(positional) == 3
 
 
+def check_activations(certificate, net, folder):
+    """Another activation in a chain, lower bounds or boxes of it, a smaller claim: the checkers agree on each."""
+    def both(changed):
+        changed["content_sha256"] = second.content_sha256(changed)
+        accepted, said = first_checker(changed, net, folder, 0)
+        reason = second.check(changed, second.Network(**arguments(net)))
+        assert accepted == (not reason), f"first says {said!r}, second says {reason!r}"
+        return accepted
+
+    def copy():
+        return json.loads(json.dumps(certificate))
+
+    is_stated = net[0].endswith("smooth.toml")
+    for part, entry in certificate["network"]["weights"].items():
+        own = {step["op"] for step in entry["chain"]} - {"linear", "clamp"}
+        for op in set(second.STEEPEST) - own:
+            changed = copy()
+            for step in changed["network"]["weights"][part]["chain"]:
+                step["op"] = op if step["op"] in own else step["op"]
+            assert not (both(changed) and is_stated), f"{part}: {op} instead of {own} is accepted"
+            changed["network"]["weights"][part]["chain"][1]["op"] = "identity"
+            assert not both(changed)
+    for i, bound in enumerate(certificate["bounds"]):
+        for key, value in (("upper", second.math.nextafter(bound["upper"], 0)), ("upper_method", "branch"), ("upper_method", "sdp"),
+                           ("domain", "box"), ("lower", 0.0)):
+            changed = copy()
+            changed["bounds"][i][key] = value
+            if key in ("upper", "lower"):
+                changed["bounds"][i][key + "_hex"] = value.hex()
+            if key == "domain":
+                changed["box"] = {part: {side: ["0x0p+0"] * entry["chain"][0]["inputs"] for side in ("lower", "upper")}
+                                  for part, entry in certificate["network"]["weights"].items() if part[:4] != "rho:"}
+            assert not both(changed) or bound[key] == value, f"{bound['function']}: {key} = {value} is accepted"
+
+
 def run():
     generator = random.Random(1)
     with tempfile.TemporaryDirectory() as name:
@@ -250,6 +294,9 @@ def run():
                 ([str(demo / "network.toml")], ["--blocks=position"]),
                 ([str(demo / "network.toml")], ["--as", "float32", "--neighbours", "2", "--domain", str(folder / "box.toml")]),
                 (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
+        smooth_net = str(smooth(folder))
+        nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
+        nets += [([str(tiny)], ["--activation", op]) for op in ("silu", "gelu", "sigmoid")]
         tried = rejected = 0
         for index, (net, options) in enumerate(nets):
             path = folder / f"certificate{index}.json"
@@ -261,6 +308,8 @@ def run():
             reason = second.check(certificate, second.Network(**arguments(net)))
             assert not reason, f"the second checker rejects a sound certificate: {reason}"
             check_fixed(certificate, net, folder)
+            if net[0] == smooth_net or "--activation" in options:
+                check_activations(certificate, net, folder)
             paths = list(leaves(certificate))
             chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]
             changed, longer = zip(*(forged(certificate, p, generator) for p in chosen))

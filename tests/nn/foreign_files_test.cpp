@@ -112,7 +112,7 @@ TEST(Activation, OfAStateDictIsTheSameFunctionWithRelu) {
       for (std::size_t i = 0; i < y.size(); ++i) EXPECT_NEAR(y[i], h[i], 1e-12) << one.name;
     }
   }
-  for (const char* const name : {"tanh", "leaky_relu:", "leaky_relu:x", "leaky_relux", ""})
+  for (const char* const name : {"mish", "leaky_relu:", "leaky_relu:x", "leaky_relux", ""})
     EXPECT_FALSE(is_activation(name)) << name;
   EXPECT_TRUE(refuses([] { with_activation(load_weights(foreign("onnx_acas.onnx")), "relu6"); },
                       {"--activation", "the file itself states"}));

@@ -116,8 +116,8 @@ TEST(Onnx, GraphsThatAreNoChainOfLinearLayersAreRefusedByNode) {
   const auto expect = [&](const std::vector<std::string>& nodes, const std::string& piece) {
     EXPECT_TRUE(onnx_is_refused(with(nodes), {"net.onnx: offset ", piece}));
   };
-  expect({onnx_node("Tanh", {"x"}, {"y"})}, "Tanh: is none of the operators");
-  expect({gemm, onnx_node("Tanh", {"h"}, {"y"})}, "train with ReLU, LeakyReLU or Hardtanh");
+  expect({onnx_node("Mish", {"x"}, {"y"})}, "Mish: is none of the operators");
+  expect({gemm, onnx_node("Mish", {"h"}, {"y"})}, "train with ReLU, LeakyReLU, Hardtanh");
   expect({gemm, onnx_node("Mul", {"h", "h"}, {"y"})}, "Mul: is no affine function");
   expect({gemm, onnx_node("Div", {"w", "h"}, {"y"})}, "Div: divides a constant by a value");
   expect({onnx_node("Gemm", {"x", "w", "b"}, {"y"}, {onnx_integer("transA", 1)})}, "transposes its input");

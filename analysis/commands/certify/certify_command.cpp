@@ -227,13 +227,25 @@ void parse_map(const CertifyOptions& options, const files::Network& network,
   }
 }
 
+/// Of other activations bounds for all inputs are proved, and nothing else.
+void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions& options) {
+  const std::pair<bool, const char*> asked[] = {{!options.domain.empty(), "--domain"},
+                                                {options.range, "--range"},
+                                                {options.explain, "--explain"},
+                                                {options.method == "branch", "--method branch"}};
+  for (const auto& [is_asked, option] : asked) {
+    if (is_asked) files::require_relu(network, std::string(option) + " is for ReLU networks");
+  }
+}
+
 int run_certify(CertifyOptions options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
   parse_blocks(options);
-  files::Network network = load_net(options.network);
+  files::Network network = load_any_net(options.network);
+  refuse_what_is_for_relu(network, options);
   if (!options.neighbours.empty() && network.plain)
     throw UsageError(
         "--neighbours " + options.neighbours +

@@ -20,6 +20,11 @@ using lipschitz::CertifiedLayer;
 using lipschitz::coordinate_name;
 using lipschitz::Verdict;
 
+constexpr char kForReluOnly[] =
+    "lower bounds and bounds on a box are for ReLU networks: of other activations upper bounds for all "
+    "inputs are "
+    "proved";
+
 std::string output_unit(const files::Network& network) {
   return network.output_unit.empty() ? "output" : network.output_unit;
 }
@@ -120,8 +125,9 @@ Json chain_sources_json(const files::Network& network) {
   Json sources = Json::object();
   for (const auto& [name, weights] : files::parts(network)) {
     const bool is_stated = weights->order_source == files::OrderSource::kFile;
+    const char* const otherwise = weights->activation_is_given ? "user" : "assumed";
     sources[name] = {{"order", files::name(weights->order_source)},
-                     {"activation", is_stated ? "file" : "assumed"},
+                     {"activation", is_stated ? "file" : otherwise},
                      {"notes", weights->notes},
                      {"rounding_of_slope", files::rounding_of_slope(*weights)}};
   }
@@ -248,6 +254,7 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
     json["lower_witness"] = witness_json(bound.lower);
     json["product_upper"] = bound.product.value();
     json["search_rounds"] = bound.lower.rounds;
+    if (!bound.is_relu) json["lower_reason"] = kForReluOnly;
     if (bound.branch_stop != lipschitz::BranchStop::kNothingRun)
       json["branch_stop"] = name(bound.branch_stop);
     if (bound.nodes > 0) {
@@ -331,9 +338,11 @@ void print_chains(const files::Network& network, const Certification& found) {
         break;
     }
     const auto samples = found.samples.find(name);
-    const bool is_assumed = weights->order_source != files::OrderSource::kFile &&
-                            weights->layers.size() > 1 && samples == found.samples.end();
-    if (is_assumed) remark += "; ReLU is assumed, --samples compares";
+    const bool is_unstated = weights->order_source != files::OrderSource::kFile &&
+                             weights->layers.size() > 1 && samples == found.samples.end();
+    if (is_unstated)
+      remark += weights->activation_is_given ? "; activation as given, --samples compares"
+                                             : "; ReLU is assumed, --samples compares";
     fmt::print("  {}  {}  ({})\n", name, files::chain_words(files::chain(network, name)), remark);
     for (const std::string& note : weights->notes) fmt::print("    {}\n", note);
     const double rounding = files::rounding_of_slope(*weights);
@@ -429,6 +438,9 @@ void print_bounds(const files::Network& network, const Certification& found) {
     const std::string outlook = branch_outlook_words(bound);
     if (!outlook.empty()) fmt::print("    {}\n", outlook);
   }
+  if (std::any_of(found.bounds.begin(), found.bounds.end(),
+                  [](const CertifiedBound& bound) { return !bound.is_relu; }))
+    fmt::print("  {}\n", kForReluOnly);
   if (!network.rho.empty()) {
     fmt::print("  set: one neighbour moves; any number of other neighbours, anywhere\n");
     const auto is_counted = [](const CertifiedBound& bound) { return !bound.neighbours.empty(); };

@@ -20,7 +20,7 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
   const files::Json certificate =
       is_in_memory ? files::parse_json(*host()->certificate, options.certificate, check::kCertificateSchema)
                    : files::read_json(options.certificate, check::kCertificateSchema);
-  const files::Network network = load_net(options.network);
+  const files::Network network = check::with_stated_activations(certificate, load_any_net(options.network));
   const check::CheckResult verdict = check::check(certificate, network);
 
   std::vector<std::string> inputs;

@@ -130,7 +130,7 @@ void print_description(const files::Network& network) {
 
 files::Json inspect_network(const std::string& path, files::NetworkArguments arguments, bool print) {
   arguments.file = path;
-  const files::Network network = files::load_network(arguments);
+  const files::Network network = files::load_any_network(arguments);
   if (print) print_description(network);
   files::Json parts = files::Json::object();
   for (const auto& [name, weights] : files::parts(network)) {

@@ -93,7 +93,7 @@ def certify(
         net: one of
             - a path: network.toml or one weight file;
             - a dict of arrays {"fc1.weight": [outputs, inputs], "fc1.bias": [outputs], ...} or a state dict of PyTorch:
-              ReLU between the layers, none after the last;
+              ReLU between the layers, or what the option `activation` says, none after the last;
             - a Sequential of Linear and ReLU;
             - {"phi": ..., "rho": ...}, or an object with these attributes: a deep set rho(sum_j phi(x_j)).
             Arrays are float32 or float64, or float16, which is a float32 network.
