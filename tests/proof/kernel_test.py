@@ -12,12 +12,21 @@ from pathlib import Path
 
 SWARMCERT, SOURCE, CHECKER, COQC, THEORY = sys.argv[1], Path(sys.argv[2]), sys.argv[4], sys.argv[5], sys.argv[6]
 sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
+import activations_test as smooth  # noqa: E402
 import check_certificate_test as common  # noqa: E402
+
+AXIOMS = {"ClassicalDedekindReals.sig_not_dec", "ClassicalDedekindReals.sig_forall_dec",
+          "FunctionalExtensionality.functional_extensionality_dep"}
 
 
 def kernel(path, text):
     path.write_text(text)
     return subprocess.run([COQC, "-q", "-R", THEORY, "Swarmcert", path], capture_output=True, text=True)
+
+
+def accepted(done):
+    assert done.returncode == 0, done.stderr
+    assert set(re.findall(r"^([A-Z]\w*\.\w+)", done.stdout, re.M)) == AXIOMS, done.stdout
 
 
 def main():
@@ -31,10 +40,7 @@ def main():
                        capture_output=True)
         text = subprocess.run([CHECKER, "--coq", certificate, *net], check=True, capture_output=True, text=True).stdout
         done = kernel(folder / "Sound.v", text)
-        assert done.returncode == 0, done.stderr
-        axioms = set(re.findall(r"^([A-Z]\w*\.\w+)", done.stdout, re.M))
-        assert axioms == {"ClassicalDedekindReals.sig_not_dec", "ClassicalDedekindReals.sig_forall_dec",
-                          "FunctionalExtensionality.functional_extensionality_dep"}, done.stdout
+        accepted(done)
         for kind in "Norm_at_most", "Norm_at_least", "Slope_at_most", "Slope_at_least", "Law", "Within", "Sum_within", "Jump_at_most", \
                 "Float_error", "Sum_float_error":
             assert f": claim := {kind}" in text, kind
@@ -46,6 +52,11 @@ def main():
         assert false != text
         assert kernel(folder / "Claim.v", false).returncode != 0
         print(f"{text.count('claim :=')} claims accepted by the kernel")
+        net, sigmoid = smooth.one_network(folder, "sigmoid", generator)
+        text = smooth.check(sigmoid, net, "--coq").stdout
+        accepted(kernel(folder / "Sigmoid.v", text))
+        assert text.count(" Sigmoid.") == 1
+        assert kernel(folder / "Steeper.v", text.replace(" Sigmoid.", " Tanh.")).returncode != 0
 
 
 if __name__ == "__main__":

@@ -113,7 +113,8 @@ def field(number, value):
     return varint(number << 3 | 2) + varint(len(value)) + value
 
 
-def onnx(network):
+def onnx(network, activation="Relu", first=None, attributes=b""):
+    """`first`: another activation than `activation` behind the first layer."""
     graph, current = b"", "x"
     for k, (name, rows, biases) in enumerate(network):
         weights = [f"{name}.weight", f"{name}.bias"]
@@ -129,7 +130,7 @@ def onnx(network):
             graph += field(1, field(1, f"m{k}") + field(1, weights[1]) + field(2, f"y{k}") + field(4, "Add"))
         current = f"y{k}"
         if k + 1 < len(network):
-            graph += field(1, field(1, current) + field(2, f"h{k}") + field(4, "Relu"))
+            graph += field(1, field(1, current) + field(2, f"h{k}") + field(4, first if first and k == 0 else activation) + attributes)
             current = f"h{k}"
     graph += field(11, field(1, "x")) + field(12, field(1, current))
     return field(1, 7) + field(2, "test") + field(7, graph)

@@ -529,6 +529,16 @@ let lmi zero0 add1 mul1 minus_one two_rho minus_rho t first later last0 =
       (gram zero0 add1 mul1 (scale_rows mul1 t first)))
     (band zero0 add1 mul1 two_rho minus_rho t later last0)
 
+type activation =
+| Relu
+| Tanh
+| Sigmoid
+| Softplus
+| Elu
+| Selu
+| Silu
+| Gelu
+
 (** val dotZ : Big.t list -> Big.t list -> Big.t **)
 
 let rec dotZ u v =
@@ -755,15 +765,17 @@ let check hidden0 last0 upper rho t f =
         (is_nonnegative (add0 (mul0 upper upper) (neg rho))))
       (shows_nonnegative (matrix_inequality hidden0 last0 rho t) f))
 
+type stack = matrixD list * matrixD
+
 type layerD = matrixD * dyadic list
 
 type part = { hidden : layerD list; outer : layerD;
-              clamp : (dyadic * dyadic) list }
+              clamp : (dyadic * dyadic) list; between : activation }
 
 (** val no_part : part **)
 
 let no_part =
-  { hidden = []; outer = ([], []); clamp = [] }
+  { hidden = []; outer = ([], []); clamp = []; between = Relu }
 
 (** val part_at : part list -> int -> part **)
 
@@ -813,6 +825,89 @@ type claim =
 | Float_error of int * box * dyadic list * dyadic list * dyadic
 | Sum_float_error of (term * dyadic list) list * int * dyadic
 
+(** val steepest : activation -> dyadic **)
+
+let steepest = function
+| Sigmoid ->
+  (((fun p -> p) Big.one), (Big.neg ((fun p -> Big.shift_left p 1) Big.one)))
+| Selu ->
+  (((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    Big.one))))))))))))))))))))))))))))))))))))))))))))))))))))), (Big.neg
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))))
+| Silu ->
+  (((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    Big.one))))))))))))))))), (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one))))))
+| Gelu ->
+  (((fun p -> p) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.succ (Big.shift_left p 1))
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) Big.one))))))))))))), (Big.neg
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))
+| _ -> one
+
+(** val is_known : activation -> bool **)
+
+let is_known = function
+| Gelu -> false
+| _ -> true
+
+(** val is_rising : activation -> bool **)
+
+let is_rising = function
+| Silu -> false
+| Gelu -> false
+| _ -> true
+
+(** val is_relu : activation -> bool **)
+
+let is_relu = function
+| Relu -> true
+| _ -> false
+
 (** val set_stages :
     matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD
     list * matrixD **)
@@ -826,8 +921,6 @@ let set_stages phi0 w rho last0 =
 
 let outputs hidden0 n =
   length (last hidden0 (repeat [] n))
-
-type stack = matrixD list * matrixD
 
 (** val check_parts :
     stack -> stack list -> dyadic -> dyadic -> dyadic list -> factor -> bool **)
@@ -1229,7 +1322,21 @@ let fits_part p =
 (** val matrices : part -> stack **)
 
 let matrices p =
-  ((map fst p.hidden), (fst p.outer))
+  match p.hidden with
+  | [] -> ([], (fst p.outer))
+  | first :: later ->
+    let scaled = fun l -> scale_all mul0 (steepest p.between) (fst l) in
+    (((fst first) :: (map scaled later)), (scaled p.outer))
+
+(** val rising : part -> bool **)
+
+let rising p =
+  is_rising p.between
+
+(** val relu_between : part -> bool **)
+
+let relu_between p =
+  is_relu p.between
 
 (** val parts_of : part list -> function0 -> part list **)
 
@@ -1255,7 +1362,10 @@ let well_formed ps f moves scale0 =
     dyadic list -> factor -> bool **)
 
 let check_slope ps f moves scale0 u rho t factor0 =
-  (&&) ((&&) (well_formed ps f moves scale0) (is_nonnegative u))
+  (&&)
+    ((&&)
+      ((&&) (well_formed ps f moves scale0) (forallb rising (parts_of ps f)))
+      (is_nonnegative u))
     (check_parts ([], (selector moves scale0)) (map matrices (parts_of ps f))
       u rho t factor0)
 
@@ -1282,10 +1392,21 @@ let rec norms accepted p layer = function
       | None -> None)
    | None -> None)
 
+(** val with_slopes : dyadic -> 'a1 list -> dyadic -> dyadic **)
+
+let with_slopes c hidden0 u =
+  fold_right (fun _ v -> mul0 c v) u hidden0
+
 (** val norm_of : part list -> claim list -> int -> dyadic option **)
 
 let norm_of ps accepted p =
-  norms accepted p 0 (layers (part_at ps p))
+  let q = part_at ps p in
+  (match norms accepted p 0 (layers q) with
+   | Some u ->
+     if is_known q.between
+     then Some (with_slopes (steepest q.between) q.hidden u)
+     else None
+   | None -> None)
 
 (** val largest : dyadic -> dyadic list -> dyadic **)
 
@@ -1375,7 +1496,12 @@ let check_points ps f moves scale0 l x y others =
     ((&&)
       ((&&)
         ((&&)
-          ((&&) ((&&) (positive_scale scale0) (is_nonnegative l))
+          ((&&)
+            ((&&)
+              ((&&)
+                ((&&) (forallb relu_between (parts_of ps f))
+                  (forallb (fun o -> relu_between (part_at ps (fst o)))
+                    others)) (positive_scale scale0)) (is_nonnegative l))
             (agreeD moves x y))
           ((=) (length x) (inputs_of (part_at ps (moved f)))))
         (forallb (fun o ->
@@ -1516,7 +1642,8 @@ let rec sum_ends accepted n = function
 
 let check_within ps p b bounds v =
   let q = part_at ps p in
-  check_layers q.hidden q.outer (clamp_ends q.clamp b) bounds v
+  (&&) (relu_between q)
+    (check_layers q.hidden q.outer (clamp_ends q.clamp b) bounds v)
 
 (** val check_sum_within :
     part list -> claim list -> term list -> int -> box -> box -> bool **)
@@ -1553,8 +1680,9 @@ let check_error ps p b r e u bounds errors =
   let q = part_at ps p in
   (&&)
     ((&&)
-      (check_roundings q.hidden q.outer (clamp_ends q.clamp b) r bounds
-        errors e) (is_nonnegative u)) (at_most (squareD e) (mul0 u u))
+      ((&&) (relu_between q)
+        (check_roundings q.hidden q.outer (clamp_ends q.clamp b) r bounds
+          errors e)) (is_nonnegative u)) (at_most (squareD e) (mul0 u u))
 
 (** val sum_errors :
     claim list -> int -> (term * dyadic list) list -> ((Big.t * dyadic

@@ -129,6 +129,16 @@ val lmi :
   'a1 list -> 'a1 list list -> ('a1 list * 'a1 list list) list -> 'a1 list
   list -> 'a1 list list
 
+type activation =
+| Relu
+| Tanh
+| Sigmoid
+| Softplus
+| Elu
+| Selu
+| Silu
+| Gelu
+
 val dotZ : Big.t list -> Big.t list -> Big.t
 
 val strip : Big.t list -> int * Big.t list
@@ -195,10 +205,12 @@ val shapes : int -> matrixD list -> matrixD -> bool
 val check :
   matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list -> factor -> bool
 
+type stack = matrixD list * matrixD
+
 type layerD = matrixD * dyadic list
 
 type part = { hidden : layerD list; outer : layerD;
-              clamp : (dyadic * dyadic) list }
+              clamp : (dyadic * dyadic) list; between : activation }
 
 val no_part : part
 
@@ -234,12 +246,18 @@ type claim =
 | Float_error of int * box * dyadic list * dyadic list * dyadic
 | Sum_float_error of (term * dyadic list) list * int * dyadic
 
+val steepest : activation -> dyadic
+
+val is_known : activation -> bool
+
+val is_rising : activation -> bool
+
+val is_relu : activation -> bool
+
 val set_stages :
   matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD list * matrixD
 
 val outputs : matrixD list -> int -> int
-
-type stack = matrixD list * matrixD
 
 val check_parts :
   stack -> stack list -> dyadic -> dyadic -> dyadic list -> factor -> bool
@@ -327,6 +345,10 @@ val fits_part : part -> bool
 
 val matrices : part -> stack
 
+val rising : part -> bool
+
+val relu_between : part -> bool
+
 val parts_of : part list -> function0 -> part list
 
 val well_formed : part list -> function0 -> bool list -> dyadic list -> bool
@@ -338,6 +360,8 @@ val check_slope :
 val find_norm : claim list -> int -> int -> dyadic option
 
 val norms : claim list -> int -> int -> layerD list -> dyadic option
+
+val with_slopes : dyadic -> 'a1 list -> dyadic -> dyadic
 
 val norm_of : part list -> claim list -> int -> dyadic option
 

@@ -16,6 +16,21 @@ let check_chain net part stated where =
     | Array steps -> List.length steps = List.length expected && List.for_all2 fits steps expected | _ -> false in
   require is_equal "%s is not the one of this network: %s" here (Functions.chain_words expected)
 
+let rec inside path json = match path, json with
+  | [], _ -> Some json
+  | key :: rest, Object members -> Option.bind (List.assoc_opt key members) (inside rest)
+  | _ -> None
+
+(* NET with the activations that the chains state, where neither a weight file nor network.toml does. *)
+let with_stated_activations (net : Network.t) json =
+  let activation_of step = match inside [ "op" ] step with Some (Text op) -> Activation.called op | _ -> None in
+  let stated part = match inside [ "network"; "weights"; part; "chain" ] json with
+    | Some (Array steps) -> List.find_map activation_of steps
+    | _ -> None in
+  let adopted (part, (w : Weights.t)) =
+    part, if w.activation = None then { w with activation = stated part } else w in
+  { net with parts = List.map adopted net.parts }
+
 let is_hash = function
   | Text s -> String.length s = 64 && String.for_all (fun c -> (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f')) s
   | _ -> false
@@ -80,6 +95,7 @@ let check net json =
   require (member "content_sha256" = Text (Sha256.to_hex (Sha256.string (encode (Object rest)))))
     "content_sha256 does not match: the certificate was changed after it was written";
   (match member "tool" with Text _ -> () | _ -> rejected "tool is not text");
+  let net = with_stated_activations net json in
   check_weights net (member "network");
   check_boxes net (member "box");
   let state = { Claims.net; json; parts = Functions.parts net; accepted = []; log = []; norms = Hashtbl.create 8;

@@ -117,7 +117,7 @@ let function_of state = function
   | [ phi; rho ] -> Proved.Set_of (Functions.index state.net phi, Functions.index state.net rho)
   | _ -> assert false
 
-(* Neurons that a ReLU follows, where the last layer of phi and the first of rho are one. *)
+(* Neurons that an activation follows, where the last layer of phi and the first of rho are one. *)
 let hidden_neurons state names =
   let hidden part = List.fold_left
       (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer (Functions.weights state.net part)))
@@ -137,13 +137,38 @@ let bound_keys = [ "function"; "domain"; "block"; "law"; "norm"; "scale"; "unit"
     "lower";
                    "lower_hex"; "lower_witness"; "proof"; "status" ]
 
-let check_product state where names claim scale upper =
+let check_product state where bound names claim scale upper =
   let largest = match scale with [] -> 1. | first :: rest -> List.fold_left Float.max first rest in
   let total = List.fold_left (fun total name -> match Hashtbl.find_opt state.norms name with
-      | Some norm -> times total norm | None -> rejected "%s: there is no network %s" where (shown name))
-          (Exact.of_float largest) names in
+      | Some norm ->
+        let weights = Functions.weights state.net name in
+        let steepest = Proved.steepest (Functions.activation weights) in
+        List.fold_left (fun total _ -> times total steepest) (times total norm) (List.tl weights.layers)
+      | None -> rejected "%s: there is no network %s" where (shown name)) (Exact.of_float largest) names in
   require (at_most total upper) "%s: claims less than the product of the norms" where;
-  prove state claim Proved.By_product (where ^ ": claims less than the product of the norms")
+  let activations = List.map (fun name -> Functions.activation (Functions.weights state.net name)) names in
+  match List.find_opt (fun a -> not (Proved.is_known a)) activations with
+  | Some unknown ->
+    not_checked state (Printf.sprintf "%s <= %s: rests on the largest slope of %s" where
+                         (text where (find where "upper_hex" bound)) (Activation.words unknown));
+    Not_checked
+  | None ->
+    prove state claim Proved.By_product (where ^ ": claims less than the product of the norms");
+    Proved_here
+
+(* What is not stated of functions with other activations than ReLU. *)
+let check_activations state where bound names =
+  List.iter (fun name ->
+      let activation = Functions.activation (Functions.weights state.net name) in
+      if activation <> Proved.Relu then begin
+        let of_ = " of a network with " ^ Activation.words activation in
+        let by method_ = find where "upper_method" bound = Text method_ in
+        require (find where "domain" bound = Text "global" && not (by "branch")) "%s: a bound on a box%s" where of_;
+        require (List.for_all (fun key -> find where key bound = Null) [ "lower"; "lower_hex"; "lower_witness" ])
+          "%s: a lower bound%s" where of_;
+        require (Proved.is_rising activation || by "product")
+          "%s: a matrix inequality%s, which is not monotone" where of_
+      end) names
 
 let check_bound state bound =
   require_keys "bound" (bound_keys @ if has "neighbours" bound then [ "neighbours" ] else []) bound;
@@ -160,6 +185,7 @@ let check_bound state bound =
   let upper = Exact.of_float (Exact.number (where ^ " upper") (find where "upper" bound)
       (find where "upper_hex" bound)) in
   check_status where bound;
+  check_activations state where bound names;
   let moves = Functions.moves state.net f block and func = function_of state names in
   let exact_scale = List.map Exact.of_float scale in
   let claim = Proved.Slope_at_most (func, moves, exact_scale, upper) in
@@ -171,8 +197,7 @@ let check_bound state bound =
       not_checked state (Printf.sprintf "%s <= %s: proved by parts of boxes" where
                            (text where (find where "upper_hex" bound)));
       Not_checked
-    | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper;
-        Proved_here
+    | Text "product" when find where "proof" bound = Null -> check_product state where bound names claim scale upper
     | _ -> rejected "%s: unknown upper_method" where in
   if scale = [] then Hashtbl.replace state.uppers (f, block, neighbours) (upper, source);
   if source = Proved_here then state.upper_bounds <- state.upper_bounds + 1;
@@ -220,7 +245,7 @@ let check_law state law =
   let reason = where ^ ": claims less than the law gives" in
   require (at_most total (if stacked then times upper upper else upper)) "%s" reason;
   if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds then
-    not_checked state (Printf.sprintf "%s: rests on a bound proved by parts of boxes" where)
+    not_checked state (Printf.sprintf "%s: rests on a bound that is not checked" where)
   else begin
     let kind (f, n, _, _) =
       (Functions.index state.net (List.hd (Functions.networks_of f)), Functions.moves state.net f block), Z.of_int n in

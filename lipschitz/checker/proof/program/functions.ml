@@ -17,6 +17,11 @@ let index (net : Network.t) part =
   let rec go k = function [] -> rejected "there is no network %s" (shown part) | (name, _) :: rest ->
       if name = part then k else go (k + 1) rest in
   go 0 net.parts
+(* Between the layers of a part; a single layer is as well one of a ReLU network. *)
+let activation (w : Weights.t) = match w.activation with
+  | Some activation when List.length w.layers > 1 -> activation
+  | _ -> Proved.Relu
+let is_relu net part = activation (weights net part) = Proved.Relu
 let inputs net part = Weights.inputs (Weights.first_layer (weights net part))
 let has_ground (net : Network.t) = List.mem_assoc "phi:ground" net.parts
 
@@ -59,13 +64,16 @@ let chain (net : Network.t) part =
       else [] in
   let layer k (l : Weights.layer) =
     let from = Weights.inputs l in
-    (if k = 0 then [] else [ { op = "relu"; layer = None; from; onto = from } ])
+    (if k = 0 then [] else [ { op = Activation.name (activation w); layer = None; from; onto = from } ])
     @ [ { op = "linear"; layer = Some l.name; from; onto = Weights.outputs l } ] in
   clamp @ List.concat (List.mapi layer w.layers)
 
 let chain_words steps =
   String.concat " - " (List.map (fun step -> match step.op, step.layer with
-      | "relu", _ -> "ReLU" | "clamp", _ -> "clamp" | _, Some "" | _, None -> "linear" | _, Some name -> name) steps)
+      | "clamp", _ -> "clamp"
+      | _, Some "" -> "linear"
+      | _, Some name -> name
+      | op, None -> Option.fold ~none:"linear" ~some:Activation.words (Activation.called op)) steps)
 (* Parts that have the same words, together. *)
 let words (net : Network.t) =
   let add found (name, _) =
@@ -86,5 +94,5 @@ let part (net : Network.t) (name, (w : Weights.t)) =
   let hidden, outer = cut layers in
   let clamp = if Network.is_clamped name then List.map (fun (a, b) -> Exact.of_float a, Exact.of_float b) net.clamp
       else [] in
-  { Proved.hidden; outer; clamp }
+  { Proved.hidden; outer; clamp; between = activation w }
 let parts (net : Network.t) = List.map (part net) net.parts

@@ -17,8 +17,11 @@ let matrix = list long_numbers
 let pair first second out (a, b) = Printf.bprintf out "(%a,%a)" first a second b
 
 let layer = pair matrix long_numbers
-let part out { Proved.hidden; outer; clamp } =
-  Printf.bprintf out "Part %a %a %a" (list layer) hidden layer outer (list (pair number number)) clamp
+let activation out a = Buffer.add_string out (match a with
+    | Proved.Relu -> "Relu" | Tanh -> "Tanh" | Sigmoid -> "Sigmoid" | Softplus -> "Softplus" | Elu -> "Elu" | Selu -> "Selu"
+    | Silu -> "Silu" | Gelu -> "Gelu")
+let part out { Proved.hidden; outer; clamp; between } =
+  Printf.bprintf out "Part %a %a %a %a" (list layer) hidden layer outer (list (pair number number)) clamp activation between
 let func out = function
   | Proved.Alone p -> Printf.bprintf out "(Alone %a)" natural p
   | Set_of (phi, rho) -> Printf.bprintf out "(Set_of %a %a)" natural phi natural rho
@@ -56,7 +59,7 @@ let file parts claims =
   Buffer.add_string out
     "(* coqc -R THEORY Swarmcert FILE.v , THEORY: the folder of the compiled theory.\n\
     \   `certificate` is what is claimed of `networks`; Meaning.v says what that means. *)\n\
-     From Coq Require Import List ZArith.\nFrom Swarmcert Require Import Checker Meaning Claims Sound.\n\
+     From Coq Require Import List ZArith.\nFrom Swarmcert Require Import Activations Checker Meaning Claims Sound.\n\
      Import ListNotations.\nOpen Scope Z_scope.\n\n";
   List.iteri (fun k p -> Printf.bprintf out "Definition network%d : part := %a.\n" k part p) parts;
   Printf.bprintf out "Definition networks : list part := [%s].\n\n" (String.concat "; " (List.mapi (fun k _ -> Printf.sprintf "network%d" k) parts));

@@ -45,7 +45,7 @@ let schema_of path = function
       bad_input "%s: schema must be \"%s\": is this the right file?" path Statement.schema
   | _ -> bad_input "%s: is not a JSON object" path
 
-let report (net : Network.t) (state : Claims.t) =
+let report (state : Claims.t) =
   let values = if state.values > 0 then Printf.sprintf ", values of %d" state.values else "" in
   let numbers = Printf.sprintf "%d spectral norms, %d upper bounds, %d lower bounds%s" state.spectral_norms state.upper_bounds
       state.lower_bounds values in
@@ -53,7 +53,7 @@ let report (net : Network.t) (state : Claims.t) =
   (match List.length state.not_checked with
    | 0 -> Printf.printf "accepted: every statement verified in exact arithmetic: %s\n" numbers
    | n -> Printf.printf "inconclusive: what was checked holds: %s; %d not checked\n" numbers n);
-  Printf.printf "for %s\n" (Functions.words net);
+  Printf.printf "for %s\n" (Functions.words state.net);
   if state.not_checked = [] then 0 else 4
 
 let check_file net path =
@@ -91,7 +91,7 @@ let single args mode certificate =
     List.iter (fun what -> prerr_endline ("not checked: " ^ what)) (List.rev state.not_checked);
     if state.not_checked = [] then 0 else 4
   end
-  else report net state
+  else report state
 
 let run () =
   let empty = { Network.net = ""; phi = ""; rho = ""; key = ""; orders = [] } in

@@ -93,12 +93,20 @@ let read_gamma path members =
   | Some (Json.Number { value; _ }) when value > 0. -> ()
   | _ -> bad_input "%s: gamma.value must be positive" path
 
+(* What network.toml states beside the weights. Nothing lies between the layers of one that has only one. *)
+let with_activation path where (weights : Weights.t) name =
+  match Activation.called name, weights.activation with
+  | None, _ -> bad_input "%s: %s.activation: there is no activation %s" path where (shown name)
+  | Some stated, Some other when stated <> other && List.length weights.layers > 1 ->
+    bad_input "%s: %s.activation: the weight file itself states %s" path where (Activation.name other)
+  | activation, _ -> { weights with activation }
+
 let read_kinds path ~key role members =
   if members = [] then bad_input "%s: %s names no kind of vehicle" path role;
   List.map (fun (kind, json) ->
       let where = role ^ "." ^ kind in
       let entry = table path where (Some json) in
-      allow_only path (where ^ ".") [ "weights"; "order" ] entry;
+      allow_only path (where ^ ".") [ "weights"; "order"; "activation" ] entry;
       if String.contains kind ':' then bad_input "%s: a kind's name must not contain ':'" path;
       let file = text path (where ^ ".weights") (List.assoc_opt "weights" entry) in
       if file = "" || String.contains file '\000' then bad_input "%s: %s.weights is not the name of a file" path where;
@@ -106,7 +114,11 @@ let read_kinds path ~key role members =
         let names = texts path (where ^ ".order") json in
         if names = [] then bad_input "%s: %s.order names no layer" path where; names in
       let file = if Filename.is_relative file then Filename.concat (Filename.dirname path) file else file in
-      role ^ ":" ^ kind, load file ~key ~order) members
+      let weights = load file ~key ~order in
+      let weights = match List.assoc_opt "activation" entry with
+        | None -> weights
+        | json -> with_activation path where weights (text path (where ^ ".activation") json) in
+      role ^ ":" ^ kind, weights) members
 
 let check_sizes path ~order ~clamp ~components phis rhos =
   let refuse name what = bad_input "%s: %s: does not fit the other networks (%s)" path name what in

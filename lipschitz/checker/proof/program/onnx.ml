@@ -1,4 +1,4 @@
-(* ONNX models that are a chain of linear layers with ReLU between them. *)
+(* ONNX models that are a chain of linear layers with one activation between them. *)
 
 open Refusal
 
@@ -57,7 +57,10 @@ let node path message =
       attributes = List.map (attribute path) (texts path 5 fields) }
   | _ -> bad_input "%s: a node has not exactly one output" path
 
-type state = { mutable layers : affine list; mutable after_relu : bool }
+type state = { mutable layers : affine list; mutable is_activated : bool; mutable activation : Proved.activation option }
+
+(* Those whose default parameters are the ones meant here. Selu's are float32 numbers. *)
+let activations = [ "Relu", Proved.Relu; "Tanh", Tanh; "Sigmoid", Sigmoid; "Softplus", Softplus; "Elu", Elu ]
 
 let follow path kept state current node =
   let refuse what = bad_input "%s: node %s: %s" path (shown node.op) what in
@@ -68,11 +71,11 @@ let follow path kept state current node =
   let number name otherwise = match List.assoc_opt name node.attributes with
     | None -> otherwise | Some { number = Some x; _ } -> x | Some _ -> -1. in
   let start weight transposed =
-    if state.layers <> [] && not state.after_relu then refuse "two linear layers without a Relu between them";
-    state.after_relu <- false;
+    if state.layers <> [] && not state.is_activated then refuse "two linear layers without an activation between them";
+    state.is_activated <- false;
     state.layers <- { weight; transposed; bias = None } :: state.layers in
   let add_bias bias = match state.layers with
-    | ({ bias = None; _ } as layer) :: _ when not state.after_relu ->
+    | ({ bias = None; _ } as layer) :: _ when not state.is_activated ->
       layer.bias <- Some (match bias.shape with [ 1; n ] -> { bias with shape = [ n ] } | _ -> bias)
     | _ -> refuse "adds where no layer takes a bias" in
   match node.op, node.inputs with
@@ -92,11 +95,15 @@ let follow path kept state current node =
        (match rest with [ bias ] when bias <> "" -> add_bias (stored bias) | _ -> ())
      | "MatMul", [ first; weight ] when first = current -> start (stored weight) true
      | "Add", [ a; b ] -> add_bias (stored (if a = current then b else a))
-     | "Relu", [ _ ] ->
-       if state.layers = [] || state.after_relu then refuse "does not follow a linear layer";
-       state.after_relu <- true
      | "Identity", [ _ ] -> ()
-     | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Relu or Identity");
+     | op, [ _ ] when List.mem_assoc op activations ->
+       if state.layers = [] || state.is_activated then refuse "does not follow a linear layer";
+       if number "alpha" 1. <> 1. then refuse "has another alpha than 1";
+       let activation = Some (List.assoc op activations) in
+       if state.activation <> None && state.activation <> activation then refuse "is another activation than that before it";
+       state.activation <- activation;
+       state.is_activated <- true
+     | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Relu, Tanh, Sigmoid, Softplus, Elu or Identity");
     node.output
 
 let layer_name names k weight =
@@ -131,15 +138,16 @@ let read path bytes ~order =
   let input = match inputs with [ one ] -> one | _ -> bad_input "%s: the graph has not one input" path in
   let nodes = List.map (node path) (texts path 1 graph) in
   if List.length nodes > 10_000 then bad_input "%s: the graph has more than 10000 nodes" path;
-  let state = { layers = []; after_relu = false } in
+  let state = { layers = []; is_activated = false; activation = None } in
   let last = List.fold_left (follow path kept state) input nodes in
   if List.map name_of (texts path 12 graph) <> [ last ] then bad_input
       "%s: the graph's output is not where its chain of nodes ends" path;
-  if state.layers = [] || state.after_relu then bad_input "%s: has no linear layer, or ends in a Relu" path;
+  if state.layers = [] || state.is_activated then bad_input "%s: has no linear layer, or ends in an activation" path;
   let names = Hashtbl.create 16 in
   let tensors = List.concat (List.mapi (fun k layer ->
       let name = layer_name names k layer.weight.name in
       declared layer.weight (name ^ ".weight") layer.transposed
       :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> []))
           (List.rev state.layers)) in
-  Weights.assemble ~path ~sha256:(Sha256.to_hex (Sha256.string bytes)) Layer_order.Evaluation ~order tensors
+  Weights.assemble ?activation:state.activation ~path ~sha256:(Sha256.to_hex (Sha256.string bytes))
+    Layer_order.Evaluation ~order tensors

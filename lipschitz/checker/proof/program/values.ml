@@ -75,6 +75,9 @@ let check (state : Claims.t) entry =
   let where = "values of " ^ shown f in
   let names = Functions.networks_of f in
   let is_set = List.length names = 2 in
+  let require_relu = List.iter (fun name ->
+      require (Functions.is_relu state.net name) "%s: only of ReLU networks" where) in
+  require_relu names;
   require (if is_set then List.hd names <> "phi:ground" else f = "network")
     "%s: only of the network, or of a sum over neighbours" where;
   let count = match find where "neighbours" entry with
@@ -83,6 +86,7 @@ let check (state : Claims.t) entry =
   require (if is_set then 1 <= count && count <= Claims.most_neighbours else count = 0)
     "%s: impossible number of neighbours" where;
   let inputs = List.hd names :: if is_set && Functions.has_ground state.net then [ "phi:ground" ] else [] in
+  require_relu inputs;
   let rho = List.tl names in
   let weights name = Functions.weights state.net name in
   let networks = find where "networks" entry in

@@ -3,7 +3,13 @@
 open Refusal
 
 type layer = { name : string; weights : float array array; (* rows *) biases : float array }
-type t = { path : string; sha256 : string; precision : string; layers : layer list }
+type t = {
+  path : string;
+  sha256 : string;
+  precision : string;
+  layers : layer list;
+  activation : Proved.activation option;  (* between the layers; None: neither the file nor network.toml states it *)
+}
 
 let outputs layer = Array.length layer.weights
 let inputs layer = Array.length layer.weights.(0)
@@ -41,8 +47,9 @@ let contains part text =
   let rec go k = k + n <= String.length text && (String.sub text k n = part || go (k + 1)) in
   go 0
 
-(* A chain of linear layers of what a file holds, `listing` being what the order of the tensors in it means. *)
-let assemble ~path ~sha256 listing ~order tensors =
+(* A chain of linear layers of what a file holds, `listing` being what the order of the tensors in it means. A file that
+   states the order of evaluation states the activation as well. *)
+let assemble ?(activation = Proved.Relu) ~path ~sha256 listing ~order tensors =
   let refuse t what = bad_input "%s: %s: %s" path (shown t.tensor) what in
   if List.length tensors > 4096 then bad_input "%s: holds more than 4096 tensors" path;
   let check t =
@@ -79,7 +86,8 @@ let assemble ~path ~sha256 listing ~order tensors =
     { name;
       weights = Array.init outputs (fun i -> Array.sub flat (i * inputs) inputs);
       biases = (match List.assoc_opt name biases with Some t -> finite t | None -> Array.make outputs 0.) } in
-  { path; sha256; precision; layers = List.map layer (Layer_order.decide path listing ~stated:order shapes) }
+  { path; sha256; precision; layers = List.map layer (Layer_order.decide path listing ~stated:order shapes);
+    activation = if listing = Layer_order.Evaluation then Some activation else None }
 
 let width = function "float32" -> 4 | _ -> 8
 (* The k-th little-endian number. *)

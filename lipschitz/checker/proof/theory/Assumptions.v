@@ -1,8 +1,12 @@
 (** The theorems, and what they rest on; compared with assumptions.txt. *)
 From Coq Require Import List Reals.
-From Swarmcert Require Import Form Network Checker Meaning Sets Claims Sound.
+From Swarmcert Require Import Activations Form Network Checker Meaning Steepness Sets Claims Sound.
 Open Scope R_scope.
 Set Printing Width 120.
+Check rising_slopes.
+Print Assumptions rising_slopes.
+Check known_slopes.
+Print Assumptions known_slopes.
 Check check_sound.
 Print Assumptions check_sound.
 Check check_parts_sound.

@@ -1,6 +1,6 @@
 (** Movements of some coordinates, each in units of its scale, as a first stage: x = selector u + what stays. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Distance.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Distance.
 Import ListNotations.
 
 Fixpoint count (moves : list bool) : nat :=

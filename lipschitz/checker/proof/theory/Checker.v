@@ -1,6 +1,6 @@
 (** The executable checker over dyadic numbers, and what its acceptance means. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
-From Swarmcert Require Import Algebra Form Network Gram.
+From Swarmcert Require Import Algebra Activations Form Network Gram.
 Import ListNotations.
 Open Scope Z_scope.
 
@@ -247,9 +247,22 @@ Proof.
   - apply IH; [rewrite skipn_length; lia|]. rewrite <- (firstn_skipn (length m) t) in Ht. now apply Forall_app in Ht.
 Qed.
 
-(** The network with these stages and any biases. *)
-Definition chain (hidden : list matrixD) (biases : list (list R)) (last : matrixD) (b : list R) : list R -> list R :=
-  network (List.combine (map realm hidden) biases) (realm last, b).
+(** A network with these matrices, any biases and any functions with slopes in [0, 1]. *)
+Definition stack := (list matrixD * matrixD)%type.
+Definition real_stack := (list ((R -> R) * layer) * layer)%type.
+Definition run (l : real_stack) : list R -> list R := network (fst l) (snd l).
+Definition of_matrix (m : matrixD) (l : layer) := fst l = realm m /\ length (snd l) = length m.
+Definition of_stage (m : matrixD) (k : (R -> R) * layer) := slopes (fst k) 0 1 /\ of_matrix m (snd k).
+Definition instance (p : stack) (l : real_stack) := Forall2 of_stage (fst p) (fst l) /\ of_matrix (snd p) (snd l).
+
+Lemma matrix_fits m l : of_matrix m l -> bias_fits l.
+Proof. intros [E H]. unfold bias_fits. now rewrite E, map_length. Qed.
+Lemma stages_tame ms ks : Forall2 of_stage ms ks -> Forall tame ks /\ map weights ks = map realm ms.
+Proof.
+  intros H. induction H as [|m k ms ks [S H] Hs [IH1 IH2]]; simpl; split; auto.
+  - constructor; auto. split; auto. eapply matrix_fits; eauto.
+  - f_equal; auto. apply H.
+Qed.
 
 Lemma norm_bound upper rho f x x' : 0 <= upper -> rho <= upper * upper ->
   square (minus (f x) (f x')) <= rho * square (minus x x') -> norm (minus (f x) (f x')) <= upper * norm (minus x x').
@@ -260,35 +273,32 @@ Qed.
 
 (** (d) *)
 Theorem check_sound hidden last upper rho t f : check hidden last upper rho t f = true ->
-  forall biases b, Forall2 (fun (m : matrixD) (c : list R) => length c = length m) hidden biases ->
-      length b = length last ->
+  forall l, instance (hidden, last) l ->
   forall x x', length x = inputs hidden last -> length x' = inputs hidden last ->
-  norm (minus (chain hidden biases last b x) (chain hidden biases last b x')) <= real upper * norm (minus x x').
+  norm (minus (run l x) (run l x')) <= real upper * norm (minus x x').
 Proof.
-  unfold check. intros H biases b Hbs Hb x x' Hx Hx'.
+  unfold check. intros H [ks [last' b]] [Hks Hb] x x' Hx Hx'. simpl in Hks, Hb.
   apply andb_prop in H. destruct H as [_ H]. repeat (apply andb_prop in H; destruct H as [H ?]).
   apply Nat.eqb_eq in H. rename H into Hn, H0 into HP, H1 into Hur, H2 into Hu, H3 into Hrho, H4 into Ht.
   apply shows_nonnegative_sound in HP. apply real_nonnegative in Hu, Hur. apply real_positive in Hrho.
   rewrite real_add, real_mul, real_neg in Hur.
-  apply (norm_bound (real upper) (real rho) (chain hidden biases last b)); [auto|lra|]. unfold chain.
-  assert (bias_fits (realm last, b)) as Hl by (unfold bias_fits; simpl; now rewrite map_length).
+  pose proof (matrix_fits _ _ Hb) as Hl. destruct Hb as [E Hb]. simpl in E. subst last'.
+  apply (norm_bound (real upper) (real rho) (run (ks, (realm last, b)))); [auto|lra|]. unfold run. simpl.
   assert (real (-1, 0)%Z = -1) as M by (unfold real; simpl; ring).
-  destruct Hbs as [|first c later biases Hc Hbs]; simpl in HP |- *.
+  destruct Hks as [|first [g [m c]] later ks [Hg [E Hc]] Hks]; simpl in HP.
   - rewrite real_norm_inequality in HP.
     destruct (length last <=? _)%nat.
     + now apply norm_lmi_bounds.
     + rewrite (f_columns zero 0 real real_zero) in HP. eapply norm_lmi_columns_bounds; eauto.
-  - rewrite (f_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M, real_mul, real_neg in HP.
+  - simpl in E, Hg, Hc. subst m.
+    rewrite (f_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M, real_mul, real_neg in HP.
     replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
     rewrite forallb_forall, <- Forall_forall in Ht.
     pose proof (split_fits t (first :: later) Hn Ht) as S. inversion S; subst.
-    set (ls := List.combine (map realm later) biases).
-    assert (map fst ls = map realm later) as E.
-    { unfold ls. clear -Hbs. induction Hbs; simpl; congruence. }
+    destruct (stages_tame _ _ Hks) as [T E].
     apply lmi_bounds with
-        (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later));
-      auto; try (unfold bias_fits; simpl; now rewrite map_length).
-    + unfold ls. clear -Hbs. induction Hbs; simpl; constructor; auto. unfold bias_fits. simpl. now rewrite map_length.
+        (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later)); auto.
+    + split; auto. unfold bias_fits. simpl. now rewrite map_length.
     + now rewrite E.
     + rewrite E. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) =
         List.combine (map reals ts) (map realm ms)) as Q.

@@ -1,6 +1,6 @@
 (** The checker of claims, and what its acceptance means: `step_sound`. *)
 From Coq Require Import List ZArith Reals Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Blocks Lower Values.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values.
 Import ListNotations.
 
 Inductive proof :=
@@ -25,7 +25,16 @@ Definition check_norm_below (w : matrixD) (l : dyadic) (v : list dyadic) : bool 
 
 (** Slopes by a matrix inequality. *)
 Definition fits_part (p : part) : bool := forallb (fun l => length (snd l) =? length (fst l))%nat (layers p).
-Definition matrices (p : part) : stack := (map fst (hidden p), fst (outer p)).
+(** Of the network whose functions are divided by their largest slope b: M_1, b M_2, b M_3, ... *)
+Definition matrices (p : part) : stack :=
+  match hidden p with
+  | [] => ([], fst (outer p))
+  | first :: later =>
+      let scaled l := scale_all mul (steepest (between p)) (fst l) in
+      (fst first :: map scaled later, scaled (outer p))
+  end.
+Definition rising (p : part) : bool := is_rising (between p).
+Definition relu_between (p : part) : bool := is_relu (between p).
 Definition parts_of (ps : list part) (f : function) : list part :=
   match f with Alone p => [part_at ps p] | Set_of phi rho => [part_at ps phi; part_at ps rho] end.
 (** Every network's biases fit; rho has no clamp; `moves` and a scale that is stated have one entry per input. *)
@@ -34,7 +43,7 @@ Definition well_formed (ps : list part) (f : function) (moves : list bool) (scal
   && (length moves =? inputs_of (part_at ps (moved f)))%nat
   && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
 Definition check_slope ps f moves scale u rho t factor : bool :=
-  well_formed ps f moves scale && is_nonnegative u
+  well_formed ps f moves scale && forallb rising (parts_of ps f) && is_nonnegative u
   && check_parts ([], selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
 
 (** Slopes by products of norms that were accepted before. *)
@@ -53,7 +62,15 @@ Fixpoint norms (accepted : list claim) (p layer : nat) (ls : list layerD) : opti
       | _, _ => None
       end
   end.
-Definition norm_of (ps : list part) (accepted : list claim) (p : nat) := norms accepted p O (layers (part_at ps p)).
+(** Times the largest slope for each function between layers. *)
+Definition with_slopes {A} (c : dyadic) (hidden : list A) (u : dyadic) : dyadic :=
+  fold_right (fun _ v => mul c v) u hidden.
+Definition norm_of (ps : list part) (accepted : list claim) (p : nat) : option dyadic :=
+  let q := part_at ps p in
+  match norms accepted p O (layers q) with
+  | Some u => if is_known (between q) then Some (with_slopes (steepest (between q)) (hidden q) u) else None
+  | None => None
+  end.
 Fixpoint largest (m : dyadic) (scale : list dyadic) : dyadic :=
   match scale with [] => m | s :: scale' => largest (if at_most m s then s else m) scale' end.
 Definition product_of (ps : list part) (accepted : list claim) (f : function) : option dyadic :=
@@ -91,7 +108,8 @@ Fixpoint fraction_in (scale : list dyadic) (d : list dyadic) : dyadic * dyadic :
 Definition check_points ps f moves scale l x y others : bool :=
   let rest := fold_right (plus add) [] (map (fun o => valueD (part_at ps (fst o)) (snd o)) others) in
   let (n, m) := fraction_in scale (minusD x y) in
-  positive_scale scale && is_nonnegative l && agreeD moves x y && (length x =? inputs_of (part_at ps (moved f)))%nat
+  forallb relu_between (parts_of ps f) && forallb (fun o => relu_between (part_at ps (fst o))) others
+  && positive_scale scale && is_nonnegative l && agreeD moves x y && (length x =? inputs_of (part_at ps (moved f)))%nat
   && forallb (fun o => length (snd o) =? inputs_of (part_at ps (fst o)))%nat others && is_positive n
   && at_most (mul (mul l l) n) (mul (squareD (minusD (value_ofD ps f rest x) (value_ofD ps f rest y))) m).
 
@@ -162,7 +180,7 @@ Fixpoint sum_ends (accepted : list claim) (n : nat) (terms : list term) : option
       end
   end.
 Definition check_within ps p b bounds v : bool :=
-  let q := part_at ps p in check_layers (hidden q) (outer q) (clamp_ends (clamp q) b) bounds v.
+  let q := part_at ps p in relu_between q && check_layers (hidden q) (outer q) (clamp_ends (clamp q) b) bounds v.
 Definition check_sum_within ps accepted terms rho v sums : bool :=
   match sum_ends accepted (inputs_of (part_at ps rho)) terms, find_within accepted rho sums with
   | Some s, Some w => contains sums s && contains v w
@@ -177,7 +195,7 @@ Definition check_jump ps accepted p b rho u : bool :=
   end.
 Definition check_error ps p b r e u bounds errors : bool :=
   let q := part_at ps p in
-  check_roundings (hidden q) (outer q) (clamp_ends (clamp q) b) r bounds errors e
+  relu_between q && check_roundings (hidden q) (outer q) (clamp_ends (clamp q) b) r bounds errors e
   && is_nonnegative u && at_most (squareD e) (mul u u).
 (** How many summands at most, the sum of their sizes and that of their errors. *)
 Fixpoint sum_errors (accepted : list claim) (n : nat) (terms : list (term * list dyadic)) :

@@ -1,6 +1,6 @@
-(** Norms of vectors that are added, cut, clamped and passed through ReLU. *)
+(** Norms of vectors that are added, cut, clamped and passed through activations. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz.
-From Swarmcert Require Import Algebra Form Network Checker Meaning.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -68,12 +68,14 @@ Proof. intros H. unfold apply. apply map_ext_in. intros r Hr. rewrite Forall_for
 
 Lemma square_between j k : 0 <= k <= j \/ j <= k <= 0 -> k * k <= j * j.
 Proof. intros [[H G]|[H G]]; nra. Qed.
-Lemma relu_contracts y y' : length y = length y' -> square (minus (map relu y) (map relu y')) <= square (minus y y').
+Lemma slopes_contract f c y y' : slopes f (- c) c -> length y = length y' ->
+  square (minus (map f y) (map f y')) <= c * c * square (minus y y').
 Proof.
-  unfold square, minus. revert y'. induction y as [|a y IH]; intros [|b y']; simpl; try discriminate; intros H; try lra.
+  intros S. unfold square, minus. revert y'.
+  induction y as [|a y IH]; intros [|b y']; simpl; try discriminate; intros H; try lra.
   specialize (IH y' ltac:(lia)).
-  assert ((relu a + -1 * relu b) * (relu a + -1 * relu b) <= (a + -1 * b) * (a + -1 * b)); [|lra].
-  apply square_between. unfold relu, Rmax. destruct (Rle_dec 0 a), (Rle_dec 0 b), (Rle_dec a b); lra.
+  assert ((f a + -1 * f b) * (f a + -1 * f b) <= c * (a + -1 * b) * (c * (a + -1 * b))); [|nra].
+  destruct (Rle_dec a b) as [L|L]; [specialize (S a b L)|specialize (S b a ltac:(lra))]; nra.
 Qed.
 Lemma square_minus_same s : square (minus s s) = 0.
 Proof. unfold square, minus. induction s as [|a s IH]; simpl; auto. rewrite IH. ring. Qed.

@@ -1,6 +1,6 @@
 (** The checker as OCaml: integers are those of GMP (zarith), natural numbers are machine integers. *)
 From Coq Require Import ZArith List Extraction ExtrOcamlBasic ExtrOcamlNatInt.
-From Swarmcert Require Import Algebra Checker Meaning Claims.
+From Swarmcert Require Import Algebra Activations Checker Meaning Steepness Claims.
 Extract Inductive positive => "Big.t"
   ["(fun p -> Big.succ (Big.shift_left p 1))" "(fun p -> Big.shift_left p 1)" "Big.one"]
       "(fun _ _ _ _ -> assert false)".

@@ -1,7 +1,7 @@
 (** Sums of products in float32, in whatever order and with or without fused multiply-adds,
   and how far off they are. *)
 From Coq Require Import List Reals Lra Lia Psatz Permutation.
-From Swarmcert Require Import Algebra Form Network.
+From Swarmcert Require Import Algebra Activations Form Network.
 Import ListNotations.
 Open Scope R_scope.
 

@@ -1,6 +1,6 @@
 (** Lower bounds: the slope between two points, by exact evaluation. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning.
 Import ListNotations.
 
 Definition reluD (x : dyadic) : dyadic := if is_nonnegative x then x else zero.
@@ -33,8 +33,9 @@ Proof.
   unfold affineD, affine. now rewrite (f_plus add Rplus real real_add),
       (f_apply zero add mul 0 Rplus Rmult real real_zero real_add real_mul).
 Qed.
+Definition relu_layers (hidden : list layerD) := map (fun l => (relu, real_layer l)) hidden.
 Lemma real_network hidden last x :
-  reals (networkD hidden last x) = network (map real_layer hidden) (real_layer last) (reals x).
+  reals (networkD hidden last x) = network (relu_layers hidden) (real_layer last) (reals x).
 Proof.
   revert x. induction hidden as [|[m b] hidden IH]; intros x; simpl; [apply real_affine|].
   rewrite IH, <- real_affine, !map_map. f_equal. apply map_ext. apply real_relu.
@@ -47,10 +48,10 @@ Proof.
   replace (real (-1, 0)%Z) with (-1) by (unfold real; simpl; ring). reflexivity.
 Qed.
 Theorem check_lower_sound hidden last lower x x' : check_lower hidden last lower x x' = true ->
-  let f := network (map real_layer hidden) (real_layer last) in
+  let f := network (relu_layers hidden) (real_layer last) in
   real lower * norm (minus (reals x) (reals x')) <= norm (minus (f (reals x)) (f (reals x'))).
 Proof.
-  unfold check_lower. intros H. set (f := network (map real_layer hidden) (real_layer last)). cbv zeta.
+  unfold check_lower. intros H. set (f := network (relu_layers hidden) (real_layer last)). cbv zeta.
       apply andb_prop in H. destruct H as [Hl H]. apply real_nonnegative in Hl, H.
   rewrite real_add, real_neg, !real_mul, !real_square_minus, !real_network in H. fold f in H.
   unfold norm. rewrite <- (sqrt_square (real lower)) at 1 by auto. rewrite <- sqrt_mult_alt by nra.

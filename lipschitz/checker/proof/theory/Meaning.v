@@ -1,17 +1,16 @@
-(** What the claims of a certificate mean, over the real numbers.
-  Together with `network`, `affine` and `relu` of Network.v,
-    `norm` and `minus` of Form.v and Network.v, `real` of Checker.v (mantissa times 2^exponent) and,
-      for what is said of float32,
-    the first definitions of Float.v, this is all that has to be read to know what an accepted certificate states. *)
+(** What the claims of a certificate mean, over the real numbers. Together with `act` of Activations.v and what it names,
+  `network` and `affine` of Network.v, `norm` and `minus` of Form.v and Network.v, `real` of Checker.v (mantissa times
+  2^exponent) and, for what is said of float32, the first definitions of Float.v, this is all that has to be read to know
+  what an accepted certificate states. *)
 From Coq Require Import List ZArith Reals.
-From Swarmcert Require Import Algebra Form Network Checker Float.
+From Swarmcert Require Import Algebra Activations Form Network Checker Float.
 Import ListNotations.
 
 (** Weights by rows, biases. *)
 Definition layerD := (matrixD * list dyadic)%type.
-(** One network as stored; with an input clamp, an interval per input, else []. *)
-Record part := Part { hidden : list layerD; outer : layerD; clamp : list (dyadic * dyadic) }.
-Definition no_part := Part [] ([], []) [].
+(** One network as stored; with an input clamp, an interval per input, else []; and the function between its layers. *)
+Record part := Part { hidden : list layerD; outer : layerD; clamp : list (dyadic * dyadic); between : activation }.
+Definition no_part := Part [] ([], []) [] Relu.
 Definition part_at (ps : list part) (k : nat) : part := nth k ps no_part.
 Definition layers (p : part) : list layerD := hidden p ++ [outer p].
 Definition inputs_of (p : part) : nat := length (hd [] (fst (hd (outer p) (hidden p)))).
@@ -24,7 +23,7 @@ Fixpoint clamped (c : list (dyadic * dyadic)) (x : list R) : list R :=
   | _, _ => x
   end.
 Definition value (p : part) (x : list R) : list R :=
-  network (map real_layer (hidden p)) (real_layer (outer p)) (clamped (clamp p) x).
+  network (map (fun l => (act (between p), real_layer l)) (hidden p)) (real_layer (outer p)) (clamped (clamp p) x).
 Definition vector_sum (us : list (list R)) : list R := fold_right plusR [] us.
 
 (** "network", "phi:..." or "rho:...", and "set:...", whose value is rho(phi(x) + rest). *)
@@ -140,9 +139,11 @@ Definition holds (ps : list part) (c : claim) : Prop :=
         norm (minus (value (part_at ps rho) (plusR (value (part_at ps phi) x) rest)) (value (part_at ps rho) rest))
           <= real u
   | Float_error p b r e u =>
+      between (part_at ps p) = Relu /\
       forall x v, within b x -> evaluates (part_at ps p) r x v ->
         close e (value (part_at ps p) x) v /\ norm (minus v (value (part_at ps p) x)) <= real u
   | Sum_float_error terms rho u =>
+      between (part_at ps rho) = Relu /\ Forall (fun t => between (part_at ps (phi (fst t))) = Relu) terms /\
       forall inputs computed s v, Forall2 may_stand (map fst terms) inputs ->
         Forall2 (fun t_xs vs => Forall2 (evaluates (part_at ps (phi (fst (fst t_xs)))) (snd (fst t_xs))) (snd t_xs)
           vs)

@@ -1,18 +1,23 @@
-(** ReLU networks over the reals, and what a nonnegative form says about them. *)
+(** Networks over the reals, and what a nonnegative form says about those whose activations have slopes in [0, 1]. *)
 From Coq Require Import List Reals Lra Lia Psatz.
-From Swarmcert Require Import Algebra Form.
+From Swarmcert Require Import Algebra Activations Form.
 Import ListNotations.
 Open Scope R_scope.
 
 Notation matrix := (list (list R)).
-Definition relu (x : R) : R := Rmax 0 x.
+(** Weights by rows, biases. *)
+Notation layer := (matrix * list R)%type.
 Definition affine (m : matrix) (b x : list R) : list R := plusR (applyR m x) b.
-Fixpoint network (hidden : list (matrix * list R)) (last : matrix * list R) (x : list R) : list R :=
+(** Each hidden layer with the function that follows it. *)
+Fixpoint network (hidden : list ((R -> R) * layer)) (last : layer) (x : list R) : list R :=
   match hidden with
   | [] => affine (fst last) (snd last) x
-  | (m, b) :: hidden' => network hidden' last (map relu (affine m b x))
+  | (f, (m, b)) :: hidden' => network hidden' last (map f (affine m b x))
   end.
-Definition bias_fits (layer : matrix * list R) := length (snd layer) = length (fst layer).
+Definition bias_fits (l : layer) := length (snd l) = length (fst l).
+(** A hidden layer whose biases fit, followed by a function with slopes in [0, 1]. *)
+Definition tame (k : (R -> R) * layer) := slopes (fst k) 0 1 /\ bias_fits (snd k).
+Definition weights (k : (R -> R) * layer) : matrix := fst (snd k).
 Definition norm (u : list R) := sqrt (square u).
 
 Lemma minus_affine m b x x' : length b = length m -> minus (affine m b x) (affine m b x') = applyR m (minus x x').
@@ -32,14 +37,14 @@ Lemma length_minus u v : length v = length u -> length (minus u v) = length u.
 Proof. unfold minus. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. Qed.
 
 (** dz (dy - dz) >= 0, with multipliers. *)
-Lemma relu_increment y y' : 0 <= (relu y - relu y') * ((y - y') - (relu y - relu y')).
-Proof. unfold relu, Rmax. destruct (Rle_dec 0 y), (Rle_dec 0 y'); nra. Qed.
-Lemma relu_constraint t y y' : Forall (Rle 0) t -> length y' = length y ->
-  let dz := minus (map relu y) (map relu y') in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
+Lemma slope_increment f y y' : slopes f 0 1 -> 0 <= (f y - f y') * ((y - y') - (f y - f y')).
+Proof. intros S. destruct (Rle_dec y y'); [specialize (S y y')|specialize (S y' y)]; nra. Qed.
+Lemma slope_constraint f t y y' : slopes f 0 1 -> Forall (Rle 0) t -> length y' = length y ->
+  let dz := minus (map f y) (map f y') in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
 Proof.
-  simpl. unfold minus. intros Ht. revert y y'.
+  simpl. unfold minus. intros S Ht. revert y y'.
   induction Ht as [|a t Ha Ht IH]; intros [|b y] [|c y']; simpl; try discriminate; intros; try lra.
-  specialize (IH y y' ltac:(lia)). pose proof (Rmult_le_pos _ _ Ha (relu_increment b c)). nra.
+  specialize (IH y y' ltac:(lia)). pose proof (Rmult_le_pos _ _ Ha (slope_increment f b c S)). nra.
 Qed.
 
 Definition fits (m : matrix) (t : list R) := length t = length m /\ Forall (Rle 0) t.
@@ -54,21 +59,21 @@ Proof. revert m. induction t as [|a t IH]; intros [|r m]; simpl; try discriminat
 (** From the first hidden layer's activations h, h' on. *)
 Lemma later_layers rho t hidden ts last b h h' :
   0 < rho -> length t = length h -> length h' = length h -> length b = length last ->
-  Forall bias_fits hidden -> Forall2 fits (map fst hidden) ts ->
+  Forall tame hidden -> Forall2 fits (map weights hidden) ts ->
   let dz := minus h h' in
-  exists rest, form (bandR (2 * rho) (- rho) t (List.combine ts (map fst hidden)) last) (dz ++ rest) <=
+  exists rest, form (bandR (2 * rho) (- rho) t (List.combine ts (map weights hidden)) last) (dz ++ rest) <=
     2 * rho * dotR dz (timesR t dz) - rho * square (minus (network hidden (last, b) h) (network hidden (last, b) h')).
 Proof.
   simpl. intros Hr. revert t ts h h'.
-  induction hidden as [|[m c] hidden IH]; intros t ts h h' Ht Hh Hb Hbs Hts.
+  induction hidden as [|[f [m c]] hidden IH]; intros t ts h h' Ht Hh Hb Hbs Hts.
   - exists []. inversion Hts; subst. simpl. rewrite app_nil_r, form_sum, form_scale, minus_affine by auto.
     assert (length (minus h h') = length t) as <- by (rewrite length_minus; auto).
     rewrite form_gram_columns, form_diagonal by (unfold scale; rewrite map_length, length_minus; auto).
     apply Req_le. unfold Rminus. f_equal; [|ring].
     now rewrite times_scale, dot_scale_r.
-  - inversion Hbs as [|? ? Hc Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; subst. simpl in *.
-      unfold bias_fits in Hc. simpl in Hc.
-    set (z := map relu (affine m c h)). set (z' := map relu (affine m c h')).
+  - inversion Hbs as [|? ? [Hf Hc] Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; subst. simpl in *.
+      unfold bias_fits, weights in *. simpl in *.
+    set (z := map f (affine m c h)). set (z' := map f (affine m c h')).
     assert (length z = length m) as Hz by (unfold z; now rewrite map_length, length_affine).
     assert (length z' = length m) as Hz' by (unfold z'; now rewrite map_length, length_affine).
     destruct (IH t2 ts' z z') as [rest Hrest]; try congruence; auto.
@@ -78,7 +83,7 @@ Proof.
     rewrite dot_columns, (dot_comm (_ ++ _)), dot_app_short
       by (rewrite length_minus by congruence; unfold apply, scale_all; rewrite !map_length, length_scale_rows; lia).
     rewrite apply_scale_all, apply_scale_rows, dot_scale_l, (dot_comm _ (minus z z')), times_scale, dot_scale_r.
-    pose proof (relu_constraint t2 (affine m c h) (affine m c h') Hp2 ltac:(now rewrite !length_affine)) as C.
+    pose proof (slope_constraint f t2 (affine m c h) (affine m c h') Hf Hp2 ltac:(now rewrite !length_affine)) as C.
     rewrite minus_affine in C by auto. fold z z' in C. simpl in C. nra.
 Qed.
 
@@ -92,18 +97,19 @@ Qed.
 
 Definition bounded rho (f : list R -> list R) := forall x x', square (minus (f x) (f x')) <= rho * square (minus x x').
 
-Theorem lmi_bounds rho t first b1 hidden ts last b :
-  0 < rho -> bias_fits (first, b1) -> Forall bias_fits hidden -> bias_fits (last, b) ->
-  fits first t -> Forall2 fits (map fst hidden) ts ->
-  nonnegative (lmi 0 Rplus Rmult (-1) (2 * rho) (- rho) t first (List.combine ts (map fst hidden)) last) ->
-  bounded rho (network ((first, b1) :: hidden) (last, b)).
+Theorem lmi_bounds rho t f first b1 hidden ts last b :
+  0 < rho -> tame (f, (first, b1)) -> Forall tame hidden -> bias_fits (last, b) ->
+  fits first t -> Forall2 fits (map weights hidden) ts ->
+  nonnegative (lmi 0 Rplus Rmult (-1) (2 * rho) (- rho) t first (List.combine ts (map weights hidden)) last) ->
+  bounded rho (network ((f, (first, b1)) :: hidden) (last, b)).
 Proof.
-  intros Hr H1 Hh Hl [Ht Hp] Hts HP x x'. simpl. unfold bias_fits in *. simpl in *.
-  set (z := map relu (affine first b1 x)). set (z' := map relu (affine first b1 x')).
+  intros Hr [Hf H1] Hh Hl [Ht Hp] Hts HP x x'. simpl. unfold bias_fits in *. simpl in *.
+  set (z := map f (affine first b1 x)). set (z' := map f (affine first b1 x')).
   assert (length z = length first) as Hz by (unfold z; now rewrite map_length, length_affine).
   assert (length z' = length first) as Hz' by (unfold z'; now rewrite map_length, length_affine).
   destruct (later_layers rho t hidden ts last b z z') as [rest Hrest]; try congruence; auto.
-  pose proof (relu_constraint t (affine first b1 x) (affine first b1 x') Hp ltac:(now rewrite !length_affine)) as C.
+  pose proof (slope_constraint f t (affine first b1 x) (affine first b1 x') Hf Hp ltac:(now rewrite !length_affine))
+    as C.
   rewrite minus_affine in C by auto. fold z z' in C. simpl in C.
   specialize (HP (minus z z' ++ rest)). unfold lmi in HP. rewrite form_sum, form_scale, form_gram in HP.
   set (l := combine_rows _ _) in HP.

@@ -1,8 +1,7 @@
 (** Accepted claims of values over boxes hold: intervals layer by layer, sums of terms, and jumps. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Float Meaning Sets Distance Blocks Lower Values Claims
-  Slopes
-    Witness Laws.
+From Swarmcert Require Import Algebra Activations Form Network Checker Float Meaning Steepness Sets Distance Blocks
+    Lower Values Claims Slopes Witness Laws.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -69,14 +68,17 @@ Proof.
   split; [|auto]. unfold relu. split; apply Rle_max_compat_l; lra.
 Qed.
 Lemma layers_within hid last b bounds v x : check_layers hid last b bounds v = true -> within b x ->
-  within v (network (map real_layer hid) (real_layer last) x).
+  within v (network (relu_layers hid) (real_layer last) x).
 Proof.
   revert b bounds x. induction hid as [|[w c] hid IH]; intros b [|v' bounds] x; simpl; try discriminate.
   - apply encloses_within.
   - intros H G. both H. eapply IH; eauto. apply relu_within. eapply encloses_within; eauto.
 Qed.
 Lemma within_sound ps p b bounds v : check_within ps p b bounds v = true -> holds ps (Within p b v).
-Proof. intros H x Hx. eapply layers_within; eauto. now apply within_clamped. Qed.
+Proof.
+  unfold check_within. intros H x Hx. both H. apply relu_part in H. unfold value. rewrite H.
+  eapply layers_within; eauto. now apply within_clamped.
+Qed.
 Lemma find_within_sound ps accepted p b v : Forall (holds ps) accepted -> find_within accepted p b = Some v ->
   holds ps (Within p b v).
 Proof.

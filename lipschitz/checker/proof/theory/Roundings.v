@@ -1,8 +1,7 @@
 (** Accepted bounds on how far a float32 evaluation is from the exact function hold. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Float Meaning Sets Distance Blocks Lower Values Claims
-  Slopes
-    Witness Laws Ranges.
+From Swarmcert Require Import Algebra Activations Form Network Checker Float Meaning Steepness Sets Distance Blocks
+    Lower Values Claims Slopes Witness Laws Ranges.
 Import ListNotations.
 Open Scope R_scope.
 #[local] Arguments Z.add : simpl never.
@@ -89,7 +88,7 @@ Proof.
 Qed.
 Lemma roundings_close hid last b r bounds errors e x h v : check_roundings hid last b r bounds errors e = true ->
   within b x -> close r x h -> float_network (map real_layer hid) (real_layer last) h v ->
-  close e (network (map real_layer hid) (real_layer last) x) v.
+  close e (network (relu_layers hid) (real_layer last) x) v.
 Proof.
   revert b r bounds errors x h. induction hid as [|[w c] hid IH]; intros b r [|v' bounds] [|s errors] x h; simpl;
     try discriminate.
@@ -101,10 +100,10 @@ Qed.
 Lemma error_sound ps p b r e u bounds errors : check_error ps p b r e u bounds errors = true ->
   holds ps (Float_error p b r e u).
 Proof.
-  unfold check_error. intros H x v Hx (h & C & F). do 2 both H. apply real_nonnegative in H1.
-    apply at_most_real in H0.
+  unfold check_error. intros H. do 3 both H. apply relu_part in H. split; auto. intros x v Hx (h & C & F).
+  apply real_nonnegative in H1. apply at_most_real in H0.
   assert (close e (value (part_at ps p) x) v) as K.
-  { unfold value. eapply roundings_close; eauto. now apply within_clamped. }
+  { unfold value. rewrite H. eapply roundings_close; eauto. now apply within_clamped. }
   split; auto. apply sqrt_below; auto. rewrite real_square, real_mul in H0. pose proof (close_square _ _ _ K). lra.
 Qed.
 Lemma find_error_sound ps accepted p b r e u : Forall (holds ps) accepted ->
@@ -166,7 +165,7 @@ Lemma group_errors ps p (b v : box) r e u n xs vs i : holds ps (Within p b v) ->
 Proof.
   intros HW HE Lv Le Hi HF H. induction H as [|x y xs vs Hxy H IH].
   - simpl. rewrite Rminus_0_r, Rabs_R0. split; auto. lra.
-  - inversion HF as [|? ? Hx HF']; subst. destruct (IH HF') as (L & M & E). destruct (HE x y Hx Hxy) as [C _].
+  - inversion HF as [|? ? Hx HF']; subst. destruct (IH HF') as (L & M & E). destruct (proj2 HE x y Hx Hxy) as [C _].
     assert (i < length (sizes v e))%nat as Is by (rewrite sizes_length; lia).
     pose proof (no_larger_nth _ _ i (sizes_no_larger _ _ _ _ (HW x Hx) C) Is) as S.
     pose proof (close_nth _ _ _ i C ltac:(lia)) as D.
@@ -213,7 +212,7 @@ Proof.
           pose proof (Rabs_pos (real (fst j))). pose proof (Rmax_l (Rabs (real (fst j))) (Rabs (real (snd j)))). lra.
         + both H. apply IHv; auto. lia.
       - assert (within b x) as Hx by (inversion B; auto). inversion G as [|? y ? ? Hy _]; subst.
-        destruct (find_error_sound _ _ _ _ _ _ _ HA Ee x y Hx Hy) as [Cl _].
+        destruct (proj2 (find_error_sound _ _ _ _ _ _ _ HA Ee) x y Hx Hy) as [Cl _].
         pose proof (no_larger_nth _ _ i (sizes_no_larger _ _ _ _ (find_within_sound _ _ _ _ _ HA Ev x Hx) Cl) Is)
           as Q.
         pose proof (Rabs_pos (nth i y 0)). lra. }
@@ -225,6 +224,15 @@ Proof.
       match goal with |- Rabs (?a + ?b - (?c + ?d)) <= _ => replace (a + b - (c + d)) with ((a - c) + (b - d))
         by ring end.
       eapply Rle_trans; [apply Rabs_triang|]. lra.
+Qed.
+Lemma terms_relu ps accepted n terms sums : Forall (holds ps) accepted -> sum_errors accepted n terms = Some sums ->
+  Forall (fun t => between (part_at ps (phi (fst t))) = Relu) terms.
+Proof.
+  intros HA. revert sums. induction terms as [|[[p b low high] r] terms IH]; intros sums; [constructor|]. simpl.
+  destruct (find_within accepted p b); [|discriminate].
+  destruct (find_error accepted p b r) as [[e u]|] eqn:Ee; [|discriminate].
+  destruct (sum_errors accepted n terms); [|discriminate]. intros _. constructor; [|now eapply IH].
+  apply (find_error_sound _ _ _ _ _ _ _ HA Ee).
 Qed.
 Lemma sum_fits_nth count m e errors i : sum_fits count m e errors = true -> (i < length errors)%nat ->
   rounding_fits count (nth i m zero) (nth i e zero) (nth i errors zero) = true.
@@ -240,12 +248,13 @@ Proof.
   destruct (sum_ends _ _ _) as [s|] eqn:Es; [|discriminate].
   destruct (sum_errors _ _ _) as [[[count m] e]|] eqn:Ee; [|discriminate].
   destruct (find_error _ _ _ _) as [[e' w]|] eqn:Ew; [|discriminate].
-  intros H inputs computed z v M F [Lz S] N. do 4 both H. rename H0 into Hw, H1 into Hf, H2 into Hl, H3 into Hc.
+  intros H. split; [apply (find_error_sound _ _ _ _ _ _ _ HA Ew)|]. split; [eapply terms_relu; eauto|].
+  intros inputs computed z v M F [Lz S] N. do 4 both H. rename H0 into Hw, H1 into Hf, H2 into Hl, H3 into Hc.
   apply Nat.eqb_eq in Hl. apply at_most_real in Hw.
   pose proof (sum_ends_sound _ _ _ _ _ _ HA Es M) as W. apply (contains_within _ _ _ H) in W.
   set (exact := sum_of_terms ps rho (combine (map fst terms) inputs)) in *.
   assert (evaluates (part_at ps rho) errors exact v) as EV;
-    [|destruct (find_error_sound _ _ _ _ _ _ _ HA Ew exact v W EV) as [_ B]; lra].
+    [|destruct (proj2 (find_error_sound _ _ _ _ _ _ _ HA Ew) exact v W EV) as [_ B]; lra].
   exists z. split; auto. destruct (clamp (part_at ps rho)) eqn:E; [|discriminate]. simpl clamped.
   assert (length exact = n) as Lx.
   { pose proof (within_length _ _ (sum_ends_sound _ _ _ _ _ _ HA Es M)) as X. fold exact in X. rewrite X.

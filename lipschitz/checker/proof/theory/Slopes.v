@@ -1,6 +1,7 @@
 (** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Values Claims.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
+    Values Claims.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -14,7 +15,6 @@ Proof.
   { unfold is_nonnegative, neg in *. simpl. apply Z.leb_le. apply Z.leb_gt in H. lia. }
   apply real_nonnegative in N. rewrite real_neg, real_add, real_neg in N. lra.
 Qed.
-Lemma real_one : real one = 1. Proof. unfold one, real. simpl. ring. Qed.
 Lemma realm_apply m v : reals (apply zero add mul m v) = applyR (realm m) (reals v).
 Proof. apply (f_apply zero add mul 0 Rplus Rmult real real_zero real_add real_mul). Qed.
 Lemma real_square v : real (squareD v) = square (reals v).
@@ -28,9 +28,9 @@ Lemma norm_above_sound w u rho t f : check [] w u rho t f = true ->
 Proof.
   intros H d. set (n := inputs [] w). set (b := repeat 0 (length w)).
   assert (length b = length w) as Hb by apply repeat_length.
-  pose proof (check_sound [] w u rho t f H [] b (Forall2_nil _) Hb (trim n d) (repeat 0 n)
-    (length_trim n d) (repeat_length 0 n)) as B.
-  unfold chain in B. simpl in B. rewrite minus_affine in B by (now rewrite map_length).
+  assert (instance ([], w) ([], (realm w, b))) as I by (split; [constructor|split; auto]).
+  pose proof (check_sound [] w u rho t f H _ I (trim n d) (repeat 0 n) (length_trim n d) (repeat_length 0 n)) as B.
+  unfold run in B. simpl in B. rewrite minus_affine in B by (now rewrite map_length).
   rewrite <- (length_trim n d) in B at 2 4. rewrite minus_zeros in B.
   assert (is_nonnegative u = true /\ shapes n [] w = true) as [Hu Hs].
   { unfold check in H. apply andb_prop in H. destruct H as [S H]. repeat both H. auto. }
@@ -51,20 +51,69 @@ Proof.
 Qed.
 
 (** Slopes by a matrix inequality *)
-Definition stack_of (p : part) : real_stack := (map real_layer (hidden p), real_layer (outer p)).
-Lemma value_run p x : value p x = run (stack_of p) (clamped (clamp p) x). Proof. reflexivity. Qed.
+(** Part p with functions of slopes in [0, 1]: divided by b, and the later matrices multiplied by it. *)
+Definition scaled_layer (b : R) (l : layer) : layer := (scale_allR b (fst l), snd l).
+Definition scaled_network (b : R) (f : R -> R) (hidden : list layer) (last : layer) : real_stack :=
+  match hidden with
+  | [] => ([], last)
+  | first :: later =>
+      let g x := / b * f x in ((g, first) :: map (fun l => (g, scaled_layer b l)) later, scaled_layer b last)
+  end.
+Definition stack_of (p : part) : real_stack :=
+  scaled_network (real (steepest (between p))) (act (between p)) (map real_layer (hidden p)) (real_layer (outer p)).
+Lemma affine_scaled b (l : layer) x :
+  affine (fst (scaled_layer b l)) (snd (scaled_layer b l)) x = affine (fst l) (snd l) (scaleR b x).
+Proof.
+  unfold affine. f_equal. simpl. rewrite apply_scale_all. unfold apply, scale. rewrite map_map. apply map_ext. intros r.
+  symmetry. apply dot_scale_r.
+Qed.
+Lemma scale_divided b (f : R -> R) x : b <> 0 -> scaleR b (map (fun t => / b * f t) x) = map f x.
+Proof. intros H. unfold scale. rewrite map_map. apply map_ext. intros t. field. auto. Qed.
+Lemma scaled_later b f later last x : b <> 0 ->
+  network (map (fun l => (fun t => / b * f t, scaled_layer b l)) later) (scaled_layer b last) x =
+  network (map (fun l => (f, l)) later) last (scaleR b x).
+Proof.
+  intros H. revert x. induction later as [|[m c] later IH]; intros x; [apply (affine_scaled b last)|]. simpl.
+  rewrite IH, scale_divided by auto. f_equal. f_equal. apply (affine_scaled b (m, c)).
+Qed.
+Lemma scaled_run b f hidden last x : b <> 0 ->
+  run (scaled_network b f hidden last) x = network (map (fun l => (f, l)) hidden) last x.
+Proof.
+  intros H. destruct hidden as [|[m c] later]; [reflexivity|]. unfold run. simpl.
+  now rewrite scaled_later, scale_divided.
+Qed.
+Lemma divided_slopes (f : R -> R) b : 0 < b -> slopes f 0 b -> slopes (fun t => / b * f t) 0 1.
+Proof.
+  intros P S x y L. specialize (S x y L). pose proof (Rinv_0_lt_compat b P) as Q.
+  assert (/ b * (b * (y - x)) = y - x) as E by (field; lra). nra.
+Qed.
+Lemma value_network p x : value p x =
+  network (map (fun l => (act (between p), l)) (map real_layer (hidden p))) (real_layer (outer p)) (clamped (clamp p) x).
+Proof. unfold value. now rewrite map_map. Qed.
+Lemma value_run p x : rising p = true -> value p x = run (stack_of p) (clamped (clamp p) x).
+Proof.
+  intros H. destruct (rising_slopes _ H) as [P _]. unfold stack_of. rewrite scaled_run by lra. apply value_network.
+Qed.
 Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
 Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
-Lemma instance_matrices p : fits_part p = true -> instance (matrices p) (stack_of p).
+Lemma instance_matrices p : fits_part p = true -> rising p = true -> instance (matrices p) (stack_of p).
 Proof.
-  intros H. unfold instance, matrices, stack_of. simpl.
-  exists (map (fun l : layerD => reals (snd l)) (hidden p)), (reals (snd (outer p))). repeat split.
-  - assert (forall l, In l (hidden p) -> length (snd l) = length (fst l)) as G
-      by (intros; apply (fits_layer p); auto; apply in_or_app; auto).
-    induction (hidden p) as [|l ls IH]; simpl; constructor; [|apply IH; intros; apply G; now right].
-    rewrite map_length. apply G. now left.
-  - rewrite map_length. apply (fits_layer p); auto. apply in_or_app. right. now left.
-  - f_equal. clear. induction (hidden p) as [|l ls IH]; simpl; [|rewrite IH]; reflexivity.
+  intros H G. destruct (rising_slopes _ G) as [P S]. pose proof (divided_slopes _ _ P S) as T.
+  assert (forall l, In l (layers p) -> of_matrix (fst l) (real_layer l)) as F.
+  { intros l Hl. split; [reflexivity|]. simpl. rewrite map_length. now apply (fits_layer p). }
+  set (b := steepest (between p)) in *.
+  assert (forall l, In l (layers p) -> of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q.
+  { intros l Hl. destruct (F l Hl) as [_ B]. split; simpl in *.
+    - symmetry. apply (f_scale_all mul Rmult real real_mul).
+    - rewrite B. unfold scale_all. now rewrite map_length. }
+  unfold matrices, stack_of, layers in *. fold b. destruct (hidden p) as [|first later]; simpl.
+  - split; [constructor|]. apply F. now left.
+  - split; [|apply Q; right; apply in_or_app; right; now left].
+    simpl. constructor; [split; [exact T|apply F; now left]|].
+    assert (forall l, In l later -> of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q'
+      by (intros; apply Q; right; apply in_or_app; now left).
+    clear - T Q'. induction later as [|l later IH]; simpl; constructor; [split; [exact T|apply Q'; now left]|].
+    apply IH. intros. apply Q'. now right.
 Qed.
 Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
 Proof.
@@ -91,24 +140,21 @@ Qed.
 Lemma slope_sound ps f moves scale u rho t factor :
   check_slope ps f moves scale u rho t factor = true -> holds ps (Slope_at_most f moves scale u).
 Proof.
-  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 2 both H. do 4 both H.
-  rename H0 into HP, H1 into Hu, H2 into Hl, H3 into Hs, H4 into Hm, H5 into Hc.
+  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 3 both H. do 4 both H.
+  rename H0 into HP, H1 into Hu, H2 into HR, H3 into Hl, H4 into Hs, H5 into Hm, H6 into Hc.
   apply real_nonnegative in Hu. set (S := selector moves scale) in *.
   assert (forall base, length base = length moves -> instance ([], S) ([], (realm S, base))) as I.
-  { intros base Hb. exists [], base. repeat split; auto; [constructor|]. simpl. unfold S. now rewrite length_selector. }
+  { intros base Hb. split; [constructor|]. split; auto. simpl. unfold S. now rewrite length_selector. }
   assert (inputs [] S = count moves) as Hi by apply selector_columns.
   pose proof (check_parts_sound _ _ _ _ _ _ HP) as C. clear HP. cbn [fst snd] in C.
   destruct f as [p|phi k]; cbn [parts_of map forallb tl moved value_of] in *.
-  - both H. apply (instance_matrices _) in H. rewrite !value_run.
+  - both H. both HR. apply instance_matrices in H; auto. rewrite !value_run by auto.
     apply (moved_bound moves scale); auto. intros v w base Hv Hw Hb.
     pose proof (C _ [([], stack_of (part_at ps p))] (I base Hb)
       (Forall2_cons (matrices (part_at ps p)) ([], stack_of (part_at ps p)) H (Forall2_nil _)) v w) as B.
     simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
-  - both H. both H0. apply instance_matrices in H, H0.
-    both Hc. unfold value at 1 3. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
-    change (network (map real_layer (hidden (part_at ps k))) (real_layer (outer (part_at ps k)))) with
-        (run (stack_of (part_at ps k))).
-    rewrite !value_run.
+  - both H. both H0. both HR. both H2. apply instance_matrices in H, H0; auto.
+    both Hc. rewrite !value_run by auto. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
     apply (moved_bound moves scale _ _
         (fun z => run (stack_of (part_at ps k)) (plusR (run (stack_of (part_at ps phi)) z) rest))); auto.
     intros v w base Hv Hw Hb.
@@ -150,26 +196,44 @@ Lemma affine_bound l u x y : norm_bound_of l u -> length (snd l) = length (fst l
   norm (minus (affine (fst (real_layer l)) (snd (real_layer l)) x) (affine (fst (real_layer l)) (snd (real_layer l)) y))
       <= u * norm (minus x y).
 Proof. intros [_ H] L. rewrite minus_affine by (simpl; now rewrite !map_length). apply H. Qed.
-Lemma network_bound hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
+Definition with_slopes_R {A} (c : R) (hidden : list A) (u : R) : R := fold_right (fun _ v => c * v) u hidden.
+Lemma with_slopes_nonneg {A} c (hidden : list A) u : 0 <= c -> 0 <= u -> 0 <= with_slopes_R c hidden u.
+Proof. intros Hc Hu. induction hidden as [|h hidden IH]; simpl; auto. now apply Rmult_le_pos. Qed.
+Lemma real_with_slopes {A} c (hidden : list A) u :
+  real (with_slopes c hidden u) = with_slopes_R (real c) hidden (real u).
+Proof. induction hidden as [|h hidden IH]; simpl; auto. now rewrite real_mul, IH. Qed.
+Lemma with_slopes_times {A} c (hidden : list A) a u : with_slopes_R c hidden (a * u) = a * with_slopes_R c hidden u.
+Proof. induction hidden as [|h hidden IH]; simpl; auto. rewrite IH. ring. Qed.
+Lemma network_bound f c hs l us : 0 <= c -> slopes f (- c) c -> Forall2 norm_bound_of (hs ++ [l]) us ->
   (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
-  norm (minus (network (map real_layer hs) (real_layer l) x) (network (map real_layer hs) (real_layer l) y)) <=
-      product_R us * norm (minus x y).
+  let g := network (map (fun k => (f, real_layer k)) hs) (real_layer l) in
+  norm (minus (g x) (g y)) <= with_slopes_R c hs (product_R us) * norm (minus x y).
 Proof.
-  revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
+  intros Hc S. revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
   - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
   - inversion H as [|? u ? us' Hu Hus]; subst. pose proof (affine_bound k u x y Hu (L _ (or_introl eq_refl))) as B.
-    unfold real_layer in B. simpl in B.
-    eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite (Rmult_comm u), Rmult_assoc.
-    apply Rmult_le_compat_l; [eapply product_nonneg; eauto|].
-    eapply Rle_trans; [apply norm_le, relu_contracts|exact B].
-    rewrite !length_affine; auto; rewrite !map_length; apply L; auto.
+    unfold real_layer in B. simpl in B. set (p := affine _ _ x) in *. set (q := affine _ _ y) in *.
+    assert (length p = length q) as E.
+    { unfold p, q. rewrite !length_affine; auto; rewrite !map_length; apply L; auto. }
+    eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite with_slopes_times.
+    set (w := with_slopes_R c hs (product_R us')).
+    assert (0 <= w) as W by (apply with_slopes_nonneg; auto; eapply product_nonneg; eauto).
+    replace (c * (u * w) * norm (minus x y)) with (w * (c * (u * norm (minus x y)))) by ring.
+    apply Rmult_le_compat_l; auto. apply Rle_trans with (c * norm (minus p q)); [|now apply Rmult_le_compat_l].
+    unfold norm. rewrite <- (sqrt_square c) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
+    apply sqrt_le_1_alt. now apply slopes_contract.
 Qed.
+(** Of a part without its clamp. *)
+Definition unclamped (p : part) : list R -> list R :=
+  network (map (fun l => (act (between p), real_layer l)) (hidden p)) (real_layer (outer p)).
 Lemma part_bound ps accepted p v : Forall (holds ps) accepted -> fits_part (part_at ps p) = true ->
   norm_of ps accepted p = Some v -> 0 <= real v /\ forall x y,
-  norm (minus (run (stack_of (part_at ps p)) x) (run (stack_of (part_at ps p)) y)) <= real v * norm (minus x y).
+  norm (minus (unclamped (part_at ps p) x) (unclamped (part_at ps p) y)) <= real v * norm (minus x y).
 Proof.
-  intros HA Hf Hv. destruct (norms_sound ps accepted p v HA _ [] eq_refl Hv) as (us & B & ->). split.
-  - eapply product_nonneg; eauto.
+  unfold norm_of. intros HA Hf Hv. destruct (norms accepted p 0 _) as [w|] eqn:Hw; [|discriminate].
+  destruct (is_known _) eqn:K; [|discriminate]. inversion Hv. destruct (known_slopes _ K) as [C S].
+  destruct (norms_sound ps accepted p w HA _ [] eq_refl Hw) as (us & B & E). rewrite real_with_slopes, E. split.
+  - apply with_slopes_nonneg; auto. eapply product_nonneg; eauto.
   - intros x y. apply network_bound; auto. intros k. now apply fits_layer.
 Qed.
 Lemma square_in_largest m scale d : (scale = [] \/ length d = length scale) -> positive_scale scale = true ->
@@ -219,15 +283,14 @@ Proof.
     - eapply Rle_trans; [exact E|]. now apply Rmult_le_compat_l.
     - rewrite <- Rmult_assoc, (Rmult_comm (real k)). apply Rmult_le_compat_r; auto. }
   destruct f as [p|phi r]; cbn [parts_of forallb tl value_of product_of] in *.
-  - both H. destruct (part_bound _ _ _ _ HA H Hk) as [K B]. rewrite !value_run.
+  - both H. destruct (part_bound _ _ _ _ HA H Hk) as [K B]. unfold value. fold (unclamped (part_at ps p)).
     eapply G; [apply norm_nonneg | auto | apply B | apply D].
   - both H. both H3. both Hc.
     destruct (norm_of ps accepted phi) as [a|] eqn:Ea; [|discriminate].
     destruct (norm_of ps accepted r) as [b|] eqn:Eb; [|discriminate]. inversion Hk. subst k.
     destruct (part_bound _ _ _ _ HA H Ea) as [Ka Ba]. destruct (part_bound _ _ _ _ HA H3 Eb) as [Kb Bb].
     unfold value at 1 3. destruct (clamp (part_at ps r)) eqn:E; [|discriminate]. simpl clamped.
-    change (network (map real_layer (hidden (part_at ps r))) (real_layer (outer (part_at ps r)))) with
-        (run (stack_of (part_at ps r))).
+    fold (unclamped (part_at ps r)).
     apply (G (norm (minus (clamped (clamp (part_at ps phi)) x) (clamped (clamp (part_at ps phi)) y))));
       [apply norm_nonneg | rewrite real_mul; nra | | apply D].
     rewrite real_mul, (Rmult_comm (real a)), Rmult_assoc. eapply Rle_trans; [apply Bb|]. apply Rmult_le_compat_l; auto.

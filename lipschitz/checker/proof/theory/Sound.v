@@ -1,7 +1,7 @@
 (** An accepted claim holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Values Claims Slopes
-    Witness Laws Ranges Roundings.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
+    Values Claims Slopes Witness Laws Ranges Roundings.
 Import ListNotations.
 Open Scope R_scope.
 

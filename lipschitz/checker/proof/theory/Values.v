@@ -1,7 +1,7 @@
 (** What the checker computes of values over boxes: intervals of the layers,
   and how far off a float32 evaluation may be. *)
 From Coq Require Import List ZArith Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Lower.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Lower.
 Import ListNotations.
 
 Definition at_most (x y : dyadic) : bool := is_nonnegative (add y (neg x)).

@@ -1,6 +1,7 @@
 (** A slope from below, accepted for two points, holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Form Network Checker Meaning Sets Distance Blocks Lower Values Claims Slopes.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
+    Values Claims Slopes.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -15,18 +16,23 @@ Proof.
   - apply at_most_real in E. destruct (Rle_dec _ _); lra.
   - apply at_most_false in E. destruct (Rle_dec _ _); lra.
 Qed.
-Lemma real_value p x : reals (valueD p x) = value p (reals x).
-Proof. unfold valueD, value. now rewrite real_network, real_clamped. Qed.
-Lemma real_value_of ps f rest x : reals (value_ofD ps f rest x) = value_of ps f (reals rest) (reals x).
+Lemma relu_part p : relu_between p = true -> between p = Relu.
+Proof. unfold relu_between. now destruct (between p). Qed.
+Lemma real_value p x : relu_between p = true -> reals (valueD p x) = value p (reals x).
+Proof. intros H. unfold valueD, value. now rewrite real_network, real_clamped, (relu_part p H). Qed.
+Lemma real_value_of ps f rest x : forallb relu_between (parts_of ps f) = true ->
+  reals (value_ofD ps f rest x) = value_of ps f (reals rest) (reals x).
 Proof.
-  destruct f; simpl; rewrite real_value; auto. now rewrite (f_plus add Rplus real real_add), real_value.
+  destruct f; simpl; intros H; both H; [now rewrite real_value|]. both H0.
+  now rewrite real_value, (f_plus add Rplus real real_add), real_value.
 Qed.
-Lemma real_rest ps others :
+Lemma real_rest ps others : forallb (fun o => relu_between (part_at ps (fst o))) others = true ->
   reals (fold_right (plus add) [] (map (fun o => valueD (part_at ps (fst o)) (snd o)) others)) =
   vector_sum (map (fun o => value (part_at ps (fst o)) (snd o)) (map
       (fun o : nat * list dyadic => (fst o, reals (snd o))) others)).
 Proof.
-  induction others as [|o others IH]; simpl; auto. now rewrite (f_plus add Rplus real real_add), IH, real_value.
+  induction others as [|o others IH]; simpl; auto. intros H. both H.
+  now rewrite (f_plus add Rplus real real_add), IH, real_value.
 Qed.
 Lemma agree_real moves x y : agreeD moves x y = true -> agree moves (reals x) (reals y).
 Proof.
@@ -54,9 +60,10 @@ Lemma points_sound ps f moves scale l x y others :
   check_points ps f moves scale l x y others = true -> holds ps (Slope_at_least f moves scale l).
 Proof.
   unfold check_points. set (rest := fold_right _ _ _). intros H.
-  destruct (fraction_in scale (minusD x y)) as [n m] eqn:E. do 6 both H.
-  rename H0 into Hr, H1 into Hn, H2 into Ho, H3 into Hx, H4 into Ha, H5 into Hl.
-  destruct (fraction_real scale (minusD x y) H) as [Pm En]. rewrite E, real_minus in *. simpl in *.
+  destruct (fraction_in scale (minusD x y)) as [n m] eqn:E. do 8 both H.
+  rename H0 into Hr, H1 into Hn, H2 into Ho, H3 into Hx, H4 into Ha, H5 into Hl, H6 into Hs.
+  rename H7 into Hro.
+  destruct (fraction_real scale (minusD x y) Hs) as [Pm En]. rewrite E, real_minus in *. simpl in *.
   apply real_positive in Hn. apply real_nonnegative in Hl. apply at_most_real in Hr.
   assert (0 < square_in scale (minus (reals x) (reals y))) as Ps by
       (pose proof (square_in_nonneg scale (minus (reals x) (reals y))); nra).
@@ -66,7 +73,7 @@ Proof.
   - apply sqrt_lt_R0, Ps.
   - rewrite forallb_forall in Ho. apply Forall_map, Forall_forall. intros o G. simpl. rewrite map_length.
       now apply Nat.eqb_eq, Ho.
-  - rewrite <- real_rest. fold rest. rewrite <- !real_value_of.
+  - rewrite <- real_rest by auto. fold rest. rewrite <- !real_value_of by auto.
     rewrite !real_mul, real_square, real_minus, En in Hr. unfold distance, norm.
     rewrite <- (sqrt_square (real l)) at 1 by auto. rewrite <- sqrt_mult_alt by nra. apply sqrt_le_1_alt.
     apply (Rmult_le_reg_r (real m)); auto. lra.

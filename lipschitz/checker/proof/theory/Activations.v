@@ -1,0 +1,64 @@
+(** The functions between the layers of a network, and what it means that their slopes are bounded. *)
+From Coq Require Import List Reals Lra Lia.
+From Swarmcert Require Import Exponential.
+Open Scope R_scope.
+
+Inductive activation := Relu | Tanh | Sigmoid | Softplus | Elu | Selu | Silu | Gelu.
+
+Definition relu (x : R) : R := Rmax 0 x.
+Definition sigmoid (x : R) : R := / (1 + exp (- x)).
+(** ln (1 + e^x). *)
+Lemma one_and_exp_positive x : 0 < 1 + exp x. Proof. pose proof (exp_pos x). lra. Qed.
+Definition softplus (x : R) : R := proj1_sig (logarithm (1 + exp x) (one_and_exp_positive x)).
+(** The negative part of ELU, for scale 1. *)
+Definition falling (x : R) : R := Rmin 0 (exp x - 1).
+(** The constants of SELU. *)
+Definition selu_scale : R := 10507009873554805 / 10 ^ 16.
+Definition selu_alpha : R := 16732632423543772 / 10 ^ 16.
+
+(** The error function: 2 / sqrt pi times the sum of x (-x^2)^n / (n! (2 n + 1)). *)
+Definition erf_term (n : nat) : R := (-1) ^ n / (INR (fact n) * INR (2 * n + 1)).
+Lemma erf_divisor n : 0 < INR (fact n) * INR (2 * n + 1).
+Proof. apply Rmult_lt_0_compat; apply lt_0_INR; [apply lt_O_fact|lia]. Qed.
+Lemma erf_term_not_zero n : erf_term n <> 0.
+Proof.
+  unfold erf_term, Rdiv. apply Rmult_integral_contrapositive_currified; [apply pow_nonzero; lra|].
+  apply Rinv_neq_0_compat. pose proof (erf_divisor n). lra.
+Qed.
+Lemma erf_terms_fall : Un_cv (fun n => Rabs (erf_term (S n) / erf_term n)) 0.
+Proof.
+  intros e He. destruct (archimed_cor1 e He) as (N & HN & HP). exists N. intros n Hn. unfold R_dist.
+  assert (erf_term (S n) / erf_term n = - (INR (2 * n + 1) / INR (2 * n + 3) * / INR (S n))) as ->.
+  { unfold erf_term. replace (2 * S n + 1)%nat with (2 * n + 3)%nat by lia. rewrite fact_simpl, mult_INR. simpl pow.
+    pose proof (pow_nonzero (-1) n ltac:(lra)). pose proof (INR_fact_neq_0 n).
+    pose proof (not_0_INR (2 * n + 1) ltac:(lia)). pose proof (not_0_INR (2 * n + 3) ltac:(lia)).
+    pose proof (not_0_INR (S n) ltac:(lia)). field. auto. }
+  rewrite Rabs_Ropp.
+  assert (0 < INR (2 * n + 1)) by (apply lt_0_INR; lia). assert (0 < INR (S n)) by (apply lt_0_INR; lia).
+  assert (INR (2 * n + 1) <= INR (2 * n + 3)) by (apply le_INR; lia).
+  assert (0 < INR N) by (apply lt_0_INR; lia). assert (INR N <= INR (S n)) by (apply le_INR; lia).
+  pose proof (Rinv_le_contravar _ _ H2 H3). pose proof (Rinv_0_lt_compat _ H0).
+  assert (0 <= INR (2 * n + 1) / INR (2 * n + 3) <= 1) as [A B].
+  { split; [apply Rlt_le, Rdiv_lt_0_compat; lra|]. apply (Rmult_le_reg_r (INR (2 * n + 3))); [lra|].
+    unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
+  pose proof (Rmult_le_pos _ _ A (Rlt_le _ _ H5)).
+  rewrite Rminus_0_r, Rabs_Rabsolu, (Rabs_pos_eq _ H6). pose proof (Rmult_le_compat_r _ _ _ (Rlt_le _ _ H5) B). lra.
+Qed.
+Definition erf_series (x : R) : { s : R | Pser erf_term x s } :=
+  Alembert_C3 erf_term x erf_term_not_zero erf_terms_fall.
+Definition erf (x : R) : R := 2 / sqrt PI * (x * proj1_sig (erf_series (x * x))).
+
+Definition act (a : activation) (x : R) : R :=
+  match a with
+  | Relu => relu x
+  | Tanh => tanh x
+  | Sigmoid => sigmoid x
+  | Softplus => softplus x
+  | Elu => relu x + falling x
+  | Selu => selu_scale * relu x + selu_scale * selu_alpha * falling x
+  | Silu => x / (1 + exp (- x))
+  | Gelu => x / 2 * (1 + erf (x / sqrt 2))
+  end.
+
+(** Every slope of f lies in [a, b]. *)
+Definition slopes (f : R -> R) (a b : R) : Prop := forall x y, x <= y -> a * (y - x) <= f y - f x <= b * (y - x).

@@ -1,0 +1,309 @@
+#!/usr/bin/env python3
+"""The proved checker on networks with other activations than ReLU. A smooth certificate is made of two of ReLU networks:
+with slopes in [0, b], the matrix inequality is that of the ReLU network whose later matrices are multiplied by b.
+
+    activations_test.py SWARMCERT SOURCE_DIR 0 CHECKER
+"""
+import copy
+import hashlib
+import json
+import math
+import random
+import struct
+import subprocess
+import sys
+import tempfile
+from fractions import Fraction
+from pathlib import Path
+
+SWARMCERT, SOURCE, CHECKER = Path(sys.argv[1]).resolve(), Path(sys.argv[2]), Path(sys.argv[4]).resolve()
+sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
+import check_certificate as second  # noqa: E402
+import weight_files  # noqa: E402
+
+LARGEST_SLOPE = {"relu": 1.0, "tanh": 1.0, "sigmoid": 0.25, "softplus": 1.0, "elu": 1.0, "selu": float.fromhex("0x1.c212cc640f031p+0"),
+                 "silu": float.fromhex("0x1.1999p+0"), "gelu": float.fromhex("0x1.211p+0")}  # for silu and gelu of the absolute value
+
+
+def run(*command):
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=60)
+
+
+def check(certificate, net, *options):
+    certificate["content_sha256"] = second.content_sha256(certificate)
+    path = Path(net).parent / "checked.json"
+    path.write_text(json.dumps(certificate))
+    return run(CHECKER, *options, path, net)
+
+
+def refused(certificate, net, reason):
+    done = check(certificate, net)
+    assert done.returncode == 1 and reason in done.stdout, f"expected {reason!r}: {done}"
+
+
+def layers(sizes, generator):
+    """Weights are powers of two, so that they stay exact when they are multiplied by a slope."""
+    def number():
+        return generator.choice((-1, 1)) * 2.0 ** generator.randrange(-3, 1)
+    return [([[number() for _ in range(n)] for _ in range(m)], [number() for _ in range(m)]) for n, m in zip(sizes, sizes[1:])]
+
+
+def safetensors(network):
+    header, data = {}, b""
+    for k, (rows, biases) in enumerate(network):
+        for part, shape, numbers in ("weight", [len(rows), len(rows[0])], sum(rows, [])), ("bias", [len(biases)], biases):
+            stored = struct.pack(f"<{len(numbers)}d", *numbers)
+            header[f"fc{k + 1}.{part}"] = {"dtype": "F64", "shape": shape, "data_offsets": [len(data), len(data) + len(stored)]}
+            data += stored
+    text = json.dumps(header).encode()
+    return struct.pack("<Q", len(text)) + text + data
+
+
+def folded(network, b):
+    return network[:1] + [([[b * w for w in row] for row in rows], biases) for rows, biases in network[1:]]
+
+
+def certify(net, *options):
+    path = Path(net).parent / "certificate.json"
+    done = run(SWARMCERT, "certify", net, *options, "--nodes", "1", "-q", "--force", "-o", path)
+    assert done.returncode == 0, done
+    return second.parse(path.read_text())
+
+
+def networks_of(function):
+    kind, _, rest = function.partition(":")
+    return [function] if kind != "set" else ["phi:" + rest.split(":")[0], "rho:" + rest.split(":")[1]]
+
+
+def with_activations(certificate, ops):
+    """The chains state these, by part; what only ReLU networks may state is left out."""
+    changed = copy.deepcopy(certificate)
+    for part, entry in changed["network"]["weights"].items():
+        for step in entry["chain"]:
+            step["op"] = ops[part] if step["op"] == "relu" else step["op"]
+    for bound in changed["bounds"]:
+        if any(ops[part] != "relu" for part in networks_of(bound["function"])):
+            bound.update(lower=None, lower_hex=None, lower_witness=None)
+    return changed
+
+
+def with_upper(bound, upper):
+    bound.update(upper=upper, upper_hex=upper.hex())
+
+
+def least_double(exact):
+    near = float(exact)
+    return near if Fraction(near) >= exact else math.nextafter(near, math.inf)
+
+
+def one_network(folder, op, generator):
+    """A plain network and its smooth certificate by a matrix inequality."""
+    network = layers([3, 4, 3, 2], generator)
+    net, relu = folder / f"{op}.safetensors", folder / f"{op}_folded.safetensors"
+    net.write_bytes(safetensors(network))
+    relu.write_bytes(safetensors(folded(network, LARGEST_SLOPE[op])))
+    certificate = certify(net, "--method", "sdp")
+    certificate["bounds"] = certify(relu, "--method", "sdp")["bounds"]
+    assert certificate["bounds"][0]["upper_method"] == "sdp"
+    return net, with_activations(certificate, {"network": op})
+
+
+def accepted_at_the_bound_that_the_proof_shows(folder, op, generator):
+    net, certificate = one_network(folder, op, generator)
+    bound = certificate["bounds"][0]
+    rho = Fraction(float.fromhex(bound["proof"]["rho"]))
+    upper = math.sqrt(float(rho))
+    while Fraction(upper) ** 2 < rho:
+        upper = math.nextafter(upper, math.inf)
+    while Fraction(math.nextafter(upper, 0)) ** 2 >= rho:
+        upper = math.nextafter(upper, 0)
+    with_upper(bound, upper)
+    done = check(certificate, net)
+    assert done.returncode == 0 and "accepted: every statement" in done.stdout, f"{op}: {done}"
+    words = {"relu": "ReLU", "elu": "ELU", "selu": "SELU"}.get(op, op)
+    assert f"for fc1 - {words} - fc2 - {words} - fc3" in done.stdout, done
+    with_upper(bound, math.nextafter(upper, 0))
+    refused(certificate, net, "claims less than sqrt(rho)")
+    with_upper(bound, upper)
+    bound["proof"]["rho"] = (0.999 * float(rho)).hex()
+    refused(certificate, net, "the factor does not show")
+
+
+def the_inequality_is_that_of_the_activation(folder, generator):
+    """The same proof does not hold for a function that is steeper or less steep."""
+    net, certificate = one_network(folder, "sigmoid", generator)
+    for op in "tanh", "relu", "softplus", "elu", "selu":
+        refused(with_activations_again(certificate, op), net, "the factor does not show")
+    refused(with_activations_again(certificate, "silu"), net, "a matrix inequality of a network with SiLU, which is not monotone")
+    refused(with_activations_again(certificate, "gelu"), net, "a matrix inequality of a network with GELU, which is not monotone")
+    refused(with_activations_again(certificate, "mish"), net, "chain is not the one of this network")
+
+
+def with_activations_again(certificate, op):
+    changed = copy.deepcopy(certificate)
+    for step in changed["network"]["weights"]["network"]["chain"]:
+        step["op"] = op if step["op"] != "linear" else "linear"
+    return changed
+
+
+def refuses_what_only_relu_has(folder, generator):
+    net, certificate = one_network(folder, "tanh", generator)
+    relu = certify(net, "--method", "sdp")
+    assert check(relu, net).returncode == 0 and relu["bounds"][0]["lower_witness"]
+    lower = with_activations(relu, {"network": "tanh"})
+    lower["bounds"] = relu["bounds"]
+    refused(lower, net, "a lower bound of a network with tanh")
+    for keys in ["lower_witness"], ["lower", "lower_hex"]:  # some of it
+        changed = copy.deepcopy(lower)
+        for key in {"lower", "lower_hex", "lower_witness"} - set(keys):
+            changed["bounds"][0][key] = None
+        refused(changed, net, "a lower bound of a network with tanh")
+    box = folder / "box.toml"
+    box.write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, -1]\nupper = [1, 1, 1]\n')
+    on_box = certify(net, "--domain", box, "--range", "--method", "sdp")
+    assert on_box["values"]
+    refused(with_activations(on_box, {"network": "tanh"}), net, "a bound on a box of a network with tanh")
+    values = with_activations(on_box, {"network": "tanh"})
+    values["bounds"] = certificate["bounds"]
+    refused(values, net, "values of network: only of ReLU networks")
+    mixed = copy.deepcopy(certificate)
+    next(s for s in mixed["network"]["weights"]["network"]["chain"] if s["op"] == "tanh")["op"] = "sigmoid"
+    refused(mixed, net, "chain is not the one of this network")
+
+
+def products_count_the_activations(folder, generator):
+    """Of a network with three layers the product holds the largest slope twice."""
+    network = layers([3, 4, 3, 2], generator)
+    net = folder / "product.safetensors"
+    net.write_bytes(safetensors(network))
+    relu = certify(net, "--method", "product")
+    norms = [Fraction(float.fromhex(layer["spectral_norm_hex"][1])) for layer in relu["layers"]]
+    for op, slope in LARGEST_SLOPE.items():
+        certificate = with_activations(relu, {"network": op})
+        bound = certificate["bounds"][0]
+        assert bound["upper_method"] == "product"
+        upper = least_double(math.prod(norms) * Fraction(slope) ** 2)
+        with_upper(bound, upper)
+        done = check(certificate, net)
+        if op == "gelu":  # its slope is not proved
+            assert done.returncode == 4 and "accepted" not in done.stdout and "not checked: bound" in done.stdout, done
+        else:
+            assert done.returncode == 0, done
+        with_upper(bound, math.nextafter(upper, 0))
+        refused(certificate, net, "claims less than the product of the norms")
+
+
+PARTS = {"phi:small": [6, 3, 2], "phi:large": [6, 2, 3, 2], "phi:ground": [4, 3, 2], "rho:small": [2, 3, 1]}
+
+
+def network_toml(folder, networks, ops):
+    """`ops`: what it states of activations, by part."""
+    folder.mkdir(exist_ok=True)
+    text = 'schema = "swarmcert/network/1"\n[input]\nclamp = { lower = [-1,-1,-1,-2,-2,-2], upper = [1,1,1,2,2,2] }\n'
+    for part, network in networks.items():
+        file = part.replace(":", "_") + ".safetensors"
+        (folder / file).write_bytes(safetensors(network))
+        text += f'[{part.replace(":", ".")}]\nweights = "{file}"\n'
+        if part in ops:
+            text += f'activation = "{ops[part]}"\n'
+    (folder / "network.toml").write_text(text)
+    return folder / "network.toml"
+
+
+def each_part_has_its_own_activation(folder, generator):
+    """Blocks, scales, sums and laws of a network.toml, where some parts state their activation and some do not."""
+    ops = {"phi:small": "tanh", "phi:large": "sigmoid", "phi:ground": "selu", "rho:small": "sigmoid"}
+    networks = {part: layers(sizes, generator) for part, sizes in PARTS.items()}
+    stored = network_toml(folder / "stored", networks, {})
+    relu = network_toml(folder / "folded", {part: folded(n, LARGEST_SLOPE[ops[part]]) for part, n in networks.items()}, {})
+    options = ["--neighbours", "large=2,small=1", "--blocks=velocity", "--scale", "1,1,1,2,2,2", "--method", "sdp"]
+    certificate, of_folded = certify(stored, *options), certify(relu, *options)
+    certificate.update(bounds=of_folded["bounds"], laws=of_folded["laws"])
+    certificate = with_activations(certificate, ops)
+    assert certificate["laws"] and {"set:small:small", "set:large:small", "set:ground:small"} <= {
+        b["function"] for b in certificate["bounds"]}
+    for stated in [], ["phi:large"], list(ops):
+        net = network_toml(folder / "stored", networks, {part: ops[part] for part in stated})
+        certificate["network"]["description_sha256"] = hashlib.sha256(net.read_bytes()).hexdigest()
+        done = check(certificate, net)
+        assert done.returncode == 0, done
+    done = check(certificate, net, "--coq")
+    assert "Part" in done.stdout and all(f" {a}.\n" in done.stdout for a in ("Tanh", "Sigmoid", "Selu")), done.stdout[:1000]
+    for part, other in ("phi:small", "relu"), ("phi:large", "tanh"), ("rho:small", "elu"):
+        refused(with_op(certificate, part, other), net, f"network.weights.{part}.chain is not the one of this network")
+    # Where nothing states it, other activations make other claims, which the proofs do not show.
+    net = network_toml(folder / "stored", networks, {})
+    certificate["network"]["description_sha256"] = hashlib.sha256(net.read_bytes()).hexdigest()
+    assert check(with_op(certificate, "phi:small", "elu"), net).returncode == 0
+    for part, other in ("phi:small", "sigmoid"), ("phi:large", "tanh"), ("phi:ground", "elu"), ("rho:small", "tanh"):
+        refused(with_op(certificate, part, other), net, "the factor does not show")
+    law = copy.deepcopy(certificate)
+    with_upper(law["laws"][0], math.nextafter(law["laws"][0]["upper"], 0))
+    refused(law, net, "claims less than the law gives")
+    for op, words in ("mish", "there is no activation mish"), ("Tanh", "there is no activation Tanh"):
+        done = check(certificate, network_toml(folder / "stored", networks, {"phi:small": op}))
+        assert done.returncode == 3 and words in done.stderr, done
+
+
+def with_op(certificate, part, op):
+    changed = copy.deepcopy(certificate)
+    for step in changed["network"]["weights"][part]["chain"]:
+        step["op"] = step["op"] if step["op"] in ("linear", "clamp") else op
+    return changed
+
+
+def terms_that_stand_still_must_be_relu(folder, generator):
+    """A witness of a sum is evaluated exactly, so that every term of it has to be."""
+    networks = {part: layers(sizes, generator) for part, sizes in PARTS.items()}
+    net = network_toml(folder / "ground", networks, {})
+    relu = certify(net, "--neighbours", "1", "--method", "sdp")
+    assert check(relu, net).returncode == 0
+    ops = dict.fromkeys(PARTS, "relu")
+    ops["phi:ground"] = "tanh"
+    certificate = with_activations(relu, ops)
+    assert any(b["lower_witness"] and b["lower_witness"]["others"] for b in certificate["bounds"])
+    refused(certificate, net, "slope: phi:ground is no ReLU network")
+    for bound in certificate["bounds"]:
+        if bound["function"].startswith("set:"):
+            bound.update(lower=None, lower_hex=None, lower_witness=None)
+    done = check(certificate, net)
+    assert done.returncode == 0 and any(b["lower_witness"] for b in certificate["bounds"]), done
+
+
+def onnx_files_state_their_activation(folder, generator):
+    network = weight_files.layers([3, 4, 3, 2], generator)
+    net = folder / "net.onnx"
+    net.write_bytes(weight_files.onnx(network))
+    relu = certify(net, "--method", "sdp")
+    refused(with_activations(relu, {"network": "tanh"}), net, "chain is not the one of this network: fc1 - ReLU - fc2 - ReLU - fc3")
+    for node, op in ("Tanh", "tanh"), ("Softplus", "softplus"), ("Elu", "elu"), ("Sigmoid", "sigmoid"):
+        net.write_bytes(weight_files.onnx(network, node))
+        relu["network"]["weights"]["network"]["sha256"] = hashlib.sha256(net.read_bytes()).hexdigest()
+        refused(relu, net, f"chain is not the one of this network: fc1 - {'ELU' if op == 'elu' else op} - fc2")
+        done = check(with_activations(relu, {"network": op}), net)
+        if op == "sigmoid":  # as the file says, so that the proof is of another matrix
+            assert done.returncode == 1 and "the factor does not show" in done.stdout, done
+        else:
+            assert done.returncode == 0, done
+    alpha = weight_files.field(5, weight_files.field(1, "alpha") + b"\x15" + struct.pack("<f", 0.5) + weight_files.field(20, 1))
+    for model in (weight_files.onnx(network, "Tanh", first="Relu"), weight_files.onnx(network, "Elu", attributes=alpha),
+                  weight_files.onnx(network, "Mish")):
+        net.write_bytes(model)
+        assert check(relu, net).returncode == 3
+
+
+def main():
+    generator = random.Random(11)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for op in LARGEST_SLOPE:
+            if op not in ("silu", "gelu"):
+                accepted_at_the_bound_that_the_proof_shows(folder, op, generator)
+        for claim in (the_inequality_is_that_of_the_activation, refuses_what_only_relu_has, products_count_the_activations,
+                      each_part_has_its_own_activation, terms_that_stand_still_must_be_relu, onnx_files_state_their_activation):
+            claim(folder, generator)
+            print(claim.__name__.replace("_", " "))
+
+
+if __name__ == "__main__":
+    main()
