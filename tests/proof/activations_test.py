@@ -285,11 +285,27 @@ def onnx_files_state_their_activation(folder, generator):
             assert done.returncode == 1 and "the factor does not show" in done.stdout, done
         else:
             assert done.returncode == 0, done
-    alpha = weight_files.field(5, weight_files.field(1, "alpha") + b"\x15" + struct.pack("<f", 0.5) + weight_files.field(20, 1))
-    for model in (weight_files.onnx(network, "Tanh", first="Relu"), weight_files.onnx(network, "Elu", attributes=alpha),
-                  weight_files.onnx(network, "Mish")):
+    net.write_bytes(weight_files.onnx(network))
+    product = certify(net, "--method", "product")
+    with_upper(product["bounds"][0], 2.0 ** 20)
+    for node, op in ("SiLU", "silu"), ("Swish", "silu"), ("Gelu", "gelu"), ("Celu", "elu"):
+        net.write_bytes(weight_files.onnx(network, node))
+        product["network"]["weights"]["network"]["sha256"] = hashlib.sha256(net.read_bytes()).hexdigest()
+        assert check(with_activations(product, {"network": op}), net).returncode == (4 if op == "gelu" else 0), node
+        refused(product, net, "chain is not the one of this network")
+
+    def attribute(name, value):
+        return weight_files.field(5, weight_files.field(1, name) + value)
+    half = b"\x15" + struct.pack("<f", 0.5) + weight_files.field(20, 1)
+    in_words = weight_files.field(4, "tanh") + weight_files.field(20, 3)
+    for model in (weight_files.onnx(network, "Tanh", first="Relu"), weight_files.onnx(network, "Mish"),
+                  weight_files.onnx(network, "Selu"),  # its constants are float32 numbers
+                  weight_files.onnx(network, "Elu", attributes=attribute("alpha", half)),
+                  weight_files.onnx(network, "Swish", attributes=attribute("alpha", half)),
+                  weight_files.onnx(network, "Gelu", attributes=attribute("approximate", in_words))):
         net.write_bytes(model)
-        assert check(relu, net).returncode == 3
+        done = check(relu, net)
+        assert done.returncode == 3 and "node" in done.stderr, done
 
 
 def main():

@@ -129,7 +129,11 @@ def onnx(network, activation="Relu", first=None, attributes=b""):
             graph += field(1, field(1, current) + field(1, weights[0]) + field(2, f"m{k}") + field(4, "MatMul"))
             graph += field(1, field(1, f"m{k}") + field(1, weights[1]) + field(2, f"y{k}") + field(4, "Add"))
         current = f"y{k}"
-        if k + 1 < len(network):
+        if k + 1 < len(network) and activation == "SiLU":  # as PyTorch exports it
+            graph += field(1, field(1, current) + field(2, f"s{k}") + field(4, "Sigmoid"))
+            graph += field(1, field(1, current) + field(1, f"s{k}") + field(2, f"h{k}") + field(4, "Mul"))
+            current = f"h{k}"
+        elif k + 1 < len(network):
             graph += field(1, field(1, current) + field(2, f"h{k}") + field(4, first if first and k == 0 else activation) + attributes)
             current = f"h{k}"
     graph += field(11, field(1, "x")) + field(12, field(1, current))

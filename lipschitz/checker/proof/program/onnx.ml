@@ -3,7 +3,7 @@
 open Refusal
 
 type stored = { name : string; shape : int list; kind : int; raw : string }
-type attribute = { number : float option; tensor : stored option }
+type attribute = { number : float option; word : string; tensor : stored option }
 type node = { op : string; inputs : string list; output : string; attributes : (string * attribute) list }
 type affine = { weight : stored; transposed : bool; mutable bias : stored option }
 
@@ -46,7 +46,7 @@ let attribute path message =
     | Protobuf.Fixed four :: _, _ when String.length four = 4 -> Some (Int32.float_of_bits (String.get_int32_le four 0))
     | _, Protobuf.Number n :: _ -> Some (Int64.to_float n)
     | _ -> None in
-  text path 1 fields, { number; tensor = (match texts path 5 fields with t :: _ -> Some (tensor path t) | [] -> None) }
+  text path 1 fields, { number; word = text path 4 fields; tensor = (match texts path 5 fields with t :: _ -> Some (tensor path t) | [] -> None) }
 
 let node path message =
   let fields = Protobuf.fields path message in
@@ -59,8 +59,30 @@ let node path message =
 
 type state = { mutable layers : affine list; mutable is_activated : bool; mutable activation : Proved.activation option }
 
-(* Those whose default parameters are the ones meant here. Selu's are float32 numbers. *)
-let activations = [ "Relu", Proved.Relu; "Tanh", Tanh; "Sigmoid", Sigmoid; "Softplus", Softplus; "Elu", Elu ]
+(* Only with the parameters that the activations have here. Selu has float32 constants, with which it is 3e-9 steeper than
+   with the decimals of the statement: another function. *)
+let activation_of node =
+  let is name expected = match List.assoc_opt name node.attributes with
+    | None -> true | Some { number; _ } -> number = Some expected in
+  let is_exact = match List.assoc_opt "approximate" node.attributes with
+    | None -> true | Some { word; _ } -> word = "none" in
+  match node.op with
+  | "Relu" -> Some Proved.Relu
+  | "Tanh" -> Some Tanh
+  | "Sigmoid" -> Some Sigmoid
+  | "Softplus" -> Some Softplus
+  | "Elu" | "Celu" when is "alpha" 1. -> Some Elu
+  | "Swish" when is "alpha" 1. -> Some Silu
+  | "Gelu" when is_exact -> Some Gelu
+  | _ -> None
+
+(* Exporters write SiLU as the product of x and Sigmoid(x). *)
+let rec with_products_joined = function
+  | { op = "Sigmoid"; inputs = [ x ]; output = s; _ } :: { op = "Mul"; inputs = [ a; b ]; output; _ } :: rest
+    when (a = x && b = s) || (a = s && b = x) ->
+    { op = "Swish"; inputs = [ x ]; output; attributes = [] } :: with_products_joined rest
+  | node :: rest -> node :: with_products_joined rest
+  | [] -> []
 
 let follow path kept state current node =
   let refuse what = bad_input "%s: node %s: %s" path (shown node.op) what in
@@ -96,14 +118,13 @@ let follow path kept state current node =
      | "MatMul", [ first; weight ] when first = current -> start (stored weight) true
      | "Add", [ a; b ] -> add_bias (stored (if a = current then b else a))
      | "Identity", [ _ ] -> ()
-     | op, [ _ ] when List.mem_assoc op activations ->
+     | _, [ _ ] when activation_of node <> None ->
        if state.layers = [] || state.is_activated then refuse "does not follow a linear layer";
-       if number "alpha" 1. <> 1. then refuse "has another alpha than 1";
-       let activation = Some (List.assoc op activations) in
+       let activation = activation_of node in
        if state.activation <> None && state.activation <> activation then refuse "is another activation than that before it";
        state.activation <- activation;
        state.is_activated <- true
-     | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Relu, Tanh, Sigmoid, Softplus, Elu or Identity");
+     | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Identity or an activation that is known");
     node.output
 
 let layer_name names k weight =
@@ -139,7 +160,7 @@ let read path bytes ~order =
   let nodes = List.map (node path) (texts path 1 graph) in
   if List.length nodes > 10_000 then bad_input "%s: the graph has more than 10000 nodes" path;
   let state = { layers = []; is_activated = false; activation = None } in
-  let last = List.fold_left (follow path kept state) input nodes in
+  let last = List.fold_left (follow path kept state) input (with_products_joined nodes) in
   if List.map name_of (texts path 12 graph) <> [ last ] then bad_input
       "%s: the graph's output is not where its chain of nodes ends" path;
   if state.layers = [] || state.is_activated then bad_input "%s: has no linear layer, or ends in an activation" path;
