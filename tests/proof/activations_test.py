@@ -166,6 +166,10 @@ def refuses_what_only_relu_has(folder, generator):
     values = with_activations(on_box, {"network": "tanh"})
     values["bounds"] = certificate["bounds"]
     refused(values, net, "values of network: only of ReLU networks")
+    assert check(certificate, net, "--activation", "tanh").returncode == 0
+    done = check(certificate, net, "--activation", "relu")
+    assert done.returncode == 1 and "chain is not the one of this network: fc1 - ReLU - fc2" in done.stdout, done
+    assert check(certificate, net, "--activation", "mish").returncode == 2
     mixed = copy.deepcopy(certificate)
     next(s for s in mixed["network"]["weights"]["network"]["chain"] if s["op"] == "tanh")["op"] = "sigmoid"
     refused(mixed, net, "chain is not the one of this network")
@@ -240,6 +244,8 @@ def each_part_has_its_own_activation(folder, generator):
     law = copy.deepcopy(certificate)
     with_upper(law["laws"][0], math.nextafter(law["laws"][0]["upper"], 0))
     refused(law, net, "claims less than the law gives")
+    done = check(certificate, network_toml(folder / "stored", networks, ops), "--activation", "tanh")
+    assert done.returncode == 3 and "is stated already" in done.stderr, done
     for op, words in ("mish", "there is no activation mish"), ("Tanh", "there is no activation Tanh"):
         done = check(certificate, network_toml(folder / "stored", networks, {"phi:small": op}))
         assert done.returncode == 3 and words in done.stderr, done

@@ -10,6 +10,8 @@ let help =
   \  --phi FILE --rho FILE   phi and rho\n\
   \  --key KEY               key of the state dict inside a nested checkpoint\n\
   \  --order A,B,C           layers in the order of evaluation; with --phi and --rho phi=A,B and rho=A,B\n\
+  \  --activation OP         what lies between the layers, where neither the weight files nor network.toml say it; without it,\n\
+  \                          the certificate says it\n\
   \  --coq                   write the certificate as a Coq file to standard output; coqc then accepts it in its kernel\n\
   \  --many                  certificates of one NET, named on standard input, one in a line; writes the exit code and a\n\
   \                          tab and the reason of each in a line\n\
@@ -31,6 +33,9 @@ let rec options (args : Network.arguments) mode positional = function
   | "--phi" :: file :: rest -> options { args with phi = file } mode positional rest
   | "--rho" :: file :: rest -> options { args with rho = file } mode positional rest
   | "--key" :: key :: rest -> options { args with key } mode positional rest
+  | "--activation" :: activation :: rest ->
+    if Activation.called activation = None then raise (Usage ("--activation: there is no activation " ^ shown activation));
+    options { args with activation } mode positional rest
   | "--order" :: word :: rest ->
     let part, names = match String.index_opt word '=' with
       | Some at -> String.sub word 0 at, String.sub word (at + 1) (String.length word - at - 1)
@@ -94,7 +99,7 @@ let single args mode certificate =
   else report state
 
 let run () =
-  let empty = { Network.net = ""; phi = ""; rho = ""; key = ""; orders = [] } in
+  let empty = { Network.net = ""; phi = ""; rho = ""; key = ""; orders = []; activation = "" } in
   let args, mode, positional = options empty Report [] (List.tl (Array.to_list Sys.argv)) in
   let has_pair = args.phi <> "" && args.rho <> "" and has_none = args.phi = "" && args.rho = "" in
   match mode, positional with

@@ -10,7 +10,14 @@ type t = {
   parts : (string * Weights.t) list;  (* by name, sorted *)
 }
 
-type arguments = { net : string; phi : string; rho : string; key : string; orders : (string * string list) list }
+type arguments = {
+  net : string;
+  phi : string;
+  rho : string;
+  key : string;
+  orders : (string * string list) list;
+  activation : string;  (* "": not stated *)
+}
 
 let load_bytes path bytes ~key ~order =
   if Pth.looks_like bytes then Pth.read path bytes ~key ~order
@@ -93,12 +100,12 @@ let read_gamma path members =
   | Some (Json.Number { value; _ }) when value > 0. -> ()
   | _ -> bad_input "%s: gamma.value must be positive" path
 
-(* What network.toml states beside the weights. Nothing lies between the layers of one that has only one. *)
-let with_activation path where (weights : Weights.t) name =
+(* What `field` states beside the weights. Nothing lies between the layers of a network that has only one. *)
+let with_activation field (weights : Weights.t) name =
   match Activation.called name, weights.activation with
-  | None, _ -> bad_input "%s: %s.activation: there is no activation %s" path where (shown name)
+  | None, _ -> bad_input "%s: there is no activation %s" field (shown name)
   | Some stated, Some other when stated <> other && List.length weights.layers > 1 ->
-    bad_input "%s: %s.activation: the weight file itself states %s" path where (Activation.name other)
+    bad_input "%s: %s: %s is stated already" weights.path field (Activation.name other)
   | activation, _ -> { weights with activation }
 
 let read_kinds path ~key role members =
@@ -117,7 +124,7 @@ let read_kinds path ~key role members =
       let weights = load file ~key ~order in
       let weights = match List.assoc_opt "activation" entry with
         | None -> weights
-        | json -> with_activation path where weights (text path (where ^ ".activation") json) in
+        | json -> with_activation (path ^ ": " ^ where ^ ".activation") weights (text path (where ^ ".activation") json) in
       role ^ ":" ^ kind, weights) members
 
 let check_sizes path ~order ~clamp ~components phis rhos =
@@ -153,7 +160,7 @@ let read_toml path bytes ~key =
   { sha256 = Sha256.to_hex (Sha256.string bytes); unit; order; clamp; parts = sorted }
 
 let plain parts = { sha256 = ""; unit = ""; order = []; clamp = []; parts }
-let read { net; phi; rho; key; orders } =
+let read_stated { net; phi; rho; key; orders; _ } =
   let order part = Option.value ~default:[] (List.assoc_opt part orders) in
   if phi <> "" then begin
     let p = load phi ~key ~order:(order "phi") and r = load rho ~key ~order:(order "rho") in
@@ -165,5 +172,9 @@ let read { net; phi; rho; key; orders } =
     read_toml net (contents net) ~key
   end
   else plain [ "network", load net ~key ~order:(order "network") ]
+let read arguments =
+  let net = read_stated arguments in
+  let stated (name, weights) = name, with_activation "--activation" weights arguments.activation in
+  if arguments.activation = "" then net else { net with parts = List.map stated net.parts }
 
 let as_float32 net = { net with parts = List.map (fun (name, w) -> name, Weights.as_float32 w) net.parts }
