@@ -1,7 +1,7 @@
-(** What the claims of a certificate mean, over the real numbers. Together with `act` of Activations.v and what it names,
-  `network` and `affine` of Network.v, `norm` and `minus` of Form.v and Network.v, `real` of Checker.v (mantissa times
-  2^exponent) and, for what is said of float32, the first definitions of Float.v, this is all that has to be read to know
-  what an accepted certificate states. *)
+(** What the claims of a certificate mean, over the real numbers. Together with `act` of Activations.v and what it
+  names, `network` and `affine` of Network.v, `norm` and `minus` of Form.v and Network.v, `real` of Checker.v (mantissa
+  times 2^exponent) and, for what is said of float32, the first definitions of Float.v, this is all that has to be read
+  to know what an accepted certificate states. *)
 From Coq Require Import List ZArith Reals.
 From Swarmcert Require Import Algebra Activations Form Network Checker Float.
 Import ListNotations.

@@ -88,7 +88,8 @@ Proof.
   assert (/ b * (b * (y - x)) = y - x) as E by (field; lra). nra.
 Qed.
 Lemma value_network p x : value p x =
-  network (map (fun l => (act (between p), l)) (map real_layer (hidden p))) (real_layer (outer p)) (clamped (clamp p) x).
+  network (map (fun l => (act (between p), l)) (map real_layer (hidden p))) (real_layer (outer p))
+    (clamped (clamp p) x).
 Proof. unfold value. now rewrite map_map. Qed.
 Lemma value_run p x : rising p = true -> value p x = run (stack_of p) (clamped (clamp p) x).
 Proof.

@@ -54,10 +54,13 @@ Lemma slopes_extensional f g a b : (forall x, f x = g x) -> slopes f a b -> slop
 Proof. intros E H x y L. rewrite <- !E. auto. Qed.
 
 Lemma relu_slopes : slopes relu 0 1.
-Proof. apply (slopes_extensional (fun x => 1 * relu x + 0 * falling x)); [intros; ring|]. apply two_pieces_slopes; lra. Qed.
+Proof.
+  apply (slopes_extensional (fun x => 1 * relu x + 0 * falling x)); [intros; ring|]. apply two_pieces_slopes; lra.
+Qed.
 Lemma elu_slopes : slopes (act Elu) 0 1.
 Proof.
-  apply (slopes_extensional (fun x => 1 * relu x + 1 * falling x)); [intros; simpl; ring|]. apply two_pieces_slopes; lra.
+  apply (slopes_extensional (fun x => 1 * relu x + 1 * falling x)); [intros; simpl; ring|].
+  apply two_pieces_slopes; lra.
 Qed.
 
 Lemma cosh_large x : 1 <= cosh x.
@@ -99,6 +102,9 @@ Qed.
 
 Lemma exp_softplus x : exp (softplus x) = 1 + exp x.
 Proof. unfold softplus. now destruct (logarithm _ _). Qed.
+(** For readers: no theorem uses it, because the library's ln rests on excluded middle. *)
+Lemma softplus_ln x : softplus x = ln (1 + exp x).
+Proof. apply exp_inv. rewrite exp_softplus, exp_ln; [reflexivity|apply one_and_exp_positive]. Qed.
 Lemma softplus_slopes : slopes softplus 0 1.
 Proof.
   intros x y L. pose proof (exp_rises x y L).
@@ -115,8 +121,8 @@ Proof.
   apply two_pieces_slopes; unfold selu_scale, selu_alpha; lra.
 Qed.
 
-(** SiLU: t / (1 + e^-t). Its derivative is at most c if (c - 1) e^t + c e^-t + 2 c - 1 - t is not negative, which is convex
-  in t. *)
+(** SiLU: t / (1 + e^-t). Its derivative is at most c if (c - 1) e^t + c e^-t + 2 c - 1 - t is not negative, which is
+  convex in t. *)
 Lemma silu_derivative x : derivable_pt_lim (act Silu) x
     ((1 * (1 + exp (- x)) - - exp (- x) * x) / Rsqr (1 + exp (- x))).
 Proof.
@@ -125,7 +131,8 @@ Proof.
 Qed.
 Lemma exp_square q : 0 <= q -> 1 + q + q * q / 2 <= exp q.
 Proof.
-  intros H. pose proof (at_least_the_derivative (fun x => exp x - (1 + x + x * x / 2)) (fun x => exp x - (0 + 1 + x)) 0 0 q H)
+  intros H.
+  pose proof (at_least_the_derivative (fun x => exp x - (1 + x + x * x / 2)) (fun x => exp x - (0 + 1 + x)) 0 0 q H)
     as D. cbv beta in D. rewrite exp_0 in D.
   assert (0 * (q - 0) <= exp q - (1 + q + q * q / 2) - (1 - (1 + 0 + 0 * 0 / 2))); [|lra]. apply D. intros x Hx. split.
   - apply (derivable_pt_lim_minus exp); [apply derivable_pt_lim_exp|].
@@ -156,7 +163,8 @@ Lemma silu_steepest t : 1 + exp (- t) + t * exp (- t) <= 72089 / 65536 * ((1 + e
 Proof.
   destruct (logarithm (1101 / 100) ltac:(lra)) as [l E]. set (u := t - l).
   assert (exp t = 1101 / 100 * exp u) as A by (rewrite <- E, <- exp_plus; f_equal; unfold u; ring).
-  pose proof (exp_opp t) as P. pose proof (exp_pos (- t)). pose proof (exp_above_line u). pose proof (exp_above_line (- u)).
+  pose proof (exp_opp t) as P. pose proof (exp_pos (- t)).
+  pose proof (exp_above_line u). pose proof (exp_above_line (- u)).
   assert (exp (- t) = 100 / 1101 * exp (- u)) as B.
   { unfold u. replace (- (t - l)) with (- t + l) by ring. rewrite exp_plus, E. field. }
   assert (l <= 23996 / 10000) as L by (apply exp_before; rewrite E; apply exp_bound). pose proof (exp_pos t).
