@@ -280,26 +280,55 @@ class Centring {
   double mu_, scale_;
 };
 
-/// The tangent of the path: u and v solve Newton's system for the cost and for the gradient of log det S.
-struct Tangent {
-  VectorXd u, v;
+/// The path as Newton's matrix at a point sees it: its own point at mu and its derivative there.
+struct PathEstimate {
   double mu;
+  VectorXd centre, slope;
 };
 
-/// Moves along the tangent, to mu (1 - alpha), and back to the path: alpha is what the last step reached and somewhat more,
-/// or less until the end is near enough to the path. Nothing if no alpha will do.
-std::optional<PathPoint> follow(const ChainSlack& chain, const NewtonMatrix& newton, const PathPoint& at,
-                                const Tangent& tangent, double& reach, const Stop& stop) {
+/// Where the path is at mu, by Hermite's interpolation at the last `points` estimates (Newton's divided differences, each
+/// place taken twice).
+VectorXd extrapolated(const std::vector<PathEstimate>& path, std::size_t points, double mu) {
+  const std::size_t nodes = 2 * points;
+  std::vector<double> place;
+  std::vector<VectorXd> column;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    const PathEstimate& at = path[path.size() - 1 - i / 2];
+    place.push_back(at.mu);
+    column.push_back(at.centre);
+  }
+  VectorXd result = column[0];
+  double product = 1;
+  for (std::size_t order = 1; order < nodes; ++order) {
+    for (std::size_t i = 0; i + order < nodes; ++i) {
+      const double width = place[i + order] - place[i];
+      if (width == 0)
+        column[i] = path[path.size() - 1 - i / 2].slope;
+      else
+        column[i] = (column[i + 1] - column[i]) / width;
+    }
+    product *= mu - place[order - 1];
+    result += product * column[0];
+  }
+  return result;
+}
+
+/// Moves along the path to mu (1 - alpha): alpha is what the last step reached and somewhat more, or less until the
+/// extrapolated point is near enough to the path. Nothing if no alpha will do.
+std::optional<PathPoint> follow(const ChainSlack& chain, const NewtonMatrix& newton,
+                                const std::vector<PathEstimate>& path, double& reach, const Stop& stop) {
   constexpr double kLeastStep = 0.02, kFarthest = 4, kShorter = 0.8, kNear = 0.05;
-  for (double alpha = 1 - (1 - reach) / 2; alpha > kLeastStep && !stop.now(); alpha *= kShorter) {
-    std::optional<PathPoint> next =
-        path_point(chain, at.y + tangent.v - (1 + alpha) / tangent.mu * tangent.u);
-    if (!next) continue;
+  for (double alpha = 1 - (1 - reach) / 2; alpha > kLeastStep; alpha *= kShorter) {
     // What S has near its boundary shrinks with mu, and its part of Newton's matrix grows with the square.
-    const Centring centring(chain, newton, tangent.mu * (1 - alpha), (1 - alpha) * (1 - alpha));
-    if (!(centring.distance(centring.residual(*next)) < kFarthest)) continue;
-    reach = alpha;
-    return centring.run(std::move(*next), kNear, stop);
+    const double mu = path.back().mu * (1 - alpha);
+    const Centring centring(chain, newton, mu, (1 - alpha) * (1 - alpha));
+    for (std::size_t points = path.size(); points > 0; --points) {
+      if (stop.now()) return std::nullopt;
+      std::optional<PathPoint> next = path_point(chain, extrapolated(path, points, mu));
+      if (!next || !(centring.distance(centring.residual(*next)) < kFarthest)) continue;
+      reach = alpha;
+      return centring.run(std::move(*next), kNear, stop);
+    }
   }
   return std::nullopt;
 }
@@ -324,17 +353,19 @@ InteriorPointResult minimise_chain(const std::vector<MatrixXd>& stages, const In
   const double first_mu = kFirstGap * at->y(0) / size;
   double reach = kFirstReach;
   bool is_on_path = false;
+  std::vector<PathEstimate> path;
+  constexpr std::size_t kMostPoints = 3;
   for (; result.iterations < options.max_iterations; ++result.iterations) {
     MatrixXd matrix = hessian(chain, at->factor, at->blocks, options.stop);
     if (options.stop.now()) break;
     const NewtonMatrix newton(std::move(matrix));
     result.stop = LipSdpStop::kNumericalLimit;
     if (!newton.good()) break;
-    Tangent tangent = {newton.solve(cost), newton.solve(at->log_gradient), first_mu};
-    if (is_on_path) tangent.mu = tangent.u(0) / tangent.v(0);  // the nearest point of the path
-    const double mu = tangent.mu;
-    const double distance = std::sqrt(
-        std::max(0.0, at->log_gradient.dot(tangent.v) - 2 * tangent.v(0) / mu + tangent.u(0) / (mu * mu)));
+    // For any mu, v - u / mu is Newton's step to the path and u / mu^2 the path's derivative.
+    const VectorXd u = newton.solve(cost), v = newton.solve(at->log_gradient);
+    const double mu = is_on_path ? u(0) / v(0) : first_mu;  // the nearest point of the path
+    const double distance =
+        std::sqrt(std::max(0.0, at->log_gradient.dot(v) - 2 * v(0) / mu + u(0) / (mu * mu)));
     if (!(mu > 0) || !std::isfinite(distance)) break;
     const double gap = size * mu / at->y(0);
     if (distance < 1) result.best_dual = std::max(result.best_dual, at->y(0) - size * mu * (1 + distance));
@@ -345,7 +376,9 @@ InteriorPointResult minimise_chain(const std::vector<MatrixXd>& stages, const In
     is_on_path = is_on_path || distance < kOnPath;
     const double before = at->y(0);
     if (distance < kOnPath) {
-      at = follow(chain, newton, *at, tangent, reach, options.stop);
+      path.push_back({mu, at->y + v - u / mu, u / (mu * mu)});
+      if (path.size() > kMostPoints) path.erase(path.begin());
+      at = follow(chain, newton, path, reach, options.stop);
       if (!at) break;
     } else {
       at = Centring(chain, newton, mu, 1).run(std::move(*at), kNear, options.stop);
