@@ -7,6 +7,7 @@
 
 #include "analysis/identification/closed_loop.h"
 #include "analysis/identification/scan/named_forms.h"
+#include "analysis/identification/torque_balance.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
@@ -174,7 +175,7 @@ void doubt_answers(const Passes& passes, Explained& explained) {
   if (explained.scan.entries.empty() || explained.scan.entries[0].share < kMost) return;
   const ScanEntry& first = explained.scan.entries[0];
   const auto squared = [](double value) { return value * value; };
-  const double left = squared(first.rmse_before_N) - squared(first.rmse_after_N);
+  const double left = squared(first.rmse_before) - squared(first.rmse_after);
   std::vector<Missing>& ranking = explained.settled.ranking;
   const auto doubtful = std::stable_partition(ranking.begin(), ranking.end(), [&](const Missing& missing) {
     const Finding& finding = missing.finding;
@@ -294,7 +295,7 @@ void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
 /// Whether a curve of the scan explains as much as a constant share of the thrust, or more: then it is no matter of scale.
 bool is_explained_by_curve(const Scan& scan, double rmse_N) {
   return std::any_of(scan.entries.begin(), scan.entries.end(), [&](const ScanEntry& entry) {
-    return entry.variable != "thrust" && entry.variable != "body_constant" && entry.rmse_after_N <= rmse_N;
+    return entry.variable != "thrust" && entry.variable != "body_constant" && entry.rmse_after <= rmse_N;
   });
 }
 
@@ -337,6 +338,27 @@ void name_what_halves(const Passes& passes, Diagnosis& result) {
   };
   drop(result.suspected);
   drop(result.contradicted);
+}
+
+/// What the means of the torques name, unless one rotor may be the cause: that is for the scan to say.
+std::vector<stability::EffectSpec> named_balances(const Passes& passes) {
+  std::vector<stability::EffectSpec> specs;
+  const residuals::Inputs inputs = inputs_with(passes, {});
+  for (const TorqueBalance& balance : torque_balances(inputs, passes.kind, passes.jobs)) {
+    const auto& rivals = balance.rivals;
+    if (balance.is_named() && std::find(rivals.begin(), rivals.end(), "rotor_thrust") == rivals.end())
+      specs.push_back(spec_of(balance, balance.effect));
+  }
+  return specs;
+}
+
+/// What the torques and the rotors leave beside what is named.
+void scan_balance(const Passes& passes, Diagnosis& result) {
+  std::vector<stability::EffectSpec> specs = specs_of(result.ranking);
+  for (stability::EffectSpec& spec : named_balances(passes)) specs.push_back(std::move(spec));
+  const ScanSamples left = scan_samples(passes, specs, ScanQuantity::kBalance);
+  result.balance = scan(left, passes.jobs);
+  result.balance_formulas = find_formulas(left, result.balance, kMostFormulas, passes.jobs);
 }
 
 /// candidate(), at the place where a scan of what the model leaves beside `others` finds it if that is how it is found.
@@ -405,6 +427,7 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.scan = std::move(explained.scan);
   result.formulas = std::move(explained.formulas);
   name_what_halves(passes, result);
+  scan_balance(passes, result);
   return result;
 }
 

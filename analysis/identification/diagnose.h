@@ -48,6 +48,9 @@ struct Diagnosis {
   Remainder remainder;
   Scan scan;                      ///< what the remainder depends on
   std::vector<Formula> formulas;  ///< for entries of `scan`, best first
+  /// The same of torques and rotors, beside what the means of the torques name. Empty where logs have no rates.
+  Scan balance;
+  std::vector<Formula> balance_formulas;
   ThrustScale thrust_scale;
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated
   std::size_t records = 0, blocks = 0;

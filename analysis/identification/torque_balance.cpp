@@ -116,6 +116,25 @@ std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, cons
   return all;
 }
 
+stability::EffectSpec spec_of(const TorqueBalance& balance, const std::string& effect) {
+  stability::EffectSpec spec;
+  spec.name = effect;
+  spec.vehicle = balance.vehicle;
+  const auto set = [&](const char* name, double value, double half) {
+    spec.parameters[name] = value;
+    spec.fit.interval[name] = {value - half, value + half};
+  };
+  if (effect == "com_offset") {
+    set("offset_x_m", balance.offset_m.x(), balance.offset_half_m.x());
+    set("offset_y_m", balance.offset_m.y(), balance.offset_half_m.y());
+  } else {
+    set("torque_x_Nm", balance.torque_Nm.x(), balance.torque_half_Nm.x());
+    set("torque_y_Nm", balance.torque_Nm.y(), balance.torque_half_Nm.y());
+    set("torque_z_Nm", 0, 0);
+  }
+  return spec;
+}
+
 std::string in_words(const TorqueBalance& balance) {
   const auto and_rivals = [&] {
     std::string text;

@@ -42,6 +42,9 @@ struct TorqueBalance {
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
                                            int jobs);
 
+/// `effect`, com_offset or torque_bias, with the numbers of `balance` and their intervals, for its vehicle.
+stability::EffectSpec spec_of(const TorqueBalance& balance, const std::string& effect);
+
 /// "the centre of mass is 4.0 mm forward and 0.1 mm left of the rotors' centre (90 %: ...)".
 std::string in_words(const TorqueBalance& balance);
 

@@ -24,8 +24,13 @@ const char* name(Verdict verdict) {
 
 bool leaves_something(const Diagnosis& diagnosis) {
   constexpr double kMuch = 0.1;  // of the mean square that is left
-  const auto& entries = diagnosis.scan.entries;
-  return diagnosis.remainder.flag || (!entries.empty() && entries[0].share >= kMuch);
+  constexpr double kMostOfTorque =
+      0.5;  // torques of blades that flap and of a hull in the wind are in no model
+  const auto explains = [](const Scan& scan, double share) {
+    return !scan.entries.empty() && scan.entries[0].share >= share;
+  };
+  return diagnosis.remainder.flag || explains(diagnosis.scan, kMuch) ||
+         explains(diagnosis.balance, kMostOfTorque);
 }
 
 Verdict verdict_of(const std::vector<Diagnosis>& diagnoses, std::string& reason) {

@@ -19,7 +19,7 @@ enum class Verdict {
 const char* name(Verdict verdict);
 
 /// Whether something stands out in what is left after the effects that were found: slow disturbances from the spectrum of
-/// the noise, or a variable that explains at least a tenth of the remaining mean square.
+/// the noise, a variable that explains a tenth of the mean square that is left, or half of that of a torque or rotor.
 bool leaves_something(const Diagnosis& diagnosis);
 
 /// The first of the enumeration that holds for `diagnoses`.

@@ -78,6 +78,27 @@ std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model,
 
 }  // namespace
 
+std::vector<Eigen::Vector3d> torque_records(const stability::Model& model, const Kinds& kinds,
+                                            const Track& track) {
+  const std::size_t n = track.instants.size();
+  if (!track.has_rates || !why_no_rotor_forces(model, track).empty()) return {};
+  const std::vector<Eigen::Vector3d> modelled = modelled_torque_B_Nm(model, kinds, track);
+  const Eigen::Vector3d inertia(model.inertia_kg_m2[0], model.inertia_kg_m2[1], model.inertia_kg_m2[2]);
+  std::vector<Eigen::Vector3d> torque_B_Nm(
+      n, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    if (track.restarts[i] != 0 || track.restarts[i + 1] != 0) continue;
+    const stability::Instant &before = track.instants[i - 1], &now = track.instants[i],
+                             &after = track.instants[i + 1];
+    const Eigen::Vector3d slope =
+        (after.omega_B_rad_s - before.omega_B_rad_s) / (after.time_s - before.time_s);
+    const Eigen::Vector3d momentum = inertia.cwiseProduct(now.omega_B_rad_s);
+    torque_B_Nm[i] = inertia.cwiseProduct(slope) + now.omega_B_rad_s.cross(momentum) -
+                     (modelled[i - 1] + 2 * modelled[i] + modelled[i + 1]) / 4;
+  }
+  return torque_B_Nm;
+}
+
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track) {
   TorqueResidual residual;
   const std::size_t n = track.instants.size();
@@ -97,19 +118,7 @@ TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds
                     residual.rate_hz, TorqueResidual::kLeastRate_hz);
     return residual;
   }
-  const std::vector<Eigen::Vector3d> modelled = modelled_torque_B_Nm(model, kinds, track);
-  const Eigen::Vector3d inertia(model.inertia_kg_m2[0], model.inertia_kg_m2[1], model.inertia_kg_m2[2]);
-  residual.torque_B_Nm.assign(n, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  for (std::size_t i = 1; i + 1 < n; ++i) {
-    if (track.restarts[i] != 0 || track.restarts[i + 1] != 0) continue;
-    const stability::Instant &before = track.instants[i - 1], &now = track.instants[i],
-                             &after = track.instants[i + 1];
-    const Eigen::Vector3d slope =
-        (after.omega_B_rad_s - before.omega_B_rad_s) / (after.time_s - before.time_s);
-    const Eigen::Vector3d momentum = inertia.cwiseProduct(now.omega_B_rad_s);
-    residual.torque_B_Nm[i] = inertia.cwiseProduct(slope) + now.omega_B_rad_s.cross(momentum) -
-                              (modelled[i - 1] + 2 * modelled[i] + modelled[i + 1]) / 4;
-  }
+  residual.torque_B_Nm = torque_records(model, kinds, track);
   return residual;
 }
 

@@ -27,6 +27,11 @@ struct TorqueResidual {
 /// @throws files::InputError where an effect of the model cannot be made.
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track);
 
+/// As torque_residual(), of logs of any rate: single records of slow logs alias what the attitude loop does, their means
+/// over many records say what it balances. Empty where the log has no rates or does not say the force of each rotor.
+std::vector<Eigen::Vector3d> torque_records(const stability::Model& model, const Kinds& kinds,
+                                            const Track& track);
+
 /// Of the used records of one vehicle.
 struct TorqueErrors {
   std::string refused;  ///< why there is none; else empty

@@ -29,7 +29,7 @@ struct Flights {
     const Eigen::Index each = 400, size = flights * each;
     samples.values.resize(size, kNumScanVariables);
     samples.commanded = Eigen::MatrixXf::Constant(size, kNumScanVariables, std::nanf(""));
-    samples.force_N.resize(size, 6);
+    samples.residual.resize(size, 6);
     samples.axes = Eigen::MatrixXf::Zero(size, 9);
     for (const int k : {0, 4, 8}) samples.axes.col(k).setOnes();
     samples.neighbours.lateral_m = Eigen::MatrixXf::Constant(size, NeighbourPlaces::kLags, std::nanf(""));
@@ -48,8 +48,8 @@ struct Flights {
       samples.values(i, static_cast<int>(V::kTime)) = static_cast<float>(0.1 * static_cast<double>(i % each));
       samples.flight.push_back(static_cast<int>(i / each));
       samples.block.push_back(static_cast<int>(i / kBlockSamples));
-      for (int k = 0; k < 3; ++k) samples.force_N(i, k) = static_cast<float>(kNoise_N * bell(generator));
-      samples.force_N.row(i).tail(3) = samples.force_N.row(i).head(3);
+      for (int k = 0; k < 3; ++k) samples.residual(i, k) = static_cast<float>(kNoise_N * bell(generator));
+      samples.residual.row(i).tail(3) = samples.residual.row(i).head(3);
     }
     samples.flights = flights;
     samples.blocks = static_cast<int>(size) / kBlockSamples;
@@ -61,8 +61,8 @@ struct Flights {
   template <typename Force>
   void push(int axis, const Force& force) {
     for (Eigen::Index i = 0; i < samples.size(); ++i) {
-      samples.force_N(i, axis) += static_cast<float>(force(i));
-      samples.force_N(i, 3 + axis) = samples.force_N(i, axis);
+      samples.residual(i, axis) += static_cast<float>(force(i));
+      samples.residual(i, 3 + axis) = samples.residual(i, axis);
     }
   }
 };
@@ -115,7 +115,7 @@ TEST(Scan, CountsNoAnswerOfTheController) {
   for (Eigen::Index i = 0; i < flights.samples.size(); ++i) {
     const double wanted = 0.33 + 0.02 * flights.at(i, V::kDuty1);
     flights.samples.commanded(i, thrust) = static_cast<float>(wanted);
-    flights.samples.values(i, thrust) = static_cast<float>(wanted - flights.samples.force_N(i, 2));
+    flights.samples.values(i, thrust) = static_cast<float>(wanted - flights.samples.residual(i, 2));
   }
   const auto names_thrust = [](const Scan& found) {
     return std::any_of(found.entries.begin(), found.entries.end(),
@@ -135,6 +135,87 @@ TEST(Scan, DoesNotDependOnTheNumberOfThreads) {
   const Scan one = scan(flights.samples, 1), two = scan(flights.samples, 2);
   ASSERT_EQ(one.entries.size(), two.entries.size());
   for (std::size_t i = 0; i < one.entries.size(); ++i) EXPECT_EQ(one.entries[i].share, two.entries[i].share);
+}
+
+/// The same flights with torques of 1e-6 N m and rotors of 1e-3 N of noise in place of the force.
+ScanSamples balance_of(Flights& flights) {
+  constexpr double kNoise_Nm = 1e-6, kNoiseOfRotor_N = 1e-3;
+  ScanSamples samples = flights.samples;
+  samples.quantity = ScanQuantity::kBalance;
+  samples.residual.resize(samples.size(), 7);
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    for (int k = 0; k < 7; ++k)
+      samples.residual(i, k) =
+          static_cast<float>((k < 3 ? kNoise_Nm : kNoiseOfRotor_N) * flights.bell(flights.generator));
+  }
+  return samples;
+}
+
+TEST(BalanceScan, FindsTheAxisAndTheVariableOfATorque) {
+  const std::vector<std::pair<std::string, V>> cases = {
+      {"roll", V::kSpeed}, {"pitch", V::kZ}, {"yaw", V::kClimb}};
+  for (std::size_t axis = 0; axis < cases.size(); ++axis) {
+    Flights flights(30 + axis);
+    ScanSamples samples = balance_of(flights);
+    for (Eigen::Index i = 0; i < samples.size(); ++i)
+      samples.residual(i, static_cast<int>(axis)) +=
+          static_cast<float>(2e-6 * flights.at(i, cases[axis].second));
+    const Scan found = scan(samples, 1);
+    ASSERT_FALSE(found.entries.empty()) << cases[axis].first;
+    const ScanEntry& first = found.entries[0];
+    EXPECT_EQ(first.axis, cases[axis].first);
+    EXPECT_EQ(first.variable, scan_variable(cases[axis].second).name);
+    EXPECT_EQ(first.quantity, "torque");
+    EXPECT_EQ(first.frame, "body");
+    EXPECT_EQ(first.unit, "Nm");
+    // Noise of 1e-6 N m is what the right curve leaves of the axis.
+    EXPECT_NEAR(first.rmse_after, 1e-6, 1e-7);
+    EXPECT_NEAR(first.share, 1 - std::pow(first.rmse_after / first.rmse_before, 2), 0.02);
+    const std::vector<Formula> formulas = find_formulas(samples, found, 1, 1);
+    ASSERT_EQ(formulas.size(), 1U);
+    ASSERT_EQ(formulas[0].effect.expression.formulas.size(), 1U);
+    const std::string target = std::string("torque_") + "xyz"[axis] + "_Nm";
+    EXPECT_EQ(formulas[0].effect.expression.formulas.begin()->first, target);
+    const stability::AppliedEffect effect(formulas[0].effect, {});
+    const auto torque = [&](double value) {
+      stability::Instant now;
+      now.p_W_m = {0, 0, value};
+      now.v_W_m_s = {0, 0, value};
+      return effect.wrench(now).torque_B_Nm[static_cast<Eigen::Index>(axis)];
+    };
+    EXPECT_NEAR(torque(0.8) - torque(0.3), 1e-6, 2e-7);
+  }
+}
+
+TEST(BalanceScan, NamesARotorOnlyWhereNoOtherDoesTheSame) {
+  const auto rotors_of = [](const Scan& found) {
+    std::vector<std::string> names;
+    for (const ScanEntry& entry : found.entries) {
+      if (entry.quantity == "rotor_force") names.push_back(entry.axis + " over " + entry.variable);
+    }
+    return names;
+  };
+  Flights flights(40);
+  ScanSamples samples = balance_of(flights);
+  const auto duty = static_cast<Eigen::Index>(V::kDuty2);
+  samples.commanded.col(duty) = samples.values.col(duty);  // set points confirm it
+  constexpr Eigen::Index kSecond = 4, kThird = 5;
+  const Eigen::VectorXf loss = 2e-3F * samples.values.col(duty).cwiseMax(0);
+  samples.residual.col(kSecond) -= loss;
+  const std::vector<std::string> one = rotors_of(scan(samples, 1));
+  ASSERT_FALSE(one.empty());
+  EXPECT_EQ(one[0], "rotor_2 over duty_2");
+  samples.residual.col(kThird) -= loss;
+  EXPECT_EQ(rotors_of(scan(samples, 1)), std::vector<std::string>{});
+}
+
+TEST(BalanceScan, FindsNothingWhereNothingIs) {
+  int claims = 0;
+  for (std::uint64_t seed = 200; seed < 205; ++seed) {
+    Flights flights(seed, seed % 2 == 0 ? 1 : 6);
+    claims += scan(balance_of(flights), 1).entries.empty() ? 0 : 1;
+  }
+  EXPECT_EQ(claims, 0);
 }
 
 TEST(Formulas, RecoverTheFormAndItsNumbers) {

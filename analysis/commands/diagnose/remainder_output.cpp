@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace swarmcert::analysis {
 namespace {
@@ -14,6 +15,12 @@ using identification::ScanEntry;
 
 constexpr std::size_t kShownCurves = 4;
 
+bool is_torque(const ScanEntry& entry) { return entry.quantity == "torque"; }
+
+std::string words_of(const ScanEntry& entry) {
+  return entry.quantity == "rotor_force" ? "force of" : entry.quantity;
+}
+
 std::string verdict_of(const ScanEntry& entry) {
   if (!entry.is_checked) return "not_applicable";
   const double width = entry.slope.interval.second - entry.slope.interval.first;
@@ -21,35 +28,62 @@ std::string verdict_of(const ScanEntry& entry) {
   return entry.slope.interval.second < 1 ? "contradicts" : "agrees";
 }
 
-files::Json curve_json(const std::vector<CurvePoint>& curve) {
+files::Json curve_json(const ScanEntry& entry) {
   files::Json points = files::Json::array();
-  for (const CurvePoint& point : curve) {
+  for (const CurvePoint& point : entry.curve) {
     points.push_back({{"at", point.at},
-                      {"force_N", point.force_N},
+                      {is_torque(entry) ? "torque_Nm" : "force_N", point.value},
                       {"interval_90", {point.interval.first, point.interval.second}}});
   }
   return points;
 }
 
-const identification::Formula* formula_of(const Diagnosis& diagnosis, std::size_t entry) {
-  for (const identification::Formula& formula : diagnosis.formulas) {
-    if (formula.entry == entry) return &formula;
+/// An entry of the scan of the force, or of the torques and rotors.
+struct Listed {
+  const ScanEntry* entry = nullptr;
+  const identification::Formula* formula = nullptr;  ///< null: none
+};
+
+std::vector<Listed> listed(const identification::Scan& scan,
+                           const std::vector<identification::Formula>& formulas) {
+  std::vector<Listed> all;
+  for (const ScanEntry& entry : scan.entries) all.push_back({&entry, nullptr});
+  for (const identification::Formula& formula : formulas) all[formula.entry].formula = &formula;
+  return all;
+}
+
+/// So many of the force, and as many of torques and rotors.
+struct Shown {
+  std::size_t forces = 0, balances = 0;
+  bool has_room(const ScanEntry& entry) {
+    std::size_t& count = entry.quantity == "force" ? forces : balances;
+    return ++count <= kShownCurves;
   }
-  return nullptr;
+};
+
+/// Of both scans, best first; each in its own order.
+std::vector<Listed> all_listed(const Diagnosis& diagnosis) {
+  const std::vector<Listed> forces = listed(diagnosis.scan, diagnosis.formulas),
+                            balances = listed(diagnosis.balance, diagnosis.balance_formulas);
+  std::vector<Listed> all;
+  std::merge(forces.begin(), forces.end(), balances.begin(), balances.end(), std::back_inserter(all),
+             [](const Listed& a, const Listed& b) { return a.entry->share > b.entry->share; });
+  return all;
 }
 
 files::Json json_of(const ScanEntry& entry, const std::string& kind) {
   files::Json json = {{"variable", entry.variable},
+                      {"quantity", entry.quantity},
                       {"frame", entry.frame},
                       {"axis", entry.axis},
                       {"kind", kind},
                       {"share", entry.share},
                       {"share_ci", {entry.share_interval.first, entry.share_interval.second}},
                       {"uncorrected_share", entry.uncorrected_share},
-                      {"curve", curve_json(entry.curve)},
+                      {"curve", curve_json(entry)},
                       {"expression", nullptr},
-                      {"rmse_before", entry.rmse_before_N},
-                      {"rmse_after", entry.rmse_after_N},
+                      {"rmse_before", entry.rmse_before},
+                      {"rmse_after", entry.rmse_after},
                       {"set_points", verdict_of(entry)}};
   if (entry.lag_s > 0) json["lag_s"] = entry.lag_s;
   if (entry.period_s > 0) json["period_s"] = entry.period_s;
@@ -57,8 +91,8 @@ files::Json json_of(const ScanEntry& entry, const std::string& kind) {
 }
 
 std::string place_of(const ScanEntry& entry) {
-  std::string text = fmt::format("{} over {}", entry.axis, entry.variable);
-  if (entry.frame == "body") text += " (body axes)";
+  std::string text = fmt::format("{} {} over {}", words_of(entry), entry.axis, entry.variable);
+  if (entry.frame == "body" && entry.quantity == "force") text += " (body axes)";
   if (entry.lag_s > 0) text += fmt::format(", {:.1f} s ago", entry.lag_s);
   if (entry.period_s > 0) text += fmt::format(", period {:.3g} s", entry.period_s);
   return text;
@@ -67,6 +101,9 @@ std::string place_of(const ScanEntry& entry) {
 /// @param name of the figure.
 void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
                const residuals::ForceUnit& force) {
+  const double per_unit = is_torque(entry) ? 1 : force.per_newton();
+  const std::string shown =
+      fmt::format("{} {} [{}]", words_of(entry), entry.axis, is_torque(entry) ? "N m" : force.name);
   const bool is_map = entry.curve[0].at.size() == 2;
   std::string data = is_map ? "# at_1 at_2 force\n" : "# at force lower upper\n";
   double last = NAN;
@@ -74,12 +111,10 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
     if (is_map) {
       if (point.at[0] != last && !std::isnan(last)) data += "\n";
       last = point.at[0];
-      data +=
-          fmt::format("{:.6g} {:.6g} {:.6g}\n", point.at[0], point.at[1], force.per_newton() * point.force_N);
+      data += fmt::format("{:.6g} {:.6g} {:.6g}\n", point.at[0], point.at[1], per_unit * point.value);
     } else {
-      data +=
-          fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", point.at[0], force.per_newton() * point.force_N,
-                      force.per_newton() * point.interval.first, force.per_newton() * point.interval.second);
+      data += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", point.at[0], per_unit * point.value,
+                          per_unit * point.interval.first, per_unit * point.interval.second);
     }
   }
   const std::string unit =
@@ -87,27 +122,25 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
   const std::string label = is_map ? "[m]" : entry.variable + (unit.empty() ? "" : " [" + unit + "]");
   std::string script = "set xlabel '" + label + "'\n";
   if (is_map) {
-    script += "set ylabel '[m]'\nset cblabel 'force " + entry.axis + " [" + force.name +
-              "]'\nset palette @signed_colours\nplot '" + name +
+    script += "set ylabel '[m]'\nset cblabel '" + shown + "'\nset palette @signed_colours\nplot '" + name +
               ".dat' using 1:2:3 with points pointtype 5 pointsize 3 palette notitle\n";
   } else {
-    script += "set ylabel 'force " + entry.axis + " [" + force.name + "]'\nplot '" + name +
+    script += "set ylabel '" + shown + "'\nplot '" + name +
               ".dat' using 1:3:4 with filledcurves fillcolor rgb '#cccccc' title '90 %', '' using 1:2 with "
               "linespoints linetype 1 title 'what is left'\n";
   }
-  report.figure(
-      name, data, script,
-      fmt::format("What is left of the force along {} ({} axes) over {}: {:.0f} % of its mean square.",
-                  entry.axis, entry.frame, entry.variable, 100 * entry.share));
+  report.figure(name, data, script,
+                fmt::format("What is left: {}, {} axes; {:.0f} % of its mean square.", place_of(entry),
+                            entry.frame, 100 * entry.share));
 }
 
 }  // namespace
 
 files::Json remainder_json(const Diagnosis& diagnosis) {
   files::Json entries = files::Json::array();
-  for (std::size_t i = 0; i < diagnosis.scan.entries.size(); ++i) {
-    files::Json json = json_of(diagnosis.scan.entries[i], diagnosis.kind);
-    if (const identification::Formula* formula = formula_of(diagnosis, i); formula != nullptr) {
+  for (const auto& [entry, formula] : all_listed(diagnosis)) {
+    files::Json json = json_of(*entry, diagnosis.kind);
+    if (formula != nullptr) {
       json["expression"] = to_toml(*formula);
       json["form"] = formula->form;
       json["saved_bits"] = formula->saved_bits;
@@ -118,15 +151,20 @@ files::Json remainder_json(const Diagnosis& diagnosis) {
 }
 
 void print_remainder(const Diagnosis& diagnosis) {
-  const std::vector<ScanEntry>& entries = diagnosis.scan.entries;
+  const std::vector<Listed> entries = all_listed(diagnosis);
   if (entries.empty()) return;
   fmt::print("  What is left varies with:\n");
-  for (std::size_t i = 0; i < std::min(entries.size(), kShownCurves); ++i) {
-    const ScanEntry& entry = entries[i];
-    fmt::print("    force {:<28} {:.0f} % of it (90 %: {:.0f} .. {:.0f}), RMSE {:.5f} -> {:.5f} N\n",
-               place_of(entry), 100 * entry.share, 100 * entry.share_interval.first,
-               100 * entry.share_interval.second, entry.rmse_before_N, entry.rmse_after_N);
-    if (const identification::Formula* formula = formula_of(diagnosis, i); formula != nullptr) {
+  Shown shown;
+  for (const auto& [found, formula] : entries) {
+    const ScanEntry& entry = *found;
+    if (!shown.has_room(entry)) continue;
+    const std::string errors = is_torque(entry)
+                                   ? fmt::format("{:.2e} -> {:.2e} N m", entry.rmse_before, entry.rmse_after)
+                                   : fmt::format("{:.5f} -> {:.5f} N", entry.rmse_before, entry.rmse_after);
+    fmt::print("    {:<34} {:.0f} % of it (90 %: {:.0f} .. {:.0f}), RMSE {}\n", place_of(entry),
+               100 * entry.share, 100 * entry.share_interval.first, 100 * entry.share_interval.second,
+               errors);
+    if (formula != nullptr) {
       for (const auto& [target, text] : formula->effect.expression.formulas)
         fmt::print("      {} = {}\n", target, text);
     }
@@ -135,29 +173,31 @@ void print_remainder(const Diagnosis& diagnosis) {
 
 void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t number,
                    const residuals::ForceUnit& unit) {
-  const std::vector<ScanEntry>& entries = diagnosis.scan.entries;
+  const std::vector<Listed> entries = all_listed(diagnosis);
   if (entries.empty()) {
     report.paragraph("What is left varies with no variable of the scan.");
     return;
   }
   std::vector<std::vector<std::string>> rows;
-  for (const ScanEntry& entry : entries) {
+  for (const Listed& found : entries) {
+    const ScanEntry& entry = *found.entry;
+    const double per_unit = is_torque(entry) ? 1 : unit.per_newton();
     rows.push_back({place_of(entry),
                     fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * entry.share,
                                 100 * entry.share_interval.first, 100 * entry.share_interval.second),
-                    fmt::format("{:.4g} -> {:.4g}", unit.per_newton() * entry.rmse_before_N,
-                                unit.per_newton() * entry.rmse_after_N),
+                    fmt::format("{:.4g} -> {:.4g} {}", per_unit * entry.rmse_before,
+                                per_unit * entry.rmse_after, is_torque(entry) ? "N m" : unit.name),
                     verdict_of(entry)});
   }
-  report.paragraph("What is left of the force varies with:");
-  report.table(
-      {"force", "share of what is left, 90 %", std::string("RMSE [") + unit.name + "]", "set points"}, rows);
-  std::size_t shown = 0;
-  for (const ScanEntry& entry : entries) {
-    if (shown == kShownCurves) break;
-    if (entry.curve.size() < 2) continue;
-    ++shown;
-    add_curve(report, entry, fmt::format("remainder_{}_{}", number, shown), unit);
+  report.paragraph("What is left varies with:");
+  report.table({"what", "share of what is left, 90 %", "RMSE", "set points"}, rows);
+  std::size_t figures = 0;
+  Shown shown;
+  for (const Listed& found : entries) {
+    const ScanEntry& entry = *found.entry;
+    if (entry.curve.size() < 2 || !shown.has_room(entry)) continue;
+    ++figures;
+    add_curve(report, entry, fmt::format("remainder_{}_{}", number, figures), unit);
   }
 }
 

@@ -81,18 +81,18 @@ FormFit fit_coefficients(const Form& form, const FormData& data, const std::vect
   Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero(), row(1, 1, 1);
   double squares = 0;
-  for (Eigen::Index i = 0; i < data.force_N.size(); ++i) {
+  for (Eigen::Index i = 0; i < data.target.size(); ++i) {
     const Inputs2 v = inputs_at(data, i);
     form.values(v.data(), theta.data(), row.data());
     if (data.factor.size() > 0) row.head(functions) *= data.factor[i];
     row[functions] = 1;
     gram.topLeftCorner(size, size).noalias() += row.head(size) * row.head(size).transpose();
-    b.head(size) += data.force_N[i] * row.head(size);
-    squares += data.force_N[i] * data.force_N[i];
+    b.head(size) += data.target[i] * row.head(size);
+    squares += data.target[i] * data.target[i];
   }
   FormFit fit;
   fit.theta = theta;
-  const double n = std::max<double>(static_cast<double>(data.force_N.size()), 1);
+  const double n = std::max<double>(static_cast<double>(data.target.size()), 1);
   Eigen::MatrixXd held = gram.topLeftCorner(size, size);
   for (Eigen::Index k = 0; k < size; ++k) held(k, k) += 1e-9 * held(k, k) + 1e-12 * n;
   fit.coefficients = held.ldlt().solve(b.head(size));

@@ -10,9 +10,9 @@ namespace swarmcert::identification {
 
 /// What a form is fitted to.
 struct FormData {
-  Eigen::MatrixXd inputs;   ///< [samples x inputs of the form]
-  Eigen::VectorXd factor;   ///< by which every function is multiplied; empty: 1
-  Eigen::VectorXd force_N;  ///< [samples]
+  Eigen::MatrixXd inputs;  ///< [samples x inputs of the form]
+  Eigen::VectorXd factor;  ///< by which every function is multiplied; empty: 1
+  Eigen::VectorXd target;  ///< [samples]
 };
 
 struct FormFit {

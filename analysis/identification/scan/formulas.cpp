@@ -47,13 +47,13 @@ FormData rows_of(const ScanSamples& samples, const ScanEntry& entry, const std::
   FormData data;
   const auto n = static_cast<Eigen::Index>(rows.size());
   data.inputs.resize(n, static_cast<Eigen::Index>(entry.variables.size()));
-  data.force_N.resize(n);
+  data.target.resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Index row = rows[static_cast<std::size_t>(i)];
     for (std::size_t k = 0; k < entry.variables.size(); ++k)
       data.inputs(i, static_cast<Eigen::Index>(k)) =
           samples.values(row, static_cast<Eigen::Index>(entry.variables[k]));
-    data.force_N[i] = samples.force_N(row, entry.column);
+    data.target[i] = samples.residual(row, entry.column);
   }
   return data;
 }
@@ -74,8 +74,8 @@ EntryData data_of(const ScanSamples& samples, const ScanEntry& entry) {
   data.few = rows_of(samples, entry, data.thin);
   for (const Eigen::Index row : data.rows)
     data.flight.push_back(samples.flight[static_cast<std::size_t>(row)]);
-  const double mean = data.few.force_N.mean();
-  data.mean_square = (data.few.force_N.array() - mean).square().mean();
+  const double mean = data.few.target.mean();
+  data.mean_square = (data.few.target.array() - mean).square().mean();
   return data;
 }
 
@@ -91,16 +91,16 @@ Eigen::VectorXd factor_of(const ScanSamples& samples, const std::vector<Eigen::I
 /// one sample to the next.
 double independent_samples(const EntryData& data, const FormulaTrial& trial) {
   double last = 0, products = 0, squares = 0;
-  for (Eigen::Index i = 0; i < data.all.force_N.size(); ++i) {
+  for (Eigen::Index i = 0; i < data.all.target.size(); ++i) {
     const double inputs[2] = {data.all.inputs(i, 0), data.all.inputs.cols() > 1 ? data.all.inputs(i, 1) : 0};
-    const double left = data.all.force_N[i] - value_of(trial.form, trial.fit, inputs, 1);
+    const double left = data.all.target[i] - value_of(trial.form, trial.fit, inputs, 1);
     const auto k = static_cast<std::size_t>(i);
     if (i > 0 && data.flight[k] == data.flight[k - 1]) products += left * last;
     squares += left * left;
     last = left;
   }
   const double rho = squares > 0 ? std::clamp(products / squares, 0.0, 0.98) : 0;
-  return std::max(static_cast<double>(data.all.force_N.size()) * (1 - rho) / (1 + rho), 4.0);
+  return std::max(static_cast<double>(data.all.target.size()) * (1 - rho) / (1 + rho), 4.0);
 }
 
 int numbers_of(const FormulaTrial& trial) {
@@ -178,9 +178,13 @@ void replace_all(std::string& text, const std::string& from, const std::string& 
     text.replace(at, from.size(), to);
 }
 
-std::string unit_of_coefficient(const std::string& variable_unit, int power) {
-  if (power == 0 || variable_unit.empty()) return "N";
-  return "N_per_" + variable_unit + (power > 1 ? std::to_string(power) : "");
+const ScanColumn& column_of_entry(const ScanSamples& samples, int column) {
+  return scan_columns(samples.quantity)[static_cast<std::size_t>(column)];
+}
+
+std::string unit_of_coefficient(const std::string& unit, const std::string& variable_unit, int power) {
+  if (power == 0 || variable_unit.empty()) return unit;
+  return unit + "_per_" + variable_unit + (power > 1 ? std::to_string(power) : "");
 }
 
 std::string unit_of(const FormParameter& parameter, const std::string& variable_unit) {
@@ -192,7 +196,7 @@ std::string unit_of(const FormParameter& parameter, const std::string& variable_
 int column_of(const ScanSamples& samples, const ScanEntry& entry, const EntryData& data,
               const FormulaTrial& trial) {
   constexpr int kVertical = 2, kThrust = 5;
-  if (entry.column % 3 != 2) return entry.column;
+  if (samples.quantity != ScanQuantity::kForce || entry.column % 3 != 2) return entry.column;
   double world = 0, body = 0;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
@@ -201,16 +205,10 @@ int column_of(const ScanSamples& samples, const ScanEntry& entry, const EntryDat
                               ? 1
                               : samples.values(data.rows[i], static_cast<Eigen::Index>(trial.factor));
     const double value = value_of(trial.form, trial.fit, inputs, factor);
-    world += value * samples.force_N(data.rows[i], kVertical);
-    body += value * samples.force_N(data.rows[i], kThrust);
+    world += value * samples.residual(data.rows[i], kVertical);
+    body += value * samples.residual(data.rows[i], kThrust);
   }
   return body > world ? kThrust : kVertical;
-}
-
-const char* target_of(const ScanEntry& entry) {
-  constexpr const char* kTargets[] = {"force_x_N",  "force_y_N",  "force_z_N",
-                                      "force_b1_N", "force_b2_N", "force_b3_N"};
-  return kTargets[entry.column];
 }
 
 void add_shapes(const FormulaTrial& trial, const std::string& unit, stability::EffectSpec& spec,
@@ -231,7 +229,7 @@ void add_shapes(const FormulaTrial& trial, const std::string& unit, stability::E
   }
 }
 
-stability::EffectSpec spec_of(const ScanEntry& entry, const FormulaTrial& trial) {
+stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const FormulaTrial& trial) {
   stability::EffectSpec spec;
   const std::string unit = scan_variable(entry.variables[0]).unit;
   std::vector<std::string> texts = trial.form.texts;
@@ -254,13 +252,13 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const FormulaTrial& trial)
   for (std::size_t k = 0; k < texts.size(); ++k) {
     std::string text = "(" + texts[k] + ")";
     if (trial.factor != ScanVariable::kCount) text += std::string(" * ") + scan_variable(trial.factor).symbol;
-    std::string of = unit_of_coefficient(unit, trial.form.powers[k]);
+    std::string of = unit_of_coefficient(entry.unit, unit, trial.form.powers[k]);
     if (trial.factor != ScanVariable::kCount) of += std::string("_per_") + scan_variable(trial.factor).unit;
     add(letters[k], text, trial.fit.coefficients[static_cast<Eigen::Index>(k)], of);
   }
   if (trial.form.has_offset)
-    add("offset", "", trial.fit.coefficients[trial.fit.coefficients.size() - 1], "N");
-  spec.expression.formulas[target_of(entry)] = formula;
+    add("offset", "", trial.fit.coefficients[trial.fit.coefficients.size() - 1], entry.unit);
+  spec.expression.formulas[target] = formula;
   spec.name = fmt::format("{}{}_{}{}_of_{}", kFormulaPrefix, trial.form.name,
                           entry.frame == "body" ? "body_" : "", entry.axis, entry.variable);
   if (trial.factor != ScanVariable::kCount)
@@ -282,7 +280,7 @@ Formula body_constant(const ScanSamples& samples, const ScanEntry& entry) {
   spec.name = std::string(kFormulaPrefix) + kBodyConstant;
   for (int axis = 0; axis < 3; ++axis) {
     const std::string name = fmt::format("b{}_N", axis + 1);
-    const double value = samples.force_N.col(3 + axis).mean();
+    const double value = samples.residual.col(3 + axis).mean();
     spec.parameters[name] = value;
     spec.expression.linear.push_back(name);
     spec.expression.bounds[name] = {-4 * std::abs(value) - 1e-3, 4 * std::abs(value) + 1e-3};
@@ -291,7 +289,8 @@ Formula body_constant(const ScanSamples& samples, const ScanEntry& entry) {
   return formula;
 }
 
-bool has_formula(const ScanEntry& entry) {
+bool has_formula(const ScanSamples& samples, const ScanEntry& entry) {
+  if (column_of_entry(samples, entry.column).target[0] == '\0') return false;
   if (entry.variable == kBodyConstant) return true;
   return !entry.variables.empty() &&
          std::all_of(entry.variables.begin(), entry.variables.end(),
@@ -306,11 +305,11 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
                                    int jobs) {
   std::vector<std::size_t> which;
   for (std::size_t e = 0; e < scan.entries.size() && which.size() < most_entries; ++e) {
-    if (has_formula(scan.entries[e])) which.push_back(e);
+    if (has_formula(samples, scan.entries[e])) which.push_back(e);
   }
   double total = 0;
-  if (samples.size() > 0) {
-    const auto world = samples.force_N.leftCols(3).cast<double>().eval();
+  if (samples.size() > 0 && samples.quantity == ScanQuantity::kForce) {
+    const auto world = samples.residual.leftCols(3).cast<double>().eval();
     total = (world.rowwise() - world.colwise().mean()).squaredNorm() / static_cast<double>(samples.size());
   }
   std::vector<Formula> formulas(which.size());
@@ -330,10 +329,11 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
     formula.form = trial.form.name;
     formula.saved_bits = trial.saved_bits;
     if (!(trial.saved_bits > 0)) return;
-    formula.share = (data.mean_square - trial.fit.mean_square) / std::max(total, 1e-300);
+    const double of = samples.quantity == ScanQuantity::kForce ? total : data.mean_square;
+    formula.share = (data.mean_square - trial.fit.mean_square) / std::max(of, 1e-300);
     ScanEntry along = entry;
     along.column = column_of(samples, entry, data, trial);
-    formula.effect = spec_of(along, trial);
+    formula.effect = spec_of(along, column_of_entry(samples, along.column).target, trial);
   });
   formulas.erase(
       std::remove_if(formulas.begin(), formulas.end(), [](const Formula& f) { return !(f.saved_bits > 0); }),

@@ -18,7 +18,7 @@ struct Formula {
   std::string form, variable;    ///< "gaussian", "xy"
   stability::EffectSpec effect;  ///< with its numbers
   double saved_bits = 0;         ///< against a constant
-  double share = 0;              ///< of the mean square of the remainder's vector, on the samples of the fit
+  double share = 0;              ///< as ScanEntry::share, on the samples of the fit
   std::size_t entry = 0;         ///< of Scan::entries
 };
 

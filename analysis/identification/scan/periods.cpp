@@ -49,7 +49,7 @@ using Draws = std::vector<Eigen::Matrix3Xf>;  ///< [3 x rows] each: the remainde
 
 Draws draws_of(const ScanSamples& samples, const Pieces& pieces, const Chunks& chunks) {
   const auto n = static_cast<Eigen::Index>(pieces.rows.size());
-  Eigen::Matrix3Xf about_mean = samples.force_N.topRows(n).leftCols(3).transpose();
+  Eigen::Matrix3Xf about_mean = samples.residual.topRows(n).leftCols(3).transpose();
   about_mean.colwise() -= about_mean.rowwise().mean().eval();
   Draws draws = {about_mean};
   for (int d = 0; d < kDraws; ++d) {

@@ -37,8 +37,8 @@ Eigen::VectorXd ramps_of(const ScanSamples& samples, const ScanEntry& entry, con
     for (int k = 0; k < kRamps; ++k)
       row[k + 1] = ramp(samples.values(i, column), knots[static_cast<std::size_t>(k)], step);
     gram.noalias() += row * row.transpose();
-    b += samples.force_N(i, entry.column) * row;
-    squares += std::pow(samples.force_N(i, entry.column), 2);
+    b += samples.residual(i, entry.column) * row;
+    squares += std::pow(samples.residual(i, entry.column), 2);
   }
   gram.diagonal().array() += 1e-9 + 2.0;  // as weak as two samples
   const auto fit = [&](double lower, double upper) {
@@ -70,8 +70,6 @@ bool is_proposal(const std::string& name) {
 }
 
 std::optional<stability::EffectSpec> shape_of(const ScanSamples& samples, const ScanEntry& entry) {
-  constexpr const char* kTargets[] = {"force_x_N",  "force_y_N",  "force_z_N",
-                                      "force_b1_N", "force_b2_N", "force_b3_N"};
   if (entry.variables.size() != 1) return std::nullopt;
   const ScanVariableInfo& info = scan_variable(entry.variables[0]);
   const Knots knots =
@@ -95,7 +93,8 @@ std::optional<stability::EffectSpec> shape_of(const ScanSamples& samples, const 
                    : fmt::format(" + {} * min(max(({} - ({:.6g})) / {:.6g}, 0), 1)", name, info.symbol,
                                  knots[static_cast<std::size_t>(k - 1)], step);
   }
-  spec.expression.formulas[kTargets[entry.column]] = text;
+  spec.expression.formulas[scan_columns(samples.quantity)[static_cast<std::size_t>(entry.column)].target] =
+      text;
   return spec;
 }
 

@@ -9,6 +9,7 @@
 #include "analysis/identification/column_run.h"
 #include "analysis/identification/instrument.h"
 #include "analysis/identification/remainder.h"
+#include "analysis/identification/scan/balance_columns.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/parallel.h"
 
@@ -29,14 +30,14 @@ double& at(Values& values, ScanVariable variable) { return values[static_cast<st
 /// Sums over one sample.
 struct Sum {
   Values values{}, commanded{};
-  Eigen::Vector3d force_W_N = Eigen::Vector3d::Zero(), force_B_N = Eigen::Vector3d::Zero();
+  Eigen::VectorXd residual;
   double cos_heading = 0, sin_heading = 0, cos_commanded = 0, sin_commanded = 0;
   int count = 0;
 };
 
 struct TrackSamples {
   std::vector<Values> values, commanded;
-  std::vector<std::array<float, 6>> force_N;
+  std::vector<Eigen::VectorXd> residual;
   std::vector<std::array<float, 9>> axes;
   std::vector<std::array<float, NeighbourPlaces::kLags>> lateral_m, height_m;
   std::vector<int> block;
@@ -84,19 +85,32 @@ void set_motion(const Instant& now, Values& to) {
   at(to, V::kTime) = now.time_s;
 }
 
+/// What is left of the force at each record, [6 x records].
+Eigen::MatrixXd force_columns(const stability::Model& model, const residuals::Inputs& inputs,
+                              const Track& track) {
+  const auto left_N = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
+  Eigen::MatrixXd columns(6, static_cast<Eigen::Index>(left_N.size()));
+  for (std::size_t i = 0; i < left_N.size(); ++i)
+    columns.col(static_cast<Eigen::Index>(i)) << left_N[i], track.instants[i].R_WB.transpose() * left_N[i];
+  return columns;
+}
+
 class TrackSampler {
  public:
-  TrackSampler(const residuals::Inputs& inputs, const Track& track)
+  TrackSampler(const residuals::Inputs& inputs, const Track& track, ScanQuantity quantity)
       : model_(inputs.model_for(track)),
         track_(track),
-        residual_N_(residuals::force_residual(model_, inputs.kinds, inputs.rules, track)),
+        residual_(quantity == ScanQuantity::kForce ? force_columns(model_, inputs, track)
+                                                   : balance_columns(model_, inputs, track)),
         cut_(cut_into_blocks(track)),
         wind_m_s_(wind_of(model_)) {
     if (track.targets.size() == track.instants.size()) wanted_ = as_commanded(track, model_.mass_kg);
   }
 
   TrackSamples run() {
+    if (residual_.cols() == 0) return std::move(result_);
     result_.blocks = static_cast<int>(cut_.blocks.size());
+    sum_.residual = Eigen::VectorXd::Zero(residual_.rows());
     int block = -1;
     double start_s = 0;
     for (std::size_t i = 0; i < track_.instants.size(); ++i) {
@@ -109,7 +123,7 @@ class TrackSampler {
       }
       if (!is_used) continue;
       block = own;
-      add(i);
+      if (residual_.col(static_cast<Eigen::Index>(i)).allFinite()) add(i);
     }
     close(block);
     return std::move(result_);
@@ -146,9 +160,9 @@ class TrackSampler {
     }
     sum_.cos_heading += std::cos(at(values, V::kHeading));
     sum_.sin_heading += std::sin(at(values, V::kHeading));
-    sum_.force_W_N += residual_N_[i];
-    sum_.force_B_N += now.R_WB.transpose() * residual_N_[i];
-    result_.squares_N2 += residual_N_[i].squaredNorm();
+    const auto residual = residual_.col(static_cast<Eigen::Index>(i));
+    sum_.residual += residual;
+    result_.squares_N2 += residual.head<3>().squaredNorm();
     ++result_.records;
     middle_ = sum_.count == 0 ? i : middle_ + (sum_.count % 2 == 0 ? 1 : 0);
     ++sum_.count;
@@ -162,12 +176,7 @@ class TrackSampler {
     at(sum_.values, ScanVariable::kHeading) = std::atan2(sum_.sin_heading, sum_.cos_heading);
     result_.values.push_back(sum_.values);
     result_.commanded.push_back(sum_.commanded);
-    std::array<float, 6> force_N{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      force_N[axis] = static_cast<float>(sum_.force_W_N[static_cast<Eigen::Index>(axis)] / n);
-      force_N[3 + axis] = static_cast<float>(sum_.force_B_N[static_cast<Eigen::Index>(axis)] / n);
-    }
-    result_.force_N.push_back(force_N);
+    result_.residual.emplace_back(sum_.residual / n);
     const std::size_t middle = std::min(middle_, track_.instants.size() - 1);
     std::array<float, 9> axes{};
     for (std::size_t k = 0; k < 9; ++k) axes[k] = static_cast<float>(track_.instants[middle].R_WB.data()[k]);
@@ -175,6 +184,7 @@ class TrackSampler {
     result_.block.push_back(block);
     add_neighbours(middle);
     sum_ = {};
+    sum_.residual = Eigen::VectorXd::Zero(residual_.rows());
   }
 
   /// Relative to where the vehicle is at record `i`: where neighbours were some time ago.
@@ -204,7 +214,7 @@ class TrackSampler {
 
   const stability::Model model_;
   const Track& track_;
-  const std::vector<Eigen::Vector3d> residual_N_;
+  const Eigen::MatrixXd residual_;
   const TrackBlocks cut_;
   const Eigen::Vector3d wind_m_s_;
   std::vector<Instant> wanted_;
@@ -225,6 +235,15 @@ void align_means(std::vector<Values>& commanded, const std::vector<Values>& valu
   }
 }
 
+/// Residuals about the mean of their track.
+void remove_trim(TrackSamples& track) {
+  if (track.residual.empty()) return;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(track.residual[0].size());
+  for (const Eigen::VectorXd& residual : track.residual) mean += residual;
+  mean /= static_cast<double>(track.residual.size());
+  for (Eigen::VectorXd& residual : track.residual) residual -= mean;
+}
+
 void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& all) {
   Eigen::Index size = 0;
   for (const auto& piece : pieces) {
@@ -232,7 +251,7 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
   }
   all.values.resize(size, kNumScanVariables);
   all.commanded.resize(size, kNumScanVariables);
-  all.force_N.resize(size, 6);
+  all.residual.resize(size, static_cast<Eigen::Index>(scan_columns(all.quantity).size()));
   all.axes.resize(size, 9);
   all.neighbours.lateral_m.resize(size, NeighbourPlaces::kLags);
   all.neighbours.height_m.resize(size, NeighbourPlaces::kLags);
@@ -244,7 +263,7 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
           all.values(row, v) = static_cast<float>(track.values[i][static_cast<std::size_t>(v)]);
           all.commanded(row, v) = static_cast<float>(track.commanded[i][static_cast<std::size_t>(v)]);
         }
-        for (int k = 0; k < 6; ++k) all.force_N(row, k) = track.force_N[i][static_cast<std::size_t>(k)];
+        all.residual.row(row) = track.residual[i].cast<float>();
         for (int k = 0; k < 9; ++k) all.axes(row, k) = track.axes[i][static_cast<std::size_t>(k)];
         for (int k = 0; k < NeighbourPlaces::kLags; ++k) {
           all.neighbours.lateral_m(row, k) = track.lateral_m[i][static_cast<std::size_t>(k)];
@@ -260,6 +279,19 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
 }
 
 }  // namespace
+
+const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity) {
+  static const std::vector<ScanColumn> kForces = {
+      {"force", "world", "x", "N", "force_x_N"}, {"force", "world", "y", "N", "force_y_N"},
+      {"force", "world", "z", "N", "force_z_N"}, {"force", "body", "x", "N", "force_b1_N"},
+      {"force", "body", "y", "N", "force_b2_N"}, {"force", "body", "z", "N", "force_b3_N"}};
+  static const std::vector<ScanColumn> kBalances = {
+      {"torque", "body", "roll", "Nm", "torque_x_Nm"}, {"torque", "body", "pitch", "Nm", "torque_y_Nm"},
+      {"torque", "body", "yaw", "Nm", "torque_z_Nm"},  {"rotor_force", "body", "rotor_1", "N", ""},
+      {"rotor_force", "body", "rotor_2", "N", ""},     {"rotor_force", "body", "rotor_3", "N", ""},
+      {"rotor_force", "body", "rotor_4", "N", ""}};
+  return quantity == ScanQuantity::kForce ? kForces : kBalances;
+}
 
 const ScanVariableInfo& scan_variable(ScanVariable variable) {
   static const std::array<ScanVariableInfo, static_cast<std::size_t>(kNumScanVariables)> all = {{
@@ -292,6 +324,7 @@ ScanSamples thinned(const ScanSamples& samples, Eigen::Index most) {
   const Eigen::Index step = (samples.size() + most - 1) / most;
   if (step <= 1) return samples;
   ScanSamples few;
+  few.quantity = samples.quantity;
   few.flights = samples.flights;
   few.blocks = samples.blocks;
   std::vector<Eigen::Index> kept;
@@ -302,14 +335,15 @@ ScanSamples thinned(const ScanSamples& samples, Eigen::Index most) {
   }
   few.values = samples.values(kept, Eigen::all);
   few.commanded = samples.commanded(kept, Eigen::all);
-  few.force_N = samples.force_N(kept, Eigen::all);
+  few.residual = samples.residual(kept, Eigen::all);
   few.axes = samples.axes(kept, Eigen::all);
   few.neighbours.lateral_m = samples.neighbours.lateral_m(kept, Eigen::all);
   few.neighbours.height_m = samples.neighbours.height_m(kept, Eigen::all);
   return few;
 }
 
-ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs) {
+ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs,
+                         ScanQuantity quantity) {
   const residuals::Inputs inputs = inputs_with(passes, specs);
   std::vector<std::vector<TrackSamples>> pieces(inputs.found.flights.size());
   files::parallel_for(static_cast<int>(pieces.size()), passes.jobs, [&](int i) {
@@ -317,11 +351,13 @@ ScanSamples scan_samples(const Passes& passes, const std::vector<stability::Effe
     std::vector<std::string> problems;
     for (const Track& track : inputs.load(k, problems)) {
       if (track.position_only || track.kind != passes.kind) continue;
-      pieces[k].push_back(TrackSampler(inputs, track).run());
+      pieces[k].push_back(TrackSampler(inputs, track, quantity).run());
       align_means(pieces[k].back().commanded, pieces[k].back().values);
+      if (quantity == ScanQuantity::kBalance) remove_trim(pieces[k].back());
     }
   });
   ScanSamples all;
+  all.quantity = quantity;
   append(pieces, all);
   double squares_N2 = 0;
   std::size_t records = 0;

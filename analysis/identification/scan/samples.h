@@ -43,6 +43,20 @@ enum class ScanVariable : int {
 };
 inline constexpr int kNumScanVariables = static_cast<int>(ScanVariable::kCount);
 
+/// What is scanned: what is left of the force, or of what the rotors balance.
+enum class ScanQuantity { kForce, kBalance };
+
+/// A column of ScanSamples::residual.
+struct ScanColumn {
+  const char* quantity;  ///< "force", "torque", or "rotor_force": what one rotor alone gives too much
+  const char* frame;     ///< "world" or "body"
+  const char* axis;      ///< "x" .. "z"; "roll", "pitch", "yaw"; "rotor_1" .. "rotor_4"
+  const char* unit;      ///< "N" or "Nm"
+  const char* target;    ///< in [effect.expression]; empty where it has none
+};
+/// Force: x, y, z in the world, then in the body. Balance: roll, pitch, yaw, then the rotors.
+const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity);
+
 /// What is known of a variable without looking at a flight.
 struct ScanVariableInfo {
   const char* name;    ///< "climb", as results show it
@@ -67,15 +81,15 @@ struct NeighbourPlaces {
 struct ScanSamples {
   Eigen::MatrixXf values;     ///< [samples x kNumScanVariables]; NaN where unknown
   Eigen::MatrixXf commanded;  ///< the same as set points ask for it; NaN where nothing asks
-  /// [samples x 6]: residual in newton along the world's axes, then along the body's.
-  Eigen::MatrixXf force_N;
-  Eigen::MatrixXf axes;  ///< [samples x 9]: rotation from body to world, column by column
+  ScanQuantity quantity = ScanQuantity::kForce;
+  Eigen::MatrixXf residual;  ///< [samples x columns of scan_columns()], in their units
+  Eigen::MatrixXf axes;      ///< [samples x 9]: rotation from body to world, column by column
   NeighbourPlaces neighbours;
   std::vector<int> flight, block;  ///< block counts through all flights
   int flights = 0, blocks = 0;
-  double mean_square_N2 = 0;  ///< of the residual vector of the single records
+  double mean_square_N2 = 0;  ///< of the vector of the force of the single records
 
-  Eigen::Index size() const { return force_N.rows(); }
+  Eigen::Index size() const { return residual.rows(); }
   bool has_neighbours() const;
 };
 
@@ -83,6 +97,9 @@ struct ScanSamples {
 ScanSamples thinned(const ScanSamples& samples, Eigen::Index most);
 
 /// Means over 0.1 s of what the flights' models leave once they have `specs` as well.
-ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs);
+/// @param quantity kBalance: what balance_columns() says, about the mean of each track, because trims differ between
+/// vehicles; tracks of which it says nothing are left out.
+ScanSamples scan_samples(const Passes& passes, const std::vector<stability::EffectSpec>& specs,
+                         ScanQuantity quantity = ScanQuantity::kForce);
 
 }  // namespace swarmcert::identification

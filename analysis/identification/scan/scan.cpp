@@ -16,16 +16,19 @@ constexpr double kScanQuantile90 = 1.6449;  // two-sided 90 % of the normal dist
 constexpr double kLeastShare = 0.02;        // smaller ones are of no use, accident or not
 constexpr int kFlips = 20;                  // draws of the chunks' signs
 constexpr Eigen::Index kManySamples = 40'000;
-constexpr const char* kAxes[] = {"x", "y", "z"};
+
+bool is_offered(const Abscissa& abscissa, const ScanColumn& column) {
+  return column.frame[0] == 'w' ? abscissa.in_world : abscissa.in_body;
+}
 
 /// What is judged: the remainder about its mean, and its errors without any curve.
 struct Judged {
   const ScanSamples& samples;
   Chunks chunks;
-  Columns targets;             ///< [samples x 6]
-  Eigen::MatrixXd none;        ///< [chunks x 6]: errors of the constant alone
-  double total = 0;            ///< of the vector
-  Eigen::MatrixXd body_total;  ///< [chunks x 3]: errors of a constant along the body's axes
+  Columns targets;             ///< [samples x columns]
+  Eigen::MatrixXd none;        ///< [chunks x columns]: errors of the constant alone
+  Eigen::VectorXd totals;      ///< what shares are of, for each column: see ScanEntry::share
+  Eigen::MatrixXd body_total;  ///< [chunks x 3]: errors of a constant along the body's axes; of forces
 
   /// A vector of the world along the body's axes, sample by sample.
   Columns turned(const Eigen::RowVector3f& of_world) const {
@@ -35,9 +38,22 @@ struct Judged {
     return result;
   }
 
+  const std::vector<ScanColumn>& columns() const { return scan_columns(samples.quantity); }
+
   Judged(const ScanSamples& of, Columns values)
       : samples(of), chunks(chunks_of(of)), targets(std::move(values)) {
     none = chunk_errors(targets, mean_predictions(targets, chunks), chunks);
+    if (samples.quantity == ScanQuantity::kForce) prefer_constants();
+    totals = none.colwise().sum().transpose();
+    if (samples.quantity == ScanQuantity::kForce)
+      totals.setConstant(totals.head<3>().sum());
+    else
+      totals.tail<4>().setConstant(totals.tail<4>().sum());
+    totals = totals.cwiseMax(1e-300);
+  }
+
+ private:
+  void prefer_constants() {
     // Along the body's axes a constant is one of the body or one of the world, whichever leaves less.
     const Eigen::MatrixXd of_world =
         chunk_errors(targets.rightCols(3), turned(targets.leftCols(3).colwise().mean()), chunks);
@@ -45,15 +61,14 @@ struct Judged {
       if (of_world.col(axis).sum() < none.col(3 + axis).sum()) none.col(3 + axis) = of_world.col(axis);
     }
     body_total = chunk_errors(targets.rightCols(3), mean_predictions(targets.rightCols(3), chunks), chunks);
-    total = std::max(none.leftCols(3).sum(), 1e-300);
   }
 };
 
-/// Shares of the six components that a curve explains.
+/// Shares of the columns that a curve explains.
 Eigen::VectorXd shares_of(const Judged& judged, CurveFit& fit) {
   fit.fit(judged.targets);
   const Eigen::MatrixXd errors = chunk_errors(judged.targets, fit.predictions(), judged.chunks);
-  return (judged.none - errors).colwise().sum().transpose() / judged.total;
+  return (judged.none - errors).colwise().sum().transpose().cwiseQuotient(judged.totals);
 }
 
 /// The number of knots that explains most, for one component.
@@ -62,17 +77,18 @@ struct Best {
   int knots = 0;
 };
 
-using BestOfComponents = std::array<Best, 6>;
+using BestOfColumns = std::vector<Best>;
 
-BestOfComponents best_curves(const Judged& judged, const Abscissa& abscissa) {
-  BestOfComponents best;
+BestOfColumns best_curves(const Judged& judged, const Abscissa& abscissa) {
+  const std::vector<ScanColumn>& columns = judged.columns();
+  BestOfColumns best(columns.size());
   for (const int knots : abscissa.knots) {
     const Curve curve = curve_over(judged.samples, abscissa, knots);
     if (curve.columns == 0) continue;
     CurveFit fit(curve.rows, curve.columns, judged.chunks);
     const Eigen::VectorXd shares = shares_of(judged, fit);
-    for (std::size_t k = 0; k < 6; ++k) {
-      if (!(k < 3 ? abscissa.in_world : abscissa.in_body)) continue;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      if (!is_offered(abscissa, columns[k])) continue;
       const double share = shares[static_cast<Eigen::Index>(k)];
       if (share > best[k].share) best[k] = {share, knots};
     }
@@ -98,7 +114,7 @@ double accidental_share(const ScanSamples& all, const std::vector<Abscissa>& tri
   std::vector<Judged> draws;
   for (int d = 0; d < kFlips; ++d) {
     const Chunks chunks = chunks_of(samples);
-    draws.emplace_back(samples, flipped(samples.force_N, chunks, 1 + static_cast<std::uint64_t>(d)));
+    draws.emplace_back(samples, flipped(samples.residual, chunks, 1 + static_cast<std::uint64_t>(d)));
   }
   std::vector<std::vector<double>> largest(tried.size(), std::vector<double>(kFlips, 0));
   files::parallel_for(static_cast<int>(tried.size()), jobs, [&](int a) {
@@ -110,8 +126,9 @@ double accidental_share(const ScanSamples& all, const std::vector<Abscissa>& tri
       for (std::size_t d = 0; d < kFlips; ++d) {
         const Eigen::VectorXd shares = shares_of(draws[d], fit);
         double& most = largest[static_cast<std::size_t>(a)][d];
-        for (Eigen::Index k = 0; k < 6; ++k) {
-          if (k < 3 ? abscissa.in_world : abscissa.in_body) most = std::max(most, shares[k]);
+        for (Eigen::Index k = 0; k < shares.size(); ++k) {
+          if (is_offered(abscissa, draws[d].columns()[static_cast<std::size_t>(k)]))
+            most = std::max(most, shares[k]);
         }
       }
     }
@@ -142,13 +159,13 @@ Interval resampled(const Eigen::VectorXd& gains, const std::vector<int>& group, 
 }
 
 /// 90 % interval of a share: flights are resampled where there are five, else chunks.
-Interval share_interval(const Judged& judged, const Eigen::VectorXd& gains) {
+Interval share_interval(const Judged& judged, const Eigen::VectorXd& gains, double total) {
   constexpr int kFewestFlights = 5;
   if (judged.samples.flights >= kFewestFlights)
-    return resampled(gains, judged.chunks.flight, judged.samples.flights, judged.total);
+    return resampled(gains, judged.chunks.flight, judged.samples.flights, total);
   std::vector<int> each;
   for (int c = 0; c < judged.chunks.count(); ++c) each.push_back(c);
-  return resampled(gains, each, judged.chunks.count(), judged.total);
+  return resampled(gains, each, judged.chunks.count(), total);
 }
 
 /// Slope of the remainder over the curve f(v), with the instrument f(v as commanded).
@@ -198,17 +215,26 @@ void set_curve(const CurveFit& fit, const Curve& curve, int component, ScanEntry
     const auto at = static_cast<std::size_t>(k);
     point.at = width == 1 ? std::vector<double>{curve.knots[0][at]}
                           : std::vector<double>{curve.knots[0][at / width], curve.knots[1][at % width]};
-    point.force_N = all[k] + constant;
+    point.value = all[k] + constant;
     double squares = 0;
     for (int f = 0; f < Chunks::kFolds; ++f) {
       const Eigen::MatrixXd& c = fit.coefficients(f);
-      const double gap = c(k, component) + c(c.rows() - 1, component) - point.force_N;
+      const double gap = c(k, component) + c(c.rows() - 1, component) - point.value;
       squares += gap * gap;
     }
     const double half = kScanQuantile90 * std::sqrt(squares * (Chunks::kFolds - 1) / Chunks::kFolds);
-    point.interval = {point.force_N - half, point.force_N + half};
+    point.interval = {point.value - half, point.value + half};
     entry.curve.push_back(std::move(point));
   }
+}
+
+void set_column(const Judged& judged, int component, ScanEntry& entry) {
+  const ScanColumn& column = judged.columns()[static_cast<std::size_t>(component)];
+  entry.quantity = column.quantity;
+  entry.frame = column.frame;
+  entry.axis = column.axis;
+  entry.unit = column.unit;
+  entry.column = component;
 }
 
 ScanEntry entry_of(const Judged& judged, const Abscissa& abscissa, int component, int knots) {
@@ -218,10 +244,8 @@ ScanEntry entry_of(const Judged& judged, const Abscissa& abscissa, int component
   const Columns predictions = fit.predictions().col(component);
   ScanEntry entry;
   entry.variable = abscissa.name;
-  entry.frame = component < 3 ? "world" : "body";
-  entry.axis = kAxes[component % 3];
+  set_column(judged, component, entry);
   entry.variables = abscissa.variables;
-  entry.column = component;
   entry.lag_s = abscissa.lag * NeighbourPlaces::kLag_s;
   if (!curve.commanded.empty()) {
     entry.is_checked = true;
@@ -232,42 +256,44 @@ ScanEntry entry_of(const Judged& judged, const Abscissa& abscissa, int component
   const Columns target = judged.targets.col(component);
   const Eigen::VectorXd gains =
       judged.none.col(component) - chunk_errors(target, predictions, judged.chunks).col(0);
-  entry.uncorrected_share = gains.sum() / judged.total;
+  const double total = judged.totals[component];
+  entry.uncorrected_share = gains.sum() / total;
   const double beta = counted_slope(entry, abscissa.is_answer);
   const double counts = beta * (2 - beta);
   entry.share = counts * entry.uncorrected_share;
-  const Interval interval = share_interval(judged, gains);
+  const Interval interval = share_interval(judged, gains, total);
   entry.share_interval = {counts * interval.first, counts * interval.second};
   set_curve(fit, curve, component, entry);
   return entry;
 }
 
 void set_errors(const Judged& judged, ScanEntry& entry) {
-  const double before = judged.samples.mean_square_N2;
+  const auto column = judged.targets.col(entry.column).cast<double>();
+  const double before = judged.samples.quantity == ScanQuantity::kForce
+                            ? judged.samples.mean_square_N2
+                            : column.squaredNorm() / static_cast<double>(column.size());
   // A curve holds the mean of its component as well.
-  const double mean = judged.targets.col(entry.column).mean();
+  const double mean = column.mean();
   const double explained =
-      mean * mean + entry.share * judged.total / static_cast<double>(judged.samples.size());
-  entry.rmse_before_N = std::sqrt(before);
-  entry.rmse_after_N = std::sqrt(std::max(before - explained, 0.0));
+      mean * mean + entry.share * judged.totals[entry.column] / static_cast<double>(judged.samples.size());
+  entry.rmse_before = std::sqrt(before);
+  entry.rmse_after = std::sqrt(std::max(before - explained, 0.0));
 }
 
 /// A constant along the body's axes, beside a constant along the world's.
 void add_body_constant(const Judged& judged, double least, std::vector<ScanEntry>& entries) {
   const double body = judged.body_total.sum();
   ScanEntry entry;
-  entry.share = entry.uncorrected_share = (judged.total - body) / judged.total;
+  entry.share = entry.uncorrected_share = (judged.totals[0] - body) / judged.totals[0];
   if (entry.share < least) return;
   const Eigen::RowVector3f mean = judged.targets.rightCols(3).colwise().mean();
   int axis = 0;
   mean.cwiseAbs().maxCoeff(&axis);
   entry.variable = "body_constant";
-  entry.frame = "body";
-  entry.axis = kAxes[axis];
-  entry.column = 3 + axis;
+  set_column(judged, 3 + axis, entry);
   entry.slope = {1, 1, {1, 1}, 0};
-  entry.share_interval =
-      share_interval(judged, judged.none.leftCols(3).rowwise().sum() - judged.body_total.rowwise().sum());
+  entry.share_interval = share_interval(
+      judged, judged.none.leftCols(3).rowwise().sum() - judged.body_total.rowwise().sum(), judged.totals[0]);
   entry.curve.push_back({{}, mean[axis], {mean[axis], mean[axis]}});
   entries.push_back(std::move(entry));
 }
@@ -287,45 +313,86 @@ void keep_best_lags(std::vector<ScanEntry>& entries) {
   entries = std::move(kept);
 }
 
-/// Best first. What vehicles do comes before what they were asked to do, and before single rotors, where both explain
-/// about as much.
+/// Over one variable: torques that a single rotor explains are its own.
+void prefer_rotor(std::vector<ScanEntry>& entries) {
+  constexpr double kLeastOfTorque = 0.5;
+  const auto is_rotor = [](const ScanEntry& entry) { return entry.quantity == "rotor_force"; };
+  const auto rotor = std::find_if(entries.begin(), entries.end(), is_rotor);
+  if (rotor == entries.end()) return;
+  double torque = 0;
+  for (const ScanEntry& entry : entries) torque = is_rotor(entry) ? torque : std::max(torque, entry.share);
+  const bool keeps_rotor = rotor->share >= kLeastOfTorque * torque;
+  entries.erase(std::remove_if(entries.begin(), entries.end(),
+                               [&](const ScanEntry& entry) { return is_rotor(entry) != keeps_rotor; }),
+                entries.end());
+}
+
+/// Best first. What vehicles do comes before what they were asked to do, and before the duties of rotors, where both
+/// explain about as much; a rotor's own duty comes before anything else of the thrust.
 void sort_entries(std::vector<ScanEntry>& entries) {
   constexpr double kAlike = 0.95;
   const auto weight = [](const ScanEntry& entry) {
-    const bool is_proxy = entry.variable.rfind("set_point", 0) == 0 || entry.variable.rfind("duty", 0) == 0;
+    const bool is_duty = entry.variable.rfind("duty", 0) == 0;
+    const bool is_own =
+        is_duty && entry.quantity == "rotor_force" && entry.variable.back() == entry.axis.back();
+    const bool is_proxy = entry.variable.rfind("set_point", 0) == 0 || (is_duty && !is_own) ||
+                          (entry.quantity == "rotor_force" && entry.variable == "thrust");
     return (is_proxy ? kAlike : 1) * entry.share;
   };
   std::stable_sort(entries.begin(), entries.end(),
                    [&](const ScanEntry& a, const ScanEntry& b) { return weight(a) > weight(b); });
 }
 
+/// Of forces the better of the world's and the body's axis; of the rest all, but rotors only where they stand out.
+std::vector<std::size_t> judged_columns(ScanQuantity quantity, const BestOfColumns& best) {
+  constexpr double kBodyBetter = 1.05;  // the world's axes, unless the body's explain more by so much
+  constexpr double kMostOfOthers = 0.5;
+  constexpr std::size_t kAxes = 3;
+  std::vector<std::size_t> columns;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const bool body = quantity == ScanQuantity::kForce &&
+                      best[kAxes + axis].share > kBodyBetter * std::max(best[axis].share, 0.0);
+    columns.push_back(body ? kAxes + axis : axis);
+  }
+  if (quantity == ScanQuantity::kForce) return columns;
+  for (std::size_t rotor = kAxes; rotor < best.size(); ++rotor) {
+    double others = 0;
+    for (std::size_t k = kAxes; k < best.size(); ++k)
+      others = k == rotor ? others : std::max(others, best[k].share);
+    if (others < kMostOfOthers * best[rotor].share) columns.push_back(rotor);
+  }
+  return columns;
+}
+
 }  // namespace
 
 Scan scan(const ScanSamples& samples, int jobs) {
-  constexpr double kBodyBetter = 1.05;  // the world's axes, unless the body's explain more by so much
   Scan result;
   if (samples.blocks < static_cast<int>(kFewestBlocks)) return result;
-  const Judged judged(samples, samples.force_N);
+  const Judged judged(samples, samples.residual);
   const std::vector<Abscissa> tried = abscissas(samples);
-  for (const Abscissa& a : tried) result.tried += 3 * (int{a.in_world} + int{a.in_body});
+  for (const Abscissa& a : tried) {
+    for (const ScanColumn& column : judged.columns()) result.tried += is_offered(a, column) ? 1 : 0;
+  }
   result.least_share = std::max(kLeastShare, accidental_share(samples, tried, jobs));
   std::vector<std::vector<ScanEntry>> found(tried.size());
   files::parallel_for(static_cast<int>(tried.size()), jobs, [&](int a) {
     const Abscissa& abscissa = tried[static_cast<std::size_t>(a)];
-    const BestOfComponents best = best_curves(judged, abscissa);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const bool body = best[3 + axis].share > kBodyBetter * std::max(best[axis].share, 0.0);
-      const std::size_t k = body ? 3 + axis : axis;
+    const BestOfColumns best = best_curves(judged, abscissa);
+    for (const std::size_t k : judged_columns(samples.quantity, best)) {
       if (best[k].share < result.least_share) continue;
       ScanEntry entry = entry_of(judged, abscissa, static_cast<int>(k), best[k].knots);
       if (entry.share >= result.least_share) found[static_cast<std::size_t>(a)].push_back(std::move(entry));
     }
+    prefer_rotor(found[static_cast<std::size_t>(a)]);
   });
   for (auto& entries : found) {
     for (ScanEntry& entry : entries) result.entries.push_back(std::move(entry));
   }
-  add_body_constant(judged, result.least_share, result.entries);
-  add_periods(samples, judged.chunks, result);
+  if (samples.quantity == ScanQuantity::kForce) {
+    add_body_constant(judged, result.least_share, result.entries);
+    add_periods(samples, judged.chunks, result);
+  }
   keep_best_lags(result.entries);
   for (ScanEntry& entry : result.entries) set_errors(judged, entry);
   sort_entries(result.entries);

@@ -8,6 +8,10 @@
 /// answer: of a curve f over v only beta f counts, where beta is the slope of the remainder over f(v) by the instrument
 /// f(v as commanded). And the largest of many shares is no accident only if it exceeds what the same scan finds where
 /// the signs of whole chunks are drawn at random, which leaves no dependence (wild bootstrap of the largest value).
+///
+/// Torques and rotors are judged in the same way, as torques about the body's axes and as the force that each rotor gives
+/// too much. A rotor counts over a variable only where no other one varies half as much with it: what moves two speaks of
+/// the vehicle. It then stands for the torques over that variable.
 #pragma once
 
 #include <string>
@@ -21,17 +25,21 @@ namespace swarmcert::identification {
 /// One point of a curve or map.
 struct CurvePoint {
   std::vector<double> at;  ///< one number, or two of a map
-  double force_N = 0;
-  Interval interval;  ///< 90 %, from the fits without one fold
+  double value = 0;        ///< in ScanEntry::unit
+  Interval interval;       ///< 90 %, from the fits without one fold
 };
 
 /// One variable over which one component of the remainder varies.
 struct ScanEntry {
-  std::string variable, frame, axis;  ///< "climb", "world" or "body", "x" .. "z"
-  double share = 0;              ///< of the mean square of the remainder's vector about its mean, corrected
+  std::string variable, frame, axis;  ///< "climb"; for the rest see ScanColumn
+  std::string quantity = "force", unit = "N";
+  /// Corrected, of the mean square about the mean: of the force's vector, of the torque about the one axis, or of the four
+  /// rotors together.
+  double share = 0;
   double uncorrected_share = 0;  ///< before the correction for the controller's answer
   Interval share_interval;       ///< 90 %, by resampling flights or chunks
-  double rmse_before_N = 0, rmse_after_N = 0;  ///< of the vector, single records
+  /// In newton, of the force's vector at single records; else of the column in its unit, means over 0.1 s.
+  double rmse_before = 0, rmse_after = 0;
   std::vector<CurvePoint> curve;
   bool is_checked = false;  ///< set points allow the check against closed-loop bias
   InstrumentedValue slope;  ///< beta; 1 where the controller plays no part
@@ -39,7 +47,7 @@ struct ScanEntry {
   double period_s = 0;      ///< of what repeats in time; 0: it does not
   /// What formulas are fitted to.
   std::vector<ScanVariable> variables;  ///< empty for neighbours and constants
-  int column = 0;                       ///< of ScanSamples::force_N
+  int column = 0;                       ///< of ScanSamples::residual
 };
 
 struct Scan {
