@@ -20,8 +20,8 @@ struct MotionBlock {
   Eigen::Vector3d of_velocity_m_s2, measured_m_s2;
 };
 
-/// The trapezoidal rule integrates the measured force over the same time as the velocity changes in.
-std::vector<MotionBlock> motion_blocks(const Track& track) {
+/// @param scale by which the measured force is divided. The trapezoidal rule integrates the measured force over the same time as the velocity changes in.
+std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
   std::vector<MotionBlock> blocks;
   Eigen::Vector3d integral = Eigen::Vector3d::Zero();
   std::size_t first = 0;
@@ -43,8 +43,8 @@ std::vector<MotionBlock> motion_blocks(const Track& track) {
     const double length_s = now.time_s - track.instants[first].time_s;
     if (length_s < kMotionBlock_s) continue;
     const Eigen::Vector3d gained_m_s = now.v_W_m_s - track.instants[first].v_W_m_s;
-    blocks.push_back(
-        {gained_m_s / length_s + stability::kGravity_m_s2 * Eigen::Vector3d::UnitZ(), integral / length_s});
+    blocks.push_back({gained_m_s / length_s + stability::kGravity_m_s2 * Eigen::Vector3d::UnitZ(),
+                      integral / (scale * length_s)});
     first = i;
     integral.setZero();
   }
@@ -81,6 +81,26 @@ void fit_scale(const std::vector<MotionBlock>& blocks, double mass_kg, Accelerom
 
 bool AccelerometerBalance::may_be_offset() const { return z < kOffset_z; }
 
+double modelled_accelerometer_scale(const stability::Model& model, const std::string& vehicle) {
+  double scale = 1;
+  for (const stability::EffectSpec& spec : model.effects) {
+    if (spec.name != kAccelerometerScale || !spec.acts_on(vehicle)) continue;
+    const auto value = spec.parameters.find("scale");
+    if (value != spec.parameters.end()) scale *= value->second;
+  }
+  return scale;
+}
+
+stability::EffectSpec spec_of(const AccelerometerBalance& balance) {
+  stability::EffectSpec spec;
+  spec.name = kAccelerometerScale;
+  spec.vehicle = balance.vehicle;
+  spec.parameters["scale"] = balance.scale.value;
+  spec.fit.interval["scale"] = {balance.scale.value - balance.scale.half,
+                                balance.scale.value + balance.scale.half};
+  return spec;
+}
+
 std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs& inputs,
                                                          const std::string& kind, int jobs) {
   struct OneLog {
@@ -94,7 +114,8 @@ std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs
     for (const Track& track : inputs.load(flight, problems)) {
       const bool measures = track.force_source == logs::ForceSource::kAccelerometer && track.judged.z() > 0;
       if (track.position_only || track.kind != kind || !measures) continue;
-      parts[flight].push_back({track.vehicle, motion_blocks(track)});
+      const double scale = modelled_accelerometer_scale(inputs.model_for(track), track.vehicle);
+      parts[flight].push_back({track.vehicle, motion_blocks(track, scale)});
     }
   });
   struct Vehicle {

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/identification/accelerometer_balance.h"
 #include "analysis/identification/torque_balance.h"
+#include "analysis/residuals/comparison.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -22,7 +24,7 @@ residuals::Inputs with_model(residuals::Inputs inputs, const std::vector<stabili
   return inputs;
 }
 
-/// Over all vehicles; 0 where none has ten blocks.
+/// Of the rotors, over all vehicles; 0 where none has ten blocks.
 double imbalance_of(const residuals::Inputs& inputs, int jobs) {
   double squares = 0, blocks = 0;
   for (const TorqueBalance& balance : torque_balances(inputs, inputs.models[0].kind, jobs)) {
@@ -32,27 +34,24 @@ double imbalance_of(const residuals::Inputs& inputs, int jobs) {
   return blocks > 0 ? std::sqrt(squares / blocks) : 0;
 }
 
-std::vector<stability::EffectSpec> specs_of(const std::vector<TorqueBalance>& balances,
-                                            const std::string& effect) {
+double error_of(const residuals::Inputs& inputs, const std::string& effect, int jobs) {
+  if (is_of_torques(effect)) return imbalance_of(inputs, jobs);
+  return residuals::compare(inputs, jobs, [](int, int) {}).overall.statistics.rmse.total;
+}
+
+/// One per vehicle; of a single one it is for all.
+std::vector<stability::EffectSpec> fitted_to_means(const residuals::Inputs& inputs, const std::string& effect,
+                                                   int jobs) {
+  const std::string& kind = inputs.models[0].kind;
   std::vector<stability::EffectSpec> specs;
-  for (const TorqueBalance& balance : balances) {
-    stability::EffectSpec spec;
-    spec.name = effect;
-    if (balances.size() > 1) spec.vehicle = balance.vehicle;
-    const auto set = [&](const char* name, double value, double half) {
-      spec.parameters[name] = value;
-      spec.fit.interval[name] = {value - half, value + half};
-    };
-    if (effect == "com_offset") {
-      set("offset_x_m", balance.offset_m.x(), balance.offset_half_m.x());
-      set("offset_y_m", balance.offset_m.y(), balance.offset_half_m.y());
-    } else {
-      set("torque_x_Nm", balance.torque_Nm.x(), balance.torque_half_Nm.x());
-      set("torque_y_Nm", balance.torque_Nm.y(), balance.torque_half_Nm.y());
-      set("torque_z_Nm", 0, 0);
-    }
-    specs.push_back(std::move(spec));
+  if (is_of_torques(effect)) {
+    for (const TorqueBalance& balance : torque_balances(inputs, kind, jobs))
+      specs.push_back(spec_of(balance, effect));
+  } else {
+    for (const AccelerometerBalance& balance : accelerometer_balances(inputs, kind, jobs))
+      specs.push_back(spec_of(balance));
   }
+  if (specs.size() == 1) specs[0].vehicle.clear();
   return specs;
 }
 
@@ -67,7 +66,9 @@ std::map<std::string, double> values_of_effects(const stability::Model& model) {
 
 }  // namespace
 
-bool is_balanced(const std::string& effect) { return effect == "com_offset" || effect == "torque_bias"; }
+bool is_of_torques(const std::string& effect) { return effect == "com_offset" || effect == "torque_bias"; }
+
+bool is_balanced(const std::string& effect) { return is_of_torques(effect) || effect == kAccelerometerScale; }
 
 Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect, bool keep_anyway,
                       int jobs) {
@@ -75,13 +76,14 @@ Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect
   const stability::Model& nominal = inputs.models[0];
   ladder.split = split_flights(inputs);
   ladder.earlier = nominal.ladder;
-  const std::vector<TorqueBalance> balances =
-      torque_balances(with_model(inputs, {}, ladder.split.fit), nominal.kind, jobs);
-  if (balances.empty()) {
-    ladder.too_poor = "no vehicle has ten seconds of flight with the force of each rotor";
+  std::vector<stability::EffectSpec> specs =
+      fitted_to_means(with_model(inputs, {}, ladder.split.fit), effect, jobs);
+  if (specs.empty()) {
+    ladder.too_poor = is_of_torques(effect)
+                          ? "no vehicle has ten seconds of flight with the force of each rotor"
+                          : "no vehicle has ten seconds of flight with an accelerometer and a velocity";
     return ladder;
   }
-  std::vector<stability::EffectSpec> specs = specs_of(balances, effect);
   for (stability::EffectSpec& spec : specs) {
     for (const int i : ladder.split.fit)
       spec.fit.flights.push_back(inputs.found.flights[static_cast<std::size_t>(i)].name);
@@ -93,7 +95,7 @@ Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect
     const std::vector<stability::EffectSpec> added =
         has_effect ? specs : std::vector<stability::EffectSpec>{};
     const auto error_N = [&](const std::vector<int>& which) {
-      return imbalance_of(with_model(inputs, added, which), jobs);
+      return error_of(with_model(inputs, added, which), effect, jobs);
     };
     stability::LadderRow row;
     row.effect = has_effect ? effect : "nominal";
@@ -108,7 +110,9 @@ Ladder balance_ladder(const residuals::Inputs& inputs, const std::string& effect
   const double before_N = ladder.rows.front().select_rmse_N;
   const bool helps = last.select_rmse_N <= (1 - kLeastFallOfBalance) * before_N && before_N > 0;
   if (!helps)
-    last.note = fmt::format("the rotors of the select flights are off balance by {:.6f}, then by {:.6f} N",
+    last.note = fmt::format("{} goes from {:.6f} to {:.6f} N",
+                            is_of_torques(effect) ? "the imbalance of the rotors of the select flights"
+                                                  : "the error of the select flights",
                             before_N, last.select_rmse_N);
   last.accepted = ladder.any_accepted = helps || keep_anyway;
   for (stability::EffectSpec& spec : specs) {

@@ -16,7 +16,8 @@ from foreign_campaign import KEYS, asked, model_with_lag  # noqa: E402
 from foreign_simulator import fly  # noqa: E402
 
 FLIGHTS = 3
-WIDER = 2.576 / 1.645  # from intervals of 90 % to 99 %: of ten values one lies outside of 90 %
+WIDER = 2.576 / 1.645  # from intervals of 90 % to 99 %: every value lies inside of 99 %, and of all so many inside of 90 %
+LEAST_HELD = 0.8
 
 
 def com_offset(x, y):
@@ -55,9 +56,9 @@ NAMED = {
     "com_offset": dict(truth=dict(torque=com_offset(0.004, -0.002)), values={"offset_x_m": 0.004, "offset_y_m": -0.002},
                        not_rivals=["torque_bias"], is_added=True),
     "imu_tilt": dict(truth=dict(force=tilted(0.03, -0.04), yaw_reach=3.0),
-                     values={"tilt_x_rad": 0.03, "tilt_y_rad": -0.04}, not_rivals=["constant_force"]),
+                     values={"tilt_x_rad": 0.03, "tilt_y_rad": -0.04}, not_rivals=["constant_force"], is_added=True, of_sensor=True),
     "accelerometer_scale": dict(truth=dict(accelerometer_scale=1.08), values={"scale": 1.08},
-                                not_rivals=["thrust_ratio", "constant_force"]),
+                                not_rivals=["thrust_ratio", "constant_force"], is_added=True, of_sensor=True),
     "wake_delay": dict(truth=dict(force=late_wake(0.09, 0.25, 0.06, 0.06)), vehicles=2, values={"delay_s": 0.25}),
     "tether": dict(truth=dict(force=tether(0.15, (0.1, -0.1, 0.0), 0.9)),
                    values={"stiffness_N_m": 0.15, "slack_m": 0.9}),
@@ -66,9 +67,9 @@ NAMED = {
 }
 
 
-def is_inside(fitted, value):
+def is_inside(fitted, value, wider=1):
     lower, upper = fitted["interval_90"]
-    more = 0.5 * (upper - lower) * (WIDER - 1)
+    more = 0.5 * (upper - lower) * (wider - 1)
     return lower - more <= value <= upper + more
 
 
@@ -78,7 +79,7 @@ def faults_of(effect, case, ranking):
     faults = []
     for name, value in case["values"].items():
         fitted = ranking[0]["parameters"][name]
-        if not is_inside(fitted, value):
+        if not is_inside(fitted, value, WIDER):
             faults.append(f"{name}: {value} is outside of {fitted}")
         if abs(fitted["value"] - value) > 0.2 * abs(value):
             faults.append(f"{name}: {fitted['value']} instead of {value}")
@@ -97,9 +98,18 @@ def diagnosed(options, name, case):
     for run in range(FLIGHTS):
         fly(truth, 5, flights, run, case.get("vehicles", 1))
     model = model_with_lag(options.model, folder)
-    if case.get("is_added"):  # what `add` writes must leave nothing to name
+    if case.get("is_added"):  # what `add` writes must lower the error of flights held out, and leave nothing to name
         fitted = os.path.join(folder, "fitted.toml")
-        asked(options.tool, ["add", name, "--model", model, flights, "-o", fitted], os.path.join(folder, "add.json"))
+        added = asked(options.tool, ["add", name, "--model", model, flights, "-o", fitted],
+                      os.path.join(folder, "add.json"))
+        before, after = added["ladder"][0]["test_rmse"], added["ladder"][-1]["test_rmse"]
+        if not after < 0.9 * before:
+            raise RuntimeError(f"add {name}: the held-out error goes from {before} to {after} N")
+        with open(fitted) as file:
+            states_sensor = f"# {name} is an error of a sensor" in file.read()
+        is_of_sensor = [effect.get("sensor", False) for effect in added["effects"] if effect["effect"] == name]
+        if is_of_sensor != [case.get("of_sensor", False)] or states_sensor != case.get("of_sensor", False):
+            raise RuntimeError(f"add {name}: stated as of a sensor: {is_of_sensor}, in the file: {states_sensor}")
         rest = asked(options.tool, ["diagnose", fitted, flights], os.path.join(folder, "rest.json"))
         if rest["ranking"]:
             raise RuntimeError(f"beside the {name} that add fitted: {rest['ranking']}")
@@ -118,15 +128,21 @@ def main():
     parser.add_argument("--keep", action="store_true")
     options = parser.parse_args()
     chosen = [name for name in options.effects.split(",") if name] or list(NAMED)
-    failed = 0
+    failed = held = judged = 0
     for name in chosen:
-        faults = faults_of(name, NAMED[name], diagnosed(options, name, NAMED[name])["ranking"])
+        ranking = diagnosed(options, name, NAMED[name])["ranking"]
+        faults = faults_of(name, NAMED[name], ranking)
         failed += bool(faults)
+        if ranking and ranking[0]["effect"] == name:
+            values = NAMED[name]["values"].items()
+            judged += len(values)
+            held += sum(is_inside(ranking[0]["parameters"][of], value) for of, value in values)
         print(("! " if faults else "  ") + json.dumps({"effect": name, "faults": faults}), flush=True)
     ranking = diagnosed(options, "nothing", dict(truth={}))["ranking"]
     failed += bool(ranking)
     print(("! " if ranking else "  ") + json.dumps({"effect": "nothing", "named": [e["effect"] for e in ranking]}))
-    return 1 if failed else 0
+    print(f"intervals of 90 % that hold the truth: {held} of {judged}")
+    return 1 if failed or held < LEAST_HELD * judged else 0
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -43,12 +44,13 @@ void check(const std::vector<std::string>& names, const stability::Model& model)
   std::vector<std::string> known = identification::candidate_names(model);
   known.emplace_back(identification::kRotorThrust);
   std::vector<std::string> all = known;
-  all.insert(all.end(), {"auto", "com_offset", "deep_set", "downwash_torque", "formula", "shape", "show",
-                         "torque_bias", "undo"});
+  all.insert(all.end(), {"accelerometer_scale", "auto", "com_offset", "deep_set", "downwash_torque",
+                         "formula", "shape", "show", "torque_bias", "undo"});
   for (const std::string& name : names) {
     if (identification::is_proposal(name)) continue;
     if (identification::is_balanced(name)) {
-      if (names.size() > 1) throw UsageError("add " + name + " by itself: it is fitted to torques");
+      if (names.size() > 1)
+        throw UsageError("add " + name + " by itself: it is fitted to means over a second");
       continue;
     }
     if (identification::is_written_by_hand(name))
@@ -78,14 +80,24 @@ BeforeAfter before_and_after(const residuals::Inputs& inputs, const Ladder& ladd
           identification::picture_data(inputs, inputs.models[0], ladder.model)};
 }
 
+/// Comments at the head of the model file.
+std::vector<std::string> heading_of(const stability::Model& model) {
+  std::vector<std::string> lines = {"Effects fitted to flights by swarmcert add."};
+  for (const stability::EffectSpec& effect : model.effects) {
+    if (!is_sensor_error(effect.name)) continue;
+    const std::string words = sensor_words(effect.name);
+    if (std::find(lines.begin(), lines.end(), words) == lines.end()) lines.push_back(words);
+  }
+  return lines;
+}
+
 /// `add undo`: back to the model before the last accepted effect.
 int undo(const AddOptions& options, const CommonOptions& common) {
   if (options.flights.models.size() != 1) throw UsageError("add undo takes one --model");
   if (options.output.empty()) throw UsageError("add undo writes a new model: name it with -o");
   const std::string& path = options.flights.models[0];
   const stability::Model model = identification::undone(stability::read_model(path));
-  files::write_file(options.output,
-                    stability::to_toml(model, {"Effects fitted to flights by swarmcert add."}), common.force);
+  files::write_file(options.output, stability::to_toml(model, heading_of(model)), common.force);
   files::Json result = result_head("add", {path});
   result["ladder"] = ladder_json(model.ladder);
   result["effects"] = effects_json(model.effects);
@@ -142,8 +154,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
                       progress.show(done, total, "flights");
                     });
   if (ladder.any_accepted) {
-    files::write_file(options.output,
-                      stability::to_toml(ladder.model, {"Effects fitted to flights by swarmcert add."}),
+    files::write_file(options.output, stability::to_toml(ladder.model, heading_of(ladder.model)),
                       common.force);
   }
   files::Json result = result_head("add", inputs.files());
@@ -198,7 +209,8 @@ Command add_command() {
       "is a smooth or monotone curve where no formula holds. "
       "vehicle_offset is a constant force of each vehicle; rotor_thrust a factor for each rotor, from its "
       "duty in slow\n"
-      "flight; com_offset and torque_bias are fitted to the rotors' mean torques. undo goes back by one "
+      "flight; com_offset and torque_bias are fitted to the rotors' mean torques, accelerometer_scale to\n"
+      "the change of the velocity: that and imu_tilt correct a sensor. undo goes back by one "
       "accepted effect; show "
       "prints "
       "the\n"

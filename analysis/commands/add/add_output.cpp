@@ -63,7 +63,7 @@ void print_ladder(const std::vector<LadderRow>& rows) {
 }
 
 std::string what_rows_measure(const std::vector<stability::LadderRow>& rows) {
-  const bool is_balance = !rows.empty() && identification::is_balanced(rows.back().effect);
+  const bool is_balance = !rows.empty() && identification::is_of_torques(rows.back().effect);
   return is_balance ? "force by which each rotor is off balance" : "force residual";
 }
 
@@ -81,6 +81,7 @@ void print_ladder(const Ladder& ladder) {
   for (const stability::EffectSpec& effect : ladder.model.effects) {
     print_values(effect.name, effect.name + (effect.vehicle.empty() ? "" : " of " + effect.vehicle) + " ",
                  effect.parameters, effect.fit.interval);
+    if (is_sensor_error(effect.name)) fmt::print("{}\n", sensor_words(effect.name));
   }
 }
 

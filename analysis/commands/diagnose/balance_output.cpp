@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/commands/shared/effect_output.h"
 #include "analysis/identification/accelerometer_balance.h"
 #include "analysis/identification/torque_balance.h"
 #include "analysis/identification/verdict.h"
@@ -46,27 +47,29 @@ files::Json ranking_entry(const Balance& balance, const Entry& entry) {
   files::Json rivals = files::Json::array();
   for (const std::string& rival : entry.rivals)
     rivals.push_back({{"effect", rival}, {"fly", stability::effect_info(rival).excitation}});
-  return {{"effect", entry.effect},
-          {"kind", balance.kind},
-          {"vehicle", balance.vehicle},
-          {"rmse_before", balance.rmse_before_N},
-          {"rmse_after", balance.rmse_after_N},
-          {"drop", 1 - balance.rmse_after_N / balance.rmse_before_N},
-          {"drop_ci", {nullptr, nullptr}},
-          {"parameters", entry.parameters},
-          {"per_vehicle", true},
-          {"model_form", files::Json::object()},
-          {"instrument", files::Json::object()},
-          {"class", entry.equivalence_class},
-          {"confounded_with", entry.rivals},
-          {"rivals", rivals},
-          {"separated_by", stability::effect_info(entry.effect).excitation},
-          {"paired_z", balance.z},
-          {"wald_z", nullptr},
-          {"records_in_support", balance.blocks},
-          {"blocks_in_support", balance.blocks},
-          {"flights_in_support", balance.flights},
-          {"statement", identification::in_words(balance)}};
+  files::Json json = {{"effect", entry.effect},
+                      {"kind", balance.kind},
+                      {"vehicle", balance.vehicle},
+                      {"rmse_before", balance.rmse_before_N},
+                      {"rmse_after", balance.rmse_after_N},
+                      {"drop", 1 - balance.rmse_after_N / balance.rmse_before_N},
+                      {"drop_ci", {nullptr, nullptr}},
+                      {"parameters", entry.parameters},
+                      {"per_vehicle", true},
+                      {"model_form", files::Json::object()},
+                      {"instrument", files::Json::object()},
+                      {"class", entry.equivalence_class},
+                      {"confounded_with", entry.rivals},
+                      {"rivals", rivals},
+                      {"separated_by", stability::effect_info(entry.effect).excitation},
+                      {"paired_z", balance.z},
+                      {"wald_z", nullptr},
+                      {"records_in_support", balance.blocks},
+                      {"blocks_in_support", balance.blocks},
+                      {"flights_in_support", balance.flights},
+                      {"statement", identification::in_words(balance)}};
+  if (is_sensor_error(entry.effect)) json["sensor"] = true;
+  return json;
 }
 
 files::Json ranking_entry_of(const TorqueBalance& balance) {

@@ -52,25 +52,27 @@ files::Json json_of(const Missing& missing) {
   files::Json rivals = files::Json::array();
   for (const identification::Rival& rival : finding.rivals)
     rivals.push_back({{"effect", rival.effect}, {"fly", rival.excitation}});
-  return {{"effect", missing.effect},
-          {"kind", missing.kind},
-          {"rmse_before", finding.rmse_before_N},
-          {"rmse_after", finding.rmse_after_N},
-          {"drop", 1 - finding.rmse_after_N / finding.rmse_before_N},
-          {"drop_ci", {finding.drop_interval.first, finding.drop_interval.second}},
-          {"parameters", values_json(missing.effect, missing.parameters, missing.intervals)},
-          {"per_vehicle", !missing.specs.empty() && !missing.specs[0].vehicle.empty()},
-          {"model_form", std::move(model_form)},
-          {"instrument", std::move(instrument)},
-          {"class", class_of(missing)},
-          {"confounded_with", finding.confounded_with()},
-          {"rivals", std::move(rivals)},
-          {"separated_by", missing.excitation},
-          {"paired_z", finding.paired_z},
-          {"wald_z", finding.wald_z},
-          {"records_in_support", finding.support.records},
-          {"blocks_in_support", finding.support.blocks},
-          {"flights_in_support", finding.support.flights}};
+  files::Json json = {{"effect", missing.effect},
+                      {"kind", missing.kind},
+                      {"rmse_before", finding.rmse_before_N},
+                      {"rmse_after", finding.rmse_after_N},
+                      {"drop", 1 - finding.rmse_after_N / finding.rmse_before_N},
+                      {"drop_ci", {finding.drop_interval.first, finding.drop_interval.second}},
+                      {"parameters", values_json(missing.effect, missing.parameters, missing.intervals)},
+                      {"per_vehicle", !missing.specs.empty() && !missing.specs[0].vehicle.empty()},
+                      {"model_form", std::move(model_form)},
+                      {"instrument", std::move(instrument)},
+                      {"class", class_of(missing)},
+                      {"confounded_with", finding.confounded_with()},
+                      {"rivals", std::move(rivals)},
+                      {"separated_by", missing.excitation},
+                      {"paired_z", finding.paired_z},
+                      {"wald_z", finding.wald_z},
+                      {"records_in_support", finding.support.records},
+                      {"blocks_in_support", finding.support.blocks},
+                      {"flights_in_support", finding.support.flights}};
+  if (is_sensor_error(missing.effect)) json["sensor"] = true;
+  return json;
 }
 
 void print(const Missing& missing, int flights) {
@@ -79,6 +81,7 @@ void print(const Missing& missing, int flights) {
              finding.rmse_before_N, finding.rmse_after_N,
              100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.first,
              100 * finding.drop_interval.second);
+  if (is_sensor_error(missing.effect)) fmt::print("    {}\n", sensor_words(missing.effect));
   print_values(missing.effect, "    ", missing.parameters, missing.intervals);
   for (std::size_t c = 0; c < missing.instrument.size(); ++c) {
     const identification::InstrumentedValue& value = missing.instrument[c];

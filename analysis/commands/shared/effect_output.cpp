@@ -21,11 +21,20 @@ files::Json values_json(const std::string& effect, const std::map<std::string, d
   return json;
 }
 
+bool is_sensor_error(const std::string& effect) {
+  return effect == "accelerometer_scale" || effect == "imu_tilt" || effect == "sensor_delay";
+}
+
+std::string sensor_words(const std::string& effect) {
+  return effect + " is an error of a sensor, not a force on the vehicle.";
+}
+
 files::Json effects_json(const std::vector<stability::EffectSpec>& effects) {
   files::Json json = files::Json::array();
   for (const stability::EffectSpec& effect : effects) {
     files::Json entry = {{"effect", effect.name},
                          {"parameters", values_json(effect.name, effect.parameters, effect.fit.interval)}};
+    if (is_sensor_error(effect.name)) entry["sensor"] = true;
     if (!effect.vehicle.empty()) entry["vehicle"] = effect.vehicle;
     json.push_back(std::move(entry));
   }

@@ -19,6 +19,11 @@ double shown_beyond_file(const std::string& effect, const std::string& parameter
 files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
                         const std::map<std::string, std::pair<double, double>>& intervals);
 
+/// Whether `effect` is an error of what the log says, and no force on the vehicle.
+bool is_sensor_error(const std::string& effect);
+/// "accelerometer_scale is an error of a sensor, not a force". Precondition: is_sensor_error(effect).
+std::string sensor_words(const std::string& effect);
+
 /// One entry per effect with its parameters and their intervals.
 files::Json effects_json(const std::vector<stability::EffectSpec>& effects);
 
