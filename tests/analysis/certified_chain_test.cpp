@@ -129,6 +129,9 @@ TEST_F(CertifiedChain, ASmoothActivationIsCertifiedCheckedAndHeldAgainstSamples)
   EXPECT_TRUE(result["bounds"][0]["lower"].is_null());
   EXPECT_NE(result["bounds"][0]["lower_reason"].get<std::string>().find("ReLU"), std::string::npos);
   EXPECT_GE(result["bounds"][0]["upper"].get<double>(), 1e4);  // all slopes are 1 at the origin
+  const double estimate = result["bounds"][0]["slope_estimate"];
+  EXPECT_LE(estimate, result["bounds"][0]["upper"].get<double>());
+  EXPECT_GE(estimate, 5e3);
   expect("check cert.json " + net, 0, {"accepted", "0 lower bounds", chain});  // as the certificate states
   expect("check cert.json " + net + " --activation tanh", 0, {"accepted", chain});
   expect("check cert.json " + net + " --activation relu", 1, {"rejected", "chain", "ReLU"});

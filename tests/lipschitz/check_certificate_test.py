@@ -33,6 +33,40 @@ def safetensors(sizes, generator, names=()):
     return pack("<Q", len(text)) + text + data
 
 
+def onnx(nodes, sizes, generator):
+    """An ONNX model: layers w1, w2, ... of these sizes, and `nodes` as (type, inputs, output)."""
+    def varint(value):
+        return bytes([value]) if value < 128 else bytes([value & 127 | 128]) + varint(value >> 7)
+
+    def field(number, value):
+        if isinstance(value, int):
+            return varint(number << 3) + varint(value)
+        value = value.encode() if isinstance(value, str) else value
+        return varint(number << 3 | 2) + varint(len(value)) + value
+
+    graph = b""
+    for kind, inputs, output in nodes:
+        graph += field(1, b"".join(field(1, name) for name in inputs) + field(2, output) + field(4, kind))
+    for k, shape in enumerate(zip(sizes, sizes[1:])):
+        numbers = pack(f"<{shape[0] * shape[1]}f", *(generator.uniform(-1, 1) for _ in range(shape[0] * shape[1])))
+        graph += field(5, b"".join(field(1, size) for size in shape) + field(2, 1) + field(8, f"w{k + 1}") + field(9, numbers))
+    graph += field(11, field(1, "x")) + field(12, field(1, "y"))
+    return field(1, 8) + field(2, "test") + field(7, graph)
+
+
+def smooth_models(folder, generator):
+    """ONNX models with activations: one that ends in its activation, SiLU as PyTorch exports it, and ReLU."""
+    layer = lambda k, x, y: ("MatMul", [x, f"w{k}"], y)
+    models = {
+        "tanh": ([layer(1, "x", "a"), ("Tanh", ["a"], "b"), layer(2, "b", "c"), ("Tanh", ["c"], "y")], [3, 5, 2]),
+        "silu": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "s"), ("Mul", ["a", "s"], "b"), layer(2, "b", "y")], [3, 5, 2]),
+        "sigmoid": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
+        "elu": ([layer(1, "x", "a"), ("Elu", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2])}
+    for name, (nodes, sizes) in models.items():
+        (folder / f"{name}.onnx").write_bytes(onnx(nodes, sizes, generator))
+        yield [str(folder / f"{name}.onnx")]
+
+
 def heterogeneous(folder, generator):
     """A network.toml with two kinds, ground, clamp and units."""
     for name, sizes in (("small", [6, 5, 4]), ("large", [6, 4, 4, 4]), ("ground", [4, 5, 4]), ("rho", [4, 5, 1])):
@@ -249,7 +283,7 @@ def check_activations(certificate, net, folder):
     def copy():
         return json.loads(json.dumps(certificate))
 
-    is_stated = net[0].endswith("smooth.toml")
+    is_stated = net[0].endswith(("smooth.toml", ".onnx"))
     for part, entry in certificate["network"]["weights"].items():
         own = {step["op"] for step in entry["chain"]} - {"linear", "clamp"}
         for op in set(second.STEEPEST) - own:
@@ -296,6 +330,7 @@ def run():
                 (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
         smooth_net = str(smooth(folder))
         nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
+        nets += [(net, []) for net in smooth_models(folder, generator)]
         nets += [([str(tiny)], ["--activation", op]) for op in ("silu", "gelu", "sigmoid")]
         tried = rejected = 0
         for index, (net, options) in enumerate(nets):
@@ -308,7 +343,7 @@ def run():
             reason = second.check(certificate, second.Network(**arguments(net)))
             assert not reason, f"the second checker rejects a sound certificate: {reason}"
             check_fixed(certificate, net, folder)
-            if net[0] == smooth_net or "--activation" in options:
+            if net[0] == smooth_net or net[0].endswith(".onnx") or "--activation" in options:
                 check_activations(certificate, net, folder)
             paths = list(leaves(certificate))
             chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]

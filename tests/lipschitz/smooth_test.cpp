@@ -5,6 +5,7 @@
 #include "lipschitz/checker/check.h"
 #include "lipschitz/checker/witness.h"
 #include "lipschitz/networks.h"
+#include "lipschitz/slope_estimate.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/json.h"
 
@@ -107,6 +108,30 @@ TEST(SmoothBounds, OfDeepSetsAreAboveEverySampledSlopeForEveryPairOfActivations)
     }
   }
   EXPECT_EQ(with_program, 5 * 2);
+}
+
+TEST(SmoothBounds, TheSampledEstimateLiesBelowTheBoundAndAboveBlindSampling) {
+  std::mt19937 generator(28);
+  double closest = 0;
+  for (const Activation activation : kSmooth) {
+    const Network network = tests::plain(with(tests::random_network({3, 12, 2}, generator), activation));
+    const Certification found = certified_by(network);
+    const double estimate = lipschitz::slope_estimate(network, found.bounds[0], {}).value();
+    EXPECT_LE(estimate, upper_of(found, "network") * (1 + 1e-9)) << files::function_of(activation).op;
+    EXPECT_GE(estimate, 0.9 * tests::sampled_slope(*network.plain, generator, 500));
+    closest = std::max(closest, estimate / upper_of(found, "network"));
+  }
+  EXPECT_GT(closest, 0.7);
+  // tanh(tanh(x0 + 3 x1) + s), whose largest slopes are 1, 3 and sqrt 10, where x0 + 3 x1 = s = 0.
+  Network set = tests::deep_set(tests::weights({tests::layer(1, 2, {1, 3}), tests::layer(1, 1, {1})}),
+                                tests::weights({tests::layer(1, 1, {1}), tests::layer(1, 1, {1})}));
+  set.phi.at("default").activation = set.rho.at("default").activation = Activation::kTanh;
+  const auto estimate_of = [&set](const std::string& block, const std::vector<double>& scale) {
+    return lipschitz::slope_estimate(set, {"set:default:default", block, scale}, {}).value();
+  };
+  EXPECT_NEAR(estimate_of("all", {}), std::sqrt(10.0), 1e-3);
+  EXPECT_NEAR(estimate_of("x0", {}), 1, 1e-3);
+  EXPECT_NEAR(estimate_of("x1", {1, 2}), 6, 1e-2);
 }
 
 TEST(SmoothBounds, OneHiddenLayerOfSigmoidsHasAQuarterOfTheBoundOfRelu) {

@@ -14,6 +14,7 @@
 #include "analysis/commands/certify/certify_report.h"
 #include "analysis/commands/commands.h"
 #include "lipschitz/certify.h"
+#include "lipschitz/slope_estimate.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
@@ -162,6 +163,22 @@ void add_comparisons(const files::Network& network, const lipschitz::CertifyOpti
   });
 }
 
+/// Where no lower bound is searched. None with --nodes 0, as there.
+void add_slope_estimates(const files::Network& network, const lipschitz::CertifyOptions& options,
+                         CertifyOutput& output) {
+  if (options.lower.rounds == 0) return;
+  const std::vector<CertifiedBound>& bounds = output.found.bounds;
+  output.slope_estimates.resize(bounds.size());
+  files::parallel_for(static_cast<int>(bounds.size()), options.jobs, [&](int i) {
+    const CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
+    if (bound.is_relu) return;
+    lipschitz::SlopeEstimateOptions sampling;
+    sampling.seed = options.lower.seed;
+    sampling.stop = lipschitz::Stop(options.cancelled);
+    output.slope_estimates[static_cast<std::size_t>(i)] = lipschitz::slope_estimate(network, bound, sampling);
+  });
+}
+
 /// Range and float32 error over the box of --domain, or over what the clamp lets through.
 void add_ranges(const files::Network& network, const CertifyOptions& options, CertifyOutput& output) {
   const std::map<std::string, lipschitz::Box> domain =
@@ -291,6 +308,7 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   output.max_lipschitz = options.max_lipschitz;
   output.domain_file = options.domain;
   const Certification& found = output.found;
+  add_slope_estimates(network, options.certify, output);
   if (options.explain) add_comparisons(network, options.certify, output);
   if (!options.domain.empty() || options.range) add_ranges(network, options, output);
   if (!options.map.empty()) {

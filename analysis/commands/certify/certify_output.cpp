@@ -29,6 +29,10 @@ std::string output_unit(const files::Network& network) {
   return network.output_unit.empty() ? "output" : network.output_unit;
 }
 
+std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound) {
+  return bound < output.slope_estimates.size() ? output.slope_estimates[bound] : std::nullopt;
+}
+
 Json attained_json(const Attained& attained) {
   Json points = Json::array();
   for (std::size_t j = 0; j < attained.points.size(); ++j)
@@ -255,6 +259,7 @@ Json certify_json(const files::Network& network, const CertifyOutput& output) {
     json["product_upper"] = bound.product.value();
     json["search_rounds"] = bound.lower.rounds;
     if (!bound.is_relu) json["lower_reason"] = kForReluOnly;
+    if (const auto estimate = slope_estimate_of(output, i)) json["slope_estimate"] = estimate->value();
     if (bound.branch_stop != lipschitz::BranchStop::kNothingRun)
       json["branch_stop"] = name(bound.branch_stop);
     if (bound.nodes > 0) {
@@ -411,7 +416,8 @@ std::string interruption_words(const CertifiedBound& bound) {
   return {};
 }
 
-void print_bounds(const files::Network& network, const Certification& found) {
+void print_bounds(const files::Network& network, const CertifyOutput& output) {
+  const Certification& found = output.found;
   std::size_t width = 8, method_width = 7;
   for (const CertifiedBound& bound : found.bounds) {
     width = std::max(width, label(bound).size());
@@ -421,7 +427,8 @@ void print_bounds(const files::Network& network, const Certification& found) {
              found.domain.empty() ? "all inputs" : "the box");
   fmt::print("  {:<{}}  {:>14}  {:<{}}  {:>12}  {:>14}  {:>6}  {}\n", "function", width, "proved upper",
              "method", method_width, "product", "witnessed", "ratio", "unit");
-  for (const CertifiedBound& bound : found.bounds) {
+  for (std::size_t i = 0; i < found.bounds.size(); ++i) {
+    const CertifiedBound& bound = found.bounds[i];
     const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
     fmt::print("  {:<{}}  {:>14.10g}  {:<{}}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
                bound.upper.value(), name(bound.method), method_width, bound.product.value(),
@@ -433,6 +440,8 @@ void print_bounds(const files::Network& network, const Certification& found) {
       fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
                  name(bound.sdp.stop));
     }
+    if (const auto estimate = slope_estimate_of(output, i))
+      fmt::print("    steepest slope of sampled pairs, in double: {:.6g} (estimate)\n", estimate->value());
     const std::string interruption = interruption_words(bound);
     if (!interruption.empty()) fmt::print("    {}\n", interruption);
     const std::string outlook = branch_outlook_words(bound);
@@ -536,7 +545,7 @@ void print_laws(const files::Network& network, const Certification& found) {
 void print_certification(const files::Network& network, const CertifyOutput& output) {
   print_chains(network, output.found);
   print_layers(network, output.found);
-  print_bounds(network, output.found);
+  print_bounds(network, output);
   print_laws(network, output.found);
   print_comparisons(output);
   print_ranges(network, output);

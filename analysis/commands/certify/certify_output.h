@@ -20,6 +20,8 @@ struct CertifyOutput {
   lipschitz::Certification found;
   std::vector<std::optional<lipschitz::Comparison>>
       comparisons;  ///< per bound of `found`; empty where not asked for
+  /// Per bound of `found`, where its activation is not ReLU; empty where none was asked for.
+  std::vector<std::optional<lipschitz::Estimate>> slope_estimates;
   std::vector<lipschitz::CertifiedRange> ranges;
   std::vector<lipschitz::Float32Error> float32_errors;
   lipschitz::Verdict verdict = lipschitz::Verdict::kInconclusive;
