@@ -5,12 +5,13 @@
 
 #include <cstdint>
 
+#include "controller/position_law.h"
 #include "controller/scalar.h"
 
 namespace swarmcert::controller {
 
-/// Newton per gram-force, with the gravity of position_law.h.
-inline constexpr double kNewtonPerGramForce = 9.81e-3;
+/// Newton per gram-force.
+inline constexpr double kNewtonPerGramForce = 1e-3 * kGravity_m_s2;
 /// Voltage of a full cell: v = 1.
 inline constexpr double kReferenceVoltage_V = 4.2;
 /// Voltages outside are readings that cannot be: the sensor has failed.

@@ -275,17 +275,6 @@ LadderRow read_row(const TomlTable& table) {
 
 }  // namespace
 
-double ThrustMap::pwm(double force_N, double battery_V) const {
-  const double v = battery_V / kFullBattery_V;
-  const double b = c10 + c11 * v;
-  const double c = c00 + c01 * v - force_N / kGramForce_N;
-  if (c20 == 0) return std::clamp(-c / b, 0.0, 1.0);
-  const double discriminant = b * b - 4 * c20 * c;
-  const double vertex = -b / (2 * c20);
-  if (discriminant <= 0) return std::clamp(vertex, 0.0, 1.0);
-  return std::clamp(vertex + std::sqrt(discriminant) / (2 * std::abs(c20)) * (c20 > 0 ? 1 : -1), 0.0, 1.0);
-}
-
 Model parse_model(const std::string& text, const std::string& path) {
   const toml::table document = files::parse_toml(text, path);
   const TomlTable top(document, path);

@@ -15,25 +15,18 @@ namespace swarmcert::stability {
 
 using controller::kGravity_m_s2;
 /// One gram-force: the unit of the thrust map and of the published networks.
-inline constexpr double kGramForce_N = 1e-3 * kGravity_m_s2;
+inline constexpr double kGramForce_N = controller::kNewtonPerGramForce;
 /// The battery voltage to which the thrust map and the effect `battery` refer.
 inline constexpr double kFullBattery_V = controller::kReferenceVoltage_V;
 /// Voltages of one lithium-polymer cell: empty under load, and full of the high-voltage kind with a reading's error.
 inline constexpr std::pair<double, double> kOneCell_V = {2.5, 4.5};
 
-/// Force of one rotor: g = c00 + c10 p + c01 v + c20 p^2 + c11 p v in gram-force, with p = PWM / 65536 in [0, 1]
-/// and v = battery voltage / 4.2 V. Increasing in p where the calibration holds; read_model() checks that at full
-/// battery. Unlike force_of_pwm(), which the flight code uses, force_N() is not held above zero.
+/// Force of one rotor, by the map that flies. Outside the calibrated range the polynomial may fall with p.
 struct ThrustMap : controller::ThrustMap<double> {
-  double force_N(double pwm, double battery_V) const {
-    const double v = battery_V / kFullBattery_V;
-    return kGramForce_N * (c00 + c01 * v + pwm * (c10 + c11 * v + c20 * pwm));
-  }
-
-  /// The p in [0, 1] whose force is nearest to `force_N`: the root of the quadratic on its increasing branch, or the
-  /// end of the range where the force cannot be reached.
-  double pwm(double force_N, double battery_V) const;
-
+  /// Never negative. @param pwm p = PWM / 65536, in [0, 1]
+  double force_N(double pwm, double battery_V) const { return force_of_pwm(*this, pwm, battery_V); }
+  /// The p in [0, 1] that gives `force_N`; 0 or 1 where none gives so little or so much.
+  double pwm(double force_N, double battery_V) const { return pwm_of_force(*this, force_N, battery_V); }
   /// Largest force of one rotor, in newton.
   double largest_N(double battery_V) const { return force_N(1, battery_V); }
 };

@@ -14,7 +14,6 @@ using Vector = std::array<double, 3>;
 
 /// Standard gravity as the authors' code rounds it, m/s^2; also what turns newton into gram-force here.
 inline constexpr double kGravity_m_s2 = 9.81;
-inline constexpr double kNewtonPerGramForce = kGravity_m_s2 / 1000;
 
 /// Two records further apart than this are not neighbours in time: filters restart, nothing is interpolated between. In logs
 /// slower than 50 Hz it is two and a half steps instead.

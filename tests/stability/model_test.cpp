@@ -79,6 +79,22 @@ TEST(Model, PwmInvertsTheThrustMapWhereItReachesAndSaturatesElsewhere) {
   EXPECT_GT(inside, 100);
 }
 
+TEST(Model, RotorForcesAreThoseOfTheFlightCodeAndNeverNegative) {
+  ThrustMap map{};
+  map.c00 = -2, map.c10 = 10, map.c20 = 12, map.c11 = 1;  // below zero up to p = 0.16
+  EXPECT_EQ(map.force_N(0, kFullBattery_V), 0);
+  int positive = 0;
+  for (double battery_V = 3.3; battery_V < 4.21; battery_V += 0.1) {
+    for (double pwm = 0; pwm <= 1; pwm += 0.01) {
+      const double force_N = map.force_N(pwm, battery_V);
+      ASSERT_GE(force_N, 0);
+      ASSERT_EQ(force_N, controller::force_of_pwm<double>(map, pwm, battery_V));
+      positive += force_N > 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(positive, 500);
+}
+
 TEST(Model, ReadsBackWhatItWrites) {
   Model model = parse_model(kVehicle + R"toml(
 [sensor]
