@@ -31,11 +31,9 @@ std::vector<stability::LogRecord> injected_log(const Inputs& inputs, const Track
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     const stability::Instant& now = track.instants[i];
     const Eigen::Vector3d a = track.specific_force_m_s2[i] + (without[i] - with[i]) / model.mass_kg;
-    const Eigen::Quaterniond q(now.R_WB);
-    const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
     stability::LogRecord log;
     log.tick_us = static_cast<std::uint32_t>(std::llround(1e6 * (now.time_s + track.clock_offset_s)));
-    log.quaternion = stability::compress_quaternion(wxyz);
+    log.quaternion = stability::compress_quaternion(Eigen::Quaterniond(now.R_WB));
     for (std::size_t k = 0; k < 3; ++k) {
       const auto axis = static_cast<int>(k);
       auto& kinematics = log.position_mm_velocity_mm_s_acceleration_mm_s2;

@@ -101,14 +101,12 @@ stability::Swarm make_swarm(const stability::Model& model, const Kinds& kinds, c
 
 void set_state(const stability::Model& model, const Track& track, std::size_t record, double* x) {
   const stability::Instant& now = track.instants[record];
-  const Eigen::Quaterniond q(now.R_WB);
   for (int axis = 0; axis < 3; ++axis) {
     x[stability::kPosition + axis] = now.p_W_m[axis];
     x[stability::kVelocity + axis] = now.v_W_m_s[axis];
     x[stability::kOmega + axis] = now.omega_B_rad_s[axis];
   }
-  const double wxyz[] = {q.w(), q.x(), q.y(), q.z()};
-  std::copy(wxyz, wxyz + 4, x + stability::kQuaternion);
+  Eigen::Map<Eigen::Vector4d>(x + stability::kQuaternion) = Eigen::Quaterniond(now.R_WB).coeffs();
   for (std::size_t r = 0; r < stability::kNumRotors; ++r)
     x[stability::kRotors + r] = model.thrust.force_N(track.duty[record][r], now.battery_V);
 }

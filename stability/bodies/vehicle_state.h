@@ -5,16 +5,16 @@
 
 namespace swarmcert::stability {
 
-/// Places in a vehicle's state. Position and velocity in the world (z up); the quaternion (w, x, y, z) takes body to
-/// world; angular velocity in the body; rotors: force behind the motor lag, front right, back right, back left, front
-/// left (unused without lag).
+/// Places in a vehicle's state. Position and velocity in the world (z up); the quaternion takes body to world, in the
+/// order x, y, z, w of logs and of Eigen::Quaterniond::coeffs(); angular velocity in the body; rotors: force behind the
+/// motor lag, front right, back right, back left, front left (unused without lag).
 enum StateIndex : int { kPosition = 0, kVelocity = 3, kQuaternion = 6, kOmega = 10, kRotors = 13 };
 inline constexpr int kVehicleStateSize = 17;
 inline constexpr int kNumRotors = 4;
 
-/// The rotation of a quaternion (w, x, y, z) of any length but 0: R(q) / |q|^2, row after row.
+/// The rotation of a quaternion of any length but 0: R(q) / |q|^2, row after row.
 template <typename Number>
-inline void rotation_of(const Number& w, const Number& x, const Number& y, const Number& z, Number (&R)[9]) {
+inline void rotation_of(const Number& x, const Number& y, const Number& z, const Number& w, Number (&R)[9]) {
   const Number one(1), s = Number(2) / (w * w + x * x + y * y + z * z);
   const Number xx = s * x * x, yy = s * y * y, zz = s * z * z;
   const Number xy = s * x * y, xz = s * x * z, yz = s * y * z;
@@ -24,6 +24,7 @@ inline void rotation_of(const Number& w, const Number& x, const Number& y, const
   R[6] = xz - wy, R[7] = yz + wx, R[8] = one - xx - yy;
 }
 
+/// @param q x, y, z, w
 inline void rotation_of(const double* q, Eigen::Matrix3d* R_WB) {
   double R[9];
   rotation_of(q[0], q[1], q[2], q[3], R);

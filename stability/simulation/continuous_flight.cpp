@@ -235,7 +235,7 @@ void ContinuousFlight::meet(int event, double t, double* y) {
   x[kPosition + 2] = options_.ground_m;
   std::fill(x + kVelocity, x + kQuaternion, 0.0);
   std::fill(x + kQuaternion, x + kRotors, 0.0);
-  x[kQuaternion] = 1;
+  x[kQuaternion + 3] = 1;
 }
 
 void ContinuousFlight::fly_to(double end_s, double limit_s) {

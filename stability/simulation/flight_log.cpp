@@ -69,13 +69,14 @@ char* put(char* to, const LogRecord& record) {
 }
 
 /// `q` turned by a small random rotation vector.
-void disturb(files::Random& random, double angle_rad, double* q) {
+Eigen::Quaterniond disturbed(files::Random& random, double angle_rad, const Eigen::Quaterniond& q) {
   const double x = 0.5 * angle_rad * random.bell(), y = 0.5 * angle_rad * random.bell(),
                z = 0.5 * angle_rad * random.bell();
-  const double w[4] = {q[0] - q[1] * x - q[2] * y - q[3] * z, q[1] + q[0] * x + q[2] * z - q[3] * y,
-                       q[2] + q[0] * y - q[1] * z + q[3] * x, q[3] + q[0] * z + q[1] * y - q[2] * x};
-  const double length = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
-  for (int i = 0; i < 4; ++i) q[i] = w[i] / length;
+  const Eigen::Quaterniond r(
+      q.w() - q.x() * x - q.y() * y - q.z() * z, q.x() + q.w() * x + q.y() * z - q.z() * y,
+      q.y() + q.w() * y - q.x() * z + q.z() * x, q.z() + q.w() * z + q.x() * y - q.y() * x);
+  const double length = std::sqrt(r.w() * r.w() + r.x() * r.x() + r.y() * r.y() + r.z() * r.z());
+  return Eigen::Quaterniond(r.coeffs() / length);
 }
 
 /// Product of the model's accelerometer_scale effects.
@@ -156,11 +157,11 @@ LogRecord FlightRecorder::record(int index, Vehicle& vehicle, const Eigen::Vecto
   record.tick_us = static_cast<std::uint32_t>(std::max(tick_us, 0.0));
   if (!vehicle.records.empty()) record.tick_us = std::max(record.tick_us, vehicle.records.back().tick_us + 1);
 
-  double q[4] = {x[kQuaternion], x[kQuaternion + 1], x[kQuaternion + 2], x[kQuaternion + 3]};
-  disturb(random, sensor.attitude_noise_rad, q);
+  const Eigen::Quaterniond q =
+      disturbed(random, sensor.attitude_noise_rad, Eigen::Quaterniond(x + kQuaternion));
   record.quaternion = compress_quaternion(q);
   Eigen::Matrix3d R_WB;
-  rotation_of(q, &R_WB);
+  rotation_of(q.coeffs().data(), &R_WB);
   Eigen::Vector3d acceleration_B = accelerometer_scale(model) * specific_force_B;
   for (int i = 0; i < 3; ++i) acceleration_B[i] += sensor.accelerometer_noise_m_s2 * random.bell();
   const Eigen::Vector3d acceleration_W = R_WB * acceleration_B;

@@ -283,7 +283,7 @@ void SampledFlight::touch_ground() {
     input(i).resting = true;
     at(kPosition + 2) = options_.ground_m;
     for (int axis = 0; axis < 3; ++axis) at(kVelocity + axis) = at(kOmega + axis) = 0;
-    for (int c = 0; c < 4; ++c) at(kQuaternion + c) = c == 0 ? 1 : 0;
+    for (int c = 0; c < 4; ++c) at(kQuaternion + c) = c == 3 ? 1 : 0;
   }
 }
 

@@ -7,8 +7,7 @@ namespace swarmcert::stability {
 namespace {
 
 constexpr double kPiRad = 3.14159265358979323846;
-constexpr double kMagnitude = 511;       ///< nine bits
-constexpr int kPlace[4] = {1, 2, 3, 0};  ///< of x, y, z, w in (w, x, y, z)
+constexpr double kMagnitude = 511;  ///< nine bits
 
 }  // namespace
 
@@ -54,9 +53,8 @@ Eigen::Vector3d DelayedSignal::filter(const Eigen::Vector3d& input) {
   return input + gain_ * (younger + share_ * (older - younger) - input);
 }
 
-std::uint32_t compress_quaternion(const double* q_wxyz) {
-  double q[4];
-  for (int i = 0; i < 4; ++i) q[i] = q_wxyz[kPlace[i]];
+std::uint32_t compress_quaternion(const Eigen::Quaterniond& quaternion) {
+  const double* const q = quaternion.coeffs().data();
   unsigned largest = 0;
   for (unsigned i = 1; i < 4; ++i) {
     if (std::abs(q[i]) > std::abs(q[largest])) largest = i;
@@ -70,20 +68,6 @@ std::uint32_t compress_quaternion(const double* q_wxyz) {
     compressed = compressed << 10 | negative << 9 | static_cast<std::uint32_t>(magnitude);
   }
   return compressed;
-}
-
-void expand_quaternion(std::uint32_t compressed, double* q_wxyz) {
-  const unsigned largest = compressed >> 30;
-  double sum = 0;
-  for (unsigned i = 4; i-- > 0;) {
-    if (i == largest) continue;
-    const double magnitude = static_cast<double>(compressed & 0x1ffu) / kMagnitude * std::sqrt(0.5);
-    const double value = (compressed >> 9 & 1u) != 0 ? -magnitude : magnitude;
-    q_wxyz[kPlace[i]] = value;
-    sum += value * value;
-    compressed >>= 10;
-  }
-  q_wxyz[kPlace[largest]] = std::sqrt(std::max(1 - sum, 0.0));
 }
 
 std::int16_t milli(double value) {

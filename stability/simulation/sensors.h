@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <vector>
 
@@ -36,13 +37,10 @@ class DelayedSignal {
   bool is_filled_ = false;
 };
 
-/// A quaternion (w, x, y, z) in 32 bits, as firmware logs it: in the order x, y, z, w, two bits for the index of the
+/// A unit quaternion in 32 bits, as firmware logs it: in the order x, y, z, w, two bits for the index of the
 /// largest component, which is made positive and left out; then sign and nine bits of magnitude / sqrt(1/2) for each
 /// of the others, in ascending order from the highest bits.
-std::uint32_t compress_quaternion(const double* q_wxyz);
-
-/// Inverse of compress_quaternion(), up to quantisation: 1.4e-3 per component.
-void expand_quaternion(std::uint32_t compressed, double* q_wxyz);
+std::uint32_t compress_quaternion(const Eigen::Quaterniond& q);
 
 /// value x 1000 as the firmware's int16: truncated towards zero; wraps where int16 does.
 std::int16_t milli(double value);

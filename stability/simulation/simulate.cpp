@@ -68,8 +68,8 @@ Simulation simulate(Swarm& swarm, const Gains& gains, const Task& task, const Si
       sums[i].add(error);
       // The third entry of the thrust axis, whose angle to the vertical is the tilt.
       const double* const q = x + kQuaternion;
-      const double length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-      most_tilted[i] = std::min(most_tilted[i], 1 - 2 * (q[1] * q[1] + q[2] * q[2]) / length2);
+      const double length2 = q[3] * q[3] + q[0] * q[0] + q[1] * q[1] + q[2] * q[2];
+      most_tilted[i] = std::min(most_tilted[i], 1 - 2 * (q[0] * q[0] + q[1] * q[1]) / length2);
       SimulatedVehicle& result = simulation.vehicles[i];
       result.smallest_height_m = std::min(result.smallest_height_m, p.z());
       if (options.keep_errors && k % 5 == 0) {

@@ -195,7 +195,7 @@ Rows Swarm::make_rows() const {
   Rows rows(lines * kVehicleStateSize);
   for (std::size_t line = 0; line < lines; ++line) {
     const std::size_t at = row_index(static_cast<int>(line) * kRowLength, kVehicleStateSize);
-    std::fill_n(rows.data() + at + kQuaternion * kRowLength, kRowLength, 1.0);
+    std::fill_n(rows.data() + at + (kQuaternion + 3) * kRowLength, kRowLength, 1.0);
   }
   return rows;
 }
@@ -350,7 +350,7 @@ void set_hover(const Model& model, const Eigen::Vector3d& p_W_m, const Eigen::Ve
     state[kPosition + i] = p_W_m[i];
     state[kVelocity + i] = v_W_m_s[i];
   }
-  state[kQuaternion] = 1;
+  state[kQuaternion + 3] = 1;
   for (int r = 0; r < kNumRotors; ++r) state[kRotors + r] = model.weight_N() / kNumRotors;
 }
 

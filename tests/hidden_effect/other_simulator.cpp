@@ -224,8 +224,7 @@ stability::LogRecord record(const Vehicle& vehicle, const Target& target, double
   log.tick_us = static_cast<std::uint32_t>(1e6 * (time_s - vehicle.clock_s) + 6000 + 80 * noise.bell());
   Eigen::Quaterniond q = vehicle.q;
   q = q * Eigen::Quaterniond(1, 5e-4 * noise.bell(), 5e-4 * noise.bell(), 5e-4 * noise.bell()).normalized();
-  const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
-  log.quaternion = stability::compress_quaternion(wxyz);
+  log.quaternion = stability::compress_quaternion(q);
   const Vector3d noise_B = 0.12 * Vector3d(noise.bell(), noise.bell(), noise.bell());
   const Vector3d a = q * (vehicle.accelerometer.y + noise_B);
   auto& kinematics = log.position_mm_velocity_mm_s_acceleration_mm_s2;

@@ -13,6 +13,22 @@
 namespace swarmcert::stability {
 namespace {
 
+/// What a compressed quaternion stands for, after the firmware's description.
+Eigen::Quaterniond expanded(std::uint32_t compressed) {
+  Eigen::Quaterniond q;
+  const int largest = static_cast<int>(compressed >> 30);
+  double sum = 0;
+  for (int i = 3; i >= 0; --i) {
+    if (i == largest) continue;
+    const double magnitude = (compressed & 0x1ffu) / 511.0 * std::sqrt(0.5);
+    q.coeffs()[i] = (compressed >> 9 & 1u) != 0 ? -magnitude : magnitude;
+    sum += magnitude * magnitude;
+    compressed >>= 10;
+  }
+  q.coeffs()[largest] = std::sqrt(1 - sum);
+  return q;
+}
+
 /// Reads what to_usd_log() wrote, written from the format's description alone.
 struct UsdReader {
   std::vector<std::string> names;
@@ -128,10 +144,7 @@ TEST(FlightLog, ResidualForceOfALogIsTheEffectThatActed) {
   const Simulation flown = simulate(swarm, gains, *task, options);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const LogRecord& record : flown.logs[0]) {
-    double q[4];
-    expand_quaternion(record.quaternion, q);
-    Eigen::Matrix3d R;
-    rotation_of(q, &R);
+    const Eigen::Matrix3d R = expanded(record.quaternion).toRotationMatrix();
     double thrust_N = 0;
     for (const std::uint32_t pwm : record.pwm)
       thrust_N += model.thrust.force_N(pwm / 65536.0, 1e-3 * record.battery_mV);
@@ -147,17 +160,18 @@ TEST(FlightLog, ResidualForceOfALogIsTheEffectThatActed) {
 TEST(Sensors, QuaternionsSurviveTheirCompressionUpToTheQuantum) {
   files::Random random(4);
   for (int trial = 0; trial < 2000; ++trial) {
-    double q[4], r[4];
-    double length = 0;
-    for (double& component : q) {
-      component = random.bell();
-      length += component * component;
-    }
-    for (double& component : q) component /= std::sqrt(length);
-    expand_quaternion(compress_quaternion(q), r);
-    const double sign = q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3] < 0 ? -1 : 1;
-    for (int i = 0; i < 4; ++i) ASSERT_NEAR(sign * r[i], q[i], 3e-3) << trial;
+    Eigen::Vector4d wxyz;
+    for (double& component : wxyz) component = random.bell();
+    const Eigen::Quaterniond q = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized();
+    const Eigen::Quaterniond r = expanded(compress_quaternion(q));
+    const double sign = q.dot(r) < 0 ? -1 : 1;
+    for (int i = 0; i < 4; ++i) ASSERT_NEAR(sign * r.coeffs()[i], q.coeffs()[i], 3e-3) << trial;
   }
+}
+
+TEST(Sensors, TheRealPartIsTheLastComponentOfACompressedQuaternion) {
+  EXPECT_EQ(compress_quaternion(Eigen::Quaterniond(1, 0, 0, 0)) >> 30, 3U);
+  EXPECT_EQ(compress_quaternion(Eigen::Quaterniond(0, 1, 0, 0)) >> 30, 0U);
 }
 
 TEST(Sensors, AccelerometerFilterHas3dBAtItsCutoffAndTheStatedDelay) {
