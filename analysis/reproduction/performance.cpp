@@ -274,12 +274,12 @@ Finding performance(const Setting& setting) {
           (fs::path(setting.work) / fmt::format("{}{}-{}/table-{}.json", truth.name,
                                                 setting.updraft ? "-updraft" : "", k, setting.seed))
               .string();
-      if (!setting.computes(unit)) continue;
+      if (!setting.shard.has(unit)) continue;
       fly_unit(setting, truth, k, file);
       const files::Json unit_file = files::read_json(file, kPerformanceSchema);
       for (const files::Json& flight : unit_file.at("flights")) flights.push_back(flight);
     }
-    if (setting.shards > 1) continue;
+    if (!setting.shard.is_whole()) continue;
     add_truth(truth, flights, finding);
     finding.json["columns"].back()["flights"] = std::move(flights);
   }

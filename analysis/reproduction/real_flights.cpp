@@ -231,8 +231,8 @@ Finding real_flights(const Setting& setting) {
   finding.json["train"] = "development: runs with index mod 3 = 0 of campaign 21, and campaign 23";
   finding.json["select"] = "development: runs with index mod 3 = 1 of campaign 21";
   finding.json["test"] = "visible_test";
-  if (setting.computes(0)) deep_set_alone(setting, finding);
-  if (setting.computes(1)) physics_first(setting, finding);
+  if (setting.shard.has(0)) deep_set_alone(setting, finding);
+  if (setting.shard.has(1)) physics_first(setting, finding);
   const Recorded recorded = recorded_flights(setting, true);
   for (const residuals::Inputs* inputs : {&recorded.fit, &recorded.select, &recorded.test})
     for (const residuals::FlightFiles& flight : inputs->found.flights)

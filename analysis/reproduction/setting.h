@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/base/shard.h"
 #include "stability/gains.h"
 #include "stability/model.h"
 
@@ -16,8 +17,7 @@ struct Setting {
   bool updraft = false;  ///< the truth of simulations has an updraft around the downwash
   std::uint64_t seed = 1;
   int jobs = 0;
-  int shard = 0,
-      shards = 1;      ///< units with index % shards == shard are computed; others are read if they are there
+  files::Shard shard;  ///< of the units: these are computed, others are read if they are there
   std::string work;    ///< folder for flights, networks and units, which experiments share and take up again
   std::string models;  ///< folder of the bundled models
   std::string gains;   ///< gains.toml of the simulated vehicles
@@ -26,8 +26,6 @@ struct Setting {
   std::string calibrate, flights;  ///< folders for gains_in_flight()
   double coverage = 0.9;           ///< that it promises
   std::function<void(int done, int total, const std::string& what)> progress;
-
-  bool computes(int unit) const { return unit % shards == shard; }
 };
 
 /// What differs between both sizes. One minute per task is the paper's (section V-B).

@@ -46,8 +46,8 @@ Json shard_head(const Grid& grid, const SweepOptions& options) {
           {"axes", std::move(axes)},
           {"compute", grid.compute},
           {"pareto", grid.pareto},
-          {"shard", options.shard % options.count},
-          {"count", options.count},
+          {"shard", options.shard.index},
+          {"count", options.shard.count},
           {"total", grid.cells()}};
 }
 
@@ -107,13 +107,30 @@ void refuse_foreign(const std::string& folder) {
                     "name another folder, or --force writes beside what is there"});
 }
 
+/// In alphabetical order; at least one.
+std::vector<std::string> shard_files(const std::string& folder) {
+  std::vector<std::string> paths;
+  if (fs::is_directory(folder)) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+      const std::string name = entry.path().filename().string();
+      if (name.rfind("shard-", 0) == 0 && entry.path().extension() == ".json")
+        paths.push_back(entry.path().string());
+    }
+  }
+  std::sort(paths.begin(), paths.end());
+  if (paths.empty()) {
+    throw InputError(
+        {folder, "", "", "", "has no shard of a sweep", "swarmcert sweep GRID.toml -o " + folder});
+  }
+  return paths;
+}
+
 }  // namespace
 
 SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepOptions& options) {
-  const int shard = options.shard % options.count;
   SweepOutcome outcome;
-  outcome.file = (fs::path(folder) /
-                  ("shard-" + std::to_string(shard) + "-of-" + std::to_string(options.count) + ".json"))
+  outcome.file = (fs::path(folder) / ("shard-" + std::to_string(options.shard.index) + "-of-" +
+                                      std::to_string(options.shard.count) + ".json"))
                      .string();
   const Json head = shard_head(grid, options);
   if (!options.overwrite) refuse_foreign(folder);
@@ -139,7 +156,8 @@ SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepO
   }
   fs::create_directories(folder);
   std::vector<long> todo;
-  for (long i = shard; i < grid.cells(); i += options.count) {
+  for (long i = 0; i < grid.cells(); ++i) {
+    if (!options.shard.has(i)) continue;
     ++outcome.total;
     if (done.count(i) == 0) todo.push_back(i);
   }
@@ -165,19 +183,7 @@ SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepO
 }
 
 MergedSweep read_shards(const std::string& folder) {
-  std::vector<std::string> paths;
-  if (fs::is_directory(folder)) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-      const std::string name = entry.path().filename().string();
-      if (name.rfind("shard-", 0) == 0 && entry.path().extension() == ".json")
-        paths.push_back(entry.path().string());
-    }
-  }
-  std::sort(paths.begin(), paths.end());
-  if (paths.empty()) {
-    throw InputError(
-        {folder, "", "", "", "has no shard of a sweep", "swarmcert sweep GRID.toml -o " + folder});
-  }
+  const std::vector<std::string> paths = shard_files(folder);
   Json first;
   std::map<long, Cell> cells;
   for (const std::string& path : paths) {

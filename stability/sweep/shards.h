@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "nn/base/json.h"
+#include "nn/base/shard.h"
 #include "stability/sweep/grid.h"
 
 namespace swarmcert::stability {
 
 struct SweepOptions {
-  /// Cells with index % count == shard % count: 0/4 .. 3/4 and 1/4 .. 4/4 both cover a grid.
-  int shard = 0, count = 1;
+  files::Shard shard;   ///< of the grid's cells
   bool resume = false;  ///< keep the cells that the shard's file already has
   bool overwrite = false;
   int jobs = 0;

@@ -75,13 +75,11 @@ std::string write_report(const ReproduceOptions& options, const Finding& finding
 
 int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   const Experiment& chosen = experiment(options.name);
-  const Shard shard = parse_shard(options.shard);
-  options.setting.shard = shard.index % shard.count;
-  options.setting.shards = shard.count;
+  options.setting.shard = parse_shard(options.shard);
   const fs::path result_file = fs::path(options.output) / options.name / "result.json";
   refuse_to_replace(common, common.json);
   reproduction::Setting& setting = options.setting;
-  const bool is_part = setting.shards > 1;
+  const bool is_part = !setting.shard.is_whole();
   if (!is_part) refuse_to_replace(common, result_file.string());
   if (!setting.recorded.empty() && !fs::is_directory(setting.recorded))
     throw files::InputError({setting.recorded, "", "--recorded", "", "is not a folder",

@@ -5,16 +5,13 @@
 #include <string>
 
 #include "analysis/cli/command.h"
+#include "nn/base/shard.h"
 
 namespace swarmcert::analysis {
 
-/// Part `index` of `count`, 0 <= index <= count; part `count` is part 0, so that 0/4 .. 3/4 and 1/4 .. 4/4 both cover all.
-struct Shard {
-  int index = 0, count = 1;
-};
-
+/// Part N of N is part 0, so that 0/4 .. 3/4 and 1/4 .. 4/4 both cover all.
 /// @throws UsageError if `text` is not I/N with 0 <= I <= N.
-inline Shard parse_shard(const std::string& text) {
+inline files::Shard parse_shard(const std::string& text) {
   constexpr long kMostParts = 1'000'000;
   const std::size_t slash = text.find('/');
   char* end = nullptr;
@@ -23,7 +20,7 @@ inline Shard parse_shard(const std::string& text) {
   const long count = has_index ? std::strtol(text.c_str() + slash + 1, &end, 10) : 0;
   if (!has_index || *end != '\0' || count < 1 || count > kMostParts || index < 0 || index > count)
     throw UsageError("--shard " + text + ": write I/N with 0 <= I <= N, e.g. 2/8");
-  return {static_cast<int>(index), static_cast<int>(count)};
+  return {static_cast<int>(index % count), static_cast<int>(count)};
 }
 
 }  // namespace swarmcert::analysis

@@ -53,9 +53,7 @@ int run_sweep(const SweepOptions& options, const CommonOptions& common) {
     refuse_folder(common, report_folder(options.folder, options.report));
   const stability::Grid grid = stability::load_grid(options.grid);
   stability::SweepOptions sweep;
-  const Shard shard = parse_shard(options.shard.empty() ? "0/1" : options.shard);
-  sweep.shard = shard.index;
-  sweep.count = shard.count;
+  sweep.shard = parse_shard(options.shard.empty() ? "0/1" : options.shard);
   sweep.resume = options.resume;
   sweep.overwrite = common.force;
   sweep.jobs = common.jobs;
@@ -71,7 +69,7 @@ int run_sweep(const SweepOptions& options, const CommonOptions& common) {
                      outcome.done, outcome.total, outcome.file));
     return kInconclusive;
   }
-  if (sweep.count == 1)
+  if (sweep.shard.is_whole())
     return finish("sweep", options.folder, options.report, grid.inputs, common, options.resume);
   files::Json result = result_head("sweep", grid.inputs);
   result["shard"] = {{"file", outcome.file}, {"cells", outcome.done}};
