@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
+#include "stability/bounds/error_parts.h"
+#include "stability/bounds/tracking_bounds.h"
 #include "stability/vehicle.h"
 
 namespace swarmcert::stability {
@@ -164,6 +168,44 @@ TEST(DisturbanceBounds, AStaircaseIsLateByItsPeriodAndItsLatency) {
   const GainNorms gains = {0, 5, 0, 0};
   EXPECT_DOUBLE_EQ(staircase_error(gains, 100, 0.004, 0.5), 5 * 0.014 * 0.5);
   EXPECT_EQ(staircase_error(gains, 0, 0, 0.5), 0);
+}
+
+TEST(DisturbanceBounds, AConstantErrorOfAnEstimateIsAddedToClassesThatDoNotContainIt) {
+  const AxisLoop loop = {kMass_kg, 10, 5, 10, {1 / 17.4}, 0};
+  const SampledLoop sampled = {loop, 0.01, 0.01};
+  OtherErrors other;
+  other.velocity_error.amplitude = 0.5;
+  other.velocity_error.rate = 0.01;
+  const double without_m = error_parts(loop, 1, other).velocity_error_m;
+  const double sampled_m = error_parts(sampled, 1, other).velocity_error_m;
+  other.velocity_error.constant = 0.1;
+  EXPECT_NEAR(error_parts(loop, 1, other).velocity_error_m,
+              without_m + 0.1 * continuous_norms(loop, Estimate::kVelocity).edge, 1e-12);
+  EXPECT_NEAR(error_parts(sampled, 1, other).velocity_error_m,
+              sampled_m + 0.1 * sampled_norms(sampled, Estimate::kVelocity, Instants::kAll).edge, 1e-12);
+}
+
+TEST(DisturbanceBounds, AMeasuredAmplitudeThatContainsTheBiasIsNotChargedTwice) {
+  DisturbanceSource source;
+  source.kind = "measured";
+  for (int axis = 0; axis < 3; ++axis) {
+    source.axis[axis].amplitude_N = 0.1;
+    source.axis[axis].rate_N_s = 0.05;
+    source.bias_N[axis] = 0.04;
+  }
+  EXPECT_TRUE(source.amplitudes_reach_bias());
+  const AxisLoop loop = {kMass_kg, 10, 5, 10, {}, 0};
+  const GainNorms gains = continuous_norms(loop, Channel::kForce);
+  const AxisBounds once =
+      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}), true, INFINITY);
+  EXPECT_DOUBLE_EQ(once.bounds.by_amplitude, gains.amplitude * 0.1);
+  EXPECT_DOUBLE_EQ(once.bounds.by_rate, gains.rate * 0.05 + gains.edge * 0.04)
+      << "a rate does not contain it";
+  const AxisBounds beside =
+      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}), false, INFINITY);
+  EXPECT_DOUBLE_EQ(beside.bounds.by_amplitude, gains.amplitude * 0.1 + gains.edge * 0.04);
+  source.bias_N[1] = 0.2;
+  EXPECT_FALSE(source.amplitudes_reach_bias()) << "no amplitude contains a larger bias";
 }
 
 }  // namespace
