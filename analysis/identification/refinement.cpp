@@ -96,31 +96,47 @@ class Refinement {
 
   /// One pass over the flights.
   Point evaluate(const std::vector<std::vector<double>>& thetas) const {
-    struct Difference {
-      double lower, upper;
-    };
     std::vector<Candidate> around = candidates_;
-    std::vector<Difference> differences(unknowns_.size(), {0, 0});
+    const std::vector<double> widths = add_neighbours(thetas, around);
+    const Grams full =
+        block_grams(passes_.inputs, passes_.kind, around, passes_.flights, passes_.jobs, passes_.progress);
+    Members members;
+    for (int m = 0; m < static_cast<int>(around.size()); ++m) members.push_back({m, 0});
+    const Selection selection(full);
+    const Eigen::VectorXd c = selection.coefficients(members), in_model = selection.in_model(members, c);
+    Point point;
+    point.thetas = thetas;
+    const Eigen::MatrixXd mix = mixing(full, around, widths, c, in_model, point);
+    const double y = add_blocks(full, mix, point);
+    point.error =
+        y - 2 * point.coefficients.dot(point.b) + point.coefficients.dot(point.gram * point.coefficients);
+    return point;
+  }
+
+  /// Gives each member of `around` its shapes, followed by two neighbours per unknown shape, for derivatives.
+  /// @return by unknown: the distance between its two neighbours; 0 for coefficients.
+  std::vector<double> add_neighbours(const std::vector<std::vector<double>>& thetas,
+                                     std::vector<Candidate>& around) const {
+    std::vector<double> widths(unknowns_.size(), 0);
     for (std::size_t m = 0; m < around.size(); ++m) around[m].thetas = {thetas[m]};
     for (std::size_t k = 0; k < unknowns_.size(); ++k) {
       const Unknown& u = unknowns_[k];
       if (!u.is_shape) continue;
       const double at = thetas[u.member][u.index], h = kDifference * u.scale;
-      differences[k] = {std::max(at - h, parameter(u).lower), std::min(at + h, parameter(u).upper)};
-      for (const double value : {differences[k].lower, differences[k].upper}) {
+      const double lower = std::max(at - h, parameter(u).lower), upper = std::min(at + h, parameter(u).upper);
+      widths[k] = upper - lower;
+      for (const double value : {lower, upper}) {
         around[u.member].thetas.push_back(thetas[u.member]);
         around[u.member].thetas.back()[u.index] = value;
       }
     }
-    const Grams full =
-        block_grams(passes_.inputs, passes_.kind, around, passes_.flights, passes_.jobs, passes_.progress);
-    Members members;
-    for (int m = 0; m < static_cast<int>(around.size()); ++m) members.push_back({m, 0});
-    Point point;
-    point.thetas = thetas;
-    const Selection selection(full);
-    const Eigen::VectorXd c = selection.coefficients(members), in_model = selection.in_model(members, c);
-    // Column of unknown k = sum over the columns of `full`.
+    return widths;
+  }
+
+  /// The column of unknown k as a sum over the columns of `full`; also sets the point's coefficients.
+  Eigen::MatrixXd mixing(const Grams& full, const std::vector<Candidate>& around,
+                         const std::vector<double>& widths, const Eigen::VectorXd& c,
+                         const Eigen::VectorXd& in_model, Point& point) const {
     Eigen::MatrixXd mix = Eigen::MatrixXd::Zero(full.columns, static_cast<Eigen::Index>(unknowns_.size()));
     point.coefficients = Eigen::VectorXd::Zero(mix.cols());
     std::vector<std::size_t> next_theta(around.size(), 1);
@@ -138,10 +154,9 @@ class Refinement {
         continue;
       }
       const std::size_t lower = next_theta[u.member]++, upper = next_theta[u.member]++;
-      const double width = differences[k].upper - differences[k].lower;
       for (int i = 0; i < around[u.member].columns(); ++i) {
-        mix(columns[upper] + i, column) = c[first + i] / width;
-        mix(columns[lower] + i, column) = -c[first + i] / width;
+        mix(columns[upper] + i, column) = c[first + i] / widths[k];
+        mix(columns[lower] + i, column) = -c[first + i] / widths[k];
       }
     }
     std::vector<const Candidate*> effects;
@@ -152,6 +167,11 @@ class Refinement {
           mix(full.first_column[pair.stage][0], static_cast<Eigen::Index>(k)) = 1 / around[pair.stage].scale;
       }
     }
+    return mix;
+  }
+
+  /// Fills the point's blocks, their sums and the number of equations. @return the sum of the squares to be explained.
+  static double add_blocks(const Grams& full, const Eigen::MatrixXd& mix, Point& point) {
     const Eigen::Index n = mix.cols();
     point.gram = Eigen::MatrixXd::Zero(n, n);
     point.b = Eigen::VectorXd::Zero(n);
@@ -174,9 +194,7 @@ class Refinement {
       point.equations += 3.0 * block.records;
       point.blocks.push_back(std::move(small));
     }
-    point.error =
-        y - 2 * point.coefficients.dot(point.b) + point.coefficients.dot(point.gram * point.coefficients);
-    return point;
+    return y;
   }
 
   /// One over the variance of the pull of each shape towards where it is, in units of the noise.

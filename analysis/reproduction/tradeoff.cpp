@@ -49,6 +49,32 @@ stability::Disturbance measured(const std::vector<Moment>& moments, double lag_s
   return seen;
 }
 
+/// Largest z-errors of the swaps that test a network.
+struct ErrorsInSwaps {
+  double predicted_m = 0, flown_m = 0;
+  std::string by;  ///< which bound predicted it
+};
+
+ErrorsInSwaps errors_in_swaps(const Setting& setting, const Truth& truth, const stability::AxisLoop& loop,
+                              double motor_lag_s, const files::Network& network) {
+  ErrorsInSwaps errors;
+  for (int k = 0; k < scale_of(setting).flight_seeds; ++k) {
+    const Flown flown = fly(
+        setting, truth, {"swap", kVehicles, 0, seed_of(setting.seed, "table", static_cast<std::uint64_t>(k))},
+        &network, false);
+    errors.flown_m = std::max(errors.flown_m, largest_error_m(flown, 2));
+    for (const auto& moments : flown.vehicles) {
+      const stability::DisturbanceBounds bounds =
+          stability::disturbance_bounds(loop, stability::Channel::kForce, measured(moments, motor_lag_s));
+      if (bounds.least() > errors.predicted_m) {
+        errors.predicted_m = bounds.least();
+        errors.by = bounds.which();
+      }
+    }
+  }
+  return errors;
+}
+
 }  // namespace
 
 Finding lipschitz_tradeoff(const Setting& setting) {
@@ -76,23 +102,8 @@ Finding lipschitz_tradeoff(const Setting& setting) {
         (std::filesystem::path(stages.flights(stage).folder) / fmt::format("gamma-{:g}", gamma)).string();
     const Learned learned = learn(setting, options, folder, stages.data_key(stage),
                                   [&] { return stages.data(stage, options.sizes); });
-    double predicted_m = 0, flown_m = 0;
-    std::string by;
-    for (int k = 0; k < scale_of(setting).flight_seeds; ++k) {
-      const Flown flown =
-          fly(setting, truth,
-              {"swap", kVehicles, 0, seed_of(setting.seed, "table", static_cast<std::uint64_t>(k))},
-              &learned.network, false);
-      flown_m = std::max(flown_m, largest_error_m(flown, 2));
-      for (const auto& moments : flown.vehicles) {
-        const stability::DisturbanceBounds bounds = stability::disturbance_bounds(
-            *loop, stability::Channel::kForce, measured(moments, gains.motor_lag_s));
-        if (bounds.least() > predicted_m) {
-          predicted_m = bounds.least();
-          by = bounds.which();
-        }
-      }
-    }
+    const auto [predicted_m, flown_m, by] =
+        errors_in_swaps(setting, truth, *loop, gains.motor_lag_s, learned.network);
     table.rows.push_back({fmt::format("{:g}", gamma), fmt::format("{:.1f}", learned.bound),
                           fmt::format("{:.2f}", learned.test_gf), fmt::format("{:.3f}", predicted_m), by,
                           fmt::format("{:.3f}", flown_m)});

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <set>
 
 #include "analysis/residuals/force_residual.h"
@@ -78,6 +79,65 @@ void use_log_rules(Inputs& inputs) {
   }
 }
 
+void read_models(const std::vector<std::string>& paths, Inputs& inputs) {
+  for (const std::string& path : paths) {
+    inputs.models.push_back(stability::read_model(path));
+    inputs.named_files.push_back(path);
+    const std::string& kind = inputs.models.back().kind;
+    for (std::size_t i = 0; i + 1 < inputs.models.size(); ++i) {
+      if (inputs.models[i].kind != kind) continue;
+      throw files::InputError({path, "", "vehicle.kind", kind,
+                               "is the kind of " + inputs.models[i].path + " as well",
+                               "give one model per kind"});
+    }
+  }
+}
+
+/// The vehicles of the fleet that flew, with their models.
+std::map<std::string, std::string> flown_models(const Inputs& inputs) {
+  std::map<std::string, std::string> models;
+  for (const FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) {
+      const auto known = inputs.fleet.find(vehicle);
+      if (known != inputs.fleet.end()) models[vehicle] = known->second.model;
+    }
+  }
+  return models;
+}
+
+/// Where no model is named: those of the fleet or, where that may be, 1 kg.
+void use_other_models(const InputArguments& arguments, const std::map<std::string, std::string>& flown,
+                      Inputs& inputs) {
+  use_fleet_models(inputs, flown);
+  if (!inputs.models.empty()) return;
+  if (!arguments.may_lack_model) {
+    throw files::InputError({arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
+                             "no model is named and no vehicle is known",
+                             "give a model.toml ('swarmcert model draft' writes one), or a flights.toml "
+                             "(--flights) that names one per "
+                             "vehicle"});
+  }
+  inputs.rules.per_mass = true;
+  inputs.models.push_back(unit_model());
+}
+
+/// The network and the published mass, in every model.
+void complete_models(const InputArguments& arguments, Inputs& inputs) {
+  const auto complete = [&](stability::Model& model) {
+    if (!arguments.network.empty()) set_network(model, arguments.network);
+    if (arguments.rules.has_published_signals()) set_published_mass(model);
+  };
+  for (stability::Model& model : inputs.models) complete(model);
+  for (auto& [vehicle, model] : inputs.vehicle_models) complete(model);
+  for (auto& [path, model] : inputs.log_models) complete(model);
+  if (arguments.network.empty()) return;
+  inputs.named_files.push_back(arguments.network);
+  files::NetworkArguments network;
+  network.file = arguments.network;
+  const files::Network loaded = files::load_network(network);
+  for (const auto& [name, weights] : files::parts(loaded)) inputs.named_files.push_back(weights->path);
+}
+
 }  // namespace
 
 Inputs read_inputs(const InputArguments& arguments) {
@@ -92,64 +152,22 @@ Inputs read_inputs(const InputArguments& arguments) {
   }
   inputs.words = arguments.flights;
   inputs.found = find_flights(arguments.flights, inputs.log_rules);
-  for (const std::string& path : arguments.models) {
-    inputs.models.push_back(stability::read_model(path));
-    inputs.named_files.push_back(path);
-    const std::string& kind = inputs.models.back().kind;
-    for (std::size_t i = 0; i + 1 < inputs.models.size(); ++i) {
-      if (inputs.models[i].kind != kind) continue;
-      throw files::InputError({path, "", "vehicle.kind", kind,
-                               "is the kind of " + inputs.models[i].path + " as well",
-                               "give one model per kind"});
-    }
-  }
-  std::set<std::string> flown;
-  std::map<std::string, std::string> flown_models;  // by vehicle
-  for (const FlightFiles& flight : inputs.found.flights) {
-    for (const auto& [vehicle, path] : flight.logs) {
-      const auto known = inputs.fleet.find(vehicle);
-      if (known == inputs.fleet.end()) continue;
-      flown.insert(known->second.kind);
-      flown_models[vehicle] = known->second.model;
-    }
-  }
+  read_models(arguments.models, inputs);
+  const std::map<std::string, std::string> flown = flown_models(inputs);
   for (const auto& [vehicle, use] : inputs.fleet) {
     if (inputs.kinds.index(use.kind) < 0)
       add_kind(inputs.kinds, use.kind, stability::read_model(use.model).mass_kg);
   }
-  if (inputs.models.empty()) {
-    use_fleet_models(inputs, flown_models);
-    if (inputs.models.empty() && !arguments.may_lack_model) {
-      throw files::InputError({arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
-                               "no model is named and no vehicle is known",
-                               "give a model.toml ('swarmcert model draft' writes one), or a flights.toml "
-                               "(--flights) that names one per "
-                               "vehicle"});
-    }
-    if (inputs.models.empty()) {
-      inputs.rules.per_mass = true;
-      inputs.models.push_back(unit_model());
-    }
-  }
+  if (inputs.models.empty()) use_other_models(arguments, flown, inputs);
   use_log_rules(inputs);
-  const auto complete = [&](stability::Model& model) {
-    if (!arguments.network.empty()) set_network(model, arguments.network);
-    if (arguments.rules.has_published_signals()) set_published_mass(model);
-  };
-  for (stability::Model& model : inputs.models) complete(model);
-  for (auto& [vehicle, model] : inputs.vehicle_models) complete(model);
-  for (auto& [path, model] : inputs.log_models) complete(model);
-  if (!arguments.network.empty()) {
-    inputs.named_files.push_back(arguments.network);
-    files::NetworkArguments network;
-    network.file = arguments.network;
-    const files::Network loaded = files::load_network(network);
-    for (const auto& [name, weights] : files::parts(loaded)) inputs.named_files.push_back(weights->path);
-  }
+  complete_models(arguments, inputs);
   for (const stability::Model& model : inputs.models) add_kind(inputs.kinds, model.kind, model.mass_kg);
   inputs.fallback_kind = inputs.models[0].kind;
   inputs.cache = std::make_shared<LogCache>(inputs.rules.per_mass);
-  if (inputs.models.size() == 1 && !flown.empty() && flown.count(inputs.fallback_kind) == 0) {
+  const bool is_of_fleet = std::any_of(flown.begin(), flown.end(), [&inputs](const auto& one) {
+    return inputs.fleet.at(one.first).kind == inputs.fallback_kind;
+  });
+  if (inputs.models.size() == 1 && !flown.empty() && !is_of_fleet) {
     for (auto& [vehicle, use] : inputs.fleet) use.kind = inputs.fallback_kind;
   }
   return inputs;

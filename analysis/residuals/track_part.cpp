@@ -89,6 +89,78 @@ const stability::Gains* gains_of(const GainsOfKinds& gains, const std::string& k
   return nullptr;
 }
 
+TrackErrors head_of(const Track& track) {
+  TrackErrors errors;
+  errors.flight = track.flight;
+  errors.scenario = track.scenario;
+  errors.vehicle = track.vehicle;
+  errors.kind = track.kind;
+  errors.path = track.path;
+  errors.position_only = track.position_only;
+  errors.judged = track.judged;
+  errors.thrust_source = track.thrust_source;
+  errors.force_source = track.force_source;
+  errors.clock_offset_s = track.clock_offset_s;
+  errors.clock_onsets = track.clock_onsets;
+  errors.has_reference_clock = track.has_reference_clock;
+  errors.has_absolute_clock = track.has_absolute_clock;
+  errors.findings = logs::findings(track.health);
+  errors.doubts = track.doubts;
+  errors.is_sound = logs::is_sound(track.health);
+  return errors;
+}
+
+/// Sorts the residuals `r`, and `r0` without effects, into points, blocks, the map of neighbours and the series.
+void add_records(const Track& track, const std::vector<Eigen::Vector3d>& r,
+                 const std::vector<Eigen::Vector3d>& r0, TrackPart& result) {
+  TrackErrors& errors = result.errors;
+  Part& part = result.part;
+  double block_end_s = -INFINITY;
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    ++errors.cut[static_cast<std::size_t>(track.cut[i])];
+    if (track.cut[i] != Cut::kNone) continue;
+    const stability::Instant& now = track.instants[i];
+    if (i > 0 && track.cut[i - 1] == Cut::kNone && track.restarts[i] == 0)
+      errors.used_s += now.time_s - track.instants[i - 1].time_s;
+    ResidualPoint point{r[i].cast<float>(), r0[i].cast<float>(), {}};
+    regions_of(now, now.time_s - track.instants.front().time_s, point.regions);
+    part.points.push_back(point);
+    if (now.time_s >= block_end_s) {
+      part.blocks.emplace_back();
+      block_end_s = now.time_s + kBlock_s;
+    }
+    part.blocks.back().squares += r[i].cwiseAbs2();
+    part.blocks.back().count += 1;
+    add_to_map(now, r[i].z(), result.neighbours);
+    if (part.points.size() % 2 == 1) {
+      errors.series.push_back({static_cast<float>(now.time_s + track.clock_offset_s), point.r.x(),
+                               point.r.y(), point.r.z(), point.r0.z()});
+    }
+  }
+}
+
+/// Of a simulation along the track, with the gains of the log or else of the vehicle's kind.
+TrajectoryErrors trajectory_errors(const Inputs& inputs, const GainsOfKinds& gains,
+                                   const stability::Model& model, Track& track) {
+  TrajectoryErrors errors;
+  const auto of_log = inputs.log_gains.find(track.path);
+  const stability::Gains* const own_gains =
+      of_log != inputs.log_gains.end() ? &of_log->second : gains_of(gains, track.kind);
+  if (track.thrust_source != logs::ThrustSource::kDuty) {
+    errors.refused = "the log has no duty of each motor";
+  } else if (!model.rotors.empty()) {
+    errors.refused = "simulation needs four rotors in X";
+  } else if (own_gains == nullptr) {
+    errors.refused = "no gains.toml for vehicles of kind " + track.kind;
+  } else {
+    const stability::Model flown = with_lag(model, *own_gains);
+    apply_model(flown, inputs.kinds, inputs.rules, track);
+    const std::vector<Eigen::Vector3d> left = force_residual(flown, inputs.kinds, inputs.rules, track);
+    errors = fly_along(flown, *own_gains, inputs.kinds, track, left);
+  }
+  return errors;
+}
+
 }  // namespace
 
 void sort_and_shorten(std::vector<Moment>& moments) {
@@ -129,22 +201,7 @@ GroupErrors errors_of(const std::vector<const Part*>& parts) {
 TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& track) {
   TrackPart result;
   TrackErrors& errors = result.errors;
-  errors.flight = track.flight;
-  errors.scenario = track.scenario;
-  errors.vehicle = track.vehicle;
-  errors.kind = track.kind;
-  errors.path = track.path;
-  errors.position_only = track.position_only;
-  errors.judged = track.judged;
-  errors.thrust_source = track.thrust_source;
-  errors.force_source = track.force_source;
-  errors.clock_offset_s = track.clock_offset_s;
-  errors.clock_onsets = track.clock_onsets;
-  errors.has_reference_clock = track.has_reference_clock;
-  errors.has_absolute_clock = track.has_absolute_clock;
-  errors.findings = logs::findings(track.health);
-  errors.doubts = track.doubts;
-  errors.is_sound = logs::is_sound(track.health);
+  errors = head_of(track);
   if (track.position_only) {
     errors.trajectory.refused = errors.torque.refused = "position only";
     return result;
@@ -158,55 +215,19 @@ TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& tra
   apply_model(model, inputs.kinds, inputs.rules, track);
   const std::vector<Eigen::Vector3d> r = force_residual(model, inputs.kinds, inputs.rules, track);
 
-  Part& part = result.part;
-  part.weight_N = model.weight_N();
-  double block_end_s = -INFINITY;
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    ++errors.cut[static_cast<std::size_t>(track.cut[i])];
-    if (track.cut[i] != Cut::kNone) continue;
-    const stability::Instant& now = track.instants[i];
-    if (i > 0 && track.cut[i - 1] == Cut::kNone && track.restarts[i] == 0)
-      errors.used_s += now.time_s - track.instants[i - 1].time_s;
-    ResidualPoint point{r[i].cast<float>(), r0[i].cast<float>(), {}};
-    regions_of(now, now.time_s - track.instants.front().time_s, point.regions);
-    part.points.push_back(point);
-    if (now.time_s >= block_end_s) {
-      part.blocks.emplace_back();
-      block_end_s = now.time_s + kBlock_s;
-    }
-    part.blocks.back().squares += r[i].cwiseAbs2();
-    part.blocks.back().count += 1;
-    add_to_map(now, r[i].z(), result.neighbours);
-    if (part.points.size() % 2 == 1) {
-      errors.series.push_back({static_cast<float>(now.time_s + track.clock_offset_s), point.r.x(),
-                               point.r.y(), point.r.z(), point.r0.z()});
-    }
-  }
-  add_spectra(track, r, part.spectrum);
+  result.part.weight_N = model.weight_N();
+  add_records(track, r, r0, result);
+  add_spectra(track, r, result.part.spectrum);
   result.windows = error_windows(track, r);
   result.moments = moments_of(track, r);
   sort_and_shorten(result.moments);
-  errors.errors = errors_of({&part});
+  errors.errors = errors_of({&result.part});
   if (inputs.rules.per_mass)
     errors.torque.refused =
         "no model says where the rotors are: name one ('swarmcert model draft' writes it)";
   else
     errors.torque = torque_errors(model, inputs.kinds, track);
-  const auto of_log = inputs.log_gains.find(track.path);
-  const stability::Gains* const own_gains =
-      of_log != inputs.log_gains.end() ? &of_log->second : gains_of(gains, track.kind);
-  if (track.thrust_source != logs::ThrustSource::kDuty) {
-    errors.trajectory.refused = "the log has no duty of each motor";
-  } else if (!model.rotors.empty()) {
-    errors.trajectory.refused = "simulation needs four rotors in X";
-  } else if (own_gains == nullptr) {
-    errors.trajectory.refused = "no gains.toml for vehicles of kind " + track.kind;
-  } else {
-    const stability::Model flown = with_lag(model, *own_gains);
-    apply_model(flown, inputs.kinds, inputs.rules, track);
-    const std::vector<Eigen::Vector3d> left = force_residual(flown, inputs.kinds, inputs.rules, track);
-    errors.trajectory = fly_along(flown, *own_gains, inputs.kinds, track, left);
-  }
+  errors.trajectory = trajectory_errors(inputs, gains, model, track);
   return result;
 }
 

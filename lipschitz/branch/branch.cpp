@@ -50,6 +50,35 @@ const char* name(BranchStop stop) {
   return "nothing run";
 }
 
+bool BranchSearch::sharpen(Part& part) {
+  if (set_ != nullptr && part.undecided < kFormLazy * part.undecided_form) {
+    const double before = part.rho;
+    renew_form(part);
+    if (part.rho < before) return true;
+  }
+  if (part.undecided < kLazy * part.undecided_then) {
+    solve(part);
+    return true;
+  }
+  if (part.multipliers >= 0 && part.in_vain >= kInVain) {
+    part.in_vain = 0;
+    solve(part, fine_descent(), static_cast<std::size_t>(std::max(options_.pairs, 0)));
+    return true;
+  }
+  return false;
+}
+
+void BranchSearch::halve(const Part& top, std::priority_queue<Part>& queue) {
+  const auto [first, second] = halves(top.reach->box(), top.split);
+  nodes_[static_cast<std::size_t>(top.index)].split = top.split;
+  for (const Box& half : {first, second}) {
+    const auto index = static_cast<int>(nodes_.size());
+    nodes_.push_back({});
+    queue.push(part(half, &top, index));
+  }
+  nodes_[static_cast<std::size_t>(top.index)].first_child = static_cast<int>(nodes_.size()) - 2;
+}
+
 BranchResult BranchSearch::run() {
   const auto start = std::chrono::steady_clock::now();
   std::priority_queue<Part> queue;
@@ -80,45 +109,27 @@ BranchResult BranchSearch::run() {
   while ((result_.stop = why_stop()) == BranchStop::kNothingRun) {
     Part top = queue.top();
     queue.pop();
-    if (set_ != nullptr && top.undecided < kFormLazy * top.undecided_form) {
-      const double before = top.rho;
-      renew_form(top);
-      if (top.rho < before) {
-        queue.push(std::move(top));
-        continue;
-      }
-    }
-    if (top.undecided < kLazy * top.undecided_then) {
-      solve(top);
+    if (sharpen(top)) {
       queue.push(std::move(top));
       continue;
     }
-    if (top.multipliers >= 0 && top.in_vain >= kInVain) {
-      top.in_vain = 0;
-      solve(top, fine_descent(), static_cast<std::size_t>(std::max(options_.pairs, 0)));
-      queue.push(std::move(top));
-      continue;
-    }
-    const Box& whole = top.reach->box();
-    if (top.multipliers < 0 || !(relative_width(whole, static_cast<std::size_t>(top.split)) > kThin)) {
+    if (top.multipliers < 0 ||
+        !(relative_width(top.reach->box(), static_cast<std::size_t>(top.split)) > kThin)) {
       queue.push(std::move(top));
       result_.stop = BranchStop::kNothingToHalve;
       break;
     }
-    const auto [first, second] = halves(whole, top.split);
-    nodes_[static_cast<std::size_t>(top.index)].split = top.split;
-    for (const Box& half : {first, second}) {
-      const auto index = static_cast<int>(nodes_.size());
-      nodes_.push_back({});
-      queue.push(part(half, &top, index));
-    }
-    nodes_[static_cast<std::size_t>(top.index)].first_child = static_cast<int>(nodes_.size()) - 2;
+    halve(top, queue);
     course_.push_back(bound(queue.top()));
     if (options_.progress && result_.nodes % 256 < 2) {
       const double share = std::max(share_of_time(), 1.0 * result_.nodes / options_.nodes);
       options_.progress(std::min(share, 1.0), bound(queue.top()));
     }
   }
+  return finished(queue);
+}
+
+BranchResult BranchSearch::finished(std::priority_queue<Part>& queue) {
   polish(queue);
   const double rho = queue.top().rho * (1 + kRhoMargin);
   result_.tree.rho = chain_.unscaled_rho(rho);

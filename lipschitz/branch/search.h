@@ -77,6 +77,12 @@ class BranchSearch {
     return set_ == nullptr ? chain_.squared_slope(x) : set_->whole.squared_slope(x);
   }
   // branch.cpp
+  /// Improves the part's form or multipliers where due. @return whether it did: then its turn comes by its new rho.
+  bool sharpen(Part& part);
+  /// Puts the halves of `top` into the queue and into the tree.
+  void halve(const Part& top, std::priority_queue<Part>& queue);
+  /// The result of a search that stopped; empties the queue.
+  BranchResult finished(std::priority_queue<Part>& queue);
   /// What is known of the way that is left.
   void look_ahead(const Part& top);
   /// The parts that dominate in the end get better multipliers, where there are few.

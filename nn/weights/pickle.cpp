@@ -129,6 +129,7 @@ class Machine {
   // --- what the opcodes mean
 
   void execute(unsigned char opcode) {
+    if (push_scalar(opcode) || build_container(opcode) || use_memo(opcode)) return;
     switch (opcode) {
       case 0x80:  // PROTO
         if (take_unsigned(1) > 5) refuse("the pickle protocol is newer than 5");
@@ -138,64 +139,6 @@ class Machine {
         return;  // FRAME: a hint for buffering
       case '(':
         return marks_.push_back(stack_.size());
-      case 'N':
-        return push(make(Kind::kNone));
-      case 0x88:
-        return push(make(Kind::kBool, 1));
-      case 0x89:
-        return push(make(Kind::kBool, 0));
-      case 'K':
-        return push(make(Kind::kInteger, static_cast<std::int64_t>(take_unsigned(1))));
-      case 'M':
-        return push(make(Kind::kInteger, static_cast<std::int64_t>(take_unsigned(2))));
-      case 'J':
-        return push(make(Kind::kInteger, take_signed(4)));
-      case 0x8a: {  // LONG1
-        const std::uint64_t width = take_unsigned(1);
-        if (width > 8) refuse("an integer has more than 64 bits");
-        return push(make(Kind::kInteger, take_signed(static_cast<int>(width))));
-      }
-      case 'G':
-        take(8);
-        return push(make(Kind::kReal));
-      case 'U':  // SHORT_BINSTRING, as Python 2 wrote it
-      case 0x8c:
-        return push(make(Kind::kText, 0, take(take_unsigned(1))));
-      case 'T':  // BINSTRING
-      case 'X':
-        return push(make(Kind::kText, 0, take(take_unsigned(4))));
-      case 0x8d:
-        return push(make(Kind::kText, 0, take(take_unsigned(8))));
-      case ')':
-        return push(make(Kind::kTuple));
-      case 't':
-        return push(make(Kind::kTuple, 0, {}, pop_to_mark()));
-      case 0x85:
-      case 0x86:
-      case 0x87:
-        return push(make(Kind::kTuple, 0, {}, pop_last(opcode - std::size_t{0x84})));
-      case ']':
-        return push(make(Kind::kList));
-      case 'a':
-        return append(pop_last(1));
-      case 'e':
-        return append(pop_to_mark());
-      case '}':
-        return push(make(Kind::kDict));
-      case 's':
-        return set_items(pop_last(2));
-      case 'u':
-        return set_items(pop_to_mark());
-      case 'q':
-        return remember(take_unsigned(1));
-      case 'r':
-        return remember(take_unsigned(4));
-      case 0x94:
-        return remember(memo_.size());
-      case 'h':
-        return recall(take_unsigned(1));
-      case 'j':
-        return recall(take_unsigned(4));
       case 'c': {  // GLOBAL
         const std::string_view module = take_line();
         return push_global(module, take_line());
@@ -208,12 +151,11 @@ class Machine {
       }
       case 'R':
         return reduce();
-      case 'b': {  // BUILD: torch hangs version numbers (_metadata) onto the dict
+      case 'b':  // BUILD: torch hangs version numbers (_metadata) onto the dict
         pop();
         if (top().kind != Kind::kDict)
           refuse("attributes are set on something that is not a dict", kSaveStateDict);
         return;
-      }
       case 'Q':
         return load_persistent();
       default: {
@@ -221,6 +163,85 @@ class Machine {
         std::snprintf(text, sizeof text, "0x%02x", opcode);
         refuse("this pickle opcode is not part of a state dict", kSaveStateDict, text);
       }
+    }
+  }
+
+  /// Each of these three returns false for opcodes of another group.
+  bool push_scalar(unsigned char opcode) {
+    switch (opcode) {
+      case 'N':
+        return push(make(Kind::kNone)), true;
+      case 0x88:
+      case 0x89:
+        return push(make(Kind::kBool, opcode == 0x88)), true;
+      case 'K':
+        return push(make(Kind::kInteger, static_cast<std::int64_t>(take_unsigned(1)))), true;
+      case 'M':
+        return push(make(Kind::kInteger, static_cast<std::int64_t>(take_unsigned(2)))), true;
+      case 'J':
+        return push(make(Kind::kInteger, take_signed(4))), true;
+      case 0x8a: {  // LONG1
+        const std::uint64_t width = take_unsigned(1);
+        if (width > 8) refuse("an integer has more than 64 bits");
+        return push(make(Kind::kInteger, take_signed(static_cast<int>(width)))), true;
+      }
+      case 'G':
+        take(8);
+        return push(make(Kind::kReal)), true;
+      case 'U':  // SHORT_BINSTRING, as Python 2 wrote it
+      case 0x8c:
+        return push(make(Kind::kText, 0, take(take_unsigned(1)))), true;
+      case 'T':  // BINSTRING
+      case 'X':
+        return push(make(Kind::kText, 0, take(take_unsigned(4)))), true;
+      case 0x8d:
+        return push(make(Kind::kText, 0, take(take_unsigned(8)))), true;
+      default:
+        return false;
+    }
+  }
+
+  bool build_container(unsigned char opcode) {
+    switch (opcode) {
+      case ')':
+        return push(make(Kind::kTuple)), true;
+      case 't':
+        return push(make(Kind::kTuple, 0, {}, pop_to_mark())), true;
+      case 0x85:
+      case 0x86:
+      case 0x87:
+        return push(make(Kind::kTuple, 0, {}, pop_last(opcode - std::size_t{0x84}))), true;
+      case ']':
+        return push(make(Kind::kList)), true;
+      case 'a':
+        return append(pop_last(1)), true;
+      case 'e':
+        return append(pop_to_mark()), true;
+      case '}':
+        return push(make(Kind::kDict)), true;
+      case 's':
+        return set_items(pop_last(2)), true;
+      case 'u':
+        return set_items(pop_to_mark()), true;
+      default:
+        return false;
+    }
+  }
+
+  bool use_memo(unsigned char opcode) {
+    switch (opcode) {
+      case 'q':
+        return remember(take_unsigned(1)), true;
+      case 'r':
+        return remember(take_unsigned(4)), true;
+      case 0x94:
+        return remember(memo_.size()), true;
+      case 'h':
+        return recall(take_unsigned(1)), true;
+      case 'j':
+        return recall(take_unsigned(4)), true;
+      default:
+        return false;
     }
   }
 

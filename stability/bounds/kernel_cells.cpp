@@ -44,6 +44,52 @@ Step exponential(const IntervalMatrix& A, double step_s, double size) {
   return step;
 }
 
+/// The state lies within `error` of w, in the 2-norm.
+struct EnclosedState {
+  std::vector<double> w;
+  double error = 0;
+
+  explicit EnclosedState(const std::vector<Interval>& b) : w(b.size()) {
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      w[i] = (b[i].lo + b[i].hi) / 2;
+      error = up(error + (b[i].hi - b[i].lo));
+    }
+  }
+
+  double largest_norm() const { return up(norm_above(w) + error); }
+
+  /// row x state. @param row_norm at least |row|.
+  Interval value(const std::vector<Interval>& row, double row_norm) const {
+    const double missed = up(row_norm * error);
+    return dot(row, w) + Interval(-missed, missed);
+  }
+
+  void advance(const Step& step) {
+    std::vector<double> next(w.size());
+    Interval missed;
+    for (std::size_t i = 0; i < w.size(); ++i) {
+      Interval total;
+      for (std::size_t j = 0; j < w.size(); ++j) total += step.matrix(i, j) * w[j];
+      next[i] = total.lo + (total.hi - total.lo) / 2;
+      const double half = up(std::max(total.hi - next[i], next[i] - total.lo));
+      missed += Interval(half) * half;
+    }
+    error = up(up(error + sqrt(missed).hi) + up(step.remainder * norm_above(w)));
+    w = std::move(next);
+  }
+};
+
+double frobenius_above(const IntervalMatrix& A) {
+  Interval squares;
+  for (std::size_t i = 0; i < A.size(); ++i) {
+    for (std::size_t j = 0; j < A.size(); ++j) {
+      const double entry = A(i, j).mag();
+      squares += Interval(entry) * entry;
+    }
+  }
+  return sqrt(squares).hi;
+}
+
 }  // namespace
 
 double KernelCells::total() const {
@@ -57,52 +103,24 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
   const std::optional<ContractingSystem> system =
       contracting({y.numerator, sum(y.denominator, y.feedback), {}, 0});
   if (!system) return std::nullopt;
-  const std::size_t n = system->A.size();
-  Interval squares;
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j) {
-      const double entry = system->A(i, j).mag();
-      squares += Interval(entry) * entry;
-    }
-  }
-  const double norm_A = sqrt(squares).hi;
+  const double norm_A = frobenius_above(system->A);
   const int parts = static_cast<int>(std::ceil(cell_s / std::min(kLargestStep_s, 0.5 / norm_A)));
   const double step_s = cell_s / parts;  // parts step_s is cell_s up to rounding: covered below
   const Step step = exponential(system->A, step_s, up(norm_A * step_s));
   const double bend_norm = norm_above(system->rows[3]);
 
-  std::vector<double> w(n);
-  double error = 0;  // |true state - w|
-  for (std::size_t i = 0; i < n; ++i) {
-    w[i] = (system->b[i].lo + system->b[i].hi) / 2;
-    error = up(error + (system->b[i].hi - system->b[i].lo));
-  }
   const double row_norm = norm_above(system->rows[1]);
-  const auto value = [&] {
-    const double missed = up(row_norm * error);
-    return dot(system->rows[1], w) + Interval(-missed, missed);
-  };
+  EnclosedState state(system->b);
   KernelCells cells;
-  Interval last = value();
+  Interval last = state.value(system->rows[1], row_norm);
   for (int k = 0; k < count; ++k) {
     double integral = 0;
     Interval net;
     for (int p = 0; p < parts; ++p) {
       // The state's norm falls, so what it is at the step's start bounds y'' in all of the step.
-      const double size = up(norm_above(w) + error);
-      const double bend = up(up(bend_norm * size) * up(step_s * step_s));
-      std::vector<double> next(n);
-      Interval missed;
-      for (std::size_t i = 0; i < n; ++i) {
-        Interval total;
-        for (std::size_t j = 0; j < n; ++j) total += step.matrix(i, j) * w[j];
-        next[i] = total.lo + (total.hi - total.lo) / 2;
-        const double half = up(std::max(total.hi - next[i], next[i] - total.lo));
-        missed += Interval(half) * half;
-      }
-      error = up(up(error + sqrt(missed).hi) + up(step.remainder * norm_above(w)));
-      w = std::move(next);
-      const Interval now = value();
+      const double bend = up(up(bend_norm * state.largest_norm()) * up(step_s * step_s));
+      state.advance(step);
+      const Interval now = state.value(system->rows[1], row_norm);
       cells.peak = std::max(cells.peak, up(std::max(last.mag(), now.mag()) + bend / 8));
       integral = up(integral + up(step_s * up(up(last.mag() + now.mag()) / 2 + bend / 12)));
       const double bent = up(bend / 12);

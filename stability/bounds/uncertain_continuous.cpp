@@ -28,6 +28,24 @@ double missed_between(double width, double second, double first) {
   return std::min(times(width * width / 8, second), times(width / 2, first));
 }
 
+/// M but for its delay, which norms do not see.
+TransferFunction complementary_of(const AxisLoop& loop) {
+  TransferFunction complementary = step_transfer(loop, Channel::kCommand);
+  complementary.numerator = {loop.Ki, loop.Kp, loop.Kd};
+  if (loop.Ki == 0) {
+    complementary = impulse_transfer(loop, Channel::kCommand);
+    complementary.numerator = {loop.Kp, loop.Kd};
+  }
+  return complementary;
+}
+
+/// Sets the bend of gain `k` over coordinate `j`: the relative one, or the absolute one where that is smaller.
+void keep_smaller(PlantBends& bends, std::size_t k, std::size_t j, double relative, double absolute,
+                  double at_centre) {
+  const bool is_absolute = absolute < relative * at_centre;
+  (is_absolute ? bends.absolute : bends.relative)[k][j] = is_absolute ? absolute : relative;
+}
+
 }  // namespace
 
 PlantBends bends_over(const AxisLoop& fixed, Channel channel, const PlantBox& box) {
@@ -37,13 +55,7 @@ PlantBends bends_over(const AxisLoop& fixed, Channel channel, const PlantBox& bo
                  loop.Kd * box.delay_change()};
   const GainNorms norms = continuous_norms(loop, channel);
   if (!std::isfinite(norms.amplitude)) return bends;
-  // M but for its delay, which norms do not see.
-  TransferFunction complementary = step_transfer(loop, Channel::kCommand);
-  complementary.numerator = {loop.Ki, loop.Kp, loop.Kd};
-  if (loop.Ki == 0) {
-    complementary = impulse_transfer(loop, Channel::kCommand);
-    complementary.numerator = {loop.Kp, loop.Kd};
-  }
+  const TransferFunction complementary = complementary_of(loop);
   const ResponseNorms response = response_norms(complementary);
   const bool has_lag = complementary.denominator.size() > (loop.Ki > 0 ? 4 : 3);
   const double variation = response.variation + (has_lag ? 0 : loop.Kd);  // |s M|_1
@@ -83,12 +95,10 @@ PlantBends bends_over(const AxisLoop& fixed, Channel channel, const PlantBox& bo
                                          : missed_between(box.width(1), 2 * sxS * sxS, sxS);
     const double lag_absolute = is_force ? missed_between(box.width(1), 2 * sM * S * sy, M * sy)
                                          : missed_between(box.width(1), 2 * sxS * S * sy, S * sy);
-    (lag_absolute < lag_relative * at_centre ? bends.absolute : bends.relative)[k][1] =
-        lag_absolute < lag_relative * at_centre ? lag_absolute : lag_relative;
+    keep_smaller(bends, k, 1, lag_relative, lag_absolute, at_centre);
     const double delay_relative = box.width(2) / 2 * sM;
     const double delay_absolute = missed_between(box.width(2), sM * (1 + 2 * M) * sy, M * sy);
-    (delay_absolute < delay_relative * at_centre ? bends.absolute : bends.relative)[k][2] =
-        delay_absolute < delay_relative * at_centre ? delay_absolute : delay_relative;
+    keep_smaller(bends, k, 2, delay_relative, delay_absolute, at_centre);
   }
   // On the edge of least thrust absolute bends are those of r y.
   if (box.edge == PlantEdge::kLeastThrust) {

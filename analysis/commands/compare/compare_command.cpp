@@ -218,8 +218,8 @@ void print_promise_kept(const files::Json& promise) {
                promise["left_out"].size());
 }
 
-int run_compare(const CompareOptions& options, const CommonOptions& common) {
-  const auto start = std::chrono::steady_clock::now();
+/// What is to be written must not be there already, unless --force says so.
+void check_outputs(const CompareOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   if (!options.inject.empty() &&
@@ -229,6 +229,11 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     if (options.budget.empty()) throw UsageError("--fitted writes what --budget fits: name its flights");
     refuse_to_replace(common, (std::filesystem::path(options.fitted) / "flights.toml").string());
   }
+}
+
+int run_compare(const CompareOptions& options, const CommonOptions& common) {
+  const auto start = std::chrono::steady_clock::now();
+  check_outputs(options, common);
   const residuals::GainsOfKinds gains = read_gains(options.gains);
   const residuals::Inputs inputs = read_flights(options.flights, true, true);
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);

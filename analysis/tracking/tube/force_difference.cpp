@@ -37,12 +37,12 @@ struct ForceDifference::Form {
   double constant = 0;
 
   /// At least its largest value over a box, rounding included.
-  double largest(const double* lower, const double* upper) const {
+  double largest(const Box& box) const {
     double value = constant;
     double size = std::abs(constant);
     for (Index k = 0; k < row.size(); ++k) {
-      const double a = row(k) * lower[k];
-      const double b = row(k) * upper[k];
+      const double a = row(k) * box.lower[static_cast<std::size_t>(k)];
+      const double b = row(k) * box.upper[static_cast<std::size_t>(k)];
       value += std::max(a, b);
       size += std::max(std::abs(a), std::abs(b));
     }
@@ -60,95 +60,108 @@ struct ForceDifference::Part {
   LearnedForce::Forms learned;
 };
 
+/// The true wake over a part of the states. With a gradient it lies in at_centre_N + slope (x' - centre) -+ spread_N for
+/// x' in the part, which is what the network saw; the truth acts at x, which is x' up to what the network's age allows.
+struct ForceDifference::WakeForm {
+  TruthForce::Wake wake;
+  Interval at_centre_N;
+  VectorXd centre;  ///< of the part
+  VectorXd slope;   ///< the middle of the gradient
+  VectorXd bend;    ///< half the gradient's width
+  double spread_N = 0;
+  double size_N = 0;  ///< of the terms, for their rounding
+};
+
+ForceDifference::WakeForm ForceDifference::wake_form(const Box& box) const {
+  std::vector<Interval> states;
+  VectorXd centre(static_cast<Index>(box.lower.size()));
+  for (std::size_t k = 0; k < box.lower.size(); ++k) {
+    states.emplace_back(box.lower[k], box.upper[k]);
+    centre(static_cast<Index>(k)) = states[k].lo + (states[k].hi - states[k].lo) / 2;
+  }
+  const std::vector<Offset> reach = scene_->offsets(states, all_);
+  const VectorXd zero = VectorXd::Zero(centre.size());
+  WakeForm form{scene_->truth().wake(reach), scene_->truth().wake(offsets_at(centre)).value_N, centre, zero,
+                zero};
+  form.spread_N = form.wake.cut_off_N;
+  form.size_N = form.at_centre_N.mag() + form.spread_N;
+  if (!form.wake.has_gradient) return form;
+  for (std::size_t n = 0; n < reach.size(); ++n) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index at = static_cast<Index>(n) * kPerNeighbour + static_cast<Index>(k);
+      const Interval g = form.wake.gradient_N_m[n][k];
+      const Interval& x = reach[n][k];
+      const double slope = g.lo + (g.hi - g.lo) / 2;
+      const double radius = up(std::max(g.hi - slope, slope - g.lo));
+      const double away = up(std::max(x.hi - centre(at), centre(at) - x.lo));
+      const double aged = up(std::max(x.hi - box.upper[static_cast<std::size_t>(at)],
+                                      box.lower[static_cast<std::size_t>(at)] - x.lo));
+      form.slope(at) = slope;
+      form.bend(at) = radius;
+      form.spread_N += radius * away + std::abs(slope) * aged;
+      form.size_N += std::abs(slope * centre(at)) + radius * away;
+    }
+  }
+  return form;
+}
+
+std::vector<Offset> ForceDifference::offsets_at(const VectorXd& x) const {
+  std::vector<Offset> offsets(static_cast<std::size_t>(scene_->vehicles() - 1));
+  for (std::size_t n = 0; n < offsets.size(); ++n) {
+    for (std::size_t k = 0; k < 3; ++k)
+      offsets[n][k] = x(static_cast<Index>(n) * kPerNeighbour + static_cast<Index>(k));
+  }
+  return offsets;
+}
+
+/// At least sign (f_hat - f_a) on the box, where sign f_hat <= row x' + constant: once with the truth's slope, once
+/// with its range; the smaller counts.
+ForceDifference::Form ForceDifference::difference(const Box& box, const WakeForm& truth, const VectorXd& row,
+                                                  double constant, double sign) const {
+  const Interval rest_N = rest_.force_N[2];
+  const Interval wake_N = truth.wake.value_N;
+  const double rest_least = sign > 0 ? -rest_N.lo : rest_N.hi;
+  Form flat{row, constant + (sign > 0 ? -wake_N.lo : wake_N.hi) + rest_least};
+  flat.constant += kRounding * (std::abs(constant) + wake_N.mag() + rest_N.mag());
+  if (!truth.wake.has_gradient) return flat;
+  const double shift = truth.slope.dot(truth.centre);
+  const double slack = truth.spread_N + kRounding * truth.size_N;
+  Form sloped{row - sign * truth.slope, constant + (sign > 0 ? -truth.at_centre_N.lo : truth.at_centre_N.hi) +
+                                            sign * shift + slack + rest_least};
+  sloped.constant += kRounding * (std::abs(constant) + truth.size_N + rest_N.mag());
+  return sloped.largest(box) < flat.largest(box) ? sloped : flat;
+}
+
+/// |f_hat - f_a| where both forces act at x: an estimate.
+double ForceDifference::roughly(const VectorXd& x) const {
+  const Interval f = scene_->truth().wake(offsets_at(x)).value_N + rest_.force_N[2];
+  return std::abs(scene_->learned().roughly(x) - (f.lo + f.hi) / 2);
+}
+
 ForceDifference::Part ForceDifference::part(const Box& box, const LearnedForce::Forms* around) const {
-  const int neighbours = scene_->vehicles() - 1;
   Part part;
   part.box = box;
   part.learned = scene_->learned().over(box, around);
   const LearnedForce::Forms& net = part.learned;
-
-  // x' is what the network saw, in `box`; the truth acts at x, which is x' up to what the network's age allows.
-  std::vector<Interval> states;
-  for (std::size_t k = 0; k < box.lower.size(); ++k) states.emplace_back(box.lower[k], box.upper[k]);
-  const std::vector<Offset> reach = scene_->offsets(states, all_);
-  const TruthForce::Wake wake = scene_->truth().wake(reach);
-  std::vector<Offset> middle(static_cast<std::size_t>(neighbours));
-  VectorXd centre(static_cast<Index>(states.size()));
-  for (std::size_t k = 0; k < states.size(); ++k)
-    centre(static_cast<Index>(k)) = states[k].lo + (states[k].hi - states[k].lo) / 2;
-  for (int n = 0; n < neighbours; ++n) {
-    for (std::size_t k = 0; k < 3; ++k)
-      middle[static_cast<std::size_t>(n)][k] = centre(n * kPerNeighbour + static_cast<Index>(k));
-  }
-  const Interval at_centre = scene_->truth().wake(middle).value_N;
-
-  // f_a = wake + rest; wake in at_centre + slope (x' - centre) -+ spread, where the slope is the gradient's middle.
-  VectorXd slope = VectorXd::Zero(centre.size());
-  double spread = wake.cut_off_N;
-  double size = at_centre.mag() + spread;
-  VectorXd bend = VectorXd::Zero(centre.size());
-  for (int n = 0; n < neighbours && wake.has_gradient; ++n) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index at = n * kPerNeighbour + static_cast<Index>(k);
-      const Interval g = wake.gradient_N_m[static_cast<std::size_t>(n)][k];
-      const Interval& x = reach[static_cast<std::size_t>(n)][k];
-      slope(at) = g.lo + (g.hi - g.lo) / 2;
-      const double radius = up(std::max(g.hi - slope(at), slope(at) - g.lo));
-      const double away = up(std::max(x.hi - centre(at), centre(at) - x.lo));
-      const double aged = up(std::max(x.hi - box.upper[static_cast<std::size_t>(at)],
-                                      box.lower[static_cast<std::size_t>(at)] - x.lo));
-      bend(at) = radius;
-      spread += radius * away + std::abs(slope(at)) * aged;
-      size += std::abs(slope(at) * centre(at)) + radius * away;
-    }
-  }
-  const double shift = slope.dot(centre);
-  const double slack = spread + kRounding * size;
-  const auto difference = [&](const VectorXd& row, double constant, double sign) {
-    // sign (f_hat - f_a): once with the truth's slope, once with its range; the smaller counts.
-    const Interval rest_N = rest_.force_N[2];
-    const double rest_least = sign > 0 ? -rest_N.lo : rest_N.hi;
-    Form flat{row, constant + (sign > 0 ? -wake.value_N.lo : wake.value_N.hi) + rest_least};
-    flat.constant += kRounding * (std::abs(constant) + wake.value_N.mag() + rest_N.mag());
-    if (!wake.has_gradient) return flat;
-    Form sloped{row - sign * slope,
-                constant + (sign > 0 ? -at_centre.lo : at_centre.hi) + sign * shift + slack + rest_least};
-    sloped.constant += kRounding * (std::abs(constant) + size + rest_N.mag());
-    return sloped.largest(box.lower.data(), box.upper.data()) <
-                   flat.largest(box.lower.data(), box.upper.data())
-               ? sloped
-               : flat;
-  };
-  part.above = difference(net.upper_row, net.upper, 1);
-  part.below = difference(net.lower_row, net.lower, -1);
-  const double above = part.above.largest(box.lower.data(), box.upper.data());
-  const double below = part.below.largest(box.lower.data(), box.upper.data());
+  const WakeForm truth = wake_form(box);
+  part.above = difference(box, truth, net.upper_row, net.upper, 1);
+  part.below = difference(box, truth, net.lower_row, net.lower, -1);
+  const double above = part.above.largest(box);
+  const double below = part.below.largest(box);
   part.bound = std::max(above, below);
 
-  // A value of the difference: in the middle, and at the corner where the form is largest.
   const Form& worse = above >= below ? part.above : part.below;
-  VectorXd corner = centre;
+  VectorXd corner = truth.centre;
+  double most = -1;
   for (Index k = 0; k < corner.size(); ++k) {
     const auto at = static_cast<std::size_t>(k);
     corner(k) = worse.row(k) > 0 ? box.upper[at] : box.lower[at];
-  }
-  const Interval rest_N = rest_.force_N[2];
-  for (const VectorXd& x : {centre, corner}) {
-    std::vector<Offset> there(static_cast<std::size_t>(neighbours));
-    for (int n = 0; n < neighbours; ++n)
-      for (std::size_t k = 0; k < 3; ++k)
-        there[static_cast<std::size_t>(n)][k] = x(n * kPerNeighbour + static_cast<Index>(k));
-    const Interval f = scene_->truth().wake(there).value_N + rest_N;
-    part.found = std::max(part.found, std::abs(scene_->learned().roughly(x) - (f.lo + f.hi) / 2));
-  }
-  double most = -1;
-  for (Index k = 0; k < centre.size(); ++k) {
-    const auto at = static_cast<std::size_t>(k);
     const double width = box.upper[at] - box.lower[at];
     const double gain = width * (std::abs(net.upper_row(k)) + std::abs(net.lower_row(k)) +
-                                 2 * std::abs(slope(k)) + 2 * bend(k));
+                                 2 * std::abs(truth.slope(k)) + 2 * truth.bend(k));
     if (gain > most) most = gain, part.widest = k;
   }
+  part.found = std::max({0.0, roughly(truth.centre), roughly(corner)});
   return part;
 }
 
@@ -198,8 +211,8 @@ Interval ForceDifference::over(const Deviations& deviations) const {
       is_empty = is_empty || box.lower[k] > box.upper[k];
     }
     if (is_empty) continue;
-    above = std::max(above, part->above.largest(box.lower.data(), box.upper.data()));
-    below = std::max(below, part->below.largest(box.lower.data(), box.upper.data()));
+    above = std::max(above, part->above.largest(box));
+    below = std::max(below, part->below.largest(box));
   }
   return {-below, above};
 }

@@ -27,7 +27,13 @@ class ForceDifference {
  private:
   struct Form;
   struct Part;
+  struct WakeForm;
   Part part(const lipschitz::Box& box, const LearnedForce::Forms* around) const;
+  WakeForm wake_form(const lipschitz::Box& box) const;
+  Form difference(const lipschitz::Box& box, const WakeForm& truth, const Eigen::VectorXd& row,
+                  double constant, double sign) const;
+  double roughly(const Eigen::VectorXd& x) const;
+  std::vector<Offset> offsets_at(const Eigen::VectorXd& x) const;
 
   const Scene* scene_;
   const Stretch* stretch_;

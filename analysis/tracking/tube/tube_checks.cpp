@@ -176,53 +176,57 @@ void add_slices(const std::array<ErrorHistory, 3>& history, std::size_t vehicle,
   }
 }
 
-}  // namespace
-
-void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants, LocalTube& tube) {
-  const stability::TrackingSetup& tracking = scene.tracking();
-  const stability::Gains& gains = tracking.gains;
-  std::vector<Loads> all;
-  bool keeps_thrust = tracking.plant.largest_thrust_N > 0;
-  double command_N = 0;
+/// Takes the proof back where an integrator could reach its limit.
+void check_integrators(const Scene& scene, const Loads& loads, LocalTube& tube) {
+  const stability::Gains& gains = scene.tracking().gains;
   const double share = gains.rate_hz > 0 ? up(gains.integrator_step_s * gains.rate_hz) : 1;
-  for (int i = 0; i < scene.vehicles(); ++i) {
-    all.push_back(loads(scene, tube, i));
-    const Loads& one = all.back();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double limit_m_s = gains.integrator_limit_m_s[axis];
-      const double demand_m_s = up(share * one.integral_m_s[axis]);
-      if (scene.loops().axis[axis].Ki > 0 && !(demand_m_s <= limit_m_s) && tube.proved) {
-        tube.proved = false;
-        tube.why = fmt::format(
-            "the integrator of axis {} could reach {:.3g} m s, beyond its limit of {:.3g} m s, where the "
-            "loop is another",
-            stability::axis_name(static_cast<int>(axis)), demand_m_s, limit_m_s);
-      }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double limit_m_s = gains.integrator_limit_m_s[axis];
+    const double demand_m_s = up(share * loads.integral_m_s[axis]);
+    if (scene.loops().axis[axis].Ki > 0 && !(demand_m_s <= limit_m_s) && tube.proved) {
+      tube.proved = false;
+      tube.why = fmt::format(
+          "the integrator of axis {} could reach {:.3g} m s, beyond its limit of {:.3g} m s, where the "
+          "loop is another",
+          stability::axis_name(static_cast<int>(axis)), demand_m_s, limit_m_s);
     }
-    const double weight_N = up(tracking.plant.mass_kg * kGravity_m_s2);
-    command_N =
-        std::max(command_N, length(one.command_N[0], one.command_N[1], up(weight_N + one.command_N[2])));
-    keeps_thrust = keeps_thrust && command_N <= tracking.plant.largest_thrust_N &&
-                   one.command_N[2] < tracking.plant.mass_kg * kGravity_m_s2;
   }
-  bool near = true;
-  const Deviations deviations = all_within(tube.tube.radii);
+}
+
+/// What the vehicles ask of their rotors.
+struct ThrustUse {
+  double command_N = 0;  ///< the largest command
+  bool is_kept = true;   ///< no command saturates or points down
+};
+
+ThrustUse thrust_use(const stability::Plant& plant, const std::vector<Loads>& all) {
+  ThrustUse use;
+  use.is_kept = plant.largest_thrust_N > 0;
+  const double weight_N = up(plant.mass_kg * kGravity_m_s2);
+  for (const Loads& one : all) {
+    use.command_N =
+        std::max(use.command_N, length(one.command_N[0], one.command_N[1], up(weight_N + one.command_N[2])));
+    use.is_kept = use.is_kept && use.command_N <= plant.largest_thrust_N &&
+                  one.command_N[2] < plant.mass_kg * kGravity_m_s2;
+  }
+  return use;
+}
+
+/// Whether no neighbour is ever so far away that it fades.
+bool neighbours_are_near(const Scene& scene, const Deviations& deviations) {
   for (const Stretch& stretch : scene.motion().stretches) {
     const std::vector<Interval> states = scene.states(stretch, deviations);
     for (int n = 0; n + 1 < scene.vehicles(); ++n) {
       for (std::size_t k = 0; k < 3; ++k)
-        near = near && states[static_cast<std::size_t>(n * kPerNeighbour) + k].mag() <= kFade_m;
+        if (!(states[static_cast<std::size_t>(n * kPerNeighbour) + k].mag() <= kFade_m)) return false;
     }
   }
-  tube.slices.assign(static_cast<std::size_t>(scene.motion().slices), all_within(tube.tube.radii));
-  if (tube.sliced.proved) tube.slices = tube.sliced.slices;
-  for (int i = 0; i < scene.vehicles(); ++i) {
-    std::array<ErrorHistory, 3> history = scene.other_errors(i, tube.tube.truth);
-    const ErrorHistory lag = history[2];
-    history[2] = scene.errors_z(i, tube.tube.force_N, lag);
-    add_slices(history, static_cast<std::size_t>(i), tube.slices);
-    tube.bounds.push_back(bounds_of(scene, tube, all, i, constants, lag));
-  }
+  return true;
+}
+
+void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, LocalTube& tube) {
+  const stability::TrackingSetup& tracking = scene.tracking();
+  const stability::Gains& gains = tracking.gains;
   const auto add = [&tube](const char* name, const char* status, const std::string& note) {
     tube.assumptions.push_back({name, status, note});
   };
@@ -247,10 +251,33 @@ void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants
   add("predictions are a staircase", "proved",
       fmt::format("states up to {:.3g} s old are in the bounds", scene.network_age_s()));
   add("the integrator stays within its limit", tube.proved ? "proved" : "assumed", "");
-  add("no saturation of the thrust", keeps_thrust ? "proved" : "assumed",
-      fmt::format("commands of at most {:.3g} N, of {:.3g} N", command_N, tracking.plant.largest_thrust_N));
+  add("no saturation of the thrust", thrust.is_kept ? "proved" : "assumed",
+      fmt::format("commands of at most {:.3g} N, of {:.3g} N", thrust.command_N,
+                  tracking.plant.largest_thrust_N));
   add("neighbours count fully", near ? "proved" : "assumed",
       "within 0.9 m along each axis, where none fades");
+}
+
+}  // namespace
+
+void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants, LocalTube& tube) {
+  std::vector<Loads> all;
+  for (int i = 0; i < scene.vehicles(); ++i) {
+    all.push_back(loads(scene, tube, i));
+    check_integrators(scene, all.back(), tube);
+  }
+  const Deviations deviations = all_within(tube.tube.radii);
+  tube.slices.assign(static_cast<std::size_t>(scene.motion().slices), deviations);
+  if (tube.sliced.proved) tube.slices = tube.sliced.slices;
+  for (int i = 0; i < scene.vehicles(); ++i) {
+    std::array<ErrorHistory, 3> history = scene.other_errors(i, tube.tube.truth);
+    const ErrorHistory lag = history[2];
+    history[2] = scene.errors_z(i, tube.tube.force_N, lag);
+    add_slices(history, static_cast<std::size_t>(i), tube.slices);
+    tube.bounds.push_back(bounds_of(scene, tube, all, i, constants, lag));
+  }
+  add_assumptions(scene, thrust_use(scene.tracking().plant, all), neighbours_are_near(scene, deviations),
+                  tube);
 }
 
 }  // namespace swarmcert::analysis
