@@ -38,6 +38,16 @@ void require_relu_on_a_box(const std::map<std::string, const Weights*>& parts,
   }
 }
 
+/// Whether a witness of `function` can be evaluated: the terms of a set function besides the one that moves are of any kind.
+bool has_witness(const std::map<std::string, const Weights*>& parts, const std::string& function) {
+  const std::vector<std::string> names = files::networks_of(function);
+  return std::all_of(parts.begin(), parts.end(), [&names](const auto& part) {
+    const bool enters = std::find(names.begin(), names.end(), part.first) != names.end() ||
+                        (names.size() == 2 && part.first.rfind("phi:", 0) == 0);
+    return part.second->is_relu() || !enters;
+  });
+}
+
 /// The largest slopes of what lies between the layers of `weights`; nothing where they are 1.
 void add_steepest_slopes(const Weights& weights, std::vector<UpperBound>& factors) {
   const double steepest = files::function_of(weights.activation).steepest();
@@ -171,9 +181,9 @@ Certification certify(const Network& network, const CertifyOptions& options) {
       }
       add_steepest_slopes(*parts.at(name), norms);
       const files::ActivationFunction& function = files::function_of(parts.at(name)->activation);
-      bound.is_relu = bound.is_relu && parts.at(name)->is_relu();
       bound.has_program = bound.has_program && function.is_monotone();
     }
+    bound.is_relu = has_witness(parts, bound.function);
     bound.product = bound.upper = product_up(norms);
   }
 

@@ -175,6 +175,7 @@ void CertificateChecker::check_bound(const Json& bound) {
   const double upper = number(bound["upper"], bound["upper_hex"], where + " upper");
   check_status(bound, where);
   check_activations(bound, names, where);
+  files::block_coordinates(network_, function, block);  // refuses what is no block of the function
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
     check_upper(stages(network_, function, block, scale), bound["proof"], upper, where);
   } else if (bound["upper_method"] == "branch") {

@@ -14,7 +14,7 @@ constexpr char kOperators[] =
     "is none of the operators that can be read: Gemm, MatMul, Conv, BatchNormalization, AveragePool, "
     "MaxPool, "
     "Add, Sub, Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Tanh, Sigmoid, Softplus, "
-    "Elu, Selu, Gelu, Flatten, Reshape, "
+    "Elu, Gelu, Flatten, Reshape, "
     "Transpose, "
     "Concat and the like";
 constexpr char kSmooth[] =

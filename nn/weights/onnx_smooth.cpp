@@ -33,11 +33,9 @@ Activation smooth_activation(const OnnxNode& node) {
     require_parameter(node, "alpha", 1);
     return Activation::kElu;
   }
-  if (node.type == "Selu") {
-    require_parameter(node, "alpha", static_cast<double>(1.6732632423543772F));
-    require_parameter(node, "gamma", static_cast<double>(1.0507009873554805F));
-    return Activation::kSelu;
-  }
+  if (node.type == "Selu")
+    throw OperatorRefusal{"takes its constants as float32 numbers, whose product is above the slope of SELU",
+                          "save the state dict, and certify it with --activation selu"};
   if (node.type == "Gelu") {
     if (node.text("approximate", "none") != "none")
       throw OperatorRefusal{"approximate is not none", kOtherParameters};
@@ -137,9 +135,6 @@ OnnxValue OnnxGraph::computed_smooth(const Node& node) {
   if (!needed_after(node).empty())
     throw OperatorRefusal{"has a skip connection beside it, which can be read beside ReLU only",
                           "leave the skip connection out, or train with ReLU"};
-  if (activation == Activation::kSelu)
-    notes_.insert(
-        "SELU is taken with its constants in 17 digits, of which the operator's are float32 roundings");
   const AffineMap activated = chain_.activated(x.map, layer_name(x.name));
   for (auto& [value_name, value] : values_) value.name.clear();
   return {activated, x.shape, ""};

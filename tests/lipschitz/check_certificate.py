@@ -474,10 +474,10 @@ def read_onnx(data, order):
             sigmoid_of.clear()
             activations.add("silu")
             is_open = True
-        elif kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Gelu", "Selu"):
-            if attributes.get("approximate", {}).get(4, b"none") != b"none" or kind == "Selu" and attributes:
-                raise ValueError(f"this checker does not read ONNX's {kind} with attributes")
-            activations.add(kind.lower())
+        elif kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Celu", "Gelu", "Swish"):
+            if attributes.get("approximate", {}).get(4, b"none") != b"none":
+                raise ValueError("this checker does not read the approximate Gelu")
+            activations.add({"Celu": "elu", "Swish": "silu"}.get(kind, kind.lower()))  # with their alpha, 1
             is_open = True
         elif kind != "Identity":
             raise ValueError(f"this checker does not read ONNX's {kind}")
@@ -1279,6 +1279,7 @@ class Checker:
         require(isinstance(function, str) and isinstance(block, str), "bound: a name is not text")
         where = f"bound {function} {block}"
         names, scale = networks_of(function), hex_floats(bound["scale"])
+        block_coordinates(self.network, function, block)
         require(all(s > 0 for s in scale), f"{where}: scale is not positive")
         boxed = bound["domain"] == "box"
         require(isinstance(self.c["box"], dict) if boxed else bound["domain"] == "global", f"{where}: unknown domain")
@@ -1504,6 +1505,8 @@ class Checker:
             grounds = [n for n in [names[0]] + [o for o, _ in others] if n == "phi:ground"]
             require(len(grounds) == ("phi:ground" in self.network.parts), f"{where}: the ground enters exactly once")
         neighbours, there = self.neighbours_of(bound, where), [names[0]] + [o for o, _ in others]
+        require(all(self.network.parts[part].activation in (None, "relu") for part in there + names[1:]),
+                f"{where}: a part is no ReLU network")
         require(not neighbours or all(there.count(o) <= neighbours.get(o[4:], 0) for o in there if o != "phi:ground"),
                 f"{where}: has more neighbours than listed")
         block = block_coordinates(self.network, function, bound["block"])

@@ -61,7 +61,8 @@ def smooth_models(folder, generator):
         "tanh": ([layer(1, "x", "a"), ("Tanh", ["a"], "b"), layer(2, "b", "c"), ("Tanh", ["c"], "y")], [3, 5, 2]),
         "silu": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "s"), ("Mul", ["a", "s"], "b"), layer(2, "b", "y")], [3, 5, 2]),
         "sigmoid": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
-        "elu": ([layer(1, "x", "a"), ("Elu", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2])}
+        "elu": ([layer(1, "x", "a"), ("Celu", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
+        "swish": ([layer(1, "x", "a"), ("Swish", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2])}
     for name, (nodes, sizes) in models.items():
         (folder / f"{name}.onnx").write_bytes(onnx(nodes, sizes, generator))
         yield [str(folder / f"{name}.onnx")]
@@ -98,6 +99,13 @@ def smooth(folder):
     for part, activation in (("small", "tanh"), ("large", "sigmoid"), ("ground", "softplus"), ("rho", "selu")):
         text = text.replace(f'weights = "{part}.safetensors"', f'weights = "{part}.safetensors"\nactivation = "{activation}"')
     net.write_text(text)
+    return net
+
+
+def beside(folder):
+    """The network.toml of heterogeneous(), with another activation in the ground only."""
+    net = folder / "beside.toml"
+    net.write_text((folder / "network.toml").read_text().replace('"ground.safetensors"', '"ground.safetensors"\nactivation = "tanh"'))
     return net
 
 
@@ -283,19 +291,30 @@ def check_activations(certificate, net, folder):
     def copy():
         return json.loads(json.dumps(certificate))
 
-    is_stated = net[0].endswith(("smooth.toml", ".onnx"))
+    stated = {part for part, weights in second.Network(**arguments(net)).parts.items() if weights.activation}
     for part, entry in certificate["network"]["weights"].items():
         own = {step["op"] for step in entry["chain"]} - {"linear", "clamp"}
         for op in set(second.STEEPEST) - own:
             changed = copy()
             for step in changed["network"]["weights"][part]["chain"]:
                 step["op"] = op if step["op"] in own else step["op"]
-            assert not (both(changed) and is_stated), f"{part}: {op} instead of {own} is accepted"
+            assert not (both(changed) and part in stated), f"{part}: {op} instead of {own} is accepted"
             changed["network"]["weights"][part]["chain"][1]["op"] = "identity"
             assert not both(changed)
+    point = lambda part: ["0x0p+0"] * second.Network(**arguments(net)).parts[part].layers[0].inputs
     for i, bound in enumerate(certificate["bounds"]):
-        for key, value in (("upper", second.math.nextafter(bound["upper"], 0)), ("upper_method", "branch"), ("upper_method", "sdp"),
-                           ("domain", "box"), ("lower", 0.0)):
+        changed = copy()
+        names = second.networks_of(bound["function"])
+        others = [{"network": "phi:ground", "x": point("phi:ground")}] if len(names) == 2 and names[0] != "phi:ground" else []
+        changed["bounds"][i].update(lower=0.0, lower_hex="0x0p+0", lower_witness={
+            "x": point(names[0]), "y": ["0x1p+0"] + point(names[0])[1:], "others": others})
+        assert both(changed) == (bound["lower"] is not None), f"{bound['function']}: a lower bound"
+        tried = [("block", "ll"), ("upper", second.math.nextafter(bound["upper"], 0)), ("upper_method", "branch"),
+                 ("upper_method", "sdp")]
+        if any(step["op"] not in ("clamp", "linear", "relu") for name in names
+               for step in certificate["network"]["weights"][name]["chain"]):
+            tried += [("domain", "box"), ("lower", 0.0)]
+        for key, value in tried:
             changed = copy()
             changed["bounds"][i][key] = value
             if key in ("upper", "lower"):
@@ -330,6 +349,8 @@ def run():
                 (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
         smooth_net = str(smooth(folder))
         nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
+        beside_net = str(beside(folder))
+        nets += [([beside_net], ["--method", "product"])]
         nets += [(net, []) for net in smooth_models(folder, generator)]
         nets += [([str(tiny)], ["--activation", op]) for op in ("silu", "gelu", "sigmoid")]
         tried = rejected = 0
@@ -343,7 +364,7 @@ def run():
             reason = second.check(certificate, second.Network(**arguments(net)))
             assert not reason, f"the second checker rejects a sound certificate: {reason}"
             check_fixed(certificate, net, folder)
-            if net[0] == smooth_net or net[0].endswith(".onnx") or "--activation" in options:
+            if net[0] in (smooth_net, beside_net) or net[0].endswith(".onnx") or "--activation" in options:
                 check_activations(certificate, net, folder)
             paths = list(leaves(certificate))
             chosen = [generator.choice(paths) for _ in range(MUTATIONS if index == 1 else MUTATIONS // 5)]

@@ -309,6 +309,43 @@ TEST(SmoothCertificate, IsRejectedWithLowerBoundsBoxesOrValues) {
   rejects([&](Json& c) { c["values"] = {values}; }, "only of ReLU networks");
 }
 
+TEST(SmoothCertificate, OfASetFunctionBesideAnotherActivationHasNoWitness) {
+  std::mt19937 generator(29);
+  Network network = tests::deep_set(tests::random_network({3, 6, 4}, generator),
+                                    tests::random_network({4, 5, 1}, generator));
+  network.phi["ground"] = with(tests::random_network({4, 5, 4}, generator), Activation::kTanh);
+  const Json made = lipschitz::certificate(network, certified_by(network));
+  EXPECT_TRUE(checked(made, network).accepted) << checked(made, network).reason;
+  int with_witness = 0;
+  for (std::size_t i = 0; i < made["bounds"].size(); ++i) {
+    const Json& bound = made["bounds"][i];
+    const std::string function = bound["function"];
+    EXPECT_EQ(bound["lower"].is_null(), function.rfind("set:", 0) == 0 || function == "phi:ground")
+        << function;
+    with_witness += bound["lower"].is_null() ? 0 : 1;
+    if (function != "set:default:default") continue;
+    Json changed = made;
+    const std::vector<std::string> x = {"0x0p+0", "0x0p+0", "0x0p+0"}, y = {"0x1p+0", "0x0p+0", "0x0p+0"};
+    Json ground;
+    ground["network"] = "phi:ground";
+    ground["x"] = std::vector<std::string>(4, "0x0p+0");
+    Json witness = {{"x", x}, {"y", y}, {"others", Json::array()}};
+    witness["others"].push_back(ground);
+    changed["bounds"][i].update({{"lower", 0.0}, {"lower_hex", "0x0p+0"}, {"lower_witness", witness}});
+    EXPECT_NE(checked(changed, network).reason.find("phi:ground is no ReLU network"), std::string::npos)
+        << checked(changed, network).reason;
+  }
+  EXPECT_EQ(with_witness, 2);
+}
+
+TEST(SmoothCertificate, OfTheProductIsRejectedForABlockThatIsNone) {
+  const Json made = lipschitz::certificate(smooth_set(), certified_by(smooth_set(), UpperMethod::kProduct));
+  Json changed = made;
+  changed["bounds"][0]["block"] = "ll";
+  EXPECT_TRUE(checked(made).accepted);
+  EXPECT_NE(checked(changed).reason.find("no block"), std::string::npos);
+}
+
 TEST(SmoothCertificate, StatesTheActivationForFilesThatDoNot) {
   Network unstated = smooth_set();
   for (files::Weights* const weights : {&unstated.phi.at("default"), &unstated.rho.at("default")}) {
