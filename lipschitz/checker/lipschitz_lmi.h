@@ -47,9 +47,11 @@ Matrix product(const Matrix& a, const Matrix& b);
 std::size_t hidden_neurons(const std::vector<Matrix>& stages);
 
 /// The symmetric matrix whose positive semidefiniteness proves |f(x) - f(y)|_2 <= sqrt(rho) |x - y|_2 for the ReLU
-/// chain f = M_K relu( ... relu(M_1 x + b_1) ... ) + b_K with any biases (LipSDP-Neuron, Fazlyab et al. 2019).
+/// chain f = M_K relu( ... relu(M_1 x + b_1) ... ) + b_K with any biases (LipSDP-Neuron, Fazlyab et al. 2019), or with
+/// any functions of slopes in [0, 1] in place of relu.
 ///
-/// For increments dx, dz_k of the activations and dy_k = M_k dz_{k-1}, ReLU gives dz (dy - dz) >= 0 for each neuron.
+/// For increments dx, dz_k of the activations and dy_k = M_k dz_{k-1}, slopes in [0, 1] give dz (dy - dz) >= 0 for each
+/// neuron.
 /// So |df|^2 <= rho |dx|^2 follows if, with multipliers t >= 0, for all (dx, dz_1, ..., dz_{K-1}),
 ///   rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_k sum_i t_ki dz_ki (dy_ki - dz_ki) >= 0.
 /// Minimising this form over dx (its block is rho I, rho > 0) and multiplying by rho leaves a form in dz alone; with
