@@ -10,11 +10,6 @@
 namespace swarmcert::stability {
 namespace {
 
-Polynomial times_s_to(int power, Polynomial p) {
-  p.insert(p.begin(), static_cast<std::size_t>(power), 0.0);
-  return p;
-}
-
 /// The loop cut at the motors: open(s) + feedback(s) is its characteristic polynomial, and a delay of the motors multiplies
 /// `feedback` alone.
 struct CutLoop {

@@ -39,12 +39,6 @@ struct SlowMode {
   double at(double t_s) const { return c == 0 ? 0 : c * std::exp(s * t_s); }
 };
 
-Polynomial differentiated(const Polynomial& p) {
-  Polynomial result;
-  for (std::size_t i = 1; i < p.size(); ++i) result.push_back(static_cast<double>(i) * p[i]);
-  return result;
-}
-
 /// By Newton's method on D(s) = denominator + feedback e^(-Ts) from the slowest pole without delay; c is the residue
 /// numerator/D' there.
 SlowMode slow_mode(const TransferFunction& y) {
@@ -53,8 +47,8 @@ SlowMode slow_mode(const TransferFunction& y) {
   std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return std::abs(a) < std::abs(b); });
   if (all.size() < 2 || all[0].imag() != 0 || !(all[0].real() < 0)) return mode;
   mode.others_1_s = std::abs(all[1]);
-  const Polynomial denominator_slope = differentiated(y.denominator),
-                   feedback_slope = differentiated(y.feedback);
+  const Polynomial denominator_slope = derivative_of(y.denominator),
+                   feedback_slope = derivative_of(y.feedback);
   double s = all[0].real();
   for (int i = 0; i < 50 && s < 0; ++i) {
     const double late = std::exp(-y.delay_s * s);
@@ -72,13 +66,6 @@ SlowMode slow_mode(const TransferFunction& y) {
   return mode;
 }
 
-/// (i + k)! / i!: what k derivatives make of the coefficient of u^(i + k).
-double rising(std::size_t i, std::size_t k) {
-  double result = 1;
-  for (std::size_t j = 1; j <= k; ++j) result *= static_cast<double>(i + j);
-  return result;
-}
-
 /// The first `count` derivatives of p at u, by Horner's rule for all at once.
 void derivatives_at(const Polynomial& p, double u, std::size_t count, double* out) {
   std::fill(out, out + count, 0.0);
@@ -86,7 +73,7 @@ void derivatives_at(const Polynomial& p, double u, std::size_t count, double* ou
     for (std::size_t k = count; k-- > 1;) out[k] = out[k] * u + out[k - 1];
     out[0] = out[0] * u + p[i];
   }
-  for (std::size_t k = 2; k < count; ++k) out[k] *= rising(0, k);
+  for (std::size_t k = 2; k < count; ++k) out[k] *= rising_factorial(0, k);
 }
 
 class Steps {
@@ -101,7 +88,7 @@ class Steps {
     driven_.assign(terms_, 0.0);
     result_.assign(terms_, 0.0);
     for (std::size_t k = 0; k <= order_; ++k) {
-      for (std::size_t i = 0; i < terms_; ++i) rising_.push_back(rising(i, k));
+      for (std::size_t i = 0; i < terms_; ++i) rising_.push_back(rising_factorial(i, k));
     }
   }
 

@@ -28,6 +28,25 @@ inline Polynomial scaled(Polynomial p, double factor) {
   return p;
 }
 
+/// s^power p(s)
+inline Polynomial times_s_to(int power, Polynomial p) {
+  p.insert(p.begin(), static_cast<std::size_t>(power), 0.0);
+  return p;
+}
+
+inline Polynomial derivative_of(const Polynomial& p) {
+  Polynomial result;
+  for (std::size_t i = 1; i < p.size(); ++i) result.push_back(static_cast<double>(i) * p[i]);
+  return result;
+}
+
+/// (i + k)! / i!: what k derivatives make of the coefficient of s^(i + k). Exact below 2^53.
+inline double rising_factorial(std::size_t i, std::size_t k) {
+  double result = 1;
+  for (std::size_t j = 1; j <= k; ++j) result *= static_cast<double>(i + j);
+  return result;
+}
+
 /// By Horner's rule.
 inline double value(const Polynomial& p, double s) {
   double result = 0;

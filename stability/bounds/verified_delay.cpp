@@ -22,13 +22,6 @@ constexpr double kAbove = 1 + 1e-13;
 
 using Piece = std::array<double, kPieceTerms>;
 
-/// (i + k)! / i!, exact.
-double rising_factorial(std::size_t i, std::size_t k) {
-  double result = 1;
-  for (std::size_t j = 1; j <= k; ++j) result *= static_cast<double>(i + j);
-  return result;
-}
-
 class DelayedSteps {
  public:
   DelayedSteps(const TransferFunction& y, long most_pieces)

@@ -6,12 +6,6 @@
 namespace swarmcert::stability {
 namespace {
 
-Polynomial derivative(const Polynomial& p) {
-  Polynomial result;
-  for (std::size_t i = 1; i < p.size(); ++i) result.push_back(static_cast<double>(i) * p[i]);
-  return result;
-}
-
 double integral_to(const Polynomial& p, double u) {
   double result = 0;
   for (std::size_t i = p.size(); i-- > 0;) result = (result + p[i] / static_cast<double>(i + 1)) * u;
@@ -89,9 +83,9 @@ void ZeroScan::slope_event(double slope) {
 }
 
 void ZeroScan::add(const Polynomial& piece, double length, double integral_at_start) {
-  const Polynomial slope = derivative(piece);
-  const Polynomial curvature = derivative(slope);
-  const Polynomial jerk = derivative(curvature);
+  const Polynomial slope = derivative_of(piece);
+  const Polynomial curvature = derivative_of(slope);
+  const Polynomial jerk = derivative_of(curvature);
   const std::vector<double> turns = zeros(jerk, length, {});
   const std::vector<double> inflections = zeros(curvature, length, turns);
   const std::vector<double> extrema = zeros(slope, length, inflections);

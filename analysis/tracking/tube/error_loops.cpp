@@ -15,14 +15,9 @@ namespace {
 using stability::AxisLoop;
 using stability::KernelCells;
 using stability::Polynomial;
+using stability::times_s_to;
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
-
-/// s^power p
-Polynomial shifted(Polynomial p, int power) {
-  p.insert(p.begin(), static_cast<std::size_t>(power), 0.0);
-  return p;
-}
 
 bool same_loop(const AxisLoop& a, const AxisLoop& b) {
   return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
@@ -42,21 +37,21 @@ ErrorLoop error_loop(const AxisLoop& loop, double slice_s, int slices) {
   const int integrates = loop.Ki > 0 ? 1 : 0;
   const Polynomial feedback =
       integrates == 1 ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
-  const Polynomial open = shifted(lag, 2 + integrates);
+  const Polynomial open = times_s_to(2 + integrates, lag);
   const auto cells = [&](const Polynomial& numerator) {
     return stability::kernel_cells({numerator, open, feedback, 0}, slice_s, slices);
   };
   const Polynomial unit = {1 / loop.mass_kg};
   if (integrates == 1) result.h = cells(unit);
-  result.h1 = cells(shifted(unit, integrates));
-  result.h2 = cells(shifted(unit, integrates + 1));
+  result.h1 = cells(times_s_to(integrates, unit));
+  result.h2 = cells(times_s_to(integrates + 1, unit));
   result.has_lag = lag.size() > 1;
   if (!result.has_lag) return result;
   const Polynomial rest = stability::scaled(Polynomial(lag.begin() + 1, lag.end()), 1 / loop.mass_kg);
-  result.g = cells(shifted(rest, integrates));
-  result.g1 = cells(shifted(rest, integrates + 1));
-  result.g2 = cells(shifted(rest, integrates + 2));
-  result.h3 = cells(shifted(unit, integrates + 2));
+  result.g = cells(times_s_to(integrates, rest));
+  result.g1 = cells(times_s_to(integrates + 1, rest));
+  result.g2 = cells(times_s_to(integrates + 2, rest));
+  result.h3 = cells(times_s_to(integrates + 2, unit));
   return result;
 }
 
