@@ -103,8 +103,6 @@ CancelOnInterrupt::~CancelOnInterrupt() {
   std::signal(SIGINT, SIG_DFL);
 }
 
-bool CancelOnInterrupt::was_signalled() const { return host_ != nullptr ? host_->interrupted : signalled; }
-
 const std::atomic<bool>* CancelOnInterrupt::flag() const {
   return host_ != nullptr ? &host_->stop : &interrupted;
 }

@@ -44,8 +44,6 @@ class CancelOnInterrupt {
   CancelOnInterrupt& operator=(const CancelOnInterrupt&) = delete;
 
   const std::atomic<bool>* flag() const;
-  /// Whether a signal came, rather than the end of the time.
-  bool was_signalled() const;
 
  private:
   Host* const host_;

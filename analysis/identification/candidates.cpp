@@ -99,7 +99,6 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   using residuals::Track;
   struct Part {
     Coverage covered;
-    double squares = 0;
     std::set<std::string> vehicles;
   };
   std::vector<Part> parts(which.size());
@@ -129,7 +128,6 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
         range.z_min_m = std::min(range.z_min_m, now.p_W_m.z());
         range.z_max_m = std::max(range.z_max_m, now.p_W_m.z());
         part.covered.most_neighbours = std::max(part.covered.most_neighbours, now.num_neighbours);
-        part.squares += now.v_W_m_s.squaredNorm();
         part.vehicles.insert(track.vehicle);
         ++part.covered.records;
       }
@@ -138,7 +136,6 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   });
   Coverage all;
   all.range = {INFINITY, -INFINITY};
-  double squares = 0;
   std::set<std::string> vehicles;
   for (const Part& part : parts) {
     all.range.z_min_m = std::min(all.range.z_min_m, part.covered.range.z_min_m);
@@ -147,12 +144,10 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
     all.most_neighbours = std::max(all.most_neighbours, part.covered.most_neighbours);
     all.records += part.covered.records;
     all.blocks += part.covered.blocks;
-    squares += part.squares;
     vehicles.insert(part.vehicles.begin(), part.vehicles.end());
     all.problems.insert(all.problems.end(), part.covered.problems.begin(), part.covered.problems.end());
   }
   all.vehicles.assign(vehicles.begin(), vehicles.end());
-  all.speed_rms_m_s = all.records > 0 ? std::sqrt(squares / static_cast<double>(all.records)) : 0;
   return all;
 }
 

@@ -31,7 +31,6 @@ struct Coverage {
   stability::FlightRange range;
   double height_span_m = 0;  ///< the most that one vehicle moved up and down in one flight
   int most_neighbours = 0;
-  double speed_rms_m_s = 0;
   std::size_t records = 0;
   std::size_t blocks = 0;             ///< of cut_into_blocks()
   std::vector<std::string> vehicles;  ///< of the kind that flew, without those used for their position only

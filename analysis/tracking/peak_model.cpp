@@ -1,6 +1,6 @@
 #include "analysis/tracking/peak_model.h"
 
-#include <Eigen/Dense>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -37,7 +37,38 @@ Eigen::VectorXd free_solution(const Eigen::MatrixXd& G, const Eigen::VectorXd& f
   return result;
 }
 
-Eigen::VectorXd active_set_solution(const Eigen::MatrixXd& G, const Eigen::VectorXd& f) {
+/// One over the number of flights of each flight's group.
+std::vector<double> group_weights(const std::vector<FlownPeak>& flights) {
+  std::map<std::string, int> count;
+  for (const FlownPeak& flight : flights) ++count[flight.group];
+  std::vector<double> weights;
+  for (const FlownPeak& flight : flights) weights.push_back(1.0 / count[flight.group]);
+  return weights;
+}
+
+std::vector<double> largest_finite(const std::vector<FlownPeak>& flights) {
+  std::vector<double> largest(flights.empty() ? 0 : flights.front().parts.size(), 0.0);
+  for (const FlownPeak& flight : flights) {
+    for (std::size_t k = 0; k < largest.size(); ++k)
+      if (std::isfinite(flight.parts[k])) largest[k] = std::max(largest[k], flight.parts[k]);
+  }
+  return largest;
+}
+
+/// A loop that the model calls unstable has flown all the same: it counts as the worst of the stable ones.
+double finite_part(double part, double largest) { return std::isfinite(part) ? part : largest; }
+
+double prediction_m(const FlownPeak& flight, const std::vector<double>& weights,
+                    const std::vector<double>& largest) {
+  double total_m = flight.known_m;
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    total_m += weights[k] * finite_part(flight.parts[k], largest[k]);
+  return std::max(total_m, kLeastPeak_m);
+}
+
+}  // namespace
+
+Eigen::VectorXd nonnegative_least_squares(const Eigen::MatrixXd& G, const Eigen::VectorXd& f) {
   const Eigen::Index n = f.size();
   Eigen::VectorXd x = Eigen::VectorXd::Zero(n);
   std::vector<bool> is_free(static_cast<std::size_t>(n), false);
@@ -73,47 +104,6 @@ Eigen::VectorXd active_set_solution(const Eigen::MatrixXd& G, const Eigen::Vecto
   return x.cwiseMax(0.0);
 }
 
-/// One over the number of flights of each flight's group.
-std::vector<double> group_weights(const std::vector<FlownPeak>& flights) {
-  std::map<std::string, int> count;
-  for (const FlownPeak& flight : flights) ++count[flight.group];
-  std::vector<double> weights;
-  for (const FlownPeak& flight : flights) weights.push_back(1.0 / count[flight.group]);
-  return weights;
-}
-
-std::vector<double> largest_finite(const std::vector<FlownPeak>& flights) {
-  std::vector<double> largest(flights.empty() ? 0 : flights.front().parts.size(), 0.0);
-  for (const FlownPeak& flight : flights) {
-    for (std::size_t k = 0; k < largest.size(); ++k)
-      if (std::isfinite(flight.parts[k])) largest[k] = std::max(largest[k], flight.parts[k]);
-  }
-  return largest;
-}
-
-/// A loop that the model calls unstable has flown all the same: it counts as the worst of the stable ones.
-double finite_part(double part, double largest) { return std::isfinite(part) ? part : largest; }
-
-double prediction_m(const FlownPeak& flight, const std::vector<double>& weights,
-                    const std::vector<double>& largest) {
-  double total_m = flight.known_m;
-  for (std::size_t k = 0; k < weights.size(); ++k)
-    total_m += weights[k] * finite_part(flight.parts[k], largest[k]);
-  return std::max(total_m, kLeastPeak_m);
-}
-
-}  // namespace
-
-std::vector<double> nonnegative_least_squares(const std::vector<std::vector<double>>& G,
-                                              const std::vector<double>& f) {
-  Eigen::MatrixXd gram(at(f.size()), at(f.size()));
-  for (std::size_t i = 0; i < f.size(); ++i)
-    for (std::size_t j = 0; j < f.size(); ++j) gram(at(i), at(j)) = G.at(i).at(j);
-  const Eigen::VectorXd x =
-      active_set_solution(gram, Eigen::Map<const Eigen::VectorXd>(f.data(), at(f.size())));
-  return {x.data(), x.data() + x.size()};
-}
-
 double PeakModel::predicted_m(const FlownPeak& flight) const {
   return prediction_m(flight, weights, largest);
 }
@@ -147,7 +137,7 @@ std::vector<double> fit_peak_weights(const std::vector<FlownPeak>& flights,
       target[i] = predicted[i] * (1 - residual) - known[i];
     }
     const Eigen::MatrixXd weighted = weight.asDiagonal() * parts;
-    scaled = active_set_solution(parts.transpose() * weighted, weighted.transpose() * target);
+    scaled = nonnegative_least_squares(parts.transpose() * weighted, weighted.transpose() * target);
     const Eigen::VectorXd next = (parts * scaled + known).cwiseMax(kLeastPeak_m);
     predicted = (predicted + next) / 2;
   }

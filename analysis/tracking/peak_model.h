@@ -2,6 +2,7 @@
 /// weights, so that the prediction never falls where a part rises, and a conformal multiplier on top.
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -42,7 +43,6 @@ std::vector<double> fit_peak_weights(const std::vector<FlownPeak>& flights,
 PeakModel calibrate_peaks(const std::vector<FlownPeak>& flights, double level);
 
 /// min over x >= 0 of |Ax - b|, given G = A'A and f = A'b, by Lawson and Hanson's active sets.
-std::vector<double> nonnegative_least_squares(const std::vector<std::vector<double>>& G,
-                                              const std::vector<double>& f);
+Eigen::VectorXd nonnegative_least_squares(const Eigen::MatrixXd& G, const Eigen::VectorXd& f);
 
 }  // namespace swarmcert::analysis

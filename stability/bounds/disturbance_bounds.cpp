@@ -190,13 +190,6 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
   return result;
 }
 
-std::vector<double> worst_amplitude_input(const AxisLoop& loop, Channel channel, double step_s, int count) {
-  std::vector<double> input = sampled_response(impulse_transfer(loop, channel), step_s, count);
-  std::reverse(input.begin(), input.end());
-  for (double& f : input) f = f > 0 ? 1 : f < 0 ? -1 : 0;
-  return input;
-}
-
 double staircase_error(const GainNorms& gains, double rate_hz, double latency_s, double rate_of_f_hat_N_s) {
   const double age_s = (rate_hz > 0 ? 1 / rate_hz : 0) + latency_s;
   return age_s == 0 ? 0 : gains.amplitude * age_s * rate_of_f_hat_N_s;

@@ -90,9 +90,6 @@ double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double am
 /// sup |h'(t)| over t >= after_s, m per N s: what is left of an impulse of one newton second.
 double impulse_gain_after(const AxisLoop& loop, Channel channel, double after_s);
 
-/// The force of the class |f| <= 1 N that makes e(T) largest: sign of h'(T - t), at t = 0, step, ..., T.
-std::vector<double> worst_amplitude_input(const AxisLoop& loop, Channel channel, double step_s, int count);
-
 /// A staircase f_hat, updated every period and late by a latency, differs from its source by at most
 /// (period + latency) sup|f_hat'|: split f = continuous part + staircase part and bound the latter by its amplitude.
 /// @return m: |h'|_1 (1/rate_hz + latency_s) rate_of_f_hat_N_s

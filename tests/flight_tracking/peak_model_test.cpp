@@ -35,24 +35,15 @@ TEST(NonnegativeLeastSquares, KeepsTheConditionsOfOptimality) {
   std::normal_distribution<double> normal;
   int at_bound = 0;
   for (int run = 0; run < 200; ++run) {
-    constexpr std::size_t kSize = 5;
-    std::vector<std::vector<double>> A(8, std::vector<double>(kSize)), G(kSize, std::vector<double>(kSize));
-    std::vector<double> b(8), f(kSize);
-    for (auto& row : A)
-      for (double& a : row) a = normal(random);
-    for (double& x : b) x = normal(random);
-    for (std::size_t i = 0; i < kSize; ++i) {
-      for (std::size_t k = 0; k < 8; ++k) f[i] += A[k][i] * b[k];
-      for (std::size_t j = 0; j < kSize; ++j)
-        for (std::size_t k = 0; k < 8; ++k) G[i][j] += A[k][i] * A[k][j];
-    }
-    const std::vector<double> x = nonnegative_least_squares(G, f);
-    for (std::size_t i = 0; i < kSize; ++i) {
-      double slope = -f[i];
-      for (std::size_t j = 0; j < kSize; ++j) slope += G[i][j] * x[j];
+    const auto draw = [&] { return normal(random); };
+    const Eigen::MatrixXd A = Eigen::MatrixXd::NullaryExpr(8, 5, draw);
+    const Eigen::VectorXd b = Eigen::VectorXd::NullaryExpr(8, draw);
+    const Eigen::VectorXd x = nonnegative_least_squares(A.transpose() * A, A.transpose() * b);
+    const Eigen::VectorXd slope = A.transpose() * (A * x - b);
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
       EXPECT_GE(x[i], 0);
-      EXPECT_GE(slope, -1e-8);
-      EXPECT_NEAR(slope * x[i], 0, 1e-8);
+      EXPECT_GE(slope[i], -1e-8);
+      EXPECT_NEAR(slope[i] * x[i], 0, 1e-8);
       at_bound += x[i] == 0 ? 1 : 0;
     }
   }
