@@ -16,6 +16,7 @@ constexpr char kSchema[] = "swarmcert/gains/1";
 
 /// Bounds of numbers that a loop of a multirotor can have, far beyond any that flies. A position loop whose poles lie
 /// at 1000 1/s has Kp = 3e6, Kd = 3e3 and Ki = 1e9; rates beyond 100 kHz and below 1 Hz are periods or other units.
+constexpr double kLargestAttitudeGain = 1e4;
 constexpr double kLargestKp_1_s2 = 1e7, kLargestKd_1_s = 1e5, kLargestKi_1_s3 = 1e10;
 constexpr double kLargestLambda_1_s = 1e3, kLargestK_kg_s = 1e5;
 constexpr double kLeastRate_hz = 1, kLargestRate_hz = 1e5;
@@ -174,6 +175,23 @@ void read_position(const TomlTable& position, Gains& gains) {
   }
 }
 
+void read_attitude(const TomlTable& table, Gains& gains) {
+  const bool has_gains = table.has("KR") || table.has("Kw") || table.has("KI");
+  if (table.has("law") || !has_gains) {
+    gains.attitude_law =
+        table.choice("law", {"lee", "robust"}) == 0 ? AttitudeLaw::kLee : AttitudeLaw::kRobust;
+  }
+  if (!has_gains) return;
+  for (const char* const key : {"KR", "Kw"})
+    if (!table.has(key))
+      table.refuse(key, "", "is missing beside the other gains of the attitude law", "add it");
+  gains.attitude = AttitudeGains{per_axis(table, "KR", false, kLargestAttitudeGain, "N m"),
+                                 per_axis(table, "Kw", false, kLargestAttitudeGain, "N m s"),
+                                 {0, 0, 0}};
+  if (table.has("KI"))
+    gains.attitude->KI_Nm_per_s = per_axis(table, "KI", true, kLargestAttitudeGain, "N m/s");
+}
+
 }  // namespace
 
 Gains parse_gains(const std::string& text, const std::string& path) {
@@ -190,18 +208,18 @@ Gains parse_gains(const std::string& text, const std::string& path) {
   read_position(top.table("position"), gains);
   if (top.has("attitude")) {
     const TomlTable attitude = top.table("attitude");
-    attitude.allow_only({"law"});
-    gains.attitude_law =
-        attitude.choice("law", {"lee", "robust"}) == 0 ? AttitudeLaw::kLee : AttitudeLaw::kRobust;
+    attitude.allow_only({"law", "KR", "Kw", "KI"});
+    read_attitude(attitude, gains);
   }
   if (top.has("lag")) {
     const TomlTable lag = top.table("lag");
-    lag.allow_only({"motor_s", "attitude_s", "delay_s"});
+    lag.allow_only({"motor_s", "attitude_s", "body_rate_s", "delay_s"});
     const auto time = [&lag](const char* key) {
       return lag.has(key) ? seconds(lag, key, non_negative(lag, key)) : 0;
     };
     gains.motor_lag_s = time("motor_s");
     gains.attitude_lag_s = time("attitude_s");
+    gains.body_rate_lag_s = time("body_rate_s");
     gains.delay_s = time("delay_s");
   }
   if (top.has("network")) {

@@ -18,6 +18,14 @@ using PidGains = controller::PidGains<double>;
 using CompositeGains = controller::CompositeGains<double>;
 using controller::AttitudeLaw;
 
+/// Gains of the attitude law about the body's axes: torque = -(KR e_R + Kw e_w + KI int e_R). The robust law has this form
+/// with Kw = K, KR = K Lambda.
+struct AttitudeGains {
+  PerAxis KR_Nm;
+  PerAxis Kw_Nm_s;
+  PerAxis KI_Nm_per_s;
+};
+
 /// Everything gains.toml says. Exactly one of `pid` and `composite` is present.
 struct Gains {
   std::string path;    ///< of the file, for messages and hashes
@@ -31,17 +39,20 @@ struct Gains {
   double rate_hz = 0;            ///< of the position loop; 0: the law is analysed in continuous time only
   double integrator_step_s = 0;  ///< added per cycle: I += step * e; 1/rate_hz unless the file says otherwise
   AttitudeLaw attitude_law = AttitudeLaw::kLee;
-  double motor_lag_s = 0;        ///< time constant of thrust, all axes
-  double attitude_lag_s = 0;     ///< time constant of the thrust's direction: x and y only
-  double delay_s = 0;            ///< from state to force
-  double network_rate_hz = 0;    ///< of the learned force's staircase; 0: continuous
-  double network_latency_s = 0;  ///< age of what the network sees when its output is applied
+  std::optional<AttitudeGains> attitude;  ///< for the margins of the cascade; what is simulated has its own
+  double motor_lag_s = 0;                 ///< time constant of thrust, all axes
+  double attitude_lag_s = 0;              ///< time constant of the thrust's direction: x and y only
+  double body_rate_lag_s = 0;             ///< time constant of the measured body rates, in the cascade
+  double delay_s = 0;                     ///< from state to force
+  double network_rate_hz = 0;             ///< of the learned force's staircase; 0: continuous
+  double network_latency_s = 0;           ///< age of what the network sees when its output is applied
 };
 
 /// Reads gains.toml (schema swarmcert/gains/1).
 ///   [position] Kp, Kd, Ki: three numbers, or one for all axes; or Lambda, K: 3x3, three (diagonal), or one number.
 ///              integrator_limit (m s), rate_hz, integrator_step_s: optional.
-///   [attitude] law = "lee" | "robust";  [lag] motor_s, attitude_s, delay_s;  [network] rate_hz, latency_s: optional.
+///   [attitude] law = "lee" | "robust"; KR, Kw, KI: three numbers about the body's axes, or one for all; KI may be left
+///              out. [lag] motor_s, attitude_s, body_rate_s, delay_s;  [network] rate_hz, latency_s: optional.
 /// Whether Lambda and K fit the theorem is not asked here.
 /// @throws files::InputError with line, key, value and mend: unknown keys, both forms or neither, negative or
 ///   non-finite numbers, times above one second, rates outside 1 Hz .. 100 kHz, gains that no vehicle follows (Kp

@@ -13,9 +13,9 @@ namespace {
 /// The loop cut at the motors: open(s) + feedback(s) is its characteristic polynomial, and a delay of the motors multiplies
 /// `feedback` alone.
 struct CutLoop {
-  Polynomial lag;        ///< L
-  Polynomial law;        ///< ratio (Kw s^2 + KR s + KI)/J without a factor s where KI = 0; 1 without attitude
-  Polynomial stiffness;  ///< ratio (KR s + KI)/J without that factor; 1 without attitude
+  Polynomial lag;  ///< L N, N = rate_lag s + 1 of the measured body rate; L without attitude
+  Polynomial law;  ///< ratio (Kw s^2 + (KR s + KI) N)/J without a factor s where KI = 0; 1 without attitude
+  Polynomial stiffness;  ///< ratio (KR s + KI) N/J without that factor; 1 without attitude
   int inner = 0;         ///< powers of s that the open attitude loop has beside L
   int outer = 2;         ///< those of the open position loop
   Polynomial pid;        ///< ratio (Kd s^2 + Kp s + Ki) without a factor s where Ki = 0
@@ -29,10 +29,14 @@ struct CutLoop {
     const AttitudeLoop& a = *loop.attitude;
     const bool integrates = a.KI_J_s3 > 0;
     inner = integrates ? 3 : 2;
-    law = integrates ? Polynomial{a.KI_J_s3, a.KR_J_s2, a.Kw_J_s} : Polynomial{a.KR_J_s2, a.Kw_J_s};
     stiffness = integrates ? Polynomial{a.KI_J_s3, a.KR_J_s2} : Polynomial{a.KR_J_s2};
-    law = scaled(law, loop.ratio);
+    if (loop.body_rate_lag_s > 0) {
+      const Polynomial rate = {1, loop.body_rate_lag_s};
+      lag = product(lag, rate);
+      stiffness = product(stiffness, rate);
+    }
     stiffness = scaled(stiffness, loop.ratio);
+    law = sum(stiffness, times_s_to(inner - 1, {loop.ratio * a.Kw_J_s}));
   }
 
   Polynomial open() const { return times_s_to(inner + outer, lag); }

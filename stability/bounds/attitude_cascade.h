@@ -4,6 +4,7 @@
 /// that the position loop asks for, through motors with a first-order lag:
 ///   theta'' = L^-1 [-(Kw theta' + KR (theta - theta_c) + KI int (theta - theta_c))] / J + alpha,
 ///   g theta_c = -ratio (Kp e + Kd (e' + n) + Ki int e),  L = lag s + 1.
+/// The law sees theta' behind a lag of its own: Kw theta' stands for Kw (rate_lag s + 1)^-1 theta'.
 /// Lee's law has this form, with its feed-forward of the body rate left out; the robust law
 /// tau = -K (omega - omega_r), omega_r = -Lambda theta, has it with Kw = K, KR = K Lambda.
 #pragma once
@@ -28,7 +29,8 @@ struct Cascade {
   double ratio = 1;  ///< force, and torque, that acts per one commanded
   /// Nothing for the vertical axis, where thrust acts without a tilt.
   std::optional<AttitudeLoop> attitude;
-  double lag_s = 0;  ///< of thrust and torque
+  double lag_s = 0;            ///< of thrust and torque
+  double body_rate_lag_s = 0;  ///< of the measured theta'; without attitude it has no effect
 };
 
 /// What disturbs the loop.

@@ -100,6 +100,23 @@ double least_demand(const EstimateError& n, const Amplitude& amplitude, const Ed
   return least;
 }
 
+/// How old the reference's acceleration that acts is at most, on average over what the lags let through.
+double acceleration_age_s(const AxisLoop& loop) {
+  double age_s = loop.delay_s;
+  for (const double lag_s : loop.lags_s) age_s += lag_s;
+  return age_s;
+}
+double acceleration_age_s(const SampledLoop& loop) { return acceleration_age_s(loop.plant) + loop.period_s; }
+
+/// What the reference demands of the integrator: its jumps as starts away from it, its jerk as a force of age times jerk.
+/// @param position, speed, force demands per m, per m/s and per m/s^2.
+template <class AnyLoop, class Position, class Speed, class Force>
+double reference_demand(const AnyLoop& loop, const ReferenceMotion& reference, const Position& position,
+                        const Speed& speed, const Force& force) {
+  return part(reference.steps_m, position) + part(reference.speed_steps_m_s, speed) +
+         part(reference.jerk_m_s3 * acceleration_age_s(loop), force);
+}
+
 }  // namespace
 
 bool EstimateError::is_zero() const { return impulse == 0 || largest() == 0 || (rate == 0 && constant == 0); }
@@ -123,6 +140,11 @@ ErrorParts error_parts(const AxisLoop& loop, double step_gain, const OtherErrors
   };
   parts.velocity_error_m = velocity_part(loop, errors.velocity_error, norms, by_command);
   parts.position_error_m = position_part(loop, errors.position_error, norms);
+  const ReferenceMotion& reference = errors.reference;
+  parts.reference_m = part(reference.steps_m, [&] { return initial_position_gain(loop); }) +
+                      part(reference.speed_steps_m_s,
+                           [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).impulse; }) +
+                      part(reference.jerk_m_s3, [&] { return loop.mass_kg * lag_floor(loop).rate; });
   return parts;
 }
 
@@ -140,6 +162,12 @@ ErrorParts error_parts(const SampledLoop& loop, double step_gain, const OtherErr
   };
   parts.velocity_error_m = velocity_part(loop.plant, errors.velocity_error, norms, by_command);
   parts.position_error_m = position_part(loop, errors.position_error, norms);
+  const ReferenceMotion& reference = errors.reference;
+  const auto force = [&] { return sampled_norms(loop, Channel::kForce, Instants::kAll); };
+  parts.reference_m = part(reference.steps_m, [&] { return initial_position_gain(loop); }) +
+                      part(reference.speed_steps_m_s, [&] { return loop.plant.mass_kg * force().impulse; }) +
+                      part(reference.jerk_m_s3 * acceleration_age_s(loop),
+                           [&] { return loop.plant.mass_kg * force().amplitude; });
   return parts;
 }
 
@@ -196,8 +224,9 @@ double initial_position_gain(const SampledLoop& loop) {
 double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErrors& errors) {
   const double step =
       part(errors.step_N(), [&] { return response_norms(step_transfer(loop, channel)).step_max_abs; });
-  const double speed =
-      part(errors.velocity_m_s, [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).edge; });
+  const auto by_speed = [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).edge; };
+  const auto by_force = [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).rate; };
+  const double speed = part(errors.velocity_m_s, by_speed);
   const double velocity_error = least_demand(
       errors.velocity_error, [&] { return continuous_norms(loop, Estimate::kVelocity).rate; },
       [&] {
@@ -215,7 +244,8 @@ double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErr
   const double position_error = least_demand(
       errors.position_error, [&] { return drift_gain(loop); }, position,
       [&] { return initial_position_gain(loop); });
-  return step + speed + velocity_error + part(errors.position_m, position) + position_error;
+  return step + speed + velocity_error + part(errors.position_m, position) + position_error +
+         reference_demand(loop, errors.reference, position, by_speed, by_force);
 }
 
 double integral_demand_m_s(const SampledLoop& loop, Channel channel, const OtherErrors& errors) {
@@ -235,6 +265,11 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
   };
   const auto speed = [&] { return initial_response(adjoint, integral).to_velocity; };
   const auto position = [&] { return initial_response(adjoint, integral).to_position; };
+  const auto force = [&] {
+    KernelSum sum;
+    add_force_kernel(adjoint, integral, sum);
+    return sum.norms().amplitude;
+  };
   const auto demand = [&](const EstimateError& n, const Eigen::VectorXd& input) {
     if (n.is_zero()) return 0.0;
     const GainNorms gains = input_gains(adjoint, integral, input);
@@ -243,7 +278,8 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
   };
   return part(errors.step_N(), step) + part(errors.velocity_m_s, speed) + part(errors.position_m, position) +
          demand(errors.velocity_error, adjoint.model().measured_velocity()) +
-         demand(errors.position_error, adjoint.model().measured_position());
+         demand(errors.position_error, adjoint.model().measured_position()) +
+         reference_demand(loop, errors.reference, position, speed, force);
 }
 
 double effort_N(const AxisLoop& loop, const OtherErrors& errors) {
@@ -271,7 +307,9 @@ double effort_N(const AxisLoop& loop, const OtherErrors& errors) {
          loop.mass_kg *
              (part(errors.velocity_error.largest(), velocity_error) +
               part(errors.position_error.largest(), position_error) + part(errors.position_m, position)) +
-         part(errors.velocity_m_s, speed);
+         part(errors.velocity_m_s, speed) + loop.mass_kg * part(errors.reference.steps_m, position) +
+         part(errors.reference.speed_steps_m_s, speed) +
+         loop.mass_kg * part(errors.reference.jerk_m_s3 * acceleration_age_s(loop), [&] { return effort; });
 }
 
 }  // namespace swarmcert::stability

@@ -30,6 +30,16 @@ struct EstimateError {
   }
 };
 
+/// How the set point p_d moves. The law feeds p_d'' forward; what it cannot follow at once is an error.
+struct ReferenceMotion {
+  double steps_m = 0;          ///< sum of the sizes of all jumps of p_d
+  double speed_steps_m_s = 0;  ///< of all jumps of p_d': a ramp begins and ends with one
+  double jerk_m_s3 = 0;        ///< sup |p_d'''| between the jumps; p_d'' is zero before t = 0
+  bool operator==(const ReferenceMotion& o) const {
+    return steps_m == o.steps_m && speed_steps_m_s == o.speed_steps_m_s && jerk_m_s3 == o.jerk_m_s3;
+  }
+};
+
 /// Of one axis. All but the bias are sizes: the signs and the course over time are the worst ones.
 struct OtherErrors {
   double bias_N = 0;               ///< constant part of the force error, from t = 0 on
@@ -38,13 +48,14 @@ struct OtherErrors {
   double velocity_m_s = 0;         ///< |e'| at t = 0
   EstimateError velocity_error{};  ///< estimated - true velocity
   EstimateError position_error{};  ///< estimated - true position
+  ReferenceMotion reference{};
 
   /// The step that the force error makes at t = 0.
   double step_N() const;
   bool operator==(const OtherErrors& o) const {
     return bias_N == o.bias_N && start_N == o.start_N && position_m == o.position_m &&
            velocity_m_s == o.velocity_m_s && velocity_error == o.velocity_error &&
-           position_error == o.position_error;
+           position_error == o.position_error && reference == o.reference;
   }
 };
 
@@ -53,13 +64,16 @@ struct ErrorParts {
   double bias_m = 0;     ///< of step_N()
   double initial_m = 0;  ///< of position_m and velocity_m_s
   double velocity_error_m = 0, position_error_m = 0;
+  double reference_m = 0;
 
-  double total_m() const { return bias_m + initial_m + velocity_error_m + position_error_m; }
+  double total_m() const { return bias_m + initial_m + velocity_error_m + position_error_m + reference_m; }
 };
 
 /// Bounds for all t >= 0 from zero integral and lags at rest; infinite where a part is not zero and the loop unstable.
 /// Those of the bias are exact; that of the initial position is without a delay. Those of the estimates are the least of
 /// what amplitude, rate, both together, variation and impulse of their errors give, each exact for its class alone.
+/// That of a jump of the set point is that of a start as far from it; that of its jerk is the floor of the lags (exact
+/// without a delay), and of a sampled loop bounded by the age of the acceleration that acts: lags, delay and hold together.
 /// @param step_gain m/N: the edge gain of the channel by which the force error enters.
 ErrorParts error_parts(const AxisLoop& loop, double step_gain, const OtherErrors& errors);
 /// t = 0 is a sampling instant.

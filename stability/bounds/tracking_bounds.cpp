@@ -62,6 +62,9 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
       report.thrust_margin_N
           ? "under all that is declared, about hover, by the effort gain of the continuous loop"
           : "");
+  if (source.has_moving_reference())
+    add("the set point moves as declared", "assumed",
+        "its acceleration is fed forward, and the force that acts is the force commanded");
   if (source.has_estimate_errors()) {
     const bool is_measured = source.kind == "measured" && !source.declares_velocity_error;
     add("errors of the estimated position and velocity", is_measured ? "measured" : "assumed",
@@ -198,6 +201,7 @@ void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const Disturban
                        const InitialError& initial, TrackingReport& report) {
   const double amplitude_N = source.axis[2].amplitude_N;
   if (!(plant.largest_thrust_N > 0) || !std::isfinite(amplitude_N)) return;
+  if (source.has_moving_reference()) return;  // what is fed forward takes thrust too, and is not bounded
   OtherErrors other = source.other(2, initial);
   if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
   const double weight_N = plant.mass_kg * kGravity_m_s2;
@@ -249,6 +253,7 @@ void add_theorem(const Plant& plant, const DisturbanceSource& source, const Init
            std::to_string(plant.thrust_scale));
   }
   if (source.has_estimate_errors()) object("the estimated position or velocity errs, as declared");
+  if (source.has_moving_reference()) object("the set point moves as declared");
   if (!theorem.composite) return;
   report.vector = vector_peak_gain(theorem.composite->Lambda_1_s, theorem.composite->K_kg_s, plant.mass_kg);
   report.transient = transient_of(theorem, plant, source, initial);
@@ -290,6 +295,11 @@ bool DisturbanceSource::has_estimate_errors() const {
          std::any_of(std::begin(position_error), std::end(position_error), is_given);
 }
 
+bool DisturbanceSource::has_moving_reference() const {
+  return std::any_of(std::begin(reference), std::end(reference),
+                     [](const ReferenceMotion& motion) { return !(motion == ReferenceMotion{}); });
+}
+
 bool DisturbanceSource::amplitudes_reach_bias() const {
   for (std::size_t i = 0; i < 3; ++i) {
     if (std::abs(bias_N[i]) > axis[i].amplitude_N) return false;
@@ -303,6 +313,7 @@ OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial) c
   errors.start_N = initial.learning_error_N;
   errors.position_m = initial.position_m;
   errors.velocity_m_s = initial.velocity_m_s;
+  errors.reference = reference[of_axis];
   errors.velocity_error = velocity_error[of_axis];
   errors.position_error = position_error[of_axis];
   return errors;

@@ -42,8 +42,10 @@ struct DisturbanceSource {
   double bias_N[3] = {0, 0, 0};
   /// Whether amplitude and impulse were measured with the bias in them; else it comes on top of every class.
   bool classes_contain_bias = false;
-  EstimateError velocity_error[3];       ///< estimated - true velocity
-  EstimateError position_error[3];       ///< estimated - true position
+  EstimateError velocity_error[3];  ///< estimated - true velocity
+  EstimateError position_error[3];  ///< estimated - true position
+  ReferenceMotion reference[3];
+  bool has_moving_reference() const;
   bool declares_velocity_error = false;  ///< velocity_error was stated, not measured
   bool has_estimate_errors() const;
   /// Whether the amplitude is at least the bias on every axis, as one is that was measured with the bias in it.

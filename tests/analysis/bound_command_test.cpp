@@ -166,6 +166,33 @@ TEST(BoundCommand, EveryClassOfAnErrorOfAnEstimateCounts) {
   EXPECT_TRUE(told["disturbance"]["of_estimates"][0]["amplitude"].is_null());
 }
 
+TEST(BoundCommand, AMovingSetPointIsAPartOfEveryTotal) {
+  const ScratchFolder folder;
+  const std::string gains =
+      gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\nrate_hz = 100\n[lag]\nmotor_s = 0.0575\n");
+  const Json still = json_of(folder, "bound" + gains + " --amplitude 0.01");
+  const Json moving = json_of(folder, "bound" + gains + " --amplitude 0.01 --reference-jerk 0,0,5");
+  for (std::size_t k = 0; k < still["bounds"].size(); ++k) {
+    const Json& row = moving["bounds"][k];
+    const double part_m = row["parts"]["reference"].get<double>();
+    EXPECT_NEAR(row["amplitude"].get<double>(), still["bounds"][k]["amplitude"].get<double>() + part_m,
+                1e-12);
+    if (row["axis"] != "z") {
+      EXPECT_EQ(part_m, 0);
+    } else if (row["loop"] == "continuous") {
+      // The floor of the lag times what the set point asks of the force.
+      EXPECT_NEAR(part_m, moving["axes"][2]["lag_floor_rate"].get<double>() * 0.034 * 5, 1e-9);
+    } else {
+      EXPECT_GT(part_m, moving["axes"][2]["lag_floor_rate"].get<double>() * 0.034 * 5);
+    }
+  }
+  const Json jumps = json_of(folder, "bound" + gains + " --reference-step 0.3 --reference-speed-step 1");
+  EXPECT_GE(jumps["bounds"][0]["parts"]["reference"].get<double>(), 0.3);
+  for (const std::string& options :
+       {std::string(" --reference-jerk -1"), std::string(" --amplitude 0.1 --tube --reference-step 1")})
+    EXPECT_EQ(run_shell("swarmcert bound" + gains + options, folder.path()).exit_code, 2) << options;
+}
+
 TEST(BoundCommand, TheTheoremsBallIsWithheldWhereTheEstimatesErr) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");

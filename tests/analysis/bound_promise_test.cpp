@@ -43,6 +43,36 @@ TEST(BoundCommand, SaysWhichGainsAreCloseToALimitCycleOfTheAttitudeLoop) {
   }
 }
 
+TEST(BoundCommand, TakesTheGainsOfTheAttitudeLawFromTheFileThatFlies) {
+  const ScratchFolder folder;
+  const std::string model = kSourceFolder + "/stability/models/crazyflie-small.toml";
+  const auto attitude_of = [&](const std::string& tables, const std::string& words) {
+    write_text(folder / "gains.toml",
+               "schema = \"swarmcert/gains/1\"\n[position]\nKp = 9\nKd = 7\nKi = 0\n" + tables);
+    const Json result = json_of(folder, "bound --gains gains.toml --model " + model + words);
+    return result.contains("attitude") ? result["attitude"] : Json();
+  };
+  const std::string lag = "[lag]\nmotor_s = 0.0575\n";
+  const std::string law = "[attitude]\nKR = 0.007\nKw = 0.00115\nKI = 0.03\n";
+  const Json told = attitude_of(lag, " --attitude-gains 0.007,0.00115,0.03");
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(attitude_of(law + lag, ""), told);
+  EXPECT_TRUE(attitude_of(lag, "").is_null());
+  EXPECT_EQ(attitude_of("[attitude]\nKR = 1\nKw = 1\n" + lag, " --attitude-gains 0.007,0.00115,0.03"), told)
+      << "the option comes first";
+  // About the axes of the body: x is reached by a tilt about y.
+  const Json softer = attitude_of("[attitude]\nKR = [0.007, 0.003, 1]\nKw = 0.00115\nKI = 0.03\n" + lag, "");
+  EXPECT_EQ(softer[1], told[1]);
+  EXPECT_NE(softer[0], told[0]);
+  const Json late = attitude_of(law + "[lag]\nmotor_s = 0.0575\nbody_rate_s = 0.01\n", "");
+  EXPECT_LT(late[0]["gain_margin"].get<double>(), told[0]["gain_margin"].get<double>());
+  write_text(folder / "gains.toml",
+             "schema = \"swarmcert/gains/1\"\n[position]\nKp = 9\nKd = 7\nKi = 0\n[attitude]\nKR = 0.007\n");
+  const Outcome half = run_shell("swarmcert bound --gains gains.toml --model " + model, folder.path());
+  EXPECT_EQ(half.exit_code, 3);
+  EXPECT_NE(half.output.find("Kw"), std::string::npos) << half.output;
+}
+
 /// A result of compare whose flights had these amplitudes along all axes, and otherwise anything.
 /// @param velocity_m_s amplitude of the error of the velocity of every flight; 0: not measured.
 std::string compared_flights(const ScratchFolder& folder, const std::vector<double>& amplitudes,

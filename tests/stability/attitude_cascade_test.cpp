@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
 
 #include "stability/bounds/axis_loop.h"
+#include "stability/model.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -82,6 +84,44 @@ TEST(AttitudeCascade, AnUnstableLoopHasNoMargins) {
   EXPECT_EQ(cascade_margins(loop).delay_s, 0);
   EXPECT_EQ(cascade_margins(loop).gain, 0);
   EXPECT_TRUE(std::isinf(response_norms(cascade_transfer(loop, CascadeInput::kAcceleration)).integral_abs));
+}
+
+TEST(AttitudeCascade, ALagOfTheBodyRatesStandsInTheLoopWhereTheyAreMeasured) {
+  using Complex = std::complex<double>;
+  const auto at = [](const Polynomial& p, Complex s) {
+    Complex value = 0;
+    for (std::size_t k = p.size(); k-- > 0;) value = value * s + p[k];
+    return value;
+  };
+  for (const double KI : {0.0, 900.0}) {
+    for (const double Ki : {0.0, 4.0}) {
+      const Cascade loop{9, 7, Ki, 1.3, AttitudeLoop{500, 60, KI}, 0.03, 0.012};
+      for (const double hz : {0.1, 0.7, 2.0, 9.0}) {
+        const Complex s(0, 2 * M_PI * hz);
+        const Complex law = 500.0 + KI / s, rate = 60.0 * s / (0.012 * s + 1.0), pid = 9.0 + 7.0 * s + Ki / s;
+        const Complex tilts = s * s * (0.03 * s + 1.0) + 1.3 * (rate + law);
+        const Complex follows = 1.3 * law / tilts;
+        const Complex moves = 1.0 / (s * s + 1.3 * follows * pid);
+        const TransferFunction force = cascade_transfer(loop, CascadeInput::kAcceleration);
+        EXPECT_LT(std::abs(at(force.numerator, s) / at(force.denominator, s) - moves),
+                  1e-9 * std::abs(moves));
+        const TransferFunction velocity = cascade_transfer(loop, CascadeInput::kVelocityError);
+        const Complex errs = moves * 1.3 * follows * 7.0;
+        EXPECT_LT(std::abs(at(velocity.numerator, s) / at(velocity.denominator, s) - errs),
+                  1e-9 * std::abs(errs));
+        const TransferFunction torque = cascade_transfer(loop, CascadeInput::kAngularAcceleration);
+        const Complex tilted = moves * kGravity_m_s2 * (0.03 * s + 1.0) / tilts;
+        EXPECT_LT(std::abs(at(torque.numerator, s) / at(torque.denominator, s) - tilted),
+                  1e-9 * std::abs(tilted));
+      }
+    }
+  }
+  Cascade late{9, 7, 0, 1.3, AttitudeLoop{500, 60, 0}, 0.03};
+  const double prompt = cascade_margins(late).damping;
+  late.body_rate_lag_s = 0.01;
+  EXPECT_LT(cascade_margins(late).damping, prompt);
+  late.body_rate_lag_s = 0.2;
+  EXPECT_FALSE(is_stable(late));
 }
 
 TEST(AttitudeCascade, RefusesATorqueWithoutAnAttitudeLoop) {

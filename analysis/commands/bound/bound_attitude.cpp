@@ -40,19 +40,32 @@ files::Json gains_json(const stability::Cascade& loop, CascadeInput input, const
 
 }  // namespace
 
+bool has_attitude_gains(const Tracking& input, const std::string& words) {
+  if (!words.empty()) return true;
+  return input.gains.attitude && axis_loop(input.gains, input.plant, 0) &&
+         axis_loop(input.gains, input.plant, 1);
+}
+
 stability::Cascade attitude_cascade(const Tracking& input, const std::string& words, int axis) {
-  const std::array<double, 3> gains = read_attitude_gains(words);
+  // A vehicle tilts about its other horizontal axis.
+  const auto about = static_cast<std::size_t>(1 - axis);
+  const std::array<double, 3> gains =
+      !words.empty()
+          ? read_attitude_gains(words)
+          : std::array<double, 3>{input.gains.attitude->KR_Nm[about], input.gains.attitude->Kw_Nm_s[about],
+                                  input.gains.attitude->KI_Nm_per_s[about]};
   const std::optional<stability::AxisLoop> position = axis_loop(input.gains, input.plant, axis);
-  if (!position) throw UsageError("--attitude-gains: Lambda or K couples the axes; make them diagonal");
+  if (!position) throw UsageError("attitude gains: Lambda or K couples the axes; make them diagonal");
   // axis_loop() has the thrust's scale in its gains already.
   const double scale = input.plant.thrust_scale;
-  const double inertia = input.model.inertia_kg_m2[static_cast<std::size_t>(1 - axis)];
+  const double inertia = input.model.inertia_kg_m2[about];
   stability::Cascade loop{position->Kp / scale,
                           position->Kd / scale,
                           position->Ki / scale,
                           scale,
                           stability::AttitudeLoop{gains[0] / inertia, gains[1] / inertia, gains[2] / inertia},
-                          input.gains.motor_lag_s};
+                          input.gains.motor_lag_s,
+                          input.gains.body_rate_lag_s};
   if (const auto sampled = sampled_axis_loop(input.gains, input.plant, axis))
     loop.Ki = effective_Ki(*sampled) / scale;
   return loop;

@@ -1,4 +1,5 @@
-/// @file `--attitude-gains KR,Kw,KI` of bound and tune: the position loop around the attitude loop that flies.
+/// @file The position loop around the attitude loop that flies, for bound and tune: `--attitude-gains KR,Kw,KI`, else
+/// [attitude] of gains.toml.
 #pragma once
 
 #include <string>
@@ -8,9 +9,12 @@
 
 namespace swarmcert::analysis {
 
-/// The cascade of a horizontal axis. Motor lag of gains.toml, inertia and thrust ratio of the model; the attitude lag of
+/// Whether either says them; those of gains.toml only where both axes have loops of their own.
+bool has_attitude_gains(const Tracking& input, const std::string& words);
+
+/// The cascade of a horizontal axis. Motor lag and lag of the body rates of gains.toml, inertia and thrust ratio of the model; the attitude lag of
 /// gains.toml is what the attitude loop stands for and is left out.
-/// @param words KR in N m, Kw in N m s, KI in N m/s: three numbers. @throws UsageError for others, and for gains without
+/// @param words KR in N m, Kw in N m s, KI in N m/s: three numbers; empty: those of gains.toml, which must have them. @throws UsageError for others, and for gains without
 ///   a loop per axis.
 stability::Cascade attitude_cascade(const Tracking& input, const std::string& words, int axis);
 

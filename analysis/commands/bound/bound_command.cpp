@@ -67,6 +67,10 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
                                     ? "the error of the velocity that was measured (--velocity-error 0)"
                                     : "--velocity-error and --position-error";
   if (asked != nullptr && source.has_estimate_errors()) refuse(asked, estimates);
+  if ((asked != nullptr || !options.swarm.empty()) && source.has_moving_reference()) {
+    refuse(asked != nullptr ? asked : "--swarm",
+           "--reference-step, --reference-speed-step and --reference-jerk");
+  }
   if (asked != nullptr && has_initial(options.initial)) {
     refuse(asked, "--initial-error, --initial-speed and --initial-learning-error, as it starts from rest");
   }
@@ -130,7 +134,8 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     result["coverage"] = promise_json(input, report, load_disturbance(others, input).source, options.initial,
                                       options.disturbance.from, options.coverage);
   }
-  if (!options.attitude.empty()) result["attitude"] = attitude_json(input, options.attitude);
+  const bool has_attitude = has_attitude_gains(input, options.attitude);
+  if (has_attitude) result["attitude"] = attitude_json(input, options.attitude);
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
   if (local) result["local_tube"] = local_tube_json(options.task, *local);
@@ -146,7 +151,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     if (disturbance.truth) print_truth(*disturbance.truth);
     if (options.is_uncertain) print_uncertain(result["uncertain"]);
     if (options.coverage > 0) print_promise(result["coverage"]);
-    if (!options.attitude.empty()) print_attitude(result["attitude"]);
+    if (has_attitude) print_attitude(result["attitude"]);
     if (options.verified) print_verified(result["verified"]);
     if (local) print_local_tube(result["local_tube"]);
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
@@ -202,7 +207,8 @@ Command bound_command() {
             ->capture_default_str();
         app.add_option(
             "--attitude-gains", options->attitude,
-            "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade");
+            "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade "
+            "(default: [attitude] of gains.toml, where it has them)");
         app.add_option("--coverage", options->coverage,
                        "Bound that a further flight like those of --from keeps with this probability "
                        "(split-conformal "

@@ -78,7 +78,8 @@ Json bounds_json(const AxisBounds& row) {
            {{"bias", finite(row.parts.bias_m)},
             {"initial", finite(row.parts.initial_m)},
             {"velocity_error", finite(row.parts.velocity_error_m)},
-            {"position_error", finite(row.parts.position_error_m)}}},
+            {"position_error", finite(row.parts.position_error_m)},
+            {"reference", finite(row.parts.reference_m)}}},
           {"staircase", finite(row.staircase_m)},
           {"float32", finite(row.float32_m)},
           {"total", finite(row.total_m())}};
@@ -232,6 +233,7 @@ void print_parts(const AxisBounds& row) {
   add("initial error", row.parts.initial_m);
   add("velocity error", row.parts.velocity_error_m);
   add("position error", row.parts.position_error_m);
+  add("moving set point", row.parts.reference_m);
   if (!parts.empty()) fmt::print("       each contains: {}\n", fmt::join(parts, ", "));
   if (row.staircase_m > 0)
     fmt::print("       the total contains {} for the staircase of f_hat\n", cell(row.staircase_m));

@@ -59,6 +59,18 @@ void read_estimate(const std::string& option, const EstimateArguments& arguments
   read("-impulse", arguments.impulse, &stability::EstimateError::impulse);
 }
 
+void read_reference(const DisturbanceArguments& arguments, DisturbanceSource& source) {
+  const auto read = [&](const char* option, const std::string& text, double stability::ReferenceMotion::*of) {
+    double values[3] = {0, 0, 0};
+    read_axes(option, text, false, values);
+    for (int axis = 0; axis < 3; ++axis) source.reference[axis].*of = values[axis];
+  };
+  read("--reference-step", arguments.reference_step, &stability::ReferenceMotion::steps_m);
+  read("--reference-speed-step", arguments.reference_speed_step,
+       &stability::ReferenceMotion::speed_steps_m_s);
+  read("--reference-jerk", arguments.reference_jerk, &stability::ReferenceMotion::jerk_m_s3);
+}
+
 void declare_estimate(CLI::App& app, const std::string& estimate, const std::string& unit, const char* law,
                       EstimateArguments& arguments) {
   const std::string option = "--" + estimate + "-error", error = "(estimated - true " + estimate + ")";
@@ -245,6 +257,13 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
                  "Constant part of the force error, N, on top of the rest; for all axes, or X,Y,Z");
   declare_estimate(app, "velocity", "m/s", "the law sees through Kd", arguments.velocity_error);
   declare_estimate(app, "position", "m", "the law sees through Kp and Ki", arguments.position_error);
+  const std::string axes = "; for all axes, or X,Y,Z";
+  app.add_option("--reference-step", arguments.reference_step, "Sum of all jumps of the set point, m" + axes);
+  app.add_option("--reference-speed-step", arguments.reference_speed_step,
+                 "Sum of all jumps of the set point's velocity, m/s: a ramp begins and ends with one" + axes);
+  app.add_option(
+      "--reference-jerk", arguments.reference_jerk,
+      "sup |p_d'''|, m/s^3, of a set point whose acceleration is fed forward through the lags" + axes);
   auto* passes = app.add_option("--passes", arguments.passes, "How many such passes (default 1)")
                      ->check(CLI::PositiveNumber);
   app.add_option("--every", arguments.every_s, "Least time between the starts of two passes, s")
@@ -363,6 +382,7 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
   source.declares_velocity_error = arguments.velocity_error.are_given();
   read_estimate("--velocity-error", arguments.velocity_error, source.velocity_error);
   read_estimate("--position-error", arguments.position_error, source.position_error);
+  read_reference(arguments, source);
   const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
   if (!arguments.certificate.empty() || has_network) {
     read_lipschitz(arguments, source, result.inputs, source.further_assumptions);
@@ -372,8 +392,8 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
     result.truth = read_truth(arguments, tracking);
     add_truth(*result.truth, source);
   }
-  const bool has_others =
-      !arguments.bias.empty() || arguments.velocity_error.are_given() || arguments.position_error.are_given();
+  const bool has_others = !arguments.bias.empty() || arguments.velocity_error.are_given() ||
+                          arguments.position_error.are_given() || source.has_moving_reference();
   if (has_others && source.kind == "none") declare_no_class(source);
   return result;
 }

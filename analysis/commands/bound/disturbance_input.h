@@ -19,6 +19,7 @@ struct DisturbanceArguments {
   double rate = -1, amplitude = -1, edge = -1, impulse = -1;  ///< negative: not given
   std::string bias;  ///< a number for all axes, or X,Y,Z; empty: not given
   EstimateArguments velocity_error, position_error;
+  std::string reference_step, reference_speed_step, reference_jerk;  ///< as bias
   int passes = 1;
   double every_s = 0, pass_s = 0;
   std::string from;  ///< compare.json

@@ -161,8 +161,9 @@ stability::SampledLoop loop_of(const TuneOptions& options, const Tracking& input
 /// Sets the objective and, where the command line left them out, the limits: by default nothing may get worse than the
 /// given gains are, except the lag that is borne.
 void set_limits(const stability::SampledLoop& loop, const Tracking& input, int axis, TuneOptions& options) {
-  if (!options.attitude.empty()) {
-    if (axis == 2) throw UsageError("--attitude-gains: the z axis has no attitude loop");
+  if (!options.attitude.empty() && axis == 2)
+    throw UsageError("--attitude-gains: the z axis has no attitude loop");
+  if (axis < 2 && has_attitude_gains(input, options.attitude)) {
     options.tune.attitude = attitude_cascade(input, options.attitude, axis);
   }
   options.tune.objective = options.objective == "amplitude" ? stability::TuneObjective::kAmplitude
@@ -273,7 +274,7 @@ Command tune_command() {
         app.add_option(
             "--attitude-gains", options->attitude,
             "KR,Kw,KI of the attitude law, N m, N m s, N m/s (x and y): propose nothing that bound calls "
-            "close to a limit cycle with it");
+            "close to a limit cycle with it (default: [attitude] of gains.toml, where it has them)");
         app.add_option("--range", options->tune.range, "Gains at most this factor away (default 8)")
             ->check(CLI::Range(1.01, 100.0));
         app.add_option("--nodes", options->tune.global_evaluations, "Evaluations of the global search")
