@@ -356,7 +356,9 @@ std::vector<stability::EffectSpec> named_balances(const Passes& passes) {
 void scan_balance(const Passes& passes, Diagnosis& result) {
   std::vector<stability::EffectSpec> specs = specs_of(result.ranking);
   for (stability::EffectSpec& spec : named_balances(passes)) specs.push_back(std::move(spec));
-  const ScanSamples left = scan_samples(passes, specs, ScanQuantity::kBalance);
+  // An hour: more say hardly more, and take as long as the force.
+  constexpr Eigen::Index kMostOfBalance = 40'000;
+  const ScanSamples left = thinned(scan_samples(passes, specs, ScanQuantity::kBalance), kMostOfBalance);
   result.balance = scan(left, passes.jobs);
   result.balance_formulas = find_formulas(left, result.balance, kMostFormulas, passes.jobs);
 }
