@@ -256,9 +256,44 @@ std::vector<double> estimate_kernel(const Case& c, Estimate estimate, int period
   return kernel;
 }
 
+/// The worst error of an estimate within amplitude and rate, both finite: a backward dynamic program over multiples of what
+/// the rate allows in a period. Rounding the amplitude down to such a multiple is all that is lost, as a linear program
+/// of differences has a solution in whole numbers.
+std::vector<double> worst_within(const EstimateError& known, const std::vector<double>& kernel,
+                                 double period_s) {
+  const double unit = known.rate * period_s;
+  const int most = static_cast<int>(known.amplitude / unit), levels = 2 * most + 1;
+  std::vector<double> value(static_cast<std::size_t>(levels), 0.0), next(value);
+  std::vector<std::vector<signed char>> moves(kernel.size(),
+                                              std::vector<signed char>(static_cast<std::size_t>(levels)));
+  for (std::size_t k = kernel.size(); k-- > 0;) {
+    next.swap(value);
+    for (int i = 0; i < levels; ++i) next[static_cast<std::size_t>(i)] += kernel[k] * (i - most);
+    for (int i = 0; i < levels; ++i) {
+      int best = i;
+      for (const int to : {i - 1, i + 1}) {
+        if (to >= 0 && to < levels &&
+            next[static_cast<std::size_t>(to)] > next[static_cast<std::size_t>(best)])
+          best = to;
+      }
+      value[static_cast<std::size_t>(i)] = next[static_cast<std::size_t>(best)];
+      moves[k][static_cast<std::size_t>(i)] = static_cast<signed char>(best - i);
+    }
+  }
+  std::vector<double> n;
+  int at = most;
+  for (const std::vector<signed char>& move : moves) {
+    at += move[static_cast<std::size_t>(at)];
+    n.push_back((at - most) * unit);
+  }
+  return n;
+}
+
 /// The worst error of an estimate, one number per period, that its class allows for the error at the end of the run.
 std::vector<double> worst_error(const EstimateError& known, const std::vector<double>& kernel,
                                 double period_s) {
+  if (std::isfinite(known.amplitude) && std::isfinite(known.rate))
+    return worst_within(known, kernel, period_s);
   std::vector<double> n(kernel.size(), 0.0);
   std::vector<double> after = kernel;  // the response to a step that begins in a period
   for (std::size_t k = kernel.size() - 1; k-- > 0;) after[k] += after[k + 1];
@@ -286,11 +321,12 @@ TEST(ErrorParts, NoErrorOfAnEstimateInItsClassExceedsItsBoundAndTheWorstComesNea
   struct Class {
     const char* name;
     EstimateError velocity, position;
-    double near;  ///< of the bound; signs of the kernel are not the best input of amplitude and rate together
+    double near;  ///< of the bound
   };
   const Class classes[] = {
       {"rate", {kInfinite, 0.3}, {}, 0.97},
-      {"amplitude and rate", {0.1, 0.3}, {0.02, 0.005}, 0.45},
+      {"amplitude and rate", {0.1, 0.3}, {}, 0.98},
+      {"amplitude and rate", {}, {0.02, 0.005}, 0.9},
       {"variation", {kInfinite, kInfinite, 0.2}, {kInfinite, kInfinite, 0.02}, 0.99},
       {"impulse", {kInfinite, kInfinite, kInfinite, 0.01}, {kInfinite, kInfinite, kInfinite, 0.004}, 0.95}};
   int judged = 0;
