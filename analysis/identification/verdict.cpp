@@ -23,13 +23,12 @@ const char* name(Verdict verdict) {
 }
 
 bool leaves_something(const Diagnosis& diagnosis) {
-  constexpr double kMuch = 0.1;  // of the mean square that is left
-  constexpr double kMostOfTorque =
-      0.5;  // torques of blades that flap and of a hull in the wind are in no model
+  // Torques of blades that flap and of a hull in the wind are in no model.
+  constexpr double kMostOfTorque = 0.5;
   const auto explains = [](const Scan& scan, double share) {
     return !scan.entries.empty() && scan.entries[0].share >= share;
   };
-  return diagnosis.remainder.flag || explains(diagnosis.scan, kMuch) ||
+  return diagnosis.remainder.flag || explains(diagnosis.scan, kMuchOfForce) ||
          explains(diagnosis.balance, kMostOfTorque);
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "analysis/identification/verdict.h"
+
 namespace swarmcert::analysis {
 namespace {
 
@@ -61,13 +63,17 @@ struct Shown {
   }
 };
 
-/// Of both scans, best first; each in its own order.
+/// Of both scans, each best first: the force before torques and rotors where its scan explains much, else by their shares.
 std::vector<Listed> all_listed(const Diagnosis& diagnosis) {
   const std::vector<Listed> forces = listed(diagnosis.scan, diagnosis.formulas),
                             balances = listed(diagnosis.balance, diagnosis.balance_formulas);
+  const bool is_force_first = !forces.empty() && forces.front().entry->share >= identification::kMuchOfForce;
   std::vector<Listed> all;
   std::merge(forces.begin(), forces.end(), balances.begin(), balances.end(), std::back_inserter(all),
-             [](const Listed& a, const Listed& b) { return a.entry->share > b.entry->share; });
+             [is_force_first](const Listed& a, const Listed& b) {
+               if (is_force_first) return a.entry->quantity == "force" && b.entry->quantity != "force";
+               return a.entry->share > b.entry->share;
+             });
   return all;
 }
 
