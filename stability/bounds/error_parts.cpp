@@ -265,6 +265,8 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
   };
   const auto speed = [&] { return initial_response(adjoint, integral).to_velocity; };
   const auto position = [&] { return initial_response(adjoint, integral).to_position; };
+  // A jump of the speed between two samples has moved the set point by at most a period of it when the law sees it.
+  const auto speed_step = [&] { return speed() + loop.period_s * position(); };
   const auto force = [&] {
     KernelSum sum;
     add_force_kernel(adjoint, integral, sum);
@@ -279,7 +281,7 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
   return part(errors.step_N(), step) + part(errors.velocity_m_s, speed) + part(errors.position_m, position) +
          demand(errors.velocity_error, adjoint.model().measured_velocity()) +
          demand(errors.position_error, adjoint.model().measured_position()) +
-         reference_demand(loop, errors.reference, position, speed, force);
+         reference_demand(loop, errors.reference, position, speed_step, force);
 }
 
 double effort_N(const AxisLoop& loop, const OtherErrors& errors) {

@@ -93,13 +93,16 @@ TEST(ReferenceMotion, NoJerkOfItsSizeMakesALargerErrorAndTheWorstComesNear) {
 TEST(ReferenceMotion, JumpsAreStartsAwayFromTheSetPoint) {
   for (const FollowingLoop& c : following_loops()) {
     double from_position_m = 0, from_speed_m = 0;
-    SteppedLoop loop = c.stepped();
-    for (const bool is_speed : {false, true}) {
-      loop.reset();
-      loop.place(is_speed ? 0 : 0.2, is_speed ? 0.5 : 0);
-      double& most_m = is_speed ? from_speed_m : from_position_m;
-      if (!is_speed) most_m = 0.2;
-      for (int i = 0; i < 4000; ++i) most_m = std::max(most_m, std::abs(loop.step(0, 0)));
+    for (int after = 0; after < std::max(c.steps, 1); ++after) {
+      for (const bool is_speed : {false, true}) {
+        SteppedLoop loop = c.stepped();
+        loop.reset();
+        for (int i = 0; i < after; ++i) loop.step(0, 0);
+        loop.place(is_speed ? 0 : 0.2, is_speed ? 0.5 : 0);
+        double& most_m = is_speed ? from_speed_m : from_position_m;
+        if (!is_speed) most_m = std::max(most_m, 0.2);
+        for (int i = 0; i < 4000; ++i) most_m = std::max(most_m, std::abs(loop.step(0, 0)));
+      }
     }
     const double step_m = c.part_m({0.2, 0, 0}), ramp_m = c.part_m({0, 0.5, 0});
     EXPECT_LE(from_position_m, step_m * (1 + 1e-7));
@@ -133,13 +136,17 @@ TEST(ReferenceMotion, WhatItDemandsOfTheIntegratorIsNotExceeded) {
     other.reference = {0.2, 0.5, 0};
     const double demand_m_s = c.steps == 0 ? integral_demand_m_s(c.loop, Channel::kForce, other)
                                            : integral_demand_m_s(c.sampled(), Channel::kForce, other);
-    SteppedLoop loop = c.stepped();
-    loop.reset();
-    loop.place(0.2, 0.5);
     double most_m_s = 0;
-    for (int i = 0; i < 4000; ++i) {
-      loop.step(0, 0);
-      most_m_s = std::max(most_m_s, std::abs(loop.integral_m_s()));
+    // The set point may jump between two samples as well.
+    for (int after = 0; after < std::max(c.steps, 1); ++after) {
+      SteppedLoop loop = c.stepped();
+      loop.reset();
+      for (int i = 0; i < after; ++i) loop.step(0, 0);
+      loop.place(0.2, 0.5);
+      for (int i = 0; i < 4000; ++i) {
+        loop.step(0, 0);
+        most_m_s = std::max(most_m_s, std::abs(loop.integral_m_s()));
+      }
     }
     EXPECT_LE(most_m_s, demand_m_s * (1 + 1e-7));
     EXPECT_GT(most_m_s, 0.6 * demand_m_s);
