@@ -193,6 +193,20 @@ TEST(BoundCommand, AMovingSetPointIsAPartOfEveryTotal) {
     EXPECT_EQ(run_shell("swarmcert bound" + gains + options, folder.path()).exit_code, 2) << options;
 }
 
+TEST(BoundCommand, AJerkIsNoBoundWhereTheModelScalesTheThrustThatIsFedForward) {
+  const ScratchFolder folder;
+  write_text(
+      folder / "gains.toml",
+      "schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n[lag]\nmotor_s = 0.0575\n");
+  const std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");
+  write_text(folder / "model.toml", model + "\n[[effect]]\nname = \"thrust_ratio\"\nparameters = { ratio = 0.3 }\n");
+  const std::string scaled = "bound --gains gains.toml --model model.toml --amplitude 0.01";
+  const Outcome outcome = run_shell("swarmcert " + scaled + " --reference-jerk 5", folder.path());
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_NE(outcome.output.find("1.3"), std::string::npos) << outcome.output;
+  EXPECT_EQ(run_shell("swarmcert " + scaled + " --reference-step 0.1", folder.path()).exit_code, 0);
+}
+
 TEST(BoundCommand, TheTheoremsBallIsWithheldWhereTheEstimatesErr) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nLambda = 4\nK = 0.136\n");

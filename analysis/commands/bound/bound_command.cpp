@@ -55,6 +55,19 @@ bool has_initial(const stability::InitialError& initial) {
   return initial.position_m != 0 || initial.velocity_m_s != 0 || initial.learning_error_N != 0;
 }
 
+/// Through a thrust ratio r other than 1 the acceleration that is fed forward leaves the force (r - 1) m p_d'', which a jerk
+/// does not limit.
+void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, const Tracking& input) {
+  for (const stability::ReferenceMotion& motion : source.reference) {
+    if (motion.jerk_m_s3 == 0 || input.plant.thrust_scale == 1) continue;
+    throw UsageError(fmt::format(
+        "--reference-jerk: the thrust ratio {} of the model scales the acceleration that is fed forward, "
+        "which "
+        "leaves a force that the jerk does not limit; add it to --amplitude, with a model without the ratio",
+        input.plant.thrust_scale));
+  }
+}
+
 /// The tubes and the swarm bound start from rest and know exact estimates; the tube around a task knows no force but that
 /// of the declared truth. What they would leave out is refused.
 void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
@@ -97,6 +110,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   LoadedDisturbance disturbance = load_disturbance(told, input);
   if (has_initial(options.initial) && disturbance.source.kind == "none") declare_no_class(disturbance.source);
   refuse_what_is_left_out(options, disturbance.source);
+  refuse_jerk_of_scaled_thrust(disturbance.source, input);
   const stability::DisturbanceSource& source = disturbance.source;
   inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
   if (options.tube && !has_task &&
@@ -152,6 +166,8 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     if (options.is_uncertain) print_uncertain(result["uncertain"]);
     if (options.coverage > 0) print_promise(result["coverage"]);
     if (has_attitude) print_attitude(result["attitude"]);
+    if (!has_attitude && input.gains.attitude)
+      fmt::print("\nmargins of the attitude loop: none, as Lambda or K couples the axes\n");
     if (options.verified) print_verified(result["verified"]);
     if (local) print_local_tube(result["local_tube"]);
     if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
