@@ -20,7 +20,8 @@ struct MotionBlock {
   Eigen::Vector3d of_velocity_m_s2, measured_m_s2;
 };
 
-/// @param scale by which the measured force is divided. The trapezoidal rule integrates the measured force over the same time as the velocity changes in.
+/// The trapezoidal rule integrates the measured force over the same time as the velocity changes in.
+/// @param scale by which the measured force is divided.
 std::vector<MotionBlock> motion_blocks(const Track& track, double scale) {
   std::vector<MotionBlock> blocks;
   Eigen::Vector3d integral = Eigen::Vector3d::Zero();

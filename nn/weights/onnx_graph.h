@@ -58,7 +58,7 @@ class OnnxGraph {
   AffineMap relu(const Node& node, const AffineMap& rows, const std::string& name,
                  const std::vector<AffineMap*>& also_carried);
   OnnxNode* only_user(const std::string& name);
-  bool holds(const std::string& name, double wanted) const;
+  bool holds(const std::string& name, double wanted, double error) const;
   void join_smooth_activations();
   std::vector<AffineMap*> needed_after(const Node& node);
   void require_activation(const Node& node, Activation activation);

@@ -11,6 +11,7 @@ namespace swarmcert::files {
 namespace {
 
 constexpr double kRootOfTwo = 1.41421356237309504880;
+constexpr double kRootRounding = 1e-7;  ///< of sqrt 2 as float32
 constexpr char kOtherParameters[] = "use the activation with its default parameters";
 
 void require_parameter(const OnnxNode& node, const char* attribute, double value) {
@@ -58,11 +59,11 @@ OnnxNode* OnnxGraph::only_user(const std::string& name) {
   return name == model_.output ? nullptr : found;
 }
 
-/// Whether `name` is a stored number near `wanted`, up to the rounding of float32.
-bool OnnxGraph::holds(const std::string& name, double wanted) const {
+/// Whether `name` is a stored number and off `wanted` by `error` at most.
+bool OnnxGraph::holds(const std::string& name, double wanted, double error) const {
   const OnnxTensor* const tensor = name.empty() ? nullptr : stored_anywhere(name);
   return tensor != nullptr && tensor->numbers.size() == 1 &&
-         std::fabs(tensor->numbers.front() - wanted) <= 1e-7 * wanted;
+         std::fabs(tensor->numbers.front() - wanted) <= error;
 }
 
 /// x Sigmoid(x) becomes one node Swish, and x (1 + Erf(x / sqrt 2)) 0.5, in the order in which PyTorch exports it, one
@@ -90,15 +91,15 @@ void OnnxGraph::join_smooth_activations() {
     };
     const auto quotient = std::find_if(model_.nodes.begin(), model_.nodes.end(), writes);
     if (quotient == model_.nodes.end() || quotient->type != "Div" || quotient->inputs.size() != 2 ||
-        !holds(quotient->inputs[1], kRootOfTwo) || only_user(from) != &node)
+        !holds(quotient->inputs[1], kRootOfTwo, kRootRounding) || only_user(from) != &node)
       continue;
     const std::string x = quotient->inputs[0];
-    if (user->type != "Add" || !holds(other_input(*user, node.outputs[0]), 1)) continue;
+    if (user->type != "Add" || !holds(other_input(*user, node.outputs[0]), 1, 0)) continue;
     OnnxNode* const product = only_user(user->outputs[0]);
     if (product == nullptr || product->type != "Mul" || other_input(*product, user->outputs[0]) != x)
       continue;
     OnnxNode* const half = only_user(product->outputs[0]);
-    if (half == nullptr || half->type != "Mul" || !holds(other_input(*half, product->outputs[0]), 0.5))
+    if (half == nullptr || half->type != "Mul" || !holds(other_input(*half, product->outputs[0]), 0.5, 0))
       continue;
     replace(*half, "Gelu", x, {&node, &*quotient, user, product});
     notes_.insert("GELU is taken with sqrt 2 exactly; the file's rounded one leaves the slopes as they are");

@@ -24,6 +24,7 @@ std::string smooth_model(const std::vector<std::string>& nodes, const std::strin
                    onnx_raw("v", {2, 1}, {2, -3}),
                    onnx_raw("root", {}, {1.41421354F}),
                    onnx_raw("one", {}, {1}),
+                   onnx_raw("above_one", {}, {1.00000012F}),
                    onnx_raw("half", {}, {0.5F})};
   model.shape = {1, 2};
   return model.bytes();
@@ -38,9 +39,9 @@ testing::AssertionResult smooth_is_refused(const std::vector<std::string>& nodes
   return refuses([&] { smooth_weights(nodes); }, pieces);
 }
 
-std::vector<std::string> gelu_nodes(const std::string& root = "root") {
+std::vector<std::string> gelu_nodes(const std::string& root = "root", const std::string& one = "one") {
   return {onnx_node("Div", {"h", root}, {"q"}), onnx_node("Erf", {"q"}, {"e"}),
-          onnx_node("Add", {"e", "one"}, {"p"}), onnx_node("Mul", {"h", "p"}, {"m"}),
+          onnx_node("Add", {"e", one}, {"p"}), onnx_node("Mul", {"h", "p"}, {"m"}),
           onnx_node("Mul", {"m", "half"}, {"a"})};
 }
 
@@ -134,6 +135,8 @@ TEST(OnnxSmooth, AProductThatOnlyResemblesSiluOrGeluIsRefused) {
                                  onnx_node("Mul", {"n", "s"}, {"a"})},
                                 {"Sigmoid: has a skip connection"}));
   EXPECT_TRUE(smooth_is_refused(gelu_nodes("half"), {"Erf: is none of the operators"}));
+  // Such a function has a slope above GELU's by half of what the number is off.
+  EXPECT_TRUE(smooth_is_refused(gelu_nodes("root", "above_one"), {"Erf: is none of the operators"}));
 }
 
 TEST(OnnxSmooth, EveryTruncatedOrFlippedModelIsRefusedOrSound) {
