@@ -199,7 +199,8 @@ TEST(BoundCommand, AJerkIsNoBoundWhereTheModelScalesTheThrustThatIsFedForward) {
       folder / "gains.toml",
       "schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n[lag]\nmotor_s = 0.0575\n");
   const std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");
-  write_text(folder / "model.toml", model + "\n[[effect]]\nname = \"thrust_ratio\"\nparameters = { ratio = 0.3 }\n");
+  write_text(folder / "model.toml",
+             model + "\n[[effect]]\nname = \"thrust_ratio\"\nparameters = { ratio = 0.3 }\n");
   const std::string scaled = "bound --gains gains.toml --model model.toml --amplitude 0.01";
   const Outcome outcome = run_shell("swarmcert " + scaled + " --reference-jerk 5", folder.path());
   EXPECT_EQ(outcome.exit_code, 2);
