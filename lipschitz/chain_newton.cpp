@@ -231,7 +231,7 @@ class Centring {
     return std::sqrt(std::max(0.0, scale_ * r.dot(newton_.solve(r))));
   }
 
-  /// Until the distance is estimated as `enough`, or for so many steps.
+  /// Iterates until the estimated distance from the path is below `enough`, for at most kSteps steps.
   PathPoint run(PathPoint at, double enough, const Stop& stop) const {
     constexpr int kSteps = 12;
     std::vector<VectorXd> moves, changes;

@@ -10,8 +10,9 @@
 
 namespace swarmcert::lipschitz {
 
-/// An upper bound on a chain's Lipschitz constant with what shows it: sqrt(rho) <= upper, and `factor` shows that
-/// check::lipschitz_lmi(stages, rho, t) is positive semidefinite, or check::proposed_factor() does where there is none.
+/// An upper bound on a chain's Lipschitz constant with what shows it: sqrt(rho) <= upper, and a factor shows that
+/// check::lipschitz_lmi(stages, rho, t) is positive semidefinite: `factor`, or, if it is empty, that of
+/// check::proposed_factor().
 struct UpperProof {
   UpperBound upper{0};
   double rho = 0;
@@ -19,8 +20,8 @@ struct UpperProof {
   std::optional<check::Factor> factor;
 };
 
-/// A proof holds its factor up to so many rows; the checker finds a larger one itself, as quickly as it would read it, and
-/// it would be several times as long as the weights.
+/// Proofs contain factors of at most this many rows. A larger factor would be several times as long as the weights, and the
+/// checker recomputes it as quickly as it would read it.
 inline constexpr std::size_t kMostFactorRows = 64;
 
 /// A verified proof that sqrt(rho) bounds the chain, or nothing if (rho, t) does not satisfy the inequality with a

@@ -26,7 +26,7 @@ struct ActivationFunction {
 
 const ActivationFunction& function_of(Activation activation);
 
-/// The activation that is called `op`; nothing: there is none.
+/// The activation with this name; empty if the name is unknown.
 std::optional<Activation> activation_called(const std::string& op);
 
 /// "tanh, sigmoid, ...": all but ReLU.

@@ -87,9 +87,10 @@ Network with_activation(Network network, const std::string& activation);
 /// load_network() there.
 Network load_any_network(const NetworkArguments& arguments);
 
-/// Loads NET, whose activation is ReLU. A `file` is a network.toml if its name ends in ".toml" or its text names that schema. Weight files
-/// named in a network.toml are relative to its folder; the orders of their layers stand there as well.
-/// @throws InputError with line, field, value and mend; unknown keys are errors with a did-you-mean. As require_relu().
+/// Loads NET, whose activation must be ReLU. A `file` is a network.toml if its name ends in ".toml" or its text names that
+/// schema. Weight files named in a network.toml are relative to its folder, which also states the order of their layers.
+/// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one. Throws what
+///   require_relu() throws as well.
 Network load_network(const NetworkArguments& arguments);
 
 /// as_float32() of every part.
