@@ -5,14 +5,13 @@ Prints a line per case; exits 1 where the first torque or rotor in remainder[] i
 any effect have one.
 """
 
-import argparse
 import json
 import os
 import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from foreign_campaign import KEYS, asked, model_with_lag  # noqa: E402
+from foreign_campaign import KEYS, argument_parser, asked, model_with_lag  # noqa: E402
 from foreign_simulator import fly  # noqa: E402
 
 FLIGHTS = 3
@@ -78,14 +77,9 @@ def diagnosed(options, name, case, seed):
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("tool")
-    parser.add_argument("model")
-    parser.add_argument("folder")
-    parser.add_argument("--effects", default="")
+    parser = argument_parser()
     parser.add_argument("--seeds", default="1:2")
     parser.add_argument("--nothing", type=int, default=1, help="cases without any effect")
-    parser.add_argument("--keep", action="store_true")
     options = parser.parse_args()
     first, last = (int(x) for x in options.seeds.split(":"))
     chosen = [name for name in options.effects.split(",") if name] or list(BALANCES)

@@ -29,6 +29,17 @@ def model_with_lag(path, folder, extra="", name="model.toml"):
     return to
 
 
+def argument_parser():
+    """The arguments that every campaign takes."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("tool")
+    parser.add_argument("model")
+    parser.add_argument("folder")
+    parser.add_argument("--effects", default="")
+    parser.add_argument("--keep", action="store_true")
+    return parser
+
+
 def asked(tool, words, result):
     done = subprocess.run([tool] + words + ["-q", "--force", "--json", result], capture_output=True, text=True)
     if done.returncode == 4:
@@ -85,15 +96,10 @@ def held_out(options, folder, flights, model, effect):
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("tool")
-    parser.add_argument("model")
-    parser.add_argument("folder")
-    parser.add_argument("--effects", default="")
+    parser = argument_parser()
     parser.add_argument("--seeds", default="1:4")
     parser.add_argument("--nothing", type=int, default=0, help="cases without any effect, instead of the effects")
     parser.add_argument("--add", action="store_true", help="also ask `add formula`, and judge its held-out error")
-    parser.add_argument("--keep", action="store_true")
     options = parser.parse_args()
     first, last = (int(x) for x in options.seeds.split(":"))
     chosen = [n for n in options.effects.split(",") if n] or list(EFFECTS)

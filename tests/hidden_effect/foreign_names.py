@@ -4,7 +4,6 @@ Usage: foreign_names.py TOOL MODEL FOLDER [--effects NAME,...]
 Prints a line per case; exits 1 where a name is not first, a value is outside, or a flight without the effect has the name.
 """
 
-import argparse
 import json
 import math
 import os
@@ -12,7 +11,7 @@ import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from foreign_campaign import KEYS, asked, model_with_lag  # noqa: E402
+from foreign_campaign import KEYS, argument_parser, asked, model_with_lag  # noqa: E402
 from foreign_simulator import fly  # noqa: E402
 
 FLIGHTS = 3
@@ -120,12 +119,7 @@ def diagnosed(options, name, case):
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("tool")
-    parser.add_argument("model")
-    parser.add_argument("folder")
-    parser.add_argument("--effects", default="")
-    parser.add_argument("--keep", action="store_true")
+    parser = argument_parser()
     options = parser.parse_args()
     chosen = [name for name in options.effects.split(",") if name] or list(NAMED)
     failed = held = judged = 0
