@@ -110,25 +110,30 @@ void add_crazyflie(Table& t) {
 
 /// CSV as people write it. The first name of a group is what the tool itself would write.
 void add_generic(Table& t) {
-  for (const char* group : {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#",
-                            "odom.position.#", "drone.#", "vicon.#", "mocap.#", "pos#", "position#", "#"})
+  for (const char* group :
+       {"position.#", "pos.#", "p#", "p.#", "pose.position.#", "pose.pose.position.#", "odom.position.#",
+        "transform.translation.#", "point.#", "drone.#", "vicon.#", "mocap.#", "pos#", "position#", "#"})
     t.push_back({kPosition, axes(group), "m"});
   for (const char* group :
        {"velocity.#", "vel.#", "v#", "v.#", "vel#", "velocity#", "linear.velocity.#", "d#", "#dot"})
     t.push_back({kVelocity, axes(group), "m/s"});
+  for (const char* group : {"twist.linear.#", "twist.twist.linear.#"})
+    t.push_back({kVelocity, axes(group), "m/s", 1, 1, Ask::kVelocityFrame});
   for (const char* group : {"imu.acc.#", "accel.#", "accelerometer.#", "imu.linear.acceleration.#", "acc#",
                             "accel#", "linear.acceleration.#", "acceleration.#", "a#", "a.#"})
     t.push_back({kForceBody, axes(group), "", 1, 1, Ask::kAcceleration});
-  for (const char* group : {"q#", "q.#", "quat.#", "quat#", "quaternion.#", "quaternion#", "orientation.#",
-                            "pose.orientation.#", "pose.pose.orientation.#", "att.q#"})
+  for (const char* group :
+       {"q#", "q.#", "quat.#", "quat#", "quaternion.#", "quaternion#", "pose.orientation.#",
+        "pose.pose.orientation.#", "transform.rotation.#", "orientation.#", "att.q#"})
     t.push_back({kAttitude, quaternion(group), "1"});
   for (const char* group : {"q#", "q.#", "quat.#", "quaternion.#"})
     t.push_back({kAttitude, each(group, {"0", "1", "2", "3"}), "1", 1, 1, Ask::kQuaternion});
   for (const auto& names : {euler("#"), euler("att.#"), euler("attitude.#"), euler("euler.#"),
                             each("#", {"phi", "theta", "psi"}), axes("rpy.#"), axes("euler.#")})
     t.push_back({kEuler, names, "", 1, 1, Ask::kAngles});
-  for (const char* group : {"imu.gyro.#", "gyr.#", "angular.velocity.#", "omega.#", "w#", "w.#", "gyro#",
-                            "omega#", "body.rate.#", "body.rates.#"})
+  for (const char* group :
+       {"imu.gyro.#", "gyr.#", "angular.velocity.#", "omega.#", "w#", "w.#", "gyro#", "omega#", "body.rate.#",
+        "body.rates.#", "twist.angular.#", "twist.twist.angular.#"})
     t.push_back({kRates, axes(group), "", 1, 1, Ask::kRates});
   t.push_back({kRates, {"p", "q", "r"}, "", 1, 1, Ask::kRates});
   for (const char* group : {"motor.#", "motor#", "m#", "u#", "pwm#", "pwm.#", "duty.#", "thrust.#", "cmd.#"})
@@ -190,7 +195,7 @@ std::vector<std::string> called_names(const std::string& column) {
   const std::size_t dot = column.find('.');
   if (dot == std::string::npos || column.find('.', dot + 1) == std::string::npos) return names;
   for (const char* const wish : {"target.", "ref.", "reference.", "des.", "desired.", "setpoint.", "cmd.",
-                                 "command.", "goal.", "error.", "err.", "initial."}) {
+                                 "command.", "goal.", "error.", "err.", "initial.", "angular."}) {
     if (column.rfind(wish, 0) == 0) return names;
   }
   names.push_back(column.substr(dot + 1));

@@ -19,7 +19,8 @@ enum class Ask {
   kLegacyPitch,   ///< nothing: the second component has the opposite sign of the rotation about y
   kRates,         ///< degrees or radians per second
   kQuaternion,    ///< x, y, z, w or w, x, y, z
-  kMotors         ///< requested thrust or applied duty; scale
+  kMotors,        ///< requested thrust or applied duty; scale
+  kVelocityFrame  ///< along the axes of the world or of the body
 };
 
 /// Columns of one topic that together carry a group of signals, from `signal` on.

@@ -4,6 +4,9 @@
 #include <cctype>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "analysis/logs/angles.h"
 
@@ -84,6 +87,42 @@ void add_servo_outputs(RawTopic& topic, const std::string& pattern, int first) {
   }
 }
 
+/// ArduPilot's outputs by motor: SERVOn_FUNCTION 33 to 40 is motor 1 to 8; empty where the parameters name no three motors.
+std::vector<int> outputs_of_motors(const std::map<std::string, double>& parameters) {
+  constexpr int kFirstMotor = 33, kMost = 8, kOutputs = 16;
+  std::vector<int> outputs(kMost, 0);
+  for (int n = 1; n <= kOutputs; ++n) {
+    const auto found = parameters.find("SERVO" + std::to_string(n) + "_FUNCTION");
+    if (found == parameters.end()) continue;
+    const double motor = found->second - kFirstMotor;
+    if (motor >= 0 && motor < kMost) outputs[static_cast<std::size_t>(motor)] = n;
+  }
+  outputs.erase(std::find(outputs.begin(), outputs.end(), 0), outputs.end());
+  return outputs.size() < 3 ? std::vector<int>() : outputs;
+}
+
+/// Motor commands between MOT_PWM_MIN and MOT_PWM_MAX, 1000 and 2000 us where these are not set.
+void add_ardupilot_outputs(RawTopic& topic, const std::map<std::string, double>& parameters) {
+  const std::vector<int> outputs = outputs_of_motors(parameters);
+  for (const int output : outputs) {
+    if (topic.find("C" + std::to_string(output)) == nullptr) return;  // RCO2 carries it, at times of its own
+  }
+  if (outputs.empty()) return add_servo_outputs(topic, "C#", 1);
+  const auto limit_us = [&](const char* name, double otherwise) {
+    const auto found = parameters.find(name);
+    return found != parameters.end() && found->second > 0 ? found->second : otherwise;
+  };
+  double low_us = limit_us("MOT_PWM_MIN", 1000), high_us = limit_us("MOT_PWM_MAX", 2000);
+  if (!(high_us > low_us)) low_us = 1000, high_us = 2000;
+  for (std::size_t k = 0; k < outputs.size(); ++k) {
+    const RawColumn& column = *topic.find("C" + std::to_string(outputs[k]));
+    RawColumn command{"motor_command_" + std::to_string(k + 1), "", column.values};
+    for (double& value : command.values)
+      value = std::min(std::max((value - low_us) / (high_us - low_us), 0.0), 1.0);
+    topic.columns.push_back(std::move(command));
+  }
+}
+
 /// Normalised motor commands; NaN where a motor is not used.
 void add_motors(RawTopic& topic) {
   for (int k = 0; k < 8; ++k) {
@@ -131,7 +170,7 @@ void add_px4(RawTopic& topic, const std::string& message) {
   }
 }
 
-void add_ardupilot(RawTopic& topic) {
+void add_ardupilot(RawTopic& topic, const std::map<std::string, double>& parameters) {
   Renamer renamer(topic);
   const std::string& message = topic.name;
   const std::vector<std::string> ned = {"N", "E", "D"}, capital = {"X", "Y", "Z"};
@@ -146,7 +185,7 @@ void add_ardupilot(RawTopic& topic) {
   } else if (message == "BAT" || message == "CURR") {
     renamer.add("Volt", "battery_volt", 1);
   } else if (message == "RCOU") {
-    add_servo_outputs(topic, "C#", 1);
+    add_ardupilot_outputs(topic, parameters);
   } else if (message == "CTUN") {
     renamer.add("ThO", "thrust_command_normalised", 1);
   }
@@ -179,7 +218,7 @@ void add_own_names(RawLog& log) {
     const std::string message = message_of(topic);
     if (topic.instance != lowest[message]) continue;
     if (is_ardupilot)
-      add_ardupilot(topic);
+      add_ardupilot(topic, log.parameters);
     else if (message == "actuator_outputs" && lowest.count("actuator_motors") != 0)
       continue;  // the same commands after their scaling to servo signals
     else if (log.format == "ulog" || topic.type.rfind("px4_msgs", 0) == 0)
@@ -210,6 +249,7 @@ Armed was_armed(const RawLog& log) {
   for (const Armed armed :
        {any_record(log, "actuator_armed", "armed", [](double x) { return x != 0; }),
         any_record(log, "vehicle_status", "arming_state", [](double x) { return x == kArmedState; }),
+        any_record(log, "ARM", "ArmState", [](double x) { return x != 0; }),
         any_record(log, "STAT", "Armed", [](double x) { return x != 0; })}) {
     if (armed != Armed::kUnknown) return armed;
   }

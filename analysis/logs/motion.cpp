@@ -187,12 +187,49 @@ void settle_lengths(Draft& draft) {
   }
 }
 
+/// nav_msgs/Odometry states velocities along the axes of the body, but Crazyswarm2 and motion capture write those of the
+/// world into it, and into TwistStamped. The derivative of the position says which.
+void settle_velocity_frame(Draft& draft) {
+  const Carried* const carried = draft.recognition.find(kVelocity);
+  if (carried == nullptr || carried->ask != Ask::kVelocityFrame || !draft.asks_physics) return;
+  SignalTable& t = draft.table;
+  const std::string names = names_of(draft.raw, *carried);
+  if (!t.has_group(kVelocity, 3) || !t.has_group(kPosition, 3) || !t.has_group(kAttitude, 4)) {
+    draft.note(names +
+               ": taken along the axes of the world; without position and quaternion nothing can tell");
+    return;
+  }
+  std::array<std::vector<double>, 3> slope, turned;
+  for (int k = 0; k < 3; ++k) {
+    slope[static_cast<std::size_t>(k)] =
+        local_derivative(t, t[kPosition + k], velocity_window_s(t.step_s()), 2, 1);
+    turned[static_cast<std::size_t>(k)].resize(t.size());
+  }
+  std::vector<double> as_world, as_body;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    const Vector body = t.three(kVelocity, i), world = rotated(t, i, body);
+    for (std::size_t k = 0; k < 3; ++k) {
+      turned[k][i] = world[k];
+      as_world.push_back(slope[k][i] - body[k]);
+      as_body.push_back(slope[k][i] - world[k]);
+    }
+  }
+  const double world_m_s = root_mean_square(as_world), body_m_s = root_mean_square(as_body);
+  const bool is_body = body_m_s < world_m_s;
+  draft.note(fmt::format(
+      "{}: along the axes of the {}; {:.2g} m/s from the derivative of the position, against {:.2g}", names,
+      is_body ? "body" : "world", is_body ? body_m_s : world_m_s, is_body ? world_m_s : body_m_s));
+  if (!is_body) return;
+  for (std::size_t k = 0; k < 3; ++k) t[kVelocity + static_cast<int>(k)] = turned[k];
+}
+
 }  // namespace
 
 void derive_kinematics(Draft& draft) {
   SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;
   settle_lengths(draft);
+  settle_velocity_frame(draft);
   signals.position = t.has_group(kPosition, 3);
   const char* const axes[] = {"x", "y", "z"};
   if (t.has(kPosition) || t.has(kPosition + 1) || t.has(kPosition + 2))
