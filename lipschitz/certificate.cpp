@@ -186,7 +186,7 @@ Json summary(const files::Network& network, const CertifiedBound& bound) {
   Json json = {{"function", bound.function},
                {"domain", bound.domain},
                {"block", bound.block},
-               {"law", bound.function.rfind("set:", 0) == 0 ? "one_neighbour" : "none"},
+               {"law", files::is_set(bound.function) ? "one_neighbour" : "none"},
                {"norm", bound.scale.empty() ? "l2" : "weighted_l2"},
                {"scale", bound.scale},
                {"unit", files::unit(network, bound.function, bound.block)},
@@ -202,13 +202,13 @@ Json summary(const files::Network& network, const CertifiedBound& bound) {
 Json summary(const files::Network& network, const CertifiedLaw& law) {
   const std::string kind = law.neighbours.begin()->first;
   const std::string shown = law.neighbours.size() == 1 ? kind : "mixed";
-  return {{"function", "set:" + shown + ":" + law.rho},
+  return {{"function", files::set_name(shown, law.rho)},
           {"domain", law.domain},
           {"block", law.block},
           {"law", name(law.law)},
           {"neighbours", law.neighbours},
           {"norm", "l2"},
-          {"unit", files::unit(network, "set:" + kind + ":" + law.rho, law.block)},
+          {"unit", files::unit(network, files::set_name(kind, law.rho), law.block)},
           {"upper", law.upper.value()},
           {"upper_method", "law"},
           {"status", status(law.interrupted)},

@@ -43,7 +43,7 @@ bool has_witness(const std::map<std::string, const Weights*>& parts, const std::
   const std::vector<std::string> names = files::networks_of(function);
   return std::all_of(parts.begin(), parts.end(), [&names](const auto& part) {
     const bool enters = std::find(names.begin(), names.end(), part.first) != names.end() ||
-                        (names.size() == 2 && part.first.rfind("phi:", 0) == 0);
+                        (names.size() == 2 && files::is_phi(part.first));
     return part.second->is_relu() || !enters;
   });
 }
@@ -62,7 +62,7 @@ void settle(const Network& network, const std::vector<CertifiedBound>& bounds, C
   for (const auto& [kind, count] : neighbours) {
     const CertifiedBound* best = nullptr;
     for (const CertifiedBound& bound : bounds) {
-      const bool holds = bound.function == "set:" + kind + ":" + law.rho && bound.block == law.block &&
+      const bool holds = bound.function == files::set_name(kind, law.rho) && bound.block == law.block &&
                          bound.scale.empty() &&
                          (bound.neighbours.empty() || bound.neighbours == law.neighbours);
       if (holds && (best == nullptr || bound.upper.value() < best->upper.value())) best = &bound;
@@ -122,13 +122,71 @@ const char* name(UpperMethod method) {
   return "branch";
 }
 
+namespace {
+
+/// The claims that the options ask for, without numbers yet.
+void add_claims(const Network& network, const CertifyOptions& options, Certification& result) {
+  ClaimOptions wanted = options;
+  wanted.counted = options.method == UpperMethod::kBranch;
+  for (Claim& claim : claims(network, wanted)) {
+    result.bounds.emplace_back();
+    static_cast<Claim&>(result.bounds.back()) = std::move(claim);
+  }
+  for (LawClaim& claim : law_claims(network, options)) {
+    result.laws.emplace_back();
+    static_cast<LawClaim&>(result.laws.back()) = std::move(claim);
+  }
+}
+
+void enclose_norms(const std::vector<const files::Layer*>& layers, int jobs, WorkProgress& progress,
+                   Certification& result) {
+  std::optional<double> limit;
+  if (result.gamma && result.gamma->scope == GammaStatement::Scope::kLayer) limit = result.gamma->value;
+  files::parallel_for(static_cast<int>(layers.size()), jobs, [&](int i) {
+    CertifiedLayer& layer = result.layers[static_cast<std::size_t>(i)];
+    progress.run("spectral norm of " + layer.network + " " + layer.name,
+                 [&] { layer.norm = spectral_norm(*layers[static_cast<std::size_t>(i)], limit); });
+  });
+}
+
+void judge_gamma(const std::map<std::string, const Weights*>& parts, Certification& result) {
+  if (!result.gamma) return;
+  std::size_t next = 0;
+  for (const auto& [name, weights] : parts) {
+    std::vector<Enclosure> norms;
+    for (std::size_t k = 0; k < weights->layers.size(); ++k)
+      norms.push_back(result.layers[next + k].norm.norm);
+    const auto verdicts = respects_gamma(*result.gamma, norms);
+    for (std::size_t k = 0; k < norms.size(); ++k) result.layers[next + k].respects_gamma = verdicts[k];
+    next += norms.size();
+  }
+}
+
+/// The product of norms, of the scale and of the steepest slopes between the layers: the first upper bound.
+void multiply_norms(const std::map<std::string, const Weights*>& parts,
+                    const std::vector<CertifiedLayer>& layers, CertifiedBound& bound) {
+  std::vector<UpperBound> norms;
+  if (!bound.scale.empty()) norms.emplace_back(*std::max_element(bound.scale.begin(), bound.scale.end()));
+  for (const std::string& name : files::networks_of(bound.function)) {
+    for (const CertifiedLayer& layer : layers) {
+      if (layer.network == name) norms.push_back(layer.norm.norm.upper);
+    }
+    add_steepest_slopes(*parts.at(name), norms);
+    const files::ActivationFunction& function = files::function_of(parts.at(name)->activation);
+    bound.has_program = bound.has_program && function.is_monotone();
+  }
+  bound.is_relu = has_witness(parts, bound.function);
+  bound.product = bound.upper = product_up(norms);
+}
+
+}  // namespace
+
 Certification certify(const Network& network, const CertifyOptions& options) {
   const Stop stop(options.cancelled, options.seconds);
   Certification result;
   result.gamma = options.gamma ? options.gamma : network.gamma;
-  if (result.gamma && !(result.gamma->value > 0)) {
+  if (result.gamma && !(result.gamma->value > 0))
     throw std::invalid_argument("certify: gamma must be positive");
-  }
   require_moderate(network);
   const std::map<std::string, const Weights*> parts = files::parts(network);
   require_relu_on_a_box(parts, options);
@@ -140,55 +198,15 @@ Certification certify(const Network& network, const CertifyOptions& options) {
     }
   }
   result.domain = options.domain;
-  ClaimOptions wanted = options;
-  wanted.counted = options.method == UpperMethod::kBranch;
-  for (Claim& claim : claims(network, wanted)) {
-    result.bounds.emplace_back();
-    static_cast<Claim&>(result.bounds.back()) = std::move(claim);
-  }
-  for (LawClaim& claim : law_claims(network, options)) {
-    result.laws.emplace_back();
-    static_cast<LawClaim&>(result.laws.back()) = std::move(claim);
-  }
+  add_claims(network, options, result);
 
   WorkProgress progress(
       static_cast<int>(layers.size()) + pieces_of_work(options, static_cast<int>(result.bounds.size())),
       options.progress);
-  files::parallel_for(static_cast<int>(layers.size()), options.jobs, [&](int i) {
-    CertifiedLayer& layer = result.layers[static_cast<std::size_t>(i)];
-    std::optional<double> limit;
-    if (result.gamma && result.gamma->scope == GammaStatement::Scope::kLayer) limit = result.gamma->value;
-    progress.run("spectral norm of " + layer.network + " " + layer.name,
-                 [&] { layer.norm = spectral_norm(*layers[static_cast<std::size_t>(i)], limit); });
-  });
-
-  std::size_t next = 0;
-  for (const auto& [name, weights] : parts) {
-    std::vector<Enclosure> norms;
-    for (std::size_t k = 0; k < weights->layers.size(); ++k)
-      norms.push_back(result.layers[next + k].norm.norm);
-    for (std::size_t k = 0; result.gamma && k < norms.size(); ++k)
-      result.layers[next + k].respects_gamma = respects_gamma(*result.gamma, norms)[k];
-    next += norms.size();
-  }
-
-  for (CertifiedBound& bound : result.bounds) {
-    std::vector<UpperBound> norms;
-    if (!bound.scale.empty()) norms.emplace_back(*std::max_element(bound.scale.begin(), bound.scale.end()));
-    for (const std::string& name : files::networks_of(bound.function)) {
-      for (const CertifiedLayer& layer : result.layers) {
-        if (layer.network == name) norms.push_back(layer.norm.norm.upper);
-      }
-      add_steepest_slopes(*parts.at(name), norms);
-      const files::ActivationFunction& function = files::function_of(parts.at(name)->activation);
-      bound.has_program = bound.has_program && function.is_monotone();
-    }
-    bound.is_relu = has_witness(parts, bound.function);
-    bound.product = bound.upper = product_up(norms);
-  }
-
+  enclose_norms(layers, options.jobs, progress, result);
+  judge_gamma(parts, result);
+  for (CertifiedBound& bound : result.bounds) multiply_norms(parts, result.layers, bound);
   find_bounds(network, options, stop, progress, result.bounds);
-
   for (CertifiedLaw& law : result.laws) {
     settle(network, result.bounds, law);
     for (const CertifiedBound& bound : result.bounds)

@@ -27,7 +27,7 @@ bool has_program(const CertifyOptions& options, const CertifiedBound& bound) {
 }
 
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method == UpperMethod::kBranch && bound.function.rfind("rho:", 0) != 0 && bound.is_relu;
+  return options.method == UpperMethod::kBranch && !files::is_rho(bound.function) && bound.is_relu;
 }
 
 /// The sooner of a limit of its own, 0: none, and a stop, in seconds; 0: no limit.

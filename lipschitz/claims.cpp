@@ -16,7 +16,7 @@ bool contains(const std::vector<std::string>& list, const std::string& text) {
 }
 
 /// Whether `function` takes inputs of NET rather than hidden values.
-bool takes_inputs(const std::string& function) { return function.rfind("rho:", 0) != 0; }
+bool takes_inputs(const std::string& function) { return !files::is_rho(function); }
 
 int inputs_of(const files::Network& network, const std::string& function) {
   return files::parts(network).at(files::networks_of(function).front())->inputs();
@@ -41,8 +41,8 @@ std::vector<Neighbours> groups(const files::Network& network, const ClaimOptions
 void add_counted(const files::Network& network, const ClaimOptions& options, std::vector<Claim>& claims) {
   for (const Neighbours& group : groups(network, options)) {
     for (const std::string& function : files::functions(network)) {
-      if (function.rfind("set:", 0) != 0) continue;
-      const std::string kind = files::networks_of(function).front().substr(4);
+      if (!files::is_set(function)) continue;
+      const std::string kind = files::kind_of(files::networks_of(function).front());
       if (kind != files::kGroundKind && group.count(kind) == 0) continue;
       Claim claim;
       claim.function = function;
@@ -116,7 +116,7 @@ std::vector<LawClaim> law_claims(const files::Network& network, const ClaimOptio
     for (const Neighbours& group : named) {
       for (const std::string block : {"all", "position", "velocity"}) {
         const std::vector<std::string> has =
-            files::blocks(network, "set:" + group.begin()->first + ":" + rho);
+            files::blocks(network, files::set_name(group.begin()->first, rho));
         const bool wanted = contains(options.blocks, block) || contains(options.blocks, "every");
         if (block != "all" && !(wanted && contains(has, block))) continue;
         for (const LawKind law : {LawKind::kAllStacked, LawKind::kAllMax, LawKind::kOwnState})
@@ -147,7 +147,7 @@ std::map<std::string, Box> read_domain(const std::string& path, const files::Net
   }
   if (inputs > 0) {
     const Box box = read_box(top, inputs);
-    for (const auto& [kind, phi] : network.phi) domain["phi:" + kind] = box;
+    for (const auto& [kind, phi] : network.phi) domain[files::phi_name(kind)] = box;
   }
   const bool has_ground = network.phi.count(files::kGroundKind) == 1;
   if (!has_ground && top.has("ground")) top.refuse("ground", "", "the network has no ground term");

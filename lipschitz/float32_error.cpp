@@ -144,8 +144,8 @@ class SetError {
     phi_tails_.push_back(rho_bound_);  // an error in phi's output goes through rho
     neighbour_ = term(phi_, names_[0], phi_tails_);
     if (!has_ground_) return;
-    std::vector<double> ground_tails = tails(
-        check::stages(network, "set:" + std::string(files::kGroundKind) + ":" + names_[1].substr(4)), stop);
+    std::vector<double> ground_tails =
+        tails(check::stages(network, files::set_name(files::kGroundKind, files::kind_of(names_[1]))), stop);
     const ReachNetwork ground = reach_network(*parts_.at(files::kGroundPhi));
     ground_tails.resize(ground.size() - 1);
     ground_tails.push_back(rho_bound_);
@@ -275,7 +275,7 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
   }
   std::vector<std::string> functions;
   for (const std::string& function : files::functions(network)) {
-    const bool is_set = function.rfind("set:", 0) == 0;
+    const bool is_set = files::is_set(function);
     if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
       functions.push_back(function);
   }
@@ -290,7 +290,7 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
       if (n == 0) continue;
       double inputs = n * lipschitz.at(function) * moved.at(names[0]);
       if (names.size() == 2 && moved.count(files::kGroundPhi) == 1) {
-        const std::string ground = "set:" + std::string(files::kGroundKind) + ":" + names[1].substr(4);
+        const std::string ground = files::set_name(files::kGroundKind, files::kind_of(names[1]));
         inputs += lipschitz.at(ground) * moved.at(files::kGroundPhi);
       }
       Float32Error one;

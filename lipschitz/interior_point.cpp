@@ -5,9 +5,11 @@
 #include <cmath>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 #include "lipschitz/block_cholesky.h"
 #include "lipschitz/dense_kernels.h"
+#include "lipschitz/schur_complement.h"
 #include "nn/base/doubles.h"
 
 namespace swarmcert::lipschitz {
@@ -108,69 +110,7 @@ auto backtrack(double step, const FactorAt& factor_at) {
   return factor;
 }
 
-/// (<A_j, X>)_j for symmetric X, given X A.
-VectorXd functionals(const RankTwoInequality& it, const MatrixXd& x, const MatrixXd& x_a) {
-  VectorXd v(1 + it.neurons());
-  v(0) = x.diagonal().head(it.inputs()).sum();
-  v.tail(it.neurons()) = -2.0 * x_a.bottomRows(it.neurons()).diagonal();
-  return v;
-}
-
 void symmetrise(MatrixXd& x) { x = 0.5 * (x + MatrixXd(x.transpose())); }
-
-/// M_ij = <A_i, Z A_j Y>, from rank-two constraints.
-MatrixXd schur_complement(const RankTwoInequality& it, const MatrixXd& z, const MatrixXd& z_a,
-                          const MatrixXd& y, const MatrixXd& y_a) {
-  const Index n0 = it.inputs();
-  const Index m = it.neurons();
-  const MatrixXd a_z_a = it.a_transposed_times(z_a);
-  const MatrixXd a_y_a = it.a_transposed_times(y_a);
-  MatrixXd schur(m + 1, m + 1);
-  const auto e_z_a = z_a.bottomRows(m).array();
-  const MatrixXd cross = e_z_a * y_a.bottomRows(m).transpose().array();
-  schur.bottomRightCorner(m, m) = cross + cross.transpose();
-  schur.bottomRightCorner(m, m).array() += z.bottomRightCorner(m, m).array() * a_y_a.array();
-  schur.bottomRightCorner(m, m).array() += a_z_a.array() * y.bottomRightCorner(m, m).array();
-  const VectorXd edge = -((z_a.topRows(n0).array() * y.topRightCorner(n0, m).array()).colwise().sum() +
-                          (z.topRightCorner(n0, m).array() * y_a.topRows(n0).array()).colwise().sum())
-                             .transpose();
-  schur.col(0).tail(m) = edge;
-  schur.row(0).tail(m) = edge.transpose();
-  schur(0, 0) = (z.topLeftCorner(n0, n0).array() * y.topLeftCorner(n0, n0).array()).sum();
-  return schur;
-}
-
-/// Solves M v = rhs for a symmetric positive definite M that may be badly scaled.
-class SchurSolver {
- public:
-  explicit SchurSolver(const MatrixXd& schur) : scale_(schur.diagonal().cwiseSqrt().cwiseInverse()) {
-    scaled_ = scale_.asDiagonal() * schur * scale_.asDiagonal();
-    for (double regularisation = 1e-15; regularisation < 1e-6; regularisation *= 100) {
-      MatrixXd shifted = scaled_;
-      shifted.diagonal().array() += regularisation;
-      factor_ = cholesky(shifted);
-      if (factor_.size() > 0) break;
-    }
-  }
-  bool good() const { return factor_.size() > 0 && scale_.allFinite(); }
-  VectorXd solve(const VectorXd& rhs) const {
-    const VectorXd b = scale_.cwiseProduct(rhs);
-    VectorXd v = b;
-    solve_cholesky(factor_, v);
-    for (int i = 0; i < 2; ++i) {  // undoes the regularisation
-      VectorXd residual = b;
-      add_symmetric_product(residual, -1.0, scaled_, v);
-      solve_cholesky(factor_, residual);
-      v += residual;
-    }
-    return scale_.cwiseProduct(v);
-  }
-
- private:
-  VectorXd scale_;
-  MatrixXd scaled_;
-  MatrixXd factor_;
-};
 
 }  // namespace
 
@@ -218,120 +158,184 @@ void add_divided(MatrixXd& c, MatrixXd a, const SlackFactor& s, const MatrixXd& 
   c += a;
 }
 
+/// Mehrotra's predictor-corrector method, with the direction of Helmberg, Rendl, Vanderbei and Wolkowicz.
+class Minimisation {
+ public:
+  Minimisation(const RankTwoInequality& inequality, const VectorXd& start,
+               const InteriorPointOptions& options)
+      : it_(inequality),
+        options_(options),
+        size_(static_cast<double>(inequality.size())),
+        block_begin_(inequality.slack_blocks()),
+        b_(VectorXd::Unit(1 + inequality.neurons(), 0)),
+        y_(start),
+        s_(inequality.slack(start)) {}
+
+  InteriorPointResult run() {
+    if (!begin()) return std::move(result_);
+    result_.stop = LipSdpStop::kIterationLimit;
+    while (result_.iterations < options_.max_iterations && iterate()) ++result_.iterations;
+    return std::move(result_);
+  }
+
+ private:
+  /// What an iteration knows of the point at which it starts.
+  struct Point {
+    MatrixXd s_inverse, z_a, y_a;
+    double mu, gap, infeasibility;
+  };
+  struct Direction {
+    VectorXd dy;
+    MatrixXd ds, dz;
+  };
+  /// Largest steps along a direction.
+  struct Lengths {
+    double primal, dual;
+  };
+
+  /// Notes why the search ends; false, so that callers can return it.
+  bool ends(LipSdpStop why) {
+    result_.stop = why;
+    return false;
+  }
+
+  /// An iteration of a large program takes seconds: it ends between its products, and leaves the last iterate.
+  bool has_to_stop() {
+    const std::optional<LipSdpStop> why = why_stopped(options_.stop);
+    if (why) result_.stop = *why;
+    return why.has_value();
+  }
+
+  /// Factors the first iterates; false where the start is not strictly feasible, or there is no time.
+  bool begin() {
+    s_factor_ = options_.stop.now() ? SlackFactor() : SlackFactor(s_, block_begin_);
+    if (!s_factor_.good()) return ends(why_stopped(options_.stop).value_or(LipSdpStop::kNumericalLimit));
+    // Z = mu S^-1 with trace 1 over the inputs: on the central path but for the constraints of the neurons.
+    z_ = s_factor_.inverse();
+    z_ /= z_.diagonal().head(it_.inputs()).sum();
+    z_factor_ = cholesky(z_);
+    result_.points.push_back(y_);
+    result_.gaps.push_back(kInfinity);
+    return z_factor_.size() > 0 || ends(LipSdpStop::kNumericalLimit);
+  }
+
+  /// One step; false where it was the last one, with the reason in the result.
+  bool iterate() {
+    const std::optional<Point> point = linearise();
+    if (!point) return false;
+    note_dual(*point);
+    if (point->gap < options_.relative_gap && point->infeasibility < options_.infeasibility)
+      return ends(LipSdpStop::kGapReached);
+    if (has_to_stop()) return false;
+    const SchurSolver schur(schur_complement(it_, z_, point->z_a, point->s_inverse, point->y_a));
+    if (!schur.good()) return ends(LipSdpStop::kNumericalLimit);
+
+    const Direction predictor = direction(schur, -b_, -z_, nullptr, *point);
+    if (has_to_stop()) return false;
+    const Lengths predicted = lengths(predictor, 1.0, kRough);
+    const double centring = centring_mu(predictor, predicted, point->mu);
+
+    const MatrixXd q = it_.times_patterned(predictor.dz, predictor.ds);
+    const Direction corrector =
+        direction(schur, corrected(q, centring, *point), centring * point->s_inverse - z_, &q, *point);
+    if (has_to_stop()) return false;
+    const double fraction = std::min(0.98, 0.9 + 0.09 * std::min(predicted.primal, predicted.dual));
+    const Lengths length = lengths(corrector, fraction, kFine);
+    if (has_to_stop()) return false;
+    if (!advance(corrector, length)) return ends(LipSdpStop::kNumericalLimit);
+    result_.points.push_back(y_);
+    result_.gaps.push_back(point->gap);
+    return true;
+  }
+
+  std::optional<Point> linearise() {
+    if (has_to_stop()) return std::nullopt;
+    Point point;
+    point.s_inverse = s_factor_.inverse();
+    if (has_to_stop()) return std::nullopt;
+    point.z_a = it_.times_a(z_);
+    point.y_a = it_.times_a(point.s_inverse);
+    point.infeasibility = (b_ - functionals(it_, z_, point.z_a)).cwiseAbs().maxCoeff();
+    point.mu = z_.cwiseProduct(s_).sum() / size_;
+    point.gap = size_ * point.mu / y_(0);
+    return point;
+  }
+
+  /// The dual objective <C, Z>: with a feasible Z it is below the optimum.
+  void note_dual(const Point& point) {
+    if (point.infeasibility < 1e-9) result_.best_dual = std::max(result_.best_dual, y_(0) - size_ * point.mu);
+  }
+
+  /// dy from the Schur complement, and dS and dZ from it: dZ = `target` - (Z dS + `q`) S^-1, symmetrised.
+  Direction direction(const SchurSolver& schur, const VectorXd& rhs, MatrixXd target, const MatrixXd* q,
+                      const Point& point) {
+    Direction found{schur.solve(rhs), {}, std::move(target)};
+    found.ds = it_.linear(found.dy);
+    MatrixXd divided = it_.times_patterned(-z_, found.ds);
+    if (q) divided -= *q;
+    add_divided(found.dz, std::move(divided), s_factor_, point.s_inverse, options_.stop);
+    symmetrise(found.dz);
+    return found;
+  }
+
+  Lengths lengths(const Direction& step, double fraction, double accuracy) const {
+    return {step_length(z_factor_, step.dz, fraction, accuracy),
+            step_length(s_factor_, step.ds, fraction, accuracy)};
+  }
+
+  /// sigma mu: how far to aim above zero, from how much of mu the predictor would remove.
+  double centring_mu(const Direction& predictor, const Lengths& length, double mu) const {
+    const double after =
+        (z_ + length.primal * predictor.dz).cwiseProduct(s_ + length.dual * predictor.ds).sum() / size_;
+    const double ratio = std::clamp(after / mu, 0.0, 1.0);
+    const bool is_long = length.primal > 0.1 && length.dual > 0.1;
+    return std::max(1e-6, ratio * ratio * (is_long ? ratio : 1.0)) * mu;
+  }
+
+  /// Right-hand side of the corrector, with the second-order term `q` = dZ dS of the predictor.
+  VectorXd corrected(const MatrixXd& q, double centring, const Point& point) const {
+    const Index m = it_.neurons();
+    VectorXd rhs = centring * functionals(it_, point.s_inverse, point.y_a) - b_;
+    const MatrixXd a_q = it_.a_transposed_times(q);
+    rhs.tail(m) += (q.bottomRows(m).array() * point.y_a.transpose().array()).rowwise().sum().matrix() +
+                   (a_q.array() * point.s_inverse.bottomRows(m).array()).rowwise().sum().matrix();
+    rhs(0) -= (q.topRows(it_.inputs()).array() * point.s_inverse.topRows(it_.inputs()).array()).sum();
+    return rhs;
+  }
+
+  /// Moves both iterates, by less than `length` where a factor fails; false, and y as it was, where none succeeds.
+  bool advance(const Direction& step, const Lengths& length) {
+    const VectorXd y_before = y_;
+    s_factor_ = backtrack(length.dual, [&](double by) {
+      y_ = y_before + by * step.dy;
+      s_ = it_.slack(y_);
+      return SlackFactor(s_, block_begin_);
+    });
+    const MatrixXd z_before = z_;
+    z_factor_ = backtrack(length.primal, [&](double by) {
+      z_ = z_before + by * step.dz;
+      return cholesky(z_);
+    });
+    return s_factor_.good() && z_factor_.size() > 0 && y_.allFinite();
+  }
+
+  const RankTwoInequality& it_;
+  const InteriorPointOptions& options_;
+  const double size_;
+  const std::vector<Index> block_begin_;
+  const VectorXd b_;
+  VectorXd y_;
+  MatrixXd s_, z_, z_factor_;
+  SlackFactor s_factor_;
+  InteriorPointResult result_;
+};
+
 }  // namespace
 
 InteriorPointResult minimise(const RankTwoInequality& it, const VectorXd& start,
                              const InteriorPointOptions& options) {
   use_one_blas_thread();
-  const Index n = it.size();
-  const Index m = it.neurons();
-  VectorXd y = start;
-  MatrixXd s = it.slack(y);
-  const std::vector<Index> begin = it.slack_blocks();
-  SlackFactor s_factor = options.stop.now() ? SlackFactor() : SlackFactor(s, begin);
-  if (!s_factor.good()) {
-    InteriorPointResult result;
-    result.stop = why_stopped(options.stop).value_or(LipSdpStop::kNumericalLimit);
-    return result;
-  }
-  // Z = mu S^-1 with trace 1 over the inputs: on the central path but for the constraints of the neurons.
-  MatrixXd z = s_factor.inverse();
-  z /= z.diagonal().head(it.inputs()).sum();
-  MatrixXd z_factor = cholesky(z);
-
-  VectorXd b = VectorXd::Zero(m + 1);
-  b(0) = 1;
-  InteriorPointResult result;
-  result.points.push_back(y);
-  result.gaps.push_back(kInfinity);
-  result.stop = LipSdpStop::kIterationLimit;
-  if (z_factor.size() == 0) {
-    result.stop = LipSdpStop::kNumericalLimit;
-    return result;
-  }
-  for (; result.iterations < options.max_iterations; ++result.iterations) {
-    // An iteration of a large program takes seconds: it ends between its products, and leaves the last iterate.
-    const auto has_to_stop = [&] {
-      const std::optional<LipSdpStop> why = why_stopped(options.stop);
-      if (why) result.stop = *why;
-      return why.has_value();
-    };
-    if (has_to_stop()) break;
-    const MatrixXd s_inverse = s_factor.inverse();
-    if (has_to_stop()) break;
-    const MatrixXd z_a = it.times_a(z);
-    const MatrixXd y_a = it.times_a(s_inverse);
-    const VectorXd residual = b - functionals(it, z, z_a);
-    const double mu = z.cwiseProduct(s).sum() / static_cast<double>(n);
-    // Dual objective <C, Z>; with a feasible Z it is below the optimum.
-    const double infeasibility = residual.cwiseAbs().maxCoeff();
-    const double gap = static_cast<double>(n) * mu / y(0);
-    if (infeasibility < 1e-9)
-      result.best_dual = std::max(result.best_dual, y(0) - static_cast<double>(n) * mu);
-    if (gap < options.relative_gap && infeasibility < options.infeasibility) {
-      result.stop = LipSdpStop::kGapReached;
-      break;
-    }
-
-    if (has_to_stop()) break;
-    const SchurSolver schur(schur_complement(it, z, z_a, s_inverse, y_a));
-    if (!schur.good()) {
-      result.stop = LipSdpStop::kNumericalLimit;
-      break;
-    }
-    const VectorXd inverse_functionals = functionals(it, s_inverse, y_a);
-
-    // Predictor.
-    const VectorXd dy_a = schur.solve(-b);
-    const MatrixXd ds_a = it.linear(dy_a);
-    MatrixXd dz_a = -z;
-    add_divided(dz_a, it.times_patterned(-z, ds_a), s_factor, s_inverse, options.stop);
-    if (has_to_stop()) break;
-    symmetrise(dz_a);
-    const double primal_a = step_length(z_factor, dz_a, 1.0, kRough);
-    const double dual_a = step_length(s_factor, ds_a, 1.0, kRough);
-    const double mu_a = (z + primal_a * dz_a).cwiseProduct(s + dual_a * ds_a).sum() / static_cast<double>(n);
-    const double ratio = std::clamp(mu_a / mu, 0.0, 1.0);
-    const double sigma = std::max(1e-6, ratio * ratio * (primal_a > 0.1 && dual_a > 0.1 ? ratio : 1.0));
-
-    // Corrector.
-    const MatrixXd q = it.times_patterned(dz_a, ds_a);
-    VectorXd rhs = sigma * mu * inverse_functionals - b;
-    const MatrixXd a_q = it.a_transposed_times(q);
-    rhs.tail(m) += (q.bottomRows(m).array() * y_a.transpose().array()).rowwise().sum().matrix() +
-                   (a_q.array() * s_inverse.bottomRows(m).array()).rowwise().sum().matrix();
-    rhs(0) -= (q.topRows(it.inputs()).array() * s_inverse.topRows(it.inputs()).array()).sum();
-    const VectorXd dy = schur.solve(rhs);
-    const MatrixXd ds = it.linear(dy);
-    MatrixXd dz = sigma * mu * s_inverse - z;
-    add_divided(dz, it.times_patterned(-z, ds) - q, s_factor, s_inverse, options.stop);
-    if (has_to_stop()) break;
-    symmetrise(dz);
-    const double fraction = std::min(0.98, 0.9 + 0.09 * std::min(primal_a, dual_a));
-    const double primal = step_length(z_factor, dz, fraction, kFine);
-    const double dual = step_length(s_factor, ds, fraction, kFine);
-
-    if (has_to_stop()) break;
-    const VectorXd y_before = y;
-    s_factor = backtrack(dual, [&](double step) {
-      y = y_before + step * dy;
-      s = it.slack(y);
-      return SlackFactor(s, begin);
-    });
-    const MatrixXd z_before = z;
-    z_factor = backtrack(primal, [&](double step) {
-      z = z_before + step * dz;
-      return cholesky(z);
-    });
-    if (!s_factor.good() || z_factor.size() == 0 || !y.allFinite()) {
-      y = y_before;
-      result.stop = LipSdpStop::kNumericalLimit;
-      break;
-    }
-    result.points.push_back(y);
-    result.gaps.push_back(gap);
-  }
-  return result;
+  return Minimisation(it, start, options).run();
 }
 
 }  // namespace swarmcert::lipschitz

@@ -27,16 +27,16 @@ std::vector<std::string> other_networks(const Network& network, const Claim& cla
   std::vector<std::string> kinds;
   if (!ground_moves) kinds.push_back(names[0]);
   for (const auto& [kind, weights] : network.phi) {
-    const std::string name = "phi:" + kind;
+    const std::string name = files::phi_name(kind);
     if (name != ground && name != names[0]) kinds.push_back(name);
   }
   Neighbours left = claim.neighbours;
-  if (!ground_moves && !left.empty()) --left[names[0].substr(4)];
+  if (!ground_moves && !left.empty()) --left[files::kind_of(names[0])];
   std::size_t turn = 0;
   for (int j = ground_moves ? 0 : 1; j < neighbours; ++j) {
     for (std::size_t tries = 0; tries < kinds.size(); ++tries, ++turn) {
       const std::string& name = kinds[turn % kinds.size()];
-      if (!claim.neighbours.empty() && left[name.substr(4)]-- <= 0) continue;
+      if (!claim.neighbours.empty() && left[files::kind_of(name)]-- <= 0) continue;
       others.push_back(name);
       ++turn;
       break;

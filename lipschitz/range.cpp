@@ -224,7 +224,7 @@ std::map<std::string, Box> clamp_domain(const Network& network) {
   std::map<std::string, Box> result;
   if (!network.clamp || network.phi.count(files::kGroundKind) == 1) return result;
   for (const auto& [kind, phi] : network.phi)
-    result["phi:" + kind] = {network.clamp->lower, network.clamp->upper};
+    result[files::phi_name(kind)] = {network.clamp->lower, network.clamp->upper};
   if (network.plain) result["network"] = {network.clamp->lower, network.clamp->upper};
   return result;
 }
@@ -235,7 +235,7 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
   const std::map<std::string, Box> inner = clamped(network, domain);
   std::vector<std::string> functions;
   for (const std::string& function : files::functions(network)) {
-    const bool is_set = function.rfind("set:", 0) == 0;
+    const bool is_set = files::is_set(function);
     if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
       functions.push_back(function);
   }
@@ -252,7 +252,7 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
       range.upper = -kInfinity;
       range.lower = kInfinity;
       if (is_set) {
-        const std::string rho = files::networks_of(function)[1].substr(4);
+        const std::string rho = files::kind_of(files::networks_of(function)[1]);
         range.jump = next_up(ranger.jump_norm() * rho_bound.at(rho));
       }
       for (int n = is_set ? 0 : 1; n <= (is_set ? options.neighbours : 1); ++n) {

@@ -58,7 +58,7 @@ class SampledFunction {
     others_ = VectorXd::Zero(files::parts(network_).at(*last_)->inputs());
     std::vector<std::string> kinds;
     for (const auto& [name, weights] : files::parts(network_))
-      if (name.rfind("phi:", 0) == 0 && name != files::kGroundPhi) kinds.push_back(name);
+      if (files::is_phi(name) && name != files::kGroundPhi) kinds.push_back(name);
     if (network_.phi.count(files::kGroundKind) == 1 && first_ != files::kGroundPhi)
       add_other(files::kGroundPhi, generator);
     for (std::uint64_t count = kinds.empty() ? 0 : generator() % 3; count > 0; --count)

@@ -17,8 +17,8 @@ constexpr double kTolerance = 0.01;
 
 bool has_map(const CertifiedBound& bound) {
   if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) return false;
-  return bound.function == "network" || (bound.function.rfind("set:", 0) == 0 &&
-                                         files::networks_of(bound.function).front() != files::kGroundPhi);
+  return bound.function == "network" ||
+         (files::is_set(bound.function) && files::networks_of(bound.function).front() != files::kGroundPhi);
 }
 
 int moving_inputs(const files::Network& network) {

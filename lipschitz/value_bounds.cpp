@@ -78,7 +78,7 @@ class Values {
     }
     if (names.size() == 2) {
       const auto size = static_cast<std::size_t>(parts_.at(names[1])->inputs());
-      const double slope = rho_bound.at(names[1].substr(4));
+      const double slope = rho_bound.at(files::kind_of(names[1]));
       found.jump = root_above(Dyadic(slope) * slope * check::largest_square(terms.front().values));
       found.sum = rounded(check::sum_intervals(terms, size),
                           options_.float32 ? check::sum_error(terms, size) : std::nullopt, values);
@@ -141,7 +141,7 @@ std::vector<CertifiedValues> certified_values(const files::Network& network,
   const Values values(network, inner, options), without_float32(network, inner, exact_only);
   std::vector<CertifiedValues> result;
   for (const std::string& function : files::functions(network)) {
-    const bool is_set = function.rfind("set:", 0) == 0;
+    const bool is_set = files::is_set(function);
     if (function != "network" && (!is_set || files::networks_of(function)[0] == files::kGroundPhi)) continue;
     for (int n = is_set ? 1 : 0; n <= (is_set ? options.neighbours : 0); ++n) {
       std::optional<CertifiedValues> found = values.of(function, n, rho_bound);

@@ -309,13 +309,14 @@ std::string source_text(const files::Network& network, const ExportOptions& opti
   if (!network.sha256.empty()) text += fmt::format("// sha256 of network.toml: {}\n\n", network.sha256);
   for (const auto& [part, weights] : files::parts(network)) text += weights_source(*weights, ids.at(part));
   std::string phi, rho;
-  for (const std::string& kind : kinds) phi += mlp(ids.at("phi:" + kind), network.phi.at(kind)) + ", ";
-  for (const auto& [kind, weights] : network.rho) rho += mlp(ids.at("rho:" + kind), weights) + ", ";
+  for (const std::string& kind : kinds)
+    phi += mlp(ids.at(files::phi_name(kind)), network.phi.at(kind)) + ", ";
+  for (const auto& [kind, weights] : network.rho) rho += mlp(ids.at(files::rho_name(kind)), weights) + ", ";
   text += fmt::format("static const Mlp<float> phi[] = {{{}}};\nstatic const Mlp<float> rho[] = {{{}}};\n",
                       phi, rho);
   const bool has_ground = network.phi.count(files::kGroundKind) != 0;
   if (has_ground) {
-    const std::string part = std::string("phi:") + files::kGroundKind;
+    const std::string part = files::kGroundPhi;
     text += fmt::format("static const Mlp<float> ground = {};\n",
                         mlp(ids.at(part), network.phi.at(files::kGroundKind)));
   }

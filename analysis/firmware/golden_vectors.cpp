@@ -21,9 +21,9 @@ class FlightEvaluator {
       : most_(most_neighbours), scale_(newton_per_unit(network)) {
     for (const auto& [part, weights] : files::parts(network)) evaluators_.emplace(part, *weights);
     for (const std::string& kind : neighbour_kinds(network))
-      phi_.push_back(evaluators_.at("phi:" + kind).mlp());
+      phi_.push_back(evaluators_.at(files::phi_name(kind)).mlp());
     if (network.phi.count(files::kGroundKind) != 0) {
-      ground_ = evaluators_.at(std::string("phi:") + files::kGroundKind).mlp();
+      ground_ = evaluators_.at(files::kGroundPhi).mlp();
       has_ground_ = true;
     }
     if (network.clamp) {
@@ -37,7 +37,7 @@ class FlightEvaluator {
     const nn::DeepSet<float> set{has_ground_ ? &ground_ : nullptr,
                                  phi_.data(),
                                  static_cast<int>(phi_.size()),
-                                 evaluators_.at("rho:" + rho_kind).mlp(),
+                                 evaluators_.at(files::rho_name(rho_kind)).mlp(),
                                  lower_.empty() ? nullptr : lower_.data(),
                                  upper_.empty() ? nullptr : upper_.data()};
     std::vector<nn::Neighbour<float>> neighbours;

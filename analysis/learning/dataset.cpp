@@ -132,13 +132,12 @@ training::Layout layout_of(const std::vector<RawTrack>& tracks, const std::vecto
     parts.push_back({part, std::move(all), 0, std::move(horizontal)});
   };
   if (sizes.ground) {
-    add(std::string("phi:") + files::kGroundKind, files::kGroundInputs, sizes.phi, sizes.features,
-        {Plane{1, 2}});
+    add(files::kGroundPhi, files::kGroundInputs, sizes.phi, sizes.features, {Plane{1, 2}});
   }
   for (const std::string& kind : neighbours)
-    add("phi:" + kind, kNeighbourInputs, sizes.phi, sizes.features, {Plane{0, 1}, Plane{3, 4}});
+    add(files::phi_name(kind), kNeighbourInputs, sizes.phi, sizes.features, {Plane{0, 1}, Plane{3, 4}});
   for (const std::string& kind : own)
-    add("rho:" + kind, sizes.features, sizes.rho, info(target).components, {});
+    add(files::rho_name(kind), sizes.features, sizes.rho, info(target).components, {});
   return training::Layout(std::move(parts));
 }
 
@@ -164,10 +163,10 @@ void append(LearningData& data, const RawTrack& raw, const std::vector<std::stri
   TrackSamples about = raw.about;
   about.use = use;
   about.begin = data.samples.samples();
-  const int ground = data.layout.find(std::string("phi:") + files::kGroundKind);
-  const int rho = data.layout.find("rho:" + raw.kind);
+  const int ground = data.layout.find(files::kGroundPhi);
+  const int rho = data.layout.find(files::rho_name(raw.kind));
   std::vector<int> phi;
-  for (const std::string& kind : kinds) phi.push_back(data.layout.find("phi:" + kind));
+  for (const std::string& kind : kinds) phi.push_back(data.layout.find(files::phi_name(kind)));
   for (std::size_t i = from; i < to; ++i) {
     if (ground >= 0) data.samples.add_input(ground, {raw.own[i].begin(), raw.own[i].end()});
     for (std::size_t j = raw.first[i]; j < raw.first[i + 1]; ++j)
@@ -220,6 +219,46 @@ std::vector<Index> LearningData::indices(Use use) const {
   return result;
 }
 
+namespace {
+
+/// The tracks of the flights that are fitted, wholly or in blocks. @throws InputError where they teach nothing.
+std::vector<RawTrack> fitted_tracks(const std::vector<std::vector<RawTrack>>& flights,
+                                    const HeldBack& held_back, const residuals::Inputs& inputs,
+                                    const LearningData& data) {
+  std::vector<RawTrack> fitted;
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    if (data.split_by_blocks || held_back.of_flight(f, flights.size()) == Use::kFit)
+      fitted.insert(fitted.end(), flights[f].begin(), flights[f].end());
+  }
+  const auto refuse = [&](const std::string& what, const std::string& mend) {
+    throw files::InputError(
+        {inputs.found.flights.empty() ? "" : inputs.found.flights.front().logs.front().second, "", "flights",
+         "", what, mend});
+  };
+  if (fitted.empty()) {
+    refuse("no usable record of a vehicle with a model among the flights to fit",
+           data.problems.empty() ? "see 'swarmcert compare' for what was cut" : data.problems.front());
+  }
+  if (std::all_of(fitted.begin(), fitted.end(), [](const RawTrack& t) { return t.neighbour.empty(); }))
+    refuse("no vehicle ever has a neighbour", "name flights of two or more vehicles");
+  return fitted;
+}
+
+/// Appends a track of kinds that the network has; of others, the reason why it is left out.
+void append_if_known(LearningData& data, const RawTrack& track, const std::vector<std::string>& kinds,
+                     Use use) {
+  const auto has_phi = [&](int kind) { return data.layout.find(files::phi_name(kinds[kind])) >= 0; };
+  if (data.layout.find(files::rho_name(track.kind)) >= 0 &&
+      std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), has_phi)) {
+    append(data, track, kinds, 0, track.target.size(), use);
+  } else {
+    data.problems.push_back(track.about.flight + " " + track.about.vehicle +
+                            ": a kind of vehicle that is not in the flights to learn from");
+  }
+}
+
+}  // namespace
+
 LearningData load_learning_data(const LearningFlights& named, const NetworkSizes& sizes, SplitBy split,
                                 int jobs, const Progress& progress, Target target) {
   LearningData data;
@@ -236,54 +275,27 @@ LearningData load_learning_data(const LearningFlights& named, const NetworkSizes
     const std::lock_guard<std::mutex> lock(mutex);
     progress(++done, total);
   };
-  std::vector<std::vector<RawTrack>> flights = load(inputs, target, jobs, flight_done, data.problems);
+  const std::vector<std::vector<RawTrack>> flights = load(inputs, target, jobs, flight_done, data.problems);
   // What a flight is for follows from its place among all that were named, never from what is in it: else a damaged
   // flight that tests would change which others are fitted.
   const HeldBack held_back = {named.select == nullptr, named.test == nullptr};
   const std::size_t needed = 1 + (held_back.select ? 1 : 0) + (held_back.test ? 1 : 0);
   data.split_by_blocks =
       split == SplitBy::kBlocks || (split == SplitBy::kAuto && flights.size() < needed && needed > 1);
-  const auto use_of = [&](std::size_t flight) { return held_back.of_flight(flight, flights.size()); };
-  std::vector<RawTrack> fitted;
-  for (std::size_t f = 0; f < flights.size(); ++f) {
-    if (data.split_by_blocks || use_of(f) == Use::kFit)
-      fitted.insert(fitted.end(), flights[f].begin(), flights[f].end());
-  }
-  const auto refuse = [&](const std::string& what, const std::string& mend) {
-    throw files::InputError(
-        {inputs.found.flights.empty() ? "" : inputs.found.flights.front().logs.front().second, "", "flights",
-         "", what, mend});
-  };
-  if (fitted.empty()) {
-    refuse("no usable record of a vehicle with a model among the flights to fit",
-           data.problems.empty() ? "see 'swarmcert compare' for what was cut" : data.problems.front());
-  }
-  if (std::all_of(fitted.begin(), fitted.end(), [](const RawTrack& t) { return t.neighbour.empty(); }))
-    refuse("no vehicle ever has a neighbour", "name flights of two or more vehicles");
-  data.layout = layout_of(fitted, inputs.kinds.names, sizes, target);
+  data.layout = layout_of(fitted_tracks(flights, held_back, inputs, data), inputs.kinds.names, sizes, target);
 
-  const auto append_if_known = [&](const RawTrack& track, const std::vector<std::string>& kinds, Use use) {
-    const auto has_phi = [&](int kind) { return data.layout.find("phi:" + kinds[kind]) >= 0; };
-    if (data.layout.find("rho:" + track.kind) >= 0 &&
-        std::all_of(track.neighbour_kind.begin(), track.neighbour_kind.end(), has_phi)) {
-      append(data, track, kinds, 0, track.target.size(), use);
-    } else {
-      data.problems.push_back(track.about.flight + " " + track.about.vehicle +
-                              ": a kind of vehicle that is not in the flights to learn from");
-    }
-  };
   for (std::size_t f = 0; f < flights.size(); ++f) {
     for (const RawTrack& track : flights[f]) {
       if (data.split_by_blocks)
         append_blocks(data, track, inputs.kinds.names, held_back);
       else
-        append_if_known(track, inputs.kinds.names, use_of(f));
+        append_if_known(data, track, inputs.kinds.names, held_back.of_flight(f, flights.size()));
     }
   }
   const auto append_all = [&](const residuals::Inputs* others, Use use) {
     if (others == nullptr) return;
     for (const auto& tracks : load(*others, target, jobs, flight_done, data.problems)) {
-      for (const RawTrack& track : tracks) append_if_known(track, others->kinds.names, use);
+      for (const RawTrack& track : tracks) append_if_known(data, track, others->kinds.names, use);
     }
   };
   append_all(named.select, Use::kSelect);

@@ -8,6 +8,7 @@
 #include "lipschitz/sdp_bound.h"
 #include "lipschitz/spectral_norm.h"
 #include "nn/base/parallel.h"
+#include "nn/weights/function_names.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::learning {
@@ -16,8 +17,6 @@ namespace {
 /// Storing the scaled weights in float32 moves the bound by about 2^-24 of it.
 constexpr double kScalingHeadroom = 0x1p-20;
 constexpr int kMostScalings = 8;
-
-bool begins_with(const std::string& text, const char* start) { return text.rfind(start, 0) == 0; }
 
 lipschitz::UpperBound product_of_norms(const files::Weights& phi, const files::Weights& rho) {
   std::vector<lipschitz::UpperBound> norms;
@@ -35,18 +34,18 @@ std::vector<JointBound> joint_bounds(const training::Layout& layout, const train
   files::Network network;
   std::vector<JointBound> bounds;
   const auto count = static_cast<int>(layout.parts().size());
-  const auto kind = [&](int part) { return layout.parts()[part].name.substr(4); };
+  const auto kind = [&](int part) { return files::kind_of(layout.parts()[part].name); };
   for (int p = 0; p < count; ++p) {
-    const bool is_phi = begins_with(layout.parts()[p].name, "phi:");
+    const bool is_phi = files::is_phi(layout.parts()[p].name);
     (is_phi ? network.phi : network.rho)[kind(p)] = layout.stored(theta, p);
     for (int r = 0; is_phi && r < count; ++r) {
-      if (begins_with(layout.parts()[r].name, "rho:")) bounds.push_back({p, r, 0});
+      if (files::is_rho(layout.parts()[r].name)) bounds.push_back({p, r, 0});
     }
   }
   files::parallel_for(static_cast<int>(bounds.size()), jobs, [&](int i) {
     JointBound& bound = bounds[static_cast<std::size_t>(i)];
     const std::string phi = kind(bound.phi), rho = kind(bound.rho);
-    const lipschitz::SdpBound found = lipschitz::sdp_bound(check::stages(network, "set:" + phi + ":" + rho));
+    const lipschitz::SdpBound found = lipschitz::sdp_bound(check::stages(network, files::set_name(phi, rho)));
     bound.upper = product_of_norms(network.phi.at(phi), network.rho.at(rho)).value();
     if (found.proof) bound.upper = std::min(bound.upper, found.proof->upper.value());
   });
@@ -69,7 +68,7 @@ Tightening scale_to(double limit, const training::Layout& layout, int jobs, trai
     }
   }
   for (std::size_t p = 0; p < count; ++p) {
-    if (!begins_with(layout.parts()[p].name, "rho:") || !(ratio[p] > 1)) continue;
+    if (!files::is_rho(layout.parts()[p].name) || !(ratio[p] > 1)) continue;
     const int part = static_cast<int>(p);
     layout.weights(theta, part, layout.parts()[p].layers() - 1) *=
         static_cast<float>((1 - kScalingHeadroom) / ratio[p]);

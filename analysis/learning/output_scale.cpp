@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "nn/training/deep_set_loss.h"
+#include "nn/weights/function_names.h"
 
 namespace swarmcert::learning {
 namespace {
@@ -60,7 +61,7 @@ std::map<std::string, double> output_scales(const LearningData& data, const trai
 void scale_outputs(const training::Layout& layout, const std::map<std::string, double>& scales,
                    training::Vector& theta) {
   for (const auto& [kind, scale] : scales) {
-    const int part = layout.find("rho:" + kind);
+    const int part = layout.find(files::rho_name(kind));
     if (part < 0) continue;
     const int last = layout.parts()[static_cast<std::size_t>(part)].layers() - 1;
     layout.weights(theta, part, last) *= static_cast<float>(scale);

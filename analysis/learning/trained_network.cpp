@@ -8,6 +8,7 @@
 #include "analysis/residuals/published_lag.h"
 #include "nn/base/file_io.h"
 #include "nn/training/deep_set_loss.h"
+#include "nn/weights/function_names.h"
 #include "nn/weights/record_samples.h"
 
 namespace swarmcert::learning {
@@ -100,7 +101,9 @@ void write_models(const residuals::Inputs& inputs, const training::Layout& layou
                                                      "flights it is worse than none."}),
                       true);
   };
-  const auto is_learned = [&layout](const std::string& kind) { return layout.find("rho:" + kind) >= 0; };
+  const auto is_learned = [&layout](const std::string& kind) {
+    return layout.find(files::rho_name(kind)) >= 0;
+  };
   for (const stability::Model& model : inputs.models)
     if (is_learned(model.kind)) write(model, model.kind);
   if (inputs.vehicle_models.empty()) return;
@@ -138,8 +141,7 @@ Certified write_certificate(const files::Network& network, const std::string& fo
       certified.gamma = *layer.respects_gamma;
   }
   for (const lipschitz::CertifiedBound& bound : certified.found.bounds) {
-    if (bound.function.rfind("set:", 0) == 0)
-      certified.set_bounds.emplace_back(bound.function, bound.upper.value());
+    if (files::is_set(bound.function)) certified.set_bounds.emplace_back(bound.function, bound.upper.value());
   }
   return certified;
 }

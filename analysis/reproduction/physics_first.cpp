@@ -5,12 +5,46 @@
 
 namespace swarmcert::reproduction {
 
+namespace {
+
+/// A model's name and its residuals on the test flights.
+using Row = std::pair<std::string, std::vector<ResidualBlock>>;
+
+/// The ladder as a table and in JSON, each row with how much the error falls from the row before.
+void add_rows(const std::vector<Row>& rows, Finding& finding) {
+  Table table = {"Physics first: vertical residual on test flights",
+                 {"model", "RMS [gf]", "90 %", "falls by [gf]", "90 %"},
+                 {}};
+  finding.json["physics_first"] = files::Json::array();
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const residuals::Interval of_row = interval_of(rows[k].second);
+    const double rms = rms_gf(rows[k].second);
+    files::Json row = {
+        {"model", rows[k].first}, {"rms_gf", rms}, {"interval_gf", {of_row.lower, of_row.upper}}};
+    std::vector<std::string> cells = {rows[k].first, gf(rms), gf(of_row), "", ""};
+    if (k > 0) {
+      const Estimate fall = change(rows[k - 1].second, rows[k].second);
+      row["falls_by_gf"] = fall.value_gf;
+      row["falls_by_interval_gf"] = {fall.interval.lower, fall.interval.upper};
+      cells[3] = gf(fall.value_gf);
+      cells[4] = gf(fall.interval);
+    }
+    row["compositions"] = files::Json::object();
+    for (const auto& [name, value] : by_composition(rows[k].second)) row["compositions"][name] = value;
+    finding.json["physics_first"].push_back(std::move(row));
+    table.rows.push_back(std::move(cells));
+  }
+  finding.tables.push_back(std::move(table));
+}
+
+}  // namespace
+
 void physics_first(const Setting& setting, Finding& finding) {
   Recorded recorded = recorded_flights(setting, false);
   const identification::Budget budget =
       identification::error_budget(recorded.fit, recorded.select, "", setting.jobs,
                                    [&](int done, int total) { setting.progress(done, total, "passes"); });
-  std::vector<std::pair<std::string, std::vector<ResidualBlock>>> rows;
+  std::vector<Row> rows;
   const auto judge = [&](const std::string& name, const residuals::Inputs& inputs) {
     rows.emplace_back(name, residual_blocks(inputs, setting.jobs));
   };
@@ -35,30 +69,8 @@ void physics_first(const Setting& setting, Finding& finding) {
       train_recorded(setting, recorded, recorded_options(setting), "remainder", "remainder of " + physics);
   judge("+ deep set on the remainder", with_network(recorded.test, learned.folder + "/network.toml"));
 
-  Table table = {"Physics first: vertical residual on test flights",
-                 {"model", "RMS [gf]", "90 %", "falls by [gf]", "90 %"},
-                 {}};
-  finding.json["physics_first"] = files::Json::array();
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const residuals::Interval of_row = interval_of(rows[k].second);
-    const double rms = rms_gf(rows[k].second);
-    files::Json row = {
-        {"model", rows[k].first}, {"rms_gf", rms}, {"interval_gf", {of_row.lower, of_row.upper}}};
-    std::vector<std::string> cells = {rows[k].first, gf(rms), gf(of_row), "", ""};
-    if (k > 0) {
-      const Estimate fall = change(rows[k - 1].second, rows[k].second);
-      row["falls_by_gf"] = fall.value_gf;
-      row["falls_by_interval_gf"] = {fall.interval.lower, fall.interval.upper};
-      cells[3] = gf(fall.value_gf);
-      cells[4] = gf(fall.interval);
-    }
-    row["compositions"] = files::Json::object();
-    for (const auto& [name, value] : by_composition(rows[k].second)) row["compositions"][name] = value;
-    finding.json["physics_first"].push_back(std::move(row));
-    table.rows.push_back(std::move(cells));
-  }
+  add_rows(rows, finding);
   finding.json["remainder_bound"] = learned.bound;
-  finding.tables.push_back(std::move(table));
   finding.notes.push_back(
       fmt::format("Physics first is judged with its own labels (accelerometer filter in the model), the deep "
                   "set alone with the "

@@ -155,11 +155,8 @@ LearnOptions taught_options(const Setting& setting) {
   return options;
 }
 
-/// The deep set alone, with the authors' own labels: thrust behind their lag, acceleration as logged, their masses.
-void deep_set_alone(const Setting& setting, Finding& finding) {
-  const Recorded recorded = recorded_flights(setting, true);
-  const Learned learned =
-      train_recorded(setting, recorded, taught_options(setting), "deep-set", "deep set alone");
+/// The networks that were trained, their errors on the selecting flights, and which was kept.
+void add_candidates(const Learned& learned, Finding& finding) {
   finding.json["networks"] = files::Json::array();
   std::string select_gf;
   for (const auto& [seed, score_gf] : learned.scores) {
@@ -174,6 +171,14 @@ void deep_set_alone(const Setting& setting, Finding& finding) {
                     "decided: seed {}.",
                     learned.scores.size() - 1, select_gf, learned.kept_seed));
   }
+}
+
+/// The deep set alone, with the authors' own labels: thrust behind their lag, acceleration as logged, their masses.
+void deep_set_alone(const Setting& setting, Finding& finding) {
+  const Recorded recorded = recorded_flights(setting, true);
+  const Learned learned =
+      train_recorded(setting, recorded, taught_options(setting), "deep-set", "deep set alone");
+  add_candidates(learned, finding);
   finding.json["recorded_sha256"] = files::sha256(recorded_key(setting, recorded));
   const std::string network = published_network(setting);
   const TestBlocks ours_blocks =

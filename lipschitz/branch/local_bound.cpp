@@ -51,27 +51,27 @@ struct Others {
 Others others_of(const files::Network& network, const Claim& claim, const std::map<std::string, Box>& domain,
                  int nodes) {
   const std::vector<std::string> names = files::networks_of(claim.function);
-  const std::string ground = std::string("phi:") + files::kGroundKind;
+  const std::string ground = files::kGroundPhi;
   std::map<std::string, int> counts;
-  for (const auto& [kind, count] : claim.neighbours) counts["phi:" + kind] = count;
+  for (const auto& [kind, count] : claim.neighbours) counts[files::phi_name(kind)] = count;
   if (names[0] == ground) {
-    counts.erase(ground);
+      counts.erase(ground);
   } else {
-    if (--counts.at(names[0]) == 0) counts.erase(names[0]);
-    if (network.phi.count(files::kGroundKind) == 1) counts[ground] = 1;
+      if (--counts.at(names[0]) == 0) counts.erase(names[0]);
+      if (network.phi.count(files::kGroundKind) == 1) counts[ground] = 1;
   }
   Others others;
   const auto rows = static_cast<std::size_t>(files::parts(network).at(names[1])->layers.front().outputs);
   others.least.assign(rows, 0.0);
   others.most.assign(rows, 0.0);
   for (const auto& [part, count] : counts) {
-    RangeProof range =
-        sum_range(check::term_layers(network, part, names[1]), domain.at(part), std::min(nodes, kRangeNodes));
-    for (std::size_t i = 0; i < rows; ++i) {  // all the ground, of the others any number up to `count`
-      others.least[i] += part == ground ? range.least[i] : count * std::min(range.least[i], 0.0);
-      others.most[i] += part == ground ? range.most[i] : count * std::max(range.most[i], 0.0);
-    }
-    others.ranges.emplace(part, std::move(range));
+      RangeProof range = sum_range(check::term_layers(network, part, names[1]), domain.at(part),
+                                   std::min(nodes, kRangeNodes));
+      for (std::size_t i = 0; i < rows; ++i) {  // all the ground, of the others any number up to `count`
+        others.least[i] += part == ground ? range.least[i] : count * std::min(range.least[i], 0.0);
+        others.most[i] += part == ground ? range.most[i] : count * std::max(range.most[i], 0.0);
+      }
+      others.ranges.emplace(part, std::move(range));
   }
   return others;
 }
@@ -128,7 +128,7 @@ LocalBound local_bound(const files::Network& network, const Claim& claim,
   BranchOptions options = given;
   const std::vector<std::string> names = files::networks_of(claim.function);
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
-  if (parts.at(names.front())->layers.size() < 2 || names.front().rfind("rho:", 0) == 0) return result;
+  if (parts.at(names.front())->layers.size() < 2 || files::is_rho(names.front())) return result;
   const bool is_global = claim.domain == "global";
   std::vector<check::Sides> boxes;
   if (!is_global) boxes.push_back({domain.at(names.front()).lower, domain.at(names.front()).upper});

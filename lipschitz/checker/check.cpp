@@ -4,6 +4,7 @@
 #include "lipschitz/checker/certificate_checker.h"
 #include "nn/base/content_hash.h"
 #include "nn/weights/chain.h"
+#include "nn/weights/function_names.h"
 
 namespace swarmcert::check {
 namespace {
@@ -86,8 +87,7 @@ void CertificateChecker::check_boxes(const Json& boxes) const {
   require(boxes.is_object() && !boxes.empty(), "box is neither null nor an object with boxes");
   for (const auto& [part, box] : boxes.items()) {
     const auto found = parts_.find(part);
-    require(found != parts_.end() && part.rfind("rho:", 0) != 0,
-            "box." + part + " is of no network with a box");
+    require(found != parts_.end() && !files::is_rho(part), "box." + part + " is of no network with a box");
     files::require_keys(box, {"lower", "upper"}, "box." + part);
     const auto inputs = static_cast<std::size_t>(found->second->inputs());
     const std::vector<double> lower = files::parse_hex_floats(box["lower"]);
@@ -235,10 +235,11 @@ CertificateChecker::Neighbours CertificateChecker::neighbours_of(const Json& bou
   require(names.size() == 2 && bound["domain"] == "box",
           where + ": neighbours only of a set function on a box");
   for (const auto& [kind, count] : neighbours)
-    require(kind != files::kGroundKind && parts_.count("phi:" + kind) == 1 && 1 <= count &&
+    require(kind != files::kGroundKind && parts_.count(files::phi_name(kind)) == 1 && 1 <= count &&
                 count <= kMostNeighbours,
             where + ": impossible neighbours");
-  require(!neighbours.empty() && (names[0] == files::kGroundPhi || neighbours.count(names[0].substr(4)) == 1),
+  require(!neighbours.empty() &&
+              (names[0] == files::kGroundPhi || neighbours.count(files::kind_of(names[0])) == 1),
           where + ": the neighbour that moves is none of those listed");
   return neighbours;
 }
@@ -264,7 +265,7 @@ void CertificateChecker::check_law(const Json& law) {
   for (const auto& [kind, count] : terms) {
     require(1 <= count && count <= kMostNeighbours, where + ": impossible number of neighbours");
     const Dyadic n = static_cast<double>(count);
-    const std::string function = "set:" + kind + ":" + rho, any_number = key(function, block, {});
+    const std::string function = files::set_name(kind, rho), any_number = key(function, block, {});
     require(proved_.count(any_number) == 1,
             where + ": rests on a bound of " + function + " that is not there");
     Dyadic k = proved_.at(any_number);
@@ -301,8 +302,8 @@ files::Network with_stated_activations(const files::Json& certificate, files::Ne
     }
   };
   if (network.plain) adopt("network", *network.plain);
-  for (auto& [kind, weights] : network.phi) adopt("phi:" + kind, weights);
-  for (auto& [kind, weights] : network.rho) adopt("rho:" + kind, weights);
+  for (auto& [kind, weights] : network.phi) adopt(files::phi_name(kind), weights);
+  for (auto& [kind, weights] : network.rho) adopt(files::rho_name(kind), weights);
   return network;
 }
 

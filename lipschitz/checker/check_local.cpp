@@ -5,6 +5,7 @@
 #include "lipschitz/checker/certificate_checker.h"
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/checker/tree_proof.h"
+#include "nn/weights/function_names.h"
 
 namespace swarmcert::check {
 
@@ -27,7 +28,7 @@ void CertificateChecker::check_others(const Json& others, const std::vector<std:
                                       Neighbours counts, Row& least, Row& most,
                                       const std::string& where) const {
   if (names[0] != files::kGroundPhi) {
-    if (--counts.at(names[0].substr(4)) == 0) counts.erase(names[0].substr(4));
+    if (--counts.at(files::kind_of(names[0])) == 0) counts.erase(files::kind_of(names[0]));
     if (parts_.count(files::kGroundPhi) == 1) counts[files::kGroundKind] = 1;
   }
   require(others.is_object() && others.size() == counts.size(), where + ": others lists other kinds");
@@ -35,7 +36,7 @@ void CertificateChecker::check_others(const Json& others, const std::vector<std:
   least.assign(rows, 0.0);
   most.assign(rows, 0.0);
   for (const auto& [kind, count] : counts) {
-    const std::string part = "phi:" + kind, here = where + "." + part;
+    const std::string part = files::phi_name(kind), here = where + "." + part;
     const Json& range = others.at(part);
     files::require_keys(range, {"tree", "least", "most"}, here);
     const Row low = files::parse_hex_floats(range["least"]), high = files::parse_hex_floats(range["most"]);
@@ -68,7 +69,7 @@ void CertificateChecker::check_local(const Json& bound, double upper, const std:
   const std::vector<std::string> names = files::networks_of(bound["function"].get<std::string>());
   const std::string& moved = names.front();
   const std::string block = bound["block"].get<std::string>();
-  require(moved.rfind("rho:", 0) != 0, where + ": rho has no box");
+  require(!files::is_rho(moved), where + ": rho has no box");
   const double rho = files::parse_hex_float(proof["rho"].get<std::string>());
   require(rho > 0 && Dyadic(upper) * upper >= Dyadic(rho), where + ": claims less than sqrt(rho)");
   LocalFunction f;

@@ -212,10 +212,10 @@ SlopeFunction slope_function(const files::Network& network, const std::string& f
     return Term{parts.at(name), clamped ? &*network.clamp : nullptr};
   };
   SlopeFunction f{term(names[0]), {}, names.size() == 2 ? parts.at(names[1]) : nullptr};
-  const std::string ground = std::string("phi:") + files::kGroundKind;
+  const std::string ground = files::kGroundPhi;
   std::size_t grounds = names[0] == ground ? 1 : 0;
   for (const std::string& name : others) {
-    if (name.rfind("phi:", 0) != 0) refuse(name + " is no neighbour");
+    if (!files::is_phi(name)) refuse(name + " is no neighbour");
     grounds += name == ground ? 1 : 0;
     f.others.push_back(term(name));
   }

@@ -6,8 +6,6 @@
 namespace swarmcert::files {
 namespace {
 
-bool starts_with(const std::string& text, const std::string& prefix) { return text.rfind(prefix, 0) == 0; }
-
 bool ends_with(const std::string& text, const std::string& suffix) {
   return text.size() >= suffix.size() &&
          text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0;
@@ -31,8 +29,8 @@ std::vector<std::string> ground_names() {
 
 /// Names that show which inputs are positions and which velocities; empty where nobody knows.
 std::vector<std::string> input_names(const Network& network, const std::string& part, int inputs) {
-  if (part == std::string("phi:") + kGroundKind) return ground_names();
-  if (starts_with(part, "rho:")) return {};
+  if (part == kGroundPhi) return ground_names();
+  if (is_rho(part)) return {};
   if (!network.input_order.empty()) return network.input_order;
   if (inputs != 6) return {};
   return {"dp_x_m", "dp_y_m", "dp_z_m", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"};
@@ -43,32 +41,31 @@ std::vector<std::string> input_names(const Network& network, const std::string& 
 std::map<std::string, const Weights*> parts(const Network& network) {
   std::map<std::string, const Weights*> result;
   if (network.plain) result["network"] = &*network.plain;
-  for (const auto& [kind, weights] : network.phi) result["phi:" + kind] = &weights;
-  for (const auto& [kind, weights] : network.rho) result["rho:" + kind] = &weights;
+  for (const auto& [kind, weights] : network.phi) result[phi_name(kind)] = &weights;
+  for (const auto& [kind, weights] : network.rho) result[rho_name(kind)] = &weights;
   return result;
 }
 
 std::vector<std::string> networks_of(const std::string& function) {
-  if (function == "network" || starts_with(function, "phi:") || starts_with(function, "rho:"))
-    return {function};
+  if (function == kPlainNetwork || is_phi(function) || is_rho(function)) return {function};
   const std::size_t colon = function.find(':', 4);
-  if (!starts_with(function, "set:") || colon == std::string::npos) {
+  if (!is_set(function) || colon == std::string::npos) {
     throw std::invalid_argument("networks_of: no function is called \"" + function + "\"");
   }
-  return {"phi:" + function.substr(4, colon - 4), "rho:" + function.substr(colon + 1)};
+  return {phi_name(function.substr(4, colon - 4)), rho_name(function.substr(colon + 1))};
 }
 
 std::vector<std::string> functions(const Network& network) {
   std::vector<std::string> names;
   for (const auto& [name, weights] : parts(network)) names.push_back(name);
   for (const auto& [phi_kind, phi] : network.phi) {
-    for (const auto& [rho_kind, rho] : network.rho) names.push_back("set:" + phi_kind + ":" + rho_kind);
+    for (const auto& [rho_kind, rho] : network.rho) names.push_back(set_name(phi_kind, rho_kind));
   }
   return names;
 }
 
 bool is_clamped(const std::string& name) {
-  return name == "network" || (starts_with(name, "phi:") && name != std::string("phi:") + kGroundKind);
+  return name == kPlainNetwork || (is_phi(name) && name != kGroundPhi);
 }
 
 std::vector<int> block_coordinates(const Network& network, const std::string& function,
@@ -94,7 +91,7 @@ std::vector<int> block_coordinates(const Network& network, const std::string& fu
 std::vector<std::string> blocks(const Network& network, const std::string& function) {
   const std::string first = networks_of(function).front();
   const int inputs = parts(network).at(first)->inputs();
-  if (starts_with(first, "rho:") || inputs == 1) return {};
+  if (is_rho(first) || inputs == 1) return {};
   std::vector<std::string> result;
   const std::vector<std::string> names = input_names(network, first, inputs);
   const auto has = [&names](const char* suffix) {
@@ -116,8 +113,8 @@ std::string unit(const Network& network, const std::string& function, const std:
     moved = names;
   }
   const std::string input = input_unit(moved);
-  if (starts_with(function, "phi:")) return "hidden/" + input;
-  if (starts_with(function, "rho:")) return output + "/hidden";
+  if (is_phi(function)) return "hidden/" + input;
+  if (is_rho(function)) return output + "/hidden";
   return output + "/" + input;
 }
 

@@ -5,14 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "nn/weights/function_names.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::files {
-
-/// The kind of phi that models the ground: its input is the vehicle's own state, and it always enters the sum.
-inline constexpr const char* kGroundKind = "ground";
-/// Its part phi, as functions() names it.
-inline constexpr const char* kGroundPhi = "phi:ground";
 
 /// The stored networks under the names that commands print: "network", or "phi:<kind>" and "rho:<kind>".
 std::map<std::string, const Weights*> parts(const Network& network);

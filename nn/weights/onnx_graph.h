@@ -48,6 +48,7 @@ class OnnxGraph {
 
   OnnxValue applied(const Node& node, const AffineMap& map, const OnnxShape& shape, const OnnxTensor* weight);
   OnnxValue padded(const Node& node, const OnnxValue& x) const;
+  OnnxValue concatenated(const Node& node) const;
   OnnxValue elementwise(const Node& node);
   OnnxValue largest(const Node& node, OnnxValue from, std::vector<std::vector<int>> windows, OnnxShape shape);
   OnnxValue largest_of_inputs(const Node& node);

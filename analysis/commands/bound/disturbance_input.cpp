@@ -164,8 +164,8 @@ Constants largest(const Bounds& bounds, const Function& function, const Upper& u
   Constants result;
   for (const auto& bound : bounds) {
     const std::string of = function(bound);
-    if (of.rfind("set:", 0) != 0 && of != "network") continue;
-    const bool is_ground = of.rfind(std::string("set:") + files::kGroundKind + ":", 0) == 0;
+    if (!files::is_whole(of)) continue;
+    const bool is_ground = files::is_set(of) && files::networks_of(of).front() == files::kGroundPhi;
     double& constant = is_ground ? result.own : result.neighbour;
     constant = std::max(constant, newtons(unit(bound), upper(bound), path));
   }

@@ -53,10 +53,6 @@ struct CertifyOptions {
   lipschitz::CertifyOptions certify;
 };
 
-bool is_composed(const CertifiedBound& bound) {
-  return bound.function == "network" || bound.function.rfind("set:", 0) == 0;
-}
-
 /// Refuted if anything is, inconclusive if anything else is, proved if all is.
 Verdict all_of(const std::vector<Verdict>& verdicts) {
   Verdict total = Verdict::kProved;
@@ -74,7 +70,7 @@ Verdict judge(const Certification& found, double max_lipschitz) {
     if (layer.respects_gamma) verdicts.push_back(*layer.respects_gamma);
   }
   for (const CertifiedBound& bound : found.bounds) {
-    if (max_lipschitz <= 0 || !is_composed(bound)) continue;
+    if (max_lipschitz <= 0 || !files::is_whole(bound.function)) continue;
     if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
     const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
     verdicts.push_back(bound.upper.value() <= max_lipschitz ? Verdict::kProved
@@ -188,7 +184,7 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Ce
   for (const CertifiedBound& bound : output.found.bounds) {
     if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
     bounds[bound.function] = bound.upper.value();
-    if (bound.function.rfind("rho:", 0) == 0) rho_bounds[bound.function.substr(4)] = bound.upper.value();
+    if (files::is_rho(bound.function)) rho_bounds[files::kind_of(bound.function)] = bound.upper.value();
   }
   lipschitz::RangeOptions range;
   range.neighbours = std::max(1, options.certify.neighbours);
@@ -255,10 +251,8 @@ void refuse_what_is_for_relu(const files::Network& network, const CertifyOptions
   }
 }
 
-int run_certify(CertifyOptions options, const CommonOptions& common) {
-  refuse_to_replace(common, options.output);
-  refuse_to_replace(common, common.json);
-  refuse_folder(common, options.report);
+/// Reads NET and the files beside it, and turns the words of the command line into options.
+files::Network read_network(CertifyOptions& options) {
   if (!options.neighbours.empty()) parse_neighbours(options.neighbours, options.certify);
   parse_blocks(options);
   files::Network network = load_any_net(options.network);
@@ -268,19 +262,16 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
         "--neighbours " + options.neighbours +
         ": the file holds one plain network, which has none; give a network.toml or --phi and --rho");
   if (options.as == "float32") network = files::as_float32(std::move(network));
-  const std::map<std::string, files::SampleAgreement> samples = compare_samples(network, options);
-  if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
-  lipschitz::SlopeMapOptions map = options.slope_map;
-  if (!options.map.empty()) {
-    if (options.domain.empty()) throw UsageError("--map needs the box of --domain");
-    parse_map(options, network, map);
-  }
+  return network;
+}
+
+/// --gamma, --method, and how far its search goes.
+void set_method(CertifyOptions& options) {
   if (options.gamma != 0) options.certify.gamma = files::GammaStatement{options.gamma};
   options.certify.method = options.method == "branch"    ? lipschitz::UpperMethod::kBranch
                            : options.method == "sdp"     ? lipschitz::UpperMethod::kSdp
                            : options.method == "product" ? lipschitz::UpperMethod::kProduct
                                                          : lipschitz::UpperMethod::kAuto;
-  options.certify.jobs = common.jobs;
   if (options.method == "branch") {
     if (options.nodes == 0) throw UsageError("--nodes must be at least 1 with --method branch");
     if (options.nodes) options.certify.branch.nodes = *options.nodes;
@@ -290,7 +281,61 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
       throw UsageError("--cuts and --default-slopes are options of the search: they need --method branch");
     options.certify.lower.rounds = options.nodes;
   }
+}
+
+/// Bounds, and beside them what the options ask for.
+CertifyOutput find_all(const files::Network& network, const CertifyOptions& options, Progress& progress) {
+  CertifyOutput output;
+  output.found = certify_or_refuse(network, options.certify);
+  output.found.as_float32 = options.as == "float32";
+  output.seed = options.certify.lower.seed;
+  output.max_lipschitz = options.max_lipschitz;
+  output.domain_file = options.domain;
+  add_slope_estimates(network, options.certify, output);
+  if (options.explain) add_comparisons(network, options.certify, output);
+  if (!options.domain.empty() || options.range) add_ranges(network, options, output);
+  if (!options.map.empty()) {
+    output.map = options.slope_map;
+    output.map.progress = [&progress](int done, int total) {
+      progress.show(done, total, "cells of the map");
+    };
+    output.maps = lipschitz::slope_maps(network, output.found, output.map);
+  }
+  output.verdict = judge(output.found, options.max_lipschitz);
+  return output;
+}
+
+void write_certificate(const files::Network& network, const CertifyOutput& output, const std::string& path,
+                       bool force) {
+  if (path.empty() && host() == nullptr) return;
+  const std::string text = files::to_text(certificate(network, output.found));
+  if (!path.empty()) files::write_file(path, text, force);
+  if (host() != nullptr) host()->certificate_written = text;
+}
+
+void print_all(const files::Network& network, const CertifyOptions& options, const CertifyOutput& output) {
+  print_certification(network, output);
+  if (options.max_lipschitz > 0)
+    fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
+  if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
+  fmt::print("verdict: {} for {}{}\n", name(output.verdict), files::chain_words(network),
+             output.is_interrupted() ? ", from interrupted searches" : "");
+}
+
+int run_certify(CertifyOptions options, const CommonOptions& common) {
+  refuse_to_replace(common, options.output);
+  refuse_to_replace(common, common.json);
+  refuse_folder(common, options.report);
+  const files::Network network = read_network(options);
+  const std::map<std::string, files::SampleAgreement> samples = compare_samples(network, options);
+  if (!options.domain.empty()) options.certify.domain = lipschitz::read_domain(options.domain, network);
+  if (!options.map.empty()) {
+    if (options.domain.empty()) throw UsageError("--map needs the box of --domain");
+    parse_map(options, network, options.slope_map);
+  }
+  set_method(options);
   Progress progress(common.quiet);
+  options.certify.jobs = common.jobs;
   options.certify.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
   };
@@ -299,155 +344,145 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
   const CancelOnInterrupt interrupt(options.seconds > 0 ? options.seconds + kLater_s : 0);
   options.certify.cancelled = interrupt.flag();
   options.certify.seconds = options.seconds;
+  options.slope_map.domain = options.certify.domain;
+  options.slope_map.seed = options.certify.lower.seed;
+  options.slope_map.jobs = common.jobs;
+  options.slope_map.cancelled = interrupt.flag();
 
-  CertifyOutput output;
-  output.found = certify_or_refuse(network, options.certify);
-  output.found.as_float32 = options.as == "float32";
+  CertifyOutput output = find_all(network, options, progress);
   output.found.samples = samples;
-  output.seed = options.certify.lower.seed;
-  output.max_lipschitz = options.max_lipschitz;
-  output.domain_file = options.domain;
-  const Certification& found = output.found;
-  add_slope_estimates(network, options.certify, output);
-  if (options.explain) add_comparisons(network, options.certify, output);
-  if (!options.domain.empty() || options.range) add_ranges(network, options, output);
-  if (!options.map.empty()) {
-    map.domain = options.certify.domain;
-    map.seed = options.certify.lower.seed;
-    map.jobs = common.jobs;
-    map.cancelled = interrupt.flag();
-    map.progress = [&progress](int done, int total) { progress.show(done, total, "cells of the map"); };
-    output.map = map;
-    output.maps = lipschitz::slope_maps(network, found, map);
-  }
-  const Verdict verdict = output.verdict = judge(found, options.max_lipschitz);
-  if (!options.output.empty() || host() != nullptr) {
-    const std::string text = files::to_text(certificate(network, found));
-    if (!options.output.empty()) files::write_file(options.output, text, common.force);
-    if (host() != nullptr) host()->certificate_written = text;
-  }
+  write_certificate(network, output, options.output, common.force);
   const files::Json result = certify_json(network, output);
   write_result(common, result);
-  if (common.prints_text()) {
-    print_certification(network, output);
-    if (options.max_lipschitz > 0)
-      fmt::print("\nlimit: Lipschitz constant at most {}\n", options.max_lipschitz);
-    if (!options.output.empty()) fmt::print("\ncertificate: {}\n", options.output);
-    fmt::print("verdict: {} for {}{}\n", name(verdict), files::chain_words(network),
-               output.is_interrupted() ? ", from interrupted searches" : "");
-  }
+  if (common.prints_text()) print_all(network, options, output);
   if (!options.report.empty()) {
     const std::string path = write_certify_report(network, output, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
-  return verdict == Verdict::kProved ? kDone : verdict == Verdict::kRefuted ? kViolated : kInconclusive;
+  return output.verdict == Verdict::kProved    ? kDone
+         : output.verdict == Verdict::kRefuted ? kViolated
+                                               : kInconclusive;
+}
+
+void declare_function(CLI::App& app, CertifyOptions& options) {
+  app.add_option("--method", options.method,
+                 "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron; the layer-wise eclipse_fast "
+                 "where "
+                 "its search is interrupted), auto (the smallest of the three), "
+                 "or branch (branch and bound over the box of --domain; without --domain over all inputs)")
+      ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
+      ->capture_default_str();
+  app.add_option("--samples", options.samples,
+                 "Inputs and outputs recorded from the trained network (CSV, .npz or JSON), which the "
+                 "certified "
+                 "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. "
+                 "phi:small=FILE")
+      ->allow_extra_args(false);
+  app.add_option("--samples-tolerance", options.sample_tolerance,
+                 "How far samples may be off, times what their outputs range over")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
+  app.add_option("--as", options.as,
+                 "Certify the weights rounded to this precision, as they are stored in flash")
+      ->check(CLI::IsMember({"float32"}));
+}
+
+/// @returns the option --blocks, which may stand without a value.
+const CLI::Option* declare_inputs(CLI::App& app, CertifyOptions& options) {
+  auto* blocks = app.add_option("--blocks", options.blocks,
+                                "Bounds per block of inputs as well: of every block, or of those named, "
+                                "e.g. position,velocity,x2")
+                     ->expected(0, 1)
+                     ->type_name("[LIST]")
+                     ->default_str("every");
+  app.add_option("--scale", options.certify.scale,
+                 "Also bounds in the norm sqrt(sum (dx_k / scale_k)^2): one number per input")
+      ->delimiter(',');
+  app.add_option("--neighbours", options.neighbours,
+                 "Bounds for several moving neighbours: a number of each kind, or a group such as "
+                 "small=1,large=2. With --method branch also the bound for one neighbour that moves "
+                 "among at most this many, all in the box");
+  app.add_option("--domain", options.domain,
+                 "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
+  return blocks;
+}
+
+void declare_search_on_a_box(CLI::App& app, CertifyOptions& options) {
+  app.add_option("--cuts", options.certify.branch.pairs,
+                 "With --method branch: maximum number of constraints per box from pairs of "
+                 "incompatible activations. Gives fewer boxes and a shorter certificate for the same "
+                 "bound, but takes more time")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  app.add_flag_callback(
+      "--default-slopes", [&options] { options.certify.branch.better_slopes = false; },
+      "With --method branch: disable the adaptive lower ReLU slopes (for comparison)");
+  auto* map = app.add_option("--map", options.map,
+                             "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
+                             "by cell; the slope in a "
+                             "cell is proved above and witnessed below, the other inputs range over "
+                             "the box (JSON and report)");
+  app.add_option("--cells", options.cells, "Cells of --map along each input (default: 12), e.g. 12,8")
+      ->needs(map);
+  app.add_option("--cell-nodes", options.slope_map.nodes,
+                 "Maximum number of boxes of branch and bound per cell of --map")
+      ->needs(map)
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+}
+
+void declare_limits(CLI::App& app, CertifyOptions& options) {
+  app.add_flag("--range", options.range,
+               "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it");
+  app.add_option("--input-step", options.input_step,
+                 "Inputs are quantised to multiples of this (float32 error)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--explain", options.explain,
+               "Other bounds for comparison, and which layers make the bound loose");
+  app.add_option("--gamma", options.gamma, "Limit on the spectral norm of every layer")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--max-lipschitz", options.max_lipschitz,
+                 "Limit on the Lipschitz constant of the network, or of every set function")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--nodes", options.nodes,
+                 "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
+                 "networks). With --method branch: boxes to look at, per bound (default: 20000)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--time", options.seconds,
+                 "Time limit of the whole command in seconds. Bounds are proved all the same; those "
+                 "whose search was "
+                 "cut short have the status interrupted, as after Ctrl-C or SIGTERM")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--seed", options.certify.lower.seed, "Seed of the lower-bound search")
+      ->capture_default_str();
+  add_output(app, "-o,--output", options.output, "File for the certificate");
+  add_output(app, "--report", options.report, "Folder for an HTML report with its plots");
 }
 
 }  // namespace
 
 Command certify_command() {
-  return {
-      "certify", "Spectral norms and Lipschitz bounds of a network that hold in exact arithmetic",
-      "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
-      "the proofs\n"
-      "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
-      "float32 points.\n"
-      "Verdict: proved (exit 0), refuted (1) or inconclusive (4), of --gamma and --max-lipschitz where "
-      "given, and of\n"
-      "the gamma that a network.toml states.\n\n"
-      "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
-      [](CLI::App& app) {
-        const auto options = std::make_shared<CertifyOptions>();
-        declare_network(app, options->network);
-        app.add_option(
-               "--method", options->method,
-               "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron; the layer-wise eclipse_fast "
-               "where "
-               "its search is interrupted), auto (the smallest of the three), "
-               "or branch (branch and bound over the box of --domain; without --domain over all inputs)")
-            ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
-            ->capture_default_str();
-        app.add_option("--samples", options->samples,
-                       "Inputs and outputs recorded from the trained network (CSV, .npz or JSON), which the "
-                       "certified "
-                       "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. "
-                       "phi:small=FILE")
-            ->allow_extra_args(false);
-        app.add_option("--samples-tolerance", options->sample_tolerance,
-                       "How far samples may be off, times what their outputs range over")
-            ->check(CLI::Range(0.0, 0.1))
-            ->capture_default_str();
-        app.add_option("--as", options->as,
-                       "Certify the weights rounded to this precision, as they are stored in flash")
-            ->check(CLI::IsMember({"float32"}));
-        auto* blocks =
-            app.add_option("--blocks", options->blocks,
-                           "Bounds per block of inputs as well: of every block, or of those named, "
-                           "e.g. position,velocity,x2")
-                ->expected(0, 1)
-                ->type_name("[LIST]")
-                ->default_str("every");
-        app.add_option("--scale", options->certify.scale,
-                       "Also bounds in the norm sqrt(sum (dx_k / scale_k)^2): one number per input")
-            ->delimiter(',');
-        app.add_option("--neighbours", options->neighbours,
-                       "Bounds for several moving neighbours: a number of each kind, or a group such as "
-                       "small=1,large=2. With --method branch also the bound for one neighbour that moves "
-                       "among at most this many, all in the box");
-        app.add_option("--domain", options->domain,
-                       "box.toml: bounds for inputs in this box only (schema swarmcert/box/1, lower, upper)");
-        app.add_option("--cuts", options->certify.branch.pairs,
-                       "With --method branch: maximum number of constraints per box from pairs of "
-                       "incompatible activations. Gives fewer boxes and a shorter certificate for the same "
-                       "bound, but takes more time")
-            ->check(CLI::Range(0, 1000))
-            ->capture_default_str();
-        app.add_flag_callback(
-            "--default-slopes", [options] { options->certify.branch.better_slopes = false; },
-            "With --method branch: disable the adaptive lower ReLU slopes (for comparison)");
-        auto* map = app.add_option("--map", options->map,
-                                   "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
-                                   "by cell; the slope in a "
-                                   "cell is proved above and witnessed below, the other inputs range over "
-                                   "the box (JSON and report)");
-        app.add_option("--cells", options->cells, "Cells of --map along each input (default: 12), e.g. 12,8")
-            ->needs(map);
-        app.add_option("--cell-nodes", options->slope_map.nodes,
-                       "Maximum number of boxes of branch and bound per cell of --map")
-            ->needs(map)
-            ->check(CLI::Range(1, 1000000))
-            ->capture_default_str();
-        app.add_flag("--range", options->range,
-                     "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it");
-        app.add_option("--input-step", options->input_step,
-                       "Inputs are quantised to multiples of this (float32 error)")
-            ->check(CLI::NonNegativeNumber);
-        app.add_flag("--explain", options->explain,
-                     "Other bounds for comparison, and which layers make the bound loose");
-        app.add_option("--gamma", options->gamma, "Limit on the spectral norm of every layer")
-            ->check(CLI::PositiveNumber);
-        app.add_option("--max-lipschitz", options->max_lipschitz,
-                       "Limit on the Lipschitz constant of the network, or of every set function")
-            ->check(CLI::PositiveNumber);
-        app.add_option(
-               "--nodes", options->nodes,
-               "Rounds of the search for lower bounds, per function; 0: none (default: 40, fewer for large "
-               "networks). With --method branch: boxes to look at, per bound (default: 20000)")
-            ->check(CLI::NonNegativeNumber);
-        app.add_option("--time", options->seconds,
-                       "Time limit of the whole command in seconds. Bounds are proved all the same; those "
-                       "whose search was "
-                       "cut short have the status interrupted, as after Ctrl-C or SIGTERM")
-            ->check(CLI::PositiveNumber);
-        app.add_option("--seed", options->certify.lower.seed, "Seed of the lower-bound search")
-            ->capture_default_str();
-        add_output(app, "-o,--output", options->output, "File for the certificate");
-        add_output(app, "--report", options->report, "Folder for an HTML report with its plots");
-        return [options, blocks](const CommonOptions& common) {
-          if (blocks->count() > 0 && options->blocks.empty()) options->blocks = "every";
-          return run_certify(*options, common);
-        };
-      }};
+  return {"certify", "Spectral norms and Lipschitz bounds of a network that hold in exact arithmetic",
+          "Upper bounds are proved in exact arithmetic for the weights as stored; the certificate (-o) holds "
+          "the proofs\n"
+          "and 'swarmcert check' verifies them without an optimiser. Lower bounds are slopes between two "
+          "float32 points.\n"
+          "Verdict: proved (exit 0), refuted (1) or inconclusive (4), of --gamma and --max-lipschitz where "
+          "given, and of\n"
+          "the gamma that a network.toml states.\n\n"
+          "Example: swarmcert certify nn/networks/demo/network.toml --max-lipschitz 500 -o cert.json",
+          [](CLI::App& app) {
+            const auto options = std::make_shared<CertifyOptions>();
+            declare_network(app, options->network);
+            declare_function(app, *options);
+            const CLI::Option* const blocks = declare_inputs(app, *options);
+            declare_search_on_a_box(app, *options);
+            declare_limits(app, *options);
+            return [options, blocks](const CommonOptions& common) {
+              if (blocks->count() > 0 && options->blocks.empty()) options->blocks = "every";
+              return run_certify(*options, common);
+            };
+          }};
 }
 
 }  // namespace swarmcert::analysis

@@ -12,144 +12,10 @@
 namespace swarmcert::analysis {
 namespace {
 
-using files::Json;
-using lipschitz::Attained;
 using lipschitz::Certification;
 using lipschitz::CertifiedBound;
 using lipschitz::CertifiedLayer;
-using lipschitz::coordinate_name;
 using lipschitz::Verdict;
-
-constexpr char kForReluOnly[] =
-    "lower bounds and bounds on a box are for ReLU networks: of other activations upper bounds for all "
-    "inputs are "
-    "proved";
-
-std::string output_unit(const files::Network& network) {
-  return network.output_unit.empty() ? "output" : network.output_unit;
-}
-
-std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound) {
-  return bound < output.slope_estimates.size() ? output.slope_estimates[bound] : std::nullopt;
-}
-
-Json attained_json(const Attained& attained) {
-  Json points = Json::array();
-  for (std::size_t j = 0; j < attained.points.size(); ++j)
-    points.push_back({{"network", attained.networks[j]}, {"x", attained.points[j]}});
-  return {{"value", attained.value}, {"points", std::move(points)}};
-}
-
-/// What the certificate states of the function's values; nothing where it is left out.
-const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output, const std::string& function,
-                                                 int neighbours) {
-  for (const lipschitz::CertifiedValues& values : output.found.values)
-    if (values.function == function && values.neighbours == neighbours) return &values;
-  return nullptr;
-}
-
-Json number_or_null(const std::optional<double>& number) { return number ? Json(*number) : Json(); }
-
-Json range_json(const files::Network& network, const CertifyOutput& output,
-                const lipschitz::CertifiedRange& range) {
-  const auto* const stated = in_certificate(output, range.function, range.neighbours_at_most);
-  const auto index = static_cast<std::size_t>(range.output);
-  return {{"function", range.function},
-          {"output", range.output},
-          {"domain", "box"},
-          {"neighbours", range.neighbours_at_most},
-          {"unit", output_unit(network)},
-          {"lower", range.lower},
-          {"upper", range.upper},
-          {"largest_magnitude", range.largest()},
-          {"lower_witness", attained_json(range.least)},
-          {"upper_witness", attained_json(range.greatest)},
-          {"cut_off_jump", range.jump},
-          {"arithmetic", "exact"},
-          {"lower_in_certificate", stated != nullptr ? Json(stated->output().lower[index]) : Json()},
-          {"upper_in_certificate", stated != nullptr ? Json(stated->output().upper[index]) : Json()},
-          {"jump_in_certificate", stated != nullptr ? number_or_null(stated->jump) : Json()}};
-}
-
-double slope_of(const CertifiedBound& bound) {
-  return bound.lower.witness ? bound.lower.witness->slope.value() : 0;
-}
-
-Json comparison_json(const CertifiedBound& bound, const lipschitz::Comparison& comparison) {
-  Json stages = Json::array();
-  for (const lipschitz::StageLoss& stage : comparison.stages)
-    stages.push_back(
-        {{"layer", stage.name}, {"norm", stage.norm}, {"gain", stage.gain}, {"loss", stage.loss()}});
-  Json json = {{"combettes_pesquet_upper", nullptr},
-               {"eclipse_fast_upper", nullptr},
-               {"pattern_floor_estimate", comparison.floor.slope.value()},
-               {"stages", std::move(stages)},
-               {"words", explain(comparison, bound.product.value(), bound.upper.value(), slope_of(bound))}};
-  if (comparison.combettes_pesquet) json["combettes_pesquet_upper"] = comparison.combettes_pesquet->value();
-  if (comparison.eclipse_fast) json["eclipse_fast_upper"] = comparison.eclipse_fast->upper.value();
-  return json;
-}
-
-Json outlook_json(const CertifiedBound& bound) {
-  const std::optional<BranchOutlook> outlook = branch_outlook(bound);
-  if (!outlook) return nullptr;
-  return {{"ratio", BranchOutlook::kRatio},
-          {"boxes_estimate", outlook->boxes ? Json(*outlook->boxes) : Json()},
-          {"gap_halfway", outlook->gap_halfway},
-          {"undecided", bound.outlook.undecided},
-          {"neurons", bound.outlook.neurons},
-          {"slope_in_part_estimate", bound.outlook.slope_in_part},
-          {"relaxation_share_estimate", outlook->relaxation_share},
-          {"words", branch_outlook_words(bound)}};
-}
-
-Json witness_json(const lipschitz::FoundSlope& found) {
-  if (!found.witness) return nullptr;
-  Json others = Json::array();
-  for (std::size_t j = 0; j < found.witness->others.size(); ++j) {
-    others.push_back({{"network", found.other_networks[j]}, {"x", found.witness->others[j]}});
-  }
-  return {{"x", found.witness->x}, {"y", found.witness->y}, {"others", std::move(others)}};
-}
-
-/// The operations of all parts, one after the other.
-Json chains_json(const files::Network& network) {
-  Json list = Json::array();
-  for (const auto& [name, weights] : files::parts(network)) {
-    for (Json& step : files::chain_json(files::chain(network, name))) {
-      step["network"] = name;
-      list.push_back(std::move(step));
-    }
-  }
-  return list;
-}
-
-/// What is known of where each part's chain comes from.
-Json chain_sources_json(const files::Network& network) {
-  Json sources = Json::object();
-  for (const auto& [name, weights] : files::parts(network)) {
-    const bool is_stated = weights->order_source == files::OrderSource::kFile;
-    const char* const otherwise = weights->activation_is_given ? "user" : "assumed";
-    sources[name] = {{"order", files::name(weights->order_source)},
-                     {"activation", is_stated ? "file" : otherwise},
-                     {"notes", weights->notes},
-                     {"rounding_of_slope", files::rounding_of_slope(*weights)}};
-  }
-  return sources;
-}
-
-Json samples_result(const Certification& found) {
-  Json list = Json::array();
-  for (const auto& [part, agreement] : found.samples) {
-    list.push_back({{"network", part},
-                    {"file", agreement.path},
-                    {"sha256", agreement.sha256},
-                    {"count", agreement.count},
-                    {"tolerance", agreement.tolerance},
-                    {"largest_deviation", agreement.largest_deviation}});
-  }
-  return list;
-}
 
 std::string group_label(const lipschitz::Neighbours& neighbours) {
   std::string text;
@@ -159,6 +25,25 @@ std::string group_label(const lipschitz::Neighbours& neighbours) {
 }
 
 }  // namespace
+
+std::string output_unit(const files::Network& network) {
+  return network.output_unit.empty() ? "output" : network.output_unit;
+}
+
+double slope_found(const CertifiedBound& bound) {
+  return bound.lower.witness ? bound.lower.witness->slope.value() : 0;
+}
+
+std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound) {
+  return bound < output.slope_estimates.size() ? output.slope_estimates[bound] : std::nullopt;
+}
+
+const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output, const std::string& function,
+                                                 int neighbours) {
+  for (const lipschitz::CertifiedValues& values : output.found.values)
+    if (values.function == function && values.neighbours == neighbours) return &values;
+  return nullptr;
+}
 
 std::string label(const CertifiedBound& bound) {
   return bound.function + (bound.block == "all" ? "" : " " + bound.block) +
@@ -203,117 +88,6 @@ std::vector<std::string> explain(const lipschitz::Comparison& comparison, double
                     "reaches, or slopes that the search did not find.",
                     floor / lower));
   return words;
-}
-
-namespace {
-
-/// A cell's box holds the two coordinates of the map; the others are the same for all cells.
-Json map_json(const files::Network& network, const lipschitz::SlopeMapOptions& options,
-              const lipschitz::SlopeMap& map) {
-  const auto [first, second] = options.coordinates;
-  const std::string names[] = {coordinate_name(network, first), coordinate_name(network, second)};
-  const auto interval = [](const lipschitz::Box& box, int k) {
-    return Json{box.lower[static_cast<std::size_t>(k)], box.upper[static_cast<std::size_t>(k)]};
-  };
-  Json others = Json::object(), cells = Json::array();
-  const lipschitz::Box& any = map.cells.front().box;
-  for (int k = 0; k < static_cast<int>(any.lower.size()); ++k) {
-    if (k != first && k != second) others[coordinate_name(network, k)] = interval(any, k);
-  }
-  for (const lipschitz::SlopeCell& cell : map.cells) {
-    cells.push_back({{"box", {{names[0], interval(cell.box, first)}, {names[1], interval(cell.box, second)}}},
-                     {"upper", cell.upper.value()},
-                     {"upper_method", cell.is_local ? "branch" : "everywhere"},
-                     {"lower", cell.lower.witness ? Json(cell.lower.witness->slope.value()) : Json()},
-                     {"lower_witness", witness_json(cell.lower)}});
-  }
-  return {{"function", map.function},
-          {"coordinates", names},
-          {"shape", options.cells},
-          {"others", std::move(others)},
-          {"norm", "l2"},
-          {"unit", files::unit(network, map.function)},
-          {"nodes", options.nodes},
-          {"cells", std::move(cells)}};
-}
-
-}  // namespace
-
-Json certify_json(const files::Network& network, const CertifyOutput& output) {
-  const Certification& found = output.found;
-  Json layers = Json::array();
-  for (const CertifiedLayer& layer : found.layers) {
-    Json respects;
-    if (layer.respects_gamma == Verdict::kProved) respects = true;
-    if (layer.respects_gamma == Verdict::kRefuted) respects = false;
-    layers.push_back({{"network", layer.network},
-                      {"name", layer.name},
-                      {"spectral_norm", {layer.norm.norm.lower.value(), layer.norm.norm.upper.value()}},
-                      {"respects_gamma", respects}});
-  }
-  Json bounds = Json::array();
-  for (std::size_t i = 0; i < found.bounds.size(); ++i) {
-    const CertifiedBound& bound = found.bounds[i];
-    Json json = summary(network, bound);
-    json["lower_witness"] = witness_json(bound.lower);
-    json["product_upper"] = bound.product.value();
-    json["search_rounds"] = bound.lower.rounds;
-    if (!bound.is_relu) json["lower_reason"] = kForReluOnly;
-    if (const auto estimate = slope_estimate_of(output, i)) json["slope_estimate"] = estimate->value();
-    if (bound.branch_stop != lipschitz::BranchStop::kNothingRun)
-      json["branch_stop"] = name(bound.branch_stop);
-    if (bound.nodes > 0) {
-      json["nodes"] = bound.nodes;
-      const bool has_lower = bound.lower.witness && bound.lower.witness->slope.value() > 0;
-      json["gap"] = has_lower ? Json(bound.upper.value() / bound.lower.witness->slope.value() - 1) : Json();
-      json["outlook"] = outlook_json(bound);
-    }
-    if (bound.sdp.stop != lipschitz::LipSdpStop::kNothingRun) json["sdp_stop"] = name(bound.sdp.stop);
-    if (i < output.comparisons.size() && output.comparisons[i])
-      json["comparison"] = comparison_json(bound, *output.comparisons[i]);
-    bounds.push_back(std::move(json));
-  }
-  for (const lipschitz::CertifiedLaw& law : found.laws) bounds.push_back(summary(network, law));
-  std::vector<std::string> inputs = input_files(network);
-  if (!output.domain_file.empty()) inputs.push_back(output.domain_file);
-  for (const auto& [part, agreement] : found.samples) {
-    if (std::find(inputs.begin(), inputs.end(), agreement.path) == inputs.end())
-      inputs.push_back(agreement.path);
-  }
-  Json result = result_head("certify", inputs);
-  result["seed"] = output.seed;
-  result["as"] = found.as_float32 ? Json("float32") : Json();
-  result["gamma"] = found.gamma ? Json(found.gamma->value) : Json();
-  result["max_lipschitz"] = output.max_lipschitz > 0 ? Json(output.max_lipschitz) : Json();
-  result["chain"] = chains_json(network);
-  result["chain_source"] = chain_sources_json(network);
-  result["samples"] = samples_result(found);
-  result["layers"] = std::move(layers);
-  result["bounds"] = std::move(bounds);
-  if (!output.maps.empty()) {
-    result["slope_maps"] = Json::array();
-    for (const lipschitz::SlopeMap& map : output.maps)
-      result["slope_maps"].push_back(map_json(network, output.map, map));
-  }
-  result["range"] = Json::array();
-  for (const lipschitz::CertifiedRange& range : output.ranges)
-    result["range"].push_back(range_json(network, output, range));
-  result["float32_error"] = Json::array();
-  for (const lipschitz::Float32Error& error : output.float32_errors) {
-    const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);
-    result["float32_error"].push_back(
-        {{"function", error.function},
-         {"neighbours", error.neighbours_at_most},
-         {"unit", output_unit(network)},
-         {"bound", error.total.value()},
-         {"evaluation", error.evaluation.value()},
-         {"inputs", error.inputs.value()},
-         {"arithmetic", "float32 against exact"},
-         {"bound_in_certificate", stated != nullptr ? number_or_null(stated->float32_error) : Json()}});
-  }
-  result["status"] = lipschitz::status(output.is_interrupted());
-  result["verdict"] = name(output.verdict);
-  return result;
 }
 
 namespace {
@@ -429,7 +203,7 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
              "method", method_width, "product", "witnessed", "ratio", "unit");
   for (std::size_t i = 0; i < found.bounds.size(); ++i) {
     const CertifiedBound& bound = found.bounds[i];
-    const double lower = bound.lower.witness ? bound.lower.witness->slope.value() : 0;
+    const double lower = slope_found(bound);
     fmt::print("  {:<{}}  {:>14.10g}  {:<{}}  {:>12.8g}  {:>14}  {:>6}  {}\n", label(bound), width,
                bound.upper.value(), name(bound.method), method_width, bound.product.value(),
                bound.lower.witness ? fmt::format("{:.8g}", lower) : "-",
@@ -477,7 +251,7 @@ void print_comparisons(const CertifyOutput& output) {
         shown(comparison.combettes_pesquet ? comparison.combettes_pesquet->value() : 0), bound.upper.value(),
         comparison.floor.slope.value());
     for (const std::string& sentence :
-         explain(comparison, bound.product.value(), bound.upper.value(), slope_of(bound)))
+         explain(comparison, bound.product.value(), bound.upper.value(), slope_found(bound)))
       fmt::print("  {}\n", sentence);
   }
 }

@@ -35,6 +35,24 @@ struct CertifyOutput {
   bool is_interrupted() const { return lipschitz::is_interrupted(found) || ranges_cut_short; }
 };
 
+/// Said of networks that have another activation than ReLU.
+inline constexpr char kForReluOnly[] =
+    "lower bounds and bounds on a box are for ReLU networks: of other activations upper bounds for all "
+    "inputs are proved";
+
+/// Unit of the network's outputs; "output" where NET states none.
+std::string output_unit(const files::Network& network);
+
+/// The steepest slope that was found between two points, a lower bound; 0 where none was.
+double slope_found(const lipschitz::CertifiedBound& bound);
+
+/// The sampled slope of bound number `bound` of those found; none where it was not asked for.
+std::optional<lipschitz::Estimate> slope_estimate_of(const CertifyOutput& output, std::size_t bound);
+
+/// What the certificate states of the function's values; null where it leaves them out.
+const lipschitz::CertifiedValues* in_certificate(const CertifyOutput& output, const std::string& function,
+                                                 int neighbours);
+
 /// "set:small:large", "set:small:large position scaled", "set:small:large, at most 2 small".
 std::string label(const lipschitz::CertifiedBound& bound);
 

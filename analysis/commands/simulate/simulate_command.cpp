@@ -221,6 +221,51 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
   return kDone;
 }
 
+/// Empty where a simulation may last so long.
+std::string refusal_of_duration(const std::string& seconds) {
+  if (std::strtod(seconds.c_str(), nullptr) <= kLongestFlight_s) return {};
+  return fmt::format(
+      "{} s is longer than a day ({:g} s); batteries last minutes, and the duration is in seconds", seconds,
+      kLongestFlight_s);
+}
+
+void declare_swarm(CLI::App& app, SimulateOptions& options) {
+  app.add_option("TASK", options.task, "Task to fly, see Tasks below")
+      ->type_name(fmt::format("{{{}}}", fmt::join(stability::task_names(), ",")))
+      ->required();
+  app.add_option("--vehicles", options.vehicles, "Number of vehicles")->check(CLI::Range(1, 1000));
+  app.add_option("--model", options.models, "model.toml: one for all vehicles, or one for each")->required();
+  app.add_option("--gains", options.gains, "gains.toml")->required();
+  app.add_option("--network", options.network.file, "network.toml whose prediction the controller uses");
+  app.add_option("--torque-network", options.torque_network,
+                 "network.toml made by train --quantity torque; its prediction is subtracted "
+                 "from the torque that the attitude law commands");
+  auto* phi = app.add_option("--phi", options.network.phi, "Weight file of phi, in place of --network");
+  auto* rho = app.add_option("--rho", options.network.rho, "Weight file of rho, in place of --network");
+  phi->needs(rho);
+  rho->needs(phi);
+  declare_order(app, options.network);
+}
+
+void declare_flight(CLI::App& app, SimulateOptions& options) {
+  add_output(app, "-o,--output", options.output, "Folder for the logs")->required();
+  add_output(app, "--report", options.report, "Folder for an HTML report with plots");
+  app.add_option("--duration", options.duration_s, "Seconds, at most a day (default: the task's own)")
+      ->check(CLI::PositiveNumber)
+      ->check(CLI::Validator(refusal_of_duration, ""));
+  app.add_option("--seed", options.seed, "Seed of noise, clocks and random goals (default 0)");
+  app.add_option("--run", options.run, "Number of the run in the logs' names (default 0)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--radio-latency", options.radio.latency_s,
+                 "Seconds until neighbours' positions arrive at the network (default 0)")
+      ->check(CLI::Range(0.0, 10.0));
+  app.add_option("--radio-loss", options.radio.loss,
+                 "Fraction of neighbours' positions that are lost (default 0); a neighbour that "
+                 "has not been heard for 500 ms is ignored")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_flag("--no-noise", options.no_noise, "No noise: the controller gets the true state");
+}
+
 }  // namespace
 
 Command simulate_command() {
@@ -237,51 +282,8 @@ Command simulate_command() {
               "      --gains controller/gains/crazyflie-small.toml -o flights",
           [](CLI::App& app) {
             auto options = std::make_shared<SimulateOptions>();
-            app.add_option("TASK", options->task, "Task to fly, see Tasks below")
-                ->type_name(fmt::format("{{{}}}", fmt::join(stability::task_names(), ",")))
-                ->required();
-            app.add_option("--vehicles", options->vehicles, "Number of vehicles")->check(CLI::Range(1, 1000));
-            app.add_option("--model", options->models, "model.toml: one for all vehicles, or one for each")
-                ->required();
-            app.add_option("--gains", options->gains, "gains.toml")->required();
-            app.add_option("--network", options->network.file,
-                           "network.toml whose prediction the controller uses");
-            app.add_option("--torque-network", options->torque_network,
-                           "network.toml made by train --quantity torque; its prediction is subtracted "
-                           "from the torque that the attitude law commands");
-            auto* phi =
-                app.add_option("--phi", options->network.phi, "Weight file of phi, in place of --network");
-            auto* rho =
-                app.add_option("--rho", options->network.rho, "Weight file of rho, in place of --network");
-            phi->needs(rho);
-            rho->needs(phi);
-            declare_order(app, options->network);
-            add_output(app, "-o,--output", options->output, "Folder for the logs")->required();
-            add_output(app, "--report", options->report, "Folder for an HTML report with plots");
-            app.add_option("--duration", options->duration_s,
-                           "Seconds, at most a day (default: the task's own)")
-                ->check(CLI::PositiveNumber)
-                ->check(CLI::Validator(
-                    [](const std::string& text) {
-                      return std::strtod(text.c_str(), nullptr) <= kLongestFlight_s
-                                 ? std::string()
-                                 : fmt::format(
-                                       "{} s is longer than a day ({:g} s); batteries last minutes, and "
-                                       "the duration is in seconds",
-                                       text, kLongestFlight_s);
-                    },
-                    ""));
-            app.add_option("--seed", options->seed, "Seed of noise, clocks and random goals (default 0)");
-            app.add_option("--run", options->run, "Number of the run in the logs' names (default 0)")
-                ->check(CLI::NonNegativeNumber);
-            app.add_option("--radio-latency", options->radio.latency_s,
-                           "Seconds until neighbours' positions arrive at the network (default 0)")
-                ->check(CLI::Range(0.0, 10.0));
-            app.add_option("--radio-loss", options->radio.loss,
-                           "Fraction of neighbours' positions that are lost (default 0); a neighbour that "
-                           "has not been heard for 500 ms is ignored")
-                ->check(CLI::Range(0.0, 1.0));
-            app.add_flag("--no-noise", options->no_noise, "No noise: the controller gets the true state");
+            declare_swarm(app, *options);
+            declare_flight(app, *options);
             return [options](const CommonOptions& common) { return run_simulate(*options, common); };
           }};
 }

@@ -12,7 +12,8 @@
 #include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
-#include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/train/train_options.h"
+#include "analysis/commands/train/train_output.h"
 #include "analysis/commands/train/train_report.h"
 #include "analysis/learning/output_scale.h"
 #include "analysis/learning/trained_network.h"
@@ -32,26 +33,6 @@ const std::map<std::string, learning::Target> kTargets = {{"force_z", learning::
 const std::map<std::string, learning::SplitBy> kSplits = {{"auto", learning::SplitBy::kAuto},
                                                           {"flights", learning::SplitBy::kFlights},
                                                           {"blocks", learning::SplitBy::kBlocks}};
-
-struct TrainOptions {
-  FlightOptions flights;
-  std::vector<std::string> select, test;
-  std::string output, report, quantity = "force_z", split = "auto";
-  learning::NetworkSizes sizes;
-  learning::RunOptions run;
-  std::string gamma_scope = "layer", gamma_mode = "clip";
-  std::string weights = "errors", symmetry = "vertical";
-  bool no_ground = false, allow_worse = false;
-  int teachers = 0;
-};
-
-/// Root mean square errors in the unit of the targets.
-struct Scores {
-  double nothing = 0, network = 0;
-
-  /// Beyond what the order of two sums of float32 products can change.
-  bool worse_than_none() const { return network > nothing * (1 + 1e-6); }
-};
 
 std::map<std::string, Scores> scores_by_composition(const LearningData& data, const training::Vector& theta,
                                                     Use use, int jobs) {
@@ -87,159 +68,6 @@ std::vector<Scores> scores_by_component(const LearningData& data, const training
                       std::sqrt(network[c] / static_cast<double>(samples.size()))});
   }
   return result;
-}
-
-files::Json number_or_null(double x) { return std::isfinite(x) ? files::Json(x) : files::Json(); }
-
-struct Outcome {
-  learning::TaughtRun trained;
-  Scores all;
-  std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
-  std::map<std::string, Scores> compositions;
-  Scores select;  ///< of the flights that decide whether there is to be a network
-  std::map<std::string, Scores> select_compositions;
-  std::map<std::string, double> scales;  ///< of each kind's output, see learning::output_scales()
-  learning::Certified certified;
-
-  /// A network that is worse than none on the selecting flights is not kept.
-  bool kept() const {
-    const bool silent = !scales.empty() && std::all_of(scales.begin(), scales.end(),
-                                                       [](const auto& scale) { return scale.second == 0; });
-    return !silent && !(select.network >= select.nothing);
-  }
-};
-
-files::Json result_of(const TrainOptions& options, const std::vector<std::string>& inputs,
-                      const LearningData& data, const Outcome& outcome) {
-  files::Json json = result_head("train", inputs);
-  json["seed"] = options.run.trainer.seed;
-  json["gamma"] = options.run.trainer.gamma.value;
-  json["max_lipschitz"] =
-      options.run.max_lipschitz > 0 ? files::Json(options.run.max_lipschitz) : files::Json();
-  json["samples"] = {{"fit", data.indices(Use::kFit).size()},
-                     {"select", data.indices(Use::kSelect).size()},
-                     {"test", data.indices(Use::kTest).size()}};
-  const learning::TargetInfo& target = learning::info(data.target);
-  const double SI = target.SI_per_unit;
-  json["quantity"] = target.quantity;
-  json["split"] = data.split_by_blocks ? "blocks" : "flights";
-  json["test_rmse"] = number_or_null(outcome.all.network * SI);
-  json["test_rmse_" + std::string(target.unit)] = number_or_null(outcome.all.network);
-  json["test_rmse_of_nothing"] = number_or_null(outcome.all.nothing * SI);
-  for (std::size_t c = 0; c < outcome.components.size(); ++c) {
-    const std::string axis(1, "xyz"[c]);
-    json["test_rmse_axes"][axis] = number_or_null(outcome.components[c].network * SI);
-    json["test_rmse_of_nothing_axes"][axis] = number_or_null(outcome.components[c].nothing * SI);
-  }
-  json["test"] = files::Json::array();
-  for (const auto& [composition, scores] : outcome.compositions) {
-    json["test"].push_back(
-        {{"vehicles", composition}, {"rmse", scores.network * SI}, {"rmse_of_nothing", scores.nothing * SI}});
-  }
-  json["kept"] = outcome.kept();
-  json["output_scales"] = outcome.scales;
-  json["select_rmse"] = number_or_null(outcome.select.network * SI);
-  json["select_rmse_of_nothing"] = number_or_null(outcome.select.nothing * SI);
-  json["select"] = files::Json::array();
-  for (const auto& [composition, scores] : outcome.select_compositions) {
-    json["select"].push_back({{"vehicles", composition},
-                              {"rmse", scores.network * SI},
-                              {"rmse_of_nothing", scores.nothing * SI},
-                              {"worse_than_none", scores.worse_than_none()}});
-  }
-  json["bounds"] = files::Json::array();
-  for (const auto& [function, upper] : outcome.certified.set_bounds)
-    json["bounds"].push_back({{"function", function},
-                              {"upper", upper},
-                              {"unit", fmt::format("{} per unit of input", target.unit)}});
-  json["lipschitz"] = outcome.certified.largest();
-  json["gamma_verdict"] = name(outcome.certified.gamma);
-  json["teachers"] = files::Json::array();
-  const learning::TaughtRun& trained = outcome.trained;
-  const auto json_of = [&target](const learning::Score& score) {
-    return files::Json{{"seed", score.seed},
-                       {"best_epoch", score.best_epoch + 1},
-                       {fmt::format("select_rmse_{}", target.unit), score.select_rmse}};
-  };
-  for (std::size_t i = 0; i + 1 < trained.scores.size(); ++i)
-    json["teachers"].push_back(json_of(trained.scores[i]));
-  json["taught"] = trained.scores.size() > 1 ? json_of(trained.scores.back()) : files::Json();
-  json["kept_seed"] = trained.kept_score().seed;
-  json["best_epoch"] = trained.run.best_epoch + 1;
-  json["epochs"] = files::Json::array();
-  for (const learning::Epoch& epoch : trained.run.epochs)
-    json["epochs"].push_back({{fmt::format("fit_rmse_{}", target.unit), epoch.fit_rmse},
-                              {fmt::format("select_rmse_{}", target.unit), epoch.select_rmse}});
-  json["problems"] = data.problems;
-  return json;
-}
-
-/// Where the selecting flights are better off without the network.
-void print_worse_than_none(const Outcome& outcome, const std::string& unit) {
-  if (!outcome.kept()) {
-    fmt::print(
-        "no network is kept: on the selecting flights it leaves {:.3f} {}, none {:.3f}; the models written "
-        "are "
-        "without it\n",
-        outcome.select.network, unit, outcome.select.nothing);
-  }
-  for (const auto& [composition, scores] : outcome.select_compositions) {
-    if (!scores.worse_than_none()) continue;
-    fmt::print("warning: worse than none for {}: {:.3f} {} on the selecting flights, {:.3f} without\n",
-               composition, scores.network, unit, scores.nothing);
-  }
-}
-
-void print(const TrainOptions& options, const LearningData& data, const Outcome& outcome) {
-  std::map<std::string, int> flights[3];
-  for (const learning::TrackSamples& track : data.tracks)
-    ++flights[static_cast<int>(track.use)][track.flight];
-  fmt::print("{} samples: {} to fit ({} flights), {} to select ({}), {} to test ({})\n",
-             data.samples.samples(), data.indices(Use::kFit).size(), flights[0].size(),
-             data.indices(Use::kSelect).size(), flights[1].size(), data.indices(Use::kTest).size(),
-             flights[2].size());
-  if (data.split_by_blocks)
-    fmt::print("blocks of the flights that are fitted select or test: these errors look too good\n");
-  const learning::TargetInfo& target = learning::info(data.target);
-  const learning::TaughtRun& trained = outcome.trained;
-  for (std::size_t i = 0; i < trained.scores.size() && trained.scores.size() > 1; ++i) {
-    const learning::Score& score = trained.scores[i];
-    fmt::print("{} of seed {}: {:.3f} {} on the selecting flights{}\n",
-               i + 1 < trained.scores.size() ? "teacher" : "taught", score.seed, score.select_rmse,
-               target.unit, i == trained.kept ? ", kept" : "");
-  }
-  fmt::print("best of {} epochs: {}\n\n", trained.run.epochs.size(), trained.run.best_epoch + 1);
-  fmt::print("{:<34}{:>18}{:>18}\n", fmt::format("{} on test flights", target.words),
-             fmt::format("no network [{}]", target.unit), fmt::format("network [{}]", target.unit));
-  for (const auto& [composition, scores] : outcome.compositions)
-    fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", composition, scores.nothing, scores.network);
-  fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", "all", outcome.all.nothing, outcome.all.network);
-  for (std::size_t c = 0; c < outcome.components.size(); ++c) {
-    fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", fmt::format("all, along {}", "xyz"[c]),
-               outcome.components[c].nothing, outcome.components[c].network);
-  }
-  fmt::print("\n");
-  for (const auto& [function, upper] : outcome.certified.set_bounds)
-    fmt::print("Lipschitz constant of {}: at most {:.8g} {} per unit of input, proved\n", function, upper,
-               target.unit);
-  fmt::print("gamma {} in every {}: {}\n", options.run.trainer.gamma.value, options.gamma_scope,
-             name(outcome.certified.gamma));
-  if (options.run.max_lipschitz > 0)
-    fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
-               outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
-  for (const auto& [kind, scale] : outcome.scales) {
-    if (scale == 0) {
-      fmt::print("no network for {}: the selecting flights have a composition that is better off without\n",
-                 kind);
-    } else if (scale < 1) {
-      fmt::print(
-          "output for {} scaled by {:.3f}: no composition of the selecting flights is worse than without\n",
-          kind, scale);
-    }
-  }
-  for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
-  print_worse_than_none(outcome, target.unit);
-  fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
 }
 
 /// A run that was killed before its first epoch ended left nothing: --resume then begins, so that a job that is
@@ -372,9 +200,9 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   learning::write_models(inputs, data.layout, options.output, outcome.kept());
   certify_and_score(options, common.jobs, data, network, outcome);
 
-  const files::Json result = result_of(options, files_of(flights), data, outcome);
+  const files::Json result = train_json(options, files_of(flights), data, outcome);
   write_result(common, result);
-  if (common.prints_text()) print(options, data, outcome);
+  if (common.prints_text()) print_training(options, data, outcome);
   if (!options.report.empty()) {
     const std::string path = write_train_report(data, run, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
@@ -399,95 +227,7 @@ Command train_command() {
       "Example: swarmcert train flights/ --epochs 20 -o trained",
       [](CLI::App& app) {
         const auto options = std::make_shared<TrainOptions>();
-        training::TrainerOptions& trainer = options->run.trainer;
-        trainer.gamma.value = 3;
-        declare_flights(app, options->flights, true);
-        add_output(app, "-o,--output", options->output, "Folder for networks, certificate and models")
-            ->required();
-        app.add_option("--quantity", options->quantity,
-                       "force_z, force (x, y, z) or torque (x, y, z; needs logs of at least 400 Hz)")
-            ->check(CLI::IsMember({"force_z", "force", "torque"}))
-            ->capture_default_str();
-        app.add_option("--test", options->test, "Flights that only test; without it every fifth flight does");
-        app.add_option("--select", options->select,
-                       "Flights that only decide when training ends; without it every fifth flight does");
-        app.add_option("--split", options->split,
-                       "How FLIGHTS are held back where --select or --test name none: whole flights, or "
-                       "blocks of 2 s of each (auto: blocks where there are too few flights)")
-            ->check(CLI::IsMember({"auto", "flights", "blocks"}))
-            ->capture_default_str();
-        app.add_option("--gamma", trainer.gamma.value, "Limit of the spectral norms")
-            ->check(CLI::PositiveNumber)
-            ->capture_default_str();
-        app.add_option("--gamma-scope", options->gamma_scope,
-                       "Whether gamma limits every layer's norm, or the product over a network's layers")
-            ->check(CLI::IsMember({"layer", "network"}))
-            ->capture_default_str();
-        app.add_option("--gamma-mode", options->gamma_mode,
-                       "clip: at most the limit; equal: always the limit")
-            ->check(CLI::IsMember({"clip", "equal"}))
-            ->capture_default_str();
-        app.add_option("--max-lipschitz", options->run.max_lipschitz,
-                       "Limit of the joint Lipschitz bounds in gf (torque: mN m) per unit of input, proved; "
-                       "layers that reach it "
-                       "are clipped below gamma")
-            ->check(CLI::PositiveNumber);
-        app.add_option("--weights", options->weights,
-                       "Scenarios and the compositions of kinds in them count the same (scenarios), or the "
-                       "same relative "
-                       "to their own errors (errors)")
-            ->check(CLI::IsMember({"scenarios", "errors"}))
-            ->capture_default_str();
-        app.add_option("--symmetry", options->symmetry,
-                       "vertical: every epoch turns every sample about the vertical and mirrors it, its "
-                       "force or torque "
-                       "included; none: samples as recorded")
-            ->check(CLI::IsMember({"vertical", "none"}))
-            ->capture_default_str();
-        app.add_option("--phi", options->sizes.phi, "Hidden layers of phi")
-            ->delimiter(',')
-            ->check(CLI::Range(1, 4096))
-            ->capture_default_str();
-        app.add_option("--rho", options->sizes.rho, "Hidden layers of rho")
-            ->delimiter(',')
-            ->check(CLI::Range(1, 4096))
-            ->capture_default_str();
-        app.add_option("--features", options->sizes.features, "Width between phi and rho")
-            ->check(CLI::Range(1, 4096))
-            ->capture_default_str();
-        app.add_flag("--no-ground", options->no_ground, "Leave out the phi of the own state");
-        app.add_flag("--allow-worse", options->allow_worse,
-                     "Keep each kind's output as trained; without it, outputs are scaled down until no "
-                     "composition of the selecting flights is worse than without the network (not with "
-                     "--gamma-mode equal)");
-        app.add_option("--epochs", options->run.epochs, "Maximum number of epochs")
-            ->check(CLI::Range(1, 100000))
-            ->capture_default_str();
-        app.add_option("--patience", options->run.patience,
-                       "Epochs without improvement after which training stops")
-            ->check(CLI::Range(1, 100000))
-            ->capture_default_str();
-        app.add_option("--rate", trainer.learning_rate, "Initial learning rate")
-            ->check(CLI::PositiveNumber)
-            ->capture_default_str();
-        app.add_option("--batch", trainer.batch, "Samples per step")
-            ->check(CLI::Range(1, 1 << 20))
-            ->capture_default_str();
-        app.add_option("--seed", trainer.seed, "Seed of the initial weights and of the sample order")
-            ->capture_default_str();
-        app.add_option("--teachers", options->teachers,
-                       "First train this many networks, with the seeds after --seed, then train one network "
-                       "on their averaged predictions (distillation); the one with the smallest error on the "
-                       "selecting flights is written")
-            ->check(CLI::Range(0, 1000))
-            ->capture_default_str();
-        leave_out_of_record(app.add_flag("--resume", options->run.resumes,
-                                         "Go on with an interrupted run in the same folder"));
-        app.add_flag("--published-filter", options->flights.published_filter,
-                     "Cut and filter as the networks' authors did, see compare");
-        app.add_flag("--published-signals", options->flights.published_signals,
-                     "Only the thrust lag, masses and unfiltered accelerometer of --published-filter");
-        add_output(app, "--report", options->report, "Write an HTML report into this folder");
+        declare_train_options(app, *options);
         return [options](const CommonOptions& common) { return run_train(*options, common); };
       }};
 }

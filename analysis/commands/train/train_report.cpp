@@ -8,6 +8,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
+#include "nn/weights/function_names.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -83,7 +84,7 @@ void add_map(Report& report, const LearningData& data, const learning::Run& run,
     for (int j = 0; j < kSteps; ++j) {
       const float x = -0.5f + static_cast<float>(i) / (kSteps - 1);
       const float z = -0.3f + 1.2f * static_cast<float>(j) / (kSteps - 1);
-      const int ground = data.layout.find("phi:ground");
+      const int ground = data.layout.find(files::kGroundPhi);
       if (ground >= 0) grid.add_input(ground, {-0.6f, 0, 0, 0});
       grid.add_input(phi, {x, 0, z, 0, 0, 0});
       grid.add_sample(rho, std::vector<float>(static_cast<std::size_t>(grid.outputs), 0.0f));
@@ -139,10 +140,10 @@ std::string write_train_report(const LearningData& data, const learning::Run& ru
   if (data.target == learning::Target::kTorque) in_plane = {1};
   const std::vector<training::Part>& parts = data.layout.parts();
   for (std::size_t phi = 0; phi < parts.size(); ++phi) {
-    if (parts[phi].name.rfind("phi:", 0) != 0 || parts[phi].name == "phi:ground") continue;
+    if (!files::is_phi(parts[phi].name) || parts[phi].name == files::kGroundPhi) continue;
     for (std::size_t rho = 0; rho < parts.size(); ++rho) {
-      if (parts[rho].name.rfind("rho:", 0) != 0) continue;
-      if (result["output_scales"].value(parts[rho].name.substr(4), 1.0) == 0) continue;
+      if (!files::is_rho(parts[rho].name)) continue;
+      if (result["output_scales"].value(files::kind_of(parts[rho].name), 1.0) == 0) continue;
       for (const int c : in_plane)
         add_map(report, data, run, static_cast<int>(phi), static_cast<int>(rho), c);
     }

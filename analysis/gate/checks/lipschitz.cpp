@@ -9,6 +9,7 @@
 #include "lipschitz/box.h"
 #include "nn/base/json.h"
 #include "nn/base/toml.h"
+#include "nn/weights/function_names.h"
 
 namespace swarmcert::gate {
 namespace {
@@ -19,8 +20,6 @@ struct WantedBound {
   std::string block;
   Limit limit;
 };
-
-bool is_whole(const std::string& function) { return function == "network" || function.rfind("set:", 0) == 0; }
 
 /// Whether the box of the certificate, on which its bounds hold, contains that of the release.
 void require_certified_box(Evidence& evidence) {
@@ -43,7 +42,8 @@ void judge_bounds(Evidence& evidence, const WantedBound& wanted, bool on_box, Ch
   double upper = -1, lower = -1;
   for (const LipschitzBound& bound : evidence.bounds()) {
     if (bound.block != wanted.block || (bound.domain != "global" && !on_box)) continue;
-    if (wanted.function.empty() ? !is_whole(bound.function) : bound.function != wanted.function) continue;
+    if (wanted.function.empty() ? !files::is_whole(bound.function) : bound.function != wanted.function)
+      continue;
     const double scale = wanted.limit.unit_N > 0 ? force_scale(evidence, wanted.limit) : 1;
     if (bound.lower) lower = std::max(lower, round_down(*bound.lower * scale));
     const double scaled = scale == 1 ? bound.upper : round_up(bound.upper * scale);

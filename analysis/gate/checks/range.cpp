@@ -7,6 +7,7 @@
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/force_unit.h"
 #include "nn/base/toml.h"
+#include "nn/weights/function_names.h"
 
 namespace swarmcert::gate {
 namespace {
@@ -94,7 +95,7 @@ Run read_range(const files::TomlTable& table, Policy& policy) {
     options.jobs = evidence.settings().jobs;
     std::map<std::string, double> rho;
     for (const auto& [function, bound] : evidence.global_bounds())
-      if (function.rfind("rho:", 0) == 0) rho[function.substr(4)] = bound;
+      if (files::is_rho(function)) rho[files::kind_of(function)] = bound;
     const auto ranges = lipschitz::ranges(evidence.flown(), evidence.domain(), rho, options);
     for (const WantedRange& wanted : all) judge_range(evidence, wanted, ranges, checks);
   };

@@ -86,7 +86,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
     if (name != files::kGroundKind) kinds.push_back(name);
   const std::string phi = network.phi.count(kind) == 1 ? kind : kinds.front();
   const std::string rho = network.rho.count(kind) == 1 ? kind : network.rho.begin()->first;
-  neighbour_function_ = "set:" + phi + ":" + rho;
+  neighbour_function_ = files::set_name(phi, rho);
   newton_per_unit_ = network.output_unit == "N" ? 1 : stability::kGramForce_N;
   const int inputs = network.phi.at(phi).inputs();
   for (int i = 0; i < inputs; ++i) {
@@ -105,7 +105,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   std::vector<ReachNetwork> parts(static_cast<std::size_t>(neighbours), one);
   const auto ground = network.phi.find(files::kGroundKind);
   if (ground != network.phi.end()) {
-    ground_function_ = std::string("set:") + files::kGroundKind + ":" + rho;
+    ground_function_ = files::set_name(files::kGroundKind, rho);
     parts.push_back(lipschitz::reach_network(ground->second));
     parts.back().front().weights *= -1;  // it sees -z and -v
   }

@@ -1,0 +1,164 @@
+#include "analysis/commands/train/train_output.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "analysis/cli/command.h"
+
+namespace swarmcert::analysis {
+
+using learning::LearningData;
+using learning::Use;
+
+namespace {
+
+files::Json number_or_null(double x) { return std::isfinite(x) ? files::Json(x) : files::Json(); }
+
+void add_selection(const Outcome& outcome, double SI, files::Json& json) {
+  json["kept"] = outcome.kept();
+  json["output_scales"] = outcome.scales;
+  json["select_rmse"] = number_or_null(outcome.select.network * SI);
+  json["select_rmse_of_nothing"] = number_or_null(outcome.select.nothing * SI);
+  json["select"] = files::Json::array();
+  for (const auto& [composition, scores] : outcome.select_compositions) {
+    json["select"].push_back({{"vehicles", composition},
+                              {"rmse", scores.network * SI},
+                              {"rmse_of_nothing", scores.nothing * SI},
+                              {"worse_than_none", scores.worse_than_none()}});
+  }
+}
+
+void add_runs(const learning::TaughtRun& trained, const std::string& unit, files::Json& json) {
+  json["teachers"] = files::Json::array();
+  const auto json_of = [&unit](const learning::Score& score) {
+    return files::Json{{"seed", score.seed},
+                       {"best_epoch", score.best_epoch + 1},
+                       {fmt::format("select_rmse_{}", unit), score.select_rmse}};
+  };
+  for (std::size_t i = 0; i + 1 < trained.scores.size(); ++i)
+    json["teachers"].push_back(json_of(trained.scores[i]));
+  json["taught"] = trained.scores.size() > 1 ? json_of(trained.scores.back()) : files::Json();
+  json["kept_seed"] = trained.kept_score().seed;
+  json["best_epoch"] = trained.run.best_epoch + 1;
+  json["epochs"] = files::Json::array();
+  for (const learning::Epoch& epoch : trained.run.epochs)
+    json["epochs"].push_back({{fmt::format("fit_rmse_{}", unit), epoch.fit_rmse},
+                              {fmt::format("select_rmse_{}", unit), epoch.select_rmse}});
+}
+
+}  // namespace
+
+files::Json train_json(const TrainOptions& options, const std::vector<std::string>& inputs,
+                       const LearningData& data, const Outcome& outcome) {
+  files::Json json = result_head("train", inputs);
+  json["seed"] = options.run.trainer.seed;
+  json["gamma"] = options.run.trainer.gamma.value;
+  json["max_lipschitz"] =
+      options.run.max_lipschitz > 0 ? files::Json(options.run.max_lipschitz) : files::Json();
+  json["samples"] = {{"fit", data.indices(Use::kFit).size()},
+                     {"select", data.indices(Use::kSelect).size()},
+                     {"test", data.indices(Use::kTest).size()}};
+  const learning::TargetInfo& target = learning::info(data.target);
+  const double SI = target.SI_per_unit;
+  json["quantity"] = target.quantity;
+  json["split"] = data.split_by_blocks ? "blocks" : "flights";
+  json["test_rmse"] = number_or_null(outcome.all.network * SI);
+  json["test_rmse_" + std::string(target.unit)] = number_or_null(outcome.all.network);
+  json["test_rmse_of_nothing"] = number_or_null(outcome.all.nothing * SI);
+  for (std::size_t c = 0; c < outcome.components.size(); ++c) {
+    const std::string axis(1, "xyz"[c]);
+    json["test_rmse_axes"][axis] = number_or_null(outcome.components[c].network * SI);
+    json["test_rmse_of_nothing_axes"][axis] = number_or_null(outcome.components[c].nothing * SI);
+  }
+  json["test"] = files::Json::array();
+  for (const auto& [composition, scores] : outcome.compositions) {
+    json["test"].push_back(
+        {{"vehicles", composition}, {"rmse", scores.network * SI}, {"rmse_of_nothing", scores.nothing * SI}});
+  }
+  add_selection(outcome, SI, json);
+  json["bounds"] = files::Json::array();
+  for (const auto& [function, upper] : outcome.certified.set_bounds)
+    json["bounds"].push_back({{"function", function},
+                              {"upper", upper},
+                              {"unit", fmt::format("{} per unit of input", target.unit)}});
+  json["lipschitz"] = outcome.certified.largest();
+  json["gamma_verdict"] = name(outcome.certified.gamma);
+  add_runs(outcome.trained, target.unit, json);
+  json["problems"] = data.problems;
+  return json;
+}
+
+namespace {
+
+/// Where the selecting flights are better off without the network.
+void print_worse_than_none(const Outcome& outcome, const std::string& unit) {
+  if (!outcome.kept()) {
+    fmt::print(
+        "no network is kept: on the selecting flights it leaves {:.3f} {}, none {:.3f}; the models written "
+        "are "
+        "without it\n",
+        outcome.select.network, unit, outcome.select.nothing);
+  }
+  for (const auto& [composition, scores] : outcome.select_compositions) {
+    if (!scores.worse_than_none()) continue;
+    fmt::print("warning: worse than none for {}: {:.3f} {} on the selecting flights, {:.3f} without\n",
+               composition, scores.network, unit, scores.nothing);
+  }
+}
+
+}  // namespace
+
+void print_training(const TrainOptions& options, const LearningData& data, const Outcome& outcome) {
+  std::map<std::string, int> flights[3];
+  for (const learning::TrackSamples& track : data.tracks)
+    ++flights[static_cast<int>(track.use)][track.flight];
+  fmt::print("{} samples: {} to fit ({} flights), {} to select ({}), {} to test ({})\n",
+             data.samples.samples(), data.indices(Use::kFit).size(), flights[0].size(),
+             data.indices(Use::kSelect).size(), flights[1].size(), data.indices(Use::kTest).size(),
+             flights[2].size());
+  if (data.split_by_blocks)
+    fmt::print("blocks of the flights that are fitted select or test: these errors look too good\n");
+  const learning::TargetInfo& target = learning::info(data.target);
+  const learning::TaughtRun& trained = outcome.trained;
+  for (std::size_t i = 0; i < trained.scores.size() && trained.scores.size() > 1; ++i) {
+    const learning::Score& score = trained.scores[i];
+    fmt::print("{} of seed {}: {:.3f} {} on the selecting flights{}\n",
+               i + 1 < trained.scores.size() ? "teacher" : "taught", score.seed, score.select_rmse,
+               target.unit, i == trained.kept ? ", kept" : "");
+  }
+  fmt::print("best of {} epochs: {}\n\n", trained.run.epochs.size(), trained.run.best_epoch + 1);
+  fmt::print("{:<34}{:>18}{:>18}\n", fmt::format("{} on test flights", target.words),
+             fmt::format("no network [{}]", target.unit), fmt::format("network [{}]", target.unit));
+  for (const auto& [composition, scores] : outcome.compositions)
+    fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", composition, scores.nothing, scores.network);
+  fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", "all", outcome.all.nothing, outcome.all.network);
+  for (std::size_t c = 0; c < outcome.components.size(); ++c) {
+    fmt::print("{:<34}{:>18.3f}{:>18.3f}\n", fmt::format("all, along {}", "xyz"[c]),
+               outcome.components[c].nothing, outcome.components[c].network);
+  }
+  fmt::print("\n");
+  for (const auto& [function, upper] : outcome.certified.set_bounds)
+    fmt::print("Lipschitz constant of {}: at most {:.8g} {} per unit of input, proved\n", function, upper,
+               target.unit);
+  fmt::print("gamma {} in every {}: {}\n", options.run.trainer.gamma.value, options.gamma_scope,
+             name(outcome.certified.gamma));
+  if (options.run.max_lipschitz > 0)
+    fmt::print("Lipschitz constants at most {}: {}\n", options.run.max_lipschitz,
+               outcome.certified.largest() <= options.run.max_lipschitz ? "proved" : "inconclusive");
+  for (const auto& [kind, scale] : outcome.scales) {
+    if (scale == 0) {
+      fmt::print("no network for {}: the selecting flights have a composition that is better off without\n",
+                 kind);
+    } else if (scale < 1) {
+      fmt::print(
+          "output for {} scaled by {:.3f}: no composition of the selecting flights is worse than without\n",
+          kind, scale);
+    }
+  }
+  for (const std::string& problem : data.problems) fmt::print("left out: {}\n", problem);
+  print_worse_than_none(outcome, target.unit);
+  fmt::print("written: {}/network.toml, weights, certificate.json, models\n", options.output);
+}
+
+}  // namespace swarmcert::analysis

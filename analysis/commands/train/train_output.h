@@ -1,0 +1,49 @@
+/// @file What `train` found, as text and as JSON.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "analysis/commands/train/train_options.h"
+#include "analysis/learning/dataset.h"
+#include "analysis/learning/trained_network.h"
+#include "analysis/learning/training_run.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// Root mean square errors in the unit of the targets.
+struct Scores {
+  double nothing = 0, network = 0;
+
+  /// Beyond what the order of two sums of float32 products can change.
+  bool worse_than_none() const { return network > nothing * (1 + 1e-6); }
+};
+
+struct Outcome {
+  learning::TaughtRun trained;
+  Scores all;
+  std::vector<Scores> components;  ///< x, y, z; empty where the target is one number
+  std::map<std::string, Scores> compositions;
+  Scores select;  ///< of the flights that decide whether there is to be a network
+  std::map<std::string, Scores> select_compositions;
+  std::map<std::string, double> scales;  ///< of each kind's output, see learning::output_scales()
+  learning::Certified certified;
+
+  /// A network that is worse than none on the selecting flights is not kept.
+  bool kept() const {
+    const bool silent = !scales.empty() && std::all_of(scales.begin(), scales.end(),
+                                                       [](const auto& scale) { return scale.second == 0; });
+    return !silent && !(select.network >= select.nothing);
+  }
+};
+
+/// The fields of the schema swarmcert/train/1.
+files::Json train_json(const TrainOptions& options, const std::vector<std::string>& inputs,
+                       const learning::LearningData& data, const Outcome& outcome);
+
+void print_training(const TrainOptions& options, const learning::LearningData& data, const Outcome& outcome);
+
+}  // namespace swarmcert::analysis
