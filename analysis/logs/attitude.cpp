@@ -235,6 +235,7 @@ void settle_attitude(Draft& draft) {
     draft.add_measured("attitude", kPackedAttitude);
   } else if (quaternion != nullptr && t.has_group(kAttitude, 4)) {
     settle_order(draft);
+    if (draft.has_forward_right_down) t.turn_half_about_x(kAttitude);
     draft.log.signals.attitude = true;
     draft.add_measured("attitude", kAttitude);
   } else if (t.has_group(kEuler, 2)) {

@@ -23,8 +23,10 @@ double seconds_per_unit(const std::vector<double>& clock) {
 
 int clock_by_name(const RawTopic& topic) {
   for (const char* const name :
-       {"t", "time", "timestamp", "time.s", "time.ms", "time.us", "t.s", "t.ms", "sec", "secs", "seconds",
-        "stamp", "header.stamp", "time.sec", "rosbag.timestamp"}) {
+       {"t",       "time",        "timestamp",    "time.s",       "time.ms",      "time.us",
+        "time.ns", "timestamp.s", "timestamp.ms", "timestamp.us", "timestamp.ns", "t.s",
+        "t.ms",    "t.us",        "t.ns",         "date.time",    "datetime",     "sec",
+        "secs",    "seconds",     "stamp",        "header.stamp", "time.sec",     "rosbag.timestamp"}) {
     for (std::size_t c = 0; c < topic.columns.size(); ++c) {
       if (plain_name(topic.columns[c].name) == name) return static_cast<int>(c);
     }

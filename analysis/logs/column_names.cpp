@@ -117,6 +117,22 @@ void add_generic(Table& t) {
   for (const char* group :
        {"velocity.#", "vel.#", "v#", "v.#", "vel#", "velocity#", "linear.velocity.#", "d#", "#dot"})
     t.push_back({kVelocity, axes(group), "m/s"});
+  const std::vector<std::string> ned = {"north", "east", "down"}, n_e_d = {"n", "e", "d"};
+  const std::vector<std::string> enu = {"east", "north", "up"}, e_n_u = {"e", "n", "u"};
+  for (const char* group : {"#", "pos.#", "position.#"}) {
+    t.push_back({kPosition, each(group, ned), "m", 1, 1, Ask::kNorthEastDown});
+    t.push_back({kPosition, each(group, enu), "m", 1, 1, Ask::kEastNorthUp});
+  }
+  for (const char* group : {"p#", "pos.#"})
+    t.push_back({kPosition, each(group, n_e_d), "m", 1, 1, Ask::kNorthEastDown});
+  for (const char* group : {"v.#", "vel.#", "velocity.#"}) {
+    t.push_back({kVelocity, each(group, ned), "m/s", 1, 1, Ask::kNorthEastDown});
+    t.push_back({kVelocity, each(group, enu), "m/s", 1, 1, Ask::kEastNorthUp});
+  }
+  for (const char* group : {"v#", "vel.#"}) {
+    t.push_back({kVelocity, each(group, n_e_d), "m/s", 1, 1, Ask::kNorthEastDown});
+    t.push_back({kVelocity, each(group, e_n_u), "m/s", 1, 1, Ask::kEastNorthUp});
+  }
   for (const char* group : {"twist.linear.#", "twist.twist.linear.#"})
     t.push_back({kVelocity, axes(group), "m/s", 1, 1, Ask::kVelocityFrame});
   for (const char* group : {"imu.acc.#", "accel.#", "accelerometer.#", "imu.linear.acceleration.#", "acc#",

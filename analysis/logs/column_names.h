@@ -14,13 +14,15 @@ namespace swarmcert::logs {
 /// What is still to be decided from the data where names do not say it.
 enum class Ask {
   kNothing,
-  kAcceleration,  ///< unit, frame, and whether gravity is in it
-  kAngles,        ///< degrees or radians, and the signs
-  kLegacyPitch,   ///< nothing: the second component has the opposite sign of the rotation about y
-  kRates,         ///< degrees or radians per second
-  kQuaternion,    ///< x, y, z, w or w, x, y, z
-  kMotors,        ///< requested thrust or applied duty; scale
-  kVelocityFrame  ///< along the axes of the world or of the body
+  kAcceleration,   ///< unit, frame, and whether gravity is in it
+  kAngles,         ///< degrees or radians, and the signs
+  kLegacyPitch,    ///< nothing: the second component has the opposite sign of the rotation about y
+  kRates,          ///< degrees or radians per second
+  kQuaternion,     ///< x, y, z, w or w, x, y, z
+  kMotors,         ///< requested thrust or applied duty; scale
+  kVelocityFrame,  ///< along the axes of the world or of the body
+  kNorthEastDown,  ///< nothing: north, east, down, beside which body axes are forward, right, down
+  kEastNorthUp     ///< nothing
 };
 
 /// Columns of one topic that together carry a group of signals, from `signal` on.

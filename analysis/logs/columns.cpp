@@ -31,23 +31,36 @@ std::map<std::string, NamedSignal> named_signals() {
       named[name + parts[k]] = {first + static_cast<int>(k), units, may_be_body};
   };
   const std::vector<std::string> axes = {"_x", "_y", "_z"}, motors = {"_1", "_2", "_3", "_4"};
-  const std::vector<Unit> length = {{"m", 1, 1}, {"mm", 1, 1000}};
-  const std::vector<Unit> speed = {{"m/s", 1, 1}, {"mm/s", 1, 1000}};
+  // A minus stands for columns of the opposite sign: of frames whose z points down.
+  const auto of_both_signs = [&](std::vector<Unit> units) {
+    static const std::map<std::string, const char*> negative = {
+        {"1", "-1"},           {"m", "-m"},         {"mm", "-mm"},         {"m/s", "-m/s"},
+        {"mm/s", "-mm/s"},     {"m/s^2", "-m/s^2"}, {"mm/s^2", "-mm/s^2"}, {"g", "-g"},
+        {"mg", "-mg"},         {"rad", "-rad"},     {"deg", "-deg"},       {"rad/s", "-rad/s"},
+        {"mrad/s", "-mrad/s"}, {"deg/s", "-deg/s"}};
+    const std::size_t count = units.size();
+    for (std::size_t i = 0; i < count; ++i)
+      units.push_back({negative.at(units[i].name), -units[i].multiply, units[i].divide});
+    return units;
+  };
+  const std::vector<Unit> length = of_both_signs({{"m", 1, 1}, {"mm", 1, 1000}});
+  const std::vector<Unit> speed = of_both_signs({{"m/s", 1, 1}, {"mm/s", 1, 1000}});
   const std::vector<Unit> force = {{"N", 1, 1}, {"gf", kGravity_m_s2, 1000}};
   add("time", {""}, kTime, {{"s", 1e6, 1}, {"ms", 1e3, 1}, {"us", 1, 1}});
   add("position", axes, kPosition, length);
   add("velocity", axes, kVelocity, speed);
   add("specific_force", axes, kForceWorld,
-      {{"m/s^2", 1, 1}, {"mm/s^2", 1, 1000}, {"g", kGravity_m_s2, 1}, {"mg", kGravity_m_s2, 1000}}, true);
-  add("attitude", {"_x", "_y", "_z", "_w"}, kAttitude, {{"1", 1, 1}});
-  // Angles of R = Rz(yaw) Ry(pitch) Rx(roll); a minus stands for columns of the opposite sign.
-  const std::vector<Unit> angle = {
-      {"rad", 1, 1}, {"deg", kDegree_rad, 1}, {"-rad", -1, 1}, {"-deg", -kDegree_rad, 1}};
+      of_both_signs(
+          {{"m/s^2", 1, 1}, {"mm/s^2", 1, 1000}, {"g", kGravity_m_s2, 1}, {"mg", kGravity_m_s2, 1000}}),
+      true);
+  add("attitude", {"_x", "_y", "_z", "_w"}, kAttitude, of_both_signs({{"1", 1, 1}}));
+  // Angles of R = Rz(yaw) Ry(pitch) Rx(roll).
+  const std::vector<Unit> angle = of_both_signs({{"rad", 1, 1}, {"deg", kDegree_rad, 1}});
   add("roll", {""}, kEuler, angle);
   add("pitch", {""}, kEuler + 1, angle);
   add("yaw", {""}, kEuler + 2, angle);
   add("requested", motors, kRequested, {{"1", 1, 1}, {"PWM", 1, 65536}});
-  add("rate", axes, kRates, {{"rad/s", 1, 1}, {"mrad/s", 1, 1000}, {"deg/s", kDegree_rad, 1}});
+  add("rate", axes, kRates, of_both_signs({{"rad/s", 1, 1}, {"mrad/s", 1, 1000}, {"deg/s", kDegree_rad, 1}}));
   add("duty", motors, kDuty, {{"1", 1, 1}, {"PWM", 1, 65536}});
   add("battery", {""}, kBattery, {{"V", 1, 1}, {"mV", 1, 1000}});
   add("target_position", axes, kTargetPosition, length);

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <istream>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "analysis/logs/record_source.h"
@@ -32,69 +33,180 @@ bool next_line(std::istream& in, std::string& line, bool& complete) {
   return any;
 }
 
-/// The number between `at` and `end` without the blanks around it; NaN for an empty cell. Returns false for anything else.
-bool parse_cell(const char* at, const char* end, double& value) {
-  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
-  while (at < end && is_blank(*at)) ++at;
-  while (end > at && is_blank(end[-1])) --end;
-  value = std::numeric_limits<double>::quiet_NaN();
-  if (at == end) return true;
-  if (*at == '+') ++at;
-  double number = 0;
-  const auto [next, error] = std::from_chars(at, end, number);
-  if (error != std::errc() || next != end) return false;
-  value = number;
+/// The number that `text` starts with, which is taken off it.
+template <typename Number>
+bool take_number(std::string_view& text, Number& number) {
+  const auto [next, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc()) return false;
+  text.remove_prefix(static_cast<std::size_t>(next - text.data()));
+  return true;
+}
+bool take(std::string_view& text, std::string_view any_of) {
+  if (text.empty() || any_of.find(text[0]) == std::string_view::npos) return false;
+  text.remove_prefix(1);
   return true;
 }
 
-/// True if `line` has exactly values.size() cells, each a number or empty where the sink needs it.
-bool parse_line(const std::string& line, char separator, const RecordSink& sink,
-                std::vector<double>& values) {
-  const char* at = line.data();
-  const char* const end = at + line.size();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const char* const cell_end = std::find(at, end, separator);
-    if (!parse_cell(at, cell_end, values[i]) && sink.needs(i)) return false;
-    const bool last = i + 1 == values.size();
-    if (last != (cell_end == end)) return false;
-    at = cell_end + 1;
-  }
-  return true;
+/// Days from 1970-01-01 to a day of the Gregorian calendar: years start in March, so that the leap day is their last.
+std::int64_t days_since_1970(std::int64_t year, int month, int day) {
+  year -= month <= 2 ? 1 : 0;
+  const std::int64_t march_based = (month + 9) % 12;
+  return 365 * year + year / 4 - year / 100 + year / 400 + (153 * march_based + 2) / 5 + day - 719469;
 }
+
+/// "12:34:56.7": seconds of the day; "2026-03-02T12:34:56.7", with "Z" or "+01:00" behind it: seconds since 1970.
+std::optional<double> date_or_time_s(std::string_view text) {
+  int year = 0, month = 0, day = 0, hour = 0, minute = 0, offset_hour = 0, offset_minute = 0;
+  double second = 0, days_s = 0;
+  std::string_view rest = text;
+  if (take_number(rest, year) && take(rest, "-/")) {
+    if (!take_number(rest, month) || !take(rest, "-/") || !take_number(rest, day) || !take(rest, "T _"))
+      return std::nullopt;
+    if (year < 1970 || year > 9999 || month < 1 || month > 12 || day < 1 || day > 31) return std::nullopt;
+    days_s = 86400.0 * static_cast<double>(days_since_1970(year, month, day));
+    text = rest;
+  }
+  if (!take_number(text, hour) || !take(text, ":") || !take_number(text, minute) || !take(text, ":") ||
+      !take_number(text, second))
+    return std::nullopt;
+  const bool in_range = hour >= 0 && hour < 24 && minute >= 0 && minute < 60 && second >= 0 && second < 61;
+  if (!in_range) return std::nullopt;
+  if (text == "Z") text = {};
+  if (!text.empty() && days_s > 0) {
+    const double sign = text[0] == '-' ? -1 : 1;
+    if (!take(text, "+-") || !take_number(text, offset_hour)) return std::nullopt;
+    if (take(text, ":") && !take_number(text, offset_minute)) return std::nullopt;
+    if (offset_hour > 14) offset_minute = offset_hour % 100, offset_hour /= 100;  // "+0130"
+    days_s -= sign * (3600.0 * offset_hour + 60.0 * offset_minute);
+  }
+  return text.empty() ? std::optional(days_s + 3600.0 * hour + 60.0 * minute + second) : std::nullopt;
+}
+
+/// The cell's number, without blanks and quotes around it; NaN for an empty cell. Returns false for anything else.
+/// @param decimal_comma commas that stand for decimal points
+bool parse_cell(std::string_view cell, bool decimal_comma, double& value) {
+  cell = files::without_blanks(cell);
+  value = std::numeric_limits<double>::quiet_NaN();
+  if (cell.empty()) return true;
+  std::string_view digits = cell;
+  if (digits[0] == '+') digits.remove_prefix(1);
+  std::string pointed;
+  if (decimal_comma && digits.find(',') != std::string_view::npos) {
+    pointed = digits;
+    std::replace(pointed.begin(), pointed.end(), ',', '.');
+    digits = pointed;
+  }
+  double number = 0;
+  if (take_number(digits, number) && digits.empty()) {
+    value = number;
+    return true;
+  }
+  const std::optional<double> time_s = date_or_time_s(cell);
+  if (time_s) value = *time_s;
+  return time_s.has_value();
+}
+
+/// What is wrong with `line`, if it does not have exactly values.size() cells, each a number or empty where the sink
+/// needs it: the column of the cell that is no number, or none.
+struct LineFault {
+  std::size_t column;
+  std::string_view cell;
+};
+std::optional<LineFault> parse_line(std::string_view line, char separator, const RecordSink& sink,
+                                    std::vector<double>& values) {
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t end = std::min(line.find(separator, at), line.size());
+    const std::string_view cell = line.substr(at, end - at);
+    if (!parse_cell(cell, separator != ',', values[i]) && sink.needs(i)) return LineFault{i, cell};
+    const bool last = i + 1 == values.size();
+    if (last != (end == line.size())) return LineFault{values.size(), {}};
+    at = end + 1;
+  }
+  return std::nullopt;
+}
+
+/// The line that names the columns. Lines of comment may stand before it, and it may itself start with "#".
+class Header {
+ public:
+  /// @return false if `in` has no line
+  bool read(std::istream& in) {
+    std::string comment;
+    bool complete = false;
+    for (;;) {
+      if (!next_line(in, line, complete)) return lines > 0;
+      if (++lines == 1 && line.compare(0, 3, "\xEF\xBB\xBF") == 0) line.erase(0, 3);
+      if (line.empty() || line[0] != '#') break;
+      comment = line.substr(1);
+    }
+    double number = 0;
+    const std::string_view first = std::string_view(line).substr(0, line.find_first_of(",;\t"));
+    if (comment.empty() || (!line.empty() && !parse_cell(first, false, number))) return true;
+    if (complete || !line.empty()) first_record = line;
+    line = comment;
+    return true;
+  }
+
+  std::string line;
+  std::optional<std::string> first_record;  ///< read already, behind a header that is a comment
+  std::size_t lines = 0;                    ///< read
+};
 
 }  // namespace
 
-void read_csv(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health) {
-  std::string line;
-  bool complete = false;
-  if (!next_line(in, line, complete)) {
+std::optional<files::InputFault> read_csv(std::istream& in, const std::string& path, RecordSink& sink,
+                                          LogHealth& health) {
+  Header header;
+  if (!header.read(in)) {
     throw files::InputError(
         {path, "line 1", "", "", "the file is empty", "the recording failed; leave it out"});
   }
-  const std::string kByteOrderMark = "\xEF\xBB\xBF";
-  if (line.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0) line.erase(0, kByteOrderMark.size());
-  if (!line.empty() && line[0] == '#') line.erase(0, 1);
-  const char separator = files::csv_separator(line, ',');
-  const std::vector<std::string_view> cells = files::csv_cells(line, separator);
+  const char separator = files::csv_separator(header.line, ',');
+  const std::vector<std::string_view> cells = files::csv_cells(header.line, separator);
   const std::vector<std::string> names(cells.begin(), cells.end());
-  if (names.size() < 2 || line.size() > kLongestLine_bytes) {
-    throw files::InputError({path, "line 1", "header", files::in_quotes(line), "does not name columns",
+  const std::string where = "line " + std::to_string(header.lines - (header.first_record ? 1 : 0));
+  if (names.size() < 2 || header.line.size() > kLongestLine_bytes) {
+    throw files::InputError({path, where, "header", files::in_quotes(header.line), "does not name columns",
                              "the first line names them, separated by commas, semicolons or tabs"});
   }
   if (std::set<std::string>(names.begin(), names.end()).size() != names.size())
-    throw files::InputError({path, "line 1", "header", "", "names a column twice", "rename one of them"});
+    throw files::InputError({path, where, "header", "", "names a column twice", "rename one of them"});
   sink.begin(names);
   std::vector<double> values(names.size());
-  while (next_line(in, line, complete)) {
-    if (line.empty()) continue;
-    if (parse_line(line, separator, sink, values)) {
+  std::optional<files::InputFault> damage;
+  std::size_t number = header.lines;
+  bool complete = true;
+  std::string line;
+  const auto take_line = [&] {
+    if (line.empty()) return;
+    const std::optional<LineFault> fault = parse_line(line, separator, sink, values);
+    if (!fault) {
       sink.record(values);
-    } else if (complete) {
-      ++health.damaged_lines;
-    } else {
+    } else if (!complete) {
       health.truncated = true;
+    } else {
+      ++health.damaged_lines;
+      if (damage) return;
+      const bool is_cell = fault->column < names.size();
+      damage = files::InputFault{
+          path,
+          "line " + std::to_string(number),
+          is_cell ? names[fault->column] : "cells",
+          is_cell ? files::in_quotes(std::string(fault->cell)) : "",
+          is_cell ? "is no number" : "are not as many as the header names",
+          "times may be seconds, or dates like 2026-03-02T12:34:56.7; numbers have a point, or a "
+          "comma where another sign separates cells"};
     }
+  };
+  if (header.first_record) {
+    line = *header.first_record;
+    take_line();
   }
+  while (next_line(in, line, complete)) {
+    ++number;
+    take_line();
+  }
+  return damage;
 }
 
 }  // namespace swarmcert::logs

@@ -18,7 +18,8 @@ struct Draft {
   Log& log;
   /// Acceleration in W without gravity, smoothed; empty where neither velocity nor position carries the axis.
   std::array<std::vector<double>, 3> acceleration_m_s2;
-  bool asks_physics = true;  ///< false where a columns.toml says what columns are
+  bool asks_physics = true;             ///< false where a columns.toml says what columns are
+  bool has_forward_right_down = false;  ///< the body's axes are those: the quaternion is still to be turned
 
   bool is_measured(int signal) const { return recognition.find(signal) != nullptr; }
   void note(const std::string& words) const { log.interpretation.push_back(words); }

@@ -187,6 +187,23 @@ void settle_lengths(Draft& draft) {
   }
 }
 
+/// North, east, down to z up. Beside such names the axes of the body are forward, right and down.
+void settle_north_east_down(Draft& draft) {
+  const Carried* const position = draft.recognition.find(kPosition);
+  const Carried* const velocity = draft.recognition.find(kVelocity);
+  SignalTable& t = draft.table;
+  std::string names;
+  for (const Carried* const carried : {position, velocity}) {
+    if (carried == nullptr || carried->ask != Ask::kNorthEastDown) continue;
+    names += (names.empty() ? "" : ", ") + names_of(draft.raw, *carried);
+    t.turn_half_about_x(carried->signal);
+  }
+  if (names.empty()) return;
+  draft.has_forward_right_down = true;
+  for (const int body : {kForceBody, kRates, kEuler}) t.turn_half_about_x(body);
+  draft.note(names + ": north, east, down; the body's axes are taken as forward, right, down");
+}
+
 /// nav_msgs/Odometry states velocities along the axes of the body, but Crazyswarm2 and motion capture write those of the
 /// world into it, and into TwistStamped. The derivative of the position says which.
 void settle_velocity_frame(Draft& draft) {
@@ -228,6 +245,7 @@ void settle_velocity_frame(Draft& draft) {
 void derive_kinematics(Draft& draft) {
   SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;
+  settle_north_east_down(draft);
   settle_lengths(draft);
   settle_velocity_frame(draft);
   signals.position = t.has_group(kPosition, 3);

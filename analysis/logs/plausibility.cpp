@@ -135,6 +135,24 @@ double step_s(const Log& log, std::size_t i) {
   return 1e-6 * (log.samples[i].time_us - log.samples[i - 1].time_us);
 }
 
+/// A vehicle flies above the ground, and the ground is near the origin.
+void check_height(const Log& log, std::vector<Doubt>& doubts) {
+  constexpr double kDeep_m = -0.5, kGround_m = 0.3;
+  std::vector<double> heights;
+  for (const Sample& sample : log.samples) heights.push_back(sample.position_m[2]);
+  const double highest_m = *std::max_element(heights.begin(), heights.end());
+  std::nth_element(heights.begin(), heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2),
+                   heights.end());
+  const double median_m = heights[heights.size() / 2];
+  if (median_m > kDeep_m || highest_m > kGround_m) return;
+  doubts.push_back(
+      {"position", median_m,
+       fmt::format("position: {:.2f} m high in the median and never above {:.2f} m; its z axis probably "
+                   "points down, then a columns.toml turns it: unit = \"-m\" for y and z",
+                   median_m, highest_m),
+       false});
+}
+
 /// How far a vehicle moves by its positions, over how far by its velocities.
 void check_velocity(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kStretch_s = 0.2, kLeastMove_m = 0.01, kDoubt = 2, kRefusal = 30;
@@ -227,7 +245,8 @@ std::vector<Doubt> doubts_of(const Log& log) {
   check_time(log, doubts);
   if (log.samples.empty()) return doubts;
   const bool has_time = doubts.empty();
-  if (has_time) check_velocity(log, doubts);
+  if (log.signals.position) check_height(log, doubts);
+  if (has_time && log.signals.position) check_velocity(log, doubts);
   if (log.signals.force) {
     check_specific_force(log, doubts);
     if (log.signals.thrust == ThrustSource::kDuty) {

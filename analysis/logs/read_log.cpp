@@ -34,6 +34,8 @@ Format kind_of(std::istream& in) {
   if (bracket != std::string::npos && bracket >= 2 && bracket + 3 < size && start[bracket + 2] == ')' &&
       start[bracket + 3] == ',')
     return Format::kUsd;
+  if (start[0] == '#' && start.find('\0') == std::string::npos)
+    return Format::kCsv;  // a comment may have no separator
   for (const char c : start) {
     const auto byte = static_cast<unsigned char>(c);
     if (byte < ' ' && c != '\n' && c != '\r' && c != '\t') return Format::kUnknown;
@@ -51,6 +53,21 @@ std::string other_formats() {
   std::string names;
   for (const LogFormat& format : log_formats()) names += std::string(", ") + format.name;
   return names;
+}
+
+[[noreturn]] void refuse_unknown(const std::string& head, const std::string& path) {
+  std::string what = "is not a flight log", mend = "known are micro-SD logs, CSV" + other_formats();
+  if (head.empty()) {
+    what = "the file is empty";
+    mend = "the recording failed; leave it out";
+  } else if (head.compare(0, 2, "\x1F\x8B") == 0) {
+    what = "is compressed";
+    mend = "unpack it with gunzip";
+  } else if (head.compare(0, 2, "\xFF\xFE") == 0 || head.compare(0, 2, "\xFE\xFF") == 0) {
+    what = "is text in UTF-16";
+    mend = "save it as UTF-8";
+  }
+  throw files::InputError({path, "offset 0", "", "", what, mend});
 }
 
 /// Micro-SD logs and CSV are streams of records; formats/formats.h knows the others.
@@ -77,17 +94,16 @@ RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
     case Format::kUsdEvents:
       log.format = fmt::format("usd version {}", read_usd_events(in, path, log));
       break;
-    case Format::kCsv:
+    case Format::kCsv: {
       log.format = "csv";
-      read_csv(in, path, collector, log.health);
+      const std::optional<files::InputFault> damage = read_csv(in, path, collector, log.health);
       collector.end();
+      if (damage && log.topics.back().time_s.empty())
+        throw files::InputError(*damage);  // no line can be read
       break;
-    case Format::kUnknown: {
-      const bool empty = in.peek() == std::char_traits<char>::eof();
-      throw files::InputError(
-          {path, "offset 0", "", "", empty ? "the file is empty" : "is not a flight log",
-           empty ? "the recording failed; leave it out" : "known are micro-SD logs, CSV" + other_formats()});
     }
+    case Format::kUnknown:
+      refuse_unknown(head, path);
   }
   return log;
 }

@@ -59,9 +59,22 @@ void take_stated_unit(const RawTopic& topic, Carried& carried) {
 }
 
 /// Which signals need all of their columns: a vertical velocity is worth having, half a quaternion is not.
-bool may_be_partial(int signal) {
+/// "north" and "east" belong to north, east, down as well as to east, north, up.
+bool may_be_partial(const NamedColumns& row) {
+  if (row.ask == Ask::kNorthEastDown || row.ask == Ask::kEastNorthUp) return false;
+  const int signal = row.signal;
   return signal == kEuler || signal == kPosition || signal == kVelocity || signal == kTargetPosition ||
          signal == kTargetVelocity;
+}
+
+/// Columns that hold no number are none.
+void drop_empty_columns(const RawTopic& topic, Carried& carried) {
+  if (topic.time_s.empty()) return;
+  for (int& c : carried.columns) {
+    if (c < 0) continue;
+    const std::vector<double>& values = topic.columns[static_cast<std::size_t>(c)].values;
+    if (std::none_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); })) c = -1;
+  }
 }
 
 bool is_dead(const RawTopic& topic, const Carried& carried) {
@@ -116,9 +129,10 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
     for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
       Carried carried{row.signal, t,      indices[t].columns_called(row.names), row.unit, row.multiply,
                       row.divide, row.ask};
+      drop_empty_columns(log.topics[t], carried);
       const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
       const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
-      if (missing == size || (missing > 0 && !may_be_partial(row.signal))) continue;
+      if (missing == size || (missing > 0 && !may_be_partial(row))) continue;
       if (is_wish(log.topics[t], row.signal)) continue;
       const bool is_quaternion = row.signal == kAttitude;
       if (!log.topics[t].time_s.empty() && ((is_dead(log.topics[t], carried) && !may_be_zero(row.signal)) ||

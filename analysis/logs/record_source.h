@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/logs/raw_log.h"
+#include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
 
@@ -36,9 +38,13 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
 /// @return the version
 int read_usd_events(std::istream& in, const std::string& path, RawLog& log);
 
-/// Text: a header line, which may start with "#", and lines of as many cells, separated by the first of comma, semicolon
-/// and tab that the header has. Cells are numbers, or empty; in columns that the sink does not need, anything.
+/// Text: a header line, which may start with "#" and follow lines that do, and lines of as many cells, separated by the
+/// first of comma, semicolon and tab that the header has. Cells are numbers, or empty; in columns that the sink does not
+/// need, anything. Where no comma separates, commas are decimal points. Dates become seconds since 1970, times of the
+/// day seconds since midnight.
+/// @return what is wrong with the first damaged line
 /// @throws files::InputError if the header is empty or has a name twice.
-void read_csv(std::istream& in, const std::string& path, RecordSink& sink, LogHealth& health);
+std::optional<files::InputFault> read_csv(std::istream& in, const std::string& path, RecordSink& sink,
+                                          LogHealth& health);
 
 }  // namespace swarmcert::logs

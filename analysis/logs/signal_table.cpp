@@ -203,6 +203,12 @@ bool is_needed(int signal) {
 
 double longest_gap_s(double step_s) { return std::max(kLongestGap_s, step_s > 0.02 ? 2.5 * step_s : 0); }
 
+void SignalTable::turn_half_about_x(int first) {
+  for (const int signal : {first + 1, first + 2}) {
+    for (double& value : (*this)[signal]) value = -value;
+  }
+}
+
 double SignalTable::step_s() const { return 1e-6 * median_step(time_us); }
 
 std::vector<double> resampled(const std::vector<double>& from_s, const std::vector<double>& series,

@@ -27,6 +27,8 @@ struct SignalTable {
   Vector three(int first, std::size_t record) const {
     return {(*this)[first][record], (*this)[first + 1][record], (*this)[first + 2][record]};
   }
+  /// y and z of a group change their signs: between axes forward, right, down and forward, left, up.
+  void turn_half_about_x(int first);
   /// Median step between records, in seconds; 0 with fewer than two. Goes through all records.
   double step_s() const;
 };

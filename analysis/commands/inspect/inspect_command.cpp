@@ -217,8 +217,16 @@ files::Json inspect(const std::string& path, const InspectOptions& options, cons
                     bool in_table, Seen& seen) {
   if (logs::looks_like_log(path)) return inspect_log(path, options, common, in_table, seen);
   if (is_model(path)) return inspect_model(path, common.prints_text());
-  return is_json(path) ? inspect_certificate(path, common.prints_text())
-                       : inspect_network(path, options.network, common.prints_text());
+  if (is_json(path)) return inspect_certificate(path, common.prints_text());
+  try {
+    return inspect_network(path, options.network, common.prints_text());
+  } catch (const files::InputError& error) {
+    files::InputFault fault = error.fault();
+    if (fault.file != path || fault.what.rfind("is neither", 0) != 0) throw;
+    fault.what += ", nor a flight log of a known format";
+    fault.mend += "; a CSV of a flight ends in .csv";
+    throw files::InputError(fault);
+  }
 }
 
 /// Files as they are, folders as the logs below them, with what was taken as one flight and why.

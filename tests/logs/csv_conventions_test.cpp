@@ -1,0 +1,205 @@
+/// CSV as other programs and countries write it: separators, decimal commas, dates, comments, axes that point down.
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "analysis/logs/plausibility.h"
+#include "analysis/logs/read_log.h"
+#include "nn/base/input_error.h"
+
+namespace swarmcert::tests {
+namespace {
+
+logs::Log convention(const std::string& text, const std::string& columns = "") {
+  std::istringstream in(text);
+  return columns.empty() ? logs::parse_log(in, "flight.csv")
+                         : logs::parse_log(in, "flight.csv", logs::parse_columns(columns, "columns.toml"));
+}
+
+/// Records of a position and a velocity each 10 ms: time as `clock` writes it, x = 0.25 k.
+template <typename Clock>
+std::string positions(const Clock& clock, char separator = ',', char point = '.', int count = 60) {
+  std::string text;
+  for (int k = 0; k < count; ++k) {
+    std::string numbers = fmt::format("{:.2f}|0.0|1.5", 0.25 * k);
+    std::replace(numbers.begin(), numbers.end(), '.', point);
+    std::replace(numbers.begin(), numbers.end(), '|', separator);
+    text += clock(k) + separator + numbers + "\n";
+  }
+  return text;
+}
+std::string seconds(int k) { return fmt::format("{:.2f}", 0.01 * k); }
+
+void expect_positions(const logs::Log& log, const std::string& what, std::size_t count = 60) {
+  ASSERT_EQ(log.samples.size(), count) << what;
+  for (std::size_t k = 0; k < count; ++k) {
+    EXPECT_NEAR(log.samples[k].position_m[0], 0.25 * static_cast<double>(k), 1e-12) << what;
+    EXPECT_NEAR(log.samples[k].position_m[2], 1.5, 1e-12) << what;
+    EXPECT_NEAR(log.samples[k].time_us - log.samples[0].time_us, 1e4 * static_cast<double>(k), 1) << what;
+  }
+  EXPECT_TRUE(logs::is_sound(log.health)) << what;
+}
+
+TEST(CsvConventions, CommasAreDecimalPointsWhereAnotherSignSeparates) {
+  for (const char separator : {';', '\t'}) {
+    const std::string head = fmt::format("t{0}px{0}py{0}pz\n", separator);
+    const auto clock = [](int k) {
+      std::string text = seconds(k);
+      std::replace(text.begin(), text.end(), '.', ',');
+      return text;
+    };
+    expect_positions(convention(head + positions(clock, separator, ',')), std::string(1, separator));
+  }
+}
+
+TEST(CsvConventions, DatesAndTimesOfTheDayAreClocks) {
+  const std::string head = "time,px,py,pz\n";
+  // 2026-03-02 10:15:07 UTC is 1772446507 s after 1970-01-01 (date -u -d @1772446507).
+  const std::pair<const char*, const char*> forms[] = {
+      {"2026-03-02T10:15:{:05.2f}Z", "ISO 8601"},
+      {"2026-03-02 10:15:{:05.2f}", "with a blank"},
+      {"\"2026/03/02 10:15:{:05.2f}\"", "quoted, with slashes"},
+      {"2026-03-02T11:15:{:05.2f}+01:00", "an hour ahead"},
+      {"2026-03-02T06:45:{:05.2f}-0330", "behind"}};
+  for (const auto& [form, what] : forms) {
+    const char* const text = form;
+    const logs::Log log =
+        convention(head + positions([&](int k) { return fmt::format(fmt::runtime(text), 7 + 0.01 * k); }));
+    expect_positions(log, what);
+    EXPECT_EQ(log.epoch_s, 1772446507) << what;
+  }
+  expect_positions(
+      convention(head + positions([](int k) { return fmt::format("10:15:{:05.2f}", 7 + 0.01 * k); })),
+      "time of the day");
+  // The last day of February of leap years: 2000-02-29 is day 11016.
+  const logs::Log leap =
+      convention(head + positions([](int k) { return fmt::format("2000-02-29T00:00:{:05.2f}", 0.01 * k); }));
+  EXPECT_EQ(leap.epoch_s, 11016.0 * 86400);
+}
+
+TEST(CsvConventions, ClocksMayNameNanoseconds) {
+  expect_positions(convention("timestamp_ns,px,py,pz\n" +
+                              positions([](int k) { return fmt::format("{}", 10'000'000 * k); })),
+                   "ns");
+}
+
+TEST(CsvConventions, CommentsMayStandBeforeTheHeader) {
+  const std::string body = positions(seconds);
+  expect_positions(convention("# recorded by a logger\n# cf5\nt,px,py,pz\n" + body), "before the header");
+  expect_positions(convention("# recorded by a logger\n# t,px,py,pz\n" + body),
+                   "the last of them is the header");
+  expect_positions(convention("#t,px,py,pz\n" + body), "a header with a sign of a comment");
+}
+
+std::string refusal_of_csv(const std::string& text) {
+  try {
+    convention(text);
+  } catch (const files::InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(CsvConventions, ATableOfWhichNoLineCanBeReadIsRefusedWithTheFirstOfThem) {
+  EXPECT_EQ(refusal_of_csv("t,px,py,pz\nnoon,1,2,3\n1,2,3,oops\n").substr(0, 45),
+            "flight.csv: line 2: t = \"noon\": is no number;");
+  EXPECT_EQ(refusal_of_csv("# a\n# t,px,py,pz\n1,2,3\n2,3,4\n").substr(0, 62),
+            "flight.csv: line 3: cells: are not as many as the header names");
+  EXPECT_NE(refusal_of_csv("time,px,py,pz\n2026-13-02T10:15:07,1,2,3\n").find("is no number"),
+            std::string::npos);
+  EXPECT_NE(refusal_of_csv(std::string("\x1F\x8B\x08\x00", 4)).find("is compressed; unpack it"),
+            std::string::npos);
+  EXPECT_NE(refusal_of_csv(std::string("\xFF\xFEt\0,\0", 6)).find("UTF-16; save it as UTF-8"),
+            std::string::npos);
+}
+
+TEST(CsvConventions, AColumnWithoutAnyNumberIsMissingAndCostsNoRecord) {
+  std::string text = "t,px,py,pz,vx,vy,vz\n";
+  for (int k = 0; k < 60; ++k) text += fmt::format("{},{},0,nan,nan,nan,nan\n", 0.01 * k, 0.25 * k);
+  const logs::Log log = convention(text);
+  EXPECT_EQ(log.samples.size(), 60u);
+  for (const logs::SignalInfo& info : log.sources) {
+    if (info.name == "position") {
+      EXPECT_EQ(info.from, "px, py");
+    }
+    if (info.name == "velocity") {
+      EXPECT_EQ(info.source, logs::SignalInfo::Source::kDerived);
+    }
+  }
+}
+
+/// A climb by 1 m with the nose 30 degrees to the left: z up, and the same with z down.
+std::string climb(bool down, const std::string& head) {
+  std::string text = head;
+  const double yaw = 0.5235987755982988, s = down ? -1 : 1;
+  for (int k = 0; k < 200; ++k) {
+    const double t = 0.01 * k;
+    text += fmt::format(
+        "{:.2f},{:.6f},{:.6f},{:.6f},1,{:.6f},{:.6f},{:.9f},0,0,{:.9f},0,0.1,{:.6f},0.5,0.5,0.5,0.5,3.8\n", t,
+        t, s * 2 * t, s * t * t / 4, s * 2, s * t / 2, std::cos(yaw / 2), s * std::sin(yaw / 2),
+        s * (9.80665 + 0.5));
+  }
+  return text;
+}
+
+void expect_climb(const logs::Log& log) {
+  ASSERT_EQ(log.samples.size(), 200u);
+  for (std::size_t k = 10; k < 190; k += 30) {
+    const double t = 0.01 * static_cast<double>(k);
+    const logs::Sample& sample = log.samples[k];
+    EXPECT_NEAR(sample.position_m[1], 2 * t, 1e-6);
+    EXPECT_NEAR(sample.position_m[2], t * t / 4, 1e-6);
+    EXPECT_NEAR(sample.velocity_m_s[2], t / 2, 1e-6);
+    EXPECT_NEAR(sample.attitude[2], 0.25881904510252074, 1e-8);
+  }
+}
+
+TEST(CsvConventions, NorthEastDownIsTurnedUpWhereNamesSayIt) {
+  const std::string rest = ",q0,q1,q2,q3,ax,ay,az,m1,m2,m3,m4,vbat\n";
+  const logs::Log ned = convention(climb(true, "t,north,east,down,vn,ve,vd" + rest));
+  expect_climb(ned);
+  // The accelerometer's z points down as well; y is 0.1 to the right.
+  EXPECT_NEAR(ned.samples[100].specific_force_m_s2[2], 9.80665 + 0.5, 1e-5);
+  expect_climb(convention(climb(false, "t,east,north,up,ve,vn,vu" + rest)));
+}
+
+TEST(CsvConventions, AColumnsTomlTurnsAxesByAMinusInTheUnit) {
+  std::string columns = "schema = \"swarmcert/columns/1\"\ntime = {column = \"t\", unit = \"s\"}\n";
+  const std::pair<const char*, const char*> lengths[] = {{"x", ""}, {"y", "-"}, {"z", "-"}};
+  for (const auto& [axis, sign] : lengths) {
+    columns += fmt::format("position_{0} = {{column = \"a{0}\", unit = \"{1}m\"}}\n", axis, sign);
+    columns += fmt::format("velocity_{0} = {{column = \"b{0}\", unit = \"{1}m/s\"}}\n", axis, sign);
+    columns += fmt::format("attitude_{0} = {{column = \"q{0}\", unit = \"{1}1\"}}\n", axis, sign);
+    columns += fmt::format(
+        "specific_force_{0} = {{column = \"f{0}\", unit = \"{1}m/s^2\", frame = \"body\"}}\n", axis, sign);
+  }
+  for (int k = 1; k <= 4; ++k) columns += fmt::format("duty_{0} = {{column = \"m{0}\", unit = \"1\"}}\n", k);
+  columns += "battery = {column = \"v\", unit = \"V\"}\n";
+  columns += "attitude_w = {column = \"qw\", unit = \"1\"}\n";
+  const logs::Log log =
+      convention(climb(true, "t,ax,ay,az,bx,by,bz,qw,qx,qy,qz,fx,fy,fz,m1,m2,m3,m4,v\n"), columns);
+  expect_climb(log);
+  EXPECT_NEAR(log.samples[100].specific_force_m_s2[2], 9.80665 + 0.5, 1e-5);
+}
+
+TEST(CsvConventions, AFlightBelowTheGroundIsDoubtedAndAMissingPositionIsNot) {
+  const auto doubted = [](const logs::Log& log) {
+    std::string names;
+    for (const logs::Doubt& doubt : logs::doubts_of(log)) names += doubt.words + "\n";
+    return names;
+  };
+  std::string below = "t,px,py,pz,vx,vy,vz\n", none = "t,vx,vy,vz\n";
+  for (int k = 0; k < 300; ++k) {
+    const double t = 0.01 * k;
+    below += fmt::format("{:.2f},0,0,{:.6f},0,0,{:.6f}\n", t, -1.2 * std::sin(t), -1.2 * std::cos(t));
+    none += fmt::format("{:.2f},0.5,0,1\n", t);
+  }
+  EXPECT_NE(doubted(convention(below)).find("its z axis probably points down"), std::string::npos);
+  EXPECT_EQ(doubted(convention(none)), "");
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
