@@ -278,6 +278,15 @@ void settle_thrust(Draft& draft) {
     signals.thrust = ThrustSource::kForce;
     draft.add("thrust", Source::kDerived,
               "commanded force " + names_of(draft.raw, *draft.recognition.find(kThrust)), "N");
+  } else if (t.has_group(kMotorForce, kFour)) {
+    t[kThrust].assign(t.size(), 0);
+    for (int k = 0; k < kFour; ++k) {
+      for (std::size_t i = 0; i < t.size(); ++i) t[kThrust][i] += t[kMotorForce + k][i];
+    }
+    signals.thrust = ThrustSource::kForce;
+    draft.add("thrust", Source::kDerived,
+              "commanded force, the sum of " + names_of(draft.raw, *draft.recognition.find(kMotorForce)),
+              "N");
   } else if (t.has_group(kRotorSpeed, kFour)) {
     set_hover_multiple(draft, {kRotorSpeed, kFour, "rotor speeds"}, true, "sum of squares");
   } else if (has_request) {

@@ -188,5 +188,20 @@ TEST(LogTraps, TheControllersCommandedForceIsAThrust) {
   EXPECT_TRUE(log.signals.force_axes[2]);
 }
 
+TEST(LogTraps, TheCommandedForcesOfTheRotorsSumToAThrust) {
+  std::string text = "time,x,y,z,vx,vy,vz,motor.f1,motor.f2,motor.f3,motor.f4\n";
+  for (int k = 0; k < 1000; ++k) {
+    const double t = 0.01 * k, force_N = 0.037 * logs::kGravity_m_s2 * Bob(t).load;
+    text += fmt::format("{:.3f},0,0,{:.5f},0,0,{:.5f},{:.6f},{:.6f},{:.6f},{:.6f}\n", t, Bob(t).z, Bob(t).vz,
+                        0.1 * force_N, 0.2 * force_N, 0.3 * force_N, 0.4 * force_N);
+  }
+  const logs::Log log = parse_text(text);
+  EXPECT_EQ(log.signals.thrust, logs::ThrustSource::kForce);
+  EXPECT_TRUE(log.signals.force_axes[2]);
+  ASSERT_GT(log.samples.size(), 900u);
+  for (const logs::Sample& sample : log.samples)
+    EXPECT_NEAR(sample.given_thrust, 0.037 * logs::kGravity_m_s2 * Bob(1e-6 * sample.time_us).load, 5e-6);
+}
+
 }  // namespace
 }  // namespace swarmcert::tests
