@@ -89,8 +89,14 @@ def test_schemas_are_valid_and_closed():
         silent = [field for field, rule in schema["properties"].items() if not rule.get("description")]
         expect(not silent, f"{name}: no description of {', '.join(silent)}")
         for place, inner in objects(schema):
-            if "properties" not in inner:
+            kinds = inner.get("type", [])
+            kinds = [kinds] if isinstance(kinds, str) else kinds
+            if "array" in kinds:
+                expect("items" in inner, f"{name}{place} does not say what its elements are")
+            if "properties" not in inner and "object" not in kinds:
                 continue
+            if (name, place) == ("schema", "/json_schema"):
+                continue  # a JSON Schema may say anything
             expect(inner.get("additionalProperties") is not True, f"{name}{place} is open")
             expect("additionalProperties" in inner, f"{name}{place} does not say whether it is closed")
 
