@@ -124,6 +124,7 @@ int run_command(int argc, const char* const* argv) {
     auto to_run = command.declare(*sub);
     sub->callback([&action, to_run] { action = to_run; });
   }
+  if (argc < 2) throw UsageError("name a command; 'swarmcert --help' lists them");
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {

@@ -4,6 +4,7 @@
 #include <openssl/evp.h>
 #include <openssl/sha.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -73,18 +74,23 @@ void Report::bars(const std::string& name, const std::vector<Bar>& bars, const s
                   const std::string& caption) {
   if (bars.empty()) return;
   std::string data = "# value lower upper name\n";
+  double largest = 0;
   for (const Bar& bar : bars) {
+    for (const double x : {bar.value, bar.upper}) largest = std::isfinite(x) ? std::max(largest, x) : largest;
     const auto end = [&bar](double x) { return std::isfinite(x) ? x : bar.value; };
     data += fmt::format("{:.10g} {:.10g} {:.10g} {}\n", bar.value, end(bar.lower), end(bar.upper),
                         plot_field(bar.name));
   }
   figure(name, data,
          fmt::format(
-             "set xlabel {0}\nset key off\nset style fill solid 0.9 noborder\nset ytics nomirror\n"
+             // The names of the bars take half of a narrow drawing: its label stands below all of it.
+             "if (exists('narrow')) {{ set xtics {3:g}; set bmargin 4; "
+             "set label 1 {0} at screen 0.5, screen 0.03 center }} else {{ set xlabel {0} }}\nset key off\n"
+             "set style fill solid 0.9 noborder\nset ytics nomirror\n"
              "set yrange [{1}.6:-0.6]\nset xrange [*<0:*]\nset grid x noy\n"
              "plot '{2}.dat' using (0):0:(0):1:($0-0.35):($0+0.35):ytic(4) with boxxyerror, "
              "'' using 1:0:2:3 with xerrorbars linecolor rgb 'black' dashtype 1 pointtype 0 linewidth 1.5\n",
-             plot_string(quantity), bars.size() - 1, name),
+             plot_string(quantity), bars.size() - 1, name, 2 * tick_step(largest)),
          caption, 120 + 32 * static_cast<int>(bars.size()));
 }
 

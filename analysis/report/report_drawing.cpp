@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 extern char** environ;
@@ -41,6 +42,13 @@ std::string plot_script(const std::string& commands, int height) {
          "signed_colours = \"defined (-2 '#003f63', -1 '#0072b2', 0 '#f4f4f4', 1 '#d55e00', 2 "
          "'#763400')\"\n" +
          commands;
+}
+
+double tick_step(double length) {
+  if (!(length > 0) || !std::isfinite(length)) return 1;
+  const double power = std::pow(10, std::floor(std::log10(length / 3)));
+  const double steps = length / 3 / power;
+  return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
 }
 
 std::string draw(const std::string& folder, const std::string& script, bool is_narrow) {

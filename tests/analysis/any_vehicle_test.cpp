@@ -269,5 +269,19 @@ TEST(Inspect, ReportIsAPageOnPhasesEventsSignalsAndWhatToLog) {
       << "the page is not replaced without --force";
 }
 
+TEST(Inspect, ReportOnAFolderNamesItOnceAndLogsWithinIt) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder.path() / "some/flights");
+  for (const char* name : {"some/flights/one.csv", "some/flights/two.csv"})
+    write_text(folder / name, hexacopter_csv(1));
+  const Outcome outcome = run_shell("swarmcert inspect some/flights --report page -q", folder.path());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  const std::string page = read_text(folder / "page/report.html");
+  EXPECT_NE(page.find("Logs in some/flights/"), std::string::npos);
+  EXPECT_NE(page.find("<h2>one.csv</h2>"), std::string::npos);
+  EXPECT_NE(page.find(">two.csv</td>"), std::string::npos);
+  EXPECT_NE(page.find(">flights</td>"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace swarmcert::tests

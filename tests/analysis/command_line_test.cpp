@@ -45,7 +45,7 @@ TEST_F(CommandLine, MisspeltCommandsAndOptionsAreUsageErrorsWithASuggestion) {
   expect("certify x --gama 3", 2, {"--gama", "did you mean", "--gamma"});
   expect("--hepl", 2, {"--hepl", "did you mean \"--help\""});
   expect("certify x --max-lipschtz=3", 2, {"--max-lipschtz", "--max-lipschitz"});
-  expect("", 2, {"subcommand"});
+  expect("", 2, {"name a command", "swarmcert --help"});
   expect("certify x --gamma minus", 2, {"--gamma", "minus"});
   expect("certify x --gamma -1", 2, {"--gamma", "-1"});
   expect("certify --phi a", 2, {"--rho"});
@@ -55,6 +55,17 @@ TEST_F(CommandLine, TwoOutputsIntoOneFileAreRefusedBeforeAnyWork) {
   expect("certify nowhere.pth -o one.json --json ./one.json", 2,
          {"--json and -o both write", "name two files"});
   expect("gate nowhere.toml --junit a.xml --sarif a.xml", 2, {"--junit and --sarif both write a.xml"});
+}
+
+TEST_F(CommandLine, AnOutputInAFolderThatDoesNotExistIsRefusedBeforeAnyWork) {
+  // The inputs do not exist either, and are not looked at.
+  expect("certify nowhere.pth -o typo/cert.json", 3, {"typo/cert.json", "folder that does not exist"});
+  expect("add drag_linear --model nowhere.toml nowhere -o typo/fitted.toml", 3,
+         {"folder that does not exist"});
+}
+
+TEST_F(CommandLine, CheckSaysThatTheCertificateStandsFirst) {
+  expect("check network.toml cert.json", 2, {"network.toml", "the certificate stands first"});
 }
 
 TEST_F(CommandLine, InspectGoesOnAfterABadFileAndSaysSoInItsExitCode) {

@@ -51,6 +51,18 @@ CHECK = r"""
     if (drawn.length === 0) fault('empty plot', caption && caption.textContent);
     const texts = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim());
     if (texts.length < 3) fault('empty plot', 'no text on its axes');
+    const raw = texts.find(t => /\[\w+_\w+\]/.test(t.textContent));
+    if (raw) fault('raw unit', raw.textContent);
+    const places = texts.map(t => [t, t.getBoundingClientRect()]);
+    for (const [text, r] of places)
+      if (r.left < box.left - 2 || r.right > box.right + 2 || r.top < box.top - 2 || r.bottom > box.bottom + 2)
+        { fault('cut text', text.textContent); break; }
+    // The box of a text that is turned says nothing: only those that stand upright are held against each other.
+    const upright = places.filter(([t]) => Math.abs(t.getScreenCTM().b) < 1e-6);
+    const over = upright.flatMap(([a, p], i) => upright.slice(i + 1).filter(([b, q]) =>
+        p.right > q.left + 1 && q.right > p.left + 1 && p.bottom > q.top + 4 && q.bottom > p.top + 4)
+        .map(([b]) => `${a.textContent} and ${b.textContent}`));
+    if (over.length > 0) fault('overlapping text', `${over.length}: ${over[0]}: ${caption && caption.textContent}`);
     const scale = box.width / svg.viewBox.baseVal.width;
     for (const text of texts) {
       const size = parseFloat(getComputedStyle(text).fontSize) * scale;
@@ -239,7 +251,7 @@ class Browser:
 
     def faults(self, page, widths=(390, 768, 1280), schemes=("light", "dark"), pictures=None):
         """[kind, width, what] of all that is wrong with a report: console, policy (of content), network, overflow, wide
-        table, missing plot, empty plot, no caption, small text, contrast, no name, no result, no command, injection. The page is loaded at every
+        table, missing plot, empty plot, no caption, raw unit, cut text, overlapping text, small text, contrast, no name, no result, no command, injection. The page is loaded at every
         width, and pictured there as <pictures>-<width>.png; colour schemes and print are looked at on the widest."""
         found = []
         for width in widths:

@@ -178,6 +178,10 @@ def planted(good):
     yield "missing plot", text.replace(drawing, "")
     yield "empty plot", text.replace(drawing, without_curves)
     yield "small text", text.replace('font-size="1', 'font-size="0')
+    yield "raw unit", text.replace("time [s]", "time [m_s]")
+    yield "cut text", text.replace("<text> 0</text>", f"<text> {80 * 'm'}</text>")
+    label = r'translate\(([0-9.]+),[0-9.]+\)(?=" stroke="none" fill="currentColor" font-size)'
+    yield "overlapping text", re.sub(label, r"translate(\1,200)", text)
     yield "contrast", text.replace('fill="currentColor"', 'fill="#777777"')
     yield "no caption", re.sub(r"<figcaption>.*?</figcaption>", "", text, flags=re.S)
     yield "no name", text.replace(end, "<button type='button'></button>" + end)

@@ -13,6 +13,7 @@
 #include "analysis/commands/commands.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
+#include "analysis/commands/shared/output_folder.h"
 #include "analysis/identification/balance_ladder.h"
 #include "analysis/identification/ladder.h"
 #include "analysis/identification/scan/proposal.h"
@@ -137,6 +138,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   if (options.output.empty()) throw UsageError("add writes a new model: name it with -o");
   if (options.flights.words.empty()) throw UsageError("add needs flights: name logs or folders of them");
   refuse_to_replace(common, options.output);
+  refuse_missing_folder(options.output);
   if (options.flights.models.size() != 1) throw UsageError("add takes one --model");
   const residuals::Inputs inputs = read_flights(options.flights, false, false, true);
   identification::LadderOptions what;

@@ -2,6 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/shared/effect_output.h"
@@ -16,6 +19,15 @@ std::string step(const stability::LadderRow& row) {
   return (row.effect == "nominal" ? "" : row.accepted ? "+ " : "refused: ") + row.effect;
 }
 
+/// So many decimals that the largest error has four digits: rows line up.
+int decimals_of(const std::vector<stability::LadderRow>& rows, double per_newton) {
+  double largest = 0;
+  for (const stability::LadderRow& row : rows)
+    largest = std::max({largest, row.fit_rmse_N, row.select_rmse_N, row.test_rmse_N});
+  const double digits = std::floor(std::log10(std::max(largest * per_newton, 1e-6)));
+  return static_cast<int>(std::min(std::max(3 - digits, 0.0), 9.0));
+}
+
 }  // namespace
 
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
@@ -24,12 +36,13 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
   const double per_newton = force.per_newton();
   std::string data = "# fit select test step\n";
   std::vector<std::vector<std::string>> cells;
+  const int decimals = decimals_of(rows, per_newton);
   for (const stability::LadderRow& row : rows) {
     data += fmt::format("{:.8g} {:.8g} {:.8g} {}\n", per_newton * row.fit_rmse_N,
                         per_newton * row.select_rmse_N, per_newton * row.test_rmse_N, plot_field(step(row)));
-    cells.push_back({step(row), fmt::format("{:.4g}", per_newton * row.fit_rmse_N),
-                     fmt::format("{:.4g}", per_newton * row.select_rmse_N),
-                     fmt::format("{:.4g}", per_newton * row.test_rmse_N),
+    cells.push_back({step(row), fmt::format("{:.{}f}", per_newton * row.fit_rmse_N, decimals),
+                     fmt::format("{:.{}f}", per_newton * row.select_rmse_N, decimals),
+                     fmt::format("{:.{}f}", per_newton * row.test_rmse_N, decimals),
                      row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
                      row.note});
   }

@@ -13,6 +13,7 @@
 #include "analysis/commands/certify/certify_output.h"
 #include "analysis/commands/certify/certify_report.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/shared/output_folder.h"
 #include "lipschitz/certify.h"
 #include "lipschitz/slope_estimate.h"
 #include "nn/base/file_io.h"
@@ -324,6 +325,7 @@ void print_all(const files::Network& network, const CertifyOptions& options, con
 
 int run_certify(CertifyOptions options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
+  refuse_missing_folder(options.output);
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   const files::Network network = read_network(options);

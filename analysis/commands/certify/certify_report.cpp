@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/report/report.h"
@@ -54,13 +55,22 @@ void add_bounds(Report& report, const files::Network& network, const CertifyOutp
       "constant lies between the last two. Logarithmic scale.");
 }
 
+/// An enclosure with eight digits, rounded outwards.
+std::pair<std::string, std::string> outwards(double lower, double upper) {
+  const double unit = std::pow(10, std::floor(std::log10(std::max(upper, 1e-300))) - 7);
+  constexpr double kSlack = 1e-15;  // of the divisions here
+  return {number(std::floor(lower / unit * (1 - kSlack)) * unit, 8),
+          number(std::ceil(upper / unit * (1 + kSlack)) * unit, 8)};
+}
+
 void add_layers(Report& report, const CertifyOutput& output) {
   report.heading("Spectral norms of the layers");
   std::vector<std::vector<std::string>> rows;
   std::vector<Bar> bars;
   for (const CertifiedLayer& layer : output.found.layers) {
     const double lower = layer.norm.norm.lower.value(), upper = layer.norm.norm.upper.value();
-    rows.push_back({layer.network, layer.name, number(lower, 15), number(upper, 15),
+    const auto [at_least, at_most] = outwards(lower, upper);
+    rows.push_back({layer.network, layer.name, at_least, at_most,
                     layer.respects_gamma ? name(*layer.respects_gamma) : "not stated"});
     bars.push_back({layer.network + " " + layer.name, upper, lower, upper});
   }
@@ -80,7 +90,8 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
   const std::string names[] = {coordinate_name(network, output.map.coordinates[0]),
                                coordinate_name(network, output.map.coordinates[1])};
   const auto middle = [](const SlopeCell& cell, std::size_t k) {
-    return (cell.box.lower[k] + cell.box.upper[k]) / 2;
+    const double at = (cell.box.lower[k] + cell.box.upper[k]) / 2;
+    return std::abs(at) < 1e-12 * (cell.box.upper[k] - cell.box.lower[k]) ? 0.0 : at;
   };
   const SlopeCell* steepest = &map.cells.front();
   int local = 0;

@@ -1,7 +1,9 @@
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <memory>
 
+#include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
 #include "analysis/commands/commands.h"
 #include "lipschitz/checker/check.h"
@@ -17,6 +19,9 @@ struct CheckOptions {
 
 int run_check(const CheckOptions& options, const CommonOptions& common) {
   const bool is_in_memory = host() != nullptr && host()->certificate;
+  if (!is_in_memory && std::filesystem::path(options.certificate).extension() == ".toml")
+    throw UsageError("CERTIFICATE " + options.certificate +
+                     ": is a TOML file; the certificate stands first: check cert.json network.toml");
   const files::Json certificate =
       is_in_memory ? files::parse_json(*host()->certificate, options.certificate, check::kCertificateSchema)
                    : files::read_json(options.certificate, check::kCertificateSchema);

@@ -96,13 +96,19 @@ void add_left(Report& report, const Diagnosis& diagnosis, const residuals::Force
   report.paragraph(
       "Smallest sizes that these flights show in 9 of 10 injections (open loop: the flight does not react):");
   std::vector<std::vector<std::string>> rows;
+  const bool all_show =
+      std::all_of(diagnosis.detectable.begin(), diagnosis.detectable.end(),
+                  [](const identification::Detectable& entry) { return std::isfinite(entry.size); });
   for (const identification::Detectable& entry : diagnosis.detectable) {
     const bool shows = std::isfinite(entry.size);
     rows.push_back({entry.effect, entry.parameter,
                     shows ? fmt::format("{:.3g}", entry.size) : "not at any size",
                     shows ? "" : entry.excitation});
+    if (all_show) rows.back().pop_back();
   }
-  report.table({"effect", "number", "size", "what would show it"}, rows);
+  std::vector<std::string> header = {"effect", "number", "size", "what would show it"};
+  if (all_show) header.pop_back();
+  report.table(header, rows);
 }
 
 std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses,

@@ -19,6 +19,24 @@ constexpr std::size_t kShownCurves = 4;
 
 bool is_torque(const ScanEntry& entry) { return entry.quantity == "torque"; }
 
+/// The unit in which a page shows a quantity of that size.
+struct ShownUnit {
+  std::string name;
+  double per_si;
+};
+
+ShownUnit shown_unit(const ScanEntry& entry, const residuals::ForceUnit& force) {
+  if (!is_torque(entry)) return {force.name, force.per_newton()};
+  if (entry.rmse_before < 1e-3) return {"µN m", 1e6};
+  return entry.rmse_before < 1 ? ShownUnit{"mN m", 1e3} : ShownUnit{"N m", 1};
+}
+
+/// "m_s" as "m/s".
+std::string with_slash(std::string unit) {
+  std::replace(unit.begin(), unit.end(), '_', '/');
+  return unit;
+}
+
 std::string words_of(const ScanEntry& entry) {
   return entry.quantity == "rotor_force" ? "force of" : entry.quantity;
 }
@@ -107,9 +125,8 @@ std::string place_of(const ScanEntry& entry) {
 /// @param name of the figure.
 void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
                const residuals::ForceUnit& force) {
-  const double per_unit = is_torque(entry) ? 1 : force.per_newton();
-  const std::string shown =
-      fmt::format("{} {} [{}]", words_of(entry), entry.axis, is_torque(entry) ? "N m" : force.name);
+  const auto [unit_name, per_unit] = shown_unit(entry, force);
+  const std::string shown = fmt::format("{} {} [{}]", words_of(entry), entry.axis, unit_name);
   const bool is_map = entry.curve[0].at.size() == 2;
   std::string data = is_map ? "# at_1 at_2 force\n" : "# at force lower upper\n";
   double last = NAN;
@@ -124,7 +141,7 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
     }
   }
   const std::string unit =
-      entry.variables.empty() ? "m" : identification::scan_variable(entry.variables[0]).unit;
+      entry.variables.empty() ? "m" : with_slash(identification::scan_variable(entry.variables[0]).unit);
   const std::string label = is_map ? "[m]" : entry.variable + (unit.empty() ? "" : " [" + unit + "]");
   std::string script = "set xlabel '" + label + "'\n";
   if (is_map) {
@@ -187,13 +204,15 @@ void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t numbe
   std::vector<std::vector<std::string>> rows;
   for (const Listed& found : entries) {
     const ScanEntry& entry = *found.entry;
-    const double per_unit = is_torque(entry) ? 1 : unit.per_newton();
+    const auto [unit_name, per_unit] = shown_unit(entry, unit);
+    std::string set_points = verdict_of(entry);
+    std::replace(set_points.begin(), set_points.end(), '_', ' ');
     rows.push_back({place_of(entry),
                     fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * entry.share,
                                 100 * entry.share_interval.first, 100 * entry.share_interval.second),
                     fmt::format("{:.4g} -> {:.4g} {}", per_unit * entry.rmse_before,
-                                per_unit * entry.rmse_after, is_torque(entry) ? "N m" : unit.name),
-                    verdict_of(entry)});
+                                per_unit * entry.rmse_after, unit_name),
+                    set_points});
   }
   report.paragraph("What is left varies with:");
   report.table({"what", "share of what is left, 90 %", "RMSE", "set points"}, rows);

@@ -33,7 +33,26 @@ std::string words_of(const Json& list) {
   return words.empty() ? "none" : words;
 }
 
-void add_collections(Report& report, const std::vector<CollectionRow>& rows) {
+/// The folder that all logs lie in, with its slash; empty for one log, and where there is none.
+std::string common_folder(const std::vector<InspectedLog>& logs) {
+  if (logs.size() < 2) return "";
+  std::string common = logs[0].path;
+  for (const InspectedLog& log : logs) {
+    const auto end = std::mismatch(common.begin(), common.end(), log.path.begin(), log.path.end()).first;
+    common.erase(end, common.end());
+  }
+  return common.substr(0, common.rfind('/') == std::string::npos ? 0 : common.rfind('/') + 1);
+}
+
+/// `path` within `folder`; of the folder itself its last name. Long paths would fill narrow screens.
+std::string within(const std::string& folder, const std::string& path) {
+  if (folder.empty()) return path;
+  if (path.compare(0, folder.size(), folder) == 0) return path.substr(folder.size());
+  const bool is_folder = path + "/" == folder && path.find('/') != std::string::npos;
+  return is_folder ? path.substr(path.rfind('/') + 1) : path;
+}
+
+void add_collections(Report& report, const std::vector<CollectionRow>& rows, const std::string& folder) {
   if (rows.empty()) return;
   report.heading("What can be judged");
   Rows table;
@@ -41,7 +60,7 @@ void add_collections(Report& report, const std::vector<CollectionRow>& rows) {
     std::string left_out;
     for (const auto& [why, count] : row.left_out)
       left_out += fmt::format("{}{} {}", left_out.empty() ? "" : "; ", count, why);
-    table.push_back({row.name, std::to_string(row.logs), std::to_string(row.opened),
+    table.push_back({within(folder, row.name), std::to_string(row.logs), std::to_string(row.opened),
                      std::to_string(row.force[0]), std::to_string(row.force[1]), std::to_string(row.force[2]),
                      std::to_string(row.torque), fmt::format("{:.1f}", row.seconds),
                      fmt::format("{:.2f}", row.run_s), left_out});
@@ -51,13 +70,13 @@ void add_collections(Report& report, const std::vector<CollectionRow>& rows) {
                table);
 }
 
-void add_log_list(Report& report, const std::vector<InspectedLog>& logs) {
+void add_log_list(Report& report, const std::vector<InspectedLog>& logs, const std::string& folder) {
   if (logs.size() < 2) return;
   report.heading("Logs");
   Rows table;
   for (const InspectedLog& log : logs) {
     const Json& d = log.described;
-    table.push_back({log.path, text_of(d["format"]), number_of(d["in_the_air_s"], "{:.1f}"),
+    table.push_back({within(folder, log.path), text_of(d["format"]), number_of(d["in_the_air_s"], "{:.1f}"),
                      words_of(d["judged"]["force"]), text_of(d["judged_torque"]), text_of(d["no_flight"])});
   }
   report.table({"log", "format", "in the air [s]", "force", "torque", "no flight"}, table);
@@ -149,11 +168,13 @@ std::string write_inspect_report(const std::vector<InspectedLog>& logs,
   Report report("Flight logs");
   report.made_by(command_to_copy());
   report.result(result);
-  add_collections(report, rows);
-  add_log_list(report, logs);
+  const std::string common = common_folder(logs);
+  if (!common.empty()) report.paragraph("Logs in " + common);
+  add_collections(report, rows, common);
+  add_log_list(report, logs, common);
   for (std::size_t i = 0; i < logs.size() && i < kMostLogs; ++i) {
     const Json& d = logs[i].described;
-    report.heading(logs[i].path);
+    report.heading(within(common, logs[i].path));
     report.paragraph(
         fmt::format("{}, {} records from {:.2f} to {:.2f} s, {:.1f} s in the air.{}", text_of(d["format"]),
                     text_of(d["records"]), d["t0_s"].get<double>(), d["t1_s"].get<double>(),

@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "analysis/commands/shared/time_plots.h"
+#include "analysis/report/report_drawing.h"
 #include "analysis/report/report_text.h"
 
 namespace swarmcert::analysis {
@@ -13,8 +15,14 @@ namespace {
 using identification::EffectCurve;
 using identification::RoomMap;
 
-/// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after).
-std::string two_maps(const std::string& name, const std::string& x, const std::string& y,
+/// Lengths of the map's axes.
+struct MapSize {
+  double x, y;
+};
+
+/// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after). On narrow screens they
+/// stand above each other, on a drawing of twice the height.
+std::string two_maps(const std::string& name, const std::string& x, const std::string& y, const MapSize& size,
                      const residuals::ForceUnit& unit) {
   const std::string file = "'" + name + ".dat'";
   return "stats " + file + " using 3 nooutput\nlow = STATS_min; high = STATS_max\nstats " + file +
@@ -22,9 +30,11 @@ std::string two_maps(const std::string& name, const std::string& x, const std::s
          "high = STATS_max > high ? STATS_max : high\nm = -low > high ? -low : high\n"
          "set cbrange [-(m > 0 ? m : 1):(m > 0 ? m : 1)]\nset palette @signed_colours\nset key off\n"
          "set xlabel '" +
-         x + "'\nset ylabel '" + y + "'\nset xtics rotate by -45\nset cblabel 'mean vertical residual [" +
-         unit.name +
-         "]'\nif (exists('narrow')) { set multiplot layout 2,1 } else { set multiplot layout 1,2 }\n"
+         x + "'\nset ylabel '" + y +
+         fmt::format("'\nset xtics {:g}\nset ytics {:g}\nset cblabel 'mean vertical residual [{}]'\n",
+                     tick_step(size.x), tick_step(size.y), unit.name) +
+         "if (exists('narrow')) { set terminal svg size 400,680 dynamic noenhanced font 'sans-serif,13'; "
+         "set multiplot layout 2,1 } else { set multiplot layout 1,2 }\n"
          "set title 'before'\nplot " +
          file + " using 1:2:3 with image\nset title 'after'\nplot " + file +
          " using 1:2:4 with image\nunset multiplot\n";
@@ -48,7 +58,9 @@ void add_room(Report& report, const RoomMap& map, const residuals::ForceUnit& un
     }
     data += "\n";
   }
-  report.figure("room", data, two_maps("room", "x [m]", "y [m]", unit),
+  report.figure("room", data,
+                two_maps("room", "x [m]", "y [m]",
+                         {RoomMap::kCells * map.step_m[0], RoomMap::kCells * map.step_m[1]}, unit),
                 "Mean vertical residual over the place in the room, before and after, on one colour scale; "
                 "cells of fewer than 20 records are empty.");
 }
@@ -76,7 +88,8 @@ void add_neighbours(Report& report, const residuals::NeighbourMap& before,
   if (!any) return;
   report.figure(
       "neighbours", data,
-      two_maps("neighbours", "lateral distance [m]", "height of the neighbour above [m]", unit),
+      two_maps("neighbours", "lateral distance [m]", "height of the neighbour above [m]",
+               {Map::kLateral * Map::kLateralStep_m, Map::kHeights * Map::kHeightStep_m}, unit),
       "Mean vertical residual over the place of the laterally nearest neighbour, before and after, on "
       "one colour scale.");
 }
@@ -128,18 +141,24 @@ void add_effect_curves(Report& report, const std::vector<EffectCurve>& effects,
   std::size_t number = 0;
   for (const EffectCurve& curve : effects) {
     std::string data = "# predicted measured standard_error records\n";
-    for (const EffectCurve::Point& point : curve.points)
+    double least = INFINITY, most = -INFINITY;
+    for (const EffectCurve::Point& point : curve.points) {
+      least = std::min(least, point.predicted_N * unit.per_newton());
+      most = std::max(most, point.predicted_N * unit.per_newton());
       data +=
           fmt::format("{:.6g} {:.6g} {:.6g} {}\n", point.predicted_N * unit.per_newton(),
                       point.measured_N * unit.per_newton(), point.error_N * unit.per_newton(), point.records);
+    }
     const std::string name = fmt::format("effect_{}", ++number);
     report.figure(
         name, data,
         fmt::format(
-            "set xlabel {0}\nset ylabel {1}\nset key top left\nplot x title 'the fitted formula' "
+            "set xlabel {0}\nset ylabel {1}\nif (exists('narrow')) {{ set xtics {3:g} }}\nset key top left\n"
+            "plot x title 'the fitted formula' "
             "linecolor 'gray', '{2}.dat' using 1:2:(1.645*$3) with yerrorbars title 'measured, 90 %'\n",
             plot_string(fmt::format("{} as fitted, along {} [{}]", curve.effect, curve.axis, unit.name)),
-            plot_string(fmt::format("measured without it [{}]", unit.name)), name),
+            plot_string(fmt::format("measured without it [{}]", unit.name)), name,
+            2 * tick_step(most - least)),
         "Effect " + curve.effect +
             ": what was measured where the model has every effect but this one, over what this one "
             "predicts. Points on the line confirm the fit.");

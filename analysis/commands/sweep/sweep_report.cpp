@@ -114,6 +114,7 @@ void add_plane(Report& report, const MergedSweep& sweep, std::size_t quantity) {
     if (is_geometric(sweep.axis_values[axes[1]])) script += "set logscale y\n";
     script += "set ylabel " + plot_string(sweep.axis_names[axes[1]]) + "\nset cblabel " + plot_string(label) +
               "\nset view map\nset pm3d map corners2color c1\n"
+              "if (exists('narrow')) { set lmargin at screen 0.17 }\n"
               "splot '" +
               file + ".dat' using 1:2:3 with pm3d\n";
   } else {
