@@ -62,6 +62,17 @@ def test_flights_given_as_arrays_are_judged_as_their_files(flights):
     assert len(swarmcert.residuals(MODEL, logs[0])) == 2
 
 
+def test_flights_of_options_may_be_arrays_too(flights, tmp_path):
+    logs = [{v: swarmcert.read(flights / run / f"{v}_00") for v in ("cf1", "cf2")} for run in "123"]
+    given = swarmcert.diagnose(MODEL, logs[:2], against=logs[2])
+    files = swarmcert.diagnose(MODEL, [flights / "1", flights / "2"], against=flights / "3")
+    assert given.code == files.code and len(given.against["vehicles"]) == len(files.against["vehicles"]) > 0
+    for ours, theirs in zip(given.against["vehicles"], files.against["vehicles"]):
+        assert [h["effect"] for h in ours["held"]] == [h["effect"] for h in theirs["held"]]
+    with pytest.raises(swarmcert.UsageError, match="no option select"):
+        swarmcert.compare(MODEL, logs[:2], select=logs[2])
+
+
 def test_arrays_of_another_shape_or_name_are_refused(flights):
     log = dict(swarmcert.read(flights / "1/cf1_00"))
     with pytest.raises(swarmcert.InputError) as caught:

@@ -11,6 +11,7 @@ Path = Union[str, "os.PathLike[str]"]
 Progress = Callable[[int, int, str], None]
 
 _OPTIONS: Dict[str, Dict[str, bool]] = _core.options()
+_FLIGHT_OPTIONS = ("select", "test", "against")
 
 
 def _text(value: Any) -> str:
@@ -133,15 +134,23 @@ def check(certificate: Any, net: Any, *, order: Any = (), description: Optional[
 def _flights(
     command: str, models: Sequence[Any], flights: Any, options: Dict[str, Any], progress: Optional[Progress]
 ) -> Result:
-    """Flights are a path, a mapping, or a list of these."""
-    if isinstance(flights, (str, os.PathLike)) or hasattr(flights, "keys"):
-        flights = [flights]
-    with _logs.Written(list(flights)) as written:
+    """Flights are a path, a mapping, or a list of these; so are those of the options that name flights."""
+
+    def listed(given: Any) -> List[Any]:
+        return [given] if isinstance(given, (str, os.PathLike)) or hasattr(given, "keys") else list(given)
+
+    groups = {key: listed(options[key]) for key in _FLIGHT_OPTIONS if options.get(key) is not None}
+    flights = listed(flights)
+    with _logs.Written(flights + [flight for group in groups.values() for flight in group]) as written:
+        first = len(flights)
+        for key, group in groups.items():
+            options = {**options, key: written.words[first : first + len(group)]}
+            first += len(group)
         if written.columns:
             if options.get("columns") is not None:
                 raise UsageError("columns goes with files, and there are flights given as arrays")
             options = {**options, "columns": written.columns}
-        return _run(command, [*models, *written.words], options, progress)
+        return _run(command, [*models, *written.words[: len(flights)]], options, progress)
 
 
 def _models(model: Any) -> List[Any]:
@@ -156,7 +165,8 @@ def compare(model: Any, flights: Any, *, progress: Optional[Progress] = None, **
     Args:
         model: path of a model.toml, a list of them, or None for known vehicles.
         flights: paths of logs or folders; or arrays: a dict as Log has it, or {"cf1": ..., "cf2": ...} for the vehicles
-            of one flight; or a list of these, one per flight. Arrays are handed over in temporary files.
+            of one flight; or a list of these, one per flight. Arrays are handed over in temporary files. The options
+            select, test and against, where a command has them, take the same.
         options: those of `swarmcert compare --help`.
 
     Returns:
