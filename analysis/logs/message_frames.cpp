@@ -191,6 +191,16 @@ void add_ardupilot(RawTopic& topic, const std::map<std::string, double>& paramet
   }
 }
 
+/// Whether no column but the clocks ever changes.
+bool is_constant(const RawTopic& topic) {
+  return std::all_of(topic.columns.begin(), topic.columns.end(), [](const RawColumn& column) {
+    return column.name.find("timestamp") != std::string::npos ||
+           std::all_of(column.values.begin(), column.values.end(), [&](double value) {
+             return value == column.values[0] || (std::isnan(value) && std::isnan(column.values[0]));
+           });
+  });
+}
+
 /// Whether any topic of that name has a record whose `column` holds `holds`; nothing where there is no such column.
 Armed any_record(const RawLog& log, const std::string& message, const std::string& column,
                  const std::function<bool(double)>& holds) {
@@ -207,19 +217,21 @@ Armed any_record(const RawLog& log, const std::string& message, const std::strin
 }  // namespace
 
 void add_own_names(RawLog& log) {
-  // The first instance of a message is the one in use; others would be taken where the first lacks a column.
-  std::map<std::string, int> lowest;
+  // The first instance of a message is the one in use; others would be taken where the first lacks a column. One that says
+  // the same from end to end is none: a battery that is not there, outputs without motors.
+  std::map<std::string, std::pair<bool, int>> first;  // whether it is constant, and its number
   for (const RawTopic& topic : log.topics) {
-    const auto [known, is_new] = lowest.emplace(message_of(topic), topic.instance);
-    if (!is_new) known->second = std::min(known->second, topic.instance);
+    const std::pair<bool, int> instance = {is_constant(topic), topic.instance};
+    const auto [known, is_new] = first.emplace(message_of(topic), instance);
+    if (!is_new) known->second = std::min(known->second, instance);
   }
   const bool is_ardupilot = log.format.find("ardupilot") != std::string::npos;
   for (RawTopic& topic : log.topics) {
     const std::string message = message_of(topic);
-    if (topic.instance != lowest[message]) continue;
+    if (topic.instance != first[message].second) continue;
     if (is_ardupilot)
       add_ardupilot(topic, log.parameters);
-    else if (message == "actuator_outputs" && lowest.count("actuator_motors") != 0)
+    else if (message == "actuator_outputs" && first.count("actuator_motors") != 0)
       continue;  // the same commands after their scaling to servo signals
     else if (log.format == "ulog" || topic.type.rfind("px4_msgs", 0) == 0)
       add_px4(topic, message);

@@ -7,7 +7,7 @@ namespace swarmcert::logs {
 
 /// Adds columns named position_x, attitude_w, motor_command_1, ... to the topics of PX4 (ULog, px4_msgs in ROS) and
 /// ArduPilot that carry these signals. NED and FRD become z up and FLU: (x, -y, -z), q = (w, x, -y, -z).
-/// Of several instances of a message the first counts.
+/// Of several instances of a message the first counts that is not constant.
 void add_own_names(RawLog& log);
 
 /// Adds events "landed" to `log`, on the clock of `raw`: when PX4's land detector says so.

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "analysis/logs/formats/formats.h"
+#include "analysis/logs/interpretation.h"
 #include "analysis/logs/log.h"
 #include "analysis/logs/read_log.h"
 #include "data.h"
@@ -105,6 +106,46 @@ TEST(ForeignLogs, ATwistWithoutPositionsIsTakenInTheWorldAndSaysSo) {
   const logs::Log log = turned_flight(true, false);
   ASSERT_FALSE(log.interpretation.empty());
   EXPECT_NE(log.interpretation[0].find("nothing can tell"), std::string::npos) << log.interpretation[0];
+}
+
+/// A topic of a PX4 log at 50 Hz for 4 s; `value` gives column c at record k.
+logs::RawTopic px4_topic(const std::string& name, int instance, const std::vector<std::string>& columns,
+                         const std::function<double(std::size_t c, int k)>& value) {
+  logs::RawTopic topic;
+  topic.name = topic.type = name;
+  topic.instance = instance;
+  for (int k = 0; k < 200; ++k) topic.time_s.push_back(10 + 0.02 * k);
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    topic.columns.push_back({columns[c], "", {}});
+    for (int k = 0; k < 200; ++k) topic.columns.back().values.push_back(value(c, k));
+  }
+  return topic;
+}
+
+/// A battery that is not there and outputs without motors come first, as on boards with two power ports and an IO chip.
+TEST(ForeignLogs, OfSeveralInstancesTheFirstThatChangesIsInUse) {
+  logs::RawLog raw;
+  raw.path = "flight.ulg";
+  raw.format = "ulog";
+  const std::vector<std::string> outputs = {"timestamp", "output[0]", "output[1]", "output[2]", "output[3]"};
+  raw.topics = {
+      px4_topic("battery_status", 0, {"timestamp", "voltage_v"},
+                [](std::size_t c, int k) { return c == 0 ? k : 0; }),
+      px4_topic("battery_status", 1, {"timestamp", "voltage_v"},
+                [](std::size_t c, int k) { return c == 0 ? k : 16 - 0.001 * k; }),
+      px4_topic("actuator_outputs", 0, outputs, [](std::size_t c, int k) { return c == 0 ? k : 900; }),
+      px4_topic(
+          "actuator_outputs", 1, outputs,
+          [](std::size_t c, int k) { return c == 0 ? k : 1400 + 10.0 * static_cast<double>(c) + k % 3; }),
+      px4_topic("vehicle_local_position", 0, {"x", "y", "z", "vx", "vy", "vz"}, [](std::size_t c, int k) {
+        return c == 2 ? -1.5 : c == 0 ? 0.01 * k : c == 3 ? 0.5 : 0;
+      })};
+  const logs::Log log = logs::interpret(raw, logs::known_columns());
+  EXPECT_EQ(log.signals.motor_commands, 4);
+  ASSERT_EQ(log.samples.size(), 200u);
+  EXPECT_NEAR(log.samples[100].battery_V, 15.9, 1e-9);
+  EXPECT_NEAR(log.samples[100].motor_command[3], 0.441, 1e-6);
+  EXPECT_NEAR(log.samples[100].position_m[2], 1.5, 1e-12);
 }
 
 /// Formats, units and multipliers as ArduPilot's releases from 4.1 on define them (libraries/*/LogStructure.h).
