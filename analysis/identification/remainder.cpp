@@ -34,6 +34,8 @@ Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpe
     if (std::isfinite(ratio)) result.ratio = std::max(result.ratio, ratio);
   }
   result.flag = result.ratio > kFlagRatio;
+  const double total_N = left.overall.statistics.rmse.total;
+  result.excess_N2 = std::max(total_N * total_N - left.overall.noise_floor_N.squaredNorm(), 0.0);
   if (!result.flag) return result;
   std::array<double, residuals::kNumVariables> shares{};
   for (const residuals::RegionErrors& region : left.regions)

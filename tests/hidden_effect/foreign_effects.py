@@ -111,6 +111,42 @@ def weak_cells(knee=3.95, slope=0.6):
     return lambda s, k, f: f * (1 - slope * max(0.0, knee - s.battery))
 
 
+def platform(a=0.06, from_x=0.1, top=0.4, reach=0.15):
+    return lambda s: (0, 0, a * math.exp(-(max(s.p[2], top) - top) / reach) if s.p[0] > from_x else 0)
+
+
+def turning_wind(a=0.02, rate=0.25):
+    return lambda s: (a * math.cos(rate * s.t), a * math.sin(rate * s.t), 0)
+
+
+def icing(share=0.12, after=12.0):
+    return lambda s, k, f: f * (1 - share * (1 - math.exp(-s.t / after)))
+
+
+def dead_band(k=0.12, free=0.35):
+    return lambda s: (-k * math.copysign(max(abs(s.p[0]) - free, 0), s.p[0]), 0, 0)
+
+
+def thick_air(k=0.06, from_z=0.7):
+    return lambda s: tuple(-k * max(s.p[2] - from_z, 0) * v for v in s.v)
+
+
+def sideslip(k=0.03):
+    return lambda s: tuple(k * s.to_body(s.v)[0] * s.R[i][2] for i in range(3))
+
+
+def tilt_loss(k=0.9):
+    return lambda s: (0, 0, -k * (1 - s.R[2][2]))
+
+
+def lane(a=0.02, middle=0.1, width=0.08):
+    return lambda s: (0, -a * math.tanh((s.p[1] - middle) / width), 0)
+
+
+def slow_drain(a=0.04, at=15.0, width=2.0):
+    return lambda s: (0, 0, -a / (1 + math.exp(-(s.t - at) / width)))
+
+
 EFFECTS = {
     "thermal": dict(force=column(), variables={"xy"}, names={"wind_field"}, formula=expression(
         "force_z_N", "a_N * exp(-((x - 0.2)^2 + (y + 0.1)^2) / (2 * w_m^2))", a_N=0.03, w_m=0.25)),
@@ -144,4 +180,13 @@ EFFECTS = {
         "force_z_N", "a_N * max(0, z - 0.6)", a_N=-0.035)),
     "weak cells": dict(rotor=weak_cells(), variables={"battery", "time", "thrust"}, names={"battery", "voltage_sag"},
                        discharge_V_s=0.012),
+    "platform": dict(force=platform(), variables={"z", "x", "xy"}, names={"ground"}),
+    "turning wind": dict(force=turning_wind(), variables={"time"}),
+    "icing": dict(rotor=icing(), variables={"time", "battery", "thrust"}, names={"battery", "thrust_ratio"}),
+    "dead band": dict(force=dead_band(), variables={"x", "xy"}, names={"tether"}),
+    "thick air": dict(force=thick_air(), variables={"vx", "vy", "vz", "z"}, names={"drag_linear", "drag_rotor"}),
+    "sideslip": dict(force=sideslip(), variables={"vx"}),
+    "tilt loss": dict(force=tilt_loss(), variables={"tilt"}, speed=1.6),
+    "lane": dict(force=lane(), variables={"y", "xy"}),
+    "slow drain": dict(force=slow_drain(), variables={"time", "battery"}, names={"payload_step"}),
 }

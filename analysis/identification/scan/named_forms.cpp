@@ -202,6 +202,13 @@ bool needs_scan(const std::string& effect) {
                      [&](const NamedForm& form) { return effect == form.effect; });
 }
 
+bool points_to(const std::string& variable, const std::string& effect) {
+  return std::any_of(all_forms().begin(), all_forms().end(), [&](const NamedForm& form) {
+    return effect == form.effect &&
+           std::find(form.variables.begin(), form.variables.end(), variable) != form.variables.end();
+  });
+}
+
 std::vector<Candidate> named_forms(const std::vector<Formula>& formulas, const stability::Model& model,
                                    const Coverage& coverage) {
   std::vector<Candidate> all;

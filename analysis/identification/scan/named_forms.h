@@ -16,6 +16,9 @@ namespace swarmcert::identification {
 /// True for effects that are candidates by named_forms() only.
 bool needs_scan(const std::string& effect);
 
+/// True if formulas over this variable of the scan make `effect` a candidate.
+bool points_to(const std::string& variable, const std::string& effect);
+
 /// Candidates that `formulas` point to, in their order, each effect once for every formula that points to it with
 /// another shape. Effects that `model` has are left out.
 std::vector<Candidate> named_forms(const std::vector<Formula>& formulas, const stability::Model& model,

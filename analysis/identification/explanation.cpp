@@ -1,0 +1,250 @@
+#include "analysis/identification/explanation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "analysis/identification/closed_loop.h"
+#include "analysis/identification/scan/named_forms.h"
+#include "nn/base/doubles.h"
+#include "stability/effects/registry.h"
+
+namespace swarmcert::identification {
+namespace {
+
+/// Names whose shape ended at a bound of its parameters, other than where it starts: what they fit is something else.
+/// Effects of neighbours act where neighbours are, which nothing else does: their shapes may end anywhere.
+std::set<std::string> out_of_bounds(const Selected& selected) {
+  std::set<std::string> names;
+  for (const Refined& refined : selected.refined) {
+    const stability::EffectInfo& info = refined.candidate.info;
+    if (info.remembers || info.needs_neighbours || is_formula(refined.candidate.name)) continue;
+    for (std::size_t i = 0; i < refined.theta.size(); ++i) {
+      const stability::Parameter& p = info.shape[i];
+      if (p.grid.empty() || !(p.lower < p.upper)) continue;
+      const bool at_lower = refined.theta[i] <= p.lower && p.value > p.lower;
+      const bool at_upper = refined.theta[i] >= p.upper && p.value < p.upper;
+      if (at_lower || at_upper) names.insert(refined.candidate.name);
+    }
+  }
+  return names;
+}
+
+/// @param rivals that compete with the names that are always candidates
+/// @param start effects where selection begins
+Settled settle(const Passes& passes, const Coverage& covered, const std::vector<Candidate>& rivals,
+               const std::vector<std::string>& start) {
+  constexpr int kMostRounds = 8;
+  std::vector<Candidate> candidates = all_candidates(*passes.inputs.model_of(passes.kind), covered);
+  candidates.insert(candidates.end(), rivals.begin(), rivals.end());
+  Settled result;
+  bool doubts_slope = false;
+  for (int round = 0; round < kMostRounds; ++round) {
+    result.selected =
+        doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
+    std::set<std::string> doubtful = out_of_bounds(result.selected);
+    doubtful.merge(unconfirmed_loads(result.selected));
+    if (!doubtful.empty() && round + 1 < kMostRounds) {
+      result.suspected.insert(result.suspected.end(), doubtful.begin(), doubtful.end());
+      erase(candidates, doubtful);
+      continue;
+    }
+    result.ranking = ranking_of(passes, result.selected);
+    result.rest = remainder(passes, specs_of(result.ranking));
+    if (result.rest.ratio <= kLoudRatio) break;
+    std::set<std::string> names = suspects(result.selected);
+    if (names.empty()) break;
+    const bool has_scale = std::any_of(names.begin(), names.end(), is_scale);
+    if (has_scale && !doubts_slope && has_vertical_push(result.selected.refined)) {
+      doubts_slope = true;
+      continue;
+    }
+    if (has_scale) doubts_slope = false;
+    result.suspected.insert(result.suspected.end(), names.begin(), names.end());
+    erase(candidates, with_substitutes(names, result.selected.refined));
+  }
+  return result;
+}
+
+bool is_named(const Missing& missing) { return !is_formula(missing.effect); }
+
+/// What the model leaves without any name.
+struct Nominal {
+  ScanSamples samples;
+  Scan scan;
+};
+
+/// Formulas for what the model leaves, and for what it leaves beside the names: those that may take a name's place.
+/// @param nominal null where nothing has a name
+std::vector<Formula> rivals_of_names(const Passes& passes, const Explained& explained,
+                                     const Nominal* nominal) {
+  constexpr std::size_t kOfEach = 3;
+  std::vector<Formula> rivals;
+  const auto add = [&](const std::vector<Formula>& formulas) {
+    for (std::size_t i = 0; i < std::min(kOfEach, formulas.size()); ++i) {
+      const bool is_known = std::any_of(rivals.begin(), rivals.end(), [&](const Formula& other) {
+        return other.effect.name == formulas[i].effect.name;
+      });
+      if (!is_known) rivals.push_back(formulas[i]);
+    }
+  };
+  if (nominal != nullptr) add(find_formulas(nominal->samples, nominal->scan, kOfEach, passes.jobs));
+  add(explained.formulas);
+  return rivals;
+}
+
+void scan_what_is_left(const Passes& passes, Explained& explained) {
+  const ScanSamples left = scan_samples(passes, specs_of(explained.settled.ranking));
+  explained.scan = scan(left, passes.jobs);
+  explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
+}
+
+bool is_answer_of_thrust(const Missing& missing) {
+  const std::vector<std::string> library = stability::effect_names();
+  if (std::find(library.begin(), library.end(), missing.effect) == library.end()) return false;
+  const stability::EffectInfo& info = stability::effect_info(missing.effect);
+  return info.remembers || is_scale(missing.effect) || is_of_load(missing.effect) ||
+         missing.effect == "inflow";
+}
+
+/// Mean square that a name takes away, N^2.
+double taken_N2(const Missing& missing) {
+  const Finding& finding = missing.finding;
+  return finding.rmse_before_N * finding.rmse_before_N - finding.rmse_after_N * finding.rmse_after_N;
+}
+
+/// Whether a name may be the mean, or the edge, of something else: a force of a place or a moment, which few vehicles
+/// meet, and a share of the thrust of less than two percent of the weight. Every vehicle has drag and a lag.
+bool may_be_part(const Missing& missing, double weight_N) {
+  constexpr double kSmall = 0.02;
+  const std::string& effect = missing.effect;
+  if (effect == "thrust_ratio" || effect == "constant_force")
+    return taken_N2(missing) < kSmall * weight_N * (kSmall * weight_N);
+  return needs_scan(effect) || effect == "ground" || effect == "ceiling";
+}
+
+/// Whether a name is no match for what is left beside it.
+bool is_doubtful(const Missing& missing, const Explained& explained, double weight_N) {
+  constexpr double kMost = 0.5, kOfSameVariable = 0.5;
+  const double taken = taken_N2(missing);
+  const Remainder& rest = explained.settled.rest;
+  if (rest.flag && may_be_part(missing, weight_N) && taken < rest.excess_N2) return true;
+  if (explained.scan.entries.empty() || explained.scan.entries[0].share < kMost) return false;
+  const ScanEntry& first = explained.scan.entries[0];
+  const double left = first.rmse_before * first.rmse_before - first.rmse_after * first.rmse_after;
+  // Where one variable explains most of what is left, thrust and its history answer it.
+  if (is_answer_of_thrust(missing) && taken <= left) return true;
+  // A name that varies with this variable has not its form.
+  return points_to(first.variable, missing.effect) && kOfSameVariable * taken < left;
+}
+
+void drop_doubtful_names(const Passes& passes, Explained& explained) {
+  const double weight_N = passes.inputs.model_of(passes.kind)->weight_N();
+  std::vector<Missing>& ranking = explained.settled.ranking;
+  const auto doubtful = std::stable_partition(ranking.begin(), ranking.end(), [&](const Missing& missing) {
+    return !is_doubtful(missing, explained, weight_N);
+  });
+  if (doubtful == ranking.end()) return;
+  for (auto it = doubtful; it != ranking.end(); ++it) explained.settled.suspected.push_back(it->effect);
+  ranking.erase(doubtful, ranking.end());
+  explained.settled.rest = remainder(passes, specs_of(ranking));
+  scan_what_is_left(passes, explained);
+}
+
+/// A scale of the thrust that halves the error. Where thrust hardly varies, formulas of anything can say the same.
+bool has_plain_scale(const std::vector<Missing>& ranking) {
+  constexpr double kHalf = 0.5;
+  return std::any_of(ranking.begin(), ranking.end(), [](const Missing& missing) {
+    return is_scale(missing.effect) && missing.finding.rmse_after_N <= kHalf * missing.finding.rmse_before_N;
+  });
+}
+
+/// The battery's share vanishes where the battery is full.
+bool is_only_thrust_ratio(const std::vector<Missing>& ranking) {
+  return std::all_of(ranking.begin(), ranking.end(), [](const Missing& missing) {
+    return !is_scale(missing.effect) || missing.effect == "thrust_ratio";
+  });
+}
+
+/// A scale of the thrust acts wherever thrust does. Over a variable that explains most of what the model leaves, a force
+/// of one sign that vanishes somewhere, such as at rest, is therefore something else.
+bool vanishes_somewhere(const Nominal& nominal) {
+  constexpr double kMost = 0.5, kNothing = 0.15;  // of the variance; of the mean
+  return std::any_of(nominal.scan.entries.begin(), nominal.scan.entries.end(), [&](const ScanEntry& entry) {
+    if (entry.share < kMost || entry.curve.empty() || entry.axis != "z") return false;
+    const double mean = nominal.samples.residual.col(entry.column).mean();
+    double least = kInfinity, width = 0;
+    for (const CurvePoint& point : entry.curve) {
+      const double share = point.value / mean;
+      if (share >= least) continue;
+      least = share;
+      width = (point.interval.second - point.interval.first) / std::abs(mean);
+    }
+    return std::abs(least) < kNothing && width < 2 * kNothing;
+  });
+}
+
+/// settle() without formulas that only take back what a scale of the thrust says too much.
+Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std::vector<Candidate> rivals,
+                             const std::vector<std::string>& names) {
+  constexpr int kMostRounds = 4;
+  Settled result = settle(passes, covered, rivals, names);
+  for (int round = 1; round < kMostRounds; ++round) {
+    const std::set<std::string> substitutes = substitutes_of_scales(result.selected);
+    if (substitutes.empty()) break;
+    erase(rivals, substitutes);
+    result = settle(passes, covered, rivals, names);
+  }
+  return result;
+}
+
+/// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
+/// selection is done anew with them among the candidates, and they are what is left. Names that only formulas point to
+/// take part as well.
+Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
+  constexpr double kClearlyLess = 0.9, kMuchLess = 0.7;  // of the mean square: names are worth a little
+  Explained result;
+  result.settled = settle(passes, covered, {}, {});
+  scan_what_is_left(passes, result);
+  std::optional<Nominal> nominal;
+  if (!result.settled.ranking.empty()) {
+    nominal.emplace(Nominal{scan_samples(passes, {}), {}});
+    nominal->scan = scan(nominal->samples, passes.jobs);
+  }
+  const std::vector<Formula> formulas = rivals_of_names(passes, result, nominal ? &*nominal : nullptr);
+  const stability::Model& model = *passes.inputs.model_of(passes.kind);
+  std::vector<Candidate> rivals = named_forms(formulas, model, covered);
+  if (rivals.empty() && (formulas.empty() || result.settled.ranking.empty())) return result;
+  for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
+  std::vector<std::string> names;
+  for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);
+  Settled again = settle_with_formulas(passes, covered, rivals, names);
+  const auto is_known = [](const Missing& missing) {
+    return is_named(missing) && !needs_scan(missing.effect);
+  };
+  if (std::all_of(again.ranking.begin(), again.ranking.end(), is_known)) return result;
+  const double left = Selection(again.selected.grams).mean_square(again.selected.members);
+  const Selection by_names(result.settled.selected.grams);
+  const double left_by_names = by_names.mean_square(result.settled.selected.members);
+  if (!(left < kClearlyLess * left_by_names)) return result;
+  const bool loses_scale = has_plain_scale(result.settled.ranking) && !has_plain_scale(again.ranking);
+  const bool is_other = is_only_thrust_ratio(result.settled.ranking) || left < kMuchLess * left_by_names;
+  if (loses_scale && !(is_other && vanishes_somewhere(*nominal))) return result;
+  again.ranking.erase(std::stable_partition(again.ranking.begin(), again.ranking.end(), is_named),
+                      again.ranking.end());
+  again.rest = remainder(passes, specs_of(again.ranking));
+  result.settled = std::move(again);
+  scan_what_is_left(passes, result);
+  return result;
+}
+
+}  // namespace
+
+Explained explain(const Passes& passes, const Coverage& covered) {
+  Explained explained = explain_by_formulas(passes, covered);
+  drop_doubtful_names(passes, explained);
+  return explained;
+}
+
+}  // namespace swarmcert::identification

@@ -1,0 +1,67 @@
+#include "analysis/identification/missing.h"
+
+#include <algorithm>
+#include <set>
+
+#include "stability/effects/registry.h"
+
+namespace swarmcert::identification {
+namespace {
+
+Missing missing_of(const Passes& passes, const Refined& refined, Finding finding, const Grams& grams) {
+  const Candidate& candidate = refined.candidate;
+  Missing missing;
+  missing.effect = candidate.name;
+  missing.equivalence_class = candidate.info.equivalence_class;
+  missing.kind = passes.kind;
+  missing.excitation = candidate.info.excitation;
+  for (std::size_t c = 0; c < refined.coefficients.size(); ++c) {
+    const std::string& name = candidate.info.linear[c].name;
+    missing.coefficients.push_back(name);
+    missing.parameters[name] = refined.coefficients[c];
+    missing.intervals[name] = refined.linear_intervals[c];
+  }
+  for (std::size_t i = 0; i < refined.theta.size(); ++i) {
+    const std::string& name = candidate.info.shape[i].name;
+    missing.parameters[name] = refined.theta[i];
+    const Interval& interval = refined.shape_intervals[i];
+    if (interval.first < interval.second) missing.intervals[name] = interval;
+  }
+  missing.specs = specs_of(candidate, refined.coefficients, refined.theta, refined.linear_intervals,
+                           refined.shape_intervals);
+  std::set<int> flights;
+  for (const Block& block : grams.blocks) flights.insert(block.flight);
+  for (stability::EffectSpec& spec : missing.specs) {
+    spec.fit = {{}, spec.fit.interval, 0, 0, 0, ""};
+    for (const int flight : flights)
+      spec.fit.flights.push_back(passes.inputs.found.flights[static_cast<std::size_t>(flight)].name);
+  }
+  missing.finding = std::move(finding);
+  return missing;
+}
+
+}  // namespace
+
+std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) {
+  std::vector<Finding> known = findings(Selection(selected.grams), selected.members);
+  std::vector<Missing> ranking;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const std::string& name = selected.refined[i].candidate.name;
+    const std::vector<std::string> rivals = known[i].confounded_with();
+    const bool has_substitute = !selected.instead.empty() && (is_scale(name) || name == "constant_force");
+    if (has_substitute && name != selected.instead &&
+        std::find(rivals.begin(), rivals.end(), selected.instead) == rivals.end())
+      known[i].rivals.push_back({selected.instead, stability::effect_info(selected.instead).excitation});
+    ranking.push_back(missing_of(passes, selected.refined[i], std::move(known[i]), selected.grams));
+    if (!selected.checks.empty()) ranking.back().instrument = selected.checks[i];
+  }
+  return ranking;
+}
+
+std::vector<stability::EffectSpec> specs_of(const std::vector<Missing>& missing) {
+  std::vector<stability::EffectSpec> specs;
+  for (const Missing& m : missing) specs.insert(specs.end(), m.specs.begin(), m.specs.end());
+  return specs;
+}
+
+}  // namespace swarmcert::identification
