@@ -194,114 +194,168 @@ Split split_flights(const residuals::Inputs& inputs) {
   return split;
 }
 
+namespace {
+
+/// Tries effects one after the other, and keeps those that lower the error of the selecting flights.
+class Climb {
+ public:
+  Climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
+        const residuals::Progress& progress, Ladder& ladder)
+      : inputs_(inputs),
+        kind_(inputs.models[0].kind),
+        keeps_anyway_(options.keep_anyway),
+        jobs_(jobs),
+        progress_(progress),
+        ladder_(ladder),
+        wanted_(options.effects) {
+    if (options.automatic) add_missing();
+    working_ = with_formulas_off(inputs, wanted_);
+    trials_.push_back(trial("nominal", inputs.models[0]));
+  }
+
+  void run() {
+    for (const std::string& asked : wanted_) attempt(asked);
+    finish();
+  }
+
+ private:
+  Trial& best() { return trials_[best_]; }
+
+  void add_missing() {
+    for (const Missing& missing : missing_effects(inputs_, kind_, ladder_.split.fit, jobs_, progress_)) {
+      const bool each = !missing.specs.empty() && !missing.specs[0].vehicle.empty();
+      wanted_.push_back(each ? kVehicleOffset : missing.effect);
+    }
+  }
+
+  Trial trial(const std::string& effect, stability::Model model) const {
+    Trial next{{}, std::move(model)};
+    next.row.effect = effect;
+    next.row.fit_rmse_N = rmse(inputs_, next.model, ladder_.split.fit, jobs_);
+    next.row.select_rmse_N = rmse(inputs_, next.model, ladder_.split.select, jobs_);
+    next.row.values = values_of(next.model);
+    return next;
+  }
+
+  /// A row that repeats the best one.
+  void refuse(const std::string& effect, const std::string& why) {
+    trials_.push_back(best());
+    trials_.back().row.effect = effect;
+    trials_.back().row.accepted = false;
+    trials_.back().row.note = why;
+  }
+
+  void attempt(const std::string& asked) {
+    std::string name = asked;
+    if (is_proposal(asked)) {
+      const Passes passes = {working_, kind_, ladder_.split.fit, 0, jobs_, progress_};
+      name = propose(working_, passes, ladder_.fitted, asked);
+      if (name.empty())
+        return refuse(asked, "what is left varies with no variable that a " + asked + " could express");
+    }
+    std::vector<std::string> names = accepted_;
+    names.push_back(name);
+    const bool is_rotors = name == kRotorThrust;
+    std::vector<Missing> fitted =
+        fit_with_rotors(working_, kind_, names, ladder_.split.fit, jobs_, progress_);
+    const auto fresh = std::find_if(fitted.rbegin(), fitted.rend(), [&](const Missing& missing) {
+      return (missing.effect == kRotorThrust) == is_rotors;
+    });
+    if (fresh == fitted.rend())
+      return refuse(name, "no flight of the fit has slow flight with the duty of each of four motors");
+    Trial next = trial(name, with_effects(working_.models[0], specs_of(fitted)));
+    const bool helps = is_rotors ? balances(next) : lowers_error(next);
+    next.row.accepted = helps || keeps_anyway_;
+    if (next.row.accepted) {
+      note_errors(*fresh, helps, next);
+      accepted_.push_back(name);
+      ladder_.fitted = std::move(fitted);
+      best_ = trials_.size();
+    } else {
+      next.row.values = best().row.values;
+      if (name != asked) withdraw(working_, name);
+    }
+    trials_.push_back(std::move(next));
+  }
+
+  bool lowers_error(Trial& next) {
+    const double before_N = best().row.select_rmse_N, after_N = next.row.select_rmse_N;
+    const bool helps = after_N <= (1 - kLeastFall) * before_N;
+    if (!helps)
+      next.row.note =
+          fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N", before_N, after_N);
+    return helps;
+  }
+
+  bool balances(Trial& next) {
+    const auto before_N = imbalance_N(inputs_, best().model, ladder_.split.select, jobs_);
+    const auto after_N = imbalance_N(inputs_, next.model, ladder_.split.select, jobs_);
+    const bool helps = before_N && *after_N <= (1 - kLeastFall) * *before_N;
+    if (!before_N)
+      next.row.note = "the select flights have no slow flight with the duty of each motor";
+    else if (!helps)
+      next.row.note = fmt::format("rotors of the select flights are {:.5f} N, then {:.5f} N off balance",
+                                  *before_N, *after_N);
+    return helps;
+  }
+
+  /// Into the model file, beside what was fitted last.
+  void note_errors(const Missing& fresh, bool helps, Trial& next) {
+    for (const stability::EffectSpec& spec : fresh.specs) {
+      for (stability::EffectSpec& effect : next.model.effects) {
+        if (effect.name != spec.name || effect.vehicle != spec.vehicle) continue;
+        effect.fit.select_rmse_before_N = best().row.select_rmse_N;
+        effect.fit.select_rmse_after_N = next.row.select_rmse_N;
+        if (!helps) effect.fit.note = "kept although " + next.row.note;
+      }
+    }
+  }
+
+  /// The test flights are looked at once, after everything is decided.
+  void finish() {
+    ladder_.any_accepted = best_ > 0;
+    ladder_.model = best().model;
+    for (stability::EffectSpec& effect : ladder_.model.effects) {
+      if (effect.fit.is_empty()) continue;
+      effect.fit.test_looks = ladder_.test_looks;
+      if (!ladder_.split.by_flight && effect.fit.note.empty())
+        effect.fit.note = "fewer than three flights: selected and tested on the fit's";
+    }
+    const double floor_N = noise_floor_N(inputs_, ladder_.model, ladder_.split.test, jobs_);
+    for (Trial& t : trials_) {
+      t.row.test_rmse_N = rmse(inputs_, t.model, ladder_.split.test, jobs_);
+      t.row.noise_floor_N = floor_N;
+      t.row.test_looks = ladder_.test_looks;
+      ladder_.rows.push_back(std::move(t.row));
+    }
+    ladder_.model.ladder = ladder_.earlier;
+    ladder_.model.ladder.insert(ladder_.model.ladder.end(), ladder_.rows.begin(), ladder_.rows.end());
+  }
+
+  const residuals::Inputs& inputs_;
+  const std::string kind_;
+  const bool keeps_anyway_;
+  const int jobs_;
+  const residuals::Progress& progress_;
+  Ladder& ladder_;
+  std::vector<std::string> wanted_, accepted_;
+  residuals::Inputs working_;  ///< with what was proposed
+  std::vector<Trial> trials_;
+  std::size_t best_ = 0;  ///< the last accepted trial
+};
+
+}  // namespace
+
 Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress) {
   Ladder ladder;
   ladder.split = options.split ? *options.split : split_flights(inputs);
   const stability::Model& nominal = inputs.models[0];
-  const std::string& kind = nominal.kind;
-  ladder.too_poor = too_poor(inputs, kind, ladder.split, jobs, ladder.problems, ladder.is_tested);
+  ladder.too_poor = too_poor(inputs, nominal.kind, ladder.split, jobs, ladder.problems, ladder.is_tested);
   if (!ladder.too_poor.empty()) return ladder;
   ladder.earlier = nominal.ladder;
   ladder.test_looks = looks_so_far(nominal) + 1;
-  std::vector<std::string> wanted = options.effects;
-  if (options.automatic) {
-    for (const Missing& missing : missing_effects(inputs, kind, ladder.split.fit, jobs, progress)) {
-      const bool each = !missing.specs.empty() && !missing.specs[0].vehicle.empty();
-      wanted.push_back(each ? kVehicleOffset : missing.effect);
-    }
-  }
-  const auto trial = [&](const std::string& effect, stability::Model model) {
-    Trial next{{}, std::move(model)};
-    next.row.effect = effect;
-    next.row.fit_rmse_N = rmse(inputs, next.model, ladder.split.fit, jobs);
-    next.row.select_rmse_N = rmse(inputs, next.model, ladder.split.select, jobs);
-    next.row.values = values_of(next.model);
-    return next;
-  };
-  std::vector<Trial> trials = {trial("nominal", nominal)};
-  std::size_t best = 0;  // the last accepted trial
-  std::vector<std::string> accepted;
-  residuals::Inputs working = with_formulas_off(inputs, wanted);
-  for (const std::string& asked : wanted) {
-    std::string name = asked;
-    if (is_proposal(asked)) {
-      const Passes passes = {working, kind, ladder.split.fit, 0, jobs, progress};
-      name = propose(working, passes, ladder.fitted, asked);
-      if (name.empty()) {
-        trials.push_back(trials[best]);
-        trials.back().row.effect = asked;
-        trials.back().row.accepted = false;
-        trials.back().row.note = "what is left varies with no variable that a " + asked + " could express";
-        continue;
-      }
-    }
-    std::vector<std::string> names = accepted;
-    names.push_back(name);
-    const bool is_rotors = name == kRotorThrust;
-    std::vector<Missing> fitted = fit_with_rotors(working, kind, names, ladder.split.fit, jobs, progress);
-    const auto fresh = std::find_if(fitted.rbegin(), fitted.rend(), [&](const Missing& missing) {
-      return (missing.effect == kRotorThrust) == is_rotors;
-    });
-    if (fresh == fitted.rend()) {
-      trials.push_back(trials[best]);
-      trials.back().row.effect = name;
-      trials.back().row.accepted = false;
-      trials.back().row.note = "no flight of the fit has slow flight with the duty of each of four motors";
-      continue;
-    }
-    Trial next = trial(name, with_effects(working.models[0], specs_of(fitted)));
-    const double before_N = trials[best].row.select_rmse_N, after_N = next.row.select_rmse_N;
-    bool helps = after_N <= (1 - kLeastFall) * before_N;
-    if (is_rotors) {
-      const auto off_before_N = imbalance_N(inputs, trials[best].model, ladder.split.select, jobs);
-      const auto off_after_N = imbalance_N(inputs, next.model, ladder.split.select, jobs);
-      helps = off_before_N && *off_after_N <= (1 - kLeastFall) * *off_before_N;
-      next.row.note =
-          off_before_N ? fmt::format("rotors of the select flights are {:.5f} N, then {:.5f} N off balance",
-                                     *off_before_N, *off_after_N)
-                       : "the select flights have no slow flight with the duty of each motor";
-      if (helps) next.row.note.clear();
-    } else if (!helps) {
-      next.row.note =
-          fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N", before_N, after_N);
-    }
-    next.row.accepted = helps || options.keep_anyway;
-    if (next.row.accepted) {
-      for (const stability::EffectSpec& spec : fresh->specs) {
-        for (stability::EffectSpec& effect : next.model.effects) {
-          if (effect.name != spec.name || effect.vehicle != spec.vehicle) continue;
-          effect.fit.select_rmse_before_N = before_N;
-          effect.fit.select_rmse_after_N = after_N;
-          if (!helps) effect.fit.note = "kept although " + next.row.note;
-        }
-      }
-      accepted.push_back(name);
-      ladder.fitted = std::move(fitted);
-      best = trials.size();
-    } else {
-      next.row.values = trials[best].row.values;
-      if (name != asked) withdraw(working, name);
-    }
-    trials.push_back(std::move(next));
-  }
-  ladder.any_accepted = best > 0;
-  ladder.model = trials[best].model;
-  for (stability::EffectSpec& effect : ladder.model.effects) {
-    if (effect.fit.is_empty()) continue;
-    effect.fit.test_looks = ladder.test_looks;
-    if (!ladder.split.by_flight && effect.fit.note.empty())
-      effect.fit.note = "fewer than three flights: selected and tested on the fit's";
-  }
-  const double floor_N = noise_floor_N(inputs, ladder.model, ladder.split.test, jobs);
-  for (Trial& t : trials) {
-    t.row.test_rmse_N = rmse(inputs, t.model, ladder.split.test, jobs);
-    t.row.noise_floor_N = floor_N;
-    t.row.test_looks = ladder.test_looks;
-    ladder.rows.push_back(std::move(t.row));
-  }
-  ladder.model.ladder = ladder.earlier;
-  ladder.model.ladder.insert(ladder.model.ladder.end(), ladder.rows.begin(), ladder.rows.end());
+  Climb(inputs, options, jobs, progress, ladder).run();
   return ladder;
 }
 

@@ -95,6 +95,78 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
   }
 }
 
+/// The declared force, with the files it was read from in `inputs`.
+LoadedDisturbance checked_disturbance(const BoundOptions& options, const Tracking& input,
+                                      std::vector<std::string>& inputs) {
+  const bool has_task = !options.task.task.empty();
+  if (has_task && !options.tube) throw UsageError("--task requires --tube");
+  DisturbanceArguments told = options.disturbance;
+  // The tube makes its own bounds of how vehicles move; without --speed there are no others.
+  if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
+  LoadedDisturbance disturbance = load_disturbance(told, input);
+  stability::DisturbanceSource& source = disturbance.source;
+  if (has_initial(options.initial) && source.kind == "none") declare_no_class(source);
+  refuse_what_is_left_out(options, source);
+  refuse_jerk_of_scaled_thrust(source, input);
+  inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
+  const bool has_size = std::any_of(std::begin(source.axis), std::end(source.axis), [](const auto& d) {
+    return std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s);
+  });
+  if (options.tube && !has_task && !has_size)
+    throw UsageError("--tube needs a force of known size: --amplitude E or --impulse J, --from or --truth");
+  return disturbance;
+}
+
+files::Json uncertain_result(const BoundOptions& options, const Tracking& input,
+                             const CommonOptions& common) {
+  const CancelOnInterrupt interrupt;
+  Progress progress(common.quiet);
+  UncertainRun run;
+  run.jobs = common.jobs;
+  run.most_loops = options.most_loops;
+  run.progress = [&progress](int done, int total) {
+    progress.show(done, total, "of the enclosures over the intervals");
+  };
+  run.cancelled = interrupt.flag();
+  return uncertain_json(input, options.uncertain, run);
+}
+
+/// What the options ask for beside the bounds, each a field of the result.
+void add_extras(const BoundOptions& options, const CommonOptions& common, const Tracking& input,
+                const stability::DisturbanceSource& source, const stability::TrackingReport& report,
+                const std::optional<LocalTube>& local, files::Json& result) {
+  if (options.is_uncertain) result["uncertain"] = uncertain_result(options, input, common);
+  if (options.coverage > 0) {
+    // Beside the file's classes stands only what was given on the command line.
+    DisturbanceArguments others = options.disturbance;
+    others.from.clear();
+    result["coverage"] = promise_json(input, report, load_disturbance(others, input).source, options.initial,
+                                      options.disturbance.from, options.coverage);
+  }
+  if (has_attitude_gains(input, options.attitude))
+    result["attitude"] = attitude_json(input, options.attitude);
+  if (options.verified) result["verified"] = verified_json(input);
+  if (options.tube) result["tube"] = tube_json(input, source, 101);
+  if (local) result["local_tube"] = local_tube_json(options.task, *local);
+  if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
+}
+
+/// The extras as text, where there are any.
+void print_extras(const Tracking& input, const files::Json& result) {
+  const auto print = [&result](const char* field, void (*print_field)(const files::Json&)) {
+    if (result.contains(field)) print_field(result[field]);
+  };
+  print("uncertain", print_uncertain);
+  print("coverage", print_promise);
+  print("attitude", print_attitude);
+  if (!result.contains("attitude") && input.gains.attitude)
+    fmt::print("\nmargins of the attitude loop: none, as Lambda or K couples the axes\n");
+  print("verified", print_verified);
+  print("local_tube", print_local_tube);
+  if (result.contains("tube")) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
+  print("swarm", print_swarm);
+}
+
 int run_bound(const BoundOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -102,25 +174,11 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   refuse_coupled_axes(options, input);
   std::vector<std::string> inputs = {options.tracking.gains, options.tracking.model};
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
-  const bool has_task = !options.task.task.empty();
-  if (has_task && !options.tube) throw UsageError("--task requires --tube");
-  DisturbanceArguments told = options.disturbance;
-  // The tube makes its own bounds of how vehicles move; without --speed there are no others.
-  if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
-  LoadedDisturbance disturbance = load_disturbance(told, input);
-  if (has_initial(options.initial) && disturbance.source.kind == "none") declare_no_class(disturbance.source);
-  refuse_what_is_left_out(options, disturbance.source);
-  refuse_jerk_of_scaled_thrust(disturbance.source, input);
+  const LoadedDisturbance disturbance = checked_disturbance(options, input, inputs);
   const stability::DisturbanceSource& source = disturbance.source;
-  inputs.insert(inputs.end(), disturbance.inputs.begin(), disturbance.inputs.end());
-  if (options.tube && !has_task &&
-      std::none_of(std::begin(source.axis), std::end(source.axis), [](const auto& d) {
-        return std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s);
-      })) {
-    throw UsageError("--tube needs a force of known size: --amplitude E or --impulse J, --from or --truth");
-  }
   std::optional<LocalTube> local;
-  if (has_task) local = load_local_tube(options.task, options.disturbance, input, common, inputs);
+  if (!options.task.task.empty())
+    local = load_local_tube(options.task, options.disturbance, input, common, inputs);
   stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
   const FloatErrors float32 = float_errors(input, report);
   for (stability::AxisBounds& row : report.bounds) row.float32_m = float32.tracking_error_m[row.axis];
@@ -129,55 +187,23 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   add_tracking_json(result, input, source, report);
   result["float32"] = float_errors_json(float32);
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
-  if (options.is_uncertain) {
-    const CancelOnInterrupt interrupt;
-    Progress progress(common.quiet);
-    UncertainRun run;
-    run.jobs = common.jobs;
-    run.most_loops = options.most_loops;
-    run.progress = [&progress](int done, int total) {
-      progress.show(done, total, "of the enclosures over the intervals");
-    };
-    run.cancelled = interrupt.flag();
-    result["uncertain"] = uncertain_json(input, options.uncertain, run);
-  }
-  if (options.coverage > 0) {
-    // Beside the file's classes stands only what was given on the command line.
-    DisturbanceArguments others = options.disturbance;
-    others.from.clear();
-    result["coverage"] = promise_json(input, report, load_disturbance(others, input).source, options.initial,
-                                      options.disturbance.from, options.coverage);
-  }
-  const bool has_attitude = has_attitude_gains(input, options.attitude);
-  if (has_attitude) result["attitude"] = attitude_json(input, options.attitude);
-  if (options.verified) result["verified"] = verified_json(input);
-  if (options.tube) result["tube"] = tube_json(input, source, 101);
-  if (local) result["local_tube"] = local_tube_json(options.task, *local);
-  if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
+  add_extras(options, common, input, source, report, local, result);
   std::string report_path;
-  if (!options.report.empty()) {
+  if (!options.report.empty())
     report_path = write_bound_report(input, disturbance, report, local, result, options.report, common.force);
-  }
   write_result(common, result);
   if (common.prints_text()) {
     print_tracking(input, source, report);
     print_float_errors(float32);
     if (disturbance.truth) print_truth(*disturbance.truth);
-    if (options.is_uncertain) print_uncertain(result["uncertain"]);
-    if (options.coverage > 0) print_promise(result["coverage"]);
-    if (has_attitude) print_attitude(result["attitude"]);
-    if (!has_attitude && input.gains.attitude)
-      fmt::print("\nmargins of the attitude loop: none, as Lambda or K couples the axes\n");
-    if (options.verified) print_verified(result["verified"]);
-    if (local) print_local_tube(result["local_tube"]);
-    if (options.tube) fmt::print("\nthe tube over time is in the JSON result (--json)\n");
-    if (!options.swarm.empty()) print_swarm(result["swarm"]);
+    print_extras(input, result);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
-  if (!options.swarm.empty() && result["swarm"]["verdict"] == "refuted") return kViolated;
-  if (local && !local->proved) return kInconclusive;
-  if (options.swarm.empty() || result["swarm"]["verdict"] == "proved") return kDone;
-  return kInconclusive;
+  if (local && !local->proved && options.swarm.empty()) return kInconclusive;
+  if (options.swarm.empty()) return kDone;
+  const std::string verdict = result["swarm"]["verdict"];
+  if (verdict == "refuted") return kViolated;
+  return verdict == "proved" && !(local && !local->proved) ? kDone : kInconclusive;
 }
 
 }  // namespace
