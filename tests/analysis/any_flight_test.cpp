@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <random>
+#include <set>
 
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/log_cache.h"
@@ -218,10 +219,13 @@ TEST(AnyFlight, TheWholeOfEveryCollectionHasAnAnswer_slow) {
     const files::Json json = result_of(folder, "compare " + small_model() + " " + data + name, "compare");
     EXPECT_EQ(json["flights"].size(), logs) << name;
     std::size_t judged = 0;
+    // Named by independent scripts; the second topples within a third of a second after its first gap.
+    const std::set<std::string> crashed = {"log30", "log88_2_yaw"};
     for (const files::Json& flight : json["flights"]) {
       if (flight["samples"].get<int>() > 0)
         ++judged;
-      else
+      else if (crashed.count(std::filesystem::path(flight["file"].get<std::string>()).filename()) == 0 ||
+               flight["records"]["crash"] == 0)
         ADD_FAILURE() << flight["file"] << " has no answer: " << flight["records"].dump();
     }
     EXPECT_GE(judged, logs - 2) << name;
