@@ -174,19 +174,41 @@ void group_by_clock(std::vector<FoundLog>& logs) {
 
 }  // namespace
 
+namespace {
+
+/// Whether the end of `path`, with as many folders as `pattern` names, matches it.
+bool is_of(const std::string& pattern, const std::string& path) {
+  const auto depth = std::count(pattern.begin(), pattern.end(), '/');
+  fs::path tail;
+  const fs::path full = fs::absolute(path).lexically_normal();
+  auto part = full.end();
+  for (std::ptrdiff_t k = 0; k <= depth && part != full.begin(); ++k)
+    tail = tail.empty() ? *--part : *--part / tail;
+  const std::string with = tail.string(), without = fs::path(tail).replace_extension().string();
+  return fnmatch(pattern.c_str(), with.c_str(), 0) == 0 || fnmatch(pattern.c_str(), without.c_str(), 0) == 0;
+}
+
+}  // namespace
+
+std::vector<std::string> patterns_without_log(const LogRules& rules, const FoundFlights& found) {
+  std::vector<std::string> paths;
+  for (const FlightFiles& flight : found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) paths.push_back(path);
+  }
+  for (const std::string& left_out : found.left_out)
+    paths.push_back(left_out.substr(0, left_out.rfind(": ")));
+  std::vector<std::string> patterns;
+  for (const LogRule& rule : rules) {
+    const auto matches = [&](const std::string& path) { return is_of(rule.pattern, path); };
+    if (std::none_of(paths.begin(), paths.end(), matches)) patterns.push_back(rule.pattern);
+  }
+  return patterns;
+}
+
 LogRule rule_for(const LogRules& rules, const std::string& path) {
   std::vector<const LogRule*> matching;
   for (const LogRule& rule : rules) {
-    const auto depth = std::count(rule.pattern.begin(), rule.pattern.end(), '/');
-    fs::path tail;
-    const fs::path full = fs::absolute(path).lexically_normal();
-    auto part = full.end();
-    for (std::ptrdiff_t k = 0; k <= depth && part != full.begin(); ++k)
-      tail = tail.empty() ? *--part : *--part / tail;
-    const std::string with = tail.string(), without = fs::path(tail).replace_extension().string();
-    if (fnmatch(rule.pattern.c_str(), with.c_str(), 0) == 0 ||
-        fnmatch(rule.pattern.c_str(), without.c_str(), 0) == 0)
-      matching.push_back(&rule);
+    if (is_of(rule.pattern, path)) matching.push_back(&rule);
   }
   const auto is_plain = [](const LogRule* rule) {
     return rule->pattern.find_first_of("*?[") == std::string::npos;

@@ -30,7 +30,8 @@ struct LogRule {
 using LogRules = std::vector<LogRule>;
 
 /// What `rules` say of a log, taken together: a pattern without wildcards before one with, a longer before a shorter.
-/// A pattern is matched against the end of the path, with or without extension: as many folders as it names.
+/// A pattern is matched against the end of the path, with or without extension: as many folders as it names:
+/// "alpha/*/*" matches every log two folders below alpha.
 LogRule rule_for(const LogRules& rules, const std::string& path);
 
 struct FoundFlights {
@@ -38,6 +39,9 @@ struct FoundFlights {
   std::vector<std::string> skipped;   ///< files in the folders that are no logs
   std::vector<std::string> left_out;  ///< logs that flights.toml leaves out
 };
+
+/// Patterns of `rules` that match none of the logs: misspelt ones, or those of other flights.
+std::vector<std::string> patterns_without_log(const LogRules& rules, const FoundFlights& found);
 
 /// Files and folders, searched recursively. A log may have any name; it is recognised by its content. One log is one
 /// flight of one vehicle, unless

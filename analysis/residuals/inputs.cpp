@@ -105,10 +105,19 @@ std::map<std::string, std::string> flown_models(const Inputs& inputs) {
   return models;
 }
 
-/// Where no model is named: those of the fleet or, where that may be, 1 kg.
+/// The models of single logs, where nothing else names one: the first of each kind stands for it.
+void use_log_models(Inputs& inputs) {
+  for (const auto& [path, model] : inputs.log_models) {
+    if (inputs.model_of(model.kind) == nullptr) inputs.models.push_back(model);
+  }
+  inputs.has_only_log_models = !inputs.models.empty();
+}
+
+/// Where no model is named: those of the fleet, those of single logs or, where that may be, 1 kg.
 void use_other_models(const InputArguments& arguments, const std::map<std::string, std::string>& flown,
                       Inputs& inputs) {
   use_fleet_models(inputs, flown);
+  if (inputs.models.empty()) use_log_models(inputs);
   if (!inputs.models.empty()) return;
   if (!arguments.may_lack_model) {
     throw files::InputError({arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
@@ -158,8 +167,8 @@ Inputs read_inputs(const InputArguments& arguments) {
     if (inputs.kinds.index(use.kind) < 0)
       add_kind(inputs.kinds, use.kind, stability::read_model(use.model).mass_kg);
   }
-  if (inputs.models.empty()) use_other_models(arguments, flown, inputs);
   use_log_rules(inputs);
+  if (inputs.models.empty()) use_other_models(arguments, flown, inputs);
   complete_models(arguments, inputs);
   for (const stability::Model& model : inputs.models) add_kind(inputs.kinds, model.kind, model.mass_kg);
   inputs.fallback_kind = inputs.models[0].kind;
@@ -201,6 +210,11 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
       load_flight(found.flights[index], uses, fallback_kind, kinds, map, rules, *cache, problems);
   for (Track& track : tracks) {
     if (track.position_only) continue;
+    if (has_only_log_models && log_models.count(track.path) == 0) {
+      problems.push_back(track.path + ": no model: none is named, and flights.toml gives this log none");
+      track.position_only = true;
+      continue;
+    }
     const stability::Model model = model_for(track);
     if (track.thrust_source == logs::ThrustSource::kDuty && model.num_rotors() != 4 && !rules.per_mass) {
       problems.push_back(fmt::format("{}: the log has the duties of 4 motors, and {} has {} rotors",

@@ -21,7 +21,7 @@ struct InputArguments {
   std::string columns;               ///< columns.toml; empty: the known columns
   std::string network;  ///< a learned force that every model gets, in place of its own; empty: none
   CutRules rules;
-  /// Without a model and a known vehicle: CutRules::per_mass and a model of 1 kg, so that newtons are m/s^2.
+  /// Without a model, a known vehicle and a log's own model: CutRules::per_mass and a model of 1 kg, so that newtons are m/s^2.
   bool may_lack_model = false;
 };
 
@@ -38,6 +38,8 @@ struct Inputs {
   LogRules log_rules;
   /// What `[log]` rules give single logs, by path: a model, a mass, gains.
   std::map<std::string, stability::Model> log_models;
+  bool has_only_log_models =
+      false;  ///< no other model is known: a log without one is a neighbour and nothing else
   std::map<std::string, double> log_masses_kg;
   std::map<std::string, stability::Gains> log_gains;
   logs::SignalMap map;

@@ -172,6 +172,33 @@ TEST(AnyFlight, WithoutAModelResidualsArePerMass) {
   EXPECT_EQ(json["flights"][0]["judged"]["force"], files::Json({"x", "y", "z"}));
 }
 
+TEST(AnyFlight, AModelOfASingleLogGivesForcesAndLogsWithoutOneAreNamed) {
+  const ScratchFolder folder;
+  for (const char* name : {"one.csv", "two.csv"}) write_text(folder / name, hover_csv(0, 8));
+  write_text(folder / "flights.toml",
+             "schema = \"swarmcert/flights/1\"\n[log.\"one\"]\nmodel = \"" + small_model() + "\"\n");
+  const files::Json named = result_of(folder, "compare " + small_model() + " one.csv", "compare");
+  const files::Json json = result_of(folder, "compare one.csv two.csv --flights flights.toml", "compare");
+  EXPECT_EQ(json["unit"], named["unit"]);
+  EXPECT_EQ(json["overall"]["rmse"]["z"], named["overall"]["rmse"]["z"]);
+  EXPECT_EQ(json["overall"]["samples"], named["overall"]["samples"]) << "two.csv has no model";
+  EXPECT_NE(run_shell("swarmcert compare one.csv two.csv --flights flights.toml", folder.path())
+                .output.find("two.csv: no model: none is named"),
+            std::string::npos);
+}
+
+TEST(AnyFlight, WhatAFlightsTomlNamesAndNoLogIsCalledIsSaid) {
+  const ScratchFolder folder;
+  write_text(folder / "one.csv", hover_csv(0, 8));
+  write_text(folder / "flights.toml", "schema = \"swarmcert/flights/1\"\n[vehicle.alpha]\nmodel = \"" +
+                                          small_model() + "\"\n[log.\"alpha/**\"]\nmass_kg = 0.03\n");
+  const Outcome outcome = run_shell("swarmcert compare one.csv --flights flights.toml", folder.path());
+  EXPECT_NE(outcome.output.find("[log.\"alpha/**\"] matches none of these logs"), std::string::npos)
+      << outcome.output;
+  EXPECT_NE(outcome.output.find("flights.toml knows alpha; the logs are of "), std::string::npos)
+      << outcome.output;
+}
+
 TEST(AnyFlight, AMassOfOneLogShiftsItsResidualByItsWeight) {
   const ScratchFolder folder;
   write_text(folder / "one.csv", hover_csv(0, 8));

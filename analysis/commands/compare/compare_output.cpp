@@ -1,10 +1,12 @@
 #include "analysis/commands/compare/compare_output.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "analysis/commands/compare/log_output.h"
 #include "analysis/commands/shared/collection_table.h"
@@ -414,6 +416,17 @@ void print_errors(const Comparison& comparison, const Comparison* own, const res
   print_trajectories(comparison.trajectories);
 }
 
+/// What a flights.toml names, and what flew instead.
+std::string vehicles_without_model(const residuals::Inputs& inputs) {
+  std::set<std::string> flown;
+  for (const residuals::FlightFiles& flight : inputs.found.flights) {
+    for (const auto& [vehicle, path] : flight.logs) flown.insert(vehicle);
+  }
+  std::string known;
+  for (const auto& [vehicle, use] : inputs.fleet) known += (known.empty() ? "" : ", ") + vehicle;
+  return fmt::format("flights.toml knows {}; the logs are of {}.", known, fmt::join(flown, ", "));
+}
+
 }  // namespace
 
 void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
@@ -423,11 +436,15 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
                model.effects.size());
   }
   fmt::print("{} flights; force residual f_a = m a - model, in the world.\n", inputs.found.flights.size());
-  if (inputs.rules.per_mass)
+  if (inputs.rules.per_mass) {
     fmt::print(
         "No model is known: residuals are per mass, and thrust is in multiples of each log's hover thrust, "
         "so that "
         "the mean vertical force says nothing.\n");
+    if (!inputs.fleet.empty()) fmt::print("{}\n", vehicles_without_model(inputs));
+  }
+  for (const std::string& pattern : residuals::patterns_without_log(inputs.log_rules, inputs.found))
+    fmt::print("flights.toml: [log.\"{}\"] matches none of these logs.\n", pattern);
   print_cuts(comparison);
   if (comparison.overall.statistics.samples > 0)
     print_errors(comparison, own, residuals::force_unit(inputs), inputs.rules.per_mass);
