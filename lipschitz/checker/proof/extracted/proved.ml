@@ -332,6 +332,18 @@ let rec nth n l default =
               | _ :: t -> nth m t default)
     n
 
+(** val nth_error : 'a1 list -> int -> 'a1 option **)
+
+let rec nth_error l n =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> match l with
+              | [] -> None
+              | x :: _ -> Some x)
+    (fun n0 -> match l with
+               | [] -> None
+               | _ :: l0 -> nth_error l0 n0)
+    n
+
 (** val last : 'a1 list -> 'a1 -> 'a1 **)
 
 let rec last l d =
@@ -358,6 +370,12 @@ let rec fold_right f a0 = function
 let rec forallb f = function
 | [] -> true
 | a :: l0 -> (&&) (f a) (forallb f l0)
+
+(** val filter : ('a1 -> bool) -> 'a1 list -> 'a1 list **)
+
+let rec filter f = function
+| [] -> []
+| x :: l0 -> if f x then x :: (filter f l0) else filter f l0
 
 (** val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list **)
 
@@ -388,6 +406,14 @@ let rec skipn n l =
                | [] -> []
                | _ :: l0 -> skipn n0 l0)
     n
+
+(** val seq : int -> int -> int list **)
+
+let rec seq start len =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> [])
+    (fun len0 -> start :: (seq (Stdlib.Int.succ start) len0))
+    len
 
 (** val repeat : 'a1 -> int -> 'a1 list **)
 
@@ -523,10 +549,10 @@ let rec band zero0 add1 mul1 two_rho minus_rho t later last0 =
     'a1 list -> 'a1 list list -> ('a1 list * 'a1 list list) list -> 'a1 list
     list -> 'a1 list list **)
 
-let lmi zero0 add1 mul1 minus_one two_rho minus_rho t first later last0 =
+let lmi zero0 add1 mul1 minus_one two_rho minus_rho t first0 later last0 =
   sum add1
     (scale_all mul1 minus_one
-      (gram zero0 add1 mul1 (scale_rows mul1 t first)))
+      (gram zero0 add1 mul1 (scale_rows mul1 t first0)))
     (band zero0 add1 mul1 two_rho minus_rho t later last0)
 
 type activation =
@@ -555,7 +581,7 @@ let rec strip row = match row with
 | [] -> (0, [])
 | a :: row' ->
   if Big.equal a Big.zero
-  then let (n, rest) = strip row' in ((Stdlib.Int.succ n), rest)
+  then let (n, rest0) = strip row' in ((Stdlib.Int.succ n), rest0)
   else (0, row)
 
 (** val dot_stripped : (int * Big.t list) -> (int * Big.t list) -> Big.t **)
@@ -734,11 +760,11 @@ let matrix_inequality hidden0 last0 rho t =
     let n = length (hd [] last0) in
     norm_inequality rho
       (if (<=) (length last0) n then last0 else columns zero n last0)
-  | first :: later ->
+  | first0 :: later ->
     lmi zero add0 mul0 ((Big.neg Big.one), Big.zero)
       (mul0 (((fun p -> p) Big.one), ((fun p -> p) Big.one)) rho) (neg rho)
-      (firstn (length first) t) first
-      (combine (split (skipn (length first) t) later) later) last0
+      (firstn (length first0) t) first0
+      (combine (split (skipn (length first0) t) later) later) last0
 
 (** val shapes : int -> matrixD list -> matrixD -> bool **)
 
@@ -818,7 +844,9 @@ type claim =
 | Norm_at_least of int * int * dyadic
 | Slope_at_most of function0 * bool list * dyadic list * dyadic
 | Slope_at_least of function0 * bool list * dyadic list * dyadic
+| Slope_in_box of function0 * bool list * dyadic list * box * dyadic
 | Law of bool * kind list * int * dyadic
+| Law_in_box of bool * (kind * box) list * int * dyadic
 | Within of int * box * box
 | Sum_within of term list * int * box
 | Jump_at_most of int * box * int * dyadic
@@ -1116,14 +1144,14 @@ let rec encloses w c b v =
 (** val check_layers :
     layerD list -> layerD -> box -> box list -> box -> bool **)
 
-let rec check_layers hidden0 last0 b bounds v =
+let rec check_layers hidden0 last0 b bounds0 v =
   match hidden0 with
   | [] ->
-    (match bounds with
+    (match bounds0 with
      | [] -> encloses (fst last0) (snd last0) b v
      | _ :: _ -> false)
   | l :: hidden' ->
-    (match bounds with
+    (match bounds0 with
      | [] -> false
      | c :: bounds' ->
        (&&) (encloses (fst l) (snd l) b c)
@@ -1225,17 +1253,17 @@ let rec layer_fits w c m r e =
     layerD list -> layerD -> box -> dyadic list -> box list -> dyadic list
     list -> dyadic list -> bool **)
 
-let rec check_roundings hidden0 last0 b r bounds errors e =
+let rec check_roundings hidden0 last0 b r bounds0 errors e =
   match hidden0 with
   | [] ->
-    (match bounds with
+    (match bounds0 with
      | [] ->
        (match errors with
         | [] -> layer_fits (fst last0) (snd last0) (sizes b r) r e
         | _ :: _ -> false)
      | _ :: _ -> false)
   | l :: hidden' ->
-    (match bounds with
+    (match bounds0 with
      | [] -> false
      | c :: bounds' ->
        (match errors with
@@ -1282,12 +1310,492 @@ let rec sum_fits count0 m e errors =
         | x :: errors' ->
           (&&) (rounding_fits count0 a b x) (sum_fits count0 m' e' errors')))
 
+type hints = { slope_between : (dyadic -> dyadic -> dyadic);
+               rounded_up : (dyadic -> dyadic);
+               factor_number : (int -> matrixD -> factor option) }
+
+(** val up : hints -> dyadic -> dyadic **)
+
+let up o x =
+  let r = o.rounded_up x in if at_most x r then r else x
+
+type line =
+| On
+| Off
+| Open of dyadic * dyadic * dyadic * dyadic
+
+(** val line_of : hints -> dyadic -> dyadic -> line **)
+
+let line_of o low high =
+  if is_nonnegative low
+  then On
+  else if is_nonnegative (neg high)
+       then Off
+       else let s = o.slope_between low high in
+            Open (low, high, s,
+            (larger (add0 high (neg (mul0 s high))) (neg (mul0 s low))))
+
+(** val through_relu :
+    dyadic list -> line list -> bool list -> dyadic list * dyadic **)
+
+let rec through_relu c lines below =
+  match c with
+  | [] -> ([], zero)
+  | a :: c' ->
+    (match lines with
+     | [] -> ([], zero)
+     | l :: lines' ->
+       let (d, k) = through_relu c' lines' (tl below) in
+       (match l with
+        | On -> ((a :: d), k)
+        | Off -> ((zero :: d), k)
+        | Open (low, high, s, t) ->
+          if is_nonnegative a
+          then (((mul0 a s) :: d), (add0 (mul0 a t) k))
+          else if hd (is_positive (add0 low high)) below
+               then ((a :: d), k)
+               else ((zero :: d), k)))
+
+(** val combined : dyadic list -> matrixD -> dyadic list **)
+
+let rec combined z0 m =
+  match z0 with
+  | [] -> []
+  | a :: z' ->
+    (match m with
+     | [] -> []
+     | r :: m' ->
+       if Big.equal (fst a) Big.zero
+       then combined z' m'
+       else plus add0 (scale mul0 a r) (combined z' m'))
+
+(** val form_above :
+    (layerD * line list) list -> bool list list -> dyadic list -> dyadic ->
+    dyadic list * dyadic **)
+
+let rec form_above before below c k =
+  match before with
+  | [] -> (c, k)
+  | p :: before' ->
+    let (l, lines) = p in
+    let (w, bias) = l in
+    let (d, j) = through_relu c lines (hd [] below) in
+    form_above before' (tl below) (combined d w)
+      (add0 (add0 k j) (dot zero add0 mul0 d bias))
+
+(** val most0 :
+    (layerD * line list) list -> bool list list -> dyadic list -> dyadic ->
+    box -> dyadic **)
+
+let most0 before below c k b =
+  let (d, j) = form_above before below c k in add0 j (snd (row_ends d b))
+
+type decision = { neuron : int; is_on : bool; lower_slopes : bool list list }
+
+(** val new_line :
+    hints -> box -> (layerD * line list) list -> dyadic list -> dyadic ->
+    line list -> line **)
+
+let new_line o b before row bias around =
+  let low = neg (up o (most0 before [] (map neg row) (neg bias) b)) in
+  let high = up o (most0 before [] row bias b) in
+  (match around with
+   | [] -> line_of o low high
+   | known :: _ ->
+     (match known with
+      | Open (l, h, _, _) ->
+        line_of o (larger l low) (if at_most h high then h else high)
+      | _ -> known))
+
+(** val new_lines :
+    hints -> box -> (layerD * line list) list -> matrixD -> dyadic list ->
+    line list -> line list **)
+
+let rec new_lines o b before w c around =
+  match w with
+  | [] -> []
+  | row :: w' ->
+    (match c with
+     | [] -> []
+     | a :: c' ->
+       (new_line o b before row a around) :: (new_lines o b before w' c'
+                                               (tl around)))
+
+(** val decide :
+    box -> (layerD * line list) list -> matrixD -> dyadic list -> line list
+    -> decision -> line list option **)
+
+let decide b before w c lines d =
+  match nth_error lines d.neuron with
+  | Some l ->
+    (match l with
+     | Open (_, _, _, _) ->
+       let row = nth d.neuron w [] in
+       let bias = nth d.neuron c zero in
+       let end_ =
+         if d.is_on
+         then most0 before d.lower_slopes (map neg row) (neg bias) b
+         else most0 before d.lower_slopes row bias b
+       in
+       if is_nonnegative (neg end_)
+       then Some
+              (app (firstn d.neuron lines)
+                ((if d.is_on then On else Off) :: (skipn (Stdlib.Int.succ
+                                                    d.neuron) lines)))
+       else None
+     | _ -> Some lines)
+  | None -> None
+
+(** val decide_all :
+    box -> (layerD * line list) list -> matrixD -> dyadic list -> line list
+    -> decision list -> line list option **)
+
+let rec decide_all b before w c lines = function
+| [] -> Some lines
+| d :: ds' ->
+  (match decide b before w c lines d with
+   | Some l -> decide_all b before w c l ds'
+   | None -> None)
+
+(** val bounds :
+    hints -> box -> (layerD * line list) list -> layerD list -> line list
+    list -> decision list list -> line list list option **)
+
+let rec bounds o b before ls around ds =
+  match ls with
+  | [] -> Some []
+  | l :: ls' ->
+    let (w, c) = l in
+    (match decide_all b before w c (new_lines o b before w c (hd [] around))
+             (hd [] ds) with
+     | Some l0 ->
+       (match bounds o b (((w, c), l0) :: before) ls' (tl around) (tl ds) with
+        | Some r -> Some (l0 :: r)
+        | None -> None)
+     | None -> None)
+
+type pair_of_forms = dyadic list * dyadic list
+
+(** val scale_short : dyadic -> dyadic list -> dyadic list **)
+
+let scale_short a u =
+  if Big.equal (fst a) Big.zero then [] else scale mul0 a u
+
+(** val outer_sum_of : dyadic list -> dyadic list -> matrixD **)
+
+let rec outer_sum_of p q =
+  match p with
+  | [] -> []
+  | a :: p' ->
+    (match q with
+     | [] -> []
+     | b :: q' ->
+       ((mul0 (((fun p -> p) Big.one), ((fun p -> p) Big.one)) (mul0 a b)) :: 
+         (plus add0 (scale_short a q') (scale_short b p'))) :: (outer_sum_of
+                                                                 p' q'))
+
+(** val quadratic : pair_of_forms list -> matrixD **)
+
+let quadratic ps =
+  fold_right (fun p s -> sum add0 (outer_sum_of (fst p) (snd p)) s) [] ps
+
+(** val half : dyadic -> dyadic **)
+
+let half x =
+  shift (Big.neg Big.one) x
+
+(** val unit_form : int -> dyadic list **)
+
+let unit_form n =
+  app (repeat zero n) (one :: [])
+
+(** val minus_squares : matrixD -> pair_of_forms list **)
+
+let minus_squares ys =
+  map (fun y -> ((map neg y), (map half y))) ys
+
+(** val half_last : dyadic list -> dyadic list **)
+
+let rec half_last = function
+| [] -> []
+| a :: u' ->
+  (match u' with
+   | [] -> (half a) :: []
+   | _ :: _ -> a :: (half_last u'))
+
+(** val form_pairs :
+    dyadic -> matrixD -> matrixD -> matrixD -> pair_of_forms list **)
+
+let rec form_pairs s q ys all =
+  match q with
+  | [] -> []
+  | r :: q' ->
+    (match ys with
+     | [] -> []
+     | y :: ys' ->
+       ((scale mul0 s y),
+         (combined (half_last r) all)) :: (form_pairs s q' ys' all))
+
+(** val is_open : line -> bool **)
+
+let is_open = function
+| Open (_, _, _, _) -> true
+| _ -> false
+
+(** val relu_step :
+    line list -> dyadic list -> matrixD -> int -> (pair_of_forms
+    list * matrixD) * int **)
+
+let rec relu_step lines ts ys n =
+  match lines with
+  | [] -> (([], []), n)
+  | l :: lines' ->
+    (match ys with
+     | [] -> (([], []), n)
+     | y :: ys' ->
+       let (p0, m) =
+         relu_step lines' (tl ts) ys'
+           (if is_open l then Stdlib.Int.succ n else n)
+       in
+       let (p, z0) = p0 in
+       (match l with
+        | On -> ((p, (y :: z0)), m)
+        | Off -> ((p, ([] :: z0)), m)
+        | Open (_, _, _, _) ->
+          let e = unit_form n in
+          (((((scale mul0 (neg (hd zero ts)) e),
+          (plus add0 y (scale mul0 ((Big.neg Big.one), Big.zero) e))) :: p),
+          (e :: z0)), m)))
+
+(** val times_rows : matrixD -> matrixD -> matrixD **)
+
+let times_rows w rows0 =
+  map (fun r -> combined r rows0) w
+
+(** val chain_pairs :
+    layerD list -> line list list -> dyadic list list -> matrixD -> int ->
+    (pair_of_forms list * matrixD) * (matrixD * matrixD) list **)
+
+let rec chain_pairs ls lines ts rows0 n =
+  match ls with
+  | [] -> (([], rows0), [])
+  | l0 :: ls' ->
+    let (w, _) = l0 in
+    (match lines with
+     | [] -> (([], rows0), [])
+     | l :: lines' ->
+       let y = times_rows w rows0 in
+       let (p0, m) = relu_step l (hd [] ts) y n in
+       let (p, z0) = p0 in
+       let (p1, all) = chain_pairs ls' lines' (tl ts) z0 m in
+       let (q, last0) = p1 in (((app p q), last0), ((y, z0) :: all)))
+
+type place = { in_layer : int; in_row : int; stays_on : bool }
+
+type conflict = { first : place; second : place; weight : dyadic;
+                  rest : dyadic; times_product : dyadic }
+
+(** val lines_before :
+    layerD list -> line list list -> (layerD * line list) list -> int ->
+    (layerD * line list) list **)
+
+let rec lines_before ls lines before k =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> before)
+    (fun k' ->
+    match ls with
+    | [] -> before
+    | l :: ls' ->
+      (match lines with
+       | [] -> before
+       | a :: lines' -> lines_before ls' lines' ((l, a) :: before) k'))
+    k
+
+(** val place_is_open : line list list -> place -> bool **)
+
+let place_is_open lines p =
+  match nth_error (nth p.in_layer lines []) p.in_row with
+  | Some l -> is_open l
+  | None -> false
+
+(** val no_layer : layerD **)
+
+let no_layer =
+  ([], [])
+
+(** val form_of_place :
+    layerD list -> line list list -> place -> dyadic list * dyadic **)
+
+let form_of_place ls lines p =
+  let (w, c) = nth p.in_layer ls no_layer in
+  let s = if p.stays_on then one else ((Big.neg Big.one), Big.zero) in
+  form_above (lines_before ls lines [] p.in_layer) []
+    (scale mul0 s (nth p.in_row w [])) (mul0 s (nth p.in_row c zero))
+
+(** val is_shown :
+    layerD list -> line list list -> box -> conflict -> bool **)
+
+let is_shown ls lines b c =
+  let (f, k) = form_of_place ls lines c.first in
+  let (g, j) = form_of_place ls lines c.second in
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&) (place_is_open lines c.first) (place_is_open lines c.second))
+          (is_nonnegative c.weight)) (is_nonnegative c.rest))
+      (is_positive (add0 c.weight c.rest)))
+    (is_nonnegative
+      (neg
+        (add0 (add0 (mul0 c.weight k) (mul0 c.rest j))
+          (snd
+            (row_ends
+              (plus add0 (scale mul0 c.weight f) (scale mul0 c.rest g)) b)))))
+
+(** val increment_form : (matrixD * matrixD) list -> place -> dyadic list **)
+
+let increment_form all p =
+  let (y, z0) = nth p.in_layer all ([], []) in
+  let z_row = nth p.in_row z0 [] in
+  if p.stays_on
+  then z_row
+  else plus add0 (nth p.in_row y [])
+         (scale mul0 ((Big.neg Big.one), Big.zero) z_row)
+
+(** val conflict_pairs :
+    (matrixD * matrixD) list -> conflict list -> pair_of_forms list **)
+
+let conflict_pairs all cs =
+  map (fun c ->
+    ((scale mul0 (neg c.times_product) (increment_form all c.first)),
+    (increment_form all c.second))) cs
+
+(** val shown_by :
+    (int -> matrixD -> factor option) -> int -> int -> matrixD -> bool **)
+
+let rec shown_by factor_of tries k p =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> false)
+    (fun tries' ->
+    match factor_of k p with
+    | Some f ->
+      if shows_nonnegative p f
+      then true
+      else shown_by factor_of tries' (Stdlib.Int.succ k) p
+    | None -> false)
+    tries
+
+(** val most_factors : int **)
+
+let most_factors =
+  Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ (Stdlib.Int.succ
+    0)))))))))))))))))))
+
+(** val input_pairs : dyadic -> int -> pair_of_forms list **)
+
+let input_pairs rho n =
+  map (fun k -> ((unit_form k), (scale mul0 (half rho) (unit_form k))))
+    (seq 0 n)
+
+(** val output_pairs : matrixD option -> matrixD -> pair_of_forms list **)
+
+let output_pairs form out =
+  match form with
+  | Some q -> form_pairs ((Big.neg Big.one), Big.zero) q out out
+  | None -> minus_squares out
+
+(** val part_inequality :
+    layerD list -> layerD -> matrixD option -> bool list -> dyadic list ->
+    dyadic -> line list list -> conflict list -> dyadic list -> matrixD **)
+
+let part_inequality ls last0 form moves scale0 rho lines cs ts =
+  let (p0, all) =
+    chain_pairs ls lines (split ts (map fst ls)) (selector moves scale0)
+      (count moves)
+  in
+  let (p, z0) = p0 in
+  let out = times_rows (fst last0) z0 in
+  quadratic
+    (app (input_pairs rho (count moves))
+      (app p (app (conflict_pairs all cs) (output_pairs form out))))
+
+(** val anything : layerD -> line list **)
+
+let anything l =
+  repeat (Open (zero, zero, zero, zero)) (length (fst l))
+
+(** val form_inequality : part -> matrixD -> dyadic list -> matrixD **)
+
+let form_inequality p q ts =
+  let n = inputs_of p in
+  let rows0 = map unit_form (seq 0 n) in
+  let (p0, _) =
+    chain_pairs p.hidden (map anything p.hidden)
+      (split ts (map fst p.hidden)) rows0 n
+  in
+  let (s, z0) = p0 in
+  quadratic
+    (app (form_pairs one q rows0 rows0)
+      (app s (minus_squares (times_rows (fst p.outer) z0))))
+
+type proved_form = { lower_rows : matrixD; form_multipliers : dyadic list;
+                     form_factor : (int -> matrixD -> factor option) }
+
+(** val check_form : part -> proved_form -> bool **)
+
+let check_form p f =
+  (&&) (forallb is_nonnegative f.form_multipliers)
+    (shown_by f.form_factor most_factors 0
+      (form_inequality p f.lower_rows f.form_multipliers))
+
+type tree =
+| Leaf of decision list list * conflict list * dyadic list
+| Halve of decision list list * int * dyadic * tree * tree
+
+(** val cut : int -> dyadic -> bool -> box -> box **)
+
+let rec cut k m is_upper b =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ ->
+    match b with
+    | [] -> []
+    | p :: b' -> let (l, h) = p in (if is_upper then (m, h) else (l, m)) :: b')
+    (fun k' ->
+    match b with
+    | [] -> []
+    | i :: b' -> i :: (cut k' m is_upper b'))
+    k
+
+(** val check_tree :
+    hints -> layerD list -> (line list list -> conflict list -> dyadic list
+    -> matrixD) -> box -> line list list -> tree -> bool **)
+
+let rec check_tree o ls inequality b around = function
+| Leaf (ds, cs, ts) ->
+  (match bounds o b [] ls around ds with
+   | Some lines ->
+     (&&) (forallb is_nonnegative ts)
+       (shown_by o.factor_number most_factors 0
+         (inequality lines (filter (is_shown ls lines b) cs) ts))
+   | None -> false)
+| Halve (ds, k, m, lower, upper) ->
+  (match bounds o b [] ls around ds with
+   | Some lines ->
+     (&&) (check_tree o ls inequality (cut k m false b) lines lower)
+       (check_tree o ls inequality (cut k m true b) lines upper)
+   | None -> false)
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
 | By_product
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
+| By_parts of dyadic * proved_form option * hints * tree
 | By_layers of box list
 | By_sum of box
 | By_norm
@@ -1324,9 +1832,9 @@ let fits_part p =
 let matrices p =
   match p.hidden with
   | [] -> ([], (fst p.outer))
-  | first :: later ->
+  | first0 :: later ->
     let scaled = fun l -> scale_all mul0 (steepest p.between) (fst l) in
-    (((fst first) :: (map scaled later)), (scaled p.outer))
+    (((fst first0) :: (map scaled later)), (scaled p.outer))
 
 (** val rising : part -> bool **)
 
@@ -1374,11 +1882,13 @@ let check_slope ps f moves scale0 u rho t factor0 =
 let rec find_norm accepted p layer =
   match accepted with
   | [] -> None
-  | c :: rest ->
+  | c :: rest0 ->
     (match c with
      | Norm_at_most (q, k, u) ->
-       if (&&) ((=) p q) ((=) layer k) then Some u else find_norm rest p layer
-     | _ -> find_norm rest p layer)
+       if (&&) ((=) p q) ((=) layer k)
+       then Some u
+       else find_norm rest0 p layer
+     | _ -> find_norm rest0 p layer)
 
 (** val norms : claim list -> int -> int -> layerD list -> dyadic option **)
 
@@ -1439,6 +1949,34 @@ let check_product ps accepted f moves scale0 u =
      | Some k -> at_most (mul0 m k) u
      | None -> false)
 
+(** val check_parts_of_box :
+    part list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
+    dyadic -> proved_form option -> hints -> tree -> bool **)
+
+let check_parts_of_box ps f moves scale0 b u r form o t =
+  let p = part_at ps (moved f) in
+  let covers = fun q ->
+    check_tree o p.hidden (part_inequality p.hidden p.outer q moves scale0 r)
+      (clamp_ends p.clamp b) [] t
+  in
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&) (well_formed ps f moves scale0)
+          (forallb relu_between (parts_of ps f))) (is_nonnegative u))
+      (at_most r (mul0 u u)))
+    (match f with
+     | Alone _ -> (match form with
+                   | Some _ -> false
+                   | None -> covers None)
+     | Set_of (_, rho) ->
+       (match form with
+        | Some q ->
+          (&&)
+            ((&&) ((=) (length (fst p.outer)) (inputs_of (part_at ps rho)))
+              (check_form (part_at ps rho) q)) (covers (Some q.lower_rows))
+        | None -> false))
+
 (** val valueD : part -> dyadic list -> dyadic list **)
 
 let valueD p x =
@@ -1447,11 +1985,11 @@ let valueD p x =
 (** val value_ofD :
     part list -> function0 -> dyadic list -> dyadic list -> dyadic list **)
 
-let value_ofD ps f rest x =
+let value_ofD ps f rest0 x =
   match f with
   | Alone p -> valueD (part_at ps p) x
   | Set_of (phi0, rho) ->
-    valueD (part_at ps rho) (plus add0 (valueD (part_at ps phi0) x) rest)
+    valueD (part_at ps rho) (plus add0 (valueD (part_at ps phi0) x) rest0)
 
 (** val agreeD : bool list -> dyadic list -> dyadic list -> bool **)
 
@@ -1487,7 +2025,7 @@ let rec fraction_in scale0 = function
     list -> dyadic list -> (int * dyadic list) list -> bool **)
 
 let check_points ps f moves scale0 l x y others =
-  let rest =
+  let rest0 =
     fold_right (plus add0) []
       (map (fun o -> valueD (part_at ps (fst o)) (snd o)) others)
   in
@@ -1509,7 +2047,8 @@ let check_points ps f moves scale0 l x y others =
       (is_positive n))
     (at_most (mul0 (mul0 l l) n)
       (mul0
-        (squareD (minusD (value_ofD ps f rest x) (value_ofD ps f rest y))) m))
+        (squareD (minusD (value_ofD ps f rest0 x) (value_ofD ps f rest0 y)))
+        m))
 
 (** val same_moves : bool list -> bool list -> bool **)
 
@@ -1529,22 +2068,22 @@ let rec same_moves a b =
 let rec find_slope accepted phi0 rho moves =
   match accepted with
   | [] -> None
-  | c :: rest ->
+  | c :: rest0 ->
     (match c with
      | Slope_at_most (f, m, scale0, u) ->
        (match f with
-        | Alone _ -> find_slope rest phi0 rho moves
+        | Alone _ -> find_slope rest0 phi0 rho moves
         | Set_of (q, k) ->
           (match scale0 with
            | [] ->
-             let others = find_slope rest phi0 rho moves in
+             let others = find_slope rest0 phi0 rho moves in
              if (&&) ((&&) ((=) phi0 q) ((=) rho k)) (same_moves moves m)
              then (match others with
                    | Some v -> if at_most v u then Some v else Some u
                    | None -> Some u)
              else others
-           | _ :: _ -> find_slope rest phi0 rho moves))
-     | _ -> find_slope rest phi0 rho moves)
+           | _ :: _ -> find_slope rest0 phi0 rho moves))
+     | _ -> find_slope rest0 phi0 rho moves)
 
 (** val total_of : claim list -> bool -> kind list -> int -> dyadic option **)
 
@@ -1557,12 +2096,12 @@ let rec total_of accepted squares kinds rho =
     (match find_slope accepted phi0 rho moves with
      | Some k0 ->
        (match total_of accepted squares kinds' rho with
-        | Some rest ->
+        | Some rest0 ->
           if (&&) (is_nonnegative k0) (Big.leq Big.zero n)
           then Some
                  (add0
                    (mul0 (n, Big.zero) (if squares then mul0 k0 k0 else k0))
-                   rest)
+                   rest0)
           else None
         | None -> None)
      | None -> None)
@@ -1576,16 +2115,89 @@ let check_law ps accepted stacked kinds rho u =
      | Some s -> at_most s (if stacked then mul0 u u else u)
      | None -> false)
 
+(** val less_of : dyadic -> dyadic option -> dyadic option **)
+
+let less_of u = function
+| Some w -> if at_most w u then Some w else Some u
+| None -> Some u
+
+(** val find_slope_in :
+    claim list -> int -> int -> bool list -> box -> dyadic option **)
+
+let rec find_slope_in accepted phi0 rho moves b =
+  match accepted with
+  | [] -> None
+  | c0 :: rest0 ->
+    (match c0 with
+     | Slope_at_most (f, m, scale0, u) ->
+       (match f with
+        | Alone _ -> find_slope_in rest0 phi0 rho moves b
+        | Set_of (q, k) ->
+          (match scale0 with
+           | [] ->
+             let others = find_slope_in rest0 phi0 rho moves b in
+             if (&&) ((&&) ((=) phi0 q) ((=) rho k)) (same_moves moves m)
+             then less_of u others
+             else others
+           | _ :: _ -> find_slope_in rest0 phi0 rho moves b))
+     | Slope_in_box (f, m, scale0, c, u) ->
+       (match f with
+        | Alone _ -> find_slope_in rest0 phi0 rho moves b
+        | Set_of (q, k) ->
+          (match scale0 with
+           | [] ->
+             let others = find_slope_in rest0 phi0 rho moves b in
+             if (&&)
+                  ((&&) ((&&) ((=) phi0 q) ((=) rho k)) (same_moves moves m))
+                  (same_box b c)
+             then less_of u others
+             else others
+           | _ :: _ -> find_slope_in rest0 phi0 rho moves b))
+     | _ -> find_slope_in rest0 phi0 rho moves b)
+
+(** val total_in :
+    claim list -> bool -> (kind * box) list -> int -> dyadic option **)
+
+let rec total_in accepted squares kinds rho =
+  match kinds with
+  | [] -> Some zero
+  | p :: kinds' ->
+    let (k, b) = p in
+    let (p0, n) = k in
+    let (phi0, moves) = p0 in
+    (match find_slope_in accepted phi0 rho moves b with
+     | Some k0 ->
+       (match total_in accepted squares kinds' rho with
+        | Some rest0 ->
+          if (&&) (is_nonnegative k0) (Big.leq Big.zero n)
+          then Some
+                 (add0
+                   (mul0 (n, Big.zero) (if squares then mul0 k0 k0 else k0))
+                   rest0)
+          else None
+        | None -> None)
+     | None -> None)
+
+(** val check_law_in_box :
+    part list -> claim list -> bool -> (kind * box) list -> int -> dyadic ->
+    bool **)
+
+let check_law_in_box ps accepted stacked kinds rho u =
+  (&&) ((&&) (is_nonnegative u) (fits_part (part_at ps rho)))
+    (match total_in accepted stacked kinds rho with
+     | Some s -> at_most s (if stacked then mul0 u u else u)
+     | None -> false)
+
 (** val find_within : claim list -> int -> box -> box option **)
 
 let rec find_within accepted p b =
   match accepted with
   | [] -> None
-  | c0 :: rest ->
+  | c0 :: rest0 ->
     (match c0 with
      | Within (q, c, v) ->
-       if (&&) ((=) p q) (same_box b c) then Some v else find_within rest p b
-     | _ -> find_within rest p b)
+       if (&&) ((=) p q) (same_box b c) then Some v else find_within rest0 p b
+     | _ -> find_within rest0 p b)
 
 (** val find_error :
     claim list -> int -> box -> dyadic list -> (dyadic list * dyadic) option **)
@@ -1593,20 +2205,20 @@ let rec find_within accepted p b =
 let rec find_error accepted p b r =
   match accepted with
   | [] -> None
-  | c0 :: rest ->
+  | c0 :: rest0 ->
     (match c0 with
      | Float_error (q, c, s, e, u) ->
        if (&&) ((&&) ((=) p q) (same_box b c)) (same_numbers r s)
        then Some (e, u)
-       else find_error rest p b r
-     | _ -> find_error rest p b r)
+       else find_error rest0 p b r
+     | _ -> find_error rest0 p b r)
 
 (** val find_alone : claim list -> int -> int -> dyadic option **)
 
 let rec find_alone accepted p n =
   match accepted with
   | [] -> None
-  | c :: rest ->
+  | c :: rest0 ->
     (match c with
      | Slope_at_most (f, moves, scale0, u) ->
        (match f with
@@ -1616,10 +2228,10 @@ let rec find_alone accepted p n =
              if (&&) ((&&) ((=) p q) (forallb (fun m -> m) moves))
                   ((=) (length moves) n)
              then Some u
-             else find_alone rest p n
-           | _ :: _ -> find_alone rest p n)
-        | Set_of (_, _) -> find_alone rest p n)
-     | _ -> find_alone rest p n)
+             else find_alone rest0 p n
+           | _ :: _ -> find_alone rest0 p n)
+        | Set_of (_, _) -> find_alone rest0 p n)
+     | _ -> find_alone rest0 p n)
 
 (** val sum_ends : claim list -> int -> term list -> box option **)
 
@@ -1640,10 +2252,10 @@ let rec sum_ends accepted n = function
 
 (** val check_within : part list -> int -> box -> box list -> box -> bool **)
 
-let check_within ps p b bounds v =
+let check_within ps p b bounds0 v =
   let q = part_at ps p in
   (&&) (relu_between q)
-    (check_layers q.hidden q.outer (clamp_ends q.clamp b) bounds v)
+    (check_layers q.hidden q.outer (clamp_ends q.clamp b) bounds0 v)
 
 (** val check_sum_within :
     part list -> claim list -> term list -> int -> box -> box -> bool **)
@@ -1676,12 +2288,12 @@ let check_jump ps accepted p b rho u =
     part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box
     list -> dyadic list list -> bool **)
 
-let check_error ps p b r e u bounds errors =
+let check_error ps p b r e u bounds0 errors =
   let q = part_at ps p in
   (&&)
     ((&&)
       ((&&) (relu_between q)
-        (check_roundings q.hidden q.outer (clamp_ends q.clamp b) r bounds
+        (check_roundings q.hidden q.outer (clamp_ends q.clamp b) r bounds0
           errors e)) (is_nonnegative u)) (at_most (squareD e) (mul0 u u))
 
 (** val sum_errors :
@@ -1758,13 +2370,22 @@ let check_claim ps accepted c p =
     (match p with
      | By_points (x, y, others) -> check_points ps f moves scale0 l x y others
      | _ -> false)
+  | Slope_in_box (f, moves, scale0, b, u) ->
+    (match p with
+     | By_parts (r, form, o, t) ->
+       check_parts_of_box ps f moves scale0 b u r form o t
+     | _ -> false)
   | Law (stacked, kinds, rho, u) ->
     (match p with
      | By_triangle -> check_law ps accepted stacked kinds rho u
      | _ -> false)
+  | Law_in_box (stacked, kinds, rho, u) ->
+    (match p with
+     | By_triangle -> check_law_in_box ps accepted stacked kinds rho u
+     | _ -> false)
   | Within (p0, b, v) ->
     (match p with
-     | By_layers bounds -> check_within ps p0 b bounds v
+     | By_layers bounds0 -> check_within ps p0 b bounds0 v
      | _ -> false)
   | Sum_within (terms, rho, v) ->
     (match p with
@@ -1776,8 +2397,8 @@ let check_claim ps accepted c p =
      | _ -> false)
   | Float_error (p0, b, r, e, u) ->
     (match p with
-     | By_roundings (bounds, errors) ->
-       check_error ps p0 b r e u bounds errors
+     | By_roundings (bounds0, errors) ->
+       check_error ps p0 b r e u bounds0 errors
      | _ -> false)
   | Sum_float_error (terms, rho, u) ->
     (match p with

@@ -70,6 +70,8 @@ val tl : 'a1 list -> 'a1 list
 
 val nth : int -> 'a1 list -> 'a1 -> 'a1
 
+val nth_error : 'a1 list -> int -> 'a1 option
+
 val last : 'a1 list -> 'a1 -> 'a1
 
 val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
@@ -78,11 +80,15 @@ val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1
 
 val forallb : ('a1 -> bool) -> 'a1 list -> bool
 
+val filter : ('a1 -> bool) -> 'a1 list -> 'a1 list
+
 val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list
 
 val firstn : int -> 'a1 list -> 'a1 list
 
 val skipn : int -> 'a1 list -> 'a1 list
+
+val seq : int -> int -> int list
 
 val repeat : 'a1 -> int -> 'a1 list
 
@@ -239,7 +245,9 @@ type claim =
 | Norm_at_least of int * int * dyadic
 | Slope_at_most of function0 * bool list * dyadic list * dyadic
 | Slope_at_least of function0 * bool list * dyadic list * dyadic
+| Slope_in_box of function0 * bool list * dyadic list * box * dyadic
 | Law of bool * kind list * int * dyadic
+| Law_in_box of bool * (kind * box) list * int * dyadic
 | Within of int * box * box
 | Sum_within of term list * int * box
 | Jump_at_most of int * box * int * dyadic
@@ -323,12 +331,146 @@ val add_ends : Big.t -> Big.t -> box -> box -> box
 
 val sum_fits : Big.t -> dyadic list -> dyadic list -> dyadic list -> bool
 
+type hints = { slope_between : (dyadic -> dyadic -> dyadic);
+               rounded_up : (dyadic -> dyadic);
+               factor_number : (int -> matrixD -> factor option) }
+
+val up : hints -> dyadic -> dyadic
+
+type line =
+| On
+| Off
+| Open of dyadic * dyadic * dyadic * dyadic
+
+val line_of : hints -> dyadic -> dyadic -> line
+
+val through_relu :
+  dyadic list -> line list -> bool list -> dyadic list * dyadic
+
+val combined : dyadic list -> matrixD -> dyadic list
+
+val form_above :
+  (layerD * line list) list -> bool list list -> dyadic list -> dyadic ->
+  dyadic list * dyadic
+
+val most0 :
+  (layerD * line list) list -> bool list list -> dyadic list -> dyadic -> box
+  -> dyadic
+
+type decision = { neuron : int; is_on : bool; lower_slopes : bool list list }
+
+val new_line :
+  hints -> box -> (layerD * line list) list -> dyadic list -> dyadic -> line
+  list -> line
+
+val new_lines :
+  hints -> box -> (layerD * line list) list -> matrixD -> dyadic list -> line
+  list -> line list
+
+val decide :
+  box -> (layerD * line list) list -> matrixD -> dyadic list -> line list ->
+  decision -> line list option
+
+val decide_all :
+  box -> (layerD * line list) list -> matrixD -> dyadic list -> line list ->
+  decision list -> line list option
+
+val bounds :
+  hints -> box -> (layerD * line list) list -> layerD list -> line list list
+  -> decision list list -> line list list option
+
+type pair_of_forms = dyadic list * dyadic list
+
+val scale_short : dyadic -> dyadic list -> dyadic list
+
+val outer_sum_of : dyadic list -> dyadic list -> matrixD
+
+val quadratic : pair_of_forms list -> matrixD
+
+val half : dyadic -> dyadic
+
+val unit_form : int -> dyadic list
+
+val minus_squares : matrixD -> pair_of_forms list
+
+val half_last : dyadic list -> dyadic list
+
+val form_pairs : dyadic -> matrixD -> matrixD -> matrixD -> pair_of_forms list
+
+val is_open : line -> bool
+
+val relu_step :
+  line list -> dyadic list -> matrixD -> int -> (pair_of_forms
+  list * matrixD) * int
+
+val times_rows : matrixD -> matrixD -> matrixD
+
+val chain_pairs :
+  layerD list -> line list list -> dyadic list list -> matrixD -> int ->
+  (pair_of_forms list * matrixD) * (matrixD * matrixD) list
+
+type place = { in_layer : int; in_row : int; stays_on : bool }
+
+type conflict = { first : place; second : place; weight : dyadic;
+                  rest : dyadic; times_product : dyadic }
+
+val lines_before :
+  layerD list -> line list list -> (layerD * line list) list -> int ->
+  (layerD * line list) list
+
+val place_is_open : line list list -> place -> bool
+
+val no_layer : layerD
+
+val form_of_place :
+  layerD list -> line list list -> place -> dyadic list * dyadic
+
+val is_shown : layerD list -> line list list -> box -> conflict -> bool
+
+val increment_form : (matrixD * matrixD) list -> place -> dyadic list
+
+val conflict_pairs :
+  (matrixD * matrixD) list -> conflict list -> pair_of_forms list
+
+val shown_by :
+  (int -> matrixD -> factor option) -> int -> int -> matrixD -> bool
+
+val most_factors : int
+
+val input_pairs : dyadic -> int -> pair_of_forms list
+
+val output_pairs : matrixD option -> matrixD -> pair_of_forms list
+
+val part_inequality :
+  layerD list -> layerD -> matrixD option -> bool list -> dyadic list ->
+  dyadic -> line list list -> conflict list -> dyadic list -> matrixD
+
+val anything : layerD -> line list
+
+val form_inequality : part -> matrixD -> dyadic list -> matrixD
+
+type proved_form = { lower_rows : matrixD; form_multipliers : dyadic list;
+                     form_factor : (int -> matrixD -> factor option) }
+
+val check_form : part -> proved_form -> bool
+
+type tree =
+| Leaf of decision list list * conflict list * dyadic list
+| Halve of decision list list * int * dyadic * tree * tree
+
+val cut : int -> dyadic -> bool -> box -> box
+
+val check_tree :
+  hints -> layerD list -> (line list list -> conflict list -> dyadic list ->
+  matrixD) -> box -> line list list -> tree -> bool
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
 | By_product
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
+| By_parts of dyadic * proved_form option * hints * tree
 | By_layers of box list
 | By_sum of box
 | By_norm
@@ -373,6 +515,10 @@ val check_product :
   part list -> claim list -> function0 -> bool list -> dyadic list -> dyadic
   -> bool
 
+val check_parts_of_box :
+  part list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
+  dyadic -> proved_form option -> hints -> tree -> bool
+
 val valueD : part -> dyadic list -> dyadic list
 
 val value_ofD :
@@ -394,6 +540,17 @@ val total_of : claim list -> bool -> kind list -> int -> dyadic option
 
 val check_law :
   part list -> claim list -> bool -> kind list -> int -> dyadic -> bool
+
+val less_of : dyadic -> dyadic option -> dyadic option
+
+val find_slope_in :
+  claim list -> int -> int -> bool list -> box -> dyadic option
+
+val total_in : claim list -> bool -> (kind * box) list -> int -> dyadic option
+
+val check_law_in_box :
+  part list -> claim list -> bool -> (kind * box) list -> int -> dyadic ->
+  bool
 
 val find_within : claim list -> int -> box -> box option
 

@@ -4,7 +4,7 @@
 open Refusal
 open Json
 
-type source = Proved_here | Not_checked
+type source = Proved_here | In_box | Not_checked
 type t = {
   net : Network.t;
   json : Json.t;
@@ -14,6 +14,8 @@ type t = {
   norms : (string, Proved.dyadic) Hashtbl.t;  (* product of the norms of a network *)
   uppers : (string * string * (string * int) list, Proved.dyadic * source) Hashtbl.t;
       (* by function, block, neighbours *)
+  in_box : (string * string, unit) Hashtbl.t;  (* functions and blocks whose bound, for any neighbours, is one in a box *)
+  mutable unwritten : int;  (* claims that --coq does not write *)
   mutable spectral_norms : int;
   mutable upper_bounds : int;
   mutable lower_bounds : int;
@@ -28,6 +30,11 @@ let rec prove_by state claim proofs reason = match proofs () with
     match Proved.step state.parts state.accepted claim proof with
     | Some accepted -> state.accepted <- accepted; state.log <- (claim, proof) :: state.log
     | None -> prove_by state claim others reason
+
+(* By parts of boxes: what --coq cannot write, because such proofs hold guesses of floating point as functions. *)
+let prove_unwritten state claim proof reason = match Proved.step state.parts state.accepted claim proof with
+  | Some accepted -> state.accepted <- accepted; state.unwritten <- state.unwritten + 1
+  | None -> rejected "%s" (reason ())
 
 let prove state claim proof reason = prove_by state claim (Seq.return proof) reason
 
@@ -156,6 +163,17 @@ let check_product state where bound names claim scale upper =
     prove state claim Proved.By_product (where ^ ": claims less than the product of the norms");
     Proved_here
 
+(* By parts of boxes: the claim is one of the box, and what is beyond the theorems is not checked. *)
+let check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper =
+  match Box_parts.read state.net state.json bound ~where ~names ~moves ~scale ~upper with
+  | Beyond what ->
+    not_checked state (Printf.sprintf "%s <= %s: %s" where (text where (find where "upper_hex" bound)) (Box_parts.words_of what));
+    Not_checked
+  | Proof (box, proof, reason) ->
+    let claim = Proved.Slope_in_box (func, moves, exact_scale, box, upper) in
+    prove_unwritten state claim (proof ()) reason;
+    In_box
+
 (* What is not stated of functions with other activations than ReLU. *)
 let check_activations state where bound names =
   List.iter (fun name ->
@@ -193,14 +211,15 @@ let check_bound state bound =
     | Text ("sdp" | "eclipse_fast") ->
       let proofs = inequality state claim where ~neurons:(hidden_neurons state names) ~upper (find where "proof" bound) in
       prove_by state claim proofs (no_factor where); Proved_here
-    | Text "branch" ->
-      not_checked state (Printf.sprintf "%s <= %s: proved by parts of boxes" where
-                           (text where (find where "upper_hex" bound)));
-      Not_checked
+    | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper
     | Text "product" when find where "proof" bound = Null -> check_product state where bound names claim scale upper
     | _ -> rejected "%s: unknown upper_method" where in
-  if scale = [] then Hashtbl.replace state.uppers (f, block, neighbours) (upper, source);
-  if source = Proved_here then state.upper_bounds <- state.upper_bounds + 1;
+  if scale = [] then begin
+    Hashtbl.replace state.uppers (f, block, neighbours) (upper, source);
+    if find where "upper_method" bound = Text "branch" && find where "domain" bound = Text "box" && neighbours = [] then
+      Hashtbl.replace state.in_box (f, block) ()
+  end;
+  if source <> Not_checked then state.upper_bounds <- state.upper_bounds + 1;
   match find where "lower_witness" bound with
   | Null -> require (find where "lower" bound = Null && find where "lower_hex" bound = Null)
       "%s: lower without a witness" where
@@ -232,6 +251,7 @@ let check_law state law =
     let f = Printf.sprintf "set:%s:%s" kind rho in
     let any, source = match Hashtbl.find_opt state.uppers (f, block, []) with
       | Some found -> found | None -> rejected "%s: rests on a bound of %s that is not there" where (shown f) in
+    require (domain = "box" || not (Hashtbl.mem state.in_box (f, block))) "%s: rests on a bound that holds on a box only" where;
     match Hashtbl.find_opt state.uppers (f, block, neighbours) with
     | Some (fewer, source) when domain = "box" && neighbours <> [] && at_most fewer any -> f, count, fewer, source
     | _ -> f, count, any, source in
@@ -244,12 +264,19 @@ let check_law state law =
       plus sum (times (Z.of_int n, Z.zero) (if stacked then times k k else k))) Exact.zero bounds in
   let reason = where ^ ": claims less than the law gives" in
   require (at_most total (if stacked then times upper upper else upper)) "%s" reason;
-  if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds then
+  let part f = List.hd (Functions.networks_of f) in
+  let has_box (f, _, _, _) = match state.json with
+    | Object members -> (match List.assoc_opt "box" members with Some box -> has (part f) box | None -> false)
+    | _ -> false in
+  let everywhere = List.for_all (fun (_, _, _, source) -> source = Proved_here) bounds in
+  if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds || not (everywhere || List.for_all has_box bounds) then
     not_checked state (Printf.sprintf "%s: rests on a bound that is not checked" where)
   else begin
-    let kind (f, n, _, _) =
-      (Functions.index state.net (List.hd (Functions.networks_of f)), Functions.moves state.net f block), Z.of_int n in
+    let kind (f, n, _, _) = (Functions.index state.net (part f), Functions.moves state.net f block), Z.of_int n in
+    let in_box ((f, _, _, _) as bound) =
+      let box, _, _ = Box_parts.box_of state.net state.json (part f) where in kind bound, box in
     let rho = Functions.index state.net ("rho:" ^ rho) in
-    prove state (Law (stacked, List.map kind bounds, rho, upper)) By_triangle reason;
+    if everywhere then prove state (Law (stacked, List.map kind bounds, rho, upper)) By_triangle reason
+    else prove_unwritten state (Law_in_box (stacked, List.map in_box bounds, rho, upper)) By_triangle (fun () -> reason);
     state.upper_bounds <- state.upper_bounds + 1
   end

@@ -1,6 +1,6 @@
 (** The checker of claims, and what its acceptance means: `step_sound`. *)
 From Coq Require Import List ZArith Reals Bool.
-From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Blocks Lower Values Parts.
 Import ListNotations.
 
 Inductive proof :=
@@ -9,6 +9,7 @@ Inductive proof :=
 | By_product
 | By_points (x y : list dyadic) (others : list (nat * list dyadic))
 | By_triangle
+| By_parts (rho : dyadic) (form : option proved_form) (o : hints) (t : tree)
 | By_layers (bounds : list box)
 | By_sum (sums : box)
 | By_norm
@@ -84,6 +85,19 @@ Definition check_product ps accepted f moves scale u : bool :=
   well_formed ps f moves scale && at_most (hd one scale) m && forallb (fun s => at_most s m) scale
   && match product_of ps accepted f with Some k => at_most (mul m k) u | None => false end.
 
+(** Slopes in a box, part by part. *)
+Definition check_parts_of_box ps f moves scale (b : box) u r (form : option proved_form) (o : hints) (t : tree) : bool :=
+  let p := part_at ps (moved f) in
+  let covers q := check_tree o (hidden p) (part_inequality (hidden p) (outer p) q moves scale r) (clamp_ends (clamp p) b) [] t in
+  well_formed ps f moves scale && forallb relu_between (parts_of ps f) && is_nonnegative u && at_most r (mul u u)
+  && match f, form with
+     | Alone _, None => covers None
+     | Set_of _ rho, Some q =>
+         (length (fst (outer p)) =? inputs_of (part_at ps rho))%nat && check_form (part_at ps rho) q
+         && covers (Some (lower_rows q))
+     | _, _ => false
+     end.
+
 (** Slopes from below, between two points. *)
 Definition valueD (p : part) (x : list dyadic) : list dyadic := networkD (hidden p) (outer p) (clampedD (clamp p) x).
 Definition value_ofD (ps : list part) (f : function) (rest x : list dyadic) : list dyadic :=
@@ -141,6 +155,38 @@ Fixpoint total_of (accepted : list claim) (squares : bool) (kinds : list kind) (
 Definition check_law ps accepted (stacked : bool) kinds rho u : bool :=
   is_nonnegative u && fits_part (part_at ps rho)
   && match total_of accepted stacked kinds rho with
+     | Some s => at_most s (if stacked then mul u u else u)
+     | None => false
+     end.
+
+(** The least bound that was accepted for this box, or for all inputs. *)
+Definition less_of (u : dyadic) (v : option dyadic) : option dyadic :=
+  match v with Some w => if at_most w u then Some w else Some u | None => Some u end.
+Fixpoint find_slope_in (accepted : list claim) (phi rho : nat) (moves : list bool) (b : box) : option dyadic :=
+  match accepted with
+  | [] => None
+  | Slope_at_most (Set_of q k) m [] u :: rest =>
+      let others := find_slope_in rest phi rho moves b in
+      if ((phi =? q) && (rho =? k))%nat%bool && same_moves moves m then less_of u others else others
+  | Slope_in_box (Set_of q k) m [] c u :: rest =>
+      let others := find_slope_in rest phi rho moves b in
+      if ((phi =? q) && (rho =? k))%nat%bool && same_moves moves m && same_box b c then less_of u others else others
+  | _ :: rest => find_slope_in rest phi rho moves b
+  end.
+Fixpoint total_in (accepted : list claim) (squares : bool) (kinds : list (kind * box)) (rho : nat) : option dyadic :=
+  match kinds with
+  | [] => Some zero
+  | ((phi, moves, n), b) :: kinds' =>
+      match find_slope_in accepted phi rho moves b, total_in accepted squares kinds' rho with
+      | Some k, Some rest =>
+          if is_nonnegative k && (0 <=? n)%Z then Some (add (mul (n, 0%Z) (if squares then mul k k else k)) rest)
+              else None
+      | _, _ => None
+      end
+  end.
+Definition check_law_in_box ps accepted (stacked : bool) kinds rho u : bool :=
+  is_nonnegative u && fits_part (part_at ps rho)
+  && match total_in accepted stacked kinds rho with
      | Some s => at_most s (if stacked then mul u u else u)
      | None => false
      end.
@@ -227,8 +273,10 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Norm_at_least p layer l, By_vector v => check_norm_below (matrix_at ps p layer) l v
   | Slope_at_most f moves scale u, By_inequality rho t r => check_slope ps f moves scale u rho t r
   | Slope_at_most f moves scale u, By_product => check_product ps accepted f moves scale u
+  | Slope_in_box f moves scale b u, By_parts r form o t => check_parts_of_box ps f moves scale b u r form o t
   | Slope_at_least f moves scale l, By_points x y others => check_points ps f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u
+  | Law_in_box stacked kinds rho u, By_triangle => check_law_in_box ps accepted stacked kinds rho u
   | Within p b v, By_layers bounds => check_within ps p b bounds v
   | Sum_within terms rho v, By_sum sums => check_sum_within ps accepted terms rho v sums
   | Jump_at_most p b rho u, By_norm => check_jump ps accepted p b rho u

@@ -60,6 +60,11 @@ Definition sum_at (ps : list part) (side : mover -> list R) (groups : list (kind
   vector_sum (flat_map (terms ps side) groups).
 Definition step_of (m : mover) : R := norm (minus (fst m) (snd m)).
 
+(** At most u times the norm of all steps together or, if not stacked, of the longest. *)
+Definition bounded_change (stacked : bool) (u : dyadic) (change : list R) (movers : list mover) : Prop :=
+  if stacked then norm change <= real u * norm (map step_of movers)
+  else forall r, 0 <= r -> Forall (fun m => step_of m <= r) movers -> norm change <= real u * r.
+
 (** Values over boxes of inputs: an interval for each number. *)
 Definition box := list (dyadic * dyadic).
 Fixpoint within (b : box) (x : list R) : Prop :=
@@ -98,7 +103,9 @@ Inductive claim :=
 | Norm_at_least (p layer : nat) (l : dyadic)
 | Slope_at_most (f : function) (moves : list bool) (scale : list dyadic) (u : dyadic)
 | Slope_at_least (f : function) (moves : list bool) (scale : list dyadic) (l : dyadic)
+| Slope_in_box (f : function) (moves : list bool) (scale : list dyadic) (b : box) (u : dyadic)
 | Law (stacked : bool) (kinds : list kind) (rho : nat) (u : dyadic)
+| Law_in_box (stacked : bool) (kinds : list (kind * box)) (rho : nat) (u : dyadic)
 | Within (p : nat) (b v : box)
 | Sum_within (terms : list term) (rho : nat) (v : box)
 | Jump_at_most (phi : nat) (b : box) (rho : nat) (u : dyadic)
@@ -116,6 +123,9 @@ Definition holds (ps : list part) (c : claim) : Prop :=
   | Slope_at_most f moves scale u =>
       forall rest x y, agree moves x y -> length x = inputs_of (part_at ps (moved f)) ->
         norm (minus (value_of ps f rest x) (value_of ps f rest y)) <= real u * distance scale x y
+  | Slope_in_box f moves scale b u =>
+      forall rest x y, agree moves x y -> length x = inputs_of (part_at ps (moved f)) -> within b x -> within b y ->
+        norm (minus (value_of ps f rest x) (value_of ps f rest y)) <= real u * distance scale x y
   | Slope_at_least f moves scale l =>
       exists others x y, agree moves x y /\ length x = inputs_of (part_at ps (moved f)) /\ 0 < distance scale x y /\
         Forall (fun o => length (snd o) = inputs_of (part_at ps (fst o))) others /\
@@ -125,11 +135,16 @@ Definition holds (ps : list part) (c : claim) : Prop :=
       forall movers, Forall2 may_move kinds movers -> let groups := combine kinds movers in
       Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g))
         groups ->
-      let change := minus (value (part_at ps rho) (sum_at ps fst groups))
-          (value (part_at ps rho) (sum_at ps snd groups)) in
-      if stacked
-      then norm change <= real u * norm (map step_of (concat movers))
-      else forall r, 0 <= r -> Forall (fun m => step_of m <= r) (concat movers) -> norm change <= real u * r
+      bounded_change stacked u (minus (value (part_at ps rho) (sum_at ps fst groups))
+        (value (part_at ps rho) (sum_at ps snd groups))) (concat movers)
+  | Law_in_box stacked kinds rho u =>
+      forall movers, Forall2 may_move (map fst kinds) movers ->
+      Forall2 (fun k => Forall (fun m => within (snd k) (fst m) /\ within (snd k) (snd m))) kinds movers ->
+      let groups := combine (map fst kinds) movers in
+      Forall (fun g => Forall (fun m => length (fst m) = inputs_of (part_at ps (fst (fst (fst g))))) (snd g))
+        groups ->
+      bounded_change stacked u (minus (value (part_at ps rho) (sum_at ps fst groups))
+        (value (part_at ps rho) (sum_at ps snd groups))) (concat movers)
   | Within p b v => forall x, within b x -> within v (value (part_at ps p) x)
   | Sum_within terms rho v =>
       forall inputs, Forall2 may_stand terms inputs ->

@@ -5,17 +5,10 @@ From Swarmcert Require Import Algebra Activations Form Network Checker Float Mea
 Import ListNotations.
 Open Scope R_scope.
 
-Lemma same_eq x y : same x y = true -> x = y.
-Proof. destruct x, y. unfold same. simpl. intros H. both H. apply Z.eqb_eq in H, H0. congruence. Qed.
 Lemma same_numbers_eq x y : same_numbers x y = true -> x = y.
 Proof.
   revert y. induction x as [|a x IH]; intros [|b y]; simpl; auto; try discriminate. intros H. both H.
   apply same_eq in H. f_equal; auto.
-Qed.
-Lemma same_box_eq x y : same_box x y = true -> x = y.
-Proof.
-  revert y. induction x as [|[a b] x IH]; intros [|[c d] y]; simpl; auto; try discriminate. intros H. do 2 both H.
-  apply same_eq in H, H1. f_equal; [congruence|auto].
 Qed.
 Lemma within_length b x : within b x -> length x = length b.
 Proof. revert x. induction b as [|[l h] b IH]; intros [|a x]; simpl; try tauto. intros [_ H]. f_equal; auto. Qed.
@@ -202,7 +195,7 @@ Lemma find_alone_sound ps accepted p n u : Forall (holds ps) accepted -> find_al
   exists moves, forallb (fun m => m) moves = true /\ length moves = n /\ holds ps (Slope_at_most (Alone p) moves []
     u).
 Proof.
-  intros H. induction H as [|c rest Hc H IH]; [discriminate|]. destruct c as [| |[q|] m [|] w| | | | | | |];
+  intros H. induction H as [|c rest Hc H IH]; [discriminate|]. destruct c as [| |[q|] m [|] w| | | | | | | | |];
     simpl find_alone; auto.
   destruct (Nat.eqb_spec p q); simpl; auto. destruct (forallb _ m) eqn:E; auto.
   destruct (Nat.eqb_spec (length m) n); simpl; auto. intros G. inversion G. subst. exists m. auto.

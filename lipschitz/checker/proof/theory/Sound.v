@@ -1,7 +1,8 @@
 (** An accepted claim holds. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Claims Slopes Witness Laws Ranges Roundings.
+    Values Claims Slopes Witness Laws Ranges Roundings
+    Relaxation Increments Cover.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -13,7 +14,9 @@ Proof.
   - now apply slope_sound in H.
   - now apply product_sound in H.
   - now apply points_sound in H.
+  - now apply slope_in_box_sound in H.
   - now apply law_sound in H.
+  - now apply law_in_box_sound in H.
   - now apply within_sound in H.
   - now apply sum_within_sound in H.
   - now apply jump_sound in H.

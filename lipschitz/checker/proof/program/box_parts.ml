@@ -1,0 +1,248 @@
+(* Proofs by parts of a box: the tree of a certificate as a proof of the theorems, with the numbers that only have to be good
+   guesses, in floating point. *)
+
+open Refusal
+open Json
+
+(* Numbers that a proof may hold, as in the other checkers. *)
+let most_inputs_of_a_corner = 48
+let deepest = 2000
+let largest_input = 0x1p100
+let on_at_corner = 0x1p-30
+
+type beyond = Global | Coupled
+type found = Beyond of beyond | Proof of Proved.box * (unit -> Proved.proof) * (unit -> string)
+
+let words_of = function
+  | Global -> "proved by parts of a cover of all inputs"
+  | Coupled -> "proved by parts of boxes with forms for a number of neighbours"
+
+(* Guesses. None of them can make a false claim accepted. *)
+
+let slope_between low high =
+  let l = Proposal.to_float low and u = Proposal.to_float high in
+  let slope = u /. (u -. l) in
+  if Float.is_finite slope && slope > 0. then Exact.of_float (Float.min 1. slope) else Exact.one
+
+(* No less, in 64 bits. *)
+let rounded_up (m, e) =
+  let excess = Z.numbits m - 64 in
+  if excess <= 0 then m, e else Z.add (Z.shift_right m excess) Z.one, Z.add e (Z.of_int excess)
+
+(* A guesser for one matrix after the other: the candidates of the one at hand, and how many were asked for before it. *)
+type guesses = { mutable rest : Proved.factor Seq.t; mutable matrices : int; mutable is_shown : bool }
+(* Rows of the theorems' matrices end where only zeros follow. *)
+let padded matrix =
+  let size = List.fold_left max (List.length matrix) (List.mapi (fun i row -> i + List.length row) matrix) in
+  let row i given = given @ List.init (size - i - List.length given) (fun _ -> Exact.zero) in
+  List.init size (fun i -> row i (match List.nth_opt matrix i with Some given -> given | None -> []))
+let next_factor guesses k matrix =
+  if k = 0 then begin
+    guesses.rest <- Proposal.factors (padded matrix);
+    guesses.matrices <- guesses.matrices + 1;
+  end;
+  match guesses.rest () with
+  | Seq.Nil -> guesses.is_shown <- false; None
+  | Seq.Cons (factor, rest) -> guesses.rest <- rest; guesses.is_shown <- true; Some factor
+let new_guesses () = { rest = Seq.empty; matrices = 0; is_shown = false }
+
+(* For each layer before layer `top`, the last one first, which neurons are on at a point. *)
+let slopes_at (layers : Weights.layer list) top point =
+  let rec go k h found = function
+    | (layer : Weights.layer) :: rest when k < top ->
+      let y = Array.mapi (fun i row ->
+          let bias = layer.biases.(i) in
+          let y = ref bias and size = ref (Float.abs bias) in
+          Array.iteri (fun j w -> let term = w *. h.(j) in y := !y +. term; size := !size +. Float.abs term) row;
+          !y, !size) layer.weights in
+      let is_on = Array.to_list (Array.map (fun (y, size) -> y > on_at_corner *. size) y) in
+      go (k + 1) (Array.map (fun (y, _) -> Float.max 0. y) y) (is_on :: found) rest
+    | _ -> found in
+  go 0 point [] layers
+
+(* Reading *)
+
+let box_of (net : Network.t) certificate part where =
+  let box = find where part (find where "box" certificate) in
+  let ends key = Exact.hex_floats where (find where key box) in
+  let lower = ends "lower" and upper = ends "upper" in
+  require (List.length lower = Functions.inputs net part && List.length upper = List.length lower)
+    "%s: the box has another size" where;
+  let clamped side = if Network.is_clamped part && net.clamp <> [] then
+      List.map2 (fun x (a, b) -> Float.min (Float.max x a) b) side net.clamp else side in
+  let low = clamped lower and high = clamped upper in
+  require (List.for_all2 ( <= ) low high) "%s: the box is empty" where;
+  require (List.for_all (fun x -> Float.abs x <= largest_input) (low @ high))
+    "%s: the box is empty, too large or of another size" where;
+  List.combine (List.map Exact.of_float lower) (List.map Exact.of_float upper), Array.of_list low, Array.of_list high
+
+let hex_words where json = List.map Exact.parse_hex_float (Exact.words (text where json))
+
+(* One word of a tree: a letter, and its number or its decision. *)
+type word = Split of int | Multipliers of int | Of_rho | Decided of int * bool * int
+let word_of text =
+  let size = String.length text in
+  let number from until =
+    let digits = String.sub text from (until - from) in
+    if digits <> "" && String.length digits <= 15 && String.for_all (fun c -> c >= '0' && c <= '9') digits
+    then int_of_string_opt ("0u" ^ digits) else None in
+  if size = 0 then None else
+  match text.[0] with
+  | 'r' when size = 1 -> Some Of_rho
+  | 's' -> Option.map (fun k -> Split k) (number 1 size)
+  | 't' -> Option.map (fun k -> Multipliers k) (number 1 size)
+  | 'q' -> Option.map (fun _ -> Of_rho) (number 1 size)
+  | 'd' ->
+    (match List.find_opt (fun sign -> String.contains text sign) [ '+'; '-' ] with
+     | None -> None
+     | Some sign ->
+       let at = String.index text sign in
+       match number 1 at, number (at + 1) size with
+       | Some neuron, Some corner -> Some (Decided (neuron, sign = '+', corner))
+       | _ -> None)
+  | _ -> None
+
+let rec place neuron layer = function
+  | size :: rest -> if neuron < size then Some (layer, neuron) else place (neuron - size) (layer + 1) rest
+  | [] -> None
+
+(* Pairs of neurons that are not in some states at once: "3+ 17- <lambda> <multiplier>". *)
+let conflicts_of where sizes json =
+  let neuron word =
+    let size = String.length word in
+    let digits = if size > 0 then String.sub word 0 (size - 1) else "" in
+    require (digits <> "" && size <= 10 && String.for_all (fun c -> c >= '0' && c <= '9') digits
+             && (word.[size - 1] = '+' || word.[size - 1] = '-')) "%s: a conflict's neuron is not a number with + or -" where;
+    int_of_string ("0u" ^ digits), word.[size - 1] = '+' in
+  let rec read = function
+    | [] -> []
+    | first :: second :: lambda :: multiplier :: rest ->
+      let i, first_on = neuron first and j, second_on = neuron second in
+      let lambda = Exact.parse_hex_float lambda and multiplier = Exact.parse_hex_float multiplier in
+      let fails () = rejected "%s: a conflict is not between two neurons, or its lambda not in [0, 1]" where in
+      let at neuron stays_on = match place neuron 0 sizes with
+        | Some (in_layer, in_row) -> { Proved.in_layer; in_row; stays_on } | None -> fails () in
+      if not (i < j && 0. <= lambda && lambda <= 1.) then fails ();
+      let weight = Exact.of_float lambda in
+      { Proved.first = at i first_on; second = at j second_on; weight; rest = Proved.add0 Exact.one (Proved.neg weight);
+        times_product = Exact.of_float multiplier } :: read rest
+    | _ -> rejected "%s: a conflict lacks words" where in
+  read (Exact.words (text where json))
+
+(* The tree, and the number of the word of each leaf. *)
+let tree_of ~where ~(layers : Weights.layer list) ~multipliers ~low ~high text =
+  let words = if text = "" then [||] else Array.of_list (String.split_on_char ' ' text) in
+  let fails at reason = rejected "%s: word %d of the tree: %s" where (at + 1) reason in
+  let at = ref 0 and leaves = ref [] in
+  let sizes = List.map Weights.outputs layers in
+  let rec decisions low high found =
+    if !at >= Array.length words then rejected "%s: the tree ends before the box is covered" where;
+    match word_of words.(!at) with
+    | None -> fails !at "neither a split nor a leaf, a form or a decision"
+    | Some Of_rho -> fails !at "there is no rho"
+    | Some (Decided (neuron, is_on, corner)) ->
+      (match place neuron 0 sizes with
+       | None -> fails !at "a neuron is decided that nothing looks at"
+       | Some _ when Array.length low > most_inputs_of_a_corner -> fails !at "a neuron is not decided by its slopes"
+       | Some (layer, neuron) ->
+         let point = Array.mapi (fun k l -> if (corner lsr k) land 1 = 1 then high.(k) else l) low in
+         incr at;
+         decisions low high ((layer, { Proved.neuron; is_on; lower_slopes = slopes_at layers layer point }) :: found))
+    | Some word ->
+      if found = [] then word, [] else
+      let found = List.rev found in
+      word, List.mapi (fun k _ -> List.filter_map (fun (layer, d) -> if layer = k then Some d else None) found) sizes in
+  let rec tree pending low high =
+    let word, decided = decisions low high [] in
+    let here = !at in
+    incr at;
+    match word with
+    | Multipliers k ->
+      if k >= Array.length multipliers then fails here "there are no such multipliers";
+      leaves := (here + 1) :: !leaves;
+      let conflicts, t = multipliers.(k) in
+      Proved.Leaf (decided, conflicts, t)
+    | Split k ->
+      if pending > deepest + 1 then fails here "the tree is too deep";
+      if k >= Array.length low then fails here "there is no such coordinate";
+      let middle = low.(k) +. (high.(k) -. low.(k)) /. 2. in
+      if not (low.(k) <= middle && middle <= high.(k)) then fails here "the side cannot be halved";
+      let with_middle side = let side = Array.copy side in side.(k) <- middle; side in
+      let lower = tree (pending + 1) low (with_middle high) in
+      let upper = tree pending (with_middle low) high in
+      Proved.Halve (decided, k, Exact.of_float middle, lower, upper)
+    | Of_rho | Decided _ -> assert false in
+  let result = tree 0 low high in
+  if !at < Array.length words then fails !at "the box is covered already";
+  result, Array.of_list (List.rev !leaves)
+
+(* |drho|^2 <= dv' Q dv. *)
+let form_of net rho where json =
+  require_keys where [ "q"; "t"; "factor" ] json;
+  let weights = Functions.weights net rho in
+  let q = List.map (hex_words where) (list where (find where "q" json)) in
+  require (List.length q = Functions.inputs net rho) "%s: q has another size" where;
+  List.iteri (fun k row -> require (List.length row = k + 1) "%s: q is not a lower triangle" where) q;
+  let t = Exact.hex_floats where (find where "t" json) in
+  let neurons = List.fold_left (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer weights)) weights.layers in
+  require (List.length t = neurons && List.for_all (fun x -> x >= 0.) t) "%s: needs one nonnegative t per hidden neuron" where;
+  let form_factor = match find where "factor" json with
+    | Null -> next_factor (new_guesses ())
+    | factor ->
+      let factor = Exact.factor (where ^ ".factor") factor in
+      fun k _ -> if k = 0 then Some factor else None in
+  let form = { Proved.lower_rows = List.map (List.map Exact.of_float) q;
+               form_multipliers = List.map Exact.of_float t; form_factor } in
+  let part = List.nth (Functions.parts net) (Functions.index net rho) in
+  require (Proved.check_form part form) "%s: the factor does not show that the matrix inequality holds" where;
+  form
+
+(* `bound`'s proof; its box and what proves the bound there. *)
+let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper =
+  let json = find where "proof" bound and here = where ^ ".proof" in
+  let is_coupled = has "others" json and is_global = find where "domain" bound = Text "global" in
+  let has_conflicts = has "conflicts" json in
+  require_keys here ([ "rho"; (if is_coupled then "others" else "form"); "tree"; "multipliers" ]
+    @ (if is_global then [ "radius" ] else []) @ (if has_conflicts then [ "conflicts" ] else [])
+    @ (if is_coupled then [ "forms" ] else [])) json;
+  let moved = List.hd names in
+  require (not (Functions.starts_with "rho:" moved)) "%s: rho has no box" where;
+  let rho = Exact.hex_float where (find where "rho" json) in
+  let exact_rho = Exact.of_float rho in
+  require (rho > 0. && Proved.at_most exact_rho (Proved.mul0 upper upper)) "%s: claims less than sqrt(rho)" where;
+  let conflicts = if has_conflicts then list where (find where "conflicts" json) else [] in
+  let lists = list where (find where "multipliers" json) in
+  require (not has_conflicts || List.length conflicts = List.length lists) "%s: there are conflicts for other multipliers" where;
+  let tree_text = text where (find where "tree" json) in
+  if is_coupled then Beyond Coupled
+  else if is_global then Beyond Global
+  else begin
+    let weights = Functions.weights net moved in
+    require (List.length weights.layers > 1) "%s: no hidden layer" where;
+    let form_json = find where "form" json in
+    require ((form_json = Null) = (List.length names = 1)) "%s: a form for set functions, and only for those" where;
+    let box, low, high = box_of net certificate moved where in
+    let layers = List.filteri (fun k _ -> k + 1 < List.length weights.layers) weights.layers in
+    let neurons = List.fold_left (fun n l -> n + Weights.outputs l) 0 layers in
+    let sizes = List.map Weights.outputs layers in
+    let conflicts = if has_conflicts then List.map (conflicts_of where sizes) conflicts else List.map (fun _ -> []) lists in
+    let multipliers = Array.of_list (List.map2 (fun conflicts some ->
+        let t = hex_words where some in
+        require (List.length t = neurons && List.for_all (fun x -> x >= 0.) t)
+          "%s: multipliers are not one nonnegative number per hidden neuron" where;
+        conflicts, List.map Exact.of_float t) conflicts lists) in
+    require (0x1p-400 <= rho && rho <= 0x1p400) "%s: rho is not positive, or out of range" where;
+    let moving = List.filteri (fun k _ -> List.nth moves k) scale in
+    require (List.for_all (fun w -> 0x1p-200 <= w && w <= 0x1p200) moving) "%s: scale is out of range" where;
+    let tree, leaves = tree_of ~where ~layers ~multipliers ~low ~high tree_text in
+    let form = match names with [ _; name ] -> Some (form_of net name (where ^ ".form") form_json) | _ -> None in
+    let guesses = new_guesses () in
+    let proof () =
+      Proved.By_parts (exact_rho, form, { slope_between; rounded_up; factor_number = next_factor guesses }, tree) in
+    let reason () =
+      let k = guesses.matrices in
+      if k > 0 && not guesses.is_shown then
+        Printf.sprintf "%s: word %d of the tree: its multipliers do not show the bound there" where leaves.(k - 1)
+      else Printf.sprintf "%s: the tree does not prove the bound after leaf %d: a neuron is not decided by its slopes" where k in
+    Proof (box, proof, reason)
+  end
