@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <sstream>
 
@@ -23,6 +24,44 @@ TEST(BoundCommand, TheTheoremAppliesToIsotropicCompositeGainsWithTheBallOfTheRef
   EXPECT_LE(result["vector"]["peak_gain"][0].get<double>(), 0.45955882352941174 + 1e-12);
   EXPECT_GE(result["vector"]["peak_gain"][1].get<double>(), 0.45955882352941174 - 1e-12);
   EXPECT_EQ(result["exact"].size(), 12u);  // four channels; no rate_hz: continuous only
+}
+
+TEST(BoundCommand, WritesACertificateOfTheContinuousGainsThatCheckAcceptsAndListsTheOthers) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nKp = 12\nKd = 7\nKi = 20\nrate_hz = 100\n");
+  const Json result = json_of(folder, "bound" + gains + " --verified -o cert.json");
+  EXPECT_EQ(result["certificate"]["loops"], 12);
+  EXPECT_EQ(result["certificate"]["left_out"].size(), 12u);
+  const Json certificate = files::parse_json(read_text(folder / "cert.json"), "cert.json");
+  for (const Json& loop : certificate["loops"]) {
+    for (const Json& row : result["verified"]) {
+      if (row["axis"] != loop["axis"] || row["channel"] != loop["input"] || row["loop"] != "continuous")
+        continue;
+      for (const char* gain : {"amplitude", "edge", "impulse"}) {
+        EXPECT_GE(loop["gains"][gain].get<double>(), row[gain][0].get<double>());
+        EXPECT_LE(loop["gains"][gain].get<double>(), 1.05 * row[gain][1].get<double>());
+      }
+    }
+  }
+  const Outcome checked = run_shell("swarmcert check cert.json" + gains, folder.path());
+  EXPECT_EQ(checked.exit_code, 0) << checked.output;
+  EXPECT_NE(checked.output.find("accepted"), std::string::npos) << checked.output;
+  const Outcome foreign =
+      run_shell("swarmcert check cert.json --gains " + kSourceFolder + "/controller/gains/composite.toml",
+                folder.path());
+  EXPECT_EQ(foreign.exit_code, 1) << foreign.output;
+}
+
+TEST(BoundCommand, WritesNoCertificateOfAnUnstableOrDelayedLoopAndSaysWhy) {
+  const ScratchFolder folder;
+  const std::string gains =
+      gains_file(folder, "[position]\nKp = 12\nKd = 7\nKi = 20\n[lag]\ndelay_s = 0.01\n");
+  const Outcome outcome = run_shell("swarmcert bound" + gains + " --verified -o cert.json", folder.path());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("no certificate"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("with a delay"), std::string::npos) << outcome.output;
+  EXPECT_FALSE(std::filesystem::exists(folder / "cert.json"));
+  EXPECT_EQ(run_shell("swarmcert bound" + kFlown + " -o cert.json", folder.path()).exit_code, 2);
 }
 
 TEST(BoundCommand, FlownGainsAreNotOfTheTheoremsFormAndTheWeakenedIntegratorIsShown) {

@@ -35,6 +35,7 @@ const std::vector<Layer>& layers() {
       {"controller/crazyflie", {"controller", "nn"}},
       {"lipschitz/checker", {"nn/base", "nn/weights"}},
       {"lipschitz", {"lipschitz/checker", "nn", "nn/base", "nn/weights"}},
+      {"stability/checker", {"nn/base"}},
       {"stability", {"controller", "nn", "nn/base", "nn/weights"}},  // with bodies and effects
       {"stability/bounds", {"controller", "nn/base", "stability"}},
       {"stability/tasks", {"nn/base", "stability/bounds"}},
@@ -87,6 +88,7 @@ const std::vector<Layer>& layers() {
         "nn/weights",
         "stability",
         "stability/bounds",
+        "stability/checker",
         "stability/simulation",
         "stability/iss",
         "stability/sweep"}},

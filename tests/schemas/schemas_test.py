@@ -134,7 +134,8 @@ def command_lines():
     sizes = ["--phi", "4", "--rho", "4", "--features", "2", "--epochs", "1"]
     yield ["train", model, "flights", *sizes, "-o", "trained"], any_verdict
     force = ["--rate", "0.3", "--amplitude", "0.1"]
-    yield ["bound", "--gains", composite, "--model", model, *force, "--tube", "--verified"], any_verdict
+    yield ["bound", "--gains", composite, "--model", model, *force, "--tube", "--verified", "-o", "gains-cert.json"], any_verdict
+    yield ["check", "gains-cert.json"], (0,)
     yield ["spacing", "--gains", gains, "--model", truth, "--max-error", "0.1"], any_verdict
     yield ["sweep", "grid.toml", "-o", "sweep"], (0,)
     yield ["sweep", "grid.toml", "--shard", "1/1", "-o", "shards"], (0,)
@@ -198,7 +199,7 @@ def test_files_that_they_write_conform(folder):
         if str(document.get("schema", "")).startswith("swarmcert/") and "command_line" not in document:
             kinds.add(document["schema"].split("/")[1])
             conforms(document, document["schema"].split("/")[1], str(path))
-    wanted = {"certificate", "baseline", "manifest", "sweep-points", "sweep-shard"}
+    wanted = {"certificate", "tracking-certificate", "baseline", "manifest", "sweep-points", "sweep-shard"}
     expect(wanted <= kinds, f"no file of the kinds {sorted(wanted - kinds)}")
 
 

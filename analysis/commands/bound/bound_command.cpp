@@ -14,8 +14,10 @@
 #include "analysis/commands/bound/bound_report.h"
 #include "analysis/commands/bound/disturbance_input.h"
 #include "analysis/commands/bound/float_errors.h"
+#include "analysis/commands/bound/tracking_certificate.h"
 #include "analysis/commands/bound/tube_output.h"
 #include "analysis/commands/commands.h"
+#include "nn/base/file_io.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -30,6 +32,7 @@ struct BoundOptions {
   double coverage = 0;   ///< 0: no promise
   std::string attitude;  ///< empty: no attitude loop
   bool verified = false;
+  std::string certificate;  ///< file to write; empty: none
   bool tube = false;
   TubeArguments task;
   std::string swarm;
@@ -169,6 +172,7 @@ void print_extras(const Tracking& input, const files::Json& result) {
 
 int run_bound(const BoundOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
+  refuse_to_replace(common, options.certificate);
   refuse_folder(common, options.report);
   const Tracking input = load_tracking(options.tracking);
   refuse_coupled_axes(options, input);
@@ -188,6 +192,13 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   result["float32"] = float_errors_json(float32);
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
   add_extras(options, common, input, source, report, local, result);
+  std::optional<files::Json> certificate;
+  if (!options.certificate.empty()) {
+    certificate = tracking_certificate(input, options.tracking, result["verified"]);
+    result["certificate"] = certificate_summary(*certificate);
+    if (!(*certificate)["loops"].empty())
+      files::write_file(options.certificate, files::to_text(*certificate), common.force);
+  }
   std::string report_path;
   if (!options.report.empty())
     report_path = write_bound_report(input, disturbance, report, local, result, options.report, common.force);
@@ -197,6 +208,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     print_float_errors(float32);
     if (disturbance.truth) print_truth(*disturbance.truth);
     print_extras(input, result);
+    if (certificate) print_certificate_summary(*certificate, options.certificate);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
   if (local && !local->proved && options.swarm.empty()) return kInconclusive;
@@ -258,6 +270,10 @@ Command bound_command() {
             ->check(CLI::Range(0.5, 0.999))
             ->needs("--from");
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
+        add_output(
+            app, "-o,--output", options->certificate,
+            "File for a certificate of the gains of --verified, for check: continuous loops without a delay")
+            ->needs("--verified");
         app.add_flag("--tube", options->tube,
                      "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "
                      "trajectories that the network and the truth prove");

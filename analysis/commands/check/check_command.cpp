@@ -7,7 +7,9 @@
 #include "analysis/cli/host.h"
 #include "analysis/commands/commands.h"
 #include "lipschitz/checker/check.h"
+#include "nn/base/file_io.h"
 #include "nn/weights/chain.h"
+#include "stability/checker/check_tracking.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -15,16 +17,62 @@ namespace {
 struct CheckOptions {
   std::string certificate;
   files::NetworkArguments network;
+  std::string gains, model;  ///< of a certificate of tracking gains
 };
+
+/// Whether the text is a certificate of tracking gains. Certificates of networks can be long: they are parsed once.
+bool is_of_tracking(const std::string& text, const std::string& path) {
+  if (text.find(check::kTrackingSchema) == std::string::npos) return false;
+  const files::Json json = files::parse_json(text, path);
+  return json.is_object() && json.value("schema", files::Json()) == check::kTrackingSchema;
+}
+
+int check_gains(const CheckOptions& options, const CommonOptions& common, const std::string& text) {
+  if (!options.network.file.empty() || !options.network.phi.empty())
+    throw UsageError(options.certificate + " is of tracking gains and of no network: leave the network out");
+  const files::Json certificate = files::parse_json(text, options.certificate, check::kTrackingSchema);
+  std::vector<std::string> inputs;
+  if (host() == nullptr || !host()->certificate) inputs.push_back(options.certificate);
+  const auto hash = [&inputs](const std::string& path) {
+    if (path.empty()) return std::string();
+    inputs.push_back(path);
+    return files::sha256(files::read_file(path));
+  };
+  const std::string gains = hash(options.gains), model = hash(options.model);
+  const check::TrackingVerdict verdict = check::check_tracking(certificate, gains, model);
+  files::Json result = result_head("check", inputs);
+  result["accepted"] = verdict.accepted;
+  result["reason"] = verdict.reason;
+  result["chain"] = "tracking gains";
+  result["spectral_norms"] = 0;
+  result["upper_bounds"] = verdict.gains;
+  result["lower_bounds"] = 0;
+  result["values"] = 0;
+  write_result(common, result);
+  if (common.prints_text()) {
+    if (verdict.accepted) {
+      fmt::print("accepted: {}: {} gains of {} loops\n", verdict.reason, verdict.gains, verdict.loops);
+      if (gains.empty() || model.empty())
+        fmt::print("whether it is of these gains and this model was not compared: --gains, --model\n");
+    } else {
+      fmt::print("rejected: {}\n", verdict.reason);
+    }
+  }
+  return verdict.accepted ? kDone : kViolated;
+}
 
 int run_check(const CheckOptions& options, const CommonOptions& common) {
   const bool is_in_memory = host() != nullptr && host()->certificate;
   if (!is_in_memory && std::filesystem::path(options.certificate).extension() == ".toml")
     throw UsageError("CERTIFICATE " + options.certificate +
                      ": is a TOML file; the certificate stands first: check cert.json network.toml");
-  const files::Json certificate =
-      is_in_memory ? files::parse_json(*host()->certificate, options.certificate, check::kCertificateSchema)
-                   : files::read_json(options.certificate, check::kCertificateSchema);
+  std::string text = is_in_memory ? *host()->certificate : files::read_file(options.certificate);
+  if (is_of_tracking(text, options.certificate)) return check_gains(options, common, text);
+  if (!options.gains.empty() || !options.model.empty())
+    throw UsageError("--gains and --model are for certificates of tracking gains; " + options.certificate +
+                     " is none");
+  const files::Json certificate = files::parse_json(text, options.certificate, check::kCertificateSchema);
+  text = std::string();  // may be as large as all that follows
   const files::Network network = check::with_stated_activations(certificate, load_any_net(options.network));
   const check::CheckResult verdict = check::check(certificate, network);
 
@@ -60,13 +108,21 @@ Command check_command() {
           "Rebuilds every matrix inequality from the weights and verifies it in exact integer arithmetic, "
           "proofs on a box\n"
           "in double with every rounding accounted for; uses no optimiser. Accepted: exit 0. Rejected, with "
-          "the reason: exit 1.\n\n"
-          "Example: swarmcert check cert.json nn/networks/demo/network.toml",
+          "the reason: exit 1.\n"
+          "A certificate of tracking gains needs no network; its hashes are compared with --gains and "
+          "--model.\n\n"
+          "Example: swarmcert check cert.json nn/networks/demo/network.toml\n"
+          "         swarmcert check gains-cert.json --gains controller/gains/composite.toml",
           [](CLI::App& app) {
             const auto options = std::make_shared<CheckOptions>();
-            app.add_option("CERTIFICATE", options->certificate, "Certificate that certify wrote with -o")
+            app.add_option("CERTIFICATE", options->certificate,
+                           "Certificate that certify or bound --verified wrote with -o")
                 ->required();
             declare_network(app, options->network);
+            app.add_option("--gains", options->gains,
+                           "gains.toml that a certificate of tracking gains must be of");
+            app.add_option("--model", options->model,
+                           "model.toml that a certificate of tracking gains must be of");
             return [options](const CommonOptions& common) { return run_check(*options, common); };
           }};
 }

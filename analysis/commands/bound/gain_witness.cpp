@@ -1,0 +1,126 @@
+#include "analysis/commands/bound/gain_witness.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "stability/bounds/polynomial.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using stability::Polynomial;
+
+constexpr double kMostSteps = 1 << 18;
+
+/// The characteristic polynomial, without the factor s that it has for Ki = 0.
+Polynomial characteristic(const stability::AxisLoop& loop, const std::vector<double>& lags_s) {
+  Polynomial open = {1};
+  for (const double tau : lags_s) open = stability::product(open, {1, tau});
+  const bool integrates = loop.Ki > 0;
+  return stability::sum(stability::times_s_to(integrates ? 3 : 2, open),
+                        integrates ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd});
+}
+
+/// The companion matrix of `p` in units of time of 2^-exponent s.
+MatrixXd companion(const Polynomial& p, int exponent) {
+  const auto n = static_cast<Index>(p.size()) - 1;
+  MatrixXd A = MatrixXd::Zero(n, n);
+  for (Index k = 0; k + 1 < n; ++k) A(k, k + 1) = 1;
+  for (Index k = 0; k < n; ++k) {
+    A(n - 1, k) = -std::ldexp(p[static_cast<std::size_t>(k)] / p.back(), -exponent * static_cast<int>(n - k));
+  }
+  return A;
+}
+
+/// P of A'P + PA = -I, A shifted to the right by `shift`.
+MatrixXd lyapunov(const MatrixXd& A, double shift) {
+  const Index n = A.rows();
+  const MatrixXd shifted = A + shift * MatrixXd::Identity(n, n);
+  MatrixXd system = MatrixXd::Zero(n * n, n * n);
+  VectorXd right = VectorXd::Zero(n * n);
+  for (Index i = 0; i < n; ++i) {
+    right[i * n + i] = -1;
+    for (Index j = 0; j < n; ++j) {
+      for (Index k = 0; k < n; ++k) {
+        system(i * n + j, k * n + j) += shifted(k, i);
+        system(i * n + j, i * n + k) += shifted(k, j);
+      }
+    }
+  }
+  const VectorXd solution = system.fullPivLu().solve(right);
+  MatrixXd P(n, n);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < n; ++j) P(i, j) = (solution[i * n + j] + solution[j * n + i]) / 2;
+  }
+  return P;
+}
+
+/// The largest entry becomes about 2^20, all multiples of 2^-60.
+std::vector<std::vector<double>> in_fixed_point(const MatrixXd& P) {
+  const int exponent = 20 - std::ilogb(P.cwiseAbs().maxCoeff());
+  std::vector<std::vector<double>> rows;
+  for (Index i = 0; i < P.rows(); ++i) {
+    rows.emplace_back();
+    for (Index j = 0; j < P.cols(); ++j)
+      rows.back().push_back(std::ldexp(std::round(std::ldexp(P(i, j), exponent + 60)), -60));
+  }
+  return rows;
+}
+
+/// The largest ratio of a bound to the upper end of what is known.
+double excess(const check::GainBounds& bounds, const stability::VerifiedNorms& known) {
+  double most = std::max({bounds.amplitude.get_d() / known.amplitude.hi, bounds.edge.get_d() / known.edge.hi,
+                          bounds.impulse.get_d() / known.impulse.hi});
+  if (bounds.rate) most = std::max(most, bounds.rate->get_d() / known.rate.hi);
+  return most;
+}
+
+}  // namespace
+
+std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const std::string& input,
+                                        const stability::VerifiedNorms& known, std::string& why) {
+  ProvedGains found;
+  check::LoopWitness& witness = found.witness;
+  witness.input = input;
+  witness.mass_kg = loop.mass_kg, witness.Kp = loop.Kp, witness.Kd = loop.Kd, witness.Ki = loop.Ki;
+  for (const double tau : loop.lags_s) {
+    if (tau > 0) witness.lags_s.push_back(tau);
+  }
+  const Polynomial p = characteristic(loop, witness.lags_s);
+  double slowest = 1e300, fastest = 0;
+  for (const std::complex<double>& pole : stability::poles(p)) {
+    slowest = std::min(slowest, -pole.real());
+    fastest = std::max(fastest, std::abs(pole));
+  }
+  why = "no witness was found";
+  if (!(slowest > 0)) return std::nullopt;
+  witness.time_exponent = static_cast<int>(std::lround(std::log2(fastest)));
+  const MatrixXd A = companion(p, witness.time_exponent);
+  const double slow = std::ldexp(slowest, -witness.time_exponent);
+  witness.step_exponent = std::max(
+      4, 1 + static_cast<int>(std::ceil(std::log2(A.cwiseAbs().rowwise().sum().maxCoeff() * (1 + 1e-9)))));
+  for (const double share : {0.8, 0.5, 0.2}) {
+    witness.P = in_fixed_point(lyapunov(A, share * slow));
+    witness.decay = 0.9 * share * slow;
+    double steps = std::ldexp(std::log(1e3) / slow, witness.step_exponent);
+    try {
+      for (int round = 0; round < 4; ++round, steps *= 1.7) {
+        witness.steps = static_cast<long>(std::clamp(std::ceil(steps), 1.0, kMostSteps));
+        found.bounds = check::upper_gains(witness);
+        if (excess(found.bounds, known) < 1.01) return found;
+      }
+      if (excess(found.bounds, known) < 1.05) return found;
+      why = "the bounds that the checker can verify are more than 5 % above the enclosure";
+    } catch (const std::runtime_error& refusal) {
+      why = std::string("no witness was found: ") + refusal.what();
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace swarmcert::analysis

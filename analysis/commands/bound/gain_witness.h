@@ -1,0 +1,25 @@
+/// @file Search for what proves the gains of a loop to the checker of stability/checker.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "stability/bounds/axis_loop.h"
+#include "stability/bounds/verified_norms.h"
+#include "stability/checker/gain_bounds.h"
+
+namespace swarmcert::analysis {
+
+struct ProvedGains {
+  check::LoopWitness witness;
+  check::GainBounds bounds;  ///< as the checker finds them
+};
+
+/// A quadratic form in which the loop contracts, and as many cells as bring the bounds to within 1 % of `known`.
+/// @param input force, command, velocity or position.
+/// @param loop without a delay.
+/// @returns nothing, and in `why` the reason, where no form was found or the bounds remain 5 % above `known`.
+std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const std::string& input,
+                                        const stability::VerifiedNorms& known, std::string& why);
+
+}  // namespace swarmcert::analysis

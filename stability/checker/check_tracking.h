@@ -1,0 +1,39 @@
+/// @file The checker of certificates of tracking gains. It depends on GMP and the JSON reader, on nothing that searches.
+#pragma once
+
+#include <string>
+
+#include "nn/base/json.h"
+#include "stability/checker/gain_bounds.h"
+
+namespace swarmcert::check {
+
+inline constexpr const char* kTrackingSchema = "swarmcert/tracking-certificate/1";
+
+/// What such a certificate states; the checkers insist on it.
+inline constexpr const char* kTrackingStatement =
+    "For each loop listed, with its numbers taken exactly as they stand: along one axis m e'' = u + f, "
+    "e, e', the integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int "
+    "(e + p)) + c behind first-order lags of the time constants listed, in continuous time, without a "
+    "delay and without limits. The input w is f (force), c (command), v (velocity, an error of that "
+    "estimate) or p (position); the others are zero. Then at all times, in exact arithmetic, |e| <= rate "
+    "sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total variation of "
+    "w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. "
+    "Lengths are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name the "
+    "files from which the loops were derived; checking compares them where these files are given, and "
+    "does not repeat the derivation. What is listed under left_out, and every bound made from these "
+    "gains, is not certified here.";
+
+struct TrackingVerdict {
+  bool accepted = false;
+  std::string reason;  ///< why not, naming the field; or what was verified
+  int loops = 0;
+  int gains = 0;
+};
+
+/// Verifies every gain of `certificate`; a malformed one is answered with a reason, not with an exception.
+/// @param gains_sha256, model_sha256 of the files that it must be of; empty: not compared.
+TrackingVerdict check_tracking(const files::Json& certificate, const std::string& gains_sha256,
+                               const std::string& model_sha256);
+
+}  // namespace swarmcert::check

@@ -1,0 +1,345 @@
+#include "stability/checker/gain_bounds.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+namespace swarmcert::check {
+namespace {
+
+using Rational = mpq_class;
+using Integer = mpz_class;
+using Row = std::vector<Rational>;
+using Square = std::vector<Row>;
+
+constexpr mp_bitcnt_t kBits = 128;  // a fixed-point number is an integer over 2^kBits
+constexpr mp_bitcnt_t kPBits = 96;  // the entries of P are integers over 2^kPBits
+constexpr long kMostSteps = 1 << 18;
+constexpr std::size_t kMostLags = 4;
+constexpr int kTerms = 24;
+
+void demand(bool condition, const char* reason) {
+  if (!condition) throw std::runtime_error(reason);
+}
+
+/// 2^exponent
+Rational two_to(long exponent) {
+  const Integer power = Integer(1) << static_cast<mp_bitcnt_t>(std::labs(exponent));
+  return exponent >= 0 ? Rational(power) : Rational(1, power);
+}
+
+Integer floor_fixed(const Rational& x) {
+  const Integer numerator = x.get_num() << kBits;
+  Integer result;
+  mpz_fdiv_q(result.get_mpz_t(), numerator.get_mpz_t(), x.get_den_mpz_t());
+  return result;
+}
+Integer ceil_fixed(const Rational& x) { return -floor_fixed(-x); }
+
+/// At least the product of two nonnegative fixed-point numbers.
+Integer times_up(const Integer& a, const Integer& b) { return ((a * b) >> kBits) + 1; }
+
+Integer root_up(const Integer& x) { return sqrt(x) + 1; }
+
+Row times(const Row& row, const Square& m) {
+  Row result(m.size());
+  for (std::size_t j = 0; j < m.size(); ++j) {
+    for (std::size_t i = 0; i < m.size(); ++i) result[j] += row[i] * m[i][j];
+  }
+  return result;
+}
+
+Row product(const Row& a, const Row& b) {
+  Row result(a.size() + b.size() - 1);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < b.size(); ++j) result[i + j] += a[i] * b[j];
+  }
+  return result;
+}
+
+/// Elimination of a symmetric matrix without exchange of rows, with `right` beside it.
+/// @returns right' m^-1 right; nothing unless every pivot is positive, that is, m positive definite.
+std::optional<Rational> inverse_form(Square m, Row right) {
+  Rational sum;
+  for (std::size_t k = 0; k < m.size(); ++k) {
+    if (sgn(m[k][k]) <= 0) return std::nullopt;
+    sum += right[k] * right[k] / m[k][k];
+    for (std::size_t i = k + 1; i < m.size(); ++i) {
+      const Rational factor = m[i][k] / m[k][k];
+      for (std::size_t j = k; j < m.size(); ++j) m[i][j] -= factor * m[k][j];
+      right[i] -= factor * right[k];
+    }
+  }
+  return sum;
+}
+
+void check_ranges(const LoopWitness& loop) {
+  const auto usual = [](double x) { return x >= 0x1p-40 && x <= 0x1p40; };
+  demand(loop.input == "force" || loop.input == "command" || loop.input == "velocity" ||
+             loop.input == "position",
+         "input is none of force, command, velocity, position");
+  demand(usual(loop.mass_kg) && usual(loop.Kp) && usual(loop.Kd) && (loop.Ki == 0 || usual(loop.Ki)),
+         "mass_kg, Kp, Kd or Ki is out of range");
+  demand(loop.lags_s.size() <= kMostLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), usual),
+         "lags_s are more than four, or out of range");
+  demand(loop.time_exponent >= -64 && loop.time_exponent <= 64, "time_exponent is out of range");
+  demand(loop.step_exponent >= 0 && loop.step_exponent <= 64, "step_exponent is out of range");
+  demand(loop.steps >= 1 && loop.steps <= kMostSteps, "steps is out of range");
+  demand(usual(loop.decay), "decay is out of range");
+  const std::size_t n = order(loop);
+  demand(loop.P.size() == n, "P has another size than the loop");
+  for (std::size_t i = 0; i < n; ++i) {
+    demand(loop.P[i].size() == n, "P has another size than the loop");
+    for (std::size_t j = 0; j < n; ++j) {
+      const double scaled = std::ldexp(loop.P[i][j], static_cast<int>(kPBits));
+      demand(std::abs(loop.P[i][j]) <= 0x1p64 && scaled == std::floor(scaled), "P has an entry out of range");
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < i; ++j) demand(loop.P[i][j] == loop.P[j][i], "P is not symmetric");
+  }
+}
+
+/// y = numerator/denominator, and everything that follows from them and from P exactly.
+struct System {
+  Square A, P;
+  Row initial;
+  Rational settled;         ///< what the integral of y tends to, in units of time
+  std::array<Row, 5> rows;  ///< integral of y less `settled`, y, y', y'', y'''
+};
+
+Row numerator_of(const LoopWitness& loop, const Row& lag) {
+  Row result;
+  if (loop.input == "position") {
+    result = {Rational(loop.Kp)};
+    if (loop.Ki > 0) result.insert(result.begin(), Rational(loop.Ki));
+    return result;
+  }
+  if (loop.input == "force") result = lag;
+  if (loop.input == "command") result = {Rational(1)};
+  if (loop.input == "velocity") result = {Rational(loop.Kd)};
+  if (loop.input != "velocity") {
+    for (Rational& x : result) x /= Rational(loop.mass_kg);
+  }
+  if (loop.Ki > 0) result.insert(result.begin(), Rational(0));
+  return result;
+}
+
+System system_of(const LoopWitness& loop) {
+  Row lag = {Rational(1)};
+  for (const double tau : loop.lags_s) lag = product(lag, {Rational(1), Rational(tau)});
+  Row denominator = lag;
+  denominator.insert(denominator.begin(), loop.Ki > 0 ? 3 : 2, Rational(0));
+  Row feedback = {Rational(loop.Kp), Rational(loop.Kd)};
+  if (loop.Ki > 0) feedback.insert(feedback.begin(), Rational(loop.Ki));
+  for (std::size_t k = 0; k < feedback.size(); ++k) denominator[k] += feedback[k];
+  const Row numerator = numerator_of(loop, lag);
+
+  const std::size_t n = order(loop);
+  System system;
+  Row a(n + 1);
+  for (std::size_t k = 0; k <= n; ++k) {
+    a[k] = denominator[k] / denominator[n] * two_to(-loop.time_exponent * static_cast<long>(n - k));
+  }
+  system.A.assign(n, Row(n));
+  for (std::size_t k = 0; k + 1 < n; ++k) system.A[k][k + 1] = 1;
+  for (std::size_t k = 0; k < n; ++k) system.A[n - 1][k] = -a[k];
+  system.P.assign(n, Row(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) system.P[i][j] = loop.P[i][j];
+  }
+  system.initial.resize(n);  // by division of the series in 1/s
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t power = n - 1 - k;
+    if (power < numerator.size()) {
+      system.initial[k] =
+          numerator[power] / denominator[n] * two_to(-loop.time_exponent * static_cast<long>(k));
+    }
+    for (std::size_t j = 0; j < k; ++j) system.initial[k] -= a[n - k + j] * system.initial[j];
+  }
+  system.settled = numerator[0] / denominator[0] * two_to(loop.time_exponent);
+  system.rows[0].resize(n);
+  for (std::size_t k = 0; k < n; ++k) system.rows[0][k] = -a[k + 1] / a[0];
+  system.rows[1].resize(n);
+  system.rows[1][0] = 1;
+  for (std::size_t r = 2; r < 5; ++r) system.rows[r] = times(system.rows[r - 1], system.A);
+  return system;
+}
+
+void check_decay(const System& system, double decay) {
+  const std::size_t n = system.A.size();
+  demand(inverse_form(system.P, Row(n)).has_value(), "P is not positive definite");
+  Square falls(n, Row(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      falls[i][j] = -2 * Rational(decay) * system.P[i][j];
+      for (std::size_t k = 0; k < n; ++k) {
+        falls[i][j] -= system.A[k][i] * system.P[k][j] + system.P[i][k] * system.A[k][j];
+      }
+    }
+  }
+  demand(inverse_form(falls, Row(n)).has_value(), "P does not show that the loop decays at the rate stated");
+}
+
+/// The state at the ends of the cells, in fixed point.
+class Trajectory {
+ public:
+  Trajectory(const System& system, int step_exponent) : n_(system.A.size()) {
+    Rational row_sum = 1;
+    for (const Row& row : system.A) {
+      Rational sum;
+      for (const Rational& x : row) sum += abs(x);
+      row_sum = std::max(row_sum, sum);
+    }
+    const Rational cell = two_to(-step_exponent);
+    demand(row_sum * cell <= Rational(1, 2), "step_exponent: the cells are too long");
+    Square total(n_, Row(n_));
+    for (std::size_t i = 0; i < n_; ++i) total[i][i] = 1;
+    Square power = total;
+    Integer factorial = 1;
+    for (int k = 1; k <= kTerms; ++k) {
+      factorial *= k;
+      for (std::size_t i = 0; i < n_; ++i) {
+        power[i] = times(power[i], system.A);
+        for (std::size_t j = 0; j < n_; ++j) power[i][j] *= cell / k, total[i][j] += power[i][j];
+      }
+    }
+    factorial *= kTerms + 1;
+    // The terms left out are at most 2^-25/25! (1 + 1/2 + ...); rounding takes less than a unit per entry.
+    missed_ = ceil_fixed(two_to(-kTerms) / Rational(factorial)) + static_cast<long>(n_);
+    for (const Row& row : total) {
+      for (const Rational& x : row) step_.push_back(floor_fixed(x));
+    }
+    Rational sum;
+    for (const Row& row : system.P) {
+      for (const Rational& x : row) sum += abs(x), P_.push_back(Integer(x * two_to(kPBits)));
+    }
+    from_largest_ = root_up(ceil_fixed(sum) << kBits);
+    for (const Rational& x : system.initial) state.push_back(floor_fixed(x));
+    error = times_up(from_largest_, 1);
+    measure();
+  }
+
+  void advance() {
+    std::vector<Integer> next(n_);
+    for (std::size_t i = 0; i < n_; ++i) {
+      Integer sum;
+      for (std::size_t j = 0; j < n_; ++j) sum += step_[i * n_ + j] * state[j];
+      next[i] = sum >> kBits;
+    }
+    error += times_up(from_largest_, times_up(missed_, largest) + 1);
+    state = std::move(next);
+    measure();
+  }
+
+  std::vector<Integer> state;
+  Integer error;    ///< at least |true state - state|_P
+  Integer largest;  ///< max |state_i|
+  Integer size;     ///< at least |true state|_P
+
+ private:
+  void measure() {
+    largest = 0;
+    for (const Integer& x : state) largest = std::max<Integer>(largest, abs(x));
+    Integer form;
+    for (std::size_t i = 0; i < n_; ++i) {
+      Integer sum;
+      for (std::size_t j = 0; j < n_; ++j) sum += P_[i * n_ + j] * state[j];
+      form += sum * state[i];
+    }
+    size = root_up((form >> kPBits) + 1) + error;
+  }
+
+  std::size_t n_;
+  std::vector<Integer> step_, P_;
+  Integer missed_;        ///< at least |exp(A cell) - step|_oo
+  Integer from_largest_;  ///< |u|_P <= this times |u|_oo
+};
+
+/// A linear form of the state.
+struct Form {
+  std::vector<Integer> row;
+  Integer norm;  ///< at least sqrt(r P^-1 r')
+
+  Form(const Row& exact, const Square& P) {
+    for (const Rational& x : exact) row.push_back(floor_fixed(x));
+    norm = root_up(ceil_fixed(*inverse_form(P, exact)) << kBits);
+  }
+  /// At least |offset + r x|, for the true state x.
+  Integer above(const Trajectory& at, const Integer& offset) const {
+    Integer sum = offset << kBits;
+    for (std::size_t i = 0; i < row.size(); ++i) sum += row[i] * at.state[i];
+    const Integer rounding = ((static_cast<long>(row.size()) * at.largest) >> kBits) + 3;
+    return (abs(sum) >> kBits) + rounding + times_up(norm, at.error);
+  }
+};
+
+/// Integral and supremum of |offset + r x|, cell by cell.
+class Norms {
+ public:
+  Norms(const System& system, std::size_t row, const Rational& offset, int step_exponent)
+      : value_(system.rows[row], system.P),
+        second_(system.rows[row + 2], system.P),
+        third_(system.rows[row + 3], system.P),
+        offset_(floor_fixed(offset)),
+        cell_(static_cast<mp_bitcnt_t>(step_exponent)) {}
+
+  void begin(const Trajectory& at) { before_ = value_.above(at, offset_); }
+  void prepare(const Trajectory& at) {
+    curvature_ = second_.above(at, 0) + (times_up(third_.norm, at.size) >> cell_) + 1;
+  }
+  void add(const Trajectory& at) {
+    const Integer now = value_.above(at, offset_);
+    ends_ += before_ + now;
+    curvatures_ += curvature_;
+    const Integer highest = std::max(before_, now) + (curvature_ >> (2 * cell_ + 3)) + 1;
+    supremum_ = std::max(supremum_, highest);
+    before_ = now;
+  }
+  Rational supremum(const Trajectory& end) const {
+    const Integer tail = abs(offset_) + 1 + times_up(value_.norm, end.size);
+    return Rational(std::max(supremum_, tail)) * two_to(-static_cast<long>(kBits));
+  }
+  /// For offset 0.
+  Rational integral(const Trajectory& end, double decay) const {
+    const Rational cell = two_to(-static_cast<long>(cell_));
+    const Rational cells = cell / 2 * ends_ + cell * cell * cell / 12 * curvatures_;
+    return (cells + Rational(times_up(value_.norm, end.size)) / Rational(decay)) *
+           two_to(-static_cast<long>(kBits));
+  }
+
+ private:
+  Form value_, second_, third_;
+  Integer offset_;
+  mp_bitcnt_t cell_;
+  Integer before_, curvature_, ends_, curvatures_, supremum_;
+};
+
+}  // namespace
+
+std::size_t order(const LoopWitness& loop) { return loop.lags_s.size() + (loop.Ki > 0 ? 3 : 2); }
+
+GainBounds upper_gains(const LoopWitness& loop) {
+  check_ranges(loop);
+  const System system = system_of(loop);
+  check_decay(system, loop.decay);
+  Trajectory at(system, loop.step_exponent);
+  Norms step(system, 0, system.settled, loop.step_exponent);
+  Norms impulse(system, 1, 0, loop.step_exponent);
+  for (Norms* const norms : {&step, &impulse}) norms->begin(at);
+  for (long k = 0; k < loop.steps; ++k) {
+    for (Norms* const norms : {&step, &impulse}) norms->prepare(at);
+    at.advance();
+    for (Norms* const norms : {&step, &impulse}) norms->add(at);
+  }
+  const Rational unit_s = two_to(-loop.time_exponent);
+  GainBounds gains;
+  if (sgn(system.settled) == 0) gains.rate = step.integral(at, loop.decay) * unit_s * unit_s;
+  gains.amplitude = impulse.integral(at, loop.decay) * unit_s;
+  gains.edge = step.supremum(at) * unit_s;
+  gains.impulse = impulse.supremum(at);
+  return gains;
+}
+
+}  // namespace swarmcert::check

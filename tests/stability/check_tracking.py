@@ -1,0 +1,372 @@
+#!/usr/bin/env python3
+"""A second checker of certificates of tracking gains, in another language and written from the mathematics: integers and
+fractions, standard library only. It shares no line with the C++ checker and must accept and reject the same certificates.
+
+    check_tracking.py CERTIFICATE [--gains FILE] [--model FILE]
+
+Exit 0: accepted; 1: rejected, with the reason; 2: usage; 3: a file that cannot be read, or is not JSON of this kind.
+
+Along one axis y, the response of e to an impulse of the input, solves a linear equation with the numbers of the loop.
+With x the vector of y and its derivatives, in the certificate's unit of time, x' = A x. The certificate gives P with
+A'P + PA + 2 decay P < 0, so that sqrt(x'Px) falls at least like e^(-decay t). The step response, less its limit, is a
+linear form of x, too. Four numbers follow: the integrals and the largest values of both.
+"""
+import hashlib
+import json
+import re
+import struct
+import sys
+from fractions import Fraction
+from math import factorial, isqrt
+from pathlib import Path
+
+STATEMENT = (
+    "For each loop listed, with its numbers taken exactly as they stand: along one axis m e'' = u + f, e, e', the "
+    "integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int (e + p)) + c behind first-order lags of "
+    "the time constants listed, in continuous time, without a delay and without limits. The input w is f (force), c "
+    "(command), v (velocity, an error of that estimate) or p (position); the others are zero. Then at all times, in exact "
+    "arithmetic, |e| <= rate sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total "
+    "variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. Lengths "
+    "are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name the files from which the loops "
+    "were derived; checking compares them where these files are given, and does not repeat the derivation. What is listed "
+    "under left_out, and every bound made from these gains, is not certified here.")
+
+BITS = 128  # of a fixed-point number after the point
+DEEPEST = 64
+HEX_FLOAT = re.compile(r"(-?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]{0,40})(?:\.([0-9a-fA-F]{0,40}))?[pP]([+-]?[0-9]{1,5})")
+
+
+class Rejected(Exception):
+    pass
+
+
+class Unreadable(Exception):
+    pass
+
+
+def require(condition, reason):
+    if not condition:
+        raise Rejected(reason)
+
+
+# --- the file ------------------------------------------------------------------------------------------------------
+
+def read_json(text):
+    depth = deepest = 0
+    for bracket in re.sub(r'"(?:[^"\\]|\\.)*"', "", text):
+        depth += (bracket in "[{") - (bracket in "]}")
+        deepest = max(deepest, depth)
+    if deepest > DEEPEST:
+        raise Unreadable("nested too deeply")
+
+    def unique(pairs):
+        members = dict(pairs)
+        if len(members) != len(pairs):
+            raise Unreadable("a key stands twice")
+        return members
+
+    def integer(digits):
+        return int(digits) if len(digits) < 20 else finite(digits)
+
+    def finite(digits):
+        value = float(digits)
+        if value - value != 0:
+            raise Unreadable("a number is not finite")
+        return value
+
+    def constant(name):
+        raise Unreadable(f"{name} is not JSON")
+
+    try:
+        return json.loads(text, object_pairs_hook=unique, parse_int=integer, parse_float=finite,
+                          parse_constant=constant)
+    except ValueError as fault:
+        raise Unreadable(str(fault)) from fault
+
+
+def encode(value):
+    """The bytes that content_sha256 hashes: independent of white space and of the order of members."""
+    if value is None:
+        return b"n"
+    if isinstance(value, bool):
+        return b"t" if value else b"f"
+    if isinstance(value, (int, float)):
+        return b"d%016x" % struct.unpack("<Q", struct.pack("<d", float(value)))[0]
+    if isinstance(value, str):
+        raw = value.encode()
+        return b"s%d:" % len(raw) + raw
+    if isinstance(value, list):
+        return b"[" + b"".join(map(encode, value)) + b"]"
+    members = sorted((key.encode(), member) for key, member in value.items())
+    return b"{" + b"".join(b"s%d:" % len(k) + k + encode(m) for k, m in members) + b"}"
+
+
+def content_sha256(document):
+    return hashlib.sha256(encode({k: v for k, v in document.items() if k != "content_sha256"})).hexdigest()
+
+
+def require_keys(value, keys, where):
+    require(isinstance(value, dict) and set(value) == set(keys.split()), f"{where} has other fields than {keys}")
+
+
+def exact(text):
+    """The number of a hex float that a double holds exactly."""
+    match = HEX_FLOAT.fullmatch(text) if isinstance(text, str) else None
+    require(match is not None, f"{str(text)[:60]!r} is not a hex float")
+    sign, whole, fraction, exponent = match.groups()
+    mantissa = int(whole + (fraction or ""), 16)
+    power = int(exponent) - 4 * len(fraction or "")
+    while mantissa and mantissa % 2 == 0:
+        mantissa, power = mantissa // 2, power + 1
+    require(mantissa < 2 ** 53 and (mantissa == 0 or power >= -1074 and mantissa.bit_length() + power <= 1024),
+            f"{text!r} is not a double")
+    value = Fraction(mantissa) * two_to(power) if mantissa else Fraction(0)
+    return -value if sign else value
+
+
+def whole(entry, key, low, high):
+    value = entry[key]
+    require(isinstance(value, int) and not isinstance(value, bool) and low <= value <= high, f"{key} is out of range")
+    return value
+
+
+# --- mathematics ---------------------------------------------------------------------------------------------------
+
+def two_to(exponent):
+    return Fraction(2) ** exponent
+
+
+def polynomial_product(a, b):
+    result = [Fraction(0)] * (len(a) + len(b) - 1)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            result[i + j] += x * y
+    return result
+
+
+def times(row, matrix):
+    return [sum(x * column[j] for x, column in zip(row, matrix)) for j in range(len(matrix))]
+
+
+def inverse_form(matrix, vector):
+    """vector' matrix^-1 vector, for a symmetric matrix; None unless it is positive definite."""
+    m, v, total = [list(row) for row in matrix], list(vector), Fraction(0)
+    for k in range(len(m)):
+        if m[k][k] <= 0:
+            return None
+        total += v[k] ** 2 / m[k][k]
+        for i in range(k + 1, len(m)):
+            ratio = m[i][k] / m[k][k]
+            m[i] = [x - ratio * y for x, y in zip(m[i], m[k])]
+            v[i] -= ratio * v[k]
+    return total
+
+
+def fixed_below(x):
+    return (x.numerator << BITS) // x.denominator
+
+
+def fixed_above(x):
+    return -fixed_below(-x)
+
+
+def product_above(a, b):
+    return (a * b >> BITS) + 1
+
+
+def root_above(x):
+    return isqrt(x) + 1
+
+
+class Loop:
+    def __init__(self, entry):
+        require_keys(entry, "axis input mass_kg Kp Kd Ki lags_s time_exponent step_exponent steps decay P gains", "loop")
+        require(entry["axis"] in ("x", "y", "z"), "axis is unknown")
+        self.input = entry["input"]
+        require(self.input in ("force", "command", "velocity", "position"), "input is unknown")
+        mass, kp, kd, self.ki = (exact(entry[key]) for key in ("mass_kg", "Kp", "Kd", "Ki"))
+        require(isinstance(entry["lags_s"], list), "lags_s is not an array")
+        lags = [exact(x) for x in entry["lags_s"]]
+        self.decay = exact(entry["decay"])
+        for x in (mass, kp, kd, self.decay, *lags, *([self.ki] if self.ki else [])):
+            require(two_to(-40) <= x <= two_to(40), "a number of the loop is out of range")
+        require(len(lags) <= 4, "more than four lags")
+        self.time = whole(entry, "time_exponent", -64, 64)
+        self.cell = whole(entry, "step_exponent", 0, 64)
+        self.steps = whole(entry, "steps", 1, 2 ** 18)
+        self.read_form(entry["P"], len(lags) + (3 if self.ki else 2))
+        self.build(mass, kp, kd, lags)
+
+    def read_form(self, rows, n):
+        require(isinstance(rows, list) and len(rows) == n, "P has another size than the loop")
+        require(all(isinstance(row, list) and len(row) == n for row in rows), "P has another size than the loop")
+        self.P = [[exact(x) for x in row] for row in rows]
+        for i in range(n):
+            for j in range(n):
+                x = self.P[i][j]
+                require(abs(x) <= 2 ** 64 and x.denominator <= 2 ** 96, "P has an entry out of range")
+                require(x == self.P[j][i], "P is not symmetric")
+
+    def build(self, mass, kp, kd, lags):
+        lag = [Fraction(1)]
+        for tau in lags:
+            lag = polynomial_product(lag, [Fraction(1), tau])
+        integral = [self.ki] if self.ki else []
+        back = integral + [kp, kd]
+        d = [Fraction(0)] * (len(integral) + 2) + lag
+        for k, x in enumerate(back):
+            d[k] += x
+        if self.input == "position":
+            top = integral + [kp]
+        else:
+            over = {"force": [x / mass for x in lag], "command": [1 / mass], "velocity": [kd]}[self.input]
+            top = [Fraction(0)] * len(integral) + over
+        n = len(self.P)
+        unit = two_to(-self.time)  # of time, in seconds
+        a = [d[k] / d[n] * unit ** (n - k) for k in range(n + 1)]
+        self.A = [[Fraction(int(j == k + 1)) for j in range(n)] for k in range(n - 1)] + [[-x for x in a[:n]]]
+        start = []
+        for k in range(n):
+            x = top[n - 1 - k] / d[n] * unit ** k if n - 1 - k < len(top) else Fraction(0)
+            start.append(x - sum(a[n - k + j] * start[j] for j in range(k)))
+        self.start = start
+        self.limit = top[0] / d[0] / unit
+        self.rows = [[-x / a[0] for x in a[1:]], [Fraction(int(k == 0)) for k in range(n)]]
+        for _ in range(3):
+            self.rows.append(times(self.rows[-1], self.A))
+
+    def check_decay(self):
+        n, A, P = len(self.A), self.A, self.P
+        nothing = [Fraction(0)] * n
+        require(inverse_form(P, nothing) is not None, "P is not positive definite")
+        falls = [[-2 * self.decay * P[i][j] - sum(A[k][i] * P[k][j] + P[i][k] * A[k][j] for k in range(n))
+                  for j in range(n)] for i in range(n)]
+        require(inverse_form(falls, nothing) is not None, "P does not show that the loop decays at the rate stated")
+
+    def transition(self):
+        """exp(A cell) in fixed point, and an upper bound of what is missing, in the maximum norm."""
+        n, cell = len(self.A), two_to(-self.cell)
+        require(max([1] + [sum(map(abs, row)) for row in self.A]) * cell <= Fraction(1, 2), "the cells are too long")
+        power = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
+        total = [list(row) for row in power]
+        for k in range(1, 25):
+            power = [[x * cell / k for x in times(row, self.A)] for row in power]
+            total = [[x + y for x, y in zip(r, s)] for r, s in zip(total, power)]
+        return [[fixed_below(x) for x in row] for row in total], fixed_above(two_to(-24) / factorial(25)) + n
+
+    def gains(self):
+        """Upper bounds of rate (None where there is none), amplitude, edge, impulse."""
+        self.check_decay()
+        step, missed = self.transition()
+        n, cell, P = len(self.A), self.cell, [[int(x * 2 ** 96) for x in row] for row in self.P]
+        spread = root_above(fixed_above(sum(abs(x) for row in self.P for x in row)) << BITS)  # |u|_P per max |u|
+        forms = [([fixed_below(x) for x in row], root_above(fixed_above(inverse_form(self.P, row)) << BITS))
+                 for row in self.rows]
+        offset = fixed_below(self.limit)
+        state, error = [fixed_below(x) for x in self.start], product_above(spread, 1)
+
+        def size(largest):
+            square = sum(x * sum(p * y for p, y in zip(row, state)) for x, row in zip(state, P))
+            return root_above((square >> 96) + 1) + error
+
+        def above(form, plus, largest):
+            row, norm = form
+            value = abs((plus << BITS) + sum(r * x for r, x in zip(row, state)))
+            return (value >> BITS) + (n * largest >> BITS) + 3 + product_above(norm, error)
+
+        largest = max(map(abs, state))
+        offsets = (offset, 0)
+        before = [above(forms[f], offsets[f], largest) for f in (0, 1)]
+        ends, curvatures, highest = [0, 0], [0, 0], [0, 0]
+        for _ in range(self.steps):
+            length = size(largest)
+            curved = [above(forms[f + 2], 0, largest) + (product_above(forms[f + 3][1], length) >> cell) + 1
+                      for f in (0, 1)]
+            error += product_above(spread, product_above(missed, largest) + 1)
+            state = [sum(s * x for s, x in zip(row, state)) >> BITS for row in step]
+            largest = max(map(abs, state))
+            for f in (0, 1):
+                now = above(forms[f], offsets[f], largest)
+                ends[f] += before[f] + now
+                curvatures[f] += curved[f]
+                highest[f] = max(highest[f], max(before[f], now) + (curved[f] >> 2 * cell + 3) + 1)
+                before[f] = now
+        length, d = size(largest), two_to(-cell)
+        tails = [product_above(forms[f][1], length) for f in (0, 1)]
+        integral = [d / 2 * ends[f] + d ** 3 / 12 * curvatures[f] + tails[f] / self.decay for f in (0, 1)]
+        supremum = [max(highest[f], abs(offsets[f]) + 1 + tails[f]) for f in (0, 1)]
+        second = two_to(-self.time) / 2 ** BITS
+        return {"rate": integral[0] * second * two_to(-self.time) if self.limit == 0 else None,
+                "amplitude": integral[1] * second, "edge": supremum[0] * second,
+                "impulse": Fraction(supremum[1], 2 ** BITS)}
+
+
+def check_gain(claims, name, proved):
+    decimal, text = claims[name], claims[name + "_hex"]
+    if decimal is None and text is None:
+        require(name == "rate" and proved is None, f"gains.{name} is missing")
+        return
+    claimed = exact(text)
+    require(isinstance(decimal, (int, float)) and not isinstance(decimal, bool) and Fraction(float(decimal)) == claimed,
+            f"gains.{name}: decimal and hex notation differ")
+    require(proved is not None, f"gains.{name} is claimed, but a constant input leaves an error")
+    require(claimed >= proved, f"gains.{name} is below what the witness shows")
+
+
+def check(c, hashes):
+    require_keys(c, "schema tool statement gains_sha256 model_sha256 loops left_out content_sha256", "certificate")
+    require(c["statement"] == STATEMENT, "another statement")
+    require(c["content_sha256"] == content_sha256(c), "content_sha256 does not match")
+    for key in ("tool", "gains_sha256", "model_sha256"):
+        require(isinstance(c[key], str), f"{key} is not text")
+    for key, expected in hashes.items():
+        require(c[key] == expected, f"{key} is of another file")
+    require(isinstance(c["left_out"], list), "left_out is not an array")
+    for entry in c["left_out"]:
+        require_keys(entry, "axis input loop why", "left_out")
+        require(entry["axis"] in ("x", "y", "z") and all(isinstance(x, str) for x in entry.values()), "left_out")
+    loops = c["loops"]
+    require(isinstance(loops, list) and 0 < len(loops) <= 12, "loops are none, or more than 12")
+    seen, known = set(), {}
+    for entry in loops:
+        loop = Loop(entry)
+        require((entry["axis"], loop.input) not in seen, "a loop stands twice")
+        seen.add((entry["axis"], loop.input))
+        require_keys(entry["gains"], "rate rate_hex amplitude amplitude_hex edge edge_hex impulse impulse_hex", "gains")
+        same = json.dumps({k: v for k, v in entry.items() if k not in ("axis", "gains")}, sort_keys=True)
+        if same not in known:
+            known[same] = loop.gains()
+        for name, proved in known[same].items():
+            check_gain(entry["gains"], name, proved)
+    return len(loops)
+
+
+def main(words):
+    paths, hashes = [], {}
+    try:
+        while words:
+            word = words.pop(0)
+            if word in ("--gains", "--model"):
+                hashes[word[2:] + "_sha256"] = hashlib.sha256(Path(words.pop(0)).read_bytes()).hexdigest()
+            else:
+                paths.append(word)
+        if len(paths) != 1:
+            raise IndexError
+        document = read_json(Path(paths[0]).read_text(encoding="utf-8"))
+        if not isinstance(document, dict) or document.get("schema") != "swarmcert/tracking-certificate/1":
+            raise Unreadable("is no certificate of tracking gains")
+        print(f"accepted: the gains of {check(document, hashes)} loops")
+        return 0
+    except IndexError:
+        print(__doc__, file=sys.stderr)
+        return 2
+    except (OSError, UnicodeDecodeError, RecursionError, Unreadable) as fault:
+        print(f"cannot be read: {fault}", file=sys.stderr)
+        return 3
+    except Rejected as reason:
+        print(f"rejected: {reason}")
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+"""Runs both checkers of tracking gains over the same certificates: sound ones, mutations of every field under a forged
+content hash, and hostile files. They must agree on each, and accept no claim below what holds.
+
+    check_tracking_test.py SWARMCERT SOURCE_DIR
+"""
+import contextlib
+import copy
+import json
+import math
+import random
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import check_tracking as second
+
+SWARMCERT, SOURCE = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+MODEL = SOURCE / "stability/models/crazyflie-small.toml"
+LIMIT_S = 20  # of a hostile file on a loaded machine; it takes milliseconds
+
+
+def certificate(folder, position, lag=""):
+    gains = folder / "gains.toml"
+    gains.write_text(f'schema = "swarmcert/gains/1"\n[position]\n{position}\n{lag}')
+    path = folder / "cert.json"
+    subprocess.run([SWARMCERT, "bound", "--gains", gains, "--model", MODEL, "--verified", "-o", path, "--force", "--quiet"],
+                   check=True, capture_output=True)
+    return json.loads(path.read_text())
+
+
+def exit_codes(folder, text, *options):
+    path = folder / "mutated.json"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    first = subprocess.run([SWARMCERT, "check", path, *options], capture_output=True, timeout=LIMIT_S).returncode
+    with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
+        return [first, second.main([str(path), *options])]
+
+
+def forged(document):
+    document["content_sha256"] = second.content_sha256(document)
+    return json.dumps(document)
+
+
+def places(value, path=()):
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, member in items:
+        yield from places(member, (*path, key))
+
+
+def at(document, path):
+    for key in path:
+        document = document[key]
+    return document
+
+
+def mutations(value):
+    """Other values for one field: numbers up and down, other types, what is missing."""
+    if isinstance(value, str) and value[:3] in ("0x0", "0x1"):
+        x = float.fromhex(value)
+        yield from (y.hex() for y in (x * 1.25 or 0.5, x * 0.75, -x, math.nextafter(x, math.inf),
+                                        math.nextafter(x, -math.inf)))
+        yield from ("0x1p+4000", "nan", "0x" + "1" * 1000 + "p+0")
+    elif isinstance(value, str):
+        yield value + "x"
+    elif isinstance(value, (int, float)):
+        yield from (value + 1, value - 1, value * 1.5, str(value))
+    elif isinstance(value, list):
+        yield from (value + value[:1], value[:-1], {})
+    elif isinstance(value, dict):
+        yield from ({**value, "more": 1}, [])
+    yield None
+    yield True
+
+
+def least_gains(loop):
+    """Gains of the loop from below, by stepping its differential equation: what no certificate may claim less than."""
+    c = {k: float.fromhex(loop[k]) for k in ("mass_kg", "Kp", "Kd", "Ki")}
+    lags = [float.fromhex(x) for x in loop["lags_s"]]
+    m, kp, kd, ki = c["mass_kg"], c["Kp"], c["Kd"], c["Ki"]
+    dt, horizon = 2e-3, 12.0
+
+    def slope(x):
+        e, v, q = x[:3]
+        command = -m * (kp * (e + (loop["input"] == "position")) + kd * (v + (loop["input"] == "velocity")) +
+                        ki * (q + (x[-1] if loop["input"] == "position" else 0))) + (loop["input"] == "command")
+        chain, lagged = command, []
+        for tau, y in zip(lags, x[3:]):
+            lagged.append((chain - y) / tau)
+            chain = y
+        return [v, (chain + (loop["input"] == "force")) / m, e, *lagged, 1.0]
+
+    x, peak, integral, variation, steepest = [0.0] * (4 + len(lags)), 0.0, 0.0, 0.0, 0.0
+    for _ in range(int(horizon / dt)):  # Runge and Kutta, of the response to a unit step
+        k1 = slope(x)
+        k2 = slope([a + dt / 2 * b for a, b in zip(x, k1)])
+        k3 = slope([a + dt / 2 * b for a, b in zip(x, k2)])
+        k4 = slope([a + dt * b for a, b in zip(x, k3)])
+        new = [a + dt / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(x, k1, k2, k3, k4)]
+        peak, integral = max(peak, abs(new[0])), integral + dt * abs(x[0] + new[0]) / 2
+        variation, steepest = variation + abs(new[0] - x[0]), max(steepest, abs(new[0] - x[0]) / dt)
+        x = new
+    return {"rate": integral, "amplitude": variation, "edge": peak, "impulse": steepest}
+
+
+def agree_on_mutations(folder, document):
+    seen = accepted = 0
+    loop = document["loops"][0]
+    truth = {name: gain * (1 - 1e-4) for name, gain in least_gains(loop).items()}
+    document = {**document, "loops": [loop], "left_out": document["left_out"][:1]}
+    assert exit_codes(folder, forged(document)) == [0, 0]
+    for path in places(document):
+        if not path or path[0] == "content_sha256":
+            continue
+        for value in mutations(at(document, path)):
+            mutated = copy.deepcopy(document)
+            at(mutated, path[:-1])[path[-1]] = value
+            codes = exit_codes(folder, forged(mutated))
+            assert codes[0] == codes[1] and codes[0] in (0, 1, 3), (path, value, codes)
+            seen += 1
+            if codes[0] == 0:
+                accepted += 1
+                if path[:2] == ("loops", 0) and path[2] in ("mass_kg", "Kp", "Kd", "Ki", "lags_s", "input"):
+                    truth_of = least_gains(mutated["loops"][0])
+                else:
+                    truth_of = truth
+                for name, gain in truth_of.items():
+                    claimed = mutated["loops"][0]["gains"][name]
+                    assert claimed is None or claimed >= gain * (1 - 1e-4), (path, value, name)
+    assert seen > 300 and 0 < accepted < seen / 2, (seen, accepted)
+    print(f"{seen} mutations decided alike, {accepted} of them accepted")
+
+
+def refuse_low_claims(folder, document):
+    """A gain 6 % lower is below the true one, as what is certified is at most 5 % above."""
+    for k, loop in enumerate(document["loops"][:4]):
+        for name in ("rate", "amplitude", "edge", "impulse"):
+            if loop["gains"][name] is None:
+                continue
+            mutated = copy.deepcopy(document)
+            low = loop["gains"][name] * 0.94
+            mutated["loops"][k]["gains"].update({name: low, name + "_hex": low.hex()})
+            assert exit_codes(folder, forged(mutated)) == [1, 1], (k, name)
+
+
+def refuse_hostile_files(folder, document):
+    good = forged(document)
+    deep = "[" * 100000 + "]" * 100000
+    for text in ("", "{", deep, good.replace('"left_out": [', '"left_out": [' + deep + ", ", 1), good + "x",
+                 good.replace('"time_exponent": ', '"time_exponent": 1' + "0" * 100000, 1), good.replace("null", "NaN", 1),
+                 good.replace('"steps": ', '"steps": 1e', 1), b"\xff" + good.encode(), b"\xef\xbb\xbf" + good.encode(),
+                 good.replace('"steps"', '"axis"', 1)):
+        codes = exit_codes(folder, text)
+        assert codes[0] in (1, 3) and codes[1] in (1, 3), (text[:80], codes)
+
+
+def hold_for_random_loops(folder):
+    """Gains found by stepping never exceed certified ones, which are within 5 % of them."""
+    generator, compared = random.Random(23), 0
+    for run in range(6):
+        kp, kd = generator.uniform(6, 30), generator.uniform(5, 12)
+        ki = generator.uniform(0.2, 0.4) * kp * kd if run % 3 else 0
+        lag = f"[lag]\nmotor_s = {generator.uniform(0.01, 0.04)}\n" if run % 2 else ""
+        document = certificate(folder, f"Kp = {kp}\nKd = {kd}\nKi = {ki}", lag)
+        assert exit_codes(folder, forged(document)) == [0, 0]
+        for loop in document["loops"]:
+            if loop["axis"] != "z":
+                continue
+            for name, least in least_gains(loop).items():
+                claimed = loop["gains"][name]
+                if claimed is None:
+                    continue
+                assert least * (1 - 1e-4) <= claimed <= 1.05 * least, (kp, kd, ki, lag, loop["input"], name, least, claimed)
+                compared += 1
+    assert compared > 60, compared
+    print(f"{compared} gains of random loops compared")
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        hold_for_random_loops(folder)
+        document = certificate(folder, "Kp = 12\nKd = 7\nKi = 20", "[lag]\nmotor_s = 0.03\n")
+        own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
+        assert exit_codes(folder, forged(document), *own) == [0, 0]
+        assert exit_codes(folder, forged(document), "--gains", str(MODEL)) == [1, 1]
+        changed = copy.deepcopy(document)
+        changed["tool"] = "another"
+        assert exit_codes(folder, json.dumps(changed)) == [1, 1]  # the hash of the content is of the other one
+        refuse_low_claims(folder, document)
+        refuse_hostile_files(folder, document)
+        agree_on_mutations(folder, document)
+
+
+if __name__ == "__main__":
+    main()
