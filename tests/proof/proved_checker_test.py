@@ -186,6 +186,29 @@ def a_smaller_bound(certificate, net, folder):
     assert "does not prove its part" in second.check(changed, second.Network(**arguments(net)))
 
 
+def laws_in_a_box(folder, hetero):
+    """A law that rests on bounds in a box for any number of neighbours: accepted by all; one that claims less, or holds outside of
+    the box, is refused by all."""
+    path = folder / "laws.json"
+    run([common.SWARMCERT, "certify", *hetero, "--neighbours", "2", "--domain", folder / "part.toml", "--method", "branch",
+         "--nodes", "20", "-q", "-o", path])
+    certificate = second.parse(path.read_text())
+    certificate["bounds"] = [b for b in certificate["bounds"] if "neighbours" not in b]
+    assert len(certificate["laws"]) > 3
+    for factor, domain, said in (2, "box", "accepted"), (0.9, "box", "less than the law gives"), (2, "global", "box only"):
+        changed = json.loads(json.dumps(certificate))
+        for law in changed["laws"]:
+            upper = factor * law["upper"]
+            law.update(upper=upper, upper_hex=upper.hex(), domain=domain)
+        changed["content_sha256"] = second.content_sha256(changed)
+        path.write_text(json.dumps(changed))
+        one, three = first(path, hetero), proved(path, hetero)
+        assert said in one.stdout and said in three.stdout, f"{one} {three}"
+        assert one.returncode == three.returncode == (0 if said == "accepted" else 1)
+        reason = second.check(changed, second.Network(**arguments(hetero)))
+        assert reason.endswith(said) if said != "accepted" else not reason, reason
+
+
 def short_scale(certificate, net, folder):
     """Of a product of norms as well, whose proof does not look at single inputs."""
     bound = next(b for b in certificate["bounds"] if b["scale"])
@@ -339,6 +362,7 @@ def main():
         folder = Path(name)
         every_format(folder, generator)
         everything = kinds(folder, generator)
+        laws_in_a_box(folder, next(net for name, net, _, _ in everything if name.startswith("kinds")))
         total = 0
         for index, (name, net, options, share) in enumerate(everything):
             path = folder / f"certificate{index}.json"
