@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <optional>
 
 #include "analysis/identification/column_run.h"
 #include "analysis/residuals/force_residual.h"
@@ -37,12 +38,15 @@ Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows) {
 }
 
 void add_track(const residuals::Inputs& inputs, const Track& track, const Grams& grams, int flight,
-               Piece& piece) {
+               const Noise* noise, Piece& piece) {
   const int number = piece.tracks++;
   const stability::Model model = inputs.model_for(track);
   const std::vector<Eigen::Vector3d> r = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
   const TrackBlocks cut = cut_into_blocks(track);
   ColumnRun run(grams, inputs, model, track);
+  std::optional<Whitening> whitening;
+  if (noise != nullptr) whitening.emplace(*noise);
+  Eigen::Matrix3Xd row(3, grams.columns + 1);
   Eigen::MatrixXd rows;
   std::vector<int> in_support(piece.support.size());
   int current = -1, count = 0;
@@ -59,7 +63,11 @@ void add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
     }
   };
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
-    const Eigen::Matrix3Xd& values = run.advance(track.instants[i], track.restarts[i] != 0);
+    const bool restart = track.restarts[i] != 0;
+    row << run.advance(track.instants[i], restart), r[i];
+    if (whitening)
+      row = whitening->advance(row, restart ? 0 : track.instants[i].time_s - track.instants[i - 1].time_s,
+                               restart);
     const int block = cut.of_record[i];
     if (block < 0) continue;
     if (block != current) {
@@ -69,8 +77,7 @@ void add_track(const residuals::Inputs& inputs, const Track& track, const Grams&
       rows.resize(3 * cut.blocks[static_cast<std::size_t>(block)].records, grams.columns + 1);
       std::fill(in_support.begin(), in_support.end(), 0);
     }
-    rows.block(3 * count, 0, 3, grams.columns) = values;
-    rows.block(3 * count++, grams.columns, 3, 1) = r[i];
+    rows.middleRows<3>(Eigen::Index(3) * count++) = row;
     run.count_support(track.instants[i], in_support);
   }
   close();
@@ -124,7 +131,8 @@ Grams columns_of(std::vector<Candidate> candidates) {
 }
 
 Grams block_grams(const residuals::Inputs& inputs, const std::string& kind, std::vector<Candidate> candidates,
-                  const std::vector<int>& which, int jobs, const residuals::Progress& progress) {
+                  const std::vector<int>& which, int jobs, const residuals::Progress& progress,
+                  const Noise* noise) {
   Grams grams = columns_of(std::move(candidates));
   std::size_t streams = 0;
   for (const Candidate& candidate : grams.candidates) streams += candidate.thetas.size();
@@ -136,7 +144,7 @@ Grams block_grams(const residuals::Inputs& inputs, const std::string& kind, std:
     const int flight = which[static_cast<std::size_t>(i)];
     std::vector<std::string> problems;
     for (const Track& track : inputs.load(static_cast<std::size_t>(flight), problems)) {
-      if (!track.position_only && track.kind == kind) add_track(inputs, track, grams, flight, piece);
+      if (!track.position_only && track.kind == kind) add_track(inputs, track, grams, flight, noise, piece);
     }
     progress(++done, static_cast<int>(which.size()));
   });

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "analysis/identification/candidates.h"
+#include "analysis/identification/whitening.h"
 #include "analysis/residuals/comparison.h"
 
 namespace swarmcert::identification {
@@ -58,7 +59,9 @@ Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& colu
 Grams columns_of(std::vector<Candidate> candidates);
 
 /// Condenses flights. The result does not depend on `jobs`.
+/// @param noise whitens columns and residual where it is not null.
 Grams block_grams(const residuals::Inputs& inputs, const std::string& kind, std::vector<Candidate> candidates,
-                  const std::vector<int>& which, int jobs, const residuals::Progress& progress);
+                  const std::vector<int>& which, int jobs, const residuals::Progress& progress,
+                  const Noise* noise = nullptr);
 
 }  // namespace swarmcert::identification

@@ -224,7 +224,7 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
         selected.members[i] = best;
     }
   }
-  selected.refined = refine(passes, selected.grams, selected.members);
+  selected.refined = with_innovations(passes, refine(passes, selected.grams, selected.members));
   selected.checks = instrument(passes, candidates_of(selected.refined));
   widen_by_bias(selected.checks, instrument_with_shapes(passes, selected.refined), selected.refined);
   return ranking_of(passes, selected);

@@ -239,11 +239,39 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   return result;
 }
 
+/// Times of lags and delays as the innovations show them; what is left is scanned anew where one moved.
+void correct_memories(const Passes& passes, Explained& explained) {
+  constexpr double kMoved = 0.1;
+  std::vector<Missing>& ranking = explained.settled.ranking;
+  std::vector<Refined> refined;
+  for (const Missing& missing : ranking) {
+    const std::vector<Refined>& all = explained.settled.selected.refined;
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Refined& effect) {
+      return effect.candidate.name == missing.effect;
+    });
+    if (found == all.end()) return;
+    refined.push_back(*found);
+  }
+  const std::vector<Refined> corrected = with_innovations(passes, refined);
+  bool has_moved = false;
+  for (std::size_t i = 0; i < corrected.size(); ++i) {
+    if (corrected[i].candidate.info.remembers)
+      has_moved =
+          has_moved || std::abs(corrected[i].theta[0] - refined[i].theta[0]) > kMoved * refined[i].theta[0];
+  }
+  if (!has_moved) return;
+  for (std::size_t i = 0; i < corrected.size(); ++i)
+    ranking[i] = with_numbers(passes, corrected[i], ranking[i], explained.settled.selected.grams);
+  explained.settled.rest = remainder(passes, specs_of(ranking));
+  scan_what_is_left(passes, explained);
+}
+
 }  // namespace
 
 Explained explain(const Passes& passes, const Coverage& covered) {
   Explained explained = explain_by_formulas(passes, covered);
   drop_doubtful_names(passes, explained);
+  correct_memories(passes, explained);
   return explained;
 }
 

@@ -42,6 +42,13 @@ Missing missing_of(const Passes& passes, const Refined& refined, Finding finding
 
 }  // namespace
 
+Missing with_numbers(const Passes& passes, const Refined& refined, const Missing& missing,
+                     const Grams& grams) {
+  Missing result = missing_of(passes, refined, missing.finding, grams);
+  result.instrument = missing.instrument;
+  return result;
+}
+
 std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) {
   std::vector<Finding> known = findings(Selection(selected.grams), selected.members);
   std::vector<Missing> ranking;

@@ -25,6 +25,11 @@ struct Missing {
 /// What was selected as effects that are missing, in its order.
 std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected);
 
+/// `missing` with the numbers of `refined`, a fit of the same effect.
+/// @param grams of the flights that it is fitted to
+Missing with_numbers(const Passes& passes, const Refined& refined, const Missing& missing,
+                     const Grams& grams);
+
 /// The numbers of `missing` for with_effects().
 std::vector<stability::EffectSpec> specs_of(const std::vector<Missing>& missing);
 
