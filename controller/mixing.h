@@ -218,8 +218,8 @@ struct TorqueShares {
 
 /// The largest share a of roll and pitch for which some share b of yaw keeps base + a tilt + b yaw within the limits.
 ///
-/// The largest a of each b is the least of what the rotors allow, a concave function of b. This walks on it upwards from
-/// b = 0, along the limit of one rotor after the other, while more yaw relieves the rotor that allows least.
+/// The largest a of each b is the least of what the rotors allow, a concave function of b. This walks on it upwards
+/// from b = 0, along the limit of one rotor after the other, while more yaw relieves the rotor that allows least.
 /// @param shares   the largest a for b = 0, below 1.
 /// @param limiting the rotor that allows no more.
 template <typename Scalar>

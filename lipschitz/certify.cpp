@@ -38,7 +38,8 @@ void require_relu_on_a_box(const std::map<std::string, const Weights*>& parts,
   }
 }
 
-/// Whether a witness of `function` can be evaluated: the terms of a set function besides the one that moves are of any kind.
+/// Whether a witness of `function` can be evaluated: the terms of a set function besides the one that moves are of any
+/// kind.
 bool has_witness(const std::map<std::string, const Weights*>& parts, const std::string& function) {
   const std::vector<std::string> names = files::networks_of(function);
   return std::all_of(parts.begin(), parts.end(), [&names](const auto& part) {

@@ -36,8 +36,8 @@ struct CertifyOptions : ClaimOptions {
   BranchOptions branch;                        ///< per claim; `known` and `cancelled` are taken from here
   LowerBoundOptions lower;                     ///< its `cancelled` is taken from here below
   int jobs = 0;  ///< threads; 0: all. Results do not depend on it, unless `seconds` is set.
-  /// Wall clock for all of it, shared out among its parts; 0: no limit. Exceeded by what has to be proved in any case: the
-  /// spectral norms and the layer-wise bounds before, one exact proof per bound after.
+  /// Wall clock for all of it, shared out among its parts; 0: no limit. Exceeded by what has to be proved in any case:
+  /// the spectral norms and the layer-wise bounds before, one exact proof per bound after.
   double seconds = 0;
   const std::atomic<bool>* cancelled = nullptr;  ///< ends the searches; upper bounds found so far are kept
   std::function<void(int done, int total, const std::string& what)> progress;  ///< called from any thread
@@ -65,8 +65,8 @@ struct CertifiedBound : Claim {
   SdpBound sdp;           ///< how the semidefinite program went; its proof is moved to `proof`
   FoundSlope lower;       ///< proves the lower bound
 
-  /// Whether more time might have given a smaller upper or a larger lower bound: a search was stopped by a signal or by the
-  /// time. Both bounds are proved all the same.
+  /// Whether more time might have given a smaller upper or a larger lower bound: a search was stopped by a signal or by
+  /// the time. Both bounds are proved all the same.
   bool is_interrupted() const {
     const bool above = branch_stop == BranchStop::kNothingRun ? lipschitz::is_interrupted(sdp.stop)
                                                               : lipschitz::is_interrupted(branch_stop);
@@ -96,17 +96,17 @@ struct Certification {
 inline constexpr double kEqualTolerance = 0x1p-20;
 
 /// Whether the norms of one network's layers satisfy what was stated of gamma, layer by layer. Scope layer: |W|_2 <=
-/// gamma. Scope network, mode clip: the product of the norms is at most gamma; one verdict for all layers. Scope network,
-/// mode equal: each is the equal share, gamma^(1/layers). Mode equal asks for the converse as well, both up to
+/// gamma. Scope network, mode clip: the product of the norms is at most gamma; one verdict for all layers. Scope
+/// network, mode equal: each is the equal share, gamma^(1/layers). Mode equal asks for the converse as well, both up to
 /// kEqualTolerance. Decided in exact arithmetic; inconclusive where an enclosure straddles its limit.
 std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const std::vector<Enclosure>& norms);
 
 /// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
 /// a distance, leaves the upper bounds valid. Functions with another activation than ReLU, and set
-/// functions where any phi has one, get upper bounds only; where the activation is monotone, by the same matrix inequality
-/// (checker/stages.h). Branch and bound runs on what the clamp lets through of the box, or on a projective cover of all
-/// inputs where there is no box.
+/// functions where any phi has one, get upper bounds only; where the activation is monotone, by the same matrix
+/// inequality (checker/stages.h). Branch and bound runs on what the clamp lets through of the box, or on a projective
+/// cover of all inputs where there is no box.
 /// @throws std::invalid_argument if gamma is not positive, if there is a domain or branch and bound is asked for and an
 ///   activation is not ReLU, or as claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);

@@ -13,9 +13,9 @@ namespace {
 
 using files::Network;
 
-/// Of the time of a command, what the bounds for all inputs may take where branch and bound follows; and of the time of one
-/// bound by branch and bound, what the search of boxes may take: its proof is checked afterwards, and lower bounds are
-/// searched once more.
+/// Of the time of a command, what the bounds for all inputs may take where branch and bound follows; and of the time of
+/// one bound by branch and bound, what the search of boxes may take: its proof is checked afterwards, and lower bounds
+/// are searched once more.
 constexpr double kShareBeforeBranch = 0.3, kShareOfBoxes = 0.6;
 
 std::string called(const CertifiedBound& bound) {

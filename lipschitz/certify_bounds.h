@@ -10,9 +10,9 @@ namespace swarmcert::lipschitz {
 /// Pieces of work that find_bounds() gives to its progress.
 int pieces_of_work(const CertifyOptions& options, int bounds);
 
-/// Proves upper bounds for `bounds`, whose `product` is set, and searches for lower ones: first what takes seconds at any
-/// size, eclipse_fast(); then the semidefinite programs and the searches for steep slopes; then, where it is wanted,
-/// branch and bound. Every bound is proved whenever `stop` ends the work; those that it cut short say so.
+/// Proves upper bounds for `bounds`, whose `product` is set, and searches for lower ones: first what takes seconds at
+/// any size, eclipse_fast(); then the semidefinite programs and the searches for steep slopes; then, where it is
+/// wanted, branch and bound. Every bound is proved whenever `stop` ends the work; those that it cut short say so.
 void find_bounds(const files::Network& network, const CertifyOptions& options, const Stop& stop,
                  WorkProgress& progress, std::vector<CertifiedBound>& bounds);
 

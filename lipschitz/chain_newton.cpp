@@ -286,8 +286,8 @@ struct PathEstimate {
   VectorXd centre, slope;
 };
 
-/// Where the path is at mu, by Hermite's interpolation at the last `points` estimates (Newton's divided differences, each
-/// place taken twice).
+/// Where the path is at mu, by Hermite's interpolation at the last `points` estimates (Newton's divided differences,
+/// each place taken twice).
 VectorXd extrapolated(const std::vector<PathEstimate>& path, std::size_t points, double mu) {
   const std::size_t nodes = 2 * points;
   std::vector<double> place;

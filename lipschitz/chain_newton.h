@@ -11,10 +11,10 @@ namespace swarmcert::lipschitz {
 /// Minimises rho over (rho, t) subject to S(rho, t) >= 0, the program of solve_lipsdp(), by following the path of the
 /// minimisers of rho / mu - log det S as mu goes to zero.
 ///
-/// S is block tridiagonal with one block per layer, so that its factor and the blocks of its inverse that the gradient needs
-/// cost time and memory that grow linearly with depth. Newton's matrix H is dense over the n neurons. It is built block
-/// column by block column from those of S^-1, for 4 n^2 times the width, and factorised in place. One H per step serves the
-/// correction towards the path, the extrapolation along the path, and the test how far that may go.
+/// S is block tridiagonal with one block per layer, so that its factor and the blocks of its inverse that the gradient
+/// needs cost time and memory that grow linearly with depth. Newton's matrix H is dense over the n neurons. It is built
+/// block column by block column from those of S^-1, for 4 n^2 times the width, and factorised in place. One H per step
+/// serves the correction towards the path, the extrapolation along the path, and the test how far that may go.
 ///
 /// Compared with minimise(): a fifth of the memory, a quarter to a twentieth of the time per step, at the price of less
 /// accuracy near the optimum: meant for a relative gap of 1e-6.

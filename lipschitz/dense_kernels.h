@@ -13,8 +13,9 @@ namespace swarmcert::lipschitz {
 /// bits stay the same for any number of them.
 void use_one_blas_thread();
 
-/// Lets the process keep what it frees, up to a quarter of a gigabyte: matrices of a few hundred kilobytes that come and go
-/// would otherwise be handed back to the system and zeroed again each time. Nothing where the C library has no such switch.
+/// Lets the process keep what it frees, up to a quarter of a gigabyte: matrices of a few hundred kilobytes that come
+/// and go would otherwise be handed back to the system and zeroed again each time. Nothing where the C library has no
+/// such switch.
 void keep_freed_memory();
 
 /// C += A B.

@@ -43,8 +43,8 @@ double chain_bound(const std::vector<check::Matrix>& chain, const Stop& stop) {
   return layers ? std::min(bound, layers->upper.value()) : bound;
 }
 
-/// Proved bounds of what follows each layer of a chain: tails[k] for an error in y_k, the last one 1. A chain that is cut
-/// behind k starts with a ReLU, which is no steeper than 1.
+/// Proved bounds of what follows each layer of a chain: tails[k] for an error in y_k, the last one 1. A chain that is
+/// cut behind k starts with a ReLU, which is no steeper than 1.
 std::vector<double> tails(const std::vector<check::Matrix>& chain, const Stop& stop) {
   std::vector<double> result;
   for (std::size_t k = 1; k < chain.size(); ++k) {
@@ -72,7 +72,8 @@ double weighted_errors(const ReachNetwork& chain, const Reach& reach, std::size_
   return safely(total);
 }
 
-/// The largest value over the box of `cost`, a function of the bounds over a part of it: best first, up to `nodes` parts.
+/// The largest value over the box of `cost`, a function of the bounds over a part of it: best first, up to `nodes`
+/// parts.
 template <class Cost>
 double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, const Cost& cost) {
   struct Part {

@@ -12,8 +12,8 @@
 
 namespace swarmcert::lipschitz {
 
-/// |f32(q(x)) - f(x)|_2 over the box, f32 being nn/mlp.h and nn/deep_set.h in float, f the exact function of the weights
-/// as stored, q the conversion of the inputs to what the evaluation gets.
+/// |f32(q(x)) - f(x)|_2 over the box, f32 being nn/mlp.h and nn/deep_set.h in float, f the exact function of the
+/// weights as stored, q the conversion of the inputs to what the evaluation gets.
 struct Float32Error {
   std::string function;        ///< "network" or "set:<phi kind>:<rho kind>"
   int neighbours_at_most = 0;  ///< of the kind; 0 for a plain network
@@ -38,7 +38,8 @@ std::vector<double> input_errors(const Box& box, double step);
 ///
 /// With u = 2^-24 and m inputs, a computed layer differs from the exact layer at the same computed inputs h by at most
 /// delta = gamma_{m+1} (|W| |h| + |b|) + m 2^-149, entry by entry (Higham 2002, section 3.1; the last term for products
-/// that underflow). Replacing the computed layers by exact ones from the last to the first changes the output by at most
+/// that underflow). Replacing the computed layers by exact ones from the last to the first changes the output by at
+/// most
 ///   sum_k L_k |delta_k|_2,
 /// where L_k is a proved Lipschitz bound of what follows layer k (LipSDP of the tail, which holds at every point, hence
 /// for any other neighbours). |h| comes from bounds over parts of the box (reach.h), plus what was computed wrong

@@ -1,4 +1,5 @@
-/// @file A structured primal-dual interior point method for LipSDP-Neuron. Its answer is not trusted: the checker verifies it.
+/// @file A structured primal-dual interior point method for LipSDP-Neuron. Its answer is not trusted: the checker
+/// verifies it.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,8 +46,9 @@ struct LipSdpResult {
 /// in the variables (x, z_1, ..., z_{K-1}); e_i selects neuron i and a_i = (its row of M_k in the columns of
 /// z_{k-1}) - e_i. sqrt(rho) bounds the Lipschitz constant of the chain.
 ///
-/// Solved by minimise() of interior_point.h, chains of more than 300 neurons by minimise_chain() of chain_newton.h. Chains are scaled by powers of two per layer first, and wide inputs
-/// (n_0 > n_1) reduced to n_1 by a QR factorisation of M_1'.
+/// Solved by minimise() of interior_point.h, chains of more than 300 neurons by minimise_chain() of chain_newton.h.
+/// Chains are scaled by powers of two per layer first, and wide inputs (n_0 > n_1) reduced to n_1 by a QR factorisation
+/// of M_1'.
 ///
 /// @param chain at least two matrices (one hidden layer), finite entries, matching sizes.
 /// @returns points in the chain's own scale. Floating point estimates without a guarantee: verify them.

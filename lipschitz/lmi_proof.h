@@ -20,8 +20,8 @@ struct UpperProof {
   std::optional<check::Factor> factor;
 };
 
-/// Proofs contain factors of at most this many rows. A larger factor would be several times as long as the weights, and the
-/// checker recomputes it as quickly as it would read it.
+/// Proofs contain factors of at most this many rows. A larger factor would be several times as long as the weights, and
+/// the checker recomputes it as quickly as it would read it.
 inline constexpr std::size_t kMostFactorRows = 64;
 
 /// A verified proof that sqrt(rho) bounds the chain, or nothing if (rho, t) does not satisfy the inequality with a

@@ -88,7 +88,8 @@ class Ranger {
   Index outputs() const { return names_.size() == 1 ? first_.back().bias.size() : rho_.back().bias.size(); }
   double jump_norm() const { return phi_hull_.norm; }
 
-  /// At least every value of sign * f_output with exactly `neighbours` neighbours; proposes points where it is attained.
+  /// At least every value of sign * f_output with exactly `neighbours` neighbours; proposes points where it is
+  /// attained.
   double largest(int output, double sign, int neighbours,
                  std::vector<std::vector<VectorXd>>& candidates) const {
     RowVectorXd direction = RowVectorXd::Zero(outputs());

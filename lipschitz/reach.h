@@ -36,19 +36,20 @@ struct LinearForms {
 };
 
 /// Bounds on every layer over a box by backward substitution of linear relaxations of ReLU (CROWN, Zhang et al. 2018):
-/// on l <= y <= u with l < 0 < u,  alpha y <= relu(y) <= s y + t  with s near u / (u - l), t = max(u - s u, -s l) rounded
-/// up, alpha 0 or 1: 1 where u > -l.
+/// on l <= y <= u with l < 0 < u,  alpha y <= relu(y) <= s y + t  with s near u / (u - l), t = max(u - s u, -s l)
+/// rounded up, alpha 0 or 1: 1 where u > -l.
 ///
-/// Better lower slopes. A form is largest at a corner of the box. Of the neurons before, those that are on at that corner
-/// get alpha = 1, the others 0, so that alpha y <= relu(y) is tight there; then the form is taken again. One such step
-/// is most of what optimising alpha brings (alpha-CROWN, Xu et al. 2021), and a corner says all about it (check::Decision). It
-/// is made for neurons that are nearly decided, and counts where it decides them.
+/// Better lower slopes. A form is largest at a corner of the box. Of the neurons before, those that are on at that
+/// corner get alpha = 1, the others 0, so that alpha y <= relu(y) is tight there; then the form is taken again. One
+/// such step is most of what optimising alpha brings (alpha-CROWN, Xu et al. 2021), and a corner says all about it
+/// (check::Decision). It is made for neurons that are nearly decided, and counts where it decides them.
 ///
 /// Rounding. A form lambda y_j + c is exact for the lambda that is stored. Multiplying it by W_j in floating point
 /// changes a coefficient by at most gamma_n |lambda| |W_j| in any order of summation, with or without fused products
-/// (Higham 2002, section 3.1), hence the form by gamma_n |lambda| (|W_j| max|h|), which is added to c. Constants are sums
-/// whose rounding is at most N 2^-53 times the sum of their terms' absolute values; twice that is added, which also
-/// covers the rounding of these error terms themselves, and 2^-900 for underflow. Overflow ends as an infinite bound.
+/// (Higham 2002, section 3.1), hence the form by gamma_n |lambda| (|W_j| max|h|), which is added to c. Constants are
+/// sums whose rounding is at most N 2^-53 times the sum of their terms' absolute values; twice that is added, which
+/// also covers the rounding of these error terms themselves, and 2^-900 for underflow. Overflow ends as an infinite
+/// bound.
 class Reach {
  public:
   /// @param box finite, one interval per input.

@@ -10,7 +10,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A neuron is nearly decided where its smaller end is less than this share of its range. Larger shares decide hardly more.
+/// A neuron is nearly decided where its smaller end is less than this share of its range. Larger shares decide hardly
+/// more.
 constexpr double kNearlyDecided = 0.1;
 /// How far beyond zero a neuron has to be, as a share of its range and of the terms that it sums, so that the checker's
 /// rounding does not matter.

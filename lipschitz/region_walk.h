@@ -29,9 +29,9 @@ namespace swarmcert::lipschitz {
 /// is rough, so every region's slope is evaluated before it is entered, and it goes back into the queue where that
 /// is not the steepest after all.
 ///
-/// Where the domain is open, walks start among the kinks of the first layer or, far from them, in turn on a ladder of scales
-/// and at infinity: along a ray x + t d, t -> inf, f has the slopes of the chain without its biases, whose linear regions
-/// are cones; the walk starts far out along the steepest of some random directions.
+/// Where the domain is open, walks start among the kinks of the first layer or, far from them, in turn on a ladder of
+/// scales and at infinity: along a ray x + t d, t -> inf, f has the slopes of the chain without its biases, whose
+/// linear regions are cones; the walk starts far out along the steepest of some random directions.
 ///
 /// A walk ends when kPatience regions in a row were no steeper than its best one; regions once entered are not
 /// entered again.

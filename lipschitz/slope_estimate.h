@@ -1,4 +1,5 @@
-/// @file The steepest slope that sampling finds, for networks whose values are not exact numbers: an estimate, no bound.
+/// @file The steepest slope that sampling finds, for networks whose values are not exact numbers: an estimate, no
+/// bound.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +17,9 @@ struct SlopeEstimateOptions {
   Stop stop;
 };
 
-/// The largest difference quotient |f(x) - f(y)| / |x - y| that was found for the claim, in its block and norm; of a set
-/// function with up to two more neighbours and the ground. Evaluated in double: it proves nothing, but a proved upper
-/// bound that lies close to it cannot be improved by much.
+/// The largest difference quotient |f(x) - f(y)| / |x - y| that was found for the claim, in its block and norm; of a
+/// set function with up to two more neighbours and the ground. Evaluated in double: it proves nothing, but a proved
+/// upper bound that lies close to it cannot be improved by much.
 Estimate slope_estimate(const files::Network& network, const Claim& claim,
                         const SlopeEstimateOptions& options);
 

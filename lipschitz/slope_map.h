@@ -42,7 +42,8 @@ struct SlopeMap {
 /// function but the ground's, with one neighbour in the cell and any others anywhere. What is `upper` has been accepted
 /// by check::check_tree(), or is the bound of `found`; what the clamp maps to one point has been bounded after it.
 /// @param found certified with the same network: its bounds of block "all" and the Euclidean norm.
-/// @throws std::invalid_argument if a coordinate does not exist or both are the same, or a number of cells is not positive.
+/// @throws std::invalid_argument if a coordinate does not exist or both are the same, or a number of cells is not
+/// positive.
 std::vector<SlopeMap> slope_maps(const files::Network& network, const Certification& found,
                                  const SlopeMapOptions& options);
 

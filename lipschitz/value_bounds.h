@@ -17,8 +17,8 @@ struct VectorBounds {
   std::vector<double> error;  ///< of the float32 evaluation, entry by entry; empty: not bounded
 };
 
-/// What a certificate states of one function's values over a box (checker/statement.h). By intervals, layer by layer: wider
-/// than range.h and float32_error.h find by branch and bound, and as easy to verify.
+/// What a certificate states of one function's values over a box (checker/statement.h). By intervals, layer by layer:
+/// wider than range.h and float32_error.h find by branch and bound, and as easy to verify.
 struct CertifiedValues {
   std::string function;                                     ///< "network" or "set:<phi kind>:<rho kind>"
   int neighbours = 0;                                       ///< at most, of the kind; 0 for a plain network
@@ -39,8 +39,8 @@ struct ValueOptions {
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
 };
 
-/// Of the plain network, or of every set function of a kind of neighbours. Left out is what does not fit into a double; float32
-/// errors where float32 might overflow.
+/// Of the plain network, or of every set function of a kind of neighbours. Left out is what does not fit into a double;
+/// float32 errors where float32 might overflow.
 /// @param domain by part, finite, of every input.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind, which the certificate contains.
 std::vector<CertifiedValues> certified_values(const files::Network& network,

@@ -96,12 +96,13 @@ struct LadderRow {
   double fit_rmse_N = 0, select_rmse_N = 0, test_rmse_N = 0, noise_floor_N = 0;
   int test_looks = 0;  ///< how often test flights had been scored when this was written
   std::string note;    ///< why it was refused, or kept all the same
-  /// Of every effect after this row, so that it can be gone back to: "motor_lag.tau_s", "constant_force@cf50.force_x_N".
+  /// Of every effect after this row, so that it can be gone back to: "motor_lag.tau_s",
+  /// "constant_force@cf50.force_x_N".
   std::map<std::string, double> values;
 };
 
-/// One kind of vehicle. Invariant after read_model(): all numbers finite, mass, inertia and arm positive, 3 to 8 rotors,
-/// every effect known and within its parameters' bounds.
+/// One kind of vehicle. Invariant after read_model(): all numbers finite, mass, inertia and arm positive, 3 to 8
+/// rotors, every effect known and within its parameters' bounds.
 struct Model {
   std::string path;    ///< as the user gave it; empty if made in memory
   std::string sha256;  ///< of the file
@@ -112,8 +113,8 @@ struct Model {
   double torque_per_thrust_m = 0;                   ///< yaw torque of a rotor per newton of its thrust
   std::pair<double, double> battery_range_V = kOneCell_V;  ///< voltages at which the vehicle can be
   ThrustMap thrust{};
-  /// Force of one rotor at command u in [0, 1], whatever the voltage: a + b u + c u^2, in newton. Where a file states it,
-  /// `thrust` is the same polynomial in gram-force.
+  /// Force of one rotor at command u in [0, 1], whatever the voltage: a + b u + c u^2, in newton. Where a file states
+  /// it, `thrust` is the same polynomial in gram-force.
   std::optional<std::array<double, 3>> thrust_curve_N;
   /// In the order of the motors in logs. Empty: four rotors in X at `arm_m`, in the order of a Crazyflie's motors.
   std::vector<RotorPlace> rotors;
@@ -129,7 +130,8 @@ struct Model {
   }
 };
 
-/// Where the rotors are: Model::rotors or, where that is empty, four in X: front right, back right, back left, front left.
+/// Where the rotors are: Model::rotors or, where that is empty, four in X: front right, back right, back left, front
+/// left.
 std::vector<RotorPlace> rotor_places(const Model& model);
 
 /// Sets `thrust_curve_N` and the `thrust` that is the same.

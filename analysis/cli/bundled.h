@@ -10,8 +10,8 @@ namespace swarmcert::analysis {
 /// @throws files::InputError if the folder is in neither place.
 std::string bundled_folder(const std::string& installed, const std::string& source);
 
-/// For a program that is not the tool but brings its files along: `folder` stands for the tool's own in bundled_folder(),
-/// PREFIX/bin or where the build names the sources. To be called before any command runs.
+/// For a program that is not the tool but brings its files along: `folder` stands for the tool's own in
+/// bundled_folder(), PREFIX/bin or where the build names the sources. To be called before any command runs.
 void bundled_files_beside(const std::string& folder);
 
 }  // namespace swarmcert::analysis

@@ -42,8 +42,7 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
            for (const std::string& order : orders) add_order(arguments, order);
          },
          "Layers in the order of evaluation, where a weight file does not tell it: fc1,fc2,fc3; with --phi "
-         "and "
-         "--rho phi=fc1,fc2 and rho=fc1,fc2")
+         "and --rho phi=fc1,fc2 and rho=fc1,fc2")
       ->allow_extra_args(false);
 }
 

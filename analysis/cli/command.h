@@ -54,7 +54,8 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments);
 /// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 
-/// Loads NET, whose activation is ReLU, or takes the host's. @throws UsageError if nothing was named, or an order for a file that was not; files::InputError as files::load_network() does.
+/// Loads NET, whose activation is ReLU, or takes the host's. @throws UsageError if nothing was named, or an order for a
+/// file that was not; files::InputError as files::load_network() does.
 files::Network load_net(const files::NetworkArguments& arguments);
 /// The same of networks with any activation.
 files::Network load_any_net(const files::NetworkArguments& arguments);
@@ -66,7 +67,8 @@ files::Json result_head(const std::string& command, const std::vector<std::strin
 /// Refuses early, before work that would be lost: throws InputError if `path` exists and --force is not given.
 void refuse_to_replace(const CommonOptions& common, const std::string& path);
 
-/// The same for a folder that is to be written into: throws InputError if `folder` is there, is not an empty folder, and
+/// The same for a folder that is to be written into: throws InputError if `folder` is there, is not an empty folder,
+/// and
 /// --force is not given. "" is no folder.
 void refuse_folder(const CommonOptions& common, const std::string& folder);
 

@@ -14,8 +14,8 @@
 
 namespace swarmcert::analysis {
 
-/// What a program gives to one run of a command, and what it gets back. While it is the host of a thread, a command that
-/// this thread runs prints nothing and handles no signal.
+/// What a program gives to one run of a command, and what it gets back. While it is the host of a thread, a command
+/// that this thread runs prints nothing and handles no signal.
 struct Host {
   // --- inputs ---
   std::optional<files::Network> network;   ///< NET, in place of files
@@ -24,8 +24,8 @@ struct Host {
   std::function<void(int done, int total, const std::string& what)> progress;
 
   // --- while it runs ---
-  /// The host sets both to end the command: those that stop early see `stop`, all others throw Interrupted when they next
-  /// report progress.
+  /// The host sets both to end the command: those that stop early see `stop`, all others throw Interrupted when they
+  /// next report progress.
   std::atomic<bool> stop{false}, interrupted{false};
   /// The host sets `stop`, and not `interrupted`, at this time of steady_clock, in seconds; 0: never.
   std::atomic<double> deadline_s{0};

@@ -33,8 +33,8 @@ class Progress {
   bool drawn_ = false;
 };
 
-/// Set by Ctrl-C (SIGINT) or SIGTERM while an instance exists, or once a time has passed; another such signal a second later
-/// ends the process. Under a host, signals are the host's matter: it sets the flag.
+/// Set by Ctrl-C (SIGINT) or SIGTERM while an instance exists, or once a time has passed; another such signal a second
+/// later ends the process. Under a host, signals are the host's matter: it sets the flag.
 class CancelOnInterrupt {
  public:
   /// @param seconds wall clock from now on; 0: no limit.

@@ -16,7 +16,8 @@
 namespace swarmcert::analysis {
 namespace {
 
-/// The parser shows an open range with all digits of the largest number: the same in words, or nothing if it is not one.
+/// The parser shows an open range with all digits of the largest number: the same in words, or nothing if it is not
+/// one.
 std::string explain_range(const CLI::App& scope, const std::string& message) {
   static const std::regex pattern("(-[^:]*): Value (.*) not in range .* to [0-9]{19,}(\\.0*)?");
   std::smatch found;

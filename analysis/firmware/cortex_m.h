@@ -14,8 +14,8 @@ struct NotRun : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The memory of an STM32F405, without a clock, a device, an operating system, or any access to the host: semihosting is
-/// off, so that a program can do nothing but compute.
+/// The memory of an STM32F405, without a clock, a device, an operating system, or any access to the host: semihosting
+/// is off, so that a program can do nothing but compute.
 class CortexM {
  public:
   static constexpr std::uint32_t kFlash = 0x08000000, kFlashSize = 1024 * 1024;

@@ -1,5 +1,5 @@
-/// @file Whether what is built or shipped is the certified network: an export's folder, one of its files, other C source,
-/// or an ELF.
+/// @file Whether what is built or shipped is the certified network: an export's folder, one of its files, other C
+/// source, or an ELF.
 #pragma once
 
 #include <optional>

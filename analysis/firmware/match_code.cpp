@@ -81,8 +81,7 @@ CodeMatch run(const std::vector<GoldenVector>& vectors, const ElfImage& image, s
       result.outcome = CodeMatch::Outcome::kDifferent;
       result.difference = fmt::format(
           "predict_force_z gives {:.9g} N (bits {:#010x}, status {}) for golden vector {} with {} "
-          "neighbours, "
-          "the network gives {:.9g} N (bits {:#010x}, status {})",
+          "neighbours, the network gives {:.9g} N (bits {:#010x}, status {})",
           found_N, force, status, result.vectors - 1, vector.inputs.size(), vector.force_N, expected,
           static_cast<int>(vector.status));
       return result;

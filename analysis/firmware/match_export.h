@@ -39,12 +39,12 @@ bool is_exported_file(const std::string& path, const std::string& bytes);
 /// True if one of the files of an export lies in `folder`.
 bool holds_export(const std::string& folder);
 
-/// Paths that the export's files have which `path`, a file of it or its folder, belongs to; none if `path` does not have
-/// the name of an exported file.
+/// Paths that the export's files have which `path`, a file of it or its folder, belongs to; none if `path` does not
+/// have the name of an exported file.
 std::vector<std::string> files_of_export(const std::string& path);
 
-/// Regenerates the export of `network` and compares every file byte for byte. Line ends are normalised first: CR LF counts
-/// as LF. The parameters of the export (most neighbours, seed, certificate) are those that the files state.
+/// Regenerates the export of `network` and compares every file byte for byte. Line ends are normalised first: CR LF
+/// counts as LF. The parameters of the export (most neighbours, seed, certificate) are those that the files state.
 /// @param path  the folder of the export: none of its files may be missing and no other file may be in it, those of
 ///   `other_contents` excepted; or one of its files, with which those that lie beside it are compared too.
 /// Precondition: every weight is a float32 (files::as_float32()); the network is a deep set.

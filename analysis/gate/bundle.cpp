@@ -76,7 +76,8 @@ class Unfinished {
   Unfinished(const Unfinished&) = delete;
   Unfinished& operator=(const Unfinished&) = delete;
   const fs::path& path() const { return path_; }
-  /// Puts the folder where `target` is; what was there is removed. Whoever looks sees all of the old or all of the new one.
+  /// Puts the folder where `target` is; what was there is removed. Whoever looks sees all of the old or all of the new
+  /// one.
   void move_to(const fs::path& target) {
     const unsigned flags = fs::exists(target) ? RENAME_EXCHANGE : RENAME_NOREPLACE;
     if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(), flags) == 0) {

@@ -48,8 +48,8 @@ struct RegressionLimits {
 Check row(const std::string& name, int line);
 Check row(const std::string& name, const Limit& limit);
 
-/// Pass if `proved` keeps the row's limit; fail if `attained`, which the quantity reaches or passes for certain, breaks it;
-/// else inconclusive, as for NaN. Quantities that are known pass the same number twice.
+/// Pass if `proved` keeps the row's limit; fail if `attained`, which the quantity reaches or passes for certain, breaks
+/// it; else inconclusive, as for NaN. Quantities that are known pass the same number twice.
 void judge(Check& row, const Limit& limit, double proved, double attained);
 
 /// Nothing is known to be attained.

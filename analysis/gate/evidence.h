@@ -68,8 +68,9 @@ class Evidence {
   const files::Json& certificate();
   const check::CheckResult& certificate_verdict();
 
-  /// What is proved of the flown network: by the certificate, if the checker accepts it for the flown precision. Without a
-  /// certificate, and where the policy judges a rejected one by itself, the bounds are computed and proved here.
+  /// What is proved of the flown network: by the certificate, if the checker accepts it for the flown precision.
+  /// Without a certificate, and where the policy judges a rejected one by itself, the bounds are computed and proved
+  /// here.
   /// @throws Unfounded if the certificate is rejected and nothing else in the policy says so.
   const std::vector<LipschitzBound>& bounds();
   /// Bounds for all inputs and all their coordinates, by function; computed where the certificate lacks one.

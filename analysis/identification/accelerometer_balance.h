@@ -1,7 +1,7 @@
 /// @file The accelerometer against the velocity: a scale error shows without any model of the vehicle.
 ///
-/// Over a second the mean specific force is the change of the velocity plus gravity, whatever pushes the vehicle. Means of
-/// blocks of 1 s are regressed on it: y = s x says a scale, y = x + b an offset. In slow flight both say the same.
+/// Over a second the mean specific force is the change of the velocity plus gravity, whatever pushes the vehicle. Means
+/// of blocks of 1 s are regressed on it: y = s x says a scale, y = x + b an offset. In slow flight both say the same.
 #pragma once
 
 #include <string>
@@ -34,8 +34,8 @@ struct AccelerometerBalance {
 /// What the model's accelerometer_scale effects say of `vehicle`: the product of their scales.
 double modelled_accelerometer_scale(const stability::Model& model, const std::string& vehicle);
 
-/// Every vehicle of `kind` whose logs have an accelerometer and a velocity, over all of its flights; fewer than 10 blocks are
-/// left out. The model's own accelerometer_scale is taken out. Does not depend on `jobs`.
+/// Every vehicle of `kind` whose logs have an accelerometer and a velocity, over all of its flights; fewer than 10
+/// blocks are left out. The model's own accelerometer_scale is taken out. Does not depend on `jobs`.
 std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs& inputs,
                                                          const std::string& kind, int jobs);
 

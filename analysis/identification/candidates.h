@@ -46,9 +46,9 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
                   int jobs);
 
 /// Every effect of the registry that a force can reveal, with its grid fitted to the coverage, and those that the
-/// model file defines by formulas. Of the ceiling only thetas that a flight comes away from. Effects of neighbours are left out where nobody has one, lags and delays where
-/// `model` has them; deep sets always, because a network must be named; those of needs_scan() where `model` has none.
-/// Where several vehicles flew, also a constant force of each.
+/// model file defines by formulas. Of the ceiling only thetas that a flight comes away from. Effects of neighbours are
+/// left out where nobody has one, lags and delays where `model` has them; deep sets always, because a network must be
+/// named; those of needs_scan() where `model` has none. Where several vehicles flew, also a constant force of each.
 std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage);
 
 /// One candidate by name. Of an effect that `model` has already, the candidate is a change of its coefficients; of a
@@ -78,8 +78,8 @@ inline bool is_held_at_zero(const stability::Parameter& coefficient) {
 struct ScaledStage {
   std::size_t stage, scale;
 };
-/// The ratio acts on the thrust behind the lag: (1 + c) L T = T + c T + (1 + c) (L T - T). Where a column of c stands, that
-/// of the lag, over Candidate::scale, goes with it.
+/// The ratio acts on the thrust behind the lag: (1 + c) L T = T + c T + (1 + c) (L T - T). Where a column of c stands,
+/// that of the lag, over Candidate::scale, goes with it.
 std::vector<ScaledStage> scaled_stages(const std::vector<const Candidate*>& effects);
 
 /// A lag or delay whose gain would be further from 1 than this is something else.

@@ -144,8 +144,8 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
 
 /// What of the mean square a scale of the thrust leaves where thrust answers all that is left, against what a constant
 /// force leaves, whichever of the two is true. A disturbance d beside a constant force F makes the thrust
-/// T = m g - F - d; the scale 1 + e that gives F in the mean leaves F + d - e T = (1 + e) d. At least 1: where both leave
-/// the same, the scale stands.
+/// T = m g - F - d; the scale 1 + e that gives F in the mean leaves F + d - e T = (1 + e) d. At least 1: where both
+/// leave the same, the scale stands.
 double feedback_share(const Selected& scale) {
   for (const Refined& effect : scale.refined) {
     if (effect.candidate.name != "thrust_ratio") continue;

@@ -64,8 +64,8 @@ std::set<std::string> with_substitutes(std::set<std::string> names, const std::v
 /// Takes candidates of these names out.
 void erase(std::vector<Candidate>& candidates, const std::set<std::string>& names);
 
-/// Formulas that say what a scale of the thrust beside them says: with an offset, where thrust hardly varies. The number
-/// of the scale would be any that the formula then takes back.
+/// Formulas that say what a scale of the thrust beside them says: with an offset, where thrust hardly varies. The
+/// number of the scale would be any that the formula then takes back.
 std::set<std::string> substitutes_of_scales(const Selected& selected);
 
 }  // namespace swarmcert::identification

@@ -58,7 +58,8 @@ void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
   }
 }
 
-/// Whether a curve of the scan explains as much as a constant share of the thrust, or more: then it is no matter of scale.
+/// Whether a curve of the scan explains as much as a constant share of the thrust, or more: then it is no matter of
+/// scale.
 bool is_explained_by_curve(const Scan& scan, double rmse_N) {
   return std::any_of(scan.entries.begin(), scan.entries.end(), [&](const ScanEntry& entry) {
     return entry.variable != "thrust" && entry.variable != "body_constant" && entry.rmse_after <= rmse_N;

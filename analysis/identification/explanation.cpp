@@ -167,8 +167,8 @@ bool is_only_thrust_ratio(const std::vector<Missing>& ranking) {
   });
 }
 
-/// A scale of the thrust acts wherever thrust does. Over a variable that explains most of what the model leaves, a force
-/// of one sign that vanishes somewhere, such as at rest, is therefore something else.
+/// A scale of the thrust acts wherever thrust does. Over a variable that explains most of what the model leaves, a
+/// force of one sign that vanishes somewhere, such as at rest, is therefore something else.
 bool vanishes_somewhere(const Nominal& nominal) {
   constexpr double kMost = 0.5, kNothing = 0.15;  // of the variance; of the mean
   return std::any_of(nominal.scan.entries.begin(), nominal.scan.entries.end(), [&](const ScanEntry& entry) {

@@ -32,9 +32,9 @@ struct Explained {
 
 /// Selects effects for the residual of the flights of `passes`. A name stands only if it explains about as much as the
 /// best formula would in its place, and is a match for what is left beside it: where the remainder stands out by more
-/// than kLoudRatio, an effect counts only if it takes a tenth of the mean square, and one of the thrust only if set points
-/// confirm its size; where it stands out at all, a force of a place or a share of the thrust below two percent of the
-/// weight only if it takes more than what is left above the noise.
+/// than kLoudRatio, an effect counts only if it takes a tenth of the mean square, and one of the thrust only if set
+/// points confirm its size; where it stands out at all, a force of a place or a share of the thrust below two percent
+/// of the weight only if it takes more than what is left above the noise.
 Explained explain(const Passes& passes, const Coverage& covered);
 
 }  // namespace swarmcert::identification

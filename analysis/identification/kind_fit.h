@@ -1,4 +1,5 @@
-/// @file Effects with shapes fitted jointly to all flights of one kind of vehicle, each vehicle with an offset of its own.
+/// @file Effects with shapes fitted jointly to all flights of one kind of vehicle, each vehicle with an offset of its
+/// own.
 #pragma once
 
 #include <map>

@@ -40,9 +40,9 @@ struct LadderOptions {
   std::optional<Split> split;  ///< split_flights() if not given
 };
 
-/// Fits and accepts effects for inputs' only model, where the flights suffice: an effect is accepted if the RMSE of the select flights falls by
-/// at least half a percent. Coefficients of all effects that were accepted so far are fitted anew with each step. The
-/// test flights are scored once, after the last step: their errors decide nothing.
+/// Fits and accepts effects for inputs' only model, where the flights suffice: an effect is accepted if the RMSE of the
+/// select flights falls by at least half a percent. Coefficients of all effects that were accepted so far are fitted
+/// anew with each step. The test flights are scored once, after the last step: their errors decide nothing.
 Ladder climb(const residuals::Inputs& inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress);
 

@@ -10,8 +10,8 @@ struct MeanFit {
   double value = 0, half = 0;
 };
 
-/// Least squares of y = value x. Scores of neighbouring numbers may be correlated: the variance counts their products as well
-/// (Newey and West 1987, one lag). Precondition: as many x as y, at least two, not all x zero.
+/// Least squares of y = value x. Scores of neighbouring numbers may be correlated: the variance counts their products
+/// as well (Newey and West 1987, one lag). Precondition: as many x as y, at least two, not all x zero.
 MeanFit fit_through_origin(const std::vector<double>& x, const std::vector<double>& y);
 
 /// Mean over its standard error; 0 where the values are equal.

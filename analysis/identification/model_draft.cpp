@@ -103,7 +103,8 @@ double middle(std::vector<double> values) {
   return *at;
 }
 
-/// Bodies of one shape and density: lengths grow with the third root of the mass, inertia with mass times length squared.
+/// Bodies of one shape and density: lengths grow with the third root of the mass, inertia with mass times length
+/// squared.
 void scale_body(const stability::Model& base, ModelDraft& draft) {
   stability::Model& model = draft.model;
   const double mass = model.mass_kg / base.mass_kg, length = std::cbrt(mass);

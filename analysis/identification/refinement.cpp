@@ -242,8 +242,8 @@ class Refinement {
   }
 
   std::vector<Refined> result(const Point& best) const {
-    // A shape that changes the forces by their rounding only, such as how wakes compose where there is one, is not known
-    // at all: its pull alone would make its interval narrow.
+    // A shape that changes the forces by their rounding only, such as how wakes compose where there is one, is not
+    // known at all: its pull alone would make its interval narrow.
     constexpr double kLeastShareOfPull = 1e-6;
     const Eigen::VectorXd pull = ridge(best);
     std::vector<int> free;
@@ -324,8 +324,9 @@ Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
   return sum.noise();
 }
 
-/// The controller knows the velocity, and with it more of a gust than past residuals tell: part of its answer is still in
-/// the whitened thrust. Simulated flights in gusts of 0.01 and 0.02 N kept 0.2 to 0.6 times what whitening had removed.
+/// The controller knows the velocity, and with it more of a gust than past residuals tell: part of its answer is still
+/// in the whitened thrust. Simulated flights in gusts of 0.01 and 0.02 N kept 0.2 to 0.6 times what whitening had
+/// removed.
 void widen_by_answers(const std::vector<Refined>& by_squares, std::vector<Refined>& whitened) {
   constexpr double kKept = 0.5;
   for (std::size_t i = 0; i < whitened.size(); ++i) {

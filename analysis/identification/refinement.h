@@ -30,8 +30,8 @@ struct Passes {
 /// more than 400 000 records get one step.
 std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members);
 
-/// `refined` with the times of lags and delays as the innovations of the residual show them (whitening.h), and everything
-/// else fitted anew beside them; as it is where none is refined, or what is left is white.
+/// `refined` with the times of lags and delays as the innovations of the residual show them (whitening.h), and
+/// everything else fitted anew beside them; as it is where none is refined, or what is left is white.
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined);
 
 }  // namespace swarmcert::identification

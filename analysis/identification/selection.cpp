@@ -26,9 +26,9 @@ bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, 
   return telling_blocks(grams, candidate, theta) >= static_cast<double>(blocks);
 }
 
-/// Where the voltage falls by little, its effect is a change of scale; where speed or thrust vary by little, every drag is
-/// a linear one; and a wake whose neighbours move slowly has no delay. The plain form is what flights show unless they
-/// clearly say more.
+/// Where the voltage falls by little, its effect is a change of scale; where speed or thrust vary by little, every drag
+/// is a linear one; and a wake whose neighbours move slowly has no delay. The plain form is what flights show unless
+/// they clearly say more.
 int Selection::plain_form(int which) const {
   const std::string& name = grams().candidates[static_cast<std::size_t>(which)].name;
   if (name == "battery") return index_of("thrust_ratio");

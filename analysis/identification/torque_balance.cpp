@@ -150,8 +150,7 @@ std::string in_words(const TorqueBalance& balance) {
   }
   return fmt::format(
       "the centre of mass is {:.1f} mm along x and {:.1f} mm along y from the rotors' centre (90 %: +- "
-      "{:.1f} and "
-      "{:.1f} mm){}{}",
+      "{:.1f} and {:.1f} mm){}{}",
       1e3 * balance.offset_m.x(), 1e3 * balance.offset_m.y(), 1e3 * balance.offset_half_m.x(),
       1e3 * balance.offset_half_m.y(),
       balance.is_named() ? ""

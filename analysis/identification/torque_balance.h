@@ -1,12 +1,12 @@
 /// @file What the rotors balance on average: a centre of mass off the centre, or a constant torque.
 ///
-/// Over a second the rotors' torques cancel what else turns the vehicle: tau_a = b, a constant, or tau_a = -c x T e3, which
-/// scales with the thrust T. Means of blocks of 1 s are regressed on both. Where the thrust hardly varies both say the same,
-/// and the answer names both. A rotor k that gives the share rho of its thrust leaves (rho - 1) f_k r_k x e3, which scales with
-/// the thrust as well: that is a rival in any case.
+/// Over a second the rotors' torques cancel what else turns the vehicle: tau_a = b, a constant, or tau_a = -c x T e3,
+/// which scales with the thrust T. Means of blocks of 1 s are regressed on both. Where the thrust hardly varies both
+/// say the same, and the answer names both. A rotor k that gives the share rho of its thrust leaves (rho - 1) f_k r_k x
+/// e3, which scales with the thrust as well: that is a rival in any case.
 ///
-/// A centre of mass counts as off where it is further away than a battery has play (kBatteryPlay_m) and than rotors that
-/// differ by kRotorSpread between the sides feign.
+/// A centre of mass counts as off where it is further away than a battery has play (kBatteryPlay_m) and than rotors
+/// that differ by kRotorSpread between the sides feign.
 #pragma once
 
 #include <string>
@@ -28,7 +28,8 @@ struct TorqueBalance {
   Eigen::Vector2d offset_m = Eigen::Vector2d::Zero(), torque_Nm = Eigen::Vector2d::Zero();
   Eigen::Vector2d offset_half_m = Eigen::Vector2d::Zero(), torque_half_Nm = Eigen::Vector2d::Zero();
   double least_offset_m = 0;  ///< that counts
-  /// Forces by which the rotors are off balance, rms over blocks and rotors: as measured, and with the better explanation.
+  /// Forces by which the rotors are off balance, rms over blocks and rotors: as measured, and with the better
+  /// explanation.
   double rmse_before_N = 0, rmse_after_N = 0;
   double z = 0;                     ///< of the offset over the torque, by the squares of the blocks
   std::string effect;               ///< com_offset, torque_bias, or empty: nothing counts

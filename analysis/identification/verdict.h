@@ -21,8 +21,9 @@ const char* name(Verdict verdict);
 /// Of the mean square of the force's error: what a scan explains beyond this is worth naming.
 inline constexpr double kMuchOfForce = 0.1;
 
-/// Whether something stands out in what is left after the effects that were found: slow disturbances from the spectrum of
-/// the noise, a variable that explains a tenth of the mean square that is left, or half of that of a torque or rotor.
+/// Whether something stands out in what is left after the effects that were found: slow disturbances from the spectrum
+/// of the noise, a variable that explains a tenth of the mean square that is left, or half of that of a torque or
+/// rotor.
 bool leaves_something(const Diagnosis& diagnosis);
 
 /// The first of the enumeration that holds for `diagnoses`.

@@ -1,7 +1,7 @@
 /// @file Noise of a force residual that is correlated in time, and the filter that makes it white.
 ///
-/// A gust that forgets itself, beside white noise: r = g + w with corr(g(t), g(t + d)) = exp(-d / forget_s). One record to
-/// the next this is an ARMA(1, 1) process with the innovations e_t = r_t - phi r_(t-1) + theta e_(t-1).
+/// A gust that forgets itself, beside white noise: r = g + w with corr(g(t), g(t + d)) = exp(-d / forget_s). One record
+/// to the next this is an ARMA(1, 1) process with the innovations e_t = r_t - phi r_(t-1) + theta e_(t-1).
 ///
 /// Where a controller answers gusts, least squares take the answer for a lag of the thrust. Thrust answers what was, so
 /// that it is not correlated with the innovations to come: least squares of filtered residuals on filtered columns are

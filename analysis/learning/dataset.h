@@ -79,10 +79,10 @@ struct LearningFlights {
   const residuals::Inputs* test = nullptr;    ///< decide nothing
 };
 
-/// Loads flights. The target of a sample is what the vehicle's model leaves of the force or torque; inputs are relative positions and velocities of the neighbours in the world frame (paper, section V-B), and own
-/// (-z, -v) for the ground. Among the samples to
-/// fit, every group, which is a scenario and a composition of kinds, gets the same total weight: ten flights of one task
-/// say no more of another than one does. The others have weight 1.
+/// Loads flights. The target of a sample is what the vehicle's model leaves of the force or torque; inputs are relative
+/// positions and velocities of the neighbours in the world frame (paper, section V-B), and own (-z, -v) for the ground.
+/// Among the samples to fit, every group, which is a scenario and a composition of kinds, gets the same total weight:
+/// ten flights of one task say no more of another than one does. The others have weight 1.
 ///
 /// What `select` and `test` do not name is held back from `fit`: of every five flights, in order of names and runs, the
 /// third selects and the fifth tests; of three or four flights the last two do. By blocks: of every five blocks of a

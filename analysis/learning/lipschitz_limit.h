@@ -1,8 +1,8 @@
 /// @file Keeps the joint Lipschitz bounds of a deep set below a limit while it is trained.
 ///
 /// gamma limits the product of the layers' norms, and with it the joint bound, but by an order of magnitude more than
-/// need be: networks with the same gamma differ in their joint bounds by a factor of two. Here the joint bound itself is
-/// what is limited.
+/// need be: networks with the same gamma differ in their joint bounds by a factor of two. Here the joint bound itself
+/// is what is limited.
 #pragma once
 
 #include <string>

@@ -15,8 +15,8 @@ namespace swarmcert::learning {
 /// Holds on the selecting samples; elsewhere it is an estimate.
 std::map<std::string, double> output_scales(const LearningData& data, const training::Vector& theta);
 
-/// Multiplies weights and biases of the last layer of the rho of each kind by its scale. A scale of at most 1 keeps every limit
-/// on norms and Lipschitz constants.
+/// Multiplies weights and biases of the last layer of the rho of each kind by its scale. A scale of at most 1 keeps
+/// every limit on norms and Lipschitz constants.
 void scale_outputs(const training::Layout& layout, const std::map<std::string, double>& scales,
                    training::Vector& theta);
 

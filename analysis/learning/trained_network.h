@@ -10,15 +10,15 @@
 
 namespace swarmcert::learning {
 
-/// Writes `phi_<kind>.safetensors`, `rho_<kind>.safetensors`, network.toml and samples.json, outputs that the trainer's own
-/// arithmetic gives, into `folder`, which exists; files of these names are replaced.
+/// Writes `phi_<kind>.safetensors`, `rho_<kind>.safetensors`, network.toml and samples.json, outputs that the trainer's
+/// own arithmetic gives, into `folder`, which exists; files of these names are replaced.
 /// @returns the network as read back.
 files::Network write_network(const LearningData& data, const training::Vector& theta,
                              const files::GammaStatement& gamma, const std::string& folder);
 
 /// Writes `model-<kind>.toml` for every kind with a rho: the model of `inputs` with the network in `folder` as one more
-/// effect. With labels from published signals it has their lag (published_lag.h), so that `compare` finds the error that
-/// training found. Where vehicles have models of their own, `model-<vehicle>.toml` for each of them as well, and
+/// effect. With labels from published signals it has their lag (published_lag.h), so that `compare` finds the error
+/// that training found. Where vehicles have models of their own, `model-<vehicle>.toml` for each of them as well, and
 /// flights.toml, which names the model of every vehicle.
 /// @param with_network false: the same models without the network.
 void write_models(const residuals::Inputs& inputs, const training::Layout& layout, const std::string& folder,

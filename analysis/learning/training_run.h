@@ -64,13 +64,13 @@ std::string checkpoint_of(const RunOptions& options, std::uint64_t seed);
 /// Trains `teachers` networks, with the seeds after options.trainer.seed, and then one that is fitted to the mean of
 /// what they say of the samples to fit, in place of the recorded targets (distillation: Hinton et al. 2015). Recorded
 /// flights leave networks of several seeds with errors that differ by several percent; those average out, and the one
-/// network that is taught keeps gamma and max_lipschitz like any other. Of all of them the one is kept that the selecting
-/// flights, as recorded, prefer; where no flights select, the one that was taught. Without teachers it is run_training().
-/// A run that is cancelled is returned at once, as it is.
+/// network that is taught keeps gamma and max_lipschitz like any other. Of all of them the one is kept that the
+/// selecting flights, as recorded, prefer; where no flights select, the one that was taught. Without teachers it is
+/// run_training(). A run that is cancelled is returned at once, as it is.
 TaughtRun run_with_teachers(const LearningData& data, const RunOptions& options, int teachers);
 
-/// RMSE, in the unit of the targets, of theta on the samples of `use`, of kFit weighted by scenario; NaN where there are
-/// none.
+/// RMSE, in the unit of the targets, of theta on the samples of `use`, of kFit weighted by scenario; NaN where there
+/// are none.
 double rmse(const LearningData& data, const training::Vector& theta, Use use, int jobs);
 /// The same of predicting nothing: the root mean square of the targets.
 double rmse_of_nothing(const LearningData& data, Use use);

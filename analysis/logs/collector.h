@@ -9,8 +9,8 @@ namespace swarmcert::logs {
 /// The column that is a clock by its name; -1 if none is.
 int clock_by_name(const RawTopic& topic);
 
-/// Seconds per unit of a clock, from its median step: the largest of the usual units that gives a rate which flight logs
-/// have.
+/// Seconds per unit of a clock, from its median step: the largest of the usual units that gives a rate which flight
+/// logs have.
 double seconds_per_unit(const std::vector<double>& clock);
 
 /// Collects records; the unit of the time column is decided at the end, from its steps.

@@ -139,7 +139,8 @@ class Guesser {
     }
   }
 
-  /// Slope of the lateral acceleration over what a thrust axis with quaternion_ would give, times the unit; 0 without one.
+  /// Slope of the lateral acceleration over what a thrust axis with quaternion_ would give, times the unit; 0 without
+  /// one.
   double tilt_correlation(std::size_t velocity) const {
     if (!has_quaternion_) return 0;
     const Numbers acceleration = slope_of(topic_.time_s, values(velocity), 0.1);

@@ -17,14 +17,14 @@ struct ColumnGuess {
   std::string evidence;
 };
 
-/// The column that is a clock: one that rises with nearly every record, by nearly the same step, preferably not by one per
-/// record. -1 if none does.
+/// The column that is a clock: one that rises with nearly every record, by nearly the same step, preferably not by one
+/// per record. -1 if none does.
 int guess_clock(const RawTopic& topic);
 
-/// Quaternions by their norm, positions by velocities that are their derivative, angles by the lateral acceleration, rates by
-/// the quaternion, specific force by its size, motors as four numbers of one range, a battery by its range and its fall.
-/// Groups stand in neighbouring columns. Only signals that are not in `known` are guessed, of columns that are not `taken`.
-/// Precondition: topic.time_s is set.
+/// Quaternions by their norm, positions by velocities that are their derivative, angles by the lateral acceleration,
+/// rates by the quaternion, specific force by its size, motors as four numbers of one range, a battery by its range and
+/// its fall. Groups stand in neighbouring columns. Only signals that are not in `known` are guessed, of columns that
+/// are not `taken`. Precondition: topic.time_s is set.
 std::vector<ColumnGuess> guess_columns(const RawTopic& topic, std::vector<char> taken,
                                        const std::vector<std::string>& known);
 

@@ -41,8 +41,8 @@ const std::vector<NamedColumns>& column_names();
 /// Lower case, one dot for every run of other characters than letters and digits, without a unit in brackets.
 std::string plain_name(const std::string& column);
 
-/// The names under which a column of plain name `column` is found: itself and, behind one further word that does not turn
-/// it into a set point, the rest: "att.stateestimate.qx" is also called "stateestimate.qx".
+/// The names under which a column of plain name `column` is found: itself and, behind one further word that does not
+/// turn it into a set point, the rest: "att.stateestimate.qx" is also called "stateestimate.qx".
 std::vector<std::string> called_names(const std::string& column);
 
 }  // namespace swarmcert::logs

@@ -1,5 +1,5 @@
-/// @file From columns to signals: units, frames and signs that names do not settle are decided from the data, and signals
-/// that nobody logged are derived from others.
+/// @file From columns to signals: units, frames and signs that names do not settle are decided from the data, and
+/// signals that nobody logged are derived from others.
 #pragma once
 
 #include <string>

@@ -15,8 +15,8 @@ using Vector = std::array<double, 3>;
 /// Standard gravity as the authors' code rounds it, m/s^2; also what turns newton into gram-force here.
 inline constexpr double kGravity_m_s2 = 9.81;
 
-/// Two records further apart than this are not neighbours in time: filters restart, nothing is interpolated between. In logs
-/// slower than 50 Hz it is two and a half steps instead.
+/// Two records further apart than this are not neighbours in time: filters restart, nothing is interpolated between. In
+/// logs slower than 50 Hz it is two and a half steps instead.
 inline constexpr double kLongestGap_s = 0.030;
 
 /// One record. Frames: W world, z up; B body, x forward, y left, z up.

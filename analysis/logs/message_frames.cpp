@@ -72,8 +72,8 @@ void add_quaternion(RawTopic& topic) {
   renamer.add("q[0]", "attitude_w", 1);
 }
 
-/// Motor commands from columns of servo signals in microseconds: those that are driven, from the first on. A value below
-/// 900 or so means that the output is off.
+/// Motor commands from columns of servo signals in microseconds: those that are driven, from the first on. A value
+/// below 900 or so means that the output is off.
 void add_servo_outputs(RawTopic& topic, const std::string& pattern, int first) {
   int motor = 0;
   for (int k = first; k < first + 8; ++k) {
@@ -87,7 +87,8 @@ void add_servo_outputs(RawTopic& topic, const std::string& pattern, int first) {
   }
 }
 
-/// ArduPilot's outputs by motor: SERVOn_FUNCTION 33 to 40 is motor 1 to 8; empty where the parameters name no three motors.
+/// ArduPilot's outputs by motor: SERVOn_FUNCTION 33 to 40 is motor 1 to 8; empty where the parameters name no three
+/// motors.
 std::vector<int> outputs_of_motors(const std::map<std::string, double>& parameters) {
   constexpr int kFirstMotor = 33, kMost = 8, kOutputs = 16;
   std::vector<int> outputs(kMost, 0);
@@ -217,8 +218,8 @@ Armed any_record(const RawLog& log, const std::string& message, const std::strin
 }  // namespace
 
 void add_own_names(RawLog& log) {
-  // The first instance of a message is the one in use; others would be taken where the first lacks a column. One that says
-  // the same from end to end is none: a battery that is not there, outputs without motors.
+  // The first instance of a message is the one in use; others would be taken where the first lacks a column. One that
+  // says the same from end to end is none: a battery that is not there, outputs without motors.
   std::map<std::string, std::pair<bool, int>> first;  // whether it is constant, and its number
   for (const RawTopic& topic : log.topics) {
     const std::pair<bool, int> instance = {is_constant(topic), topic.instance};

@@ -11,8 +11,8 @@ namespace {
 
 using Source = SignalInfo::Source;
 
-/// Standard deviation of the noise of a derived acceleration: what the smoother leaves of a column is held to be its noise,
-/// and goes through the smoother's weights. Correlated noise of an estimator counts as its runs last.
+/// Standard deviation of the noise of a derived acceleration: what the smoother leaves of a column is held to be its
+/// noise, and goes through the smoother's weights. Correlated noise of an estimator counts as its runs last.
 double noise_of_slope(const SignalTable& t, const std::vector<double>& column, double window_s, int degree,
                       int derivative) {
   const std::vector<double> smooth = local_derivative(t, column, window_s, degree, 0);
@@ -150,8 +150,8 @@ void settle_accelerometer(Draft& draft) {
   for (int k = 0; k < 3; ++k) t[kForceWorld + k] = world[static_cast<std::size_t>(k)];
 }
 
-/// The derivative of the position against the velocity says where one of them is in millimetres or centimetres, unless their
-/// names state a unit.
+/// The derivative of the position against the velocity says where one of them is in millimetres or centimetres, unless
+/// their names state a unit.
 void settle_lengths(Draft& draft) {
   SignalTable& t = draft.table;
   const Carried *const position = draft.recognition.find(kPosition), *const velocity =
@@ -204,8 +204,8 @@ void settle_north_east_down(Draft& draft) {
   draft.note(names + ": north, east, down; the body's axes are taken as forward, right, down");
 }
 
-/// nav_msgs/Odometry states velocities along the axes of the body, but Crazyswarm2 and motion capture write those of the
-/// world into it, and into TwistStamped. The derivative of the position says which.
+/// nav_msgs/Odometry states velocities along the axes of the body, but Crazyswarm2 and motion capture write those of
+/// the world into it, and into TwistStamped. The derivative of the position says which.
 void settle_velocity_frame(Draft& draft) {
   const Carried* const carried = draft.recognition.find(kVelocity);
   if (carried == nullptr || carried->ask != Ask::kVelocityFrame || !draft.asks_physics) return;

@@ -1,5 +1,5 @@
-/// @file A log file as its format stores it: topics with clocks of their own, and parameters. Readers of formats with several
-/// topics fill this; what the columns mean is decided afterwards, in one place for all formats.
+/// @file A log file as its format stores it: topics with clocks of their own, and parameters. Readers of formats with
+/// several topics fill this; what the columns mean is decided afterwards, in one place for all formats.
 #pragma once
 
 #include <map>

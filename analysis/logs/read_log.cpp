@@ -77,7 +77,8 @@ RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
   head.resize(static_cast<std::size_t>(in.gcount()));
   in.clear();
   in.seekg(0);
-  // The header of an old micro-SD log names variables as a CSV does. What a columns.toml says counts, whoever wrote the CSV.
+  // The header of an old micro-SD log names variables as a CSV does. What a columns.toml says counts, whoever wrote the
+  // CSV.
   const Format kind = kind_of(in);
   const bool is_usd = kind == Format::kUsd || kind == Format::kUsdEvents;
   if (!is_usd && format_of(head) != nullptr && (map.empty() || kind != Format::kCsv))
@@ -214,10 +215,10 @@ bool is_log_name(const std::string& name) {
 }
 
 void write_csv(const Log& log, double t0_s, double t1_s, std::ostream& out) {
-  out << "# time[ms],x[m],y[m],z[m],vx[m/s],vy[m/s],vz[m/s],ax[m/s^2],ay[m/s^2],az[m/s^2],qx,qy,qz,qw,"
-         "u1[N],u2[N],u3[N],u4[N],u1[PWM],u2[PWM],u3[PWM],u4[PWM],Vbat[V],thrust_des[g],torquex[Nm],torquey["
-         "Nm],"
-         "torquez[Nm],wx[rad/s],wy[rad/s],wz[rad/s]\n";
+  out << "# "
+         "time[ms],x[m],y[m],z[m],vx[m/s],vy[m/s],vz[m/s],ax[m/s^2],ay[m/s^2],az[m/"
+         "s^2],qx,qy,qz,qw,u1[N],u2[N],u3[N],u4[N],u1[PWM],u2[PWM],u3[PWM],u4[PWM],Vbat[V],thrust_des[g],"
+         "torquex[Nm],torquey[Nm],torquez[Nm],wx[rad/s],wy[rad/s],wz[rad/s]\n";
   std::string line;
   const auto add = [&line](const auto& values) {
     for (const double value : values) line += fmt::format(",{:.18e}", value);

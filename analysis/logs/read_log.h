@@ -26,7 +26,8 @@ bool looks_like_log(const std::string& path);
 /// True if the header of a CSV names a time and a position, velocity or acceleration. False where it cannot be read.
 bool is_flight_table(const std::string& path);
 
-/// First and last time of a CSV on its own clock, in seconds, from its first lines and its end; {0, 0} where it has none.
+/// First and last time of a CSV on its own clock, in seconds, from its first lines and its end; {0, 0} where it has
+/// none.
 std::pair<double, double> time_span_s(const std::string& path);
 
 /// True for `[<prefix>_]cf<id>_<run>`, with or without ".csv".

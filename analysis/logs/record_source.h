@@ -39,9 +39,9 @@ void read_usd(std::istream& in, const std::string& path, RecordSink& sink, LogHe
 int read_usd_events(std::istream& in, const std::string& path, RawLog& log);
 
 /// Text: a header line, which may start with "#" and follow lines that do, and lines of as many cells, separated by the
-/// first of comma, semicolon and tab that the header has. Cells are numbers, or empty; in columns that the sink does not
-/// need, anything. Where no comma separates, commas are decimal points. Dates become seconds since 1970, times of the
-/// day seconds since midnight.
+/// first of comma, semicolon and tab that the header has. Cells are numbers, or empty; in columns that the sink does
+/// not need, anything. Where no comma separates, commas are decimal points. Dates become seconds since 1970, times of
+/// the day seconds since midnight.
 /// @return what is wrong with the first damaged line
 /// @throws files::InputError if the header is empty or has a name twice.
 std::optional<files::InputFault> read_csv(std::istream& in, const std::string& path, RecordSink& sink,

@@ -33,16 +33,17 @@ struct SignalTable {
   double step_s() const;
 };
 
-/// Brings the recognised columns onto the clock of `recognition.clock`: units as the names say, wraps of 16-bit integers
-/// undone, other topics averaged where they are faster and interpolated where they are not. Records whose signals are
-/// not finite or whose time does not follow are dropped and counted in `health`: a time must be later than the last
-/// one; one that is over ten seconds later counts only if the next record follows it. The 32-bit tick may wrap.
+/// Brings the recognised columns onto the clock of `recognition.clock`: units as the names say, wraps of 16-bit
+/// integers undone, other topics averaged where they are faster and interpolated where they are not. Records whose
+/// signals are not finite or whose time does not follow are dropped and counted in `health`: a time must be later than
+/// the last one; one that is over ten seconds later counts only if the next record follows it. The 32-bit tick may
+/// wrap.
 /// @param events  gets the wraps and the saturation of 16-bit integers.
 SignalTable signal_table(const RawLog& log, const Recognition& recognition, const SignalMap& map,
                          LogHealth& health, std::vector<LogEvent>& events);
 
-/// Records further apart are not neighbours in time, in a log of that median step: kLongestGap_s, and two and a half steps
-/// of slow logs.
+/// Records further apart are not neighbours in time, in a log of that median step: kLongestGap_s, and two and a half
+/// steps of slow logs.
 double longest_gap_s(double step_s);
 
 /// The values of `series` at `times_s`: means over a step of the target where the series is faster than it, linear

@@ -144,8 +144,8 @@ void settle_battery(Draft& draft) {
   draft.add("battery", Source::kMissing, "", "V");
 }
 
-/// "motor.m1" is the requested thrust in some firmware and the applied duty in other: the one that follows the load while
-/// the battery sags is what it is.
+/// "motor.m1" is the requested thrust in some firmware and the applied duty in other: the one that follows the load
+/// while the battery sags is what it is.
 bool is_requested(Draft& draft) {
   const Carried& carried = *draft.recognition.find(kRequested);
   SignalTable& t = draft.table;

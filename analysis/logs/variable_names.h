@@ -18,17 +18,18 @@ struct CustomTopics {
   std::map<std::string, std::string> type_of_robot;
   Variables of_all;
 
-  /// The variables of "/<robot>/<topic>": as the robot, else its type, else the section of all robots states them. Empty
-  /// where none does.
+  /// The variables of "/<robot>/<topic>": as the robot, else its type, else the section of all robots states them.
+  /// Empty where none does.
   std::vector<std::string> variables(const std::string& topic) const;
 };
 
-/// Reads `robots`, `robot_types` and `all` of a crazyflies.yaml, at any depth. Lines that do not fit are passed over: the
-/// file belongs to another program.
+/// Reads `robots`, `robot_types` and `all` of a crazyflies.yaml, at any depth. Lines that do not fit are passed over:
+/// the file belongs to another program.
 CustomTopics parse_custom_topics(std::string_view yaml);
 
-/// Renames the columns `values[i]` of LogDataGeneric topics where a crazyflies.yaml beside the log names as many variables as
-/// the topic has values. The file is sought in the folder of the log, the one above, and in `config` below both.
+/// Renames the columns `values[i]` of LogDataGeneric topics where a crazyflies.yaml beside the log names as many
+/// variables as the topic has values. The file is sought in the folder of the log, the one above, and in `config` below
+/// both.
 /// @return for people: which topics were named, and why others were not. Empty where the log has none of that type.
 std::vector<std::string> name_variables(RawLog& log);
 

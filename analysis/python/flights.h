@@ -9,13 +9,14 @@
 
 namespace swarmcert::python {
 
-/// A log in SI units: {"path", "format", "signals": {name: array [n] or [n, k]}, "sources": [{...}], "findings": [text],
-/// "interpretation": [text], "judged_force": [axis]}. Every array owns its memory.
+/// A log in SI units: {"path", "format", "signals": {name: array [n] or [n, k]}, "sources": [{...}], "findings":
+/// [text], "interpretation": [text], "judged_force": [axis]}. Every array owns its memory.
 /// @param columns columns.toml of a CSV; "": columns are recognised.
 /// @throws files::InputError as logs::read_log().
 pybind11::dict read_log(const std::string& path, const std::string& columns);
 
-/// The residuals behind compare: one dict per vehicle and flight that lets a force be judged, with arrays over its records.
+/// The residuals behind compare: one dict per vehicle and flight that lets a force be judged, with arrays over its
+/// records.
 /// @param words models, then flights; fleet, columns, network as --flights, --columns, --network; "" where not given.
 /// @throws files::InputError as residuals::read_inputs().
 pybind11::list residuals(const std::vector<std::string>& words, const std::string& fleet,

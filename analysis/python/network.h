@@ -11,10 +11,12 @@ namespace swarmcert::python {
 
 /// A network from a dict with
 ///   "parts":       {name: {"tensors": [(name, array), ...], "order": [layer, ...], "is_chain": bool}},
-///   "description": text of a network.toml whose `weights` are the names of parts; "" for one plain network under the name
+///   "description": text of a network.toml whose `weights` are the names of parts; "" for one plain network under the
+///   name
 ///                  "network", or a pair under "phi" and "rho".
-/// Arrays are float16 (a float32 network then), float32 or float64 of one or two dimensions, C-contiguous. `is_chain` states
-/// that they are listed in the order of evaluation with ReLU between the layers. Hashes are those of the safetensors files that save_network() writes.
+/// Arrays are float16 (a float32 network then), float32 or float64 of one or two dimensions, C-contiguous. `is_chain`
+/// states that they are listed in the order of evaluation with ReLU between the layers. Hashes are those of the
+/// safetensors files that save_network() writes.
 /// @throws files::InputError as the readers of weight files do.
 files::Network network_of(const pybind11::dict& source);
 

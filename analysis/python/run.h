@@ -10,8 +10,8 @@
 
 namespace swarmcert::python {
 
-/// Runs a command as the tool does, but prints nothing, on a thread of its own while the interpreter's lock is released; the
-/// calling thread delivers progress and asks for Ctrl-C every 20 ms, which ends the command.
+/// Runs a command as the tool does, but prints nothing, on a thread of its own while the interpreter's lock is
+/// released; the calling thread delivers progress and asks for Ctrl-C every 20 ms, which ends the command.
 /// @param words command and arguments.
 /// @param network dict for network_of() in place of NET, or None.
 /// @param certificate text, in place of the file that `check` takes.

@@ -167,8 +167,7 @@ std::string Report::write(const std::string& folder, bool overwrite, const std::
   std::string html =
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
-      "form-action "
-      "'none'; img-src data:; style-src " +
+      "form-action 'none'; img-src data:; style-src " +
       policy_source(style) + "; script-src " + policy_source(script) +
       "\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
       html_text(title_) + "</title>\n<style>" + style + "</style></head><body><main>\n<h1>" +

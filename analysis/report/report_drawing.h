@@ -12,8 +12,8 @@ std::string plot_script(const std::string& commands, int height);
 /// A step of 1, 2 or 5 times a power of ten that gives an axis of that length three to seven ticks; 1 for none.
 double tick_step(double length);
 
-/// What gnuplot draws of FOLDER/`script`, as SVG; "" where there is no gnuplot or it fails. It runs in the folder, whose
-/// name never reaches it (its strings can run commands), without the user's start-up files.
+/// What gnuplot draws of FOLDER/`script`, as SVG; "" where there is no gnuplot or it fails. It runs in the folder,
+/// whose name never reaches it (its strings can run commands), without the user's start-up files.
 std::string draw(const std::string& folder, const std::string& script, bool is_narrow);
 
 }  // namespace swarmcert::analysis

@@ -137,12 +137,11 @@ Finding curriculum(const Setting& setting) {
   }
   finding.tables.push_back(std::move(table));
   finding.json["least_distance_falls"] = falls;
-  finding.notes.push_back(fmt::format(
-      "The least distance flown, the mean of {} random walks, {} from stage to stage. Set points are drawn "
-      "in "
-      "where a network flies, by factors of our choice: left as they are, the task's repulsion keeps four "
-      "vehicles as far apart as two.",
-      scale_of(setting).walks, falls ? "falls" : "does not fall every time"));
+  finding.notes.push_back(
+      fmt::format("The least distance flown, the mean of {} random walks, {} from stage to stage. Set points "
+                  "are drawn in where a network flies, by factors of our choice: left as they are, the "
+                  "task's repulsion keeps four vehicles as far apart as two.",
+                  scale_of(setting).walks, falls ? "falls" : "does not fall every time"));
   add_label_agreement(setting, stages, finding);
   return finding;
 }

@@ -66,8 +66,7 @@ Finding figure_intro(const Setting& setting) {
     finding.figures.push_back(
         {name, paths(flown),
          "set grid\nset xlabel 'along the own path [m]'\nset ylabel 'z [m]'\nset yrange [0.4:1]\nset key "
-         "outside\nplot for "
-         "[i=0:1] '" +
+         "outside\nplot for [i=0:1] '" +
              name +
              ".dat' index i using 2:3 with lines lw 2 title sprintf('vehicle %d', i + 1), for [i=0:1] '" +
              name + ".dat' index i using 2:4 with lines dt 2 lc 'gray' notitle\n",
@@ -108,8 +107,7 @@ Finding figure_swaps(const Setting& setting) {
                   return fmt::format("{:.3f} {:.5f}\n", now.time_s, height_error_m(now));
                 }),
          "set grid\nset xlabel 'time [s]'\nset ylabel 'z - z_d [m]'\nset yrange [-0.2:0.2]\nset key "
-         "outside\nplot for "
-         "[i=0:2] '" +
+         "outside\nplot for [i=0:2] '" +
              name + ".dat' index i with lines lw 2 title sprintf('vehicle %d', i + 1)\n",
          fmt::format("Height errors of three vehicles, {}; aligned at 3.0 s and 7.5 s.",
                      curve_name(trained_with))});
@@ -191,10 +189,8 @@ Finding figure_heatmap(const Setting& setting) {
     finding.figures.push_back(
         {name, data,
          "set multiplot layout 1,2\nset xrange [-0.5:0.5]\nset yrange [-0.8:0.4]\nset xlabel 'y [m]'\nset "
-         "ylabel 'z "
-         "[m]'\nset cblabel 'f_{a,z} [gf]'\nset palette defined (0 '#2166ac', 0.7 '#f7f7f7', 1 "
-         "'#b2182b')\nset cbrange "
-         "[-14:6]\nset title 'network'\nplot '" +
+         "ylabel 'z [m]'\nset cblabel 'f_{a,z} [gf]'\nset palette defined (0 '#2166ac', 0.7 '#f7f7f7', 1 "
+         "'#b2182b')\nset cbrange [-14:6]\nset title 'network'\nplot '" +
              name + ".dat' index 0 using 1:2:3 with image notitle, '" + name +
              ".dat' index 1 with points pt 3 lc 'blue' ps 2 notitle\nset title 'truth'\nplot '" + name +
              ".dat' index 0 using 1:2:4 with image notitle, '" + name +
@@ -270,10 +266,8 @@ Finding figure_validation(const Setting& setting) {
        "set multiplot layout 2,2\nset grid\nset yrange [-20:5]\nset ytics 5\nset ylabel 'f_{a,z} [gf]'\nset "
        "key inside bottom right\ndo for [i=0:3] { if (i == 1) { unset key }; if (i == 2) { set xlabel 'time "
        "[s]' }; set title sprintf('vehicle %d', i + 1); plot 'validation.dat' index i using 1:2 with lines "
-       "lw "
-       "2 lc 'black' title 'truth', '' index i using 1:3 with lines lw 2 lc 'red' title 'prediction' "
-       "}\nunset "
-       "multiplot\n",
+       "lw 2 lc 'black' title 'truth', '' index i using 1:3 with lines lw 2 lc 'red' title 'prediction' "
+       "}\nunset multiplot\n",
        "Force and prediction as flown in a swap of four; the network saw three at most."});
   return finding;
 }

@@ -17,7 +17,8 @@ Track track_of(const GainFlight& flight, std::size_t axis);
 
 /// The gains that act on an axis, as text: equal for equal gains.
 std::string gain_set(const GainFlight& flight, std::size_t axis);
-/// Vehicle and set point without the gains, as text: the motors, and range and speed of the set point to 0.1 m, 0.1 m/s.
+/// Vehicle and set point without the gains, as text: the motors, and range and speed of the set point to 0.1 m, 0.1
+/// m/s.
 std::string set_point_class(const GainFlight& flight, std::size_t axis);
 
 /// What is known of the vehicle beside the gains.
@@ -52,8 +53,8 @@ class FlightParts {
   std::map<std::string, std::vector<double>> norms_, parts_;
 };
 
-/// The height at which a vehicle without an integrator hovers off its set point: |g - thrust per mass|/Kp; zero with one,
-/// and along horizontal axes.
+/// The height at which a vehicle without an integrator hovers off its set point: |g - thrust per mass|/Kp; zero with
+/// one, and along horizontal axes.
 double steady_error_m(const GainFlight& flight, std::size_t axis, double ratio);
 
 }  // namespace swarmcert::reproduction

@@ -18,7 +18,8 @@ struct FlownGains {
   std::string motors;                      ///< empty where the file does not say
 };
 
-/// @throws files::InputError naming the line, key, value and a hint, if a key is missing or its value is no number in range.
+/// @throws files::InputError naming the line, key, value and a hint, if a key is missing or its value is no number in
+/// range.
 FlownGains read_flown_gains(const std::string& path);
 
 /// Interval between the moments of FlownAxis::set_point_m_s.

@@ -264,12 +264,12 @@ void add_axis(Track track, const std::vector<Judged>& judged, Calibrations& cali
     row["set_points"].back().update(summary_json(of_class));
     finding.tables[1].rows.push_back(summary_row(std::string(track_name(track)) + ", " + name, of_class));
   }
-  finding.notes.push_back(fmt::format(
-      "{}: calibrated on {} flights with {} gain sets. A flight of a further gain set, drawn like these, "
-      "stays below "
-      "its bound with probability {:g}; for the calibration at hand between {:.3f} and {:.3f} (90 %).",
-      track_name(track), model.promise.flights, model.promise.groups, level, model.promise.coverage_90[0],
-      model.promise.coverage_90[1]));
+  finding.notes.push_back(
+      fmt::format("{}: calibrated on {} flights with {} gain sets. A flight of a further gain set, drawn "
+                  "like these, stays below its bound with probability {:g}; for the calibration at hand "
+                  "between {:.3f} and {:.3f} (90 %).",
+                  track_name(track), model.promise.flights, model.promise.groups, level,
+                  model.promise.coverage_90[0], model.promise.coverage_90[1]));
   finding.json["axes"].push_back(std::move(row));
 }
 
@@ -325,15 +325,12 @@ void add_figure(const std::map<Track, std::vector<Judged>>& judged, Finding& fin
   }
   finding.figures.push_back(
       {"gains_in_flight", data,
-       fmt::format(
-           "set logscale xy\nset grid\nset key top left\nset xlabel 'flown peak error [mm]'\nset ylabel "
-           "'predicted bound [mm]'\nset xrange [{:.4g}:{:.4g}]\nset yrange [{:.4g}:{:.4g}]\nplot x with "
-           "lines "
-           "linecolor rgb '#888888' title 'bound = peak'{}\n",
-           0.8 * least_mm, 1.25 * largest_mm, 0.8 * least_mm, 1.25 * largest_mm, plots),
+       fmt::format("set logscale xy\nset grid\nset key top left\nset xlabel 'flown peak error [mm]'\nset "
+                   "ylabel 'predicted bound [mm]'\nset xrange [{:.4g}:{:.4g}]\nset yrange "
+                   "[{:.4g}:{:.4g}]\nplot x with lines linecolor rgb '#888888' title 'bound = peak'{}\n",
+                   0.8 * least_mm, 1.25 * largest_mm, 0.8 * least_mm, 1.25 * largest_mm, plots),
        "Predicted bound over flown peak error, one point per flight and axis. Below the line the bound did "
-       "not "
-       "hold."});
+       "not hold."});
 }
 
 void refuse_too_few(const GainFolder& folder, Track track, int groups, bool leaves_out, double level) {
@@ -419,19 +416,16 @@ Finding gains_in_flight(const Setting& setting) {
   if (leaves_out) {
     finding.notes.push_back(
         "Flights that are also among the calibrating ones were judged without their gain set: fit, thrust "
-        "ratio and "
-        "multiplier come from the others.");
+        "ratio and multiplier come from the others.");
   }
   if (extrapolates) {
     finding.notes.push_back(
         "Flights marked 'extrapolates' have motors, or a part of the bound, beyond all calibrating flights: "
-        "they are "
-        "not like them, and the promise does not cover them.");
+        "they are not like them, and the promise does not cover them.");
   }
   finding.notes.push_back(
       "The set of parts was chosen on the flights of the collection that are numbered 8 to 148 and not "
-      "divisible by "
-      "five; sizes and multiplier are fitted to the calibrating flights alone.");
+      "divisible by five; sizes and multiplier are fitted to the calibrating flights alone.");
   for (const auto& row : finding.json["left_out"])
     finding.notes.push_back(
         fmt::format("Left out: {}, {}.", row["log"].get<std::string>(), row["why"].get<std::string>()));

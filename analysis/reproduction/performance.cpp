@@ -195,9 +195,9 @@ void add_sideways(const Truth& truth, const files::Json& flights, files::Json& c
   finding.tables.push_back(std::move(sideways));
 }
 
-/// By how much networks divide the worst error, for each training seed: the least over the swarms of networks trained with
-/// three or four vehicles. A seed's networks stand beside the same baseline: the least over all seeds is a worst of more
-/// flights than the baseline's.
+/// By how much networks divide the worst error, for each training seed: the least over the swarms of networks trained
+/// with three or four vehicles. A seed's networks stand beside the same baseline: the least over all seeds is a worst
+/// of more flights than the baseline's.
 std::map<int, double> improvement_by_seed(const files::Json& flights, const Spreads& spreads) {
   std::map<int, double> factor_of_seed;
   for (const files::Json& flight : flights) {
@@ -235,12 +235,9 @@ void add_improvement(const Truth& truth, const files::Json& flights, const Sprea
   column["improvement_trained_with_2_at_4"] = number(two_at_four);
   column["improvement_trained_with_3_at_5"] = number(three_at_five);
   finding.notes.push_back(fmt::format(
-      "Truth \"{}\": baseline within {:.0f} % of the paper; networks trained with three or four "
-      "divide the worst error by "
-      "at least {:.2f} (training seeds: {}; paper: 1.5 to 3.9); trained with two, at four vehicles: by "
-      "{:.2f} "
-      "(paper: 0.71); trained with "
-      "three, at five: by {:.2f} (paper: 1.97).",
+      "Truth \"{}\": baseline within {:.0f} % of the paper; networks trained with three or four divide the "
+      "worst error by at least {:.2f} (training seeds: {}; paper: 1.5 to 3.9); trained with two, at four "
+      "vehicles: by {:.2f} (paper: 0.71); trained with three, at five: by {:.2f} (paper: 1.97).",
       truth.name, 100 * farthest, least_factor, fmt::join(factors, ", "), two_at_four, three_at_five));
 }
 
@@ -260,8 +257,7 @@ Finding performance(const Setting& setting) {
   Finding finding;
   finding.notes.push_back(
       fmt::format("Flown {:.1f} m higher than the published scripts do: the lowest of five flies at 0.3 m "
-                  "there, and the floor would end "
-                  "an error of the paper's size. The height is ours.",
+                  "there, and the floor would end an error of the paper's size. The height is ours.",
                   kHigher_m));
   finding.json["columns"] = files::Json::array();
   finding.json["swaps_per_flight"] = 6;

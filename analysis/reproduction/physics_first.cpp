@@ -73,9 +73,8 @@ void physics_first(const Setting& setting, Finding& finding) {
   finding.json["remainder_bound"] = learned.bound;
   finding.notes.push_back(
       fmt::format("Physics first is judged with its own labels (accelerometer filter in the model), the deep "
-                  "set alone with the "
-                  "authors': compare rows within a table. Largest joint bound of the deep set on the "
-                  "remainder: {:.1f} gf per unit.",
+                  "set alone with the authors': compare rows within a table. Largest joint bound of the deep "
+                  "set on the remainder: {:.1f} gf per unit.",
                   learned.bound));
 }
 

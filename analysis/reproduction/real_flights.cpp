@@ -100,10 +100,8 @@ void add_flights(const learning::LearningData& data, const std::vector<TrackErro
   finding.tables.push_back(std::move(table));
   finding.notes.push_back(
       "Nearest records: mean of this flight's labels less those that the flights to fit and to select have "
-      "at "
-      "the nearest relative states, for vehicles alone or with one neighbour. What is found there no "
-      "function "
-      "of relative states can learn from them.");
+      "at the nearest relative states, for vehicles alone or with one neighbour. What is found there no "
+      "function of relative states can learn from them.");
 }
 
 void add_bounds(const Learned& ours, const learning::Certified& theirs, Finding& finding) {
@@ -167,8 +165,7 @@ void add_candidates(const Learned& learned, Finding& finding) {
   if (learned.scores.size() > 1) {
     finding.notes.push_back(
         fmt::format("Errors on the selecting flights, in gf, of {} networks and of one fitted to what they "
-                    "say: {}. The least "
-                    "decided: seed {}.",
+                    "say: {}. The least decided: seed {}.",
                     learned.scores.size() - 1, select_gf, learned.kept_seed));
   }
 }
@@ -217,8 +214,7 @@ void deep_set_alone(const Setting& setting, Finding& finding) {
       "The published networks had seen these test flights when they were trained; ours had not.");
   finding.notes.push_back(fmt::format(
       "Mean over compositions: ours {:.3f} gf, published {:.3f} gf; over scenarios {:.3f} and {:.3f} gf. "
-      "Largest "
-      "ratio {:.3f} ({}); by scenario {:.3f} ({}), without the means of single flights {:.3f} ({}).",
+      "Largest ratio {:.3f} ({}); by scenario {:.3f} ({}), without the means of single flights {:.3f} ({}).",
       compositions.mean_ours_gf, compositions.mean_theirs_gf, scenarios.mean_ours_gf,
       scenarios.mean_theirs_gf, compositions.largest_ratio, compositions.where, scenarios.largest_ratio,
       scenarios.where, spreads.largest_ratio, spreads.where));

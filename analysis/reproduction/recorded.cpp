@@ -12,8 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// gf per unit of input. Joint bounds of the published networks: 417.6 for the large pair, 373.7 for the small one, with
-/// gamma 3 in every layer, which ours keep as well.
+/// gf per unit of input. Joint bounds of the published networks: 417.6 for the large pair, 373.7 for the small one,
+/// with gamma 3 in every layer, which ours keep as well.
 constexpr double kMaxLipschitz = 373;
 
 bool is_fitted(const residuals::FlightFiles& flight) {

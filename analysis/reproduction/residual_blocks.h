@@ -1,4 +1,5 @@
-/// @file Vertical residuals of several models on the same blocks of the same flights, so that differences have intervals.
+/// @file Vertical residuals of several models on the same blocks of the same flights, so that differences have
+/// intervals.
 #pragma once
 
 #include <map>

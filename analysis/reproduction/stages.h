@@ -11,9 +11,9 @@
 namespace swarmcert::reproduction {
 
 /// Stage 0: two vehicles without a network. 1: two with the network of stage 0. 2: three with that of stage 1. 3: four
-/// with that of stage 2. Every stage flies one random walk and repeated swaps. Its network learns from these flights and
-/// from those of all stages before it: the paper calls its curriculum cumulative. What was flown with fewer vehicles
-/// keeps swarms with fewer neighbours from being forgotten.
+/// with that of stage 2. Every stage flies one random walk and repeated swaps. Its network learns from these flights
+/// and from those of all stages before it: the paper calls its curriculum cumulative. What was flown with fewer
+/// vehicles keeps swarms with fewer neighbours from being forgotten.
 ///
 /// A network allows closer flight (section III-C): the random walks of every stage that has one are drawn in further.
 /// Left as it is, the task's repulsion keeps more vehicles as far apart as fewer. How far is our choice.

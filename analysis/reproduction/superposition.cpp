@@ -181,10 +181,8 @@ Finding superposition(const Setting& setting) {
   finding.tables.push_back(std::move(table));
   finding.notes.push_back(
       "The defect is f(a,b) - f(a) - f(b), all relative to f of no neighbour. For recorded flights f(a) and "
-      "f(b) are the "
-      "downwash fitted to flights of two vehicles, and f(a,b) is the measured force less the vehicle's mean "
-      "where nobody "
-      "is above. Intervals: 90 %, blocks of 2 s.");
+      "f(b) are the downwash fitted to flights of two vehicles, and f(a,b) is the measured force less the "
+      "vehicle's mean where nobody is above. Intervals: 90 %, blocks of 2 s.");
   return finding;
 }
 

@@ -119,9 +119,8 @@ Finding lipschitz_tradeoff(const Setting& setting) {
   finding.tables.push_back(std::move(table));
   finding.notes.push_back(
       "Predicted: the loop's exact gains times what was measured of the force that the prediction, behind "
-      "the motors' "
-      "lag, leaves in swaps of three. It bounds the linear loop, for these flights: noise and saturation "
-      "come on top.");
+      "the motors' lag, leaves in swaps of three. It bounds the linear loop, for these flights: noise and "
+      "saturation come on top.");
   finding.figures.push_back(
       {"lipschitz", data,
        "set logscale x\nset grid\nset key top right\nset xlabel 'proved Lipschitz bound [gf per m "

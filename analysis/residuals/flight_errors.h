@@ -24,8 +24,8 @@ struct FlightError {
   ErrorOfFlight velocity;  ///< velocity_error(), in m/s; no windows where the log does not measure it
 };
 
-/// One per vehicle whose force is judged and whose log holds a window at least, in the order of flights. The logs are taken
-/// from the cache of `inputs`.
+/// One per vehicle whose force is judged and whose log holds a window at least, in the order of flights. The logs are
+/// taken from the cache of `inputs`.
 std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs);
 
 }  // namespace swarmcert::residuals

@@ -45,11 +45,11 @@ std::vector<std::string> patterns_without_log(const LogRules& rules, const Found
 
 /// Files and folders, searched recursively. A log may have any name; it is recognised by its content. One log is one
 /// flight of one vehicle, unless
-/// - files are named `[<prefix>_]cf<id>_<run>`, with or without ".csv": folder, prefix and run name the flight, and where a
-///   vehicle has a binary log and a CSV, the binary log is taken;
+/// - files are named `[<prefix>_]cf<id>_<run>`, with or without ".csv": folder, prefix and run name the flight, and
+///   where a vehicle has a binary log and a CSV, the binary log is taken;
 /// - `rules` give them one flight;
-/// - logs of one folder have absolute times (of their clock, or of a satellite receiver) that overlap by more than half.
-/// A vehicle that nothing names is called as in `<vehicle>_log07`, else as its folder.
+/// - logs of one folder have absolute times (of their clock, or of a satellite receiver) that overlap by more than
+/// half. A vehicle that nothing names is called as in `<vehicle>_log07`, else as its folder.
 /// @throws files::InputError if a path does not exist, a file that was named is no log, or nothing is left.
 FoundFlights find_flights(const std::vector<std::string>& paths, const LogRules& rules = {});
 

@@ -1,9 +1,10 @@
 /// @file What a model says about a flight, and what it leaves: r = m a_sf - R (h * R' (T b3 + f_a)), per record, in W.
 ///
 /// Where the specific force is a derivative of the velocity or the position, h is the same weighted mean over the same
-/// window as that derivative, in W. T is the thrust map's command behind the model's delay and motor lag; f_a the sum of its effects; h the two-pole
-/// low-pass of the accelerometer. It acts in the body, as in the sensor; the firmware then turns the result into W by
-/// the attitude of the moment, so that forces are delayed but the thrust axis is not. Filters restart after gaps.
+/// window as that derivative, in W. T is the thrust map's command behind the model's delay and motor lag; f_a the sum
+/// of its effects; h the two-pole low-pass of the accelerometer. It acts in the body, as in the sensor; the firmware
+/// then turns the result into W by the attitude of the moment, so that forces are delayed but the thrust axis is not.
+/// Filters restart after gaps.
 #pragma once
 
 #include <memory>

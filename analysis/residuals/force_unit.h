@@ -25,8 +25,8 @@ inline ForceUnit chosen_force_unit(const std::string& name, const stability::Mod
   return model.weight_N() < kHeavy_N ? ForceUnit{"mN", 1e-3} : ForceUnit{"N", 1};
 }
 
-/// Gram-force where every vehicle weighs less than 1 N, the unit of the published networks; else newton. Without a known
-/// mass, the residuals of a model of 1 kg are accelerations.
+/// Gram-force where every vehicle weighs less than 1 N, the unit of the published networks; else newton. Without a
+/// known mass, the residuals of a model of 1 kg are accelerations.
 inline ForceUnit force_unit(const Inputs& inputs) {
   constexpr double kLight_N = 1;
   if (inputs.rules.per_mass) return {"m/s^2", 1};

@@ -123,8 +123,7 @@ void use_other_models(const InputArguments& arguments, const std::map<std::strin
     throw files::InputError({arguments.flights.empty() ? "" : arguments.flights[0], "", "MODEL", "",
                              "no model is named and no vehicle is known",
                              "give a model.toml ('swarmcert model draft' writes one), or a flights.toml "
-                             "(--flights) that names one per "
-                             "vehicle"});
+                             "(--flights) that names one per vehicle"});
   }
   inputs.rules.per_mass = true;
   inputs.models.push_back(unit_model());

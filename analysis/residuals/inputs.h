@@ -21,7 +21,8 @@ struct InputArguments {
   std::string columns;               ///< columns.toml; empty: the known columns
   std::string network;  ///< a learned force that every model gets, in place of its own; empty: none
   CutRules rules;
-  /// Without a model, a known vehicle and a log's own model: CutRules::per_mass and a model of 1 kg, so that newtons are m/s^2.
+  /// Without a model, a known vehicle and a log's own model: CutRules::per_mass and a model of 1 kg, so that newtons
+  /// are m/s^2.
   bool may_lack_model = false;
 };
 

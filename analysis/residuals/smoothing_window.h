@@ -1,9 +1,9 @@
 /// @file The weighted mean over a window that a derivative of a logged velocity or position is of the acceleration.
 ///
-/// The slope of a straight line fitted to a velocity is a mean of the acceleration with parabolic weights; the curvature
-/// of a parabola fitted to a position is a mean with weights of fourth order. So that both sides of the balance see the
-/// same mean, the model's force is integrated, once or twice, and goes through the same fit. The window ends at the
-/// record: like a filter, it delays both sides by half its length.
+/// The slope of a straight line fitted to a velocity is a mean of the acceleration with parabolic weights; the
+/// curvature of a parabola fitted to a position is a mean with weights of fourth order. So that both sides of the
+/// balance see the same mean, the model's force is integrated, once or twice, and goes through the same fit. The window
+/// ends at the record: like a filter, it delays both sides by half its length.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,8 +26,8 @@ class SmoothingWindow {
 
   /// Replaces forces, linear between the records, by their mean over the window. @param values [3 x channels]
   void average(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values);
-  /// Replaces a velocity or position by its derivative over the window: average() of the acceleration behind it. Zero for
-  /// the first records after a restart.
+  /// Replaces a velocity or position by its derivative over the window: average() of the acceleration behind it. Zero
+  /// for the first records after a restart.
   void differentiate(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values);
 
  private:

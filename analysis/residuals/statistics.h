@@ -45,8 +45,8 @@ double quantile(std::vector<float>& values, double p);
 class Spectrum {
  public:
   /// @param residual [records], consecutive, without gaps; `period_s` their mean distance.
-  /// @param passes power that a window let pass before, by frequency in hertz; empty: all of it. Both bands are divided by
-  /// it: a mean over 100 ms hides the floor, not what is above it.
+  /// @param passes power that a window let pass before, by frequency in hertz; empty: all of it. Both bands are divided
+  /// by it: a mean over 100 ms hides the floor, not what is above it.
   void add(const std::vector<Eigen::Vector3d>& residual, double period_s,
            const std::function<double(double)>& passes = {});
   void add(const Spectrum& other);

@@ -16,8 +16,8 @@ struct TorqueBlock {
   Eigen::Vector3d torque_B_Nm = Eigen::Vector3d::Zero();
 };
 
-/// One after the other, each of at least `duration_s`. Over a second the mean of omega' is known from its ends, so that logs
-/// of any rate do; without rates it counts as zero. Empty where the log does not say the force of each rotor.
+/// One after the other, each of at least `duration_s`. Over a second the mean of omega' is known from its ends, so that
+/// logs of any rate do; without rates it counts as zero. Empty where the log does not say the force of each rotor.
 /// @throws files::InputError where an effect of the model cannot be made.
 std::vector<TorqueBlock> torque_blocks(const stability::Model& model, const Kinds& kinds, const Track& track,
                                        double duration_s);

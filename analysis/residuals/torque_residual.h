@@ -22,13 +22,15 @@ struct TorqueResidual {
       torque_B_Nm;  ///< one per record, NaN where omega' is unknown; empty where refused
 };
 
-/// tau_u: forces of the rotors by duty and thrust map, or by the motors' commands, at the places of the rotors, behind the model's motor lag; tau_a: the torque of
-/// the model's effects. omega' is the central difference over three records; tau_u and tau_a are averaged over the same.
+/// tau_u: forces of the rotors by duty and thrust map, or by the motors' commands, at the places of the rotors, behind
+/// the model's motor lag; tau_a: the torque of the model's effects. omega' is the central difference over three
+/// records; tau_u and tau_a are averaged over the same.
 /// @throws files::InputError where an effect of the model cannot be made.
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track);
 
-/// As torque_residual(), of logs of any rate: single records of slow logs alias what the attitude loop does, their means
-/// over many records say what it balances. Empty where the log has no rates or does not say the force of each rotor.
+/// As torque_residual(), of logs of any rate: single records of slow logs alias what the attitude loop does, their
+/// means over many records say what it balances. Empty where the log has no rates or does not say the force of each
+/// rotor.
 std::vector<Eigen::Vector3d> torque_records(const stability::Model& model, const Kinds& kinds,
                                             const Track& track);
 
@@ -38,8 +40,8 @@ struct TorqueErrors {
   double rate_hz = 0;   ///< of the log
   std::size_t records = 0;
   Axes rmse_Nm, bias_Nm, max_Nm;
-  /// Also of slower logs and of logs without rates: minus the mean torque of the rotors in flight slower than this, which
-  /// something else must balance.
+  /// Also of slower logs and of logs without rates: minus the mean torque of the rotors in flight slower than this,
+  /// which something else must balance.
   static constexpr double kSlow_m_s = 0.1;
   std::size_t slow_records = 0;
   Axes slow_mean_Nm;

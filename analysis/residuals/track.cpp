@@ -260,17 +260,15 @@ const char* rule(Cut cut) {
       "everything else",
       "from 0.3 s before the thrust axis is more than 60 degrees from the vertical, to the end of the log",
       "the duties add up to less than 0.8, or to less than 0.3 of the most where that is less and the "
-      "vehicle "
-      "moved; other thrust is less than 0.3 of what is common: rotors off or idle, outside the calibration",
+      "vehicle moved; other thrust is less than 0.3 of what is common: rotors off or idle, outside the "
+      "calibration",
       "at or below 2 cm above the height at which the vehicle stood with idle rotors (kind small: 0.07 m, "
-      "large: "
-      "0.085 m)",
+      "large: 0.085 m)",
       "within 0.15 s after the start and after a gap of more than 30 ms: filters have no past",
       "the position of a neighbour is unknown: its log has a gap, has not begun or has ended",
       "published filter only: |f_a,z| of 50 gf or more",
       "from 0.1 s before to 0.3 s after a record that no flight has: a specific force beyond 1.25 times what "
-      "the rotors "
-      "give at full duty (at least 2 g), or a jump of position or velocity"};
+      "the rotors give at full duty (at least 2 g), or a jump of position or velocity"};
   return kRules[static_cast<int>(cut)];
 }
 

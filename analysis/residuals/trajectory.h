@@ -36,7 +36,8 @@ struct TrajectoryErrors {
 /// replayed. A lag that the loop has may not be in the force as well.
 stability::Model with_lag(stability::Model model, const stability::Gains& gains);
 
-/// Flies every piece of a track: from the measured state, sampled loop (stability/simulation/sampled_flight.h) without noise.
+/// Flies every piece of a track: from the measured state, sampled loop (stability/simulation/sampled_flight.h) without
+/// noise.
 /// @param model      with_lag().
 /// @param residual_N force residual of `model`, one per record.
 /// @param kinds      models of the neighbours are made from it: mass and kind.

@@ -1,5 +1,5 @@
-/// @file How far the estimated velocity of a flight is from the slope of its estimated position: what the law that flew saw
-/// through Kd, read by `bound --from`.
+/// @file How far the estimated velocity of a flight is from the slope of its estimated position: what the law that flew
+/// saw through Kd, read by `bound --from`.
 #pragma once
 
 #include <Eigen/Core>

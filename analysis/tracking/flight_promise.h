@@ -1,5 +1,5 @@
-/// @file A bound for a further flight: each flight that was compared gives the class of its own force error, each class a
-/// bound of the loop at hand, and these bounds the conformal threshold.
+/// @file A bound for a further flight: each flight that was compared gives the class of its own force error, each class
+/// a bound of the loop at hand, and these bounds the conformal threshold.
 ///
 /// The gains of the flights need not be those of the loop: what transfers is the force error. If a further flight is
 /// exchangeable with those compared and the loop is linear with the lags stated, the error of that flight stays below
@@ -21,8 +21,8 @@ struct FlightClass {
   stability::DisturbanceSource source;
 };
 
-/// flights[].learning_error of a result of compare, largest values over windows that follow one another. Vehicles without
-/// one are left out; axes along which no force was judged have infinite classes.
+/// flights[].learning_error of a result of compare, largest values over windows that follow one another. Vehicles
+/// without one are left out; axes along which no force was judged have infinite classes.
 /// @throws files::InputError where the file is no such result.
 std::vector<FlightClass> read_flight_classes(const std::string& path);
 
@@ -34,8 +34,8 @@ struct PromisedBound {
   ConformalThreshold promise;  ///< its threshold is the bound, m
 };
 
-/// @param declared bias and errors of the estimates that act beside the classes. @param report of tracking_bounds(): its
-///   gains are taken up again, and staircase_m and float32_m of its bounds are added.
+/// @param declared bias and errors of the estimates that act beside the classes. @param report of tracking_bounds():
+///   its gains are taken up again, and staircase_m and float32_m of its bounds are added.
 /// @throws std::invalid_argument for fewer flights than the level needs: see fewest_groups().
 std::vector<PromisedBound> promised_bounds(const stability::Gains& gains, const stability::Plant& plant,
                                            const stability::TrackingReport& report,

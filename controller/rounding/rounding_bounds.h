@@ -1,4 +1,5 @@
-/// @file Bounds on the difference between the float control law that flies and the double one that is analysed. Host only.
+/// @file Bounds on the difference between the float control law that flies and the double one that is analysed. Host
+/// only.
 #pragma once
 
 #include <string>
@@ -44,7 +45,8 @@ struct RoundedLaw {
 };
 
 /// Bounds on |float - double| over the whole envelope, for one evaluation of each law from the same state and
-/// integrals, every input rounded to float, the heading computed from a yaw within pi by heading_of_yaw(). Per world axis, per body axis where it is a torque.
+/// integrals, every input rounded to float, the heading computed from a yaw within pi by heading_of_yaw(). Per world
+/// axis, per body axis where it is a torque.
 struct RoundingBounds {
   bool applies = false;
   std::string why_not;  ///< empty if `applies`

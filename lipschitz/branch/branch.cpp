@@ -20,7 +20,8 @@ constexpr double kRhoMargin = 1e-8;
 /// inherited ones were computed.
 constexpr double kLazy = 0.9;
 /// Or after so many halvings in a row that decided no neuron. Far from the origin of a projective cover neurons stay
-/// undecided that depend on s alone, since nothing reaches them there; they do no harm once their multipliers are large.
+/// undecided that depend on s alone, since nothing reaches them there; they do no harm once their multipliers are
+/// large.
 constexpr int kInVain = 6;
 /// A search that ends with so few parts solves those that dominate, at most kPolished, this well and with kMostPairs.
 constexpr std::size_t kFewParts = 64;

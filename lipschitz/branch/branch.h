@@ -11,8 +11,8 @@
 
 namespace swarmcert::lipschitz {
 
-/// A bisection of the boxes with a proof per part, in preorder, box after box: a split is followed by its lower, then its
-/// upper half.
+/// A bisection of the boxes with a proof per part, in preorder, box after box: a split is followed by its lower, then
+/// its upper half.
 struct BranchTree {
   static constexpr int kLeaf = -1;
   struct Node {
@@ -39,8 +39,8 @@ struct BranchOptions {
   /// Conflict cuts: pairs of neurons that a box keeps from being in some states at once, at most so many per box. Fewer
   /// boxes and a shorter proof for the same bound, but more time.
   int pairs = 0;
-  /// Better lower slopes for neurons that are nearly decided (Reach): fewer boxes, shorter proofs that are checked sooner, in
-  /// about the time that a search takes without; for a stated number of neighbours in less.
+  /// Better lower slopes for neurons that are nearly decided (Reach): fewer boxes, shorter proofs that are checked
+  /// sooner, in about the time that a search takes without; for a stated number of neighbours in less.
   bool better_slopes = true;
   /// Multipliers to start from, one per hidden neuron of the network, in its own units: those of a bound that holds
   /// everywhere. Empty: none.
@@ -57,9 +57,9 @@ enum class BranchStop {
   kNodes,        ///< all boxes that it was given
   kTimeLimit,
   kCancelled,
-  /// The box that dominates has no side left to halve, or no multipliers were found for it. On a projective cover that is
-  /// where kinks which run side by side to infinity, as those behind one neuron of the first layer do, meet in one point:
-  /// boxes around it decide nothing between them, however small.
+  /// The box that dominates has no side left to halve, or no multipliers were found for it. On a projective cover that
+  /// is where kinks which run side by side to infinity, as those behind one neuron of the first layer do, meet in one
+  /// point: boxes around it decide nothing between them, however small.
   kNothingToHalve,
 };
 /// "close enough", "nodes used up", ...
@@ -83,20 +83,22 @@ struct BranchResult {
   int nodes = 0;                 ///< boxes looked at
   double undecided_per_box = 0;  ///< neurons that a box leaves undecided, on average
   Outlook outlook;
-  /// Centres of boxes, by falling slope at the centre, at most kSteepCentres: where a search for lower bounds may start.
+  /// Centres of boxes, by falling slope at the centre, at most kSteepCentres: where a search for lower bounds may
+  /// start.
   std::vector<Eigen::VectorXd> steep_centres;
 };
 
 inline constexpr std::size_t kSteepCentres = 8;
 
-/// Best-first search over the union of the boxes. Each box bounds its neurons by linear relaxation (Reach), takes out those
-/// that it decides, and inherits the multipliers of an ancestor; the box that dominates gets multipliers of its own once enough of its
-/// neurons are decided, and is halved otherwise. The slope at each box's centre says how far the bound can fall at most.
-/// The result depends on the options only, not on the machine's load (seconds unset). It can be used whenever the search stops.
+/// Best-first search over the union of the boxes. Each box bounds its neurons by linear relaxation (Reach), takes out
+/// those that it decides, and inherits the multipliers of an ancestor; the box that dominates gets multipliers of its
+/// own once enough of its neurons are decided, and is halved otherwise. The slope at each box's centre says how far the
+/// bound can fall at most. The result depends on the options only, not on the machine's load (seconds unset). It can be
+/// used whenever the search stops.
 BranchResult branch(const LocalChain& chain, const std::vector<Box>& boxes, const BranchOptions& options);
 
-/// The same for a set function whose sum is bounded. Its boxes are bounded with phi alone, in front of a form of rho; a box
-/// that decides more of phi's and of rho's neurons gets a form of its own, and hands it down.
+/// The same for a set function whose sum is bounded. Its boxes are bounded with phi alone, in front of a form of rho; a
+/// box that decides more of phi's and of rho's neurons gets a form of its own, and hands it down.
 BranchResult branch(const SetChain& set, const std::vector<Box>& boxes, const BranchOptions& options);
 
 }  // namespace swarmcert::lipschitz

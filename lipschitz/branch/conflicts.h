@@ -23,7 +23,8 @@ class NeuronForms {
   /// @param forms as Reach gives them.
   NeuronForms(const std::vector<LinearForms>& forms, const Box& box);
 
-  /// Whether the forms show it, with a margin for another's rounding. Neurons whose forms Reach left out are in no pair.
+  /// Whether the forms show it, with a margin for another's rounding. Neurons whose forms Reach left out are in no
+  /// pair.
   bool excludes(const NeuronPair& pair) const;
 
   /// All pairs among `neurons`, ascending, with the lambda that shows them best.

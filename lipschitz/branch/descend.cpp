@@ -16,8 +16,8 @@ using Eigen::VectorXd;
 
 /// Weight of log det S_zz beside log det R: keeps S_zz away from singular, where R alone does not see it.
 constexpr double kInterior = 0.01;
-/// A step is shortened by this until the barrier falls: far from the optimum, where rho is nearly linear along t, Newton's
-/// step is far too long.
+/// A step is shortened by this until the barrier falls: far from the optimum, where rho is nearly linear along t,
+/// Newton's step is far too long.
 constexpr double kShorten = 0.3;
 constexpr int kShortest = 12;
 

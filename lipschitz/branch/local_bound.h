@@ -38,8 +38,8 @@ struct LocalBound {
 /// Bound of `claim` for inputs in its box, both ends of the slope, or for all inputs by a projective cover: of a plain
 /// network or of phi; of a set function with one neighbour moving in the box, whatever the number and the places of the
 /// others, through a RhoForm. For claims with a number of neighbours: through forms of rho that
-/// hold in parts of the box (check::Form), with what the others add before its first ReLU as an interval, shown by the parts
-/// of each kind's box.
+/// hold in parts of the box (check::Form), with what the others add before its first ReLU as an interval, shown by the
+/// parts of each kind's box.
 ///
 /// Branch and bound proposes, check::check_tree() verifies: what is returned has been accepted.
 /// @param domain by part; of all kinds where the claim has a number of neighbours.

@@ -11,7 +11,8 @@
 namespace swarmcert::lipschitz {
 
 /// f = g(h_K-1), with the hidden layers h_k = relu(W_k h_k-1 + b_k), or without a ReLU where the layer has none, and
-/// |g(z) - g(z')|^2 <= (z - z')' G (z - z') for all z, z'. Of a plain network G = W_K' W_K; for phi in front of rho it carries a bound on rho (RhoBound).
+/// |g(z) - g(z')|^2 <= (z - z')' G (z - z') for all z, z'. Of a plain network G = W_K' W_K; for phi in front of rho it
+/// carries a bound on rho (RhoBound).
 ///
 /// Everything is scaled by powers of two per layer, which ReLU lets through, so that (rho, t) are of order one:
 /// h_k here is 2^-scale[k] times the network's.

@@ -33,7 +33,8 @@ class NodeInequality final : public RankTwoInequality {
   Eigen::MatrixXd a_transposed_times(const Eigen::MatrixXd& x) const override;
   Eigen::MatrixXd times_patterned(const Eigen::MatrixXd& x, const Eigen::MatrixXd& d) const override;
 
-  /// Adds a pair of undecided neurons: with u = dz (on) or dy - dz (off), 2 u_1 u_2 = 0 gets a multiplier of either sign.
+  /// Adds a pair of undecided neurons: with u = dz (on) or dy - dz (off), 2 u_1 u_2 = 0 gets a multiplier of either
+  /// sign.
   void add(const NeuronPair& pair);
   /// Columns of [A E], E the unit vectors of the neurons, that make up u_1 and u_2 of a pair.
   struct Factors {

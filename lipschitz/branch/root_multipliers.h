@@ -9,8 +9,8 @@
 
 namespace swarmcert::lipschitz {
 
-/// Multipliers for a box that inherits none: those given, improved, or where they prove nothing or there are none, those of
-/// the whole program.
+/// Multipliers for a box that inherits none: those given, improved, or where they prove nothing or there are none,
+/// those of the whole program.
 /// @param start one per hidden neuron of the network, in its own units; or empty.
 Eigen::VectorXd root_multipliers(const LocalChain& chain, const NodeInequality& inequality,
                                  const std::vector<double>& start);

@@ -32,8 +32,8 @@ class BranchSearch {
   static constexpr double kFineGap = 1e-4;
   /// A program that took rho below this share of what it was may have stopped early: it gets another turn.
   static constexpr double kFar = 0.9;
-  /// A part of a set function gets a form of rho of its own once its undecided neurons are fewer than this share of those
-  /// with which the inherited one was computed.
+  /// A part of a set function gets a form of rho of its own once its undecided neurons are fewer than this share of
+  /// those with which the inherited one was computed.
   static constexpr double kFormLazy = 0.85;
 
   /// A box of the search.
@@ -104,7 +104,8 @@ class BranchSearch {
   static int undecided_in(const std::vector<NeuronState>& states) {
     return static_cast<int>(std::count(states.begin(), states.end(), NeuronState::kUndecided));
   }
-  /// The coordinate that makes up most of the undecided neurons' ranges, of those that can be halved; else the widest one.
+  /// The coordinate that makes up most of the undecided neurons' ranges, of those that can be halved; else the widest
+  /// one.
   int best_split(const Reach& reach, const std::vector<Eigen::MatrixXd>& slopes,
                  const std::vector<NeuronState>& states) const;
 

@@ -13,7 +13,8 @@ using Eigen::VectorXd;
 /// Only if of rho's, too, fewer are undecided than this share of those then: for phi alone a program without rho is
 /// cheaper. Otherwise it looks again as if this share of its own had been undecided.
 constexpr double kLazyRho = 0.985, kFormAgain = 0.95;
-/// What a form is above the least one, relatively to its largest entry: more than rounding it to single precision takes.
+/// What a form is above the least one, relatively to its largest entry: more than rounding it to single precision
+/// takes.
 constexpr double kFormMargin = 4e-6;
 
 }  // namespace

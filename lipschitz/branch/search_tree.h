@@ -18,9 +18,9 @@ struct SearchNode {
   std::vector<check::Decision> decided;            ///< here: of phi, then of rho
 };
 
-/// The tree in preorder, the first `roots` nodes being the boxes searched. Of `found`, whose nodes are empty, it keeps the
-/// multipliers and forms that prove a leaf; of other forms only that rho's neurons were bounded there, which the forms below
-/// rest on.
+/// The tree in preorder, the first `roots` nodes being the boxes searched. Of `found`, whose nodes are empty, it keeps
+/// the multipliers and forms that prove a leaf; of other forms only that rho's neurons were bounded there, which the
+/// forms below rest on.
 BranchTree in_preorder(const std::vector<SearchNode>& nodes, std::size_t roots, BranchTree found);
 
 /// The words of check::TreeProof.

@@ -1,5 +1,5 @@
-/// @file Which neurons a box decides: linear relaxation in double, every rounding accounted for. Shares no code with the
-/// search (lipschitz/reach.h), which does the same for its own purposes.
+/// @file Which neurons a box decides: linear relaxation in double, every rounding accounted for. Shares no code with
+/// the search (lipschitz/reach.h), which does the same for its own purposes.
 #pragma once
 
 #include <cstddef>
@@ -36,9 +36,9 @@ struct NeuronBounds {
   std::vector<std::vector<double>> slope, offset;  ///< max(0, y) <= slope y + offset, where l < 0 < u
 };
 
-/// A neuron that other lower slopes decide: of the undecided ones before it, those get the lower slope 1 that are on at a
-/// corner of the box, the others 0. On: y > kOnAtCorner (|W| |h| + |b|), so that rounding hardly matters; to what follows
-/// it does not, since any slope in [0, 1] holds.
+/// A neuron that other lower slopes decide: of the undecided ones before it, those get the lower slope 1 that are on at
+/// a corner of the box, the others 0. On: y > kOnAtCorner (|W| |h| + |b|), so that rounding hardly matters; to what
+/// follows it does not, since any slope in [0, 1] holds.
 struct Decision {
   std::size_t neuron = 0;    ///< counted over all outputs of hidden layers
   bool is_on = false;        ///< y >= 0, else y <= 0
@@ -60,10 +60,10 @@ struct WeightedNeuron {
 /// A neuron y_ki = w h + b is substituted backwards layer by layer: with l < 0 < u,
 ///   max(0, y) <= s y + t  for any s >= 0 and t >= max(u - s u, -s l), and  max(0, y) >= a y  for 0 <= a <= 1,
 /// so a linear form in h_j becomes one in y_j, whose coefficient is as stored. Rounding: multiplying a form by W_j in
-/// floating point changes sum_c lambda_c W_jc h_c by at most gamma_n sum_c |lambda_c| |W_jc| max|h_c| in whatever order the
-/// terms are added; constants are sums of at most N terms, wrong by at most N u times the sum of their absolute values
-/// (Higham 2002, sections 3.1 and 4.2), twice that is added, and what underflow can cost for values up to 2^100. Larger
-/// values and overflow make a bound infinite, a NaN is never used.
+/// floating point changes sum_c lambda_c W_jc h_c by at most gamma_n sum_c |lambda_c| |W_jc| max|h_c| in whatever order
+/// the terms are added; constants are sums of at most N terms, wrong by at most N u times the sum of their absolute
+/// values (Higham 2002, sections 3.1 and 4.2), twice that is added, and what underflow can cost for values up to 2^100.
+/// Larger values and overflow make a bound infinite, a NaN is never used.
 /// @param lower, upper at most kLargestInput in absolute value.
 /// @param around bounds over a larger box, which hold here too; neurons that they decide keep them. May be null.
 /// Outputs without a ReLU are substituted as they are.
@@ -72,8 +72,8 @@ NeuronBounds neuron_bounds(const std::vector<HiddenLayer>& layers, const std::ve
 
 /// Adds the bounds of the layers that `bounds`, of the first ones over the same box, does not have yet.
 /// @param around of all layers over a larger box; may be null.
-/// @param decisions of neurons of these layers; those of other layers are not looked at, nor are those of neurons that are
-///   decided without. @returns whether all of them hold; the bounds hold in any case.
+/// @param decisions of neurons of these layers; those of other layers are not looked at, nor are those of neurons that
+///   are decided without. @returns whether all of them hold; the bounds hold in any case.
 bool add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers,
                 const std::vector<double>& lower, const std::vector<double>& upper,
                 const NeuronBounds* around, const std::vector<Decision>& decisions = {});

@@ -60,8 +60,9 @@ class CertificateChecker {
   /// shown by a tree, as often as there are such neighbours or less; the ground's once.
   void check_others(const Json& others, const std::vector<std::string>& names, Neighbours counts, Row& least,
                     Row& most, const std::string& where) const;
-  /// sqrt(rho) <= `upper` bounds the slope on the box, or on what the input clamp makes of it; of a set function through
-  /// a quadratic form of rho, for so many neighbours one that holds for the sums that they reach. Everywhere: by a projective cover.
+  /// sqrt(rho) <= `upper` bounds the slope on the box, or on what the input clamp makes of it; of a set function
+  /// through a quadratic form of rho, for so many neighbours one that holds for the sums that they reach. Everywhere:
+  /// by a projective cover.
   void check_local(const Json& bound, double upper, const std::vector<double>& scale,
                    const std::string& where);
   /// Q with |rho(v) - rho(w)|^2 <= (v - w)' Q (v - w), its lower triangle given row by row.

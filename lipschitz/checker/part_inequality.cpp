@@ -296,8 +296,9 @@ double PartInequality::largest_error(const Row& d) const {
 
 /// Of F' G F, for F and G within r_F and r_G of the true ones: at most
 ///   |F|' (r_G + gamma M) |F| + |F|' M r_F + r_F' M |F| + r_F' M r_F,  M = |G| + r_G,
-/// where gamma is for rounding G F, and F' times that, and what it is subtracted from. The bound is symmetric, as G is, so an
-/// entry that was computed for i >= j may stand for both. Of its rows' sums, weighted by d, products with vectors tell.
+/// where gamma is for rounding G F, and F' times that, and what it is subtracted from. The bound is symmetric, as G is,
+/// so an entry that was computed for i >= j may stand for both. Of its rows' sums, weighted by d, products with vectors
+/// tell.
 void PartInequality::add_error_of_output(const Row& d, Row& sums) const {
   const int rows = z_.rows;
   const auto size = static_cast<std::size_t>(rows);

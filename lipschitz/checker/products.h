@@ -1,5 +1,5 @@
-/// @file The loops in which a check of a proof by parts spends its time: sums in double, in no order that is promised, so
-/// that error bounds must hold for all; no fused products.
+/// @file The loops in which a check of a proof by parts spends its time: sums in double, in no order that is promised,
+/// so that error bounds must hold for all; no fused products.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,8 @@ struct FormSums {
 };
 FormSums form_sums(const double* c, const double* b, const double* w, int size);
 
-/// Sum c+ offset and sum c+ error over the positive c. Replaces each c by c above where it is positive, else by c below.
+/// Sum c+ offset and sum c+ error over the positive c. Replaces each c by c above where it is positive, else by c
+/// below.
 struct RelaxedSums {
   double offsets, errors;
 };

@@ -5,9 +5,9 @@
 
 namespace swarmcert::check {
 
-/// f as a function of (u, s), s >= 0: y = W h + b s in every layer, which is positively homogeneous, so that the neurons
-/// at (u, s) with s > 0 are as those of f at x = u / s, and df/dx there is the derivative in u. s is the last input and
-/// the last output of every hidden layer but the last one; it never moves.
+/// f as a function of (u, s), s >= 0: y = W h + b s in every layer, which is positively homogeneous, so that the
+/// neurons at (u, s) with s > 0 are as those of f at x = u / s, and df/dx there is the derivative in u. s is the last
+/// input and the last output of every hidden layer but the last one; it never moves.
 LocalFunction homogeneous(const LocalFunction& f);
 
 /// Boxes of (u, s) such that every x is u / s for a point of one: [-r, r] with s = 1, for |x_k| <= r_k; and for each k

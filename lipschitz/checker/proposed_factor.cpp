@@ -29,8 +29,8 @@ double inner_product(const double* a, const double* b, int count) {
   return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
 }
 
-/// Replaces a matrix by its Cholesky factor, whose rows begin in the same columns. Rows with an empty diagonal entry stay
-/// empty. False if the factorisation breaks down.
+/// Replaces a matrix by its Cholesky factor, whose rows begin in the same columns. Rows with an empty diagonal entry
+/// stay empty. False if the factorisation breaks down.
 bool factorise(Triangle& rows, const std::vector<bool>& is_empty) {
   std::vector<int> first;
   for (std::size_t i = 0; i < rows.size(); ++i)

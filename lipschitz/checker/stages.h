@@ -15,8 +15,8 @@ namespace swarmcert::check {
 /// phi and the first of rho, which no activation separates, are one stage: their product.
 /// An activation s of slopes in [0, b] is b times one of slopes in [0, 1]: the stage behind it is multiplied by b. ReLU
 /// has b = 1.
-/// @throws std::domain_error if an activation of `function` is not monotone; std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` has not one
-///   number per input.
+/// @throws std::domain_error if an activation of `function` is not monotone; std::out_of_range or std::invalid_argument
+///   if NET has no such function or block, or `scale` has not one number per input.
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});
 
@@ -32,8 +32,8 @@ LocalFunction local_function(const files::Network& network, const std::string& p
 std::vector<HiddenLayer> term_layers(const files::Network& network, const std::string& phi,
                                      const std::string& rho);
 
-/// x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>", for any s with least <= V s <= most; V as in term_layers(). What
-/// takes the place of rho, a tree's forms say.
+/// x -> rho(phi(x) + s) of "set:<phi kind>:<rho kind>", for any s with least <= V s <= most; V as in term_layers().
+/// What takes the place of rho, a tree's forms say.
 /// @throws as local_function() and term_layers().
 LocalFunction coupled_function(const files::Network& network, const std::string& function,
                                const std::string& block, const std::vector<double>& scale,

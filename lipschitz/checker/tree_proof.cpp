@@ -178,8 +178,8 @@ std::string halve(const Part& part, std::size_t coordinate, std::vector<Part>& o
   return "";
 }
 
-/// Visits the leaves of a tree. `leaf(index, part)` says what is wrong with one, or nothing. `form(word, part)` likewise
-/// with a form or with bounds of rho's neurons, and makes them the part's.
+/// Visits the leaves of a tree. `leaf(index, part)` says what is wrong with one, or nothing. `form(word, part)`
+/// likewise with a form or with bounds of rho's neurons, and makes them the part's.
 template <class Leaf, class UseForm>
 TreeVerdict walk(const std::vector<HiddenLayer>& layers, const std::vector<Sides>& boxes,
                  const std::string& tree, const Leaf& leaf, const UseForm& form) {

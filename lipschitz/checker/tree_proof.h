@@ -42,16 +42,16 @@ struct Form {
 };
 
 /// The words of a tree in preorder: "s3" halves coordinate 3 of the box at hand, its lower half first; "t5" is a leaf
-/// that multipliers 5 prove. Before what becomes of the box at hand: "q2" says that form 2 holds in it, "r" that rho's neurons
-/// are bounded in it, as before a form; "d17+5" that neuron 17 is on all over it, "d17-5" off, as the slopes of corner 5 show
-/// (Decision): neurons of phi first of all, those of rho before "q" or "r". What is decided stays so in both halves. Of
-/// several boxes, their trees one after the other.
+/// that multipliers 5 prove. Before what becomes of the box at hand: "q2" says that form 2 holds in it, "r" that rho's
+/// neurons are bounded in it, as before a form; "d17+5" that neuron 17 is on all over it, "d17-5" off, as the slopes of
+/// corner 5 show (Decision): neurons of phi first of all, those of rho before "q" or "r". What is decided stays so in
+/// both halves. Of several boxes, their trees one after the other.
 struct TreeProof {
   std::string tree;
   /// Each with one number per output of a hidden layer, not negative; nobody reads those of outputs without ReLU.
   std::vector<std::vector<double>> multipliers;
-  /// Conflicts that go with each multipliers, or nothing at all. In a part that decides one of the two neurons, or where
-  /// lambda does not show it, a conflict counts for nothing.
+  /// Conflicts that go with each multipliers, or nothing at all. In a part that decides one of the two neurons, or
+  /// where lambda does not show it, a conflict counts for nothing.
   std::vector<std::vector<Conflict>> conflicts = {};
   std::vector<Form> forms = {};
 };
@@ -62,21 +62,22 @@ struct TreeVerdict {
   long leaves = 0;
 };
 
-/// Whether |f(x) - f(y)|^2 <= rho |x - y|^2 for all x, y of the box, shown by the tree. The parts cover the box: a split
-/// is followed by both halves, which share the plane of the cut. The slope of f along a segment is bounded by that of
-/// the parts it crosses, so each part may be proved alone.
+/// Whether |f(x) - f(y)|^2 <= rho |x - y|^2 for all x, y of the box, shown by the tree. The parts cover the box: a
+/// split is followed by both halves, which share the plane of the cut. The slope of f along a segment is bounded by
+/// that of the parts it crosses, so each part may be proved alone.
 ///
 /// A part. Its neurons have bounds (box_states.h). For the derivatives at almost every point of the part, dz = dy for a
 /// neuron whose y stays positive, and for an output without ReLU, dz = 0 where it stays negative, and dz (dy - dz) >= 0
-/// otherwise. Of two neurons in conflict one has u = 0, with u = dz (on) or dy - dz (off): u_1 u_2 = 0. With multipliers
-/// t >= 0 of the undecided, s of either sign of the conflicts, and everything expressed in (dx, dz of the undecided), the
-/// claim follows from
+/// otherwise. Of two neurons in conflict one has u = 0, with u = dz (on) or dy - dz (off): u_1 u_2 = 0. With
+/// multipliers t >= 0 of the undecided, s of either sign of the conflicts, and everything expressed in (dx, dz of the
+/// undecided), the claim follows from
 ///   S = rho I_x - F' G F - sum_i t_i (a_i e_i' + e_i a_i') - sum_c s_c (p_c q_c' + q_c p_c') >= 0,
-/// with a_i = (dy_i in these variables) - e_i, and p_c, q_c one of e_i (on) and a_i (off) for the conflict's two neurons.
+/// with a_i = (dy_i in these variables) - e_i, and p_c, q_c one of e_i (on) and a_i (off) for the conflict's two
+/// neurons.
 ///
 /// A form holds in a part if |drho|^2 <= dv' Q dv for the derivatives there, by the same inequality with Q in place of
-/// rho I, over dv and the neurons of rho that the part leaves undecided. G = W' Q W then, in it and in what it is halved
-/// into, until another form takes its place.
+/// rho I, over dv and the neurons of rho that the part leaves undecided. G = W' Q W then, in it and in what it is
+/// halved into, until another form takes its place.
 ///
 /// S is computed in double together with a bound on the norm of what rounding changed, scaled to a unit diagonal by
 /// powers of two, shifted down by that bound and by what a Cholesky factorisation in double may overlook,
@@ -87,8 +88,8 @@ TreeVerdict check_tree(const LocalFunction& f, const std::vector<double>& lower,
 TreeVerdict check_tree(const LocalFunction& f, const std::vector<Sides>& boxes, double rho,
                        const TreeProof& proof);
 
-/// Whether least <= y <= most for the outputs y of the last layer, which has no ReLU, all over the box: over each leaf of
-/// the tree by neuron_bounds(). Leaves are "t0": there are no multipliers.
+/// Whether least <= y <= most for the outputs y of the last layer, which has no ReLU, all over the box: over each leaf
+/// of the tree by neuron_bounds(). Leaves are "t0": there are no multipliers.
 TreeVerdict check_range(const std::vector<HiddenLayer>& layers, const std::vector<double>& lower,
                         const std::vector<double>& upper, const std::string& tree,
                         const std::vector<double>& least, const std::vector<double>& most);

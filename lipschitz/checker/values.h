@@ -1,4 +1,5 @@
-/// @file Values over boxes in exact arithmetic: intervals of layers and of sums, and how far off a float32 evaluation is.
+/// @file Values over boxes in exact arithmetic: intervals of layers and of sums, and how far off a float32 evaluation
+/// is.
 #pragma once
 
 #include <optional>
@@ -32,13 +33,13 @@ struct SumTerm : Bounded {
 /// Of the sum of all terms.
 Intervals sum_intervals(const std::vector<SumTerm>& terms, std::size_t size);
 
-/// How far, entry by entry, what float32 arithmetic computes of W h + b at most is from its value at h, if what it computed
-/// before is within `error` of h. Sums of products in any order, with or without fused multiply-adds. Nothing where it might
-/// overflow, or with more than 2^23 summands.
+/// How far, entry by entry, what float32 arithmetic computes of W h + b at most is from its value at h, if what it
+/// computed before is within `error` of h. Sums of products in any order, with or without fused multiply-adds. Nothing
+/// where it might overflow, or with more than 2^23 summands.
 ///
-/// With u = 2^-24, an operation with exact result r returns r (1 + d) + e, |d| <= u, |e| <= 2^-150. A sum of n such summands
-/// whose absolute values sum up to m is off by at most ((1 + u)^n - 1) m + (2 n - 1) 2^-150 (1 + u)^n (by induction over the
-/// additions), and that by at most (n u + n^2 u^2) m + n 2^-148 while n u <= 1/2.
+/// With u = 2^-24, an operation with exact result r returns r (1 + d) + e, |d| <= u, |e| <= 2^-150. A sum of n such
+/// summands whose absolute values sum up to m is off by at most ((1 + u)^n - 1) m + (2 n - 1) 2^-150 (1 + u)^n (by
+/// induction over the additions), and that by at most (n u + n^2 u^2) m + n 2^-148 while n u <= 1/2.
 std::optional<std::vector<Dyadic>> layer_error(const files::Layer& layer, const Intervals& inputs,
                                                const std::vector<Dyadic>& error);
 /// The same of a sum of terms that starts from zero.

@@ -2,7 +2,8 @@
 //
 // The truth is a formula of our own, so that the project ships no one's data: a neighbour at height z > 0 above pushes
 // a vehicle down by
-//   F = 9 gf * ramp(z) * 0.45 / (0.15 + z) / (1 + (r / s)^2)^2,   s = 0.06 m + 0.1 z,   ramp = clamp((z - 0.05) / 0.1, 0, 1),
+//   F = 9 gf * ramp(z) * 0.45 / (0.15 + z) / (1 + (r / s)^2)^2,   s = 0.06 m + 0.1 z,   ramp = clamp((z - 0.05) / 0.1,
+//   0, 1),
 // with r the lateral distance to the wake, which moves with 0.15 s/m of the relative velocity; forces of several
 // neighbours add as momentum fluxes, f = -sqrt(sum F^2). It is about as strong as between two Crazyflies and
 // otherwise a caricature. The fit is deliberately small; nothing is claimed for it but its certified bounds.

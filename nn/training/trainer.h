@@ -22,8 +22,9 @@ struct TrainerOptions {
 /// Minimises deep_set_loss() / (sum of weights) with Adam and spectral normalisation after every step.
 ///
 /// A batch is cut into pieces of kPiece samples, whose gradients are summed in their order: the same bits for any
-/// number of threads and on every processor of one instruction set. Everything that a step depends on is in theta, adam, the norms' vectors, the epoch's number, and
-/// what weigh() and tighten() were told, so that a run can be taken up again at the end of any epoch.
+/// number of threads and on every processor of one instruction set. Everything that a step depends on is in theta,
+/// adam, the norms' vectors, the epoch's number, and what weigh() and tighten() were told, so that a run can be taken
+/// up again at the end of any epoch.
 class Trainer {
  public:
   /// @param layout, data must outlive the trainer.

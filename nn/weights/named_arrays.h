@@ -16,9 +16,9 @@ struct NamedArray {
   bool is_float32 = false;      ///< stored as float32 or float16
 };
 
-/// Layers out of pairs of names: "fc1.weight" and "fc1.bias", "fc1_weight" and "fc1_bias", "W1" and "b1", "weights_1" and
-/// "biases_1"; or out of NumPy's "arr_0", "arr_1", ..., where each matrix may be followed by its biases. Matrices are
-/// [outputs, inputs]; biases may be rows or columns. Layers follow one another by the numbers in their names.
+/// Layers out of pairs of names: "fc1.weight" and "fc1.bias", "fc1_weight" and "fc1_bias", "W1" and "b1", "weights_1"
+/// and "biases_1"; or out of NumPy's "arr_0", "arr_1", ..., where each matrix may be followed by its biases. Matrices
+/// are [outputs, inputs]; biases may be rows or columns. Layers follow one another by the numbers in their names.
 /// @throws InputError if an array is neither, or as assemble().
 Weights network_of_arrays(const std::vector<NamedArray>& arrays, const std::string& path,
                           const std::vector<std::string>& order);

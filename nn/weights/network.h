@@ -52,8 +52,8 @@ struct Network {
   std::optional<GammaStatement> gamma;
 };
 
-/// Numbers that a quantity has: one for "force_z", the vertical force; three for "force" and "torque", along the axes of
-/// the world, as the inputs are. 0 where it is empty.
+/// Numbers that a quantity has: one for "force_z", the vertical force; three for "force" and "torque", along the axes
+/// of the world, as the inputs are. 0 where it is empty.
 int components(const std::string& quantity);
 
 /// @throws InputError if the network states another output than the vertical force, which is what flight code takes.
@@ -72,8 +72,8 @@ struct NetworkArguments {
       {};  ///< between the layers of every weight file: see with_activation(); empty: not stated
 };
 
-/// @throws InputError that names the part, if a part of NET has another activation than ReLU; `what` says what is for ReLU
-///   networks only.
+/// @throws InputError that names the part, if a part of NET has another activation than ReLU; `what` says what is for
+///   ReLU networks only.
 void require_relu(const Network& network, const std::string& what);
 
 /// Whether every network that `function` passes through has ReLU (functions.h).
@@ -87,8 +87,9 @@ Network with_activation(Network network, const std::string& activation);
 /// load_network() there.
 Network load_any_network(const NetworkArguments& arguments);
 
-/// Loads NET, whose activation must be ReLU. A `file` is a network.toml if its name ends in ".toml" or its text names that
-/// schema. Weight files named in a network.toml are relative to its folder, which also states the order of their layers.
+/// Loads NET, whose activation must be ReLU. A `file` is a network.toml if its name ends in ".toml" or its text names
+/// that schema. Weight files named in a network.toml are relative to its folder, which also states the order of their
+/// layers.
 /// @throws InputError with line, field, value and hint; unknown keys are errors that suggest a known one. Throws what
 ///   require_relu() throws as well.
 Network load_network(const NetworkArguments& arguments);
@@ -99,7 +100,8 @@ Network as_float32(Network network);
 /// Reads the weight file at a path; `order` as in load_weights().
 using WeightsLoader = std::function<Weights(const std::string& path, const std::vector<std::string>& order)>;
 
-/// A network.toml from memory, with any activation: `path` gives its folder and the name in messages, `load` reads the weight files.
+/// A network.toml from memory, with any activation: `path` gives its folder and the name in messages, `load` reads the
+/// weight files.
 /// @throws InputError as load_network().
 Network parse_network(const std::string& text, const std::string& path, const WeightsLoader& load);
 

@@ -12,14 +12,11 @@ namespace {
 
 constexpr char kOperators[] =
     "is none of the operators that can be read: Gemm, MatMul, Conv, BatchNormalization, AveragePool, "
-    "MaxPool, Add, "
-    "Sub, Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Tanh, Sigmoid, Softplus, Elu, "
-    "Gelu, "
-    "Flatten, Reshape, Transpose, Concat and the like";
+    "MaxPool, Add, Sub, Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Tanh, Sigmoid, "
+    "Softplus, Elu, Gelu, Flatten, Reshape, Transpose, Concat and the like";
 constexpr char kSmooth[] =
     "leave it out of the exported model where it is the last node; a network with it between its layers "
-    "cannot be "
-    "read: train with ReLU, LeakyReLU, Hardtanh, tanh, sigmoid, softplus, ELU, SELU, SiLU or GELU";
+    "cannot be read: train with ReLU, LeakyReLU, Hardtanh, tanh, sigmoid, softplus, ELU, SELU, SiLU or GELU";
 
 bool is_unread_activation(const std::string& type) {
   static const std::set<std::string> kTypes = {"Erf", "Exp", "Mish", "HardSwish", "Softsign"};

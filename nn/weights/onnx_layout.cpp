@@ -1,4 +1,5 @@
-// The operators of OnnxGraph that move numbers and compute none: Pad, Cast, Flatten, Reshape, Squeeze, Transpose, Concat.
+// The operators of OnnxGraph that move numbers and compute none: Pad, Cast, Flatten, Reshape, Squeeze, Transpose,
+// Concat.
 #include <algorithm>
 #include <cmath>
 #include <utility>

@@ -23,7 +23,8 @@ struct EffectiveTensors {
 
 /// spectral_norm, old style (weight_orig, weight_u, weight_v) and new (parametrizations.weight.original, 0._u, 0._v):
 /// W / (u' W v) with the stored u and v, as PyTorch evaluates it after eval().
-/// weight_norm over the outputs, old style (weight_g, weight_v) and new (original0, original1): row i is g_i v_i / |v_i|.
+/// weight_norm over the outputs, old style (weight_g, weight_v) and new (original0, original1): row i is g_i v_i /
+/// |v_i|.
 /// @throws InputError where one of these tensors is missing, has another shape or is not finite, or the divisor is 0.
 EffectiveTensors effective_tensors(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
                                    const std::string& path);

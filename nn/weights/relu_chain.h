@@ -26,8 +26,8 @@ class ReluChain {
   /// @throws FoldingLimit.
   AffineMap relu(const AffineMap& rows, const std::vector<AffineMap*>& carried, const std::string& name);
 
-  /// Adds a layer with any activation s that acts entry by entry. @return s(rows) as a map of the new layer's outputs; all
-  /// values before it are given up.
+  /// Adds a layer with any activation s that acts entry by entry. @return s(rows) as a map of the new layer's outputs;
+  /// all values before it are given up.
   /// @throws FoldingLimit.
   AffineMap activated(const AffineMap& rows, const std::string& name) { return relu(rows, {}, name); }
 

@@ -49,16 +49,16 @@ struct Worst {
 [[noreturn]] void refuse_samples(const Samples& samples, const Worst& worst, const std::vector<double>& input,
                                  double tolerance, bool is_clamped_there) {
   const auto outputs = static_cast<std::size_t>(samples.outputs);
-  throw InputError({samples.path, samples.place(worst.sample), "output " + std::to_string(worst.output),
-                    short_text(samples.y[worst.sample * outputs + worst.output]),
-                    "the function of the weight file gives " + short_text(worst.computed) +
-                        " at the inputs " + listed(input) + ", the worst of " +
-                        std::to_string(samples.count()) + " samples (tolerance " + short_text(tolerance) +
-                        ")",
-                    is_clamped_there ? "this input lies outside input.clamp: record inputs inside it"
-                                     : "the file is of another network than the one recorded: another order "
-                                       "of layers (--order), another "
-                                       "activation (--activation), a skip connection, or other weights"});
+  throw InputError(
+      {samples.path, samples.place(worst.sample), "output " + std::to_string(worst.output),
+       short_text(samples.y[worst.sample * outputs + worst.output]),
+       "the function of the weight file gives " + short_text(worst.computed) + " at the inputs " +
+           listed(input) + ", the worst of " + std::to_string(samples.count()) + " samples (tolerance " +
+           short_text(tolerance) + ")",
+       is_clamped_there
+           ? "this input lies outside input.clamp: record inputs inside it"
+           : "the file is of another network than the one recorded: another order of layers (--order), "
+             "another activation (--activation), a skip connection, or other weights"});
 }
 
 }  // namespace

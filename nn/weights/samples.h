@@ -26,8 +26,8 @@ struct Samples {
 };
 
 /// Reads samples of parts of NET, by name of the part. The format is found from the content:
-/// - CSV: per line the inputs, then the outputs, separated by commas, semicolons, tabs or blanks. The first line may name
-///   the columns, lines that begin with # are left out.
+/// - CSV: per line the inputs, then the outputs, separated by commas, semicolons, tabs or blanks. The first line may
+///   name the columns, lines that begin with # are left out.
 /// - .npz (numpy.savez): arrays `inputs` [count x inputs] and `outputs` [count x outputs], float32 or float64.
 /// - JSON: {"inputs": [[...]], "outputs": [[...]]}; of several parts {"networks": {"phi:small": {"inputs": ..., ...}}}.
 /// @param argument "FILE", or "PART=FILE" for samples of that part. A FILE that does not name a part is of the plain

@@ -28,7 +28,8 @@ using TensorReader = std::function<std::vector<double>(std::size_t)>;
 
 /// Groups `tensors` into layers, in the order of evaluation: see decide_layer_order(), to which `listing` and `order`
 /// go.
-/// @throws InputError if a tensor is not a layer's weight or bias, as decide_layer_order(), or if the precisions differ or are neither float32 nor float64, or a number is not finite.
+/// @throws InputError if a tensor is not a layer's weight or bias, as decide_layer_order(), or if the precisions differ
+/// or are neither float32 nor float64, or a number is not finite.
 Weights assemble(const std::vector<DeclaredTensor>& tensors, const TensorReader& read,
                  const std::string& path, Listing listing, const std::vector<std::string>& order);
 

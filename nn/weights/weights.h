@@ -64,8 +64,8 @@ struct Weights {
 
 /// Reads a weight file. The format is found from the content, not from the name: PyTorch state dicts (`.pth`, zip
 /// and legacy pickle, strided views, weights under spectral_norm and weight_norm), safetensors, ONNX models of affine
-/// and piecewise linear operations or with one smooth activation, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and the C source that the networks'
-/// authors generate.
+/// and piecewise linear operations or with one smooth activation, NumPy's .npz, MATLAB's .mat (version 5), .nnet, and
+/// the C source that the networks' authors generate.
 /// A layer is a 2-D tensor `<name>.weight` with an optional 1-D `<name>.bias`. Which layer follows which, ONNX models,
 /// .nnet and our safetensors state; for other files see decide_layer_order().
 /// @param path where no such file exists, "FILE#KEY" is FILE with the key KEY.

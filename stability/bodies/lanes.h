@@ -41,8 +41,8 @@ class Lanes {
   /// reset here. (A type of which the flight code has no variables: a compiler then knows that comparing changes none.)
   static inline thread_local std::uint64_t split = 0;
 
-  /// The outcome of a comparison in each lane. The code takes one path when it turns into a bool; conditions that && and
-  /// || join do so together, which changes no outcome, since comparing has no effect of its own.
+  /// The outcome of a comparison in each lane. The code takes one path when it turns into a bool; conditions that
+  /// && and || join do so together, which changes no outcome, since comparing has no effect of its own.
   struct Choice {
     Mask m;
 

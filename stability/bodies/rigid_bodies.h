@@ -1,7 +1,7 @@
 /// @file Equations of motion of many vehicles side by side: up to eight at a time where the processor can.
 ///
-/// All numbers lie in rows of eight vehicles, a cache line each: see row_index(). Places are then known when the code is
-/// compiled, and no register straddles two lines.
+/// All numbers lie in rows of eight vehicles, a cache line each: see row_index(). Places are then known when the code
+/// is compiled, and no register straddles two lines.
 #pragma once
 
 #include <cstddef>

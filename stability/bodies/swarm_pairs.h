@@ -37,7 +37,8 @@ class SwarmPairs {
   class Layout {
    public:
     int states() const { return states_; }
-    /// Pairs, of all states. There are numbers for whole lines of kRowLength: those to spare are of a vehicle with itself.
+    /// Pairs, of all states. There are numbers for whole lines of kRowLength: those to spare are of a vehicle with
+    /// itself.
     int count() const { return count_; }
     int lines() const { return static_cast<int>(lines_for(static_cast<std::size_t>(count_))); }
     /// Where the two lie in the rows of a swarm's state: row_index(vehicle, kVehicleStateSize). In the second of two

@@ -8,9 +8,9 @@
 namespace swarmcert::stability {
 namespace {
 
-/// argmin over u of sum_i weight_i |u_i - h_i| + sum_i |u_(i+1) - u_i|, u = 0 before and after: exact. The derivative of
-/// the optimal cost up to i is a nondecreasing staircase, kept as its jumps; a term of the total variation clips it to
-/// [-1, 1] (Johnson, J. Comput. Graph. Stat. 22, 2013).
+/// argmin over u of sum_i weight_i |u_i - h_i| + sum_i |u_(i+1) - u_i|, u = 0 before and after: exact. The derivative
+/// of the optimal cost up to i is a nondecreasing staircase, kept as its jumps; a term of the total variation clips it
+/// to [-1, 1] (Johnson, J. Comput. Graph. Stat. 22, 2013).
 class TotalVariation {
  public:
   TotalVariation(const std::vector<double>& h, const std::vector<double>& weight) : h_(h), weight_(weight) {}

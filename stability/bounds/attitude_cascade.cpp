@@ -10,8 +10,8 @@
 namespace swarmcert::stability {
 namespace {
 
-/// The loop cut at the motors: open(s) + feedback(s) is its characteristic polynomial, and a delay of the motors multiplies
-/// `feedback` alone.
+/// The loop cut at the motors: open(s) + feedback(s) is its characteristic polynomial, and a delay of the motors
+/// multiplies `feedback` alone.
 struct CutLoop {
   Polynomial lag;  ///< L N, N = rate_lag s + 1 of the measured body rate; L without attitude
   Polynomial law;  ///< ratio (Kw s^2 + (KR s + KI) N)/J without a factor s where KI = 0; 1 without attitude

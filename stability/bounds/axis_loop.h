@@ -43,8 +43,8 @@ struct GainNorms {
 /// Exact norms of the continuous loop (to rounding, see response_norms()).
 GainNorms continuous_norms(const AxisLoop& loop, Channel channel);
 
-/// The same for an error n of an estimate in place of f, per m/s or per m: for |n'| <= 1, |n| <= 1, total variation of n
-/// 1, int |n| dt = 1. e is the true error. A constant error of the position is followed, so its `rate` is infinite.
+/// The same for an error n of an estimate in place of f, per m/s or per m: for |n'| <= 1, |n| <= 1, total variation of
+/// n 1, int |n| dt = 1. e is the true error. A constant error of the position is followed, so its `rate` is infinite.
 GainNorms continuous_norms(const AxisLoop& loop, Estimate estimate);
 
 /// sup h - inf h: worst error of one pulse of unit amplitude that rises once and falls once, m/N.

@@ -10,8 +10,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// exp(G t) of an interval matrix: Taylor sum of G t / 2^k, whose rows sum to at most 1/4, squared k times. What the sum
-/// misses is below 0.25^18/18! (1 + 1/64) < 3e-27 in the row-sum norm, so in every entry.
+/// exp(G t) of an interval matrix: Taylor sum of G t / 2^k, whose rows sum to at most 1/4, squared k times. What the
+/// sum misses is below 0.25^18/18! (1 + 1/64) < 3e-27 in the row-sum norm, so in every entry.
 IntervalMatrix exponential(const IntervalMatrix& generator, Interval t) {
   const std::size_t n = generator.size();
   IntervalMatrix scaled(n);

@@ -1,4 +1,5 @@
-/// @file swarm.toml: vehicles of one kind whose forces depend on each other's motion, and whether their errors stay bounded.
+/// @file swarm.toml: vehicles of one kind whose forces depend on each other's motion, and whether their errors stay
+/// bounded.
 #pragma once
 
 #include <optional>

@@ -109,8 +109,8 @@ double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double am
   const double horizon_s = 25 / slowest;  // e^-25 of the rate bound is left out of the split, and added below
   const double step_s = horizon_s / (nodes - 1);
   const auto cells = static_cast<std::size_t>(nodes) - 1;
-  // h bends away from its chord by at most step^2/8 sup |h''|, over all cells step^2/12 |h''|_1 to leading order, doubled
-  // for the variation of h'' inside a cell; shared out evenly, as only the sum counts. After the horizon u = 0.
+  // h bends away from its chord by at most step^2/8 sup |h''|, over all cells step^2/12 |h''|_1 to leading order,
+  // doubled for the variation of h'' inside a cell; shared out evenly, as only the sum counts. After the horizon u = 0.
   const double between = step_s * step_s / 6 * response_norms(h).curvature_integral;
   const StepResponse step = {sampled_response(h, step_s, nodes), std::vector<double>(cells, step_s),
                              std::vector<double>(cells, between / static_cast<double>(cells)),

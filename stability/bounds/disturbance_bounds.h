@@ -78,8 +78,9 @@ struct ClampBounds {
   }
 };
 
-/// @param loop with the integral gain as it acts. @param limit_m_s infinite: none. @param integral_share what the firmware adds to its integrator
-///   per second of error: 1 unless its step differs from its period. For a sampled loop's own clamp see sampled_bounds.h.
+/// @param loop with the integral gain as it acts. @param limit_m_s infinite: none. @param integral_share what the
+///   firmware adds to its integrator per second of error: 1 unless its step differs from its period. For a sampled
+///   loop's own clamp see sampled_bounds.h.
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
                          const OtherErrors& other, double limit_m_s, double integral_share = 1);
 

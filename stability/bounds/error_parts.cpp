@@ -19,7 +19,8 @@ double part(double size, const Gain& gain) {
   return size == 0 ? 0 : std::abs(size) * gain();
 }
 
-/// The largest response of `output`, a row over the state after control, to e = 1 or e' = 1 before the control at t = 0.
+/// The largest response of `output`, a row over the state after control, to e = 1 or e' = 1 before the control at t =
+/// 0.
 struct InitialResponse {
   double to_position = 0, to_velocity = 0;
 };
@@ -108,7 +109,8 @@ double acceleration_age_s(const AxisLoop& loop) {
 }
 double acceleration_age_s(const SampledLoop& loop) { return acceleration_age_s(loop.plant) + loop.period_s; }
 
-/// What the reference demands of the integrator: its jumps as starts away from it, its jerk as a force of age times jerk.
+/// What the reference demands of the integrator: its jumps as starts away from it, its jerk as a force of age times
+/// jerk.
 /// @param position, speed, force demands per m, per m/s and per m/s^2.
 template <class AnyLoop, class Position, class Speed, class Force>
 double reference_demand(const AnyLoop& loop, const ReferenceMotion& reference, const Position& position,
@@ -197,8 +199,8 @@ double drift_gain(const SampledLoop& loop) {
 }
 
 double initial_position_gain(const AxisLoop& loop) {
-  // e = (s^2 L + s Kd exp(-Ts)) / D. With a delay the second term comes later by T, in which it moves by at most T times
-  // its steepest slope.
+  // e = (s^2 L + s Kd exp(-Ts)) / D. With a delay the second term comes later by T, in which it moves by at most T
+  // times its steepest slope.
   const double together = response_norms(initial_position_transfer(loop)).max_abs();
   if (loop.delay_s == 0 || !std::isfinite(together)) return std::max(1.0, together);
   const ResponseNorms command = response_norms(impulse_transfer(loop, Channel::kCommand));

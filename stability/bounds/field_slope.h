@@ -22,8 +22,8 @@ struct FieldSlopes {
   Interval along;   ///< |dg/dz|
 };
 
-/// By subdivision of the strip of r / spread and z, in intervals, to a relative gap of about 1e-3. Infinite slopes where the
-/// field has a jump (no fading) inside the gaps.
+/// By subdivision of the strip of r / spread and z, in intervals, to a relative gap of about 1e-3. Infinite slopes
+/// where the field has a jump (no fading) inside the gaps.
 FieldSlopes field_slopes(const WakeField& field, double least_gap_m, double largest_gap_m);
 
 }  // namespace swarmcert::stability

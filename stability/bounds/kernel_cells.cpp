@@ -39,7 +39,8 @@ Step exponential(const IntervalMatrix& A, double step_s, double size) {
       }
     }
   }
-  // size^18/18! (1 + size/19 + ...) with size <= 1, and 18! > 6.4e15. The series is below 1.06: 1.1 covers what is rounded.
+  // size^18/18! (1 + size/19 + ...) with size <= 1, and 18! > 6.4e15. The series is below 1.06: 1.1 covers what is
+  // rounded.
   step.remainder = 1.1 * nth_power(Interval(size * 1.000001), kTaylorTerms).hi / 6.4e15;
   return step;
 }
@@ -130,7 +131,8 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
     cells.integral.push_back(integral);
     cells.net.push_back(net);
   }
-  // Cell borders k cell_s and sums of step_s differ by a few units in the last place of the time; |y| is at most `peak`.
+  // Cell borders k cell_s and sums of step_s differ by a few units in the last place of the time; |y| is at most
+  // `peak`.
   for (std::size_t k = 0; k < cells.integral.size(); ++k) {
     const double shift_s = 1e-15 * (parts + 4) * static_cast<double>(k + 2) * cell_s;
     const double more = 1e-13 * cells.integral[k] + cells.peak * shift_s;

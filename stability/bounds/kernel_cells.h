@@ -17,13 +17,14 @@ struct KernelCells {
   double total() const;          ///< at least int |y| over all of them
 };
 
-/// Steps of a millisecond or less in coordinates in which the system contracts (contracting_system.h), so that errors of
-/// the computed state never grow; within a step |y| <= max of both ends + step^2/8 sup|y''|.
+/// Steps of a millisecond or less in coordinates in which the system contracts (contracting_system.h), so that errors
+/// of the computed state never grow; within a step |y| <= max of both ends + step^2/8 sup|y''|.
 /// @param y without a delay, strictly proper.
 /// @returns nothing where stability could not be verified.
 std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count);
 
-/// sup |e| for e = y * w from rest, up to the end of each cell, where |w| <= sizes[k] in cell k, time in the same cells:
+/// sup |e| for e = y * w from rest, up to the end of each cell, where |w| <= sizes[k] in cell k, time in the same
+/// cells:
 ///   |e(t)| <= sum_m integral[m] max(sizes[n - m], sizes[n - m - 1])   for t in cell n,
 /// because t - u lies in one of these two cells for u in cell m. Rounded up. It is at most |y|_1 sup|w|, and near
 /// |y|_oo int|w| for a short w: both bounds at once.
@@ -34,9 +35,9 @@ std::vector<double> convolved(const KernelCells& kernel, const std::vector<doubl
 ///   c net[m] + [-r, r] integral[m].
 Interval answer(const KernelCells& kernel, std::size_t m, Interval w);
 
-/// Contains what cells 1, 2, ... of the kernel add to (y * w)(t) for t in cell n, where w is 0 before the start and in w[k]
-/// in cell k < n: for u in cell m, t - u lies in cell n - m or n - m - 1. All of (y * w)(t) is this and answer() of cell 0
-/// to the hull of w[n] and w[n - 1].
+/// Contains what cells 1, 2, ... of the kernel add to (y * w)(t) for t in cell n, where w is 0 before the start and in
+/// w[k] in cell k < n: for u in cell m, t - u lies in cell n - m or n - m - 1. All of (y * w)(t) is this and answer()
+/// of cell 0 to the hull of w[n] and w[n - 1].
 Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& w, std::size_t n);
 
 }  // namespace swarmcert::stability

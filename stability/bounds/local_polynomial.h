@@ -1,4 +1,5 @@
-/// @file Functions that are polynomials on short stretches, up to a bounded error: what they integrate to. Not for users.
+/// @file Functions that are polynomials on short stretches, up to a bounded error: what they integrate to. Not for
+/// users.
 #pragma once
 
 #include <algorithm>

@@ -29,10 +29,11 @@ class SampledAdjoint {
   const SampledModel& model() const { return model_; }
   static constexpr double kMostPeriods = 3e6;
 
-  /// Calls visit(start, slope, length): the kernel from a force to the output is start + slope u, u growing backwards in
-  /// time, on stretches that follow one another; the first is the part of the period before the moment looked at. Ends
-  /// where the kernel has fallen to e^-42, or where one real mode is all that is left: then every further period has
-  /// `ratio` times the kernel of the one before, and finish(start, slope, length, ratio) is called with the next one.
+  /// Calls visit(start, slope, length): the kernel from a force to the output is start + slope u, u growing backwards
+  /// in time, on stretches that follow one another; the first is the part of the period before the moment looked at.
+  /// Ends where the kernel has fallen to e^-42, or where one real mode is all that is left: then every further period
+  /// has `ratio` times the kernel of the one before, and finish(start, slope, length, ratio) is called with the next
+  /// one.
   template <class Visit, class Finish>
   void force_kernel(double phase_s, const Visit& visit, const Finish& finish) const {
     if (output_ == Output::kError) visit(0.0, 1.0, phase_s);

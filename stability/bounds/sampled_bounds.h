@@ -14,8 +14,8 @@ namespace swarmcert::stability {
 DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
                                      const Disturbance& disturbance);
 
-/// What a clamp of the integrator's state does. The demand is the exact gain to that state; the bounds that hold with an
-/// acting clamp are those of the loop without integral, to which the integral is an error of its command.
+/// What a clamp of the integrator's state does. The demand is the exact gain to that state; the bounds that hold with
+/// an acting clamp are those of the loop without integral, to which the integral is an error of its command.
 /// @param limit_m_s on the state I that firmware keeps (it adds integrator_step_s e per period).
 ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
                          const OtherErrors& other, double limit_m_s);

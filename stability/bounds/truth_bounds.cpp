@@ -72,7 +72,8 @@ void field_bounds(const WakeField& field, double strength_N, double composition,
   }
 }
 
-/// How neighbours move that are seen where they were at their velocity `delay_s` ago: dp - d v_j has the rate dv - d v_j'.
+/// How neighbours move that are seen where they were at their velocity `delay_s` ago: dp - d v_j has the rate dv - d
+/// v_j'.
 MotionSet seen_late(MotionSet motion, double delay_s) {
   const double moved_m = times_up(delay_s, motion.speed_m_s);
   motion.relative_speed_m_s = plus(motion.relative_speed_m_s, times_up(delay_s, motion.acceleration_m_s2));
@@ -159,7 +160,8 @@ void bound_rotors(const Values& value, const MotionSet& m, EffectBounds& result)
 }
 
 void bound_surface(const std::string& name, const Values& value, const MotionSet& m, EffectBounds& result) {
-  // f = a g T b3 with g = exp(-distance/b): |f'| <= a g (|(T b3)'| + T |v_z|/b). The clamps at the surfaces only reduce.
+  // f = a g T b3 with g = exp(-distance/b): |f'| <= a g (|(T b3)'| + T |v_z|/b). The clamps at the surfaces only
+  // reduce.
   const double decay_m = value("decay_m");
   const double nearest_m = name == "ground"
                                ? down(std::max(m.least_height_m, 0.0) - value("height_reference_m"))

@@ -7,9 +7,9 @@
 // Both are a derivative of something small: a - r a0 = r dw/dt with
 // |w|_oo <= W |a0|_oo, W = |tau - tau0| + |T - T0|. Besides, |Delta_L|_1 <= 2 |tau - tau0|/tau.
 // So the true loop is the centre's under the further force d = (r - 1) a0 + r dw/dt. All commutes: with M the
-// complementary response of the centre (from a force to -a0) and lambda the norm of d against its force, every gain is at
-// most the centre's over 1 - lambda, times |1 + Delta_L|_1 where the disturbance passes the actuators; so is M's and that
-// of its derivative, with r (1 + Delta_L) in front.
+// complementary response of the centre (from a force to -a0) and lambda the norm of d against its force, every gain is
+// at most the centre's over 1 - lambda, times |1 + Delta_L|_1 where the disturbance passes the actuators; so is M's and
+// that of its derivative, with r (1 + Delta_L) in front.
 //
 // Second derivatives. D = L s^3 + r F e^(-Ts), F = Kd s^2 + Kp s + Ki, M = r F e^(-Ts)/D, S = 1 - M, x = 1/(tau s + 1)
 // the motors' part of L, y = L/D (force) or 1/D (command, whose own delay norms do not see):

@@ -45,14 +45,14 @@ struct UncertainNorms {
 };
 
 /// Supremum of each gain over the box. Of all vehicles with the same ratio of thrust to mass the lightest has the
-/// largest gains: it lies on one of two edges, that of the least mass or that of the least thrust, so parts are boxes of
-/// (ratio, lag, delay) on an edge. Over a part a gain is at most its largest at the corners, plus what the response may
-/// bend between them: a norm is convex, so that of a multilinear interpolation is largest at a corner, and interpolation
-/// misses a response by (width^2/8 sup |second derivative|) of each dimension, no mixed ones. Derivatives are bounded
-/// over the part by a small gain around its centre; see uncertain_continuous.cpp and uncertain_sampled.cpp. Where that
-/// gives nothing yet, small gain alone does. The part farthest from what was reached is halved in the dimension that
-/// adds most. Norms at points are those of continuous_norms() and sampled_norms(), to rounding. Infinite upper: not
-/// proved stable.
+/// largest gains: it lies on one of two edges, that of the least mass or that of the least thrust, so parts are boxes
+/// of (ratio, lag, delay) on an edge. Over a part a gain is at most its largest at the corners, plus what the response
+/// may bend between them: a norm is convex, so that of a multilinear interpolation is largest at a corner, and
+/// interpolation misses a response by (width^2/8 sup |second derivative|) of each dimension, no mixed ones. Derivatives
+/// are bounded over the part by a small gain around its centre; see uncertain_continuous.cpp and uncertain_sampled.cpp.
+/// Where that gives nothing yet, small gain alone does. The part farthest from what was reached is halved in the
+/// dimension that adds most. Norms at points are those of continuous_norms() and sampled_norms(), to rounding. Infinite
+/// upper: not proved stable.
 /// @param loop mass: what the controller was told; gains as written; lags: those that do not vary (attitude).
 UncertainNorms uncertain_norms(const AxisLoop& loop, const UncertainPlant& plant, Channel channel,
                                const UncertainEffort& effort = {});

@@ -40,8 +40,8 @@ struct PlantBox {
 };
 
 /// Over a box: every gain per 1 kg (times the ratio on the edge of least thrust) is at most `first_order`, and at most
-/// (its largest at the corners + sum of absolute + between_samples)/(1 - sum of relative); `absolute` times the ratio on
-/// that edge, too.
+/// (its largest at the corners + sum of absolute + between_samples)/(1 - sum of relative); `absolute` times the ratio
+/// on that edge, too.
 struct PlantBends {
   FourGains first_order = {kInfinity, kInfinity, kInfinity, kInfinity};
   std::array<PlantPoint, 4> absolute{}, relative{};  ///< by gain, then dimension

@@ -3,9 +3,9 @@
 // Operators on signals over time; what samples does not commute with what shifts. A = x A' e^(-Ts) the actuators,
 // x = 1/(tau s + 1), u the command, a = r A u, e'' = a + f. E: force to e; M: force to a; N = 1 + M: force to e''.
 //
-// Small gain around the centre, as in uncertain_continuous.cpp, a0 what the centre's actuators would give: the true loop
-// is the centre's under the further force d = eps a0 + r dw/dt, eps = r - 1, |w| <= W |a0|. With G the amplitude gain
-// (to e or a0) and V the gain from w (the total variation of the kernel), |a0| <= N_a/(1 - lambda),
+// Small gain around the centre, as in uncertain_continuous.cpp, a0 what the centre's actuators would give: the true
+// loop is the centre's under the further force d = eps a0 + r dw/dt, eps = r - 1, |w| <= W |a0|. With G the amplitude
+// gain (to e or a0) and V the gain from w (the total variation of the kernel), |a0| <= N_a/(1 - lambda),
 // lambda = eps G_a + r W V_a, and |e| <= N_e + (eps G_e + r W V_e) |a0|, N of the class; V over the box alike.
 // For ramps a0 is unbounded; but n = a0 + f/r is not: d = eps n - (eps/r) f + r dw_n/dt - (a disturbance below
 // W |f'|), so |n| <= (N_n/r + G_a W)/(1 - lambda), N_n the gain from f' to a0 + f, and
@@ -17,9 +17,9 @@
 // the same with s for s x in T (x and s commute with A, not with E and M):
 //   force:   E_rr = 2/r^2 E M M,    (r E)_rr = 2/r E N M,    E_tautau = 2 E (s x) N (s x) M,  E_TT = E s (1 + 2 M) s M;
 //   command: E A: the last M is M A in r, 2/r^2 E M (M A), (r E A)_rr = 2/r E M (N A), and N A in tau and T.
-// M f, N A c: the accelerations that answer the class; (s x) of them is x times their slope, |x|_1 = 1, |s x|_1 = 2/tau;
-// E s is V_e, N (s x) <= 2/tau + V_a. Of ramps only N f = n is bounded: E M M f = E M n - E n + E f, E N M f = E M n.
-// A short command error c: E s s A c is (E s A' c - E s A c)/tau, each below sup |kernel(v + h) - kernel(v)|/h.
+// M f, N A c: the accelerations that answer the class; (s x) of them is x times their slope, |x|_1 = 1, |s x|_1 =
+// 2/tau; E s is V_e, N (s x) <= 2/tau + V_a. Of ramps only N f = n is bounded: E M M f = E M n - E n + E f, E N M f = E
+// M n. A short command error c: E s s A c is (E s A' c - E s A c)/tau, each below sup |kernel(v + h) - kernel(v)|/h.
 // Between samples |e| exceeds the larger of its neighbours by at most h^2/8 sup|a + f|.
 #include <optional>
 #include <utility>
@@ -80,10 +80,10 @@ struct Actuators {
   double slope_by_amplitude = kInfinity;  ///< of a0, per force
 };
 
-/// a0 at all times: on a period it is a convex combination of its value at the sample, of which at least 1 - share, with
-/// the other lags' outputs and the commands. Its slope is (input - a0)/tau; the difference moves from its value at the
-/// sample toward the slope of the input, a difference of the lag before or of commands; after a fresh command it is a
-/// convex combination of its differences from that.
+/// a0 at all times: on a period it is a convex combination of its value at the sample, of which at least 1 - share,
+/// with the other lags' outputs and the commands. Its slope is (input - a0)/tau; the difference moves from its value at
+/// the sample toward the slope of the input, a difference of the lag before or of commands; after a fresh command it is
+/// a convex combination of its differences from that.
 Actuators actuator_gains(const SampledLoop& loop, const SampledAdjoint& adjoint, Channel channel) {
   using Row = Eigen::RowVectorXd;
   const SampledModel& model = adjoint.model();
@@ -168,7 +168,8 @@ std::optional<OverBox> over_box(const SampledLoop& loop, Channel channel, const 
   const Actuators actuators = actuator_gains(loop, adjoint, channel);
   const OutputGains& a = actuators.a;
   OutputGains e = output_gains(adjoint, adjoint.output_after_control(0), false, channel);
-  // Between samples; a force of variation 1 from rest stays below 1, and f moves less than |f'| (T0 + 2 h) until it acts.
+  // Between samples; a force of variation 1 from rest stays below 1, and f moves less than |f'| (T0 + 2 h) until it
+  // acts.
   const double bend = h * h / 8;
   const double n_rate = is_force ? a.force.rate + loop.plant.delay_s + 2 * h : a.command.rate;
   e.force.rate += bend * n_rate;

@@ -19,9 +19,9 @@ struct UnstableSwarm {
   double largest_error = 0;  ///< in it, over the error at its start: at least 1000
 };
 
-/// Looks for signs, where couplings state none, under which the swarm of linear loops (continuous, command channel, lags included) is unstable: all
-/// combinations of up to eight couplings, else all alike; and replays what it finds with classical Runge-Kutta steps
-/// from one displaced vehicle. Nothing where none is found, or for loops with a delay.
+/// Looks for signs, where couplings state none, under which the swarm of linear loops (continuous, command channel,
+/// lags included) is unstable: all combinations of up to eight couplings, else all alike; and replays what it finds
+/// with classical Runge-Kutta steps from one displaced vehicle. Nothing where none is found, or for loops with a delay.
 /// @throws std::invalid_argument as small_gain().
 std::optional<UnstableSwarm> find_unstable_swarm(const AxisLoop& loop, int vehicles,
                                                  const std::vector<Coupling>& couplings);

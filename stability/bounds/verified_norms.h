@@ -23,17 +23,18 @@ struct VerifiedNorms {
 /// per step by interval Taylor coefficients with remainder, and summed. Between steps the response is its Taylor
 /// polynomial; stretches where its sign is not certain are halved, down to 2^-30 of a step.
 ///
-/// A delay T is treated by the method of steps, verified afterwards (verified_delay.h). Where that takes many pieces, as
-/// the delay is short against the slowest mode, it is expanded first: e^(-Ts) = R(s) + rest, R its Taylor polynomial of
-/// the highest degree k for which D0 = denominator + feedback R is no less proper, one per lag. The rest is
+/// A delay T is treated by the method of steps, verified afterwards (verified_delay.h). Where that takes many pieces,
+/// as the delay is short against the slowest mode, it is expanded first: e^(-Ts) = R(s) + rest, R its Taylor polynomial
+/// of the highest degree k for which D0 = denominator + feedback R is no less proper, one per lag. The rest is
 /// (-s)^(k+1) int_0^T (T - u)^k/k! e^(-us) du (Taylor), a kernel of one sign and of norm T^(k+1)/(k+1)! behind k + 1
 /// derivatives. With lambda = T^(k+1)/(k+1)! |s^(k+1) feedback/D0|_1 (a jump at 0 counts) the true response y is
 /// y0 - k * y, y0 that of D0 and |k|_1 <= lambda: where lambda < 1 the loop is stable (Neumann's series) and every norm
-/// of y lies between those of y0 over 1 + lambda and over 1 - lambda. Lower degrees are tried where that is above 0.001.
+/// of y lies between those of y0 over 1 + lambda and over 1 - lambda. Lower degrees are tried where that is above
+/// 0.001.
 std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel);
 
-/// The same for errors of an estimate, as continuous_norms(): for the doubles of position_error_transfer(), or those of the
-/// command channel times m Kd.
+/// The same for errors of an estimate, as continuous_norms(): for the doubles of position_error_transfer(), or those of
+/// the command channel times m Kd.
 std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Estimate estimate);
 
 }  // namespace swarmcert::stability

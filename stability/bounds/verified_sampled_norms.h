@@ -11,9 +11,9 @@ struct VerifiedSampledNorms {
   VerifiedNorms all_times;   ///< also between samples
 };
 
-/// Encloses what sampled_norms() computes, in real arithmetic, for the doubles of `loop`; a delay within 1e-9 periods of
-/// a whole number of them counts as that number. Without Ki the rate gains are infinite. Nothing where stability could
-/// not be verified.
+/// Encloses what sampled_norms() computes, in real arithmetic, for the doubles of `loop`; a delay within 1e-9 periods
+/// of a whole number of them counts as that number. Without Ki the rate gains are infinite. Nothing where stability
+/// could not be verified.
 ///
 /// The kernel is a row over the states, passed from period to period by a matrix that contracts in the coordinates of
 /// contracting_sampled_system.h, so errors of the computed row never grow; the sums and the tail follow from

@@ -1,4 +1,5 @@
-/// @file The checker of certificates of tracking gains. It depends on GMP and the JSON reader, on nothing that searches.
+/// @file The checker of certificates of tracking gains. It depends on GMP and the JSON reader, on nothing that
+/// searches.
 #pragma once
 
 #include <string>

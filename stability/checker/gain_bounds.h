@@ -36,8 +36,8 @@ std::size_t order(const LoopWitness& loop);
 
 /// x = (y, y', ...) / powers of the time unit, y the response to an impulse; x' = A x, A the companion matrix, exact.
 /// P > 0 and A'P + PA + 2 decay P < 0 are verified by exact elimination. The state goes from cell to cell by the Taylor
-/// sum of exp(A cell) to order 24 in integers over 2^128; what that misses never grows, in the norm of P, and is added up.
-/// Within a cell |f| <= the line through |f| at both ends + cell^2/8 sup|f''|. After the last cell, |r x| <=
+/// sum of exp(A cell) to order 24 in integers over 2^128; what that misses never grows, in the norm of P, and is added
+/// up. Within a cell |f| <= the line through |f| at both ends + cell^2/8 sup|f''|. After the last cell, |r x| <=
 /// sqrt(r P^-1 r') |x|_P, which decays.
 /// @throws std::runtime_error with the reason where the witness shows nothing, or a number is out of range.
 GainBounds upper_gains(const LoopWitness& loop);

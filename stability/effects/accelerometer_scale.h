@@ -5,8 +5,8 @@
 
 namespace swarmcert::stability {
 
-/// The log's specific force is `scale` times the true one. As a force, to first order in what is no thrust: (scale - 1) T b3. In
-/// simulation it acts on the log alone.
+/// The log's specific force is `scale` times the true one. As a force, to first order in what is no thrust: (scale - 1)
+/// T b3. In simulation it acts on the log alone.
 class AccelerometerScale : public MemoryEffect {
  public:
   AccelerometerScale() : MemoryEffect(describe()) {}

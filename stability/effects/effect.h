@@ -166,8 +166,8 @@ class Effect {
   /// has no such distance, zero where it looks at no such neighbour. Monotone in dz_m.
   virtual double reach_m(double dz_m, const double* shape) const;
 
-  /// How much higher a neighbour is where the force bends: its slope or curvature over the height jumps there. Simulation
-  /// steps onto these heights, since a step across one loses its order.
+  /// How much higher a neighbour is where the force bends: its slope or curvature over the height jumps there.
+  /// Simulation steps onto these heights, since a step across one loses its order.
   virtual std::vector<double> bends_m() const { return {}; }
 
  private:

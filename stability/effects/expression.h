@@ -9,14 +9,15 @@
 ///   bounds = { a = [-0.05, 0] }
 ///   grid = { width_m = [0.03, 0.05, 0.08] }
 ///
-/// Shape parameters (width_m) are fitted as well: over `grid` where one is given, else around their value, unless that is
-/// zero or their bounds are equal.
-/// Formulas: force_x_N, force_y_N, force_z_N in the world; force_b1_N, force_b2_N and force_b3_N along the axes of the body (b3: of the thrust); torque_x_Nm .. torque_z_Nm
-/// in the body. Each is linear in the parameters listed under `linear`, without a constant part: checked when read.
-/// Variables: position x y z, velocity vx vy vz (world); b3x b3y b3z; body rates wx wy wz; thrust T; battery V; mass m;
-/// g; time t (or `time`); V (or `battery`); heading and tilt in radians; speed; climb, the velocity along the thrust axis;
-/// vbx vby, the velocity along the other axes of the body. With per_neighbour = true the formulas are summed over the neighbours, with dx dy dz, dvx dvy dvz
-/// (neighbour minus own) and mj, the neighbour's mass.
+/// Shape parameters (width_m) are fitted as well: over `grid` where one is given, else around their value, unless that
+/// is zero or their bounds are equal.
+/// Formulas: force_x_N, force_y_N, force_z_N in the world; force_b1_N, force_b2_N and force_b3_N along the axes of the
+/// body (b3: of the thrust); torque_x_Nm .. torque_z_Nm in the body. Each is linear in the parameters listed under
+/// `linear`, without a constant part: checked when read. Variables: position x y z, velocity vx vy vz (world); b3x b3y
+/// b3z; body rates wx wy wz; thrust T; battery V; mass m; g; time t (or `time`); V (or `battery`); heading and tilt in
+/// radians; speed; climb, the velocity along the thrust axis; vbx vby, the velocity along the other axes of the body.
+/// With per_neighbour = true the formulas are summed over the neighbours, with dx dy dz, dvx dvy dvz (neighbour minus
+/// own) and mj, the neighbour's mass.
 #pragma once
 
 #include "stability/effects/effect.h"

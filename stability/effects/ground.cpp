@@ -14,8 +14,7 @@ EffectInfo Ground::describe() {
   return {"ground",
           "f = a T exp(-(z - z0) / b) b3",
           "fits published flights better than Cheeseman and Bennett 1955 with the radius of one rotor, and "
-          "equals it "
-          "where amplitude, radius and height are free",
+          "equals it where amplitude, radius and height are free",
           "ground",
           "at least a fifth of the time below two rotor radii over the height at which it stands",
           {{"amplitude", "relative thrust gained at the height z0", 0, 0, 1}},

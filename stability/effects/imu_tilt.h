@@ -5,8 +5,8 @@
 
 namespace swarmcert::stability {
 
-/// f = T R (t x e3), t = (tilt_x, tilt_y, 0): the rotors push along R (e3 + t x e3), to first order in t. In simulation the
-/// attitude is that of the unit, so that it is the rotors that are tilted.
+/// f = T R (t x e3), t = (tilt_x, tilt_y, 0): the rotors push along R (e3 + t x e3), to first order in t. In simulation
+/// the attitude is that of the unit, so that it is the rotors that are tilted.
 class ImuTilt : public Effect {
  public:
   ImuTilt() : Effect(describe()) {}

@@ -17,8 +17,7 @@ EffectInfo RotorThrust::describe() {
   info.equation = "f = sum (rotor_k - 1) f_k b3, tau = sum (rotor_k - 1) (r_k x f_k e3 + s_k kappa f_k e3)";
   info.source =
       "the torques of a hovering vehicle cancel, so that a rotor that gives less is asked for more; 9 % less "
-      "for "
-      "propellers 3 mm shorter (of 47 mm), 23 % for 7 mm";
+      "for propellers 3 mm shorter (of 47 mm), 23 % for 7 mm";
   info.equivalence_class = "weak rotor / load near a rotor";
   info.excitation =
       "half a minute of slow flight, and the same of the healthy vehicle; land, turn the load by 180 "

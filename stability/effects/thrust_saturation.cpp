@@ -8,8 +8,7 @@ EffectInfo ThrustSaturation::describe() {
   return {"thrust_saturation",
           "f = -c max(0, T - k W) b3",
           "propellers and motors at their limit: the thrust of a command above the knee is only a share of "
-          "what the "
-          "map says; W is the weight",
+          "what the map says; W is the weight",
           "thrust_saturation",
           "climbs and turns that ask for much more thrust than hovering",
           {{"loss", "share that is lost of the thrust above the knee", 0, 0, 1}},

@@ -9,8 +9,7 @@ EffectInfo VoltageSag::describe() {
   return {"voltage_sag",
           "f = -s T ((T / W)^(3/2) - 1) b3",
           "the power of a rotor at rest in air grows with T^(3/2) (momentum theory), the supply's voltage "
-          "falls in "
-          "proportion to the power drawn; W is the weight: hovering is part of the thrust map",
+          "falls in proportion to the power drawn; W is the weight: hovering is part of the thrust map",
           "voltage_sag",
           "thrust from half to one and a half times the weight, with the battery's voltage logged slowly or "
           "not at all",

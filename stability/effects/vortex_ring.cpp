@@ -17,8 +17,7 @@ EffectInfo VortexRing::describe() {
   return {"vortex_ring",
           "f = -a T exp(-((v_c + v_0) / w)^2 / 2) b3, v_c the velocity along the thrust axis",
           "thrust is lost where the descent is about as fast as the rotor's own induced velocity (vortex "
-          "ring state: "
-          "half to one and a half times it), and not below or beyond",
+          "ring state: half to one and a half times it), and not below or beyond",
           "vortex_ring",
           "straight descents at several speeds up to twice v_0",
           {{"loss", "a: share of the thrust lost at the descent v_0", 0, 0, 0.6}},

@@ -5,8 +5,8 @@
 
 namespace swarmcert::stability {
 
-/// The wake of downwash.h, of neighbours where they were delay_s ago: at p_j - delay_s v_j, their velocity taken as constant
-/// meanwhile. With a delay of 0 it is the downwash without convection.
+/// The wake of downwash.h, of neighbours where they were delay_s ago: at p_j - delay_s v_j, their velocity taken as
+/// constant meanwhile. With a delay of 0 it is the downwash without convection.
 class WakeDelay : public Effect {
  public:
   WakeDelay() : Effect(describe()) {}

@@ -19,8 +19,7 @@ EffectInfo Wall::describe() {
   return {"wall",
           "f = p T exp(-d / b) n, n from the wall into the room, d the distance from the wall",
           "rotors push against a wall or are drawn to it over a few of their radii; the exponential form is "
-          "that of "
-          "the ground",
+          "that of the ground",
           "wall",
           "slow flight along the wall at several distances down to two rotor radii",
           {{"push", "p: force at the wall over the thrust, negative where it draws", 0, -1, 1}},

@@ -5,8 +5,8 @@
 ///   m v' = f - m g - (eps0 + eps(t)),  |eps'| <= d_m.
 /// With the theorem's hypotheses this is the system that the theorem speaks of; lags, clamps and gains outside the
 /// theorem's form take it away from that, and then violations are to be expected. Finding no violation is not a proof.
-/// A run is judged only as long as it keeps the hypotheses on the flight: no saturation, no clamp that acts, a commanded
-/// force that is not near zero and points upwards. What happens later says nothing about the theorem.
+/// A run is judged only as long as it keeps the hypotheses on the flight: no saturation, no clamp that acts, a
+/// commanded force that is not near zero and points upwards. What happens later says nothing about the theorem.
 #pragma once
 
 #include <Eigen/Core>

@@ -11,7 +11,8 @@
 namespace swarmcert::stability {
 namespace {
 
-// The vector of numbers: the plant of all vehicles, then for each vehicle three integrals of position and three of rate.
+// The vector of numbers: the plant of all vehicles, then for each vehicle three integrals of position and three of
+// rate.
 constexpr int kControllerSize = 6;
 constexpr int kEventsPerVehicle = 5;  ///< thrust, three integrals, ground
 constexpr double kPull_1_s = 2;       ///< keeps | |q|^2 - 1 | below 3e-8 at a tolerance of 1e-6

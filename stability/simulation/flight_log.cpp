@@ -13,13 +13,12 @@ namespace {
 
 constexpr char kHeader[] =
     "tick(I),stateEstimateZ.x(h),stateEstimateZ.y(h),stateEstimateZ.z(h),stateEstimateZ.vx(h),stateEstimateZ."
-    "vy(h),"
-    "stateEstimateZ.vz(h),stateEstimateZ.ax(h),stateEstimateZ.ay(h),stateEstimateZ.az(h),stateEstimateZ.quat("
-    "I),"
-    "stateEstimateZ.rateRoll(h),stateEstimateZ.ratePitch(h),stateEstimateZ.rateYaw(h),ctrltargetZ.x(h),"
-    "ctrltargetZ.y(h),ctrltargetZ.z(h),ctrltargetZ.vx(h),ctrltargetZ.vy(h),ctrltargetZ.vz(h),motor.thrust(f),"
-    "motor.torquex(f),motor.torquey(f),motor.torquez(f),motor.f1(f),motor.f2(f),motor.f3(f),motor.f4(f),"
-    "pwm.m1_pwm(I),pwm.m2_pwm(I),pwm.m3_pwm(I),pwm.m4_pwm(I),pwm.maxThrust(f),pm.vbatMV(H),ctrlFa.Faz(f),";
+    "vy(h),stateEstimateZ.vz(h),stateEstimateZ.ax(h),stateEstimateZ.ay(h),stateEstimateZ.az(h),"
+    "stateEstimateZ.quat(I),stateEstimateZ.rateRoll(h),stateEstimateZ.ratePitch(h),stateEstimateZ.rateYaw(h),"
+    "ctrltargetZ.x(h),ctrltargetZ.y(h),ctrltargetZ.z(h),ctrltargetZ.vx(h),ctrltargetZ.vy(h),ctrltargetZ.vz(h)"
+    ",motor.thrust(f),motor.torquex(f),motor.torquey(f),motor.torquez(f),motor.f1(f),motor.f2(f),motor.f3(f),"
+    "motor.f4(f),pwm.m1_pwm(I),pwm.m2_pwm(I),pwm.m3_pwm(I),pwm.m4_pwm(I),pwm.maxThrust(f),pm.vbatMV(H),"
+    "ctrlFa.Faz(f),";
 constexpr unsigned kVariables = 35;
 constexpr std::size_t kRecordsPerBlock = 2;
 

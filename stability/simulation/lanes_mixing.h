@@ -6,8 +6,8 @@
 
 namespace swarmcert::stability {
 
-/// controller::mix(), the same bits. The flight code calls this one for Lanes: it is no template, and stands where Lanes
-/// do.
+/// controller::mix(), the same bits. The flight code calls this one for Lanes: it is no template, and stands where
+/// Lanes do.
 SWARMCERT_LANE inline controller::Mixed<Lanes> mix(const controller::Allocation<Lanes>& allocation,
                                                    const controller::ForceLimits<Lanes>& limits,
                                                    const controller::Wrench<Lanes>& wanted) {

@@ -46,7 +46,8 @@ class Pilot {
                          const controller::Measured<Scalar>& measured,
                          const controller::FlightReference<Scalar>& reference, Scalar prediction_N) const;
 
-  /// omega - omega_r, which the robust law integrates, after a step() or push() with the same `measured`; 0 for the other law.
+  /// omega - omega_r, which the robust law integrates, after a step() or push() with the same `measured`; 0 for the
+  /// other law.
   controller::Vector3<Scalar> rate_error(const controller::FlightMemory<Scalar>& memory,
                                          const controller::Measured<Scalar>& measured) const;
 

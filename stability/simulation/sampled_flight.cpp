@@ -208,8 +208,8 @@ void SampledFlight::advance(double from_s, double h_s) {
   for (int k = 0; k < options_.substeps; ++k) step_onto_bends(from_s + k * step_s, step_s);
 }
 
-/// One Runge-Kutta step, cut where vehicles meet bends: a step across one is accurate to the second order only. Vehicles
-/// that no other reaches keep the uncut step, and so the bits with which they fly alone.
+/// One Runge-Kutta step, cut where vehicles meet bends: a step across one is accurate to the second order only.
+/// Vehicles that no other reaches keep the uncut step, and so the bits with which they fly alone.
 void SampledFlight::step_onto_bends(double from_s, double h_s) {
   constexpr int kMostCuts = 8;
   const double end_s = from_s + h_s;

@@ -3,10 +3,10 @@
 /// Vehicles are computed together where registers are wide enough; each flies the same bits as alone.
 ///
 /// Every control period (the attitude loop's, 2 ms): the position loop where it is due, the network's prediction where
-/// it is due (a staircase, applied late by its latency, from neighbours' positions that came by radio), the attitude law and mixing; then the plant moves by classical
-/// Runge-Kutta under held commands, which change inside a period only where a command delay says so. A step that would
-/// take a vehicle across a height where an effect bends (Effect::bends_m()) ends there and goes on. Quaternions are
-/// normalised between periods, never inside one.
+/// it is due (a staircase, applied late by its latency, from neighbours' positions that came by radio), the attitude
+/// law and mixing; then the plant moves by classical Runge-Kutta under held commands, which change inside a period only
+/// where a command delay says so. A step that would take a vehicle across a height where an effect bends
+/// (Effect::bends_m()) ends there and goes on. Quaternions are normalised between periods, never inside one.
 #pragma once
 
 #include <array>

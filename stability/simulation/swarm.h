@@ -136,8 +136,8 @@ class Swarm {
   std::vector<Meeting> meetings_;
   std::vector<int> acted_on_;  ///< vehicles on which effects act, but for those in batches_; since hold()
   std::vector<PairBatch> batches_;  ///< by kind
-  /// Nothing acts but what pairs' positions tell. Two stages of a Runge-Kutta step, the first and the second or the other
-  /// two, then have forces that do not depend on each other.
+  /// Nothing acts but what pairs' positions tell. Two stages of a Runge-Kutta step, the first and the second or the
+  /// other two, then have forces that do not depend on each other.
   bool sees_ahead_ = false;
   bool pairs_hold_ = false;   ///< acted_on_ and batches_ are those of near_ and of the vehicles that rest
   std::vector<char> rested_;  ///< by vehicle, when they were made

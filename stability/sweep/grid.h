@@ -42,8 +42,8 @@ struct Grid {
 };
 
 /// Parameters that an axis may have:
-///   Kp Kd Ki (1/s^2, 1/s, 1/s^3), Lambda K (1/s, kg/s), mass_kg, thrust_scale, battery_V, motor_s, attitude_s, delay_s,
-///   rate_hz, integrator_step_s, neighbours (the disturbance times their number), vehicles (neighbours + 1).
+///   Kp Kd Ki (1/s^2, 1/s, 1/s^3), Lambda K (1/s, kg/s), mass_kg, thrust_scale, battery_V, motor_s, attitude_s,
+///   delay_s, rate_hz, integrator_step_s, neighbours (the disturbance times their number), vehicles (neighbours + 1).
 std::vector<std::string> grid_parameters();
 
 /// Quantities that can be computed; `better` is -1 where less is better, +1 where more is.

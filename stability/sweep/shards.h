@@ -30,8 +30,8 @@ struct SweepOutcome {
 
 /// Computes the cells of one shard and writes FOLDER/shard-I-of-N.json; every few seconds, and when cancelled, what is
 /// done so far (atomically). The file's bytes depend on the grid and the shard only.
-/// @throws files::InputError if the file exists and neither resume nor overwrite is set, or belongs to another grid; or if
-///   the folder holds other things and nothing of a sweep, and overwrite is not set.
+/// @throws files::InputError if the file exists and neither resume nor overwrite is set, or belongs to another grid; or
+///   if the folder holds other things and nothing of a sweep, and overwrite is not set.
 SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepOptions& options);
 
 /// A whole sweep, read back from its shards.

@@ -25,8 +25,8 @@ enum class TuneObjective { kAmplitude, kImpulse, kEdge, kRate };
 struct TuneOptions {
   TuneObjective objective = TuneObjective::kImpulse;
   TuneConstraints constraints;
-  /// The attitude loop that flies, with the motors' lag and the thrust's ratio; its position gains are not read. Gains that
-  /// nearness_to_limit_cycle() calls close or unstable are then not feasible.
+  /// The attitude loop that flies, with the motors' lag and the thrust's ratio; its position gains are not read. Gains
+  /// that nearness_to_limit_cycle() calls close or unstable are then not feasible.
   std::optional<Cascade> attitude = {};
   double range = 8;  ///< gains between the given ones divided and multiplied by this
   int global_evaluations = 4000;
@@ -60,13 +60,14 @@ struct TuneResult {
 /// Everything that constraints and objectives look at, for one set of gains as firmware writes them.
 TunedPoint evaluate_gains(const SampledLoop& loop, TuneObjective objective);
 
-/// The margins of these gains around the attitude loop. @param loop gains divided by `attitude.ratio` are those of firmware.
+/// The margins of these gains around the attitude loop. @param loop gains divided by `attitude.ratio` are those of
+/// firmware.
 CascadeMargins margins_of(const SampledLoop& loop, const Cascade& attitude);
 
-/// Improves Kp, Kd, Ki of `loop`, and Kp and Kd alone where its Ki is 0, which it then stays: a global search without derivatives (GN_ISRES, seeded) over the logarithms of the
-/// gains, then COBYLA from its best point and from the given gains. The objective is that of the continuous loop with
-/// the effective Ki, as its kinks (sign changes of the kernel) leave it no derivative.
-/// The result is never worse than the given gains where those are feasible.
+/// Improves Kp, Kd, Ki of `loop`, and Kp and Kd alone where its Ki is 0, which it then stays: a global search without
+/// derivatives (GN_ISRES, seeded) over the logarithms of the gains, then COBYLA from its best point and from the given
+/// gains. The objective is that of the continuous loop with the effective Ki, as its kinks (sign changes of the kernel)
+/// leave it no derivative. The result is never worse than the given gains where those are feasible.
 TuneResult tune(const SampledLoop& loop, const TuneOptions& options);
 
 /// "amplitude", "impulse", "edge", "rate".

@@ -32,8 +32,8 @@ std::string hexacopter() {
       kHexMass_kg, rotors, coefficient_N);
 }
 
-/// On the ground for 2 s, up by 1.2 m within 2 s, then a hover that rises and falls a little; 20 s at 100 Hz. The commands are
-/// those that this needs. `front` is the command of rotor 1 over that of the others.
+/// On the ground for 2 s, up by 1.2 m within 2 s, then a hover that rises and falls a little; 20 s at 100 Hz. The
+/// commands are those that this needs. `front` is the command of rotor 1 over that of the others.
 std::string hexacopter_csv(double front, double start_s = 0, double x_m = 0) {
   constexpr double kPi = 3.14159265358979, kSlow_1_s = 0.3;
   std::string text = "t,px,py,pz,vx,vy,vz,qx,qy,qz,qw,battery";
@@ -77,8 +77,8 @@ TEST(AnyVehicle, AHexacoptersForceAndTorqueFollowFromItsRotorsAndTheirCommands) 
     EXPECT_GT(json["overall"]["samples"].get<int>(), 1000);
     EXPECT_LT(json["overall"]["rmse"]["z"].get<double>(), 0.1) << "newton, of a weight of 21.6 N";
     EXPECT_EQ(json["flights"][0]["judged"]["torque"], files::Json({"x", "y", "z"}));
-    // Rotor 1 is in front, rotor 4 behind: with u1 = 1.1 the first gives 1.21, the other 0.79 of a sixth of the weight. The
-    // residual is what else must balance them.
+    // Rotor 1 is in front, rotor 4 behind: with u1 = 1.1 the first gives 1.21, the other 0.79 of a sixth of the weight.
+    // The residual is what else must balance them.
     const double each_N = kHexMass_kg * 9.81 / 6, more = std::string(log) == "even.csv" ? 0 : 0.21;
     const files::Json& mean = json["flights"][0]["torque"]["slow_flight"]["mean"];
     EXPECT_NEAR(mean["x"].get<double>(), 0, 1e-6);
@@ -175,7 +175,8 @@ TEST(Clocks, OffsetsOfLogsWithAbsoluteTimesAreTheDifferencesOfTheirClocks) {
   const std::vector<residuals::Track> tracks = inputs.load(0, problems);
   ASSERT_EQ(tracks.size(), 2u);
   EXPECT_TRUE(tracks[1].has_absolute_clock);
-  // The right one began 3.5 s after the left one: its first record is at 3.5 s of the left one's clock, which began at 0.
+  // The right one began 3.5 s after the left one: its first record is at 3.5 s of the left one's clock, which began at
+  // 0.
   EXPECT_NEAR(tracks[1].instants.front().time_s - tracks[0].instants.front().time_s, 3.5, 1e-6);
   const files::Json json = json_of(folder, "compare .", "compare");
   EXPECT_EQ(json["clocks"]["absolute"], 1);

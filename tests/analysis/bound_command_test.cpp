@@ -90,7 +90,8 @@ TEST(BoundCommand, WhatFloat32CostsIsPartOfTheErrorBudget) {
   }
 }
 
-/// Gains and mass of a flight of a Crazyflie whose z loop had no integrator and whose thrust was 0.1279 N off: it hovered
+/// Gains and mass of a flight of a Crazyflie whose z loop had no integrator and whose thrust was 0.1279 N off: it
+/// hovered
 /// 0.117 m from its set point in the mean, 0.1137 m of which the bias explains (IMRCLab/crazyswarm2-tools, log 58).
 std::string biased_flight(const ScratchFolder& folder) {
   std::string model = read_text(kSourceFolder + "/stability/models/crazyflie-small.toml");

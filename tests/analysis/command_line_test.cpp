@@ -19,7 +19,8 @@ using tests::write_text;
 
 class CommandLine : public tests::CommandLineTest {
  protected:
-  /// A 2-2-1 network f(x) = relu(3 x1) + relu(-3 x1 + x2): its Lipschitz constant is sqrt(10), its product bound larger.
+  /// A 2-2-1 network f(x) = relu(3 x1) + relu(-3 x1 + x2): its Lipschitz constant is sqrt(10), its product bound
+  /// larger.
   files::Weights small_network() {
     files::Weights weights;
     weights.layers = {{"fc1", 2, 2, {3, 0, -3, 1}, {0, 0}}, {"fc2", 1, 2, {1, 1}, {0}}};

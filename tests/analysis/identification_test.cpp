@@ -107,8 +107,8 @@ TEST(Detectable, SizesAreWhereInjectionsBeginToShow) {
   }
 }
 
-/// A process of first order, whose mean has the variance (1 + rho) / (1 - rho) / n in long series. Blocks are its values
-/// less their mean, as residuals of a fit are.
+/// A process of first order, whose mean has the variance (1 + rho) / (1 - rho) / n in long series. Blocks are its
+/// values less their mean, as residuals of a fit are.
 TEST(LongRunVariance, IsThatOfTheMeanOfACorrelatedProcess) {
   constexpr int kValues = 40, kSeries = 2000;
   std::mt19937_64 random(3);

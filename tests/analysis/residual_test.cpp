@@ -38,7 +38,8 @@ TEST(AccelerometerFilter, DelaysARampByTheTwoPolesAndKeepsItsSlope) {
 }
 
 TEST(VelocityError, IsWhatTheEstimatedVelocityHasMoreThanTheSlopeOfThePosition) {
-  // x swings with 0.3 m at 3 rad/s, its estimated velocity is 1.1 times too large; z stands, its velocity is off by 0.05.
+  // x swings with 0.3 m at 3 rad/s, its estimated velocity is 1.1 times too large; z stands, its velocity is off by
+  // 0.05.
   residuals::Track track;
   double pause_s = 0;
   for (int i = 0; i < 2000; ++i) {

@@ -22,8 +22,8 @@ struct Outcome {
   std::string output;  ///< standard output and standard error, as a terminal shows them
 };
 
-/// Runs `command` in a shell with the built tool first in PATH, in `folder`. Results that it prints, or writes into a folder
-/// for temporary files, must conform to their schemas.
+/// Runs `command` in a shell with the built tool first in PATH, in `folder`. Results that it prints, or writes into a
+/// folder for temporary files, must conform to their schemas.
 inline Outcome run_shell(const std::string& command, const std::filesystem::path& folder) {
   const std::string tool_folder = std::filesystem::path(SWARMCERT_TOOL).parent_path().string();
   const std::string line =

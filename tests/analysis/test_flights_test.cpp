@@ -21,8 +21,7 @@ const std::string& small_model() {
 void fly(const ScratchFolder& folder, int run, int seed, const std::string& into, int duration_s = 20) {
   const Outcome outcome = run_shell(
       fmt::format("swarmcert simulate random-walk -q --force --vehicles 2 --duration {} --seed {} --run {} "
-                  "--model {} "
-                  "--gains {} -o {}",
+                  "--model {} --gains {} -o {}",
                   duration_s, seed, run, source_path("stability/models/crazyflie-small-effects.toml"),
                   source_path("controller/gains/crazyflie-small.toml"), into),
       folder.path());

@@ -1,5 +1,6 @@
 // Speed of the closed loops, beside a plain Boost odeint loop on the same equations.
-//   cmake --build --preset release --target benchmark_closed_loops && build/release/tests/benchmarks/benchmark_closed_loops
+//   cmake --build --preset release --target benchmark_closed_loops &&
+//   build/release/tests/benchmarks/benchmark_closed_loops
 #include <fmt/core.h>
 
 #include <boost/numeric/odeint.hpp>
@@ -46,8 +47,7 @@ const Model& vehicle() {
 const Gains& gains() {
   static const Gains read = parse_gains(
       "schema = \"swarmcert/gains/1\"\n[position]\nKp = [20, 20, 10]\nKd = [10, 10, 5]\nKi = [3, 3, "
-      "10]\nrate_hz = "
-      "100\n[attitude]\nlaw = \"lee\"\n",
+      "10]\nrate_hz = 100\n[attitude]\nlaw = \"lee\"\n",
       "gains.toml");
   return read;
 }

@@ -1,10 +1,11 @@
 // Bounds on a box side by side: branch and bound with its checked proof, the bound for all inputs, and the norm of the
-// interval Jacobian over the whole box. Usage: benchmark_local_bounds [SECONDS [default-slopes]], per function (default 60),
-// with default-slopes as --default-slopes of certify; "per box": undecided neurons that a box has on average. The recorded
-// networks where they are present, else the bundled one. One thread. "witness": a slope attained in the box. "1.01 at":
-// boxes for that ratio, if the gap goes on falling as over the second half of the search: an estimate.
+// interval Jacobian over the whole box. Usage: benchmark_local_bounds [SECONDS [default-slopes]], per function (default
+// 60), with default-slopes as --default-slopes of certify; "per box": undecided neurons that a box has on average. The
+// recorded networks where they are present, else the bundled one. One thread. "witness": a slope attained in the box.
+// "1.01 at": boxes for that ratio, if the gap goes on falling as over the second half of the search: an estimate.
 //
-// What better slopes bring to the same bound, with and without, processor seconds of search and check on a busy machine:
+// What better slopes bring to the same bound, with and without, processor seconds of search and check on a busy
+// machine:
 //   phi_G 14.873    9689 and 10593 boxes, 2.7 + 1.0 and 2.9 + 1.4 s
 //   phi_L 22.705   25003 and 28127 boxes, 12.5 + 4.7 and 13.2 + 6.2 s (the lesser of two runs)
 //   set L 388      16713 and 18897 boxes, 10.9 + 3.1 and 10.8 + 3.6 s (the least of three)

@@ -63,7 +63,8 @@ TEST(Allocation, IsTheMoorePenroseInverse) {
   }
 }
 
-// The firmware's own mixer for this frame: m1 = t - r - p - y, m2 = t - r + p + y, m3 = t + r + p - y, m4 = t + r - p + y.
+// The firmware's own mixer for this frame: m1 = t - r - p - y, m2 = t - r + p + y, m3 = t + r + p - y, m4 = t + r - p +
+// y.
 TEST(Allocation, OfACrazyflieIsItsMixer) {
   const Allocation<double> a = allocation(crazyflie_rotors(kArm_m, kTorquePerThrust_m));
   const double rp = 0.25 / (kArm_m / std::sqrt(2.0)), y = 0.25 / kTorquePerThrust_m;

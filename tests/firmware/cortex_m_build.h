@@ -16,8 +16,7 @@ inline std::string cortex_m_build(const std::string& sources, const std::string&
   const std::string folder = SWARMCERT_SOURCE_DIR "/tests/firmware/";
   return "arm-none-eabi-g++ -std=c++17 -O2 -ffp-contract=off -mcpu=cortex-m4 -mthumb -mfloat-abi=hard "
          "-mfpu=fpv4-sp-d16 -fno-exceptions -fno-rtti -fno-threadsafe-statics -nostartfiles "
-         "-Wl,--gc-sections "
-         "-T " +
+         "-Wl,--gc-sections -T " +
          folder + "stm32f405.ld -I" + folder + " " + sources + " " + folder + "startup.cpp -o " + output;
 }
 

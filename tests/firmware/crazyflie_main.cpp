@@ -1,5 +1,6 @@
 // The app of controller/crazyflie against a stub of the stock firmware, on the host and under QEMU. Exit code: 0, the
-// line of the first check that failed as far as it fits into a byte, or 100 + the self-test's verdict where that failed.
+// line of the first check that failed as far as it fits into a byte, or 100 + the self-test's verdict where that
+// failed.
 #include <cstring>
 
 #include "controller/flight_controller.h"
@@ -55,7 +56,8 @@ void meet_a_neighbour() {
 }
 
 /// A rigid body under the commanded PWM, without lag or air: from half a metre off, tilted, turning and with its nose
-/// elsewhere, four seconds of the 1000 Hz loop. Returns the distance from the setpoint in metres; 1000 if it is not level.
+/// elsewhere, four seconds of the 1000 Hz loop. Returns the distance from the setpoint in metres; 1000 if it is not
+/// level.
 float distance_after_four_seconds() {
   namespace controller = swarmcert::controller;
   constexpr float kStep_s = 1e-3f, kMass_kg = 0.034f, kDegreePerRadian = 57.29578f;

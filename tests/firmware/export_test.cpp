@@ -79,8 +79,7 @@ std::string decimal(double value) {
 TEST_F(Firmware, MatchReadsTransposedMatricesInMembersOfAnObject) {
   std::string text =
       "struct rho { float fc1_weight[5][12]; float fc1_bias[12]; float fc2_weight[12][1]; float fc2_bias[1]; "
-      "/* ... */ "
-      "};\nstatic const struct rho weights_rho = {\n";
+      "/* ... */ };\nstatic const struct rho weights_rho = {\n";
   for (const files::Layer& layer : weights("rho.small").layers) {
     text += "." + layer.name + "_weight = {";
     for (int j = 0; j < layer.inputs; ++j) {

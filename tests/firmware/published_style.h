@@ -1,5 +1,5 @@
-/// @file Networks evaluated in the style of the firmware that flew in the paper, to hold the cycle model against what is
-/// known of its time. Compiled with that firmware's options, contraction included.
+/// @file Networks evaluated in the style of the firmware that flew in the paper, to hold the cycle model against what
+/// is known of its time. Compiled with that firmware's options, contraction included.
 #pragma once
 
 namespace swarmcert::tests {

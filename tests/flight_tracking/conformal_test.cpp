@@ -50,8 +50,8 @@ TEST(Conformal, BetaQuantilesAreThoseOfKnownDistributions) {
   EXPECT_NEAR(beta_quantile(1, 5, 0.05), 1 - std::pow(0.95, 0.2), 1e-12);
 }
 
-/// The promise itself: over many calibrations with a skewed distribution a further group is covered as often as promised,
-/// and the coverage of single calibrations lies in the stated interval nine times in ten.
+/// The promise itself: over many calibrations with a skewed distribution a further group is covered as often as
+/// promised, and the coverage of single calibrations lies in the stated interval nine times in ten.
 TEST(Conformal, CoversFurtherFlightsAsOftenAsItPromises) {
   std::mt19937_64 random(7);
   std::lognormal_distribution<double> score(0, 1.5);

@@ -49,11 +49,9 @@ void make_other(const ReleaseFolder& other) {
   other.write_facts(22000);
   EXPECT_EQ(
       other
-          .run(
-              "swarmcert simulate random-walk --vehicles 1 --duration 12 --model model.toml --gains "
-              "gains.toml "
-              "-q --force --seed 3 -o flights/1 && swarmcert simulate random-walk --vehicles 1 --duration 12 "
-              "--model model.toml --gains gains.toml -q --force --seed 4 -o flights/2")
+          .run("swarmcert simulate random-walk --vehicles 1 --duration 12 --model model.toml --gains "
+               "gains.toml -q --force --seed 3 -o flights/1 && swarmcert simulate random-walk --vehicles 1 "
+               "--duration 12 --model model.toml --gains gains.toml -q --force --seed 4 -o flights/2")
           .exit_code,
       0);
 }

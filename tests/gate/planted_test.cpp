@@ -109,8 +109,7 @@ TEST(Gate, AGoodReleasePassesAndEachPlantedViolationIsCaughtByItsOwnCheckAlone) 
                 "parameters = { force_x_N = 0.05, force_y_N = 0, force_z_N = 0 }\n";
          const Outcome flown = release.run(
              "swarmcert simulate random-walk --vehicles 1 --duration 12 --model pushed.toml --gains "
-             "gains.toml -q "
-             "--force --seed 1 -o flights/1");
+             "gains.toml -q --force --seed 1 -o flights/1");
          EXPECT_EQ(flown.exit_code, 0) << flown.output;
        }},
       {"regression",

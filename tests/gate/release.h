@@ -11,8 +11,8 @@
 
 namespace swarmcert::tests {
 
-/// Folder of a good release: network, certificate, source, ELF where a compiler is there, gains, model, swarm, box, facts,
-/// flights. Each test has one of its own.
+/// Folder of a good release: network, certificate, source, ELF where a compiler is there, gains, model, swarm, box,
+/// facts, flights. Each test has one of its own.
 class ReleaseFolder {
  public:
   /// Makes the release; a test that finds it incomplete has failed already.

@@ -1,5 +1,6 @@
 /// Flights of a vehicle with an effect that the model does not know: compare, diagnose, add, compare again, by the
-/// command line. Truths come from a simulator of its own (other_simulator.h); a few from the library's, which users have.
+/// command line. Truths come from a simulator of its own (other_simulator.h); a few from the library's, which users
+/// have.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
@@ -188,7 +189,8 @@ TEST(HiddenEffect, OfTheLibrarysSimulationIsFoundAddedAndTheErrorFalls) {
   }
 }
 
-/// Three flights, because the goals of one walk of 40 s need not lie low: of the seeds 3 .. 6 two show the ground alone.
+/// Three flights, because the goals of one walk of 40 s need not lie low: of the seeds 3 .. 6 two show the ground
+/// alone.
 TEST(HiddenEffect, GroundShowsOnSimulatedRandomWalks) {
   const ScratchFolder folder;
   Loop loop(folder);
@@ -308,8 +310,8 @@ TEST(HiddenEffect, IntervalsOfTheGroundHoldItsAmplitudeUnderAGust) {
   EXPECT_GE(held, 0.8 * kFlights) << share(held, kFlights);
 }
 
-/// Thrust that answers a gust gives the force a slope over thrust; beside a constant force that fits, and set points say
-/// that it is not there. What is left is one push upwards or downwards, by which of three causes nobody can tell.
+/// Thrust that answers a gust gives the force a slope over thrust; beside a constant force that fits, and set points
+/// say that it is not there. What is left is one push upwards or downwards, by which of three causes nobody can tell.
 TEST(HiddenEffect, AMassInAStrongGustIsNamedAsAClass) {
   const ScratchFolder folder;
   Loop loop(folder);

@@ -1,5 +1,5 @@
-/// Effects of the registry that a scan points to, hidden in flights of the foreign simulator: diagnose names them, and their
-/// true values lie in the intervals.
+/// Effects of the registry that a scan points to, hidden in flights of the foreign simulator: diagnose names them, and
+/// their true values lie in the intervals.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 

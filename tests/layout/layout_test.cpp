@@ -204,5 +204,16 @@ TEST(Layout, EveryFolderOfSourcesHasAReadmeOfAtMostAPage) {
   EXPECT_GT(folders.size(), 30U);
 }
 
+TEST(Layout, LinesOfSourcesHaveAtMost120Columns) {
+  std::size_t lines = 0;
+  for (const std::string& source : product_sources()) {
+    std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / source);
+    std::string line;
+    for (int number = 1; std::getline(in, line); ++number, ++lines)
+      EXPECT_LE(line.size(), 120U) << source << ":" << number;
+  }
+  EXPECT_GT(lines, 50'000U);
+}
+
 }  // namespace
 }  // namespace swarmcert

@@ -218,7 +218,8 @@ TEST(Claims, LawsAddUpTheirTermsAndTheGround) {
   EXPECT_TRUE(result.accepted) << result.reason;
 }
 
-/// f(own) = relu(x1) + ... with every neighbour at the same place: the own-state law is attained, sqrt(n) would be wrong.
+/// f(own) = relu(x1) + ... with every neighbour at the same place: the own-state law is attained, sqrt(n) would be
+/// wrong.
 TEST(Claims, OwnStateLawIsAttainedAndGrowsWithNNotWithItsRoot) {
   Network network = tests::deep_set(tests::weights({tests::layer(1, 2, {2, 0})}),
                                     tests::weights({tests::layer(1, 1, {3})}));

@@ -71,8 +71,8 @@ int beaten(int count, int samples) {
 }
 
 TEST(FarSlopes, FewSmallNetworksAreBeatenByPlainSamples) {
-  // All of these were beaten by more than 15 %, network 178 by a factor of 9, when searches started near the kinks of the
-  // first layer only.
+  // All of these were beaten by more than 15 %, network 178 by a factor of 9, when searches started near the kinks of
+  // the first layer only.
   int found = 0;
   for (const std::uint64_t i : {41, 48, 106, 147, 166, 178, 227}) {
     const files::Weights network = small_network(i);

@@ -72,8 +72,8 @@ TEST(LimitCycles, DampedOscillationsManoeuvresAndVibrationAreNone) {
 
 TEST(LimitCycles, OfTheFlightsThatOscillateAreFoundAndOfTheirRepetitionNot) {
   SWARMCERT_NEEDS_DATA();
-  // Named by independent scripts: 29, 76, 113, 119 and 146 oscillate, 113_2 with the same gains does not. 26, 78 and 129 do
-  // as well: four and more equal periods of 6 degrees or more, in hover and at the end of the trajectory.
+  // Named by independent scripts: 29, 76, 113, 119 and 146 oscillate, 113_2 with the same gains does not. 26, 78 and
+  // 129 do as well: four and more equal periods of 6 degrees or more, in hover and at the end of the trajectory.
   std::set<std::string> cycling;
   std::size_t flights = 0;
   for (const auto& entry :
@@ -119,7 +119,8 @@ TEST(AbsoluteTime, ComesFromTheReceiversOfPx4AndArduPilot) {
 
 TEST(Collections, DerivedAccelerationReachesTheNoiseFloorsOfCalmFlight) {
   SWARMCERT_NEEDS_DATA();
-  // Floors of independent scripts for a velocity over 100 ms, m/s^2: calm flight with motion capture 0.02, others as flown.
+  // Floors of independent scripts for a velocity over 100 ms, m/s^2: calm flight with motion capture 0.02, others as
+  // flown.
   const std::pair<const char*, double> floors_m_s2[] = {
       {"crazyswarm2-tools/logs", 0.02}, {"crazypad", 0.13}, {"nanobench", 0.09}};
   for (const auto& [folder, floor_m_s2] : floors_m_s2) {

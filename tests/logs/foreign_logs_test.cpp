@@ -1,5 +1,5 @@
-/// Logs as other programs write them: a bag that was written by none of ours, ArduPilot's messages as its releases define
-/// them, and velocities whose frame no name tells.
+/// Logs as other programs write them: a bag that was written by none of ours, ArduPilot's messages as its releases
+/// define them, and velocities whose frame no name tells.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 

@@ -70,10 +70,8 @@ TEST(RosbagSqlite, GivesMessagesWithBuiltInDefinitions) {
 TEST(RosbagSqlite, PrefersTheDefinitionsOfTheFile) {
   const std::string definitions =
       "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT "
-      "NULL,"
-      "encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);"
-      "INSERT INTO message_definitions VALUES(1,'own_msgs/msg/Two','ros2msg','float64 first\nfloat64 "
-      "second\n','');";
+      "NULL,encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);INSERT INTO "
+      "message_definitions VALUES(1,'own_msgs/msg/Two','ros2msg','float64 first\nfloat64 second\n','');";
   const logs::RawLog log =
       rosbag_of(sqlite_bytes(rosbag_tables() + definitions + rosbag_topic(1, "/two", "own_msgs/msg/Two") +
                              rosbag_message(1, 5, CdrWriter().doubles(1, 2).message())));
@@ -155,10 +153,10 @@ TEST(RosbagSqlite, RefusesSchemasThatCouldDoAnything) {
   // Columns that make large values at each row.
   EXPECT_TRUE(refuses(
       [&] {
-        rosbag_of(sqlite_bytes(tables + topic + drop +
-                               "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data AS "
-                               "(zeroblob(60000000)));"
-                               "INSERT INTO messages(topic_id,timestamp) VALUES(1,1);"));
+        rosbag_of(
+            sqlite_bytes(tables + topic + drop +
+                         "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data AS "
+                         "(zeroblob(60000000)));INSERT INTO messages(topic_id,timestamp) VALUES(1,1);"));
       },
       {"\"messages\"", "is missing or cannot be read"}));
   // A virtual table.

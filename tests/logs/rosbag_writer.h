@@ -36,14 +36,10 @@ inline std::string hex_literal(const std::string& bytes) {
 
 /// Pages of 512 bytes, so that small files have several.
 inline std::string rosbag_tables() {
-  return "PRAGMA page_size=512;"
-         "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
-         "serialization_format TEXT NOT "
-         "NULL, offered_qos_profiles TEXT NOT NULL);"
-         "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT "
-         "NULL, data BLOB NOT "
-         "NULL);"
-         "CREATE INDEX timestamp_idx ON messages (timestamp ASC);";
+  return "PRAGMA page_size=512;CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT "
+         "NULL, serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);CREATE TABLE "
+         "messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB "
+         "NOT NULL);CREATE INDEX timestamp_idx ON messages (timestamp ASC);";
 }
 inline std::string rosbag_topic(int id, const std::string& name, const std::string& type,
                                 const std::string& encoding = "cdr") {

@@ -175,7 +175,8 @@ TEST(Symmetry, TurnedSamplesKeepHeightsAndWhatTheirVectorsAreToOneAnother) {
   EXPECT_LT(mirrored, 2 * pairs / 3);
 }
 
-/// A force that is dp and a torque that is dp x dv: whatever turns and mirrors the inputs, these stay what they are to them.
+/// A force that is dp and a torque that is dp x dv: whatever turns and mirrors the inputs, these stay what they are to
+/// them.
 TEST(Symmetry, TargetsTurnWithTheInputsTorquesAsAxialVectors) {
   const Layout layout({{"phi:small", {6, 4, 3}, 0, {{0, 1}, {3, 4}}}, {"rho:small", {3, 4, 3}, 0}});
   for (const bool is_torque : {false, true}) {

@@ -2,7 +2,8 @@
 ///
 ///   FAULT_LOG   every call is one line here
 ///   FAULT_AT    the number of the call, from 1, that goes wrong
-///   FAULT_KIND  kill: the process dies there, of a write when half of it is done; else an errno: the call fails with it,
+///   FAULT_KIND  kill: the process dies there, of a write when half of it is done; else an errno: the call fails with
+///   it,
 ///               a write after its half, and so does every later write
 #include <dlfcn.h>
 #include <errno.h>

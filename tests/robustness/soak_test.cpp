@@ -120,8 +120,8 @@ const Reader& reader_of(int input, bool all) {
   return kReaders[place < quick ? place : quick + round % kReadersOfSeconds];
 }
 
-/// Tries `inputs` mutated files on the quick or on `all` of kReaders; nothing may end but with the exit code of a verdict or of a
-/// bad file, without a word of a sanitizer, or after a minute of processor.
+/// Tries `inputs` mutated files on the quick or on `all` of kReaders; nothing may end but with the exit code of a
+/// verdict or of a bad file, without a word of a sanitizer, or after a minute of processor.
 void soak(int inputs, bool all, std::uint64_t seed) {
   const ScratchFolder folder;
   make_inputs(folder.path(), true);

@@ -7,8 +7,8 @@
 
 namespace swarmcert::tests {
 
-/// What a result or file of ours breaks of the schema that its own field `schema` names. Empty if it conforms, if `text` is
-/// no JSON object of ours, or if it is of a kind that a command keeps to itself to be resumed.
+/// What a result or file of ours breaks of the schema that its own field `schema` names. Empty if it conforms, if
+/// `text` is no JSON object of ours, or if it is of a kind that a command keeps to itself to be resumed.
 std::vector<std::string> schema_faults(const std::string& text);
 
 /// Adds a test failure for each fault of `text`, which came from `source`.

@@ -1,5 +1,5 @@
-/// That the check of results against the schemas sees what it is for. The check itself runs in every test that runs the tool
-/// (analysis/run.h).
+/// That the check of results against the schemas sees what it is for. The check itself runs in every test that runs the
+/// tool (analysis/run.h).
 #include "schemas/schema_check.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-/// No slope inside the box above its bound from branch and bound: random and adversarial pairs of points, for any number of
-/// neighbours and for a stated one, whose others then stay in the box as well.
+/// No slope inside the box above its bound from branch and bound: random and adversarial pairs of points, for any
+/// number of neighbours and for a stated one, whose others then stay in the box as well.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -126,8 +126,7 @@ void try_points(const Network& network, const Proved& proved, const std::string&
   EXPECT_LE(jump, range->jump);
   std::printf(
       "%s, up to %d neighbours: sampled %.4g .. %.4g, attained %.4g .. %.4g, proved %.4g .. %.4g; jump %.3g "
-      "of %.3g; "
-      "float32 off by %.3g of %.3g\n",
+      "of %.3g; float32 off by %.3g of %.3g\n",
       function.c_str(), neighbours, least, greatest, range->least.value, range->greatest.value, range->lower,
       range->upper, jump, range->jump, largest_error, error->evaluation.value());
 }

@@ -304,8 +304,8 @@ TEST(Downwash, HasTheSameBitsForOneVehicleAndForASwarm) {
   EXPECT_GT(composed, 300);
 }
 
-/// A level vehicle whose rotors give `f`, as the simulator's mixing has it (swarm.cpp): arms of 0.046 m, 0.006 m of torque
-/// per thrust.
+/// A level vehicle whose rotors give `f`, as the simulator's mixing has it (swarm.cpp): arms of 0.046 m, 0.006 m of
+/// torque per thrust.
 Instant rotors_of(const Eigen::Vector4d& f_N) {
   const double offset_m = 0.046 * std::sqrt(0.5);
   Instant now;

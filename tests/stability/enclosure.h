@@ -7,7 +7,8 @@
 
 namespace swarmcert::tests {
 
-/// `interval` holds a number within `estimate_error` (relative) of `value`, has a width, and one below `relative_width`.
+/// `interval` holds a number within `estimate_error` (relative) of `value`, has a width, and one below
+/// `relative_width`.
 inline testing::AssertionResult encloses(const stability::Interval& interval, double value,
                                          double relative_width, double estimate_error = 0) {
   if (!(interval.lo <= value * (1 + estimate_error) && value * (1 - estimate_error) <= interval.hi)) {

@@ -180,7 +180,8 @@ std::vector<Declared> random_declarations(std::mt19937& random, bool has_integra
   return all;
 }
 
-/// How far stepping the loop may be off: a late command of a continuous loop is stepped as if it were linear on each step.
+/// How far stepping the loop may be off: a late command of a continuous loop is stepped as if it were linear on each
+/// step.
 double stepping_error(const Case& c) { return c.steps == 0 && c.loop.delay_s > 0 ? 2e-5 : 1e-7; }
 
 /// @param draws per loop and per end of a run.
@@ -258,9 +259,9 @@ std::vector<double> estimate_kernel(const Case& c, Estimate estimate, int period
   return kernel;
 }
 
-/// The worst error of an estimate within amplitude and rate, both finite: a backward dynamic program over multiples of what
-/// the rate allows in a period. Rounding the amplitude down to such a multiple is all that is lost, as a linear program
-/// of differences has a solution in whole numbers.
+/// The worst error of an estimate within amplitude and rate, both finite: a backward dynamic program over multiples of
+/// what the rate allows in a period. Rounding the amplitude down to such a multiple is all that is lost, as a linear
+/// program of differences has a solution in whole numbers.
 std::vector<double> worst_within(const EstimateError& known, const std::vector<double>& kernel,
                                  double period_s) {
   const double unit = known.rate * period_s;

@@ -42,8 +42,8 @@ std::vector<FollowingLoop> following_loops() {
           {{kMass_kg, 20, 10, 12, {1 / 17.4, 0.03}, 0}, 1}};
 }
 
-/// e at the end of every step where the set point has this jerk on each step: what acts of its acceleration, as firmware
-/// feeds it forward, less the acceleration itself is a force on the mass.
+/// e at the end of every step where the set point has this jerk on each step: what acts of its acceleration, as
+/// firmware feeds it forward, less the acceleration itself is a force on the mass.
 std::vector<double> errors_under(const FollowingLoop& c, const std::vector<double>& jerk_m_s3) {
   SteppedLoop loop = c.stepped();
   loop.reset();

@@ -202,8 +202,8 @@ TEST(SampledLoop, WithoutIntegralTheRestIsFiniteAndNearTheContinuousLoop) {
   EXPECT_TRUE(std::isfinite(noise_deviation(sampled(10, 5, 0, 500), 1e-3, 0.05).command_m_s2));
 }
 
-/// One slow mode remains for hours: its geometric series is summed. The rate gain is at least the constant one, 1/(m Ki),
-/// and equal to it for a response of one sign.
+/// One slow mode remains for hours: its geometric series is summed. The rate gain is at least the constant one, 1/(m
+/// Ki), and equal to it for a response of one sign.
 TEST(SampledLoop, AVerySlowIntegratorCostsNoTimeAndHasItsClosedForm) {
   for (const double Ki : {1e-3, 1e-6}) {
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {

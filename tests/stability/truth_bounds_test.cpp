@@ -196,9 +196,8 @@ TEST(TruthBounds, EncloseDragInflowSurfacesAndFlowOnRandomMotions) {
       "name = \"translational_lift\"\nparameters = { gain = 0.1, speed_m_s = 1 }\n",
       "name = \"vortex_ring\"\nparameters = { loss = 0.2, descent_m_s = 0.5 }\n",
       "name = \"wall\"\nparameters = { push = 0.1, place_m = 0.01 }\n",
-      "name = \"wind_field\"\nparameters = { shear_x_N = 0.02, shear_y_N = -0.01, thermal_N = "
-      "0.02, height_m = 1.15, "
-      "x_m = 0.3 }\n"};
+      "name = \"wind_field\"\nparameters = { shear_x_N = 0.02, shear_y_N = -0.01, thermal_N = 0.02, height_m "
+      "= 1.15, x_m = 0.3 }\n"};
   MotionSet motion;
   motion.speed_m_s = 1.5;
   motion.acceleration_m_s2 = 4;
@@ -263,11 +262,10 @@ TEST(TruthBounds, ALoadThatChangesHasAWeightButNoRate) {
 TEST(TruthBounds, WhatIsNotEnclosedIsInfiniteAndSaysWhy) {
   const Model model = vehicle(
       "[[effect]]\nname = \"gust\"\nparameters = { a = 1.0 }\n[effect.expression]\nforce_z_N = \"a * "
-      "sin(t)\"\nlinear = "
-      "[\"a\"]\n[[effect]]\nname = \"battery\"\n[[effect]]\nname = \"motor_lag\"\n[[effect]]\nname = "
-      "\"constant_force\"\nparameters = { force_x_N = -0.02 }\n[[effect]]\nname = "
-      "\"drag_linear\"\nparameters = { "
-      "drag_N_s_m = 0.01 }\n[[effect]]\nname = \"downwash\"\nparameters = { tail = 0.5 }\n");
+      "sin(t)\"\nlinear = [\"a\"]\n[[effect]]\nname = \"battery\"\n[[effect]]\nname = "
+      "\"motor_lag\"\n[[effect]]\nname = \"constant_force\"\nparameters = { force_x_N = -0.02 "
+      "}\n[[effect]]\nname = \"drag_linear\"\nparameters = { drag_N_s_m = 0.01 }\n[[effect]]\nname = "
+      "\"downwash\"\nparameters = { tail = 0.5 }\n");
   const auto bounds = truth_bounds(model, MotionSet());
   for (const std::size_t i : {0u, 1u, 4u, 5u}) {
     EXPECT_TRUE(std::isinf(bounds.at(i).rate_N_s[2])) << bounds[i].effect;

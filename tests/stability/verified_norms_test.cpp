@@ -16,7 +16,8 @@ using tests::encloses;
 using tests::kMass_kg;
 
 TEST(VerifiedNorms, EncloseClosedFormsAndAreNarrow) {
-  // To the eight digits that the command line prints. Triple pole: |h|_1 = 1/(m a^3), |h|_oo = 2 e^-2/(m a^2), |h'|_1 twice that.
+  // To the eight digits that the command line prints. Triple pole: |h|_1 = 1/(m a^3), |h|_oo = 2 e^-2/(m a^2), |h'|_1
+  // twice that.
   const double a = 4;
   const auto norms = verified_norms({kMass_kg, 3 * a * a, 3 * a, a * a * a, {}, 0}, Channel::kForce);
   ASSERT_TRUE(norms.has_value());

@@ -51,8 +51,8 @@ stability::Model truth_for(const stability::Gains& gains) {
 
 TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
   const files::Network network = tests::demo_network();
-  // Gains that state how fast the vehicle turns, which the simulator has and composite.toml leaves out. Left out of every
-  // tube: that the loop is sampled, and that a tilted thrust lifts less.
+  // Gains that state how fast the vehicle turns, which the simulator has and composite.toml leaves out. Left out of
+  // every tube: that the loop is sampled, and that a tilted thrust lifts less.
   const double left_out_m = 1e-4;
   const stability::TrackingSetup loop = tests::loop_of("firmware-defaults");
   const stability::Model truth = tests::truth_model();

@@ -23,7 +23,8 @@ EnclosureOptions boxes(int count) {
   return options;
 }
 
-/// How often flights were outside their slice, and how near they came to the edge where they were inside: 1 at the edge.
+/// How often flights were outside their slice, and how near they came to the edge where they were inside: 1 at the
+/// edge.
 struct Seen {
   int looks = 0, outside = 0;
   double nearest = 0;

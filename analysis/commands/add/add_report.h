@@ -24,8 +24,8 @@ struct BeforeAfter {
   identification::PictureData pictures;
 };
 
-/// Writes FOLDER/report.html with a plot and a table per ladder, the effects' numbers and the JSON `result`; returns its
-/// path.
+/// Writes FOLDER/report.html with a plot and a table per ladder, the effects' numbers and the JSON `result`; returns
+/// its path.
 /// @param change where effects were added: its pictures; else null
 /// @throws files::InputError as Report::write().
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,

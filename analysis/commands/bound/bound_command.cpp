@@ -58,21 +58,21 @@ bool has_initial(const stability::InitialError& initial) {
   return initial.position_m != 0 || initial.velocity_m_s != 0 || initial.learning_error_N != 0;
 }
 
-/// Through a thrust ratio r other than 1 the acceleration that is fed forward leaves the force (r - 1) m p_d'', which a jerk
-/// does not limit.
+/// Through a thrust ratio r other than 1 the acceleration that is fed forward leaves the force (r - 1) m p_d'', which a
+/// jerk does not limit.
 void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, const Tracking& input) {
   for (const stability::ReferenceMotion& motion : source.reference) {
     if (motion.jerk_m_s3 == 0 || input.plant.thrust_scale == 1) continue;
-    throw UsageError(fmt::format(
-        "--reference-jerk: the thrust ratio {} of the model scales the acceleration that is fed forward, "
-        "which "
-        "leaves a force that the jerk does not limit; add it to --amplitude, with a model without the ratio",
-        input.plant.thrust_scale));
+    throw UsageError(
+        fmt::format("--reference-jerk: the thrust ratio {} of the model scales the acceleration that is fed "
+                    "forward, which leaves a force that the jerk does not limit; add it to --amplitude, with "
+                    "a model without the ratio",
+                    input.plant.thrust_scale));
   }
 }
 
-/// The tubes and the swarm bound start from rest and know exact estimates; the tube around a task knows no force but that
-/// of the declared truth. What they would leave out is refused.
+/// The tubes and the swarm bound start from rest and know exact estimates; the tube around a task knows no force but
+/// that of the declared truth. What they would leave out is refused.
 void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
   const auto refuse = [](const char* what, const char* without) {
     throw UsageError(fmt::format("{} does not contain {}: leave one of them out", what, without));
@@ -265,8 +265,7 @@ Command bound_command() {
             "(default: [attitude] of gains.toml, where it has them)");
         app.add_option("--coverage", options->coverage,
                        "Bound that a further flight like those of --from keeps with this probability "
-                       "(split-conformal "
-                       "prediction over flights)")
+                       "(split-conformal prediction over flights)")
             ->check(CLI::Range(0.5, 0.999))
             ->needs("--from");
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");

@@ -173,8 +173,7 @@ void print_exact(const TrackingReport& report) {
   if (const std::vector<std::string> coupled = coupled_axes(report); !coupled.empty()) {
     fmt::print(
         "\nLambda or K couples the axes {}: none has rows of its own. Ball, transient and vector gain hold "
-        "for "
-        "all together.\n",
+        "for all together.\n",
         fmt::join(coupled, ", "));
   }
   if (report.exact.empty()) return;

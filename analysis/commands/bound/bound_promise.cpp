@@ -51,8 +51,7 @@ files::Json promise_json(const Tracking& input, const stability::TrackingReport&
   }
   json["like_them"] =
       "a flight whose force error is one more draw of what these flights' were drawn from: same vehicles, "
-      "tasks and "
-      "model";
+      "tasks and model";
   json["rests_on"] = "the linear loop with the lags of gains.toml; force errors below " +
                      std::string("the bandwidth that compare states; windows that follow one another");
   return json;
@@ -62,8 +61,7 @@ void print_promise(const files::Json& promise) {
   const files::Json& interval = promise["interval"];
   fmt::print(
       "\nA further flight like the {} that were compared stays below with probability {:g} ({:.3f} to {:.3f} "
-      "for these "
-      "flights, 90 %):\n",
+      "for these flights, 90 %):\n",
       promise["flights"].get<std::size_t>(), promise["level"].get<double>(), interval[0].get<double>(),
       interval[1].get<double>());
   for (const files::Json& row : promise["bounds"]) {

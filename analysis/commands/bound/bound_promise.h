@@ -8,8 +8,10 @@
 
 namespace swarmcert::analysis {
 
-/// `coverage` of the result: level, flights, interval, what the promise is about, and the bound of every row of bounds[].
-/// @param declared bias and errors of the estimates that were given beside the file. @param from result of compare. @throws files::InputError where it has fewer flights than the level needs.
+/// `coverage` of the result: level, flights, interval, what the promise is about, and the bound of every row of
+/// bounds[].
+/// @param declared bias and errors of the estimates that were given beside the file. @param from result of compare.
+/// @throws files::InputError where it has fewer flights than the level needs.
 files::Json promise_json(const Tracking& input, const stability::TrackingReport& report,
                          const stability::DisturbanceSource& declared, const stability::InitialError& initial,
                          const std::string& from, double level);

@@ -51,14 +51,14 @@ void add_theorem_plot(Report& report, const Tracking& input, const TrackingRepor
     data += fmt::format("{:.6g} {:.8g} {:.8g} {}\n", t_s, tracking.transient->at(t_s), *tracking.ball_m,
                         ramp.empty() ? "NaN" : fmt::format("{:.8g}", ramp[static_cast<std::size_t>(i)]));
   }
-  report.figure("theorem", data,
-                "set xlabel 'time [s]'\nset ylabel 'error [m]'\n"
-                "plot 'theorem.dat' using 1:2 with lines linewidth 2 title 'transient bound', "
-                "'' using 1:3 with lines title 'ball', "
-                "'' using 1:4 with lines title 'z from rest under a ramp of eps'\n",
-                "The theorem's closed-form transient and its ball, for the initial error given; and the "
-                "error from rest "
-                "under a learning error that rises at the rate d_m for ever, the worst of its class.");
+  report.figure(
+      "theorem", data,
+      "set xlabel 'time [s]'\nset ylabel 'error [m]'\n"
+      "plot 'theorem.dat' using 1:2 with lines linewidth 2 title 'transient bound', "
+      "'' using 1:3 with lines title 'ball', "
+      "'' using 1:4 with lines title 'z from rest under a ramp of eps'\n",
+      "The theorem's closed-form transient and its ball, for the initial error given; and the error from "
+      "rest under a learning error that rises at the rate d_m for ever, the worst of its class.");
 }
 
 /// Tube of |e| from rest for forces within the amplitude, and the error under the worst of them.

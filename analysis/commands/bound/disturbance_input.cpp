@@ -226,7 +226,8 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
         arguments.network.file.empty() ? arguments.network.phi + ", " + arguments.network.rho
                                        : arguments.network.file);
   }
-  // A neighbour's input moves at |(v_rel, a_rel)|, and every neighbour adds its own; the ground's input is the own state.
+  // A neighbour's input moves at |(v_rel, a_rel)|, and every neighbour adds its own; the ground's input is the own
+  // state.
   if (arguments.acceleration < 0) notes.emplace_back("neighbours fly at constant velocity: no --accel");
   double rate = arguments.neighbours * lipschitz_N.neighbour *
                 std::hypot(arguments.speed, std::max(0.0, arguments.acceleration));

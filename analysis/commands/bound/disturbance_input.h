@@ -48,8 +48,8 @@ struct LoadedDisturbance {
 void declare_no_class(stability::DisturbanceSource& source);
 
 /// In order: --rate and the like (declared), --from (measured), --truth (with the network's rate where one is named),
-/// a certificate or a network with --speed (rate of f_hat, which is no learning error). Bias and errors of the estimates
-/// come on top; alone, they stand beside a force error of zero.
+/// a certificate or a network with --speed (rate of f_hat, which is no learning error). Bias and errors of the
+/// estimates come on top; alone, they stand beside a force error of zero.
 /// @throws UsageError for combinations that mean nothing; files::InputError for bad files.
 LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const Tracking& tracking);
 

@@ -27,8 +27,7 @@ void print_float_errors(const FloatErrors& errors) {
   }
   fmt::print(
       "\nfloat32 against double: f_d within {:.3g}, {:.3g}, {:.3g} N, thrust {:.3g} N, torque {:.3g}, "
-      "{:.3g}, "
-      "{:.3g} N m",
+      "{:.3g}, {:.3g} N m",
       errors.force_N[0], errors.force_N[1], errors.force_N[2], errors.thrust_N, errors.torque_N_m[0],
       errors.torque_N_m[1], errors.torque_N_m[2]);
   const double* const e = errors.tracking_error_m;

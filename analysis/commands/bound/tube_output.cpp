@@ -96,8 +96,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
   if (disturbance.truth.empty()) {
     throw UsageError(
         "a tube around a task needs what the force really is, since a network bounds only what it predicts: "
-        "add "
-        "--truth MODEL");
+        "add --truth MODEL");
   }
   const std::unique_ptr<stability::Task> task =
       stability::make_task(arguments.task, {arguments.vehicles, arguments.duration_s, 0});
@@ -198,8 +197,7 @@ void print_local_tube(const Json& tube) {
       const Json& e = b["force_error"];
       fmt::print(
           "  vehicle {}: |f_hat - f_a| <= {} N, rate {} N/s, int {} N s; error by rate {}, amplitude {}, "
-          "edges {}, "
-          "impulse {}, slices {} m\n",
+          "edges {}, impulse {}, slices {} m\n",
           b["vehicle"].get<int>(), number(e["amplitude_N"]), number(e["rate_N_s"]), number(e["impulse_N_s"]),
           number(b["rate"]), number(b["amplitude"]), number(b["edges"]), number(b["impulse"]),
           number(b["slices"]));
@@ -259,8 +257,7 @@ void add_local_tube_plot(Report& report, const LocalTube& tube, const Json& json
   }
   report.figure("local_tube", data, script + "\n",
                 fmt::format("Between which values the height error of each vehicle lies at each time: "
-                            "proved, and within {:.4g} m "
-                            "over the whole flight.",
+                            "proved, and within {:.4g} m over the whole flight.",
                             tube.tube.radius_m(2)));
 }
 

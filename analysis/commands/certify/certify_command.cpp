@@ -369,16 +369,14 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
 void declare_function(CLI::App& app, CertifyOptions& options) {
   app.add_option("--method", options.method,
                  "Upper bound: product (of spectral norms), sdp (LipSDP-Neuron; the layer-wise eclipse_fast "
-                 "where "
-                 "its search is interrupted), auto (the smallest of the three), "
-                 "or branch (branch and bound over the box of --domain; without --domain over all inputs)")
+                 "where its search is interrupted), auto (the smallest of the three), or branch (branch and "
+                 "bound over the box of --domain; without --domain over all inputs)")
       ->check(CLI::IsMember({"auto", "product", "sdp", "branch"}))
       ->capture_default_str();
-  app.add_option("--samples", options.samples,
-                 "Inputs and outputs recorded from the trained network (CSV, .npz or JSON), which the "
-                 "certified "
-                 "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. "
-                 "phi:small=FILE")
+  app.add_option(
+         "--samples", options.samples,
+         "Inputs and outputs recorded from the trained network (CSV, .npz or JSON), which the certified "
+         "function must reproduce, else exit 3; PART=FILE for a part of a deep set, e.g. phi:small=FILE")
       ->allow_extra_args(false);
   app.add_option("--samples-tolerance", options.sample_tolerance,
                  "How far samples may be off, times what their outputs range over")
@@ -419,11 +417,10 @@ void declare_search_on_a_box(CLI::App& app, CertifyOptions& options) {
   app.add_flag_callback(
       "--default-slopes", [&options] { options.certify.branch.better_slopes = false; },
       "With --method branch: disable the adaptive lower ReLU slopes (for comparison)");
-  auto* map = app.add_option("--map", options.map,
-                             "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell "
-                             "by cell; the slope in a "
-                             "cell is proved above and witnessed below, the other inputs range over "
-                             "the box (JSON and report)");
+  auto* map = app.add_option(
+      "--map", options.map,
+      "Two inputs, e.g. dp_x_m,dp_z_m: their plane in the box of --domain, cell by cell; the slope in a cell "
+      "is proved above and witnessed below, the other inputs range over the box (JSON and report)");
   app.add_option("--cells", options.cells, "Cells of --map along each input (default: 12), e.g. 12,8")
       ->needs(map);
   app.add_option("--cell-nodes", options.slope_map.nodes,
@@ -451,9 +448,8 @@ void declare_limits(CLI::App& app, CertifyOptions& options) {
                  "networks). With --method branch: boxes to look at, per bound (default: 20000)")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--time", options.seconds,
-                 "Time limit of the whole command in seconds. Bounds are proved all the same; those "
-                 "whose search was "
-                 "cut short have the status interrupted, as after Ctrl-C or SIGTERM")
+                 "Time limit of the whole command in seconds. Bounds are proved all the same; those whose "
+                 "search was cut short have the status interrupted, as after Ctrl-C or SIGTERM")
       ->check(CLI::PositiveNumber);
   app.add_option("--seed", options.certify.lower.seed, "Seed of the lower-bound search")
       ->capture_default_str();

@@ -128,8 +128,7 @@ void print_chains(const files::Network& network, const Certification& found) {
     if (rounding > 0)
       fmt::print(
           "    folded weights that are no doubles are rounded to nearest; the bounds for all inputs plus "
-          "{:.2g} "
-          "hold for the exact ones\n",
+          "{:.2g} hold for the exact ones\n",
           rounding);
     if (samples == found.samples.end()) continue;
     const files::SampleAgreement& agreement = samples->second;

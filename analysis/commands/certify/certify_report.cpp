@@ -118,8 +118,7 @@ void add_map(Report& report, const files::Network& network, const CertifyOutput&
   report.paragraph(fmt::format(
       "Local slope over {} and {}; {}. {} of {} cells have a bound of their own, proved by branch and bound; "
       "the others keep the bound for all inputs. The steepest proved cell lies at {} = {:.4g}, {} = {:.4g}: "
-      "at "
-      "most {:.6g}, witnessed {} {}.",
+      "at most {:.6g}, witnessed {} {}.",
       names[0], names[1], others.empty() ? "there are no other inputs" : "the other inputs: " + others, local,
       map.cells.size(), names[0], middle(*steepest, first), names[1], middle(*steepest, second),
       steepest->upper.value(), number(slope_of(steepest->lower), 6), unit));

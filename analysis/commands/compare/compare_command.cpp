@@ -156,8 +156,8 @@ files::Json velocity_error_json(const std::map<std::string, residuals::FlightErr
   return json_of(residuals::velocity_error(bias, windows));
 }
 
-/// flights[].learning_error and flights[].velocity_error, from which bound --coverage makes its promise, and the quantiles
-/// of the velocity's error over all windows.
+/// flights[].learning_error and flights[].velocity_error, from which bound --coverage makes its promise, and the
+/// quantiles of the velocity's error over all windows.
 void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& result) {
   std::map<std::string, residuals::FlightError> errors;
   for (residuals::FlightError& error : residuals::flight_errors(inputs, jobs)) {

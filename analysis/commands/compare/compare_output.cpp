@@ -439,8 +439,7 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
   if (inputs.rules.per_mass) {
     fmt::print(
         "No model is known: residuals are per mass, and thrust is in multiples of each log's hover thrust, "
-        "so that "
-        "the mean vertical force says nothing.\n");
+        "so that the mean vertical force says nothing.\n");
     if (!inputs.fleet.empty()) fmt::print("{}\n", vehicles_without_model(inputs));
   }
   for (const std::string& pattern : residuals::patterns_without_log(inputs.log_rules, inputs.found))

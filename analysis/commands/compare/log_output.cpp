@@ -52,8 +52,7 @@ void print_clocks(const Comparison& comparison) {
   if (clocks.unknown > 0) {
     fmt::print(
         "Clocks: the offset of {} log{} could not be estimated and is taken as 0: no commanded movement "
-        "starts "
-        "within 0.1 s of one in the first log of the flight.\n",
+        "starts within 0.1 s of one in the first log of the flight.\n",
         clocks.unknown, clocks.unknown == 1 ? "" : "s");
   }
 }

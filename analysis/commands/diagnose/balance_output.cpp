@@ -40,8 +40,8 @@ struct Entry {
   std::vector<std::string> rivals;
 };
 
-/// What a balance of means finds, as an entry of the ranking. Errors are those of the balance, in newton: of torques, the
-/// force by which each rotor is off balance; of the accelerometer, mass times the error of its mean.
+/// What a balance of means finds, as an entry of the ranking. Errors are those of the balance, in newton: of torques,
+/// the force by which each rotor is off balance; of the accelerometer, mass times the error of its mean.
 template <class Balance>
 files::Json ranking_entry(const Balance& balance, const Entry& entry) {
   files::Json rivals = files::Json::array();

@@ -17,10 +17,9 @@ using identification::Missing;
 
 constexpr const char* kDetectableMeaning =
     "the smallest size that these flights show in 90 % of injections (open loop: column times size is added "
-    "to the "
-    "residual of resampled blocks; the flight does not react); null: not at any size within the physical "
-    "bounds; "
-    "nothing_missing means none above these sizes, and nothing left above three times the noise floor";
+    "to the residual of resampled blocks; the flight does not react); null: not at any size within the "
+    "physical bounds; nothing_missing means none above these sizes, and nothing left above three times the "
+    "noise floor";
 
 files::Json json_of(const identification::InstrumentedValue& value, double beyond) {
   return {{"least_squares", beyond + value.least_squares},

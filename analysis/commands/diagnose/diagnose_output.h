@@ -23,8 +23,8 @@ void add_differences(const std::vector<identification::Difference>& differences,
 /// What the ranking of `difference` rests on, for people.
 std::string in_words(const identification::Difference& difference);
 
-/// Flights that would answer what these leave open, best first: of the rivals of each effect, then of effects that these
-/// flights could not have shown at any size.
+/// Flights that would answer what these leave open, best first: of the rivals of each effect, then of effects that
+/// these flights could not have shown at any size.
 std::vector<std::string> next_flights(const identification::Diagnosis& diagnosis);
 
 }  // namespace swarmcert::analysis

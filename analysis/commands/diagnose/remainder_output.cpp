@@ -81,7 +81,8 @@ struct Shown {
   }
 };
 
-/// Of both scans, each best first: the force before torques and rotors where its scan explains much, else by their shares.
+/// Of both scans, each best first: the force before torques and rotors where its scan explains much, else by their
+/// shares.
 std::vector<Listed> all_listed(const Diagnosis& diagnosis) {
   const std::vector<Listed> forces = listed(diagnosis.scan, diagnosis.formulas),
                             balances = listed(diagnosis.balance, diagnosis.balance_formulas);

@@ -12,8 +12,8 @@ namespace swarmcert::analysis {
 void print_rotors(const std::vector<identification::RotorBalance>& balances);
 
 /// `rotors`: per vehicle and flight what each rotor gives against healthy flights. What is named for a vehicle goes to
-/// the head of `ranking` as rotor_thrust, and makes the verdict missing_effect: a weak rotor changes the thrust as a whole
-/// as well, not the other way round.
+/// the head of `ranking` as rotor_thrust, and makes the verdict missing_effect: a weak rotor changes the thrust as a
+/// whole as well, not the other way round.
 /// @param kind of the vehicles
 /// @return whether a rotor is named.
 bool add_rotors(const std::vector<identification::RotorBalance>& balances, const std::string& kind,

@@ -97,8 +97,7 @@ Command export_command() {
       "export", "Write firmware source for a network, with golden vectors and a self-test",
       "Writes the weights as hexadecimal floats, the clamp, the scale to newton, the evaluator, and golden "
       "vectors\nthat the firmware checks at start. 'swarmcert match' proves that a source file or an ELF "
-      "still holds these "
-      "weights.\n\n"
+      "still holds these weights.\n\n"
       "Example: swarmcert export nn/networks/demo/network.toml -o firmware",
       [](CLI::App& app) {
         const auto options = std::make_shared<ExportOptions>();

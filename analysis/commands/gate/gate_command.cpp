@@ -166,8 +166,7 @@ Command gate_command() {
       "POLICY.toml names the files of the release and has one table per check with its limits. Every check "
       "passes, fails\n"
       "with a witness, or is inconclusive; checks that the policy does not ask for are listed. Exit code 0 "
-      "if all pass, 3 "
-      "for\n"
+      "if all pass, 3 for\n"
       "a file that is missing or damaged, else 1. Paths in a policy are relative to it.\n\n"
       "Example: swarmcert gate policy.toml --baseline baseline.json --junit gate.xml",
       [](CLI::App& app) {
@@ -200,8 +199,7 @@ Command verify_bundle_command() {
           "Exactly the files of the manifest, with their hashes; the gate's result; then the independent "
           "checker on the\n"
           "bundle's certificate and weights, and the match of its source and ELF. Accepted: exit 0. "
-          "Rejected, with the "
-          "reason: exit 1.\n\n"
+          "Rejected, with the reason: exit 1.\n\n"
           "Example: swarmcert verify-bundle release/ --rerun",
           [](CLI::App& app) {
             const auto options = std::make_shared<VerifyOptions>();

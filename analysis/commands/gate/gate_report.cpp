@@ -15,7 +15,8 @@ namespace {
 
 std::string cell(const std::optional<double>& x) { return x ? gate::number(x) : "-"; }
 
-/// What of its limit a check uses, in percent, so that more than 100 fails in either sense. NaN where a ratio says nothing.
+/// What of its limit a check uses, in percent, so that more than 100 fails in either sense. NaN where a ratio says
+/// nothing.
 double used_percent(const gate::Check& check) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (!check.value || !check.limit || !(*check.value > 0) || !(*check.limit > 0)) return kNone;

@@ -20,8 +20,7 @@ std::string write_iss_check_report(const stability::IssCheck& check, const files
   for (const std::string& why : check.why_not) report.paragraph(why + ".");
   report.paragraph(
       fmt::format("Ball: {:.6g} m for a learning error that changes by at most {:.4g} N/s{}. {} of {} runs "
-                  "violate it{}. No "
-                  "violation is no proof.",
+                  "violate it{}. No violation is no proof.",
                   check.ball_m, check.rate_N_s,
                   check.has_ball ? "" : " (these gains lack the theorem's form: what one might take for it)",
                   check.violations, check.runs.size(), check.cancelled ? "; the check was interrupted" : ""));

@@ -146,12 +146,10 @@ Command reproduce_command() {
       "reproduce", "Reproduce the paper's table and figures, and experiments beyond them",
       "Experiments\n" + names +
           "\nWrites DIR/EXPERIMENT/: report.html, its plots with their data, result.json. Flights and "
-          "networks "
-          "in\nDIR/small or DIR/full are shared: existing ones are reused, and an interrupted run "
+          "networks in\nDIR/small or DIR/full are shared: existing ones are reused, and an interrupted run "
           "continues.\nResults are shown as found, with their seeds. Interaction torques are learned by "
-          "train --quantity\ntorque, and flown by simulate --torque-network.\n\nExample: swarmcert "
-          "reproduce table -o "
-          "reproduced\n"
+          "train --quantity\ntorque, and flown by simulate --torque-network.\n\nExample: swarmcert reproduce "
+          "table -o reproduced\n"
           "         swarmcert reproduce table --full --shard 1/2 -o reproduced\n"
           "         swarmcert reproduce gains-in-flight --calibrate flown --flights new -o reproduced",
       [words](CLI::App& app) {

@@ -20,8 +20,8 @@ struct MapSize {
   double x, y;
 };
 
-/// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after). On narrow screens they
-/// stand above each other, on a drawing of twice the height.
+/// gnuplot commands for two maps of NAME.dat on one colour scale, columns 3 (before) and 4 (after). On narrow screens
+/// they stand above each other, on a drawing of twice the height.
 std::string two_maps(const std::string& name, const std::string& x, const std::string& y, const MapSize& size,
                      const residuals::ForceUnit& unit) {
   const std::string file = "'" + name + ".dat'";

@@ -28,8 +28,8 @@ struct CollectionRow {
   std::map<std::string, std::size_t> left_out;  ///< by reason
 };
 
-/// One row for each folder among `words` that a user named or, where its logs lie in several folders right below it, for each
-/// of those; a row for all where there are several. Empty where no folder was named.
+/// One row for each folder among `words` that a user named or, where its logs lie in several folders right below it,
+/// for each of those; a row for all where there are several. Empty where no folder was named.
 std::vector<CollectionRow> collection_rows(const std::vector<std::string>& words,
                                            const std::vector<LogOutcome>& logs);
 

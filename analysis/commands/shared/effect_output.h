@@ -11,8 +11,8 @@
 
 namespace swarmcert::analysis {
 
-/// What results show of a number beyond what the model file holds: 1 for the ratio of thrust_ratio, which results give as
-/// a factor (1 is nominal) and model files as the excess over 1; else 0.
+/// What results show of a number beyond what the model file holds: 1 for the ratio of thrust_ratio, which results give
+/// as a factor (1 is nominal) and model files as the excess over 1; else 0.
 double shown_beyond_file(const std::string& effect, const std::string& parameter);
 
 /// {"tau_s": {"value": 0.06, "interval_90": [0.05, 0.07]}}; without the interval where there is none.

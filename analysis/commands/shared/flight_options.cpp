@@ -25,13 +25,11 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
       "--keep", options.keep,
       "Take logs that are damaged or implausible, which are otherwise named and left out: implausible ones "
       "everywhere, damaged ones where something is fitted");
-  app.add_option(
-      "--columns", options.columns,
-      "columns.toml: meaning of the columns of CSV logs; per signal column, unit and frame, as in position_x "
-      "= { "
-      "column = \"px\", unit = \"mm\" }: time, position_x .. z, velocity_x .. z, specific_force_x .. z, "
-      "attitude_x .. z and _w, duty_1 .. 4, battery; if there, rate_x .. z, target_position_x .. z, "
-      "target_velocity_x .. z");
+  app.add_option("--columns", options.columns,
+                 "columns.toml: meaning of the columns of CSV logs; per signal column, unit and frame, as in "
+                 "position_x = { column = \"px\", unit = \"mm\" }: time, position_x .. z, velocity_x .. z, "
+                 "specific_force_x .. z, attitude_x .. z and _w, duty_1 .. 4, battery; if there, rate_x .. "
+                 "z, target_position_x .. z, target_velocity_x .. z");
 }
 
 residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bool may_lack_model,

@@ -96,8 +96,7 @@ void write_report(const SimulateOptions& options, const CommonOptions& common,
   report.result(result);
   report.paragraph(
       "Simulated in the sampled loop: controllers at their own rates, forces held between, Runge-Kutta per "
-      "control "
-      "period. One run shows what happened in it, not what is the largest error possible.");
+      "control period. One run shows what happened in it, not what is the largest error possible.");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < flown.vehicles.size(); ++i) {
     const auto& error = flown.vehicles[i].error;

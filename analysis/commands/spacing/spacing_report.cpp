@@ -23,8 +23,7 @@ std::string write_spacing_report(const stability::SpacingQuestion& question, con
   report.result(result);
   report.paragraph(
       fmt::format("Below {} vehicle(s), the vertical error is to stay within {:.6g} m without feed-forward; "
-                  "predicted forces "
-                  "times {:.6g}. Least height gap to stay below: {}; to cross below: {}.",
+                  "predicted forces times {:.6g}. Least height gap to stay below: {}; to cross below: {}.",
                   question.neighbours, question.max_error_m, question.guard, gap(found.least_gap_to_stay_m),
                   gap(found.least_gap_to_cross_m)));
   std::string shape = "# height_gap_m keep_out_radius_m left_m\n", speed = "# height_gap_m least_speed_m_s\n";

@@ -8,7 +8,8 @@
 
 namespace swarmcert::analysis {
 
-/// Writes FOLDER/report.html with the keep-out shape, the least crossing speeds and the JSON `result`; returns its path.
+/// Writes FOLDER/report.html with the keep-out shape, the least crossing speeds and the JSON `result`; returns its
+/// path.
 /// @throws files::InputError as Report::write().
 std::string write_spacing_report(const stability::SpacingQuestion& question, const stability::Spacing& found,
                                  const files::Json& result, const std::string& folder, bool overwrite);

@@ -32,23 +32,20 @@ void declare_limits_of_training(CLI::App& app, TrainOptions& options) {
       ->check(CLI::IsMember({"clip", "equal"}))
       ->capture_default_str();
   app.add_option("--max-lipschitz", options.run.max_lipschitz,
-                 "Limit of the joint Lipschitz bounds in gf (torque: mN m) per unit of input, proved; "
-                 "layers that reach it "
-                 "are clipped below gamma")
+                 "Limit of the joint Lipschitz bounds in gf (torque: mN m) per unit of input, proved; layers "
+                 "that reach it are clipped below gamma")
       ->check(CLI::PositiveNumber);
 }
 
 void declare_samples(CLI::App& app, TrainOptions& options) {
   app.add_option("--weights", options.weights,
-                 "Scenarios and the compositions of kinds in them count the same (scenarios), or the "
-                 "same relative "
-                 "to their own errors (errors)")
+                 "Scenarios and the compositions of kinds in them count the same (scenarios), or the same "
+                 "relative to their own errors (errors)")
       ->check(CLI::IsMember({"scenarios", "errors"}))
       ->capture_default_str();
   app.add_option("--symmetry", options.symmetry,
-                 "vertical: every epoch turns every sample about the vertical and mirrors it, its "
-                 "force or torque "
-                 "included; none: samples as recorded")
+                 "vertical: every epoch turns every sample about the vertical and mirrors it, its force or "
+                 "torque included; none: samples as recorded")
       ->check(CLI::IsMember({"vertical", "none"}))
       ->capture_default_str();
 }

@@ -96,8 +96,7 @@ void print_worse_than_none(const Outcome& outcome, const std::string& unit) {
   if (!outcome.kept()) {
     fmt::print(
         "no network is kept: on the selecting flights it leaves {:.3f} {}, none {:.3f}; the models written "
-        "are "
-        "without it\n",
+        "are without it\n",
         outcome.select.network, unit, outcome.select.nothing);
   }
   for (const auto& [composition, scores] : outcome.select_compositions) {

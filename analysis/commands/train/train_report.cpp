@@ -35,8 +35,7 @@ void add_curve(Report& report, const LearningData& data, const learning::Run& ru
       fmt::format("set xlabel 'epoch'\nset ylabel 'RMSE [{}]'\nset yrange [0:*]\n",
                   learning::info(data.target).unit) +
           "plot 'epochs.dat' using 1:2 with linespoints lw 2 title 'flights to fit', '' using 1:3 with "
-          "linespoints lw 2 "
-          "title 'flights to select'\n",
+          "linespoints lw 2 title 'flights to select'\n",
       fmt::format("Error over epochs{}. Kept: epoch {}.",
                   teachers > 0 ? fmt::format(", to fit against the mean of {} teachers", teachers) : "",
                   run.best_epoch + 1));

@@ -28,7 +28,8 @@ Run read_theorem(const files::TomlTable& table, Policy& policy);
 Run read_tracking(const files::TomlTable& table, Policy& policy);
 /// [small_gain]: margin of the swarm's loop of bounds.
 Run read_small_gain(const files::TomlTable& table, Policy& policy);
-/// [match]: the exported source is that of this network, file by file; the ELF holds its weights and evaluates as it does.
+/// [match]: the exported source is that of this network, file by file; the ELF holds its weights and evaluates as it
+/// does.
 Run read_match(const files::TomlTable& table, Policy& policy);
 /// Of one file. @throws files::InputError if it, or the network, cannot be read.
 Check match_row(Evidence& evidence, const std::string& name, int line, const std::string& path, bool is_elf);

@@ -107,8 +107,7 @@ void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const 
     check.value.reset();
     check.reason = fmt::format(
         "at most {:.6g} m at the corners of the uncertainty, but nothing bounds a sampled loop with an "
-        "integrator clamp in "
-        "between; over = \"corners\" is content with the corners",
+        "integrator clamp in between; over = \"corners\" is content with the corners",
         proved);
   } else {
     judge(check, limit, proved, attained);

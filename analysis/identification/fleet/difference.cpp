@@ -50,8 +50,8 @@ std::vector<EffectSpec> without_vehicles(const std::vector<EffectSpec>& specs) {
   return shared;
 }
 
-/// The first formula that lasts, where something is left: what happened at some time of the others' flights says nothing
-/// of these. Null if no such formula exists.
+/// The first formula that lasts, where something is left: what happened at some time of the others' flights says
+/// nothing of these. Null if no such formula exists.
 const Formula* lasting_formula(const Diagnosis& diagnosis) {
   if (!leaves_something(diagnosis)) return nullptr;
   const auto lasting = std::find_if(diagnosis.formulas.begin(), diagnosis.formulas.end(),
@@ -87,8 +87,8 @@ Common common_of(const Inputs& others, const std::string& kind, const std::vecto
   return common;
 }
 
-/// What `others` show of `kind`: named effects, and the best formula for what they leave. Numbers that differ from day to
-/// day look like effects where the days are taken together: where there are groups, only what most of them show by
+/// What `others` show of `kind`: named effects, and the best formula for what they leave. Numbers that differ from day
+/// to day look like effects where the days are taken together: where there are groups, only what most of them show by
 /// themselves counts, with the numbers of all.
 std::vector<EffectSpec> baseline(const Inputs& others, const std::string& kind, bool one_vehicle,
                                  const std::vector<FlightGroup>& groups, int jobs,
@@ -118,8 +118,8 @@ stability::Model at_shape(const stability::Model& model, const EffectSpec& spec,
   return with_effects(model, {none});
 }
 
-/// The coefficients of `missing` that a fit to each group of the others gives on top of what is held. Empty for lags and
-/// delays, which have no coefficient that could be zero, and for formulas.
+/// The coefficients of `missing` that a fit to each group of the others gives on top of what is held. Empty for lags
+/// and delays, which have no coefficient that could be zero, and for formulas.
 ScatterOfGroups scatter_of(const Inputs& others, const std::string& kind, const Missing& missing,
                            const std::vector<FlightGroup>& groups, int jobs) {
   ScatterOfGroups scatter;
@@ -170,8 +170,7 @@ void judge(const Inputs& others, const std::string& kind, const std::vector<Flig
   if (groups.size() < 2) {
     difference.no_scatter =
         "the others have fewer than two flights or days with enough data; intervals hold the error of the "
-        "fit "
-        "alone";
+        "fit alone";
     return;
   }
   std::vector<Missing> beyond;

@@ -1,7 +1,7 @@
 /// @file What changed: effects of some flights beyond those of others (the healthy vehicle, the last release).
 ///
-/// Effects that most days, or flights, of the others show by themselves are fitted to all of them and held, and so is the
-/// best formula for what these leave, where most leave something.
+/// Effects that most days, or flights, of the others show by themselves are fitted to all of them and held, and so is
+/// the best formula for what these leave, where most leave something.
 /// What the flights at hand show on top is the difference. It is judged against the scatter of the same numbers between
 /// the days, or flights, of the others: a difference counts if it is larger than they differ among themselves.
 #pragma once

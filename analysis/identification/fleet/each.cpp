@@ -44,8 +44,8 @@ double error_of(const FlightNumber& number) {
   return (number.interval.second - number.interval.first) / (2 * kNormal);
 }
 
-/// A flight shows a number where its interval says more than the bounds of the effect do: the lag where its gain is that
-/// of a lag, and the others where the error is less than a tenth of the weight, or of a speed of 1 m/s.
+/// A flight shows a number where its interval says more than the bounds of the effect do: the lag where its gain is
+/// that of a lag, and the others where the error is less than a tenth of the weight, or of a speed of 1 m/s.
 bool shows(const NumberSource& source, const Missing& fit, const Interval& interval, double weight_N) {
   const double half = (interval.second - interval.first) / 2;
   if (!(half > 0) || !std::isfinite(half)) return false;

@@ -1,7 +1,7 @@
 /// @file Which rotor gives less than it did: its load in slow flight against that of the healthy vehicle.
 ///
-/// A rotor that gives the share rho of its thrust is asked for 1 / rho times as much, the others for what they were: the
-/// sum of the true forces still carries the weight and their torques still cancel. So the rise of its load over the
+/// A rotor that gives the share rho of its thrust is asked for 1 / rho times as much, the others for what they were:
+/// the sum of the true forces still carries the weight and their torques still cancel. So the rise of its load over the
 /// mean of the two rotors that rose least is (1 - rho) of its load. A load of mass m under rotor k raises that one by
 /// 3/4 m g, its neighbours by 1/4 and lowers the opposite one by 1/4: it shows as well, and slow flight cannot tell the
 /// two apart.

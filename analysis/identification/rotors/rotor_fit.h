@@ -18,8 +18,8 @@ using RotorFactors = std::array<RotorFactor, 4>;
 /// the scatter of its blocks.
 RotorFactors rotor_factors(const RotorLoads& flight);
 
-/// Of several flights, not empty. `scale` is what the sum of the true forces is of the sum of the mapped ones, per flight
-/// in their order. Intervals hold the scatter between the flights; of one flight, what the battery's place does.
+/// Of several flights, not empty. `scale` is what the sum of the true forces is of the sum of the mapped ones, per
+/// flight in their order. Intervals hold the scatter between the flights; of one flight, what the battery's place does.
 RotorFactors rotor_factors(const std::vector<RotorLoads>& flights, const std::vector<double>& scale,
                            const stability::Model& model);
 

@@ -45,7 +45,8 @@ void hold_others(Candidate& candidate, const std::vector<std::string>& free) {
   }
 }
 
-/// The shape parameters `free` may move from where they are by about kReach, if they are near zero; the others are held.
+/// The shape parameters `free` may move from where they are by about kReach, if they are near zero; the others are
+/// held.
 void free_shape(Candidate& candidate, const std::vector<std::string>& free) {
   for (std::size_t i = 0; i < candidate.info.shape.size(); ++i) {
     stability::Parameter& p = candidate.info.shape[i];

@@ -1,4 +1,5 @@
-/// @file What `add formula` and `add shape` add: effects without a name in the registry, found by a scan of what is left.
+/// @file What `add formula` and `add shape` add: effects without a name in the registry, found by a scan of what is
+/// left.
 #pragma once
 
 #include <optional>

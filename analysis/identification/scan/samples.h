@@ -76,8 +76,8 @@ struct NeighbourPlaces {
   Eigen::MatrixXf lateral_m, height_m;
 };
 
-/// One row per 0.1 s of flight in the blocks of cut_into_blocks(). Records that separate a block from the next one count
-/// as part of it: nothing here remembers the past beyond the 10 ms of the accelerometer.
+/// One row per 0.1 s of flight in the blocks of cut_into_blocks(). Records that separate a block from the next one
+/// count as part of it: nothing here remembers the past beyond the 10 ms of the accelerometer.
 struct ScanSamples {
   Eigen::MatrixXf values;     ///< [samples x kNumScanVariables]; NaN where unknown
   Eigen::MatrixXf commanded;  ///< the same as set points ask for it; NaN where nothing asks

@@ -9,9 +9,9 @@
 /// f(v as commanded). And the largest of many shares is no accident only if it exceeds what the same scan finds where
 /// the signs of whole chunks are drawn at random, which leaves no dependence (wild bootstrap of the largest value).
 ///
-/// Torques and rotors are judged in the same way, as torques about the body's axes and as the force that each rotor gives
-/// too much. A rotor counts over a variable only where no other one varies half as much with it: what moves two speaks of
-/// the vehicle. It then stands for the torques over that variable.
+/// Torques and rotors are judged in the same way, as torques about the body's axes and as the force that each rotor
+/// gives too much. A rotor counts over a variable only where no other one varies half as much with it: what moves two
+/// speaks of the vehicle. It then stands for the torques over that variable.
 #pragma once
 
 #include <string>
@@ -33,8 +33,8 @@ struct CurvePoint {
 struct ScanEntry {
   std::string variable, frame, axis;  ///< "climb"; for the rest see ScanColumn
   std::string quantity = "force", unit = "N";
-  /// Corrected, of the mean square about the mean: of the force's vector, of the torque about the one axis, or of the four
-  /// rotors together.
+  /// Corrected, of the mean square about the mean: of the force's vector, of the torque about the one axis, or of the
+  /// four rotors together.
   double share = 0;
   double uncorrected_share = 0;  ///< before the correction for the controller's answer
   Interval share_interval;       ///< 90 %, by resampling flights or chunks

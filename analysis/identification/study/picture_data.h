@@ -20,8 +20,8 @@ struct RoomMap {
   std::vector<Cell> cells;  ///< [kCells * kCells], x fastest; empty where nothing flew
 };
 
-/// One effect held against flights: what is measured where the model with all other effects predicts nothing of it, over
-/// what the effect itself predicts. Points of an effect that describes the flights lie on the diagonal.
+/// One effect held against flights: what is measured where the model with all other effects predicts nothing of it,
+/// over what the effect itself predicts. Points of an effect that describes the flights lie on the diagonal.
 struct EffectCurve {
   std::string effect;
   char axis = 'z';  ///< the world axis in which the effect varies most

@@ -13,8 +13,8 @@ namespace swarmcert::identification {
 
 struct ReplayVehicle {
   std::string name;
-  /// Time of the flight in s; position in W in m; residual force in W in newton under the given model; the same under the
-  /// fitted model. Forces are NaN where a record was cut.
+  /// Time of the flight in s; position in W in m; residual force in W in newton under the given model; the same under
+  /// the fitted model. Forces are NaN where a record was cut.
   std::vector<std::array<float, 10>> rows;
 };
 

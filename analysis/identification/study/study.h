@@ -1,4 +1,5 @@
-/// @file The whole question in one call: where a model fails, what it is missing, and how far adding it lowers the error.
+/// @file The whole question in one call: where a model fails, what it is missing, and how far adding it lowers the
+/// error.
 #pragma once
 
 #include <functional>

@@ -77,8 +77,7 @@ Solution solve(const Problem& problem, double confidence) {
   if (!(singular[k - 1] > kSmallestSingularValue)) {
     fit.why_not = fmt::format(
         "the columns of the fit depend on each other (smallest singular value {:.1e}): vary PWM and battery "
-        "voltage "
-        "independently, at three PWM levels or more",
+        "voltage independently, at three PWM levels or more",
         singular[k - 1]);
     return s;
   }

@@ -18,7 +18,8 @@ namespace swarmcert::logs {
 inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 inline constexpr std::size_t kLongestText_bytes = 4096;
 
-/// Place of a value within messages: a field, or an element of an array. Remembers its column, so that names are made once.
+/// Place of a value within messages: a field, or an element of an array. Remembers its column, so that names are made
+/// once.
 struct RosNode {
   const RosNode* parent = nullptr;
   std::string label;  ///< ".x", "[3]"
@@ -49,7 +50,8 @@ class ColumnTable {
 
   RosNode* root() { return &root_; }
 
-  /// The child of `parent`; nullptr if that is nullptr or there are too many. @param field name of the child, nullptr for an element, whose label is its index
+  /// The child of `parent`; nullptr if that is nullptr or there are too many. @param field name of the child, nullptr
+  /// for an element, whose label is its index
   RosNode* child(RosNode* parent, std::size_t index, const std::string* field) {
     if (parent == nullptr) return nullptr;
     if (parent->children.size() <= index) parent->children.resize(index + 1);

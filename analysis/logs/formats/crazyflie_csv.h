@@ -13,13 +13,15 @@ namespace swarmcert::logs {
 /// `group.name`, with a unit in brackets or without.
 bool looks_like_crazyflie_csv(std::string_view head);
 
-/// One topic, "csv", with all columns, that of the time included. Cells that are no numbers are NaN; columns without a single
-/// number are named in `skipped`. The unit of the time is that in the head, else the one in which the median step is that of
-/// a log: ms, as cfclient writes, for 0.5 to 1500; s below, then us, ns. It stands in `texts["time_unit"]`.
+/// One topic, "csv", with all columns, that of the time included. Cells that are no numbers are NaN; columns without a
+/// single number are named in `skipped`. The unit of the time is that in the head, else the one in which the median
+/// step is that of a log: ms, as cfclient writes, for 0.5 to 1500; s below, then us, ns. It stands in
+/// `texts["time_unit"]`.
 /// @throws files::InputError if the file is empty or its head names a column twice.
 RawLog read_crazyflie_csv(std::istream& in, const std::string& path);
 
-/// True for a folder in which cfclient recorded: it writes a file `<block>-<date>T<time>.csv` for each block of variables.
+/// True for a folder in which cfclient recorded: it writes a file `<block>-<date>T<time>.csv` for each block of
+/// variables.
 bool looks_like_cfclient_folder(const std::string& path);
 
 /// All files of the folder as one log: a topic for each block, on the one clock that they share, the vehicle's.

@@ -68,7 +68,8 @@ class DataflashReader {
     }
   }
 
-  /// Goes to the next byte where a message starts that another follows. @param size of a message at `at` behind which no other starts
+  /// Goes to the next byte where a message starts that another follows. @param size of a message at `at` behind which
+  /// no other starts
   std::size_t leave_out(std::size_t at, std::size_t size) {
     const bool is_unknown = size == 0 && bytes_.substr(at, 2) == kDataflashStart &&
                             bytes_.size() - at >= kDataflashHead_bytes &&

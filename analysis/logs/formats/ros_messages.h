@@ -14,8 +14,8 @@ struct RosMessageText {
   bool is_beginning = false;
 };
 
-/// What is known here of `name` ("geometry_msgs/Pose"); empty if nothing. Several: versions of the message that differ in
-/// their numbers' types only; the size of a message says which it is.
+/// What is known here of `name` ("geometry_msgs/Pose"); empty if nothing. Several: versions of the message that differ
+/// in their numbers' types only; the size of a message says which it is.
 std::vector<RosMessageText> builtin_ros_definitions(const std::string& name);
 
 }  // namespace swarmcert::logs

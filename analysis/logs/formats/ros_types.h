@@ -35,8 +35,8 @@ struct RosType {
   std::vector<RosField> fields;  ///< never empty: a message without fields is sent as one byte
 };
 
-/// A message type with all types that it uses; types[0] is the message. No type contains itself, and nesting is limited,
-/// so that a decoder may recurse.
+/// A message type with all types that it uses; types[0] is the message. No type contains itself, and nesting is
+/// limited, so that a decoder may recurse.
 struct RosSchema {
   std::vector<RosType> types;
 };
@@ -52,8 +52,8 @@ std::string short_type_name(std::string_view name);
 /// Both as the former.
 std::string long_type_name(std::string_view name);
 
-/// @param name of the message's type. @param text its definition, followed by those that it uses, each after a line of "="
-///   and a line "MSG: package/Type". Types that the text lacks are taken from ros_messages.h.
+/// @param name of the message's type. @param text its definition, followed by those that it uses, each after a line of
+///   "=" and a line "MSG: package/Type". Types that the text lacks are taken from ros_messages.h.
 RosDefinition parse_ros_definition(const std::string& name, std::string_view text);
 
 }  // namespace swarmcert::logs

@@ -100,7 +100,8 @@ class UlogReader {
   }
   static std::size_t size_of(const UlogMessage& message) { return kMessageHead_bytes + message.body.size(); }
 
-  /// True if the body has the form of its type; for data, if it is a record of a known topic. Looks at a few bytes only.
+  /// True if the body has the form of its type; for data, if it is a record of a known topic. Looks at a few bytes
+  /// only.
   bool is_sound(const UlogMessage& message) {
     return message.type == 'D' ? record_size_fits(message.body) : has_form(message);
   }
@@ -141,8 +142,8 @@ class UlogReader {
     return message->type == 'S' || (next < end && leads_on(next, end, 2));
   }
 
-  /// True if messages, be they of unknown types or topics, lead from `at` to `sound` sound ones, or end where the section
-  /// ends.
+  /// True if messages, be they of unknown types or topics, lead from `at` to `sound` sound ones, or end where the
+  /// section ends.
   bool leads_on(std::size_t at, std::size_t end, int sound) {
     constexpr int kMostMessages = 64;
     for (int i = 0; i < kMostMessages && at < end && sound > 0; ++i) {
@@ -177,8 +178,8 @@ class UlogReader {
     }
   }
 
-  /// True for what a sound file may have and this reader cannot use: messages of later versions, and records whose topic or
-  /// format the file does not define.
+  /// True for what a sound file may have and this reader cannot use: messages of later versions, and records whose
+  /// topic or format the file does not define.
   bool is_unknown(const UlogMessage& message) const {
     if (message.body.empty()) return false;
     if (message.type != 'D') return kUlogTypes.find(message.type) == std::string_view::npos;

@@ -40,8 +40,8 @@ class UlogFormats {
   /// the same name. A definition may use others that come later.
   bool add(std::string_view definition);
   bool has(const std::string& name) const { return formats_.count(name) > 0; }
-  /// Nothing where the format or one that it uses is not defined, uses itself, is nested too deeply, or is larger than a
-  /// message can be.
+  /// Nothing where the format or one that it uses is not defined, uses itself, is nested too deeply, or is larger than
+  /// a message can be.
   std::optional<UlogSize> size(const std::string& name);
   /// Precondition: size(name).
   UlogLayout layout(const std::string& name);

@@ -34,8 +34,8 @@ std::optional<double> parameter_of(const KeyedValue& entry);
 /// Information as text: characters as they are, numbers in decimal.
 std::string text_of(const KeyedValue& entry);
 
-/// True if the body has the form of its type; false for data ('D'), whose form the file defines, and for unknown types. Looks
-/// at a few bytes only.
+/// True if the body has the form of its type; false for data ('D'), whose form the file defines, and for unknown types.
+/// Looks at a few bytes only.
 bool has_form(const UlogMessage& message);
 
 }  // namespace swarmcert::logs

@@ -13,8 +13,9 @@ namespace swarmcert::analysis {
 
 using stability::Interval;
 
-/// One axis of the continuous loop without delay: m D e = s (f_a - f_hat) + s (L - 1)(f_a - m p_d''), with f_a the force
-/// that acts, f_hat what the controller believes, L the lags of its command. So e = h' * (f_a - f_hat) + g' * w with
+/// One axis of the continuous loop without delay: m D e = s (f_a - f_hat) + s (L - 1)(f_a - m p_d''), with f_a the
+/// force that acts, f_hat what the controller believes, L the lags of its command. So e = h' * (f_a - f_hat) + g' * w
+/// with
 ///   h = L^-1[1/(m D)] (command channel),   g = L^-1[(L - 1)/(m D)],   w = f_a - m p_d''.
 /// Each entry bounds its kernel in real arithmetic. h and g, which do not decay where Ki = 0, may be missing.
 struct ErrorLoop {
@@ -31,7 +32,8 @@ struct ErrorLoops {
   std::string refusal;  ///< why there are none; empty where there are
 };
 
-/// The loops of all axes, their kernels over `slices` slices, with the integral gain as the firmware's step makes it act.
+/// The loops of all axes, their kernels over `slices` slices, with the integral gain as the firmware's step makes it
+/// act.
 ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices);
 
 /// Bounds of |e| and |e'| at the times of each slice.
@@ -49,14 +51,15 @@ struct Signal {
   double at_start = 0;       ///< at least |w(0)|; matters to the rate
 };
 
-/// Errors of one axis slice by slice that one newton of excess in the thrust at t = 0 causes, m and m/s per N: a lag that
-/// starts there adds exp(-t/tau) to the force, so that e = tau h'. Of a loop with one lag.
+/// Errors of one axis slice by slice that one newton of excess in the thrust at t = 0 causes, m and m/s per N: a lag
+/// that starts there adds exp(-t/tau) to the force, so that e = tau h'. Of a loop with one lag.
 struct LagStart {
   std::vector<Interval> position_m, velocity_m_s;  ///< empty without a lag: then the thrust follows at once
 };
 LagStart lag_start(const ErrorLoop& loop, double slice_s);
 
-/// From rest: |e| <= |h'| * size, or |h| * rate + sup|h| |w(0)|, the smaller at each time; |e'| likewise, one derivative on.
+/// From rest: |e| <= |h'| * size, or |h| * rate + sup|h| |w(0)|, the smaller at each time; |e'| likewise, one
+/// derivative on.
 /// @param lagging the kernels g instead of h.
 ErrorHistory respond(const ErrorLoop& loop, bool lagging, const Signal& signal);
 

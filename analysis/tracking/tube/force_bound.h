@@ -1,4 +1,5 @@
-/// @file Bounds of |f_hat - f_a| over a tube, stretch by stretch: straight from both forces, or from a Lipschitz constant.
+/// @file Bounds of |f_hat - f_a| over a tube, stretch by stretch: straight from both forces, or from a Lipschitz
+/// constant.
 #pragma once
 
 #include <atomic>
@@ -47,7 +48,8 @@ struct ForceConstants {
   double own = 0;                                   ///< of the ground's input, together
 };
 
-/// |f_hat - f_a| at the set points, and from there by slopes: L |deviation| of each neighbour, and the truth's own gradient.
+/// |f_hat - f_a| at the set points, and from there by slopes: L |deviation| of each neighbour, and the truth's own
+/// gradient.
 class SlopeBound final : public ForceBound {
  public:
   /// @param at_set_points what an Enclosure says of radii 0.

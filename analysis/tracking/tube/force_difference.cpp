@@ -60,8 +60,9 @@ struct ForceDifference::Part {
   LearnedForce::Forms learned;
 };
 
-/// The true wake over a part of the states. With a gradient it lies in at_centre_N + slope (x' - centre) -+ spread_N for
-/// x' in the part, which is what the network saw; the truth acts at x, which is x' up to what the network's age allows.
+/// The true wake over a part of the states. With a gradient it lies in at_centre_N + slope (x' - centre) -+ spread_N
+/// for x' in the part, which is what the network saw; the truth acts at x, which is x' up to what the network's age
+/// allows.
 struct ForceDifference::WakeForm {
   TruthForce::Wake wake;
   Interval at_centre_N;

@@ -18,8 +18,8 @@ inline constexpr int kPerNeighbour = 6;
 inline constexpr int kOwnState = 4;
 inline int state_size(int neighbours) { return neighbours * kPerNeighbour + kOwnState; }
 
-/// f_hat_z = unit * rho(phi_ground(own) + sum_j phi(x_j)) among a fixed number of neighbours of the vehicle's own kind, as
-/// one chain of layers: the phi side by side, then their sum. Evaluated exactly by DeepSetForce; here enclosed.
+/// f_hat_z = unit * rho(phi_ground(own) + sum_j phi(x_j)) among a fixed number of neighbours of the vehicle's own kind,
+/// as one chain of layers: the phi side by side, then their sum. Evaluated exactly by DeepSetForce; here enclosed.
 class LearnedForce {
  public:
   /// Networks are chosen as stability::DeepSetForce does.
@@ -28,8 +28,8 @@ class LearnedForce {
   LearnedForce(const LearnedForce&) = delete;  // forms refer to its layers
   LearnedForce& operator=(const LearnedForce&) = delete;
 
-  /// upper_row x + upper >= f_hat in newton for all x of a box, and lower_row x + lower >= -f_hat. In real arithmetic: what
-  /// rounding may cost when the forms are evaluated is the caller's.
+  /// upper_row x + upper >= f_hat in newton for all x of a box, and lower_row x + lower >= -f_hat. In real arithmetic:
+  /// what rounding may cost when the forms are evaluated is the caller's.
   struct Forms {
     Eigen::VectorXd upper_row, lower_row;
     double upper = 0, lower = 0;

@@ -21,19 +21,19 @@ struct LeastTube {
   double radius_m() const;
 };
 
-/// Looks for the least radii r with B(r) < r, entry by entry, where B(r) are the bounds of e and e' that the force error
-/// within r allows (Scene::errors_z(), Scene::other_errors()).
+/// Looks for the least radii r with B(r) < r, entry by entry, where B(r) are the bounds of e and e' that the force
+/// error within r allows (Scene::errors_z(), Scene::other_errors()).
 ///
 /// Why such a tube holds. Errors start at zero and are continuous. Were one to leave the tube, there would be a first
-/// time t at which one reaches its radius; until then every state lies in the tube, the controller and the network have seen
-/// nothing else, and so the errors up to t are at most B(r) < r: a contradiction. This needs the loop of error_loops.h to
-/// be the one that flies: continuous position loop, exact measurements, thrust not saturated, axes uncoupled, the
-/// integrator within its limit (see LocalTube::assumptions). f_hat may be a staircase: that its states are up to
-/// Scene::network_age_s() old is in the bounds of the force error.
+/// time t at which one reaches its radius; until then every state lies in the tube, the controller and the network have
+/// seen nothing else, and so the errors up to t are at most B(r) < r: a contradiction. This needs the loop of
+/// error_loops.h to be the one that flies: continuous position loop, exact measurements, thrust not saturated, axes
+/// uncoupled, the integrator within its limit (see LocalTube::assumptions). f_hat may be a staircase: that its states
+/// are up to Scene::network_age_s() old is in the bounds of the force error.
 ///
-/// How it is found. B is monotone, so r <- B(r) from r = 0 rises to the least fixed point; the bounds of the force error
-/// are prepared for a larger tube, and cheap inside it. A tube that is proved is the larger one of the next round. Only
-/// B(r) < r, evaluated with every rounding accounted for, proves anything.
+/// How it is found. B is monotone, so r <- B(r) from r = 0 rises to the least fixed point; the bounds of the force
+/// error are prepared for a larger tube, and cheap inside it. A tube that is proved is the larger one of the next
+/// round. Only B(r) < r, evaluated with every rounding accounted for, proves anything.
 /// @param farthest_m gives up beyond this radius.
 LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m = 0.5);
 

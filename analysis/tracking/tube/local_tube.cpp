@@ -16,11 +16,12 @@ namespace {
 
 /// How much wider than the tube the box is on which local constants are sought.
 constexpr double kLocalBox = 1.6;
-/// More parts slice by slice, where each slice is made ready once or twice, than for one radius, where all are many times.
+/// More parts slice by slice, where each slice is made ready once or twice, than for one radius, where all are many
+/// times.
 constexpr int kSlicedParts = 4;
 
-/// The bound of a row that has better constants is at most that of a row with worse ones: a tube proved by the latter is
-/// proved by the former.
+/// The bound of a row that has better constants is at most that of a row with worse ones: a tube proved by the latter
+/// is proved by the former.
 void inherit(LeastTube& better, const LeastTube& worse) {
   if (worse.proved && (!better.proved || worse.radius_m(2) < better.radius_m(2))) better = worse;
 }

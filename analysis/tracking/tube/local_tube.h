@@ -1,5 +1,5 @@
-/// @file How far vehicles stray from a task when they fly a network in the world of a declared truth: proved, and compared
-/// with what Lipschitz constants of the network alone would have proved.
+/// @file How far vehicles stray from a task when they fly a network in the world of a declared truth: proved, and
+/// compared with what Lipschitz constants of the network alone would have proved.
 #pragma once
 
 #include <atomic>
@@ -21,8 +21,8 @@ struct LocalTubeOptions {
   std::function<void(int done, int total, const std::string& what)> progress;
 };
 
-/// The force error of one vehicle along z within the tube, and what each bound of the reference makes of it. All hold in
-/// real arithmetic for the continuous loop of error_loops.h, from rest, up to the end of the task.
+/// The force error of one vehicle along z within the tube, and what each bound of the reference makes of it. All hold
+/// in real arithmetic for the continuous loop of error_loops.h, from rest, up to the end of the task.
 struct ForceErrorBounds {
   int vehicle = 0;
   double amplitude_N = 0, rate_N_s = 0, variation_N = 0,
@@ -56,14 +56,16 @@ struct LocalTube {
 };
 
 /// The least radii r >= 0 that the errors reproduce: while every vehicle is within r of its set point, the force error
-/// f_hat - f_a along z, the lag of the feed-forward and the truth along x and y push none of them further than r. From rest
-/// the errors then stay within r for the whole task. Likewise slice by slice (sliced_tube()), which needs no gain below one
-/// over the whole flight. What holds is within both.
+/// f_hat - f_a along z, the lag of the feed-forward and the truth along x and y push none of them further than r. From
+/// rest the errors then stay within r for the whole task. Likewise slice by slice (sliced_tube()), which needs no gain
+/// below one over the whole flight. What holds is within both.
 ///
-/// Beside it least_tube() from constants of the network alone: product of spectral norms, global and local Lipschitz bounds.
+/// Beside it least_tube() from constants of the network alone: product of spectral norms, global and local Lipschitz
+/// bounds.
 /// @param tracking gains and model of every vehicle; @param truth what the force really is; @param vehicles 2 to 10.
 /// @param task one whose trajectories have enclosures (Task::over()).
-/// @return an upper bound in real arithmetic of the continuous loop under `assumptions`; where `proved` is false nothing is
+/// @return an upper bound in real arithmetic of the continuous loop under `assumptions`; where `proved` is false
+/// nothing is
 ///   known (inconclusive), for the reason in `why`.
 /// @throws files::InputError if the network lacks functions of these vehicles' kind or has no unit of force.
 LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,

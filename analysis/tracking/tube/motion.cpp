@@ -10,7 +10,8 @@ namespace {
 
 using stability::SetpointRange;
 
-/// Ends are moved outwards to multiples of this, so that periods which differ by rounding alone are found to be the same.
+/// Ends are moved outwards to multiples of this, so that periods which differ by rounding alone are found to be the
+/// same.
 constexpr double kGrid = 0x1p-24;
 
 Interval snapped(Interval x) { return {std::floor(x.lo / kGrid) * kGrid, std::ceil(x.hi / kGrid) * kGrid}; }

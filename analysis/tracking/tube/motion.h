@@ -10,8 +10,8 @@ namespace swarmcert::analysis {
 
 using stability::Interval;
 
-/// What one vehicle should do during slices that ask for the same: everything encloses the set points of these slices and
-/// of `memory_s` before them.
+/// What one vehicle should do during slices that ask for the same: everything encloses the set points of these slices
+/// and of `memory_s` before them.
 struct Stretch {
   int vehicle = 0;
   std::vector<Interval>

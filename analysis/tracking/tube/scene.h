@@ -1,4 +1,5 @@
-/// @file Vehicles that fly a task with a network, in the world of a declared truth: what every tube about them rests on.
+/// @file Vehicles that fly a task with a network, in the world of a declared truth: what every tube about them rests
+/// on.
 #pragma once
 
 #include <array>
@@ -76,8 +77,8 @@ class Scene {
   Interval excess_at_start_N(int vehicle) const { return excess_N_[static_cast<std::size_t>(vehicle)]; }
   const LagStart& lag_start_z() const { return lag_start_z_; }
 
-  /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's lag
-  /// and the rotors' start, and along x and y the truth itself.
+  /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's
+  /// lag and the rotors' start, and along x and y the truth itself.
   std::array<ErrorHistory, 3> other_errors(int vehicle, const std::vector<TruthSizes>& truth) const;
   /// One number per slice from one per stretch.
   std::vector<double> by_slice(int vehicle, const std::vector<double>& by_stretch) const;

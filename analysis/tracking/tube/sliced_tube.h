@@ -27,16 +27,16 @@ struct SlicedTube {
 /// with d = f_a - f_hat along z and d = f_a along x and y. A convolution is linear: where the signals of cell k lie in
 /// intervals D_k and W_k, errors lie in sums over the kernel's cells m of
 ///   net_m c + [-1, 1] |.|_m r,   c -+ r = D_{n-m} u D_{n-m-1}   (kernel_cells.h: answer()).
-/// So what is known of the signals, the feed-forward and the predicted part of the forces, moves the middle of the tube;
-/// only what is not known widens it, through the |kernel| of the time since. Before the start all signals are 0: vehicles
-/// start at rest at their set points.
+/// So what is known of the signals, the feed-forward and the predicted part of the forces, moves the middle of the
+/// tube; only what is not known widens it, through the |kernel| of the time since. Before the start all signals are 0:
+/// vehicles start at rest at their set points.
 ///
 /// Nothing after slice n enters, and slice n itself only through the kernel's first cell, which is small. Hence no gain
 /// below one over the whole flight is needed: with E_0 .. E_{n-1} proved, B_n(E) is the sum above where D_n and W_n
-/// enclose the forces over E (and, for what the network saw up to network_age_s() ago, over the slices before). If B_n(E)
-/// lies inside E, errors stay in B_n(E) during slice n. For were there a first time t at which one reaches the border of
-/// E, all states before t would lie in what the signals were enclosed over, and the errors at t in B_n(E), inside E: a
-/// contradiction; at the slice's start they lie in B_n(E) for the same reason. E_n = B_n(E) is kept.
+/// enclose the forces over E (and, for what the network saw up to network_age_s() ago, over the slices before). If
+/// B_n(E) lies inside E, errors stay in B_n(E) during slice n. For were there a first time t at which one reaches the
+/// border of E, all states before t would lie in what the signals were enclosed over, and the errors at t in B_n(E),
+/// inside E: a contradiction; at the slice's start they lie in B_n(E) for the same reason. E_n = B_n(E) is kept.
 /// @param tolerance_N see ForceDifference::refine().
 /// @param farthest_m gives up beyond this deviation.
 SlicedTube sliced_tube(const Scene& scene, const EnclosureOptions& options, double tolerance_N,

@@ -50,7 +50,8 @@ struct Strength {
   Offset slope;
 };
 
-/// (0.3/h)^decay exp(-r^2 / (2 s^2)) u(z), h = max(z, 0.12 m), s = spread + spread_slope h, as effects/downwash.h has it.
+/// (0.3/h)^decay exp(-r^2 / (2 s^2)) u(z), h = max(z, 0.12 m), s = spread + spread_slope h, as effects/downwash.h has
+/// it.
 Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double spread_slope) {
   Strength result;
   const Interval z = dp[2];
