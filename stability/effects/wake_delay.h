@@ -1,12 +1,13 @@
-/// @file Downwash that takes time to arrive.
+/// @file Downwash that takes time to arrive, and drifts with the wind meanwhile.
 #pragma once
 
 #include "stability/effects/downwash.h"
 
 namespace swarmcert::stability {
 
-/// The wake of downwash.h, of neighbours where they were delay_s ago: at p_j - delay_s v_j, their velocity taken as
-/// constant meanwhile. With a delay of 0 it is the downwash without convection.
+/// The wake of downwash.h, of neighbours where they were delay_s ago, carried along by a horizontal wind w since: as if
+/// they were at p_j + delay_s (w - v_j), their velocity taken as constant meanwhile. With a delay of 0 it is the
+/// downwash without convection.
 class WakeDelay : public Effect {
  public:
   WakeDelay() : Effect(describe()) {}

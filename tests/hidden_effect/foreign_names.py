@@ -27,11 +27,12 @@ def tilted(x, y):
     return lambda s: tuple(s.to_world([y * s.thrust, -x * s.thrust, 0.0]))
 
 
-def late_wake(amplitude, delay, spread, slope):
+def late_wake(amplitude, delay, spread, slope, wind=(0.0, 0.0)):
     def force(s):
         total = 0.0
         for other in s.others:
             p = other(delay)
+            p = (p[0] + delay * wind[0], p[1] + delay * wind[1], p[2])
             dz = p[2] - s.p[2]
             if dz > 0.12:
                 width = spread + slope * dz
@@ -50,7 +51,7 @@ def tether(k, anchor, slack):
     return force
 
 
-# truth: as foreign_simulator.fly() takes it; values: parameters that flights show; rivals: what must or must not be one.
+# truth: as foreign_simulator.fly() takes it; effect: its name in the registry, if it is not the case's; values: parameters that flights show; rivals: what must or must not be one.
 NAMED = {
     "com_offset": dict(truth=dict(torque=com_offset(0.004, -0.002)), values={"offset_x_m": 0.004, "offset_y_m": -0.002},
                        not_rivals=["torque_bias"], is_added=True),
@@ -59,6 +60,8 @@ NAMED = {
     "accelerometer_scale": dict(truth=dict(accelerometer_scale=1.08), values={"scale": 1.08},
                                 not_rivals=["thrust_ratio", "constant_force"], is_added=True, of_sensor=True),
     "wake_delay": dict(truth=dict(force=late_wake(0.09, 0.25, 0.06, 0.06)), vehicles=2, values={"delay_s": 0.25}),
+    "wake in wind": dict(effect="wake_delay", truth=dict(force=late_wake(0.09, 0.2, 0.06, 0.06, (0.9, -0.6))),
+                         vehicles=2, values={"delay_s": 0.2, "wind_x_m_s": 0.9, "wind_y_m_s": -0.6}),
     "tether": dict(truth=dict(force=tether(0.15, (0.1, -0.1, 0.0), 0.9)),
                    values={"stiffness_N_m": 0.15, "slack_m": 0.9}),
     "torque_bias": dict(truth=dict(torque=lambda s: (8e-4, 1.2e-3, 0.0)),
@@ -124,17 +127,18 @@ def main():
     chosen = [name for name in options.effects.split(",") if name] or list(NAMED)
     failed = held = judged = 0
     for name in chosen:
+        effect = NAMED[name].get("effect", name)
         ranking = diagnosed(options, name, NAMED[name])["ranking"]
-        faults = faults_of(name, NAMED[name], ranking)
+        faults = faults_of(effect, NAMED[name], ranking)
         failed += bool(faults)
-        if ranking and ranking[0]["effect"] == name:
+        if ranking and ranking[0]["effect"] == effect:
             values = NAMED[name]["values"].items()
             judged += len(values)
             held += sum(is_inside(ranking[0]["parameters"][of], value) for of, value in values)
-        print(("! " if faults else "  ") + json.dumps({"effect": name, "faults": faults}), flush=True)
+        print(("! " if faults else "  ") + json.dumps({"case": name, "faults": faults}), flush=True)
     ranking = diagnosed(options, "nothing", dict(truth={}))["ranking"]
     failed += bool(ranking)
-    print(("! " if ranking else "  ") + json.dumps({"effect": "nothing", "named": [e["effect"] for e in ranking]}))
+    print(("! " if ranking else "  ") + json.dumps({"case": "nothing", "named": [e["effect"] for e in ranking]}))
     print(f"intervals of 90 % that hold the truth: {held} of {judged}")
     return 1 if failed or held < LEAST_HELD * judged else 0
 

@@ -151,6 +151,32 @@ TEST(WakeDelay, IsTheDownwashOfNeighboursWhereTheyWere) {
   EXPECT_NEAR(flow_force("downwash", shape, now).z(), of_late, 1e-9);
 }
 
+TEST(WakeDelay, DriftsWithTheWindForAsLongAsItTakesToArrive) {
+  std::map<std::string, double> shape = {{"amplitude_N", 0.1},
+                                         {"decay_exponent", 1},
+                                         {"spread_m", 0.05},
+                                         {"spread_slope", 0.1},
+                                         {"delay_s", 0.2}};
+  Neighbour crossing = {{-0.1, 0.3, 0.4}, Eigen::Vector3d::Zero(), {1, 0, 0}, kFlowMass_kg, 0};
+  Instant now = hovering();
+  now.neighbours = &crossing;
+  now.num_neighbours = 1;
+  const double far_off = flow_force("wake_delay", shape, now).z();
+  EXPECT_GT(far_off, -0.001) << "0.2 s ago it was at (-0.3, 0.3) m";
+  shape["wind_x_m_s"] = 1.5;
+  shape["wind_y_m_s"] = -1.5;
+  EXPECT_NEAR(flow_force("wake_delay", shape, now).z(), -0.1 * 0.3 / 0.4, 1e-9) << "blown to (0, 0)";
+  shape["delay_s"] = 0;
+  EXPECT_NEAR(
+      flow_force("wake_delay", shape, now).z(),
+      flow_force("downwash",
+                 {{"amplitude_N", 0.1}, {"decay_exponent", 1}, {"spread_m", 0.05}, {"spread_slope", 0.1}},
+                 now)
+          .z(),
+      1e-12)
+      << "no wind moves what arrives at once";
+}
+
 TEST(Tether, PullsTowardsTheAnchorWhereItIsTaut) {
   const std::map<std::string, double> parameters = {
       {"stiffness_N_m", 0.2}, {"anchor_x_m", 1}, {"anchor_z_m", 0.5}, {"slack_m", 0.5}};

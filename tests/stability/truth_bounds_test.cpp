@@ -122,8 +122,8 @@ TEST(TruthBounds, EncloseTheDownwashThatIsSimulatedForAnyGapSpeedAndNumberAndAre
 
 TEST(TruthBounds, EncloseALateWakeOfNeighboursThatChangeTheirVelocity) {
   const Model model = vehicle(
-      "[[effect]]\nname = \"wake_delay\"\nparameters = { delay_s = 0.2, amplitude_N = 0.1, spread_m = 0.06 "
-      "}\n");
+      "[[effect]]\nname = \"wake_delay\"\nparameters = { delay_s = 0.2, amplitude_N = 0.1, spread_m = 0.06, "
+      "wind_x_m_s = 0.3, wind_y_m_s = -0.2 }\n");
   MotionSet motion;
   motion.relative_speed_m_s = 1.3;
   motion.neighbours = 2;
