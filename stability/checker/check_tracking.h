@@ -21,9 +21,9 @@ inline constexpr const char* kTrackingStatement =
     "sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total variation of "
     "w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. "
     "Lengths are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name the "
-    "files from which the loops were derived; checking compares them where these files are given, and "
-    "does not repeat the derivation. What is listed under left_out, and every bound made from these "
-    "gains, is not certified here.";
+    "files from which the loops were derived; where both are given, checking compares the hashes and "
+    "derives the loops anew, up to a relative 1e-12 for rounding. What is listed under left_out, and "
+    "every bound made from these gains, is not certified here.";
 
 struct TrackingVerdict {
   bool accepted = false;

@@ -16,6 +16,7 @@ import json
 import re
 import struct
 import sys
+import tomllib
 from fractions import Fraction
 from math import factorial, isqrt
 from pathlib import Path
@@ -28,7 +29,8 @@ STATEMENT = (
     "arithmetic, |e| <= rate sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total "
     "variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. Lengths "
     "are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name the files from which the loops "
-    "were derived; checking compares them where these files are given, and does not repeat the derivation. What is listed "
+    "were derived; where both are given, checking compares the hashes and derives the loops anew, up to a relative 1e-12 "
+    "for rounding. What is listed "
     "under left_out, and every bound made from these gains, is not certified here.")
 
 BITS = 128  # of a fixed-point number after the point
@@ -178,6 +180,52 @@ def root_above(x):
     return isqrt(x) + 1
 
 
+class Derived:
+    """The loops of gains.toml and model.toml."""
+
+    def __init__(self, gains, model):
+        self.mass = model["vehicle"]["mass_kg"]
+        lag = gains.get("lag", {})
+        self.attitude, motor, delay, ratio = lag.get("attitude_s", 0), lag.get("motor_s", 0), lag.get("delay_s", 0), 1
+        for effect in model.get("effect", []):
+            values = effect.get("parameters", {})
+            if effect.get("name") == "motor_lag" and motor == 0:
+                motor = values.get("tau_s", 1 / 17.4)
+            elif effect.get("name") == "thrust_ratio":
+                ratio = 1 + values.get("ratio", 0)
+            elif effect.get("name") == "delay":
+                delay = delay or 1  # whatever it is: nothing is certified of such loops
+        self.motor, self.delay, self.ratio, self.position = motor, delay, ratio, gains["position"]
+
+    def matrix(self, key):
+        value = self.position[key]
+        if not isinstance(value, list):
+            value = [value] * 3
+        if not isinstance(value[0], list):
+            value = [[value[i] if i == j else 0 for j in range(3)] for i in range(3)]
+        return value
+
+    def gains(self, axis):
+        if "Kp" in self.position:
+            return [self.position[key][axis] if isinstance(self.position[key], list) else self.position[key]
+                    for key in ("Kp", "Kd", "Ki")]
+        both = self.matrix("Lambda"), self.matrix("K")
+        for m in both:
+            require(all(m[axis][j] == 0 and m[j][axis] == 0 for j in range(3) if j != axis), "the files couple the axes")
+        l, a = both[0][axis][axis], both[1][axis][axis] / self.mass
+        return [2 * a * l + l * l, a + 2 * l, a * l * l]
+
+    def compare(self, entry):
+        axis = "xyz".index(entry["axis"])
+        require(self.delay == 0, "the loop of the files has a delay")
+        stated = [exact(entry[key]) for key in ("mass_kg", "Kp", "Kd", "Ki")] + sorted(map(exact, entry["lags_s"]))
+        lags = sorted(x for x in (self.motor, self.attitude if axis < 2 else 0) if x > 0)
+        derived = [self.mass] + [self.ratio * x for x in self.gains(axis)] + lags
+        require(len(stated) == len(derived) and
+                all(abs(x - Fraction(y)) <= Fraction(1, 10 ** 12) * abs(Fraction(y)) for x, y in zip(stated, derived)),
+                f"the loop of axis {entry['axis']} is not that of the files")
+
+
 class Loop:
     def __init__(self, entry):
         require_keys(entry, "axis input mass_kg Kp Kd Ki lags_s time_exponent step_exponent steps decay P gains", "loop")
@@ -313,7 +361,7 @@ def check_gain(claims, name, proved):
     require(claimed >= proved, f"gains.{name} is below what the witness shows")
 
 
-def check(c, hashes):
+def check(c, hashes, derived):
     require_keys(c, "schema tool statement gains_sha256 model_sha256 loops left_out content_sha256", "certificate")
     require(c["statement"] == STATEMENT, "another statement")
     require(c["content_sha256"] == content_sha256(c), "content_sha256 does not match")
@@ -333,6 +381,8 @@ def check(c, hashes):
         require((entry["axis"], loop.input) not in seen, "a loop stands twice")
         seen.add((entry["axis"], loop.input))
         require_keys(entry["gains"], "rate rate_hex amplitude amplitude_hex edge edge_hex impulse impulse_hex", "gains")
+        if derived is not None:
+            derived.compare(entry)
         same = json.dumps({k: v for k, v in entry.items() if k not in ("axis", "gains")}, sort_keys=True)
         if same not in known:
             known[same] = loop.gains()
@@ -342,12 +392,13 @@ def check(c, hashes):
 
 
 def main(words):
-    paths, hashes = [], {}
+    paths, hashes, files = [], {}, {}
     try:
         while words:
             word = words.pop(0)
             if word in ("--gains", "--model"):
-                hashes[word[2:] + "_sha256"] = hashlib.sha256(Path(words.pop(0)).read_bytes()).hexdigest()
+                files[word[2:]] = raw = Path(words.pop(0)).read_bytes()
+                hashes[word[2:] + "_sha256"] = hashlib.sha256(raw).hexdigest()
             else:
                 paths.append(word)
         if len(paths) != 1:
@@ -355,12 +406,15 @@ def main(words):
         document = read_json(Path(paths[0]).read_text(encoding="utf-8"))
         if not isinstance(document, dict) or document.get("schema") != "swarmcert/tracking-certificate/1":
             raise Unreadable("is no certificate of tracking gains")
-        print(f"accepted: the gains of {check(document, hashes)} loops")
+        derived = None
+        if len(files) == 2:
+            derived = Derived(*(tomllib.loads(files[name].decode()) for name in ("gains", "model")))
+        print(f"accepted: the gains of {check(document, hashes, derived)} loops")
         return 0
     except IndexError:
         print(__doc__, file=sys.stderr)
         return 2
-    except (OSError, UnicodeDecodeError, RecursionError, Unreadable) as fault:
+    except (OSError, UnicodeDecodeError, RecursionError, tomllib.TOMLDecodeError, KeyError, Unreadable) as fault:
         print(f"cannot be read: {fault}", file=sys.stderr)
         return 3
     except Rejected as reason:

@@ -21,11 +21,11 @@ MODEL = SOURCE / "stability/models/crazyflie-small.toml"
 LIMIT_S = 20  # of a hostile file on a loaded machine; it takes milliseconds
 
 
-def certificate(folder, position, lag=""):
+def certificate(folder, position, lag="", model=MODEL):
     gains = folder / "gains.toml"
     gains.write_text(f'schema = "swarmcert/gains/1"\n[position]\n{position}\n{lag}')
     path = folder / "cert.json"
-    subprocess.run([SWARMCERT, "bound", "--gains", gains, "--model", MODEL, "--verified", "-o", path, "--force", "--quiet"],
+    subprocess.run([SWARMCERT, "bound", "--gains", gains, "--model", model, "--verified", "-o", path, "--force", "--quiet"],
                    check=True, capture_output=True)
     return json.loads(path.read_text())
 
@@ -186,6 +186,27 @@ def main():
         own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
         assert exit_codes(folder, forged(document), *own) == [0, 0]
         assert exit_codes(folder, forged(document), "--gains", str(MODEL)) == [1, 1]
+        for number in ("Kp", "mass_kg"):  # of a loop that is not the one of the files, though all is true of it
+            other = copy.deepcopy(document)
+            for loop in other["loops"]:
+                loop[number] = (float.fromhex(loop[number]) * (1 + 1e-9)).hex()
+                for name in ("rate", "amplitude", "edge", "impulse"):
+                    if loop["gains"][name] is not None:
+                        loop["gains"].update({name: loop["gains"][name] * 1.1, name + "_hex": (loop["gains"][name] * 1.1).hex()})
+            assert exit_codes(folder, forged(other)) == [0, 0]
+            assert exit_codes(folder, forged(other), *own) == [1, 1]
+        composite = certificate(folder, "Lambda = [4, 4, 3]\nK = 0.136", "[lag]\nmotor_s = 0.01\nattitude_s = 0.02\n")
+        assert {loop["axis"] for loop in composite["loops"]} == {"x", "y", "z"}
+        assert exit_codes(folder, forged(composite), *own) == [0, 0]
+        changed_model = folder / "model.toml"
+        changed_model.write_text(MODEL.read_text() + '[[effect]]\nname = "motor_lag"\nparameters = { tau_s = 0.04 }\n'
+                                 '[[effect]]\nname = "thrust_ratio"\nparameters = { ratio = 0.125 }\n')
+        scaled = certificate(folder, "Kp = 12\nKd = 7\nKi = 20", model=changed_model)
+        assert {float.fromhex(x) for loop in scaled["loops"] for x in loop["lags_s"]} == {0.04}
+        assert float.fromhex(scaled["loops"][0]["Kp"]) == 13.5
+        both = ["--gains", str(folder / "gains.toml"), "--model", str(changed_model)]
+        assert exit_codes(folder, forged(scaled), *both) == [0, 0]
+        assert certificate(folder, "Kp = 12\nKd = 7\nKi = 20", "[lag]\nmotor_s = 0.03\n") == document
         changed = copy.deepcopy(document)
         changed["tool"] = "another"
         assert exit_codes(folder, json.dumps(changed)) == [1, 1]  # the hash of the content is of the other one

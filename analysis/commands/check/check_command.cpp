@@ -1,6 +1,9 @@
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 
 #include "analysis/cli/command_line.h"
@@ -9,6 +12,7 @@
 #include "lipschitz/checker/check.h"
 #include "nn/base/file_io.h"
 #include "nn/weights/chain.h"
+#include "stability/bounds/tracking_setup.h"
 #include "stability/checker/check_tracking.h"
 
 namespace swarmcert::analysis {
@@ -27,6 +31,39 @@ bool is_of_tracking(const std::string& text, const std::string& path) {
   return json.is_object() && json.value("schema", files::Json()) == check::kTrackingSchema;
 }
 
+bool is_close(double stated, double derived) {
+  return std::abs(stated - derived) <= 1e-12 * std::abs(derived);
+}
+
+/// Whether an entry of an accepted certificate states the numbers of `loop`, up to their rounding.
+bool states(const files::Json& entry, const stability::AxisLoop& loop) {
+  const auto fits = [&entry](const char* key, double derived) {
+    return is_close(files::parse_hex_float(entry[key].get<std::string>()), derived);
+  };
+  std::vector<double> stated = files::parse_hex_floats(entry["lags_s"]), derived;
+  std::copy_if(loop.lags_s.begin(), loop.lags_s.end(), std::back_inserter(derived),
+               [](double tau) { return tau > 0; });
+  std::sort(stated.begin(), stated.end());
+  std::sort(derived.begin(), derived.end());
+  return loop.delay_s == 0 && fits("mass_kg", loop.mass_kg) && fits("Kp", loop.Kp) && fits("Kd", loop.Kd) &&
+         fits("Ki", loop.Ki) &&
+         std::equal(stated.begin(), stated.end(), derived.begin(), derived.end(), is_close);
+}
+
+/// Rejects an accepted certificate whose loops are not those of the files.
+void compare_loops(const CheckOptions& options, const files::Json& certificate,
+                   check::TrackingVerdict& verdict) {
+  const stability::TrackingSetup setup = stability::load_tracking_setup(options.gains, options.model);
+  for (const files::Json& entry : certificate["loops"]) {
+    const std::string axis = entry["axis"].get<std::string>();
+    const auto loop = stability::axis_loop(setup.gains, setup.plant, axis == "x" ? 0 : axis == "y" ? 1 : 2);
+    if (!loop || !states(entry, *loop)) {
+      verdict = {false, "loops: that of axis " + axis + " is not the one of the files given", 0, 0};
+      return;
+    }
+  }
+}
+
 int check_gains(const CheckOptions& options, const CommonOptions& common, const std::string& text) {
   if (!options.network.file.empty() || !options.network.phi.empty())
     throw UsageError(options.certificate + " is of tracking gains and of no network: leave the network out");
@@ -39,7 +76,8 @@ int check_gains(const CheckOptions& options, const CommonOptions& common, const 
     return files::sha256(files::read_file(path));
   };
   const std::string gains = hash(options.gains), model = hash(options.model);
-  const check::TrackingVerdict verdict = check::check_tracking(certificate, gains, model);
+  check::TrackingVerdict verdict = check::check_tracking(certificate, gains, model);
+  if (verdict.accepted && !gains.empty() && !model.empty()) compare_loops(options, certificate, verdict);
   files::Json result = result_head("check", inputs);
   result["accepted"] = verdict.accepted;
   result["reason"] = verdict.reason;
@@ -53,7 +91,8 @@ int check_gains(const CheckOptions& options, const CommonOptions& common, const 
     if (verdict.accepted) {
       fmt::print("accepted: {}: {} gains of {} loops\n", verdict.reason, verdict.gains, verdict.loops);
       if (gains.empty() || model.empty())
-        fmt::print("whether it is of these gains and this model was not compared: --gains, --model\n");
+        fmt::print(
+            "whether the loops are those of gains.toml and model.toml was not compared: --gains, --model\n");
     } else {
       fmt::print("rejected: {}\n", verdict.reason);
     }
@@ -109,8 +148,8 @@ Command check_command() {
           "proofs on a box\n"
           "in double with every rounding accounted for; uses no optimiser. Accepted: exit 0. Rejected, with "
           "the reason: exit 1.\n"
-          "A certificate of tracking gains needs no network; its hashes are compared with --gains and "
-          "--model.\n\n"
+          "A certificate of tracking gains needs no network; with --gains and --model, which it "
+          "must be of, the loops are derived anew.\n\n"
           "Example: swarmcert check cert.json nn/networks/demo/network.toml\n"
           "         swarmcert check gains-cert.json --gains controller/gains/composite.toml",
           [](CLI::App& app) {
