@@ -186,15 +186,15 @@ def a_smaller_bound(certificate, net, folder):
     assert "does not prove its part" in second.check(changed, second.Network(**arguments(net)))
 
 
-def laws_in_a_box(folder, hetero):
+def laws_in_a_box(folder, pair):
     """A law that rests on bounds in a box for any number of neighbours: accepted by all; one that claims less, or holds outside of
     the box, is refused by all."""
     path = folder / "laws.json"
-    run([common.SWARMCERT, "certify", *hetero, "--neighbours", "2", "--domain", folder / "part.toml", "--method", "branch",
-         "--nodes", "20", "-q", "-o", path])
+    run([common.SWARMCERT, "certify", *pair, "--neighbours", "2", "--domain", folder / "part.toml", "--method", "branch",
+         "--nodes", "1", "-q", "-o", path])
     certificate = second.parse(path.read_text())
     certificate["bounds"] = [b for b in certificate["bounds"] if "neighbours" not in b]
-    assert len(certificate["laws"]) > 3
+    assert len(certificate["laws"]) == 3
     for factor, domain, said in (2, "box", "accepted"), (0.9, "box", "less than the law gives"), (2, "global", "box only"):
         changed = json.loads(json.dumps(certificate))
         for law in changed["laws"]:
@@ -202,10 +202,10 @@ def laws_in_a_box(folder, hetero):
             law.update(upper=upper, upper_hex=upper.hex(), domain=domain)
         changed["content_sha256"] = second.content_sha256(changed)
         path.write_text(json.dumps(changed))
-        one, three = first(path, hetero), proved(path, hetero)
+        one, three = first(path, pair), proved(path, pair)
         assert said in one.stdout and said in three.stdout, f"{one} {three}"
         assert one.returncode == three.returncode == (0 if said == "accepted" else 1)
-        reason = second.check(changed, second.Network(**arguments(hetero)))
+        reason = second.check(changed, second.Network(**arguments(pair)))
         assert reason.endswith(said) if said != "accepted" else not reason, reason
 
 
@@ -362,7 +362,7 @@ def main():
         folder = Path(name)
         every_format(folder, generator)
         everything = kinds(folder, generator)
-        laws_in_a_box(folder, next(net for name, net, _, _ in everything if name.startswith("kinds")))
+        laws_in_a_box(folder, next(net for name, net, _, _ in everything if name == "pair"))
         total = 0
         for index, (name, net, options, share) in enumerate(everything):
             path = folder / f"certificate{index}.json"
