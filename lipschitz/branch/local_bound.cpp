@@ -55,23 +55,23 @@ Others others_of(const files::Network& network, const Claim& claim, const std::m
   std::map<std::string, int> counts;
   for (const auto& [kind, count] : claim.neighbours) counts[files::phi_name(kind)] = count;
   if (names[0] == ground) {
-      counts.erase(ground);
+    counts.erase(ground);
   } else {
-      if (--counts.at(names[0]) == 0) counts.erase(names[0]);
-      if (network.phi.count(files::kGroundKind) == 1) counts[ground] = 1;
+    if (--counts.at(names[0]) == 0) counts.erase(names[0]);
+    if (network.phi.count(files::kGroundKind) == 1) counts[ground] = 1;
   }
   Others others;
   const auto rows = static_cast<std::size_t>(files::parts(network).at(names[1])->layers.front().outputs);
   others.least.assign(rows, 0.0);
   others.most.assign(rows, 0.0);
   for (const auto& [part, count] : counts) {
-      RangeProof range = sum_range(check::term_layers(network, part, names[1]), domain.at(part),
-                                   std::min(nodes, kRangeNodes));
-      for (std::size_t i = 0; i < rows; ++i) {  // all the ground, of the others any number up to `count`
-        others.least[i] += part == ground ? range.least[i] : count * std::min(range.least[i], 0.0);
-        others.most[i] += part == ground ? range.most[i] : count * std::max(range.most[i], 0.0);
-      }
-      others.ranges.emplace(part, std::move(range));
+    RangeProof range =
+        sum_range(check::term_layers(network, part, names[1]), domain.at(part), std::min(nodes, kRangeNodes));
+    for (std::size_t i = 0; i < rows; ++i) {  // all the ground, of the others any number up to `count`
+      others.least[i] += part == ground ? range.least[i] : count * std::min(range.least[i], 0.0);
+      others.most[i] += part == ground ? range.most[i] : count * std::max(range.most[i], 0.0);
+    }
+    others.ranges.emplace(part, std::move(range));
   }
   return others;
 }

@@ -140,8 +140,7 @@ std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
   const double alpha = 0.8 * slowest / scale;
   const auto size = static_cast<Index>(n);
   // P = R'R.
-  const Eigen::LLT<MatrixXd> factor(
-      lyapunov(companion.approximate + alpha * MatrixXd::Identity(size, size)));
+  const Eigen::LLT<MatrixXd> factor(lyapunov(companion.approximate + alpha * MatrixXd::Identity(size, size)));
   if (factor.info() != Eigen::Success) return std::nullopt;
   const MatrixXd R = factor.matrixU();
   const std::optional<IntervalMatrix> R_inverse = inverse(R);
