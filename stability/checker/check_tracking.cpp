@@ -32,8 +32,8 @@ void check_axis(const Json& entry) {
 
 LoopWitness parse_loop(const Json& entry) {
   files::require_keys(entry,
-                      {"axis", "input", "mass_kg", "Kp", "Kd", "Ki", "lags_s", "time_exponent",
-                       "step_exponent", "steps", "decay", "P", "gains"},
+                      {"axis", "input", "mass_kg", "Kp", "Kd", "Ki", "lags_s", "delay_s", "delay_order",
+                       "time_exponent", "step_exponent", "steps", "decay", "P", "gains"},
                       "loop");
   check_axis(entry);
   LoopWitness loop;
@@ -43,6 +43,8 @@ LoopWitness parse_loop(const Json& entry) {
   loop.Kd = hex_number(entry, "Kd");
   loop.Ki = hex_number(entry, "Ki");
   loop.lags_s = files::parse_hex_floats(entry["lags_s"]);
+  loop.delay_s = hex_number(entry, "delay_s");
+  loop.delay_order = small_integer(entry, "delay_order");
   loop.time_exponent = small_integer(entry, "time_exponent");
   loop.step_exponent = small_integer(entry, "step_exponent");
   loop.steps = small_integer(entry, "steps");

@@ -15,13 +15,13 @@ inline constexpr const char* kTrackingSchema = "swarmcert/tracking-certificate/1
 inline constexpr const char* kTrackingStatement =
     "For each loop listed, with its numbers taken exactly as they stand: along one axis m e'' = u + f, "
     "e, e', the integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int "
-    "(e + p)) + c behind first-order lags of the time constants listed, in continuous time, without a "
-    "delay and without limits. The input w is f (force), c (command), v (velocity, an error of that "
-    "estimate) or p (position); the others are zero. Then at all times, in exact arithmetic, |e| <= rate "
-    "sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total variation of "
-    "w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. "
-    "Lengths are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name the "
-    "files from which the loops were derived; where both are given, checking compares the hashes and "
+    "(e + p)) + c behind a delay of delay_s and first-order lags of the time constants listed, in "
+    "continuous time and without limits. The input w is f (force), c (command), v (velocity, an error of "
+    "that estimate) or p (position); the others are zero. Then at all times, in exact arithmetic, |e| <= "
+    "rate sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total "
+    "variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is "
+    "stated. Lengths are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name "
+    "the files from which the loops were derived; where both are given, checking compares the hashes and "
     "derives the loops anew, up to a relative 1e-12 for rounding. What is listed under left_out, and "
     "every bound made from these gains, is not certified here.";
 

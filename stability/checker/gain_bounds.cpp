@@ -83,6 +83,10 @@ void check_ranges(const LoopWitness& loop) {
          "mass_kg, Kp, Kd or Ki is out of range");
   demand(loop.lags_s.size() <= kMostLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), usual),
          "lags_s are more than four, or out of range");
+  demand(loop.delay_s == 0 ? loop.delay_order == 0
+                           : usual(loop.delay_s) && loop.delay_order >= 0 &&
+                                 static_cast<std::size_t>(loop.delay_order) <= loop.lags_s.size(),
+         "delay_s or delay_order is out of range");
   demand(loop.time_exponent >= -64 && loop.time_exponent <= 64, "time_exponent is out of range");
   demand(loop.step_exponent >= 0 && loop.step_exponent <= 64, "step_exponent is out of range");
   demand(loop.steps >= 1 && loop.steps <= kMostSteps, "steps is out of range");
@@ -105,6 +109,9 @@ void check_ranges(const LoopWitness& loop) {
 struct System {
   Square A, P;
   Row initial;
+  Row rest_initial;  ///< of what the expansion of the delay leaves, behind its derivatives; empty without a delay
+  Rational rest_jump;       ///< its jump at 0
+  Rational rest_weight;     ///< T^(k+1)/(k+1)!
   Rational settled;         ///< what the integral of y tends to, in units of time
   std::array<Row, 5> rows;  ///< integral of y less `settled`, y, y', y'', y'''
 };
@@ -126,6 +133,33 @@ Row numerator_of(const LoopWitness& loop, const Row& lag) {
   return result;
 }
 
+/// The state at 0+, by division of the series in 1/s.
+/// @param a `denominator` divided by its last coefficient, in units of time of 2^-time_exponent s.
+Row initial_state(const Row& numerator, const Row& denominator, const Row& a, long time_exponent) {
+  const std::size_t n = a.size() - 1;
+  Row initial(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t power = n - 1 - k;
+    if (power < numerator.size()) {
+      initial[k] = numerator[power] / denominator[n] * two_to(-time_exponent * static_cast<long>(k));
+    }
+    for (std::size_t j = 0; j < k; ++j) initial[k] -= a[n - k + j] * initial[j];
+  }
+  return initial;
+}
+
+/// Adds `feedback` times the expansion of the delay to `denominator`.
+/// @returns T^(k+1)/(k+1)!
+Rational close_loop(const LoopWitness& loop, const Row& feedback, Row& denominator) {
+  Rational term = 1;  // (-T)^j/j!
+  for (int j = 0; j <= loop.delay_order; ++j) {
+    if (j > 0) term *= -Rational(loop.delay_s) / j;
+    for (std::size_t k = 0; k < feedback.size(); ++k)
+      denominator[k + static_cast<std::size_t>(j)] += term * feedback[k];
+  }
+  return abs(term) * Rational(loop.delay_s) / (loop.delay_order + 1);
+}
+
 System system_of(const LoopWitness& loop) {
   Row lag = {Rational(1)};
   for (const double tau : loop.lags_s) lag = product(lag, {Rational(1), Rational(tau)});
@@ -133,11 +167,11 @@ System system_of(const LoopWitness& loop) {
   denominator.insert(denominator.begin(), loop.Ki > 0 ? 3 : 2, Rational(0));
   Row feedback = {Rational(loop.Kp), Rational(loop.Kd)};
   if (loop.Ki > 0) feedback.insert(feedback.begin(), Rational(loop.Ki));
-  for (std::size_t k = 0; k < feedback.size(); ++k) denominator[k] += feedback[k];
+  System system;
+  system.rest_weight = close_loop(loop, feedback, denominator);
   const Row numerator = numerator_of(loop, lag);
 
   const std::size_t n = order(loop);
-  System system;
   Row a(n + 1);
   for (std::size_t k = 0; k <= n; ++k) {
     a[k] = denominator[k] / denominator[n] * two_to(-loop.time_exponent * static_cast<long>(n - k));
@@ -149,14 +183,15 @@ System system_of(const LoopWitness& loop) {
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < n; ++j) system.P[i][j] = loop.P[i][j];
   }
-  system.initial.resize(n);  // by division of the series in 1/s
-  for (std::size_t k = 0; k < n; ++k) {
-    const std::size_t power = n - 1 - k;
-    if (power < numerator.size()) {
-      system.initial[k] =
-          numerator[power] / denominator[n] * two_to(-loop.time_exponent * static_cast<long>(k));
-    }
-    for (std::size_t j = 0; j < k; ++j) system.initial[k] -= a[n - k + j] * system.initial[j];
+  system.initial = initial_state(numerator, denominator, a, loop.time_exponent);
+  if (loop.delay_s > 0) {
+    Row rest(n + 1);  // s^(k+1) feedback, less its multiple of the denominator
+    for (std::size_t k = 0; k < feedback.size(); ++k)
+      rest[k + static_cast<std::size_t>(loop.delay_order) + 1] = feedback[k];
+    system.rest_jump = rest[n] / denominator[n];
+    for (std::size_t k = 0; k <= n; ++k) rest[k] -= system.rest_jump * denominator[k];
+    rest.pop_back();
+    system.rest_initial = initial_state(rest, denominator, a, loop.time_exponent);
   }
   system.settled = numerator[0] / denominator[0] * two_to(loop.time_exponent);
   system.rows[0].resize(n);
@@ -185,7 +220,7 @@ void check_decay(const System& system, double decay) {
 /// The state at the ends of the cells, in fixed point.
 class Trajectory {
  public:
-  Trajectory(const System& system, int step_exponent) : n_(system.A.size()) {
+  Trajectory(const System& system, const Row& initial, int step_exponent) : n_(system.A.size()) {
     Rational row_sum = 1;
     for (const Row& row : system.A) {
       Rational sum;
@@ -216,7 +251,7 @@ class Trajectory {
       for (const Rational& x : row) sum += abs(x), P_.push_back(Integer(x * two_to(kPBits)));
     }
     from_largest_ = root_up(ceil_fixed(sum) << kBits);
-    for (const Rational& x : system.initial) state.push_back(floor_fixed(x));
+    for (const Rational& x : initial) state.push_back(floor_fixed(x));
     error = times_up(from_largest_, 1);
     measure();
   }
@@ -316,6 +351,21 @@ class Norms {
   Integer before_, curvature_, ends_, curvatures_, supremum_;
 };
 
+/// At least the part of a response that the expansion of the delay may miss.
+Rational missed_by_expansion(const System& system, const LoopWitness& loop) {
+  if (loop.delay_s == 0) return 0;
+  Trajectory at(system, system.rest_initial, loop.step_exponent);
+  Norms rest(system, 1, 0, loop.step_exponent);
+  rest.begin(at);
+  for (long k = 0; k < loop.steps; ++k) {
+    rest.prepare(at);
+    at.advance();
+    rest.add(at);
+  }
+  return system.rest_weight *
+         (abs(system.rest_jump) + rest.integral(at, loop.decay) * two_to(-loop.time_exponent));
+}
+
 }  // namespace
 
 std::size_t order(const LoopWitness& loop) { return loop.lags_s.size() + (loop.Ki > 0 ? 3 : 2); }
@@ -324,7 +374,9 @@ GainBounds upper_gains(const LoopWitness& loop) {
   check_ranges(loop);
   const System system = system_of(loop);
   check_decay(system, loop.decay);
-  Trajectory at(system, loop.step_exponent);
+  const Rational missed = missed_by_expansion(system, loop);
+  demand(missed < 1, "delay_order: the expansion misses too much of the delay");
+  Trajectory at(system, system.initial, loop.step_exponent);
   Norms step(system, 0, system.settled, loop.step_exponent);
   Norms impulse(system, 1, 0, loop.step_exponent);
   for (Norms* const norms : {&step, &impulse}) norms->begin(at);
@@ -334,11 +386,12 @@ GainBounds upper_gains(const LoopWitness& loop) {
     for (Norms* const norms : {&step, &impulse}) norms->add(at);
   }
   const Rational unit_s = two_to(-loop.time_exponent);
+  const Rational more = 1 / (1 - missed);
   GainBounds gains;
-  if (sgn(system.settled) == 0) gains.rate = step.integral(at, loop.decay) * unit_s * unit_s;
-  gains.amplitude = impulse.integral(at, loop.decay) * unit_s;
-  gains.edge = step.supremum(at) * unit_s;
-  gains.impulse = impulse.supremum(at);
+  if (sgn(system.settled) == 0) gains.rate = step.integral(at, loop.decay) * unit_s * unit_s * more;
+  gains.amplitude = impulse.integral(at, loop.decay) * unit_s * more;
+  gains.edge = step.supremum(at) * unit_s * more;
+  gains.impulse = impulse.supremum(at) * more;
   return gains;
 }
 

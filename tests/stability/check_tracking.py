@@ -23,8 +23,8 @@ from pathlib import Path
 
 STATEMENT = (
     "For each loop listed, with its numbers taken exactly as they stand: along one axis m e'' = u + f, e, e', the "
-    "integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int (e + p)) + c behind first-order lags of "
-    "the time constants listed, in continuous time, without a delay and without limits. The input w is f (force), c "
+    "integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int (e + p)) + c behind a delay of "
+    "delay_s and first-order lags of the time constants listed, in continuous time and without limits. The input w is f (force), c "
     "(command), v (velocity, an error of that estimate) or p (position); the others are zero. Then at all times, in exact "
     "arithmetic, |e| <= rate sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total "
     "variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. Lengths "
@@ -194,7 +194,7 @@ class Derived:
             elif effect.get("name") == "thrust_ratio":
                 ratio = 1 + values.get("ratio", 0)
             elif effect.get("name") == "delay":
-                delay = delay or 1  # whatever it is: nothing is certified of such loops
+                delay = delay or values.get("delay_s", 0.01)
         self.motor, self.delay, self.ratio, self.position = motor, delay, ratio, gains["position"]
 
     def matrix(self, key):
@@ -217,10 +217,9 @@ class Derived:
 
     def compare(self, entry):
         axis = "xyz".index(entry["axis"])
-        require(self.delay == 0, "the loop of the files has a delay")
-        stated = [exact(entry[key]) for key in ("mass_kg", "Kp", "Kd", "Ki")] + sorted(map(exact, entry["lags_s"]))
+        stated = [exact(entry[key]) for key in ("mass_kg", "Kp", "Kd", "Ki", "delay_s")] + sorted(map(exact, entry["lags_s"]))
         lags = sorted(x for x in (self.motor, self.attitude if axis < 2 else 0) if x > 0)
-        derived = [self.mass] + [self.ratio * x for x in self.gains(axis)] + lags
+        derived = [self.mass] + [self.ratio * x for x in self.gains(axis)] + [self.delay] + lags
         require(len(stated) == len(derived) and
                 all(abs(x - Fraction(y)) <= Fraction(1, 10 ** 12) * abs(Fraction(y)) for x, y in zip(stated, derived)),
                 f"the loop of axis {entry['axis']} is not that of the files")
@@ -228,7 +227,8 @@ class Derived:
 
 class Loop:
     def __init__(self, entry):
-        require_keys(entry, "axis input mass_kg Kp Kd Ki lags_s time_exponent step_exponent steps decay P gains", "loop")
+        require_keys(entry, "axis input mass_kg Kp Kd Ki lags_s delay_s delay_order time_exponent step_exponent steps "
+                     "decay P gains", "loop")
         require(entry["axis"] in ("x", "y", "z"), "axis is unknown")
         self.input = entry["input"]
         require(self.input in ("force", "command", "velocity", "position"), "input is unknown")
@@ -239,6 +239,9 @@ class Loop:
         for x in (mass, kp, kd, self.decay, *lags, *([self.ki] if self.ki else [])):
             require(two_to(-40) <= x <= two_to(40), "a number of the loop is out of range")
         require(len(lags) <= 4, "more than four lags")
+        self.delay = exact(entry["delay_s"])
+        require(self.delay == 0 or two_to(-40) <= self.delay <= two_to(40), "delay_s is out of range")
+        self.delay_order = whole(entry, "delay_order", 0, len(lags) if self.delay else 0)
         self.time = whole(entry, "time_exponent", -64, 64)
         self.cell = whole(entry, "step_exponent", 0, 64)
         self.steps = whole(entry, "steps", 1, 2 ** 18)
@@ -262,7 +265,8 @@ class Loop:
         integral = [self.ki] if self.ki else []
         back = integral + [kp, kd]
         d = [Fraction(0)] * (len(integral) + 2) + lag
-        for k, x in enumerate(back):
+        expansion = [(-self.delay) ** j / factorial(j) for j in range(self.delay_order + 1)]
+        for k, x in enumerate(polynomial_product(back, expansion)):
             d[k] += x
         if self.input == "position":
             top = integral + [kp]
@@ -273,11 +277,21 @@ class Loop:
         unit = two_to(-self.time)  # of time, in seconds
         a = [d[k] / d[n] * unit ** (n - k) for k in range(n + 1)]
         self.A = [[Fraction(int(j == k + 1)) for j in range(n)] for k in range(n - 1)] + [[-x for x in a[:n]]]
-        start = []
-        for k in range(n):
-            x = top[n - 1 - k] / d[n] * unit ** k if n - 1 - k < len(top) else Fraction(0)
-            start.append(x - sum(a[n - k + j] * start[j] for j in range(k)))
-        self.start = start
+
+        def initial(numerator):
+            start = []
+            for k in range(n):
+                x = numerator[n - 1 - k] / d[n] * unit ** k if n - 1 - k < len(numerator) else Fraction(0)
+                start.append(x - sum(a[n - k + j] * start[j] for j in range(k)))
+            return start
+
+        self.start = initial(top)
+        # e^(-Ts) less its expansion is (-s)^(order + 1) times a kernel of one sign whose integral is this weight.
+        self.rest_weight = self.delay ** (self.delay_order + 1) / factorial(self.delay_order + 1)
+        rest = [Fraction(0)] * (self.delay_order + 1) + back
+        rest += [Fraction(0)] * (n + 1 - len(rest))
+        self.rest_jump = rest[n] / d[n]
+        self.rest_start = initial([x - self.rest_jump * y for x, y in zip(rest, d)][:n])
         self.limit = top[0] / d[0] / unit
         self.rows = [[-x / a[0] for x in a[1:]], [Fraction(int(k == 0)) for k in range(n)]]
         for _ in range(3):
@@ -305,13 +319,20 @@ class Loop:
     def gains(self):
         """Upper bounds of rate (None where there is none), amplitude, edge, impulse."""
         self.check_decay()
+        missed = 0
+        if self.delay:
+            missed = self.rest_weight * (abs(self.rest_jump) + self.norms(self.rest_start)["amplitude"])
+            require(missed < 1, "the expansion misses too much of the delay")
+        return {name: x and x / (1 - missed) for name, x in self.norms(self.start).items()}
+
+    def norms(self, start):
         step, missed = self.transition()
         n, cell, P = len(self.A), self.cell, [[int(x * 2 ** 96) for x in row] for row in self.P]
         spread = root_above(fixed_above(sum(abs(x) for row in self.P for x in row)) << BITS)  # |u|_P per max |u|
         forms = [([fixed_below(x) for x in row], root_above(fixed_above(inverse_form(self.P, row)) << BITS))
                  for row in self.rows]
         offset = fixed_below(self.limit)
-        state, error = [fixed_below(x) for x in self.start], product_above(spread, 1)
+        state, error = [fixed_below(x) for x in start], product_above(spread, 1)
 
         def size(largest):
             square = sum(x * sum(p * y for p, y in zip(row, state)) for x, row in zip(state, P))

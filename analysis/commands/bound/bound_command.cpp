@@ -269,9 +269,8 @@ Command bound_command() {
             ->check(CLI::Range(0.5, 0.999))
             ->needs("--from");
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
-        add_output(
-            app, "-o,--output", options->certificate,
-            "File for a certificate of the gains of --verified, for check: continuous loops without a delay")
+        add_output(app, "-o,--output", options->certificate,
+                   "File for a certificate of the gains of --verified, for check: continuous loops")
             ->needs("--verified");
         app.add_flag("--tube", options->tube,
                      "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "

@@ -17,13 +17,18 @@ using stability::Polynomial;
 
 constexpr double kMostSteps = 1 << 18;
 
-/// The characteristic polynomial, without the factor s that it has for Ki = 0.
-Polynomial characteristic(const stability::AxisLoop& loop, const std::vector<double>& lags_s) {
+/// The characteristic polynomial, without the factor s that it has for Ki = 0; a delay is expanded.
+Polynomial characteristic(const stability::AxisLoop& loop, const std::vector<double>& lags_s,
+                          int delay_order) {
   Polynomial open = {1};
   for (const double tau : lags_s) open = stability::product(open, {1, tau});
   const bool integrates = loop.Ki > 0;
+  const Polynomial feedback =
+      integrates ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
+  Polynomial expansion = {1};
+  for (int j = 1; j <= delay_order; ++j) expansion.push_back(-expansion.back() * loop.delay_s / j);
   return stability::sum(stability::times_s_to(integrates ? 3 : 2, open),
-                        integrates ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd});
+                        stability::product(feedback, expansion));
 }
 
 /// The companion matrix of `p` in units of time of 2^-exponent s.
@@ -80,18 +85,18 @@ double excess(const check::GainBounds& bounds, const stability::VerifiedNorms& k
   return most;
 }
 
-}  // namespace
-
-std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const std::string& input,
-                                        const stability::VerifiedNorms& known, std::string& why) {
+std::optional<ProvedGains> search_witness(const stability::AxisLoop& loop, const std::string& input,
+                                          int delay_order, const stability::VerifiedNorms& known,
+                                          std::string& why) {
   ProvedGains found;
   check::LoopWitness& witness = found.witness;
   witness.input = input;
+  witness.delay_s = loop.delay_s, witness.delay_order = delay_order;
   witness.mass_kg = loop.mass_kg, witness.Kp = loop.Kp, witness.Kd = loop.Kd, witness.Ki = loop.Ki;
   for (const double tau : loop.lags_s) {
     if (tau > 0) witness.lags_s.push_back(tau);
   }
-  const Polynomial p = characteristic(loop, witness.lags_s);
+  const Polynomial p = characteristic(loop, witness.lags_s, delay_order);
   double slowest = 1e300, fastest = 0;
   for (const std::complex<double>& pole : stability::poles(p)) {
     slowest = std::min(slowest, -pole.real());
@@ -119,6 +124,17 @@ std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const s
     } catch (const std::runtime_error& refusal) {
       why = std::string("no witness was found: ") + refusal.what();
     }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const std::string& input,
+                                        const stability::VerifiedNorms& known, std::string& why) {
+  const auto lags = std::count_if(loop.lags_s.begin(), loop.lags_s.end(), [](double tau) { return tau > 0; });
+  for (int delay_order = loop.delay_s > 0 ? static_cast<int>(lags) : 0; delay_order >= 0; --delay_order) {
+    if (auto found = search_witness(loop, input, delay_order, known, why)) return found;
   }
   return std::nullopt;
 }

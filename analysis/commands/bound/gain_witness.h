@@ -17,7 +17,6 @@ struct ProvedGains {
 
 /// A quadratic form in which the loop contracts, and as many cells as bring the bounds to within 1 % of `known`.
 /// @param input force, command, velocity or position.
-/// @param loop without a delay.
 /// @returns nothing, and in `why` the reason, where no form was found or the bounds remain 5 % above `known`.
 std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const std::string& input,
                                         const stability::VerifiedNorms& known, std::string& why);

@@ -56,6 +56,8 @@ Json loop_entry(const ProvedGains& found) {
           {"Kd", files::hex_float(w.Kd)},
           {"Ki", files::hex_float(w.Ki)},
           {"lags_s", hex_array(w.lags_s)},
+          {"delay_s", files::hex_float(w.delay_s)},
+          {"delay_order", w.delay_order},
           {"time_exponent", w.time_exponent},
           {"step_exponent", w.step_exponent},
           {"steps", w.steps},
@@ -79,7 +81,6 @@ stability::VerifiedNorms enclosures_of(const Json& row) {
 Json entry_or_reason(const stability::AxisLoop& loop, const Json& row) {
   if (row["status"] != "proved") return row["why"];
   if (row["loop"] != "continuous") return "sampled loops are not certified, only enclosed";
-  if (loop.delay_s > 0) return "loops with a delay are not certified, only enclosed";
   std::string why;
   const auto found = gain_witness(loop, row["channel"].get<std::string>(), enclosures_of(row), why);
   return found ? loop_entry(*found) : Json(why);

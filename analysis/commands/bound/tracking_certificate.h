@@ -5,8 +5,8 @@
 
 namespace swarmcert::analysis {
 
-/// Schema swarmcert/tracking-certificate/1: the gains of every continuous loop without a delay, with what proves them
-/// to the checker (stability/checker), and under left_out what `verified` holds besides, each with the reason.
+/// Schema swarmcert/tracking-certificate/1: the gains of every continuous loop, with what proves them to
+/// the checker (stability/checker), and under left_out what `verified` holds besides, each with the reason.
 /// @param verified verified_json() of the same input.
 files::Json tracking_certificate(const Tracking& input, const TrackingArguments& arguments,
                                  const files::Json& verified);

@@ -45,8 +45,8 @@ bool states(const files::Json& entry, const stability::AxisLoop& loop) {
                [](double tau) { return tau > 0; });
   std::sort(stated.begin(), stated.end());
   std::sort(derived.begin(), derived.end());
-  return loop.delay_s == 0 && fits("mass_kg", loop.mass_kg) && fits("Kp", loop.Kp) && fits("Kd", loop.Kd) &&
-         fits("Ki", loop.Ki) &&
+  return fits("delay_s", loop.delay_s) && fits("mass_kg", loop.mass_kg) && fits("Kp", loop.Kp) &&
+         fits("Kd", loop.Kd) && fits("Ki", loop.Ki) &&
          std::equal(stated.begin(), stated.end(), derived.begin(), derived.end(), is_close);
 }
 
