@@ -41,9 +41,10 @@ std::size_t order(const LoopWitness& loop);
 /// sum of exp(A cell) to order 24 in integers over 2^128; what that misses never grows, in the norm of P, and is added
 /// up. Within a cell |f| <= the line through |f| at both ends + cell^2/8 sup|f''|. After the last cell, |r x| <=
 /// sqrt(r P^-1 r') |x|_P, which decays.
-/// A delay T is expanded: A is that of D0 = open + feedback R, R the Taylor polynomial of e^(-Ts) of degree k = delay_order. What
-/// is left, (-s)^(k+1) times a kernel of one sign and of integral T^(k+1)/(k+1)!, takes at most lambda = T^(k+1)/(k+1)!
-/// |s^(k+1) feedback/D0|_1 of a response (a jump at 0 counts), so that lambda < 1 must hold and all bounds are divided by 1 - lambda.
+/// A delay T is expanded: A is that of D0 = open + feedback R, R the Taylor polynomial of e^(-Ts) of degree k =
+/// delay_order. What is left, (-s)^(k+1) times a kernel of one sign and of integral T^(k+1)/(k+1)!, takes at most
+/// lambda = T^(k+1)/(k+1)! |s^(k+1) feedback/D0|_1 of a response (a jump at 0 counts), so that lambda < 1 must hold and
+/// all bounds are divided by 1 - lambda.
 /// @throws std::runtime_error with the reason where the witness shows nothing, or a number is out of range.
 GainBounds upper_gains(const LoopWitness& loop);
 

@@ -29,7 +29,8 @@ std::array<double, 7> downwash_shape(const double* shape) {
           0};
 }
 
-/// `now` among its nearest neighbours where their wakes, which arrive now, have drifted to; `past` is scratch of kMostAtOnce.
+/// `now` among its nearest neighbours where their wakes, which arrive now, have drifted to; `past` is scratch of
+/// kMostAtOnce.
 Instant with_past_neighbours(const Instant& now, const double* shape, Neighbour* past) {
   const double delay_s = shape[kDelay];
   const Eigen::Vector3d wind_m_s(shape[kWindX], shape[kWindY], 0);
