@@ -60,6 +60,14 @@ double commanded_thrust_N(const stability::Model& model, const Track& track, std
   return thrust_N;
 }
 
+/// Turns each column. Eigen's own product of the whole needs a copy of all columns.
+void turn(const Eigen::Matrix3d& rotation, Eigen::Matrix3Xd& vectors) {
+  for (Eigen::Index k = 0; k < vectors.cols(); ++k) {
+    const Eigen::Vector3d turned = rotation * vectors.col(k);
+    vectors.col(k) = turned;
+  }
+}
+
 void pass_published_lag(Track& track) {
   double lagged_N = 0;
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
@@ -85,13 +93,22 @@ void AccelerometerFilter::advance(double time_s, Eigen::Ref<Eigen::Matrix3Xd> va
     slope_.setZero();
   } else {
     const double h = time_s - time_s_;
-    const double a = rate_1_s_;
+    const double a = rate_1_s_, inverse_a = 1 / a, inverse_h = 1 / h;
     const double decay = std::exp(-a * h), c = decay * std::cos(a * h), s = decay * std::sin(a * h);
-    ramp_ = (values - input_) / h;
-    start_ = output_ - input_ + ramp_ / a;
-    start_slope_ = slope_ - ramp_;
-    output_ = values - ramp_ / a + c * start_ + s * (start_ + start_slope_ / a);
-    slope_ = ramp_ + c * start_slope_ - s * (start_slope_ + 2 * a * start_);
+    const double start_to_output = c + s, bend_to_output = s * inverse_a;
+    const double start_to_slope = 2 * a * s, bend_to_slope = c - s;
+    // One pass over the signals, without temporary matrices and divisions: every record of every fit comes here.
+    for (Eigen::Index k = 0; k < values.cols(); ++k) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double u = values(axis, k), last = input_(axis, k);
+        double& y = output_(axis, k);
+        double& slope = slope_(axis, k);
+        const double ramp = (u - last) * inverse_h, delayed = ramp * inverse_a;
+        const double start = y - last + delayed, bend = slope - ramp;
+        y = u - delayed + start_to_output * start + bend_to_output * bend;
+        slope = ramp + bend_to_slope * bend - start_to_slope * start;
+      }
+    }
   }
   has_past_ = true;
   time_s_ = time_s;
@@ -112,9 +129,9 @@ void MeasuredForce::restart() {
 
 void MeasuredForce::apply(const stability::Instant& now, Eigen::Matrix3Xd& forces) {
   if (has_accelerometer_) {
-    forces = (now.R_WB.transpose() * forces).eval();
+    turn(now.R_WB.transpose(), forces);
     filter_.advance(now.time_s, forces);
-    forces = (now.R_WB * forces).eval();
+    turn(now.R_WB, forces);
   } else {
     window_.average(now.time_s, forces);
   }

@@ -30,7 +30,7 @@ class AccelerometerFilter {
   const double rate_1_s_;
   bool has_past_ = false;
   double time_s_ = 0;
-  Eigen::Matrix3Xd input_, output_, slope_, start_, start_slope_, ramp_;
+  Eigen::Matrix3Xd input_, output_, slope_;
 };
 
 /// Turns forces in W into what the log of a track would show of them.

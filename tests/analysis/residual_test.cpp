@@ -37,6 +37,28 @@ TEST(AccelerometerFilter, DelaysARampByTheTwoPolesAndKeepsItsSlope) {
   EXPECT_NEAR(output, 3 * (time_s - delay_s), 1e-9);
 }
 
+TEST(AccelerometerFilter, FiltersEveryAxisOfEveryChannelAsIfItWereAlone) {
+  constexpr int kChannels = 5;
+  AccelerometerFilter together(30, kChannels);
+  std::vector<AccelerometerFilter> alone(3 * kChannels, AccelerometerFilter(30, 1));
+  std::mt19937 random(1);
+  const auto uniform = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  double time_s = 0, filtered_away = 0;
+  for (int i = 0; i < 50; ++i) {
+    time_s += 0.002 + 0.016 * uniform();
+    Eigen::Matrix3Xd values(3, kChannels);
+    for (double& value : values.reshaped()) value = 2 * uniform() - 1;
+    const Eigen::Matrix3Xd inputs = values;
+    together.advance(time_s, values);
+    for (int k = 0; k < 3 * kChannels; ++k) {
+      const double expected = filtered(alone[static_cast<std::size_t>(k)], time_s, inputs(k % 3, k / 3));
+      EXPECT_NEAR(values(k % 3, k / 3), expected, 1e-12);
+    }
+    filtered_away = std::max(filtered_away, (values - inputs).cwiseAbs().maxCoeff());
+  }
+  EXPECT_GT(filtered_away, 0.5);
+}
+
 TEST(VelocityError, IsWhatTheEstimatedVelocityHasMoreThanTheSlopeOfThePosition) {
   // x swings with 0.3 m at 3 rad/s, its estimated velocity is 1.1 times too large; z stands, its velocity is off by
   // 0.05.
