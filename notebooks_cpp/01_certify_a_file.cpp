@@ -10,9 +10,9 @@
 //
 // Upper bounds are proved in exact arithmetic, lower bounds are slopes between two float32 points.
 //
-// A state dict holds weights: neither the order of its layers nor what stands between them. Record what the trained
-// network gives, and `certify net.pth --samples samples.npz` refuses a file of any other function, be it another order,
-// activation or skip connection:
+// A state dict holds weights: neither the order of its layers nor what stands between them. Record what the trained network
+// gives, and `certify net.pth --samples samples.npz` refuses a file of any other function, be it another order, activation or
+// skip connection:
 //
 //     import numpy, torch
 //     model.eval()
@@ -65,8 +65,8 @@ int main() {
                  "'' using 4 title 'product of norms' linecolor rgb '#999999'\n");
 
   // %% [markdown]
-  // The certificate holds the proofs. A small checker verifies it against the weights and trusts no optimiser. A bound
-  // one percent below what was proved may even be true, but its proof does not hold, and a new hash does not help.
+  // The certificate holds the proofs. A small checker verifies it against the weights and trusts no optimiser. A bound one
+  // percent below what was proved may even be true, but its proof does not hold, and a new hash does not help.
 
   // %%
   files::Json certificate = lipschitz::certificate(network, found);

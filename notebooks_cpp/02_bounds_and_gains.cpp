@@ -5,8 +5,7 @@
 //
 //     s = e' + 2 Lambda e + Lambda^2 int e,   force = -K s,   |d(f_a - f_hat)/dt| <= d_m
 //     limsup |e| <= d_m / (lambda_min(Lambda)^2 lambda_min(K))     the theorem's ball
-//     sup |e|     = |h|_1 d_m                                      exact for a linear loop; h: step response of the
-//     error
+//     sup |e|     = |h|_1 d_m                                      exact for a linear loop; h: step response of the error
 //
 // The theorem knows no motor lag. The exact gain of the loop does.
 
@@ -32,8 +31,8 @@ int main() {
 
   // %% [markdown]
   // Without lag the theorem is sharp. Now Lambda and K are scaled together, c times each, and the force comes through a
-  // motor with a time constant of 57 ms, as published flights show it. Near the stability limit the ball promises what
-  // the loop does not keep: a lag is a failed hypothesis of the theorem, not a detail. `swarmcert bound` names it.
+  // motor with a time constant of 57 ms, as published flights show it. Near the stability limit the ball promises what the
+  // loop does not keep: a lag is a failed hypothesis of the theorem, not a detail. `swarmcert bound` names it.
 
   // %%
   std::string data;
@@ -57,6 +56,7 @@ int main() {
                  "set xlabel 'scale c of Lambda and K (1)'\nset ylabel 'bound of the tracking error (mm)'\n"
                  "set logscale y\nset grid\n"
                  "plot 'gains.dat' using 1:2 with lines linewidth 2 linecolor rgb '#0072b2' title 'ball of "
-                 "the theorem', '' using 1:3 with lines linewidth 2 dashtype 2 linecolor rgb '#d55e00' title "
-                 "'exact, with motor lag'\n");
+                 "the theorem', "
+                 "'' using 1:3 with lines linewidth 2 dashtype 2 linecolor rgb '#d55e00' title 'exact, with "
+                 "motor lag'\n");
 }

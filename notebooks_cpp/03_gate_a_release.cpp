@@ -50,8 +50,7 @@ int main() {
     fmt::print("{:<16} {}\n", check.name, gate::name(check.verdict));
 
   // %% [markdown]
-  // The same network under other limits. Where nothing is proved and nothing attained, the release does not pass
-  // either.
+  // The same network under other limits. Where nothing is proved and nothing attained, the release does not pass either.
 
   // %%
   std::string data;
@@ -73,8 +72,7 @@ int main() {
                  "'' using 1:2:3 with labels offset 0,1 notitle\n");
 
   // %% [markdown]
-  // One digit of the certificate is changed, here of the hash that names the weights: it is refused, and the release
-  // with it.
+  // One digit of the certificate is changed, here of the hash that names the weights: it is refused, and the release with it.
 
   // %%
   std::string certificate = files::read_file("cert.json");

@@ -3,8 +3,7 @@
 //
 // Where is the model wrong? The residual is what the accelerometer feels and the model does not explain:
 //
-//     r = m a_specific - f_u - f_model        (a_specific: specific force in the world frame; f_u: thrust from PWM and
-//     battery)
+//     r = m a_specific - f_u - f_model        (a_specific: specific force in the world frame; f_u: thrust from PWM and battery)
 //
 // The flight is simulated: the truth has motor lag, downwash, drag and ground effect, the model has none of them.
 

@@ -6,8 +6,8 @@
 //
 //     r(t) = sum_k c_k X_k(t; theta) + noise,      c within physical bounds, theta from a small grid
 //
-// An effect counts if it lowers the error of flights held out of the fit, stands out from the scatter between blocks of
-// 2 s, and is there along the set points as well.
+// An effect counts if it lowers the error of flights held out of the fit, stands out from the scatter between blocks of 2 s,
+// and is there along the set points as well.
 
 // %%
 #include <fmt/format.h>

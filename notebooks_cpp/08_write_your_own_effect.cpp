@@ -80,9 +80,10 @@ int main() {
       data += fmt::format("{:.3f} {:.4f} {:.4f}\n", x_m, residual_N[i].x(), -std::max(0.0, x_m - 0.02));
     }
   }
-  notebook::plot("net", data,
-                 "set xlabel 'x (m)'\nset ylabel 'force along x (N)'\nset grid\n"
-                 "plot 'net.dat' using 1:2 with points pointtype 7 pointsize 0.4 linecolor rgb '#0072b2' "
-                 "title 'residual', '' using 1:3 with points pointtype 7 pointsize 0.4 linecolor rgb "
-                 "'#d55e00' title 'truth'\n");
+  notebook::plot(
+      "net", data,
+      "set xlabel 'x (m)'\nset ylabel 'force along x (N)'\nset grid\n"
+      "plot 'net.dat' using 1:2 with points pointtype 7 pointsize 0.4 linecolor rgb '#0072b2' title "
+      "'residual', "
+      "'' using 1:3 with points pointtype 7 pointsize 0.4 linecolor rgb '#d55e00' title 'truth'\n");
 }

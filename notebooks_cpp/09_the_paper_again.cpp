@@ -61,8 +61,7 @@ int main() {
   // prints how the vertical residual falls on flights that the fit has not seen (RMS in gf); the published
   // networks have seen them:
   //
-  // | neighbours and vehicle | nominal | + lag | + offset | + ground | + downwash | + all other effects | published
-  // networks |
+  // | neighbours and vehicle | nominal | + lag | + offset | + ground | + downwash | + all other effects | published networks |
   // |---|---|---|---|---|---|---|---|
   // | small alone, over the ground | 1.31 | 1.30 | 1.03 | 0.64 | 0.64 | 0.61 | 0.76 |
   // | large alone | 3.00 | 3.04 | 2.58 | 1.45 | 1.45 | 1.34 | 1.49 |

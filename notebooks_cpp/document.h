@@ -27,8 +27,7 @@ files::Json to_ipynb(const std::vector<RunCell>& cells);
 /// One self-contained page that loads nothing.
 std::string to_html(const std::string& title, const std::vector<RunCell>& cells);
 
-/// Where two notebooks differ, images aside: the first cell with both texts; empty if nowhere. Both must have the
-/// images.
+/// Where two notebooks differ, images aside: the first cell with both texts; empty if nowhere. Both must have the images.
 std::string first_difference(const files::Json& committed, const files::Json& fresh);
 
 }  // namespace swarmcert::notebook

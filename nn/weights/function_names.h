@@ -27,7 +27,7 @@ inline bool is_set(const std::string& function) { return function.rfind("set:", 
 /// True for what maps inputs to outputs: a plain network, or a set function.
 inline bool is_whole(const std::string& function) { return function == kPlainNetwork || is_set(function); }
 
-/// <kind> of "phi:<kind>" or "rho:<kind>".
+/// The kind of a part, "phi:<kind>" or "rho:<kind>".
 inline std::string kind_of(const std::string& part) { return part.substr(4); }
 
 }  // namespace swarmcert::files

@@ -143,6 +143,19 @@ def lane(a=0.02, middle=0.1, width=0.08):
     return lambda s: (0, -a * math.tanh((s.p[1] - middle) / width), 0)
 
 
+def suction(a=0.03, reach=0.3):
+    def force(s):
+        total = [0.0, 0.0]
+        for other in s.others:
+            p = other(0.0)
+            away = [p[i] - s.p[i] for i in range(3)]
+            r = math.sqrt(sum(x * x for x in away)) + 1e-6
+            for i in range(2):
+                total[i] += a * math.exp(-r / reach) * away[i] / r
+        return (total[0], total[1], 0)
+    return force
+
+
 def slow_drain(a=0.04, at=15.0, width=2.0):
     return lambda s: (0, 0, -a / (1 + math.exp(-(s.t - at) / width)))
 
@@ -188,5 +201,6 @@ EFFECTS = {
     "sideslip": dict(force=sideslip(), variables={"vx"}),
     "tilt loss": dict(force=tilt_loss(), variables={"tilt"}, speed=1.6),
     "lane": dict(force=lane(), variables={"y", "xy"}),
+    "suction": dict(force=suction(), variables={"neighbour"}, vehicles=2),
     "slow drain": dict(force=slow_drain(), variables={"time", "battery"}, names={"payload_step"}),
 }

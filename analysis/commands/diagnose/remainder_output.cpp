@@ -116,6 +116,7 @@ files::Json json_of(const ScanEntry& entry, const std::string& kind) {
 }
 
 std::string place_of(const ScanEntry& entry) {
+  if (entry.frame == "neighbour") return words_of(entry) + " towards the nearest neighbour, over its place";
   std::string text = fmt::format("{} {} over {}", words_of(entry), entry.axis, entry.variable);
   if (entry.frame == "body" && entry.quantity == "force") text += " (body axes)";
   if (entry.lag_s > 0) text += fmt::format(", {:.1f} s ago", entry.lag_s);

@@ -40,6 +40,8 @@ struct TrackSamples {
   std::vector<Eigen::VectorXd> residual;
   std::vector<std::array<float, 9>> axes;
   std::vector<std::array<float, NeighbourPlaces::kLags>> lateral_m, height_m;
+  std::vector<Eigen::Vector2f>
+      toward;  ///< unit vector to the nearest neighbour, horizontally; zero where there is none
   std::vector<int> block;
   int blocks = 0;
   double squares_N2 = 0;
@@ -192,6 +194,7 @@ class TrackSampler {
     std::array<float, NeighbourPlaces::kLags> lateral_m, height_m;
     lateral_m.fill(kUnknown);
     height_m.fill(kUnknown);
+    Eigen::Vector2f toward = Eigen::Vector2f::Zero();
     std::size_t past = i;
     for (std::size_t lag = 0; lag < NeighbourPlaces::kLags; ++lag) {
       const double then_s =
@@ -206,10 +209,12 @@ class TrackSampler {
         nearest_m = distance_m;
         lateral_m[lag] = static_cast<float>(distance_m);
         height_m[lag] = static_cast<float>(dp_m.z());
+        if (lag == 0 && distance_m > 0) toward = (dp_m.head<2>() / distance_m).cast<float>();
       }
     }
     result_.lateral_m.push_back(lateral_m);
     result_.height_m.push_back(height_m);
+    result_.toward.push_back(toward);
   }
 
   const stability::Model model_;
@@ -255,6 +260,7 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
   all.axes.resize(size, 9);
   all.neighbours.lateral_m.resize(size, NeighbourPlaces::kLags);
   all.neighbours.height_m.resize(size, NeighbourPlaces::kLags);
+  Eigen::MatrixX2f toward(size, 2);
   Eigen::Index row = 0;
   for (const auto& piece : pieces) {
     for (const TrackSamples& track : piece) {
@@ -263,7 +269,8 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
           all.values(row, v) = static_cast<float>(track.values[i][static_cast<std::size_t>(v)]);
           all.commanded(row, v) = static_cast<float>(track.commanded[i][static_cast<std::size_t>(v)]);
         }
-        all.residual.row(row) = track.residual[i].cast<float>();
+        all.residual.row(row).head(track.residual[i].size()) = track.residual[i].cast<float>();
+        toward.row(row) = track.toward[i];
         for (int k = 0; k < 9; ++k) all.axes(row, k) = track.axes[i][static_cast<std::size_t>(k)];
         for (int k = 0; k < NeighbourPlaces::kLags; ++k) {
           all.neighbours.lateral_m(row, k) = track.lateral_m[i][static_cast<std::size_t>(k)];
@@ -276,6 +283,11 @@ void append(const std::vector<std::vector<TrackSamples>>& pieces, ScanSamples& a
     }
     ++all.flights;
   }
+  if (all.quantity != ScanQuantity::kForce || size == 0) return;
+  const auto horizontal = all.residual.leftCols<2>();
+  const Eigen::RowVector2f mean = horizontal.colwise().mean();
+  all.residual.col(kTowardColumn) =
+      ((horizontal.rowwise() - mean).array() * toward.array()).rowwise().sum().matrix();
 }
 
 }  // namespace
@@ -284,7 +296,8 @@ const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity) {
   static const std::vector<ScanColumn> kForces = {
       {"force", "world", "x", "N", "force_x_N"}, {"force", "world", "y", "N", "force_y_N"},
       {"force", "world", "z", "N", "force_z_N"}, {"force", "body", "x", "N", "force_b1_N"},
-      {"force", "body", "y", "N", "force_b2_N"}, {"force", "body", "z", "N", "force_b3_N"}};
+      {"force", "body", "y", "N", "force_b2_N"}, {"force", "body", "z", "N", "force_b3_N"},
+      {"force", "neighbour", "toward", "N", ""}};
   static const std::vector<ScanColumn> kBalances = {
       {"torque", "body", "roll", "Nm", "torque_x_Nm"}, {"torque", "body", "pitch", "Nm", "torque_y_Nm"},
       {"torque", "body", "yaw", "Nm", "torque_z_Nm"},  {"rotor_force", "body", "rotor_1", "N", ""},

@@ -49,13 +49,16 @@ enum class ScanQuantity { kForce, kBalance };
 /// A column of ScanSamples::residual.
 struct ScanColumn {
   const char* quantity;  ///< "force", "torque", or "rotor_force": what one rotor alone gives too much
-  const char* frame;     ///< "world" or "body"
-  const char* axis;      ///< "x" .. "z"; "roll", "pitch", "yaw"; "rotor_1" .. "rotor_4"
+  const char* frame;     ///< "world", "body" or "neighbour"
+  const char* axis;      ///< "x" .. "z"; "toward"; "roll", "pitch", "yaw"; "rotor_1" .. "rotor_4"
   const char* unit;      ///< "N" or "Nm"
   const char* target;    ///< in [effect.expression]; empty where it has none
 };
-/// Force: x, y, z in the world, then in the body. Balance: roll, pitch, yaw, then the rotors.
+/// Force: x, y, z in the world, then in the body, then horizontally towards the nearest neighbour, without the mean along
+/// the world's axes. Balance: roll, pitch, yaw, then the rotors.
 const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity);
+/// The last one of the force.
+inline constexpr int kTowardColumn = 6;
 
 /// What is known of a variable without looking at a flight.
 struct ScanVariableInfo {

@@ -18,6 +18,7 @@ constexpr int kFlips = 20;                  // draws of the chunks' signs
 constexpr Eigen::Index kManySamples = 40'000;
 
 bool is_offered(const Abscissa& abscissa, const ScanColumn& column) {
+  if (column.frame[0] == 'n') return abscissa.variables.empty() && abscissa.lag == 0;
   return column.frame[0] == 'w' ? abscissa.in_world : abscissa.in_body;
 }
 
@@ -56,11 +57,15 @@ struct Judged {
   void prefer_constants() {
     // Along the body's axes a constant is one of the body or one of the world, whichever leaves less.
     const Eigen::MatrixXd of_world =
-        chunk_errors(targets.rightCols(3), turned(targets.leftCols(3).colwise().mean()), chunks);
+        chunk_errors(targets.middleCols(3, 3), turned(targets.leftCols(3).colwise().mean()), chunks);
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       if (of_world.col(axis).sum() < none.col(3 + axis).sum()) none.col(3 + axis) = of_world.col(axis);
     }
-    body_total = chunk_errors(targets.rightCols(3), mean_predictions(targets.rightCols(3), chunks), chunks);
+    body_total =
+        chunk_errors(targets.middleCols(3, 3), mean_predictions(targets.middleCols(3, 3), chunks), chunks);
+    // A constant pull of neighbours is a part of the curve.
+    const Columns pull = targets.col(kTowardColumn);
+    none.col(kTowardColumn) = chunk_errors(pull, Columns::Zero(pull.rows(), 1), chunks);
   }
 };
 
@@ -272,8 +277,9 @@ void set_errors(const Judged& judged, ScanEntry& entry) {
   const double before = judged.samples.quantity == ScanQuantity::kForce
                             ? judged.samples.mean_square_N2
                             : column.squaredNorm() / static_cast<double>(column.size());
-  // A curve holds the mean of its component as well.
-  const double mean = column.mean();
+  // A curve holds the mean of its component as well; of a pull the share counts it.
+  const bool is_pull = entry.frame == "neighbour";
+  const double mean = is_pull ? 0.0 : static_cast<double>(column.mean());
   const double explained =
       mean * mean + entry.share * judged.totals[entry.column] / static_cast<double>(judged.samples.size());
   entry.rmse_before = std::sqrt(before);
@@ -286,7 +292,7 @@ void add_body_constant(const Judged& judged, double least, std::vector<ScanEntry
   ScanEntry entry;
   entry.share = entry.uncorrected_share = (judged.totals[0] - body) / judged.totals[0];
   if (entry.share < least) return;
-  const Eigen::RowVector3f mean = judged.targets.rightCols(3).colwise().mean();
+  const Eigen::RowVector3f mean = judged.targets.middleCols(3, 3).colwise().mean();
   int axis = 0;
   mean.cwiseAbs().maxCoeff(&axis);
   entry.variable = "body_constant";
@@ -354,7 +360,10 @@ std::vector<std::size_t> judged_columns(ScanQuantity quantity, const BestOfColum
                       best[kAxes + axis].share > kBodyBetter * std::max(best[axis].share, 0.0);
     columns.push_back(body ? kAxes + axis : axis);
   }
-  if (quantity == ScanQuantity::kForce) return columns;
+  if (quantity == ScanQuantity::kForce) {
+    columns.push_back(kTowardColumn);
+    return columns;
+  }
   for (std::size_t rotor = kAxes; rotor < best.size(); ++rotor) {
     double others = 0;
     for (std::size_t k = kAxes; k < best.size(); ++k)
