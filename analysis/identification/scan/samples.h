@@ -54,8 +54,8 @@ struct ScanColumn {
   const char* unit;      ///< "N" or "Nm"
   const char* target;    ///< in [effect.expression]; empty where it has none
 };
-/// Force: x, y, z in the world, then in the body, then horizontally towards the nearest neighbour, without the mean along
-/// the world's axes. Balance: roll, pitch, yaw, then the rotors.
+/// Force: x, y, z in the world, then in the body, then horizontally towards the nearest neighbour, without the mean
+/// along the world's axes. Balance: roll, pitch, yaw, then the rotors.
 const std::vector<ScanColumn>& scan_columns(ScanQuantity quantity);
 /// The last one of the force.
 inline constexpr int kTowardColumn = 6;
