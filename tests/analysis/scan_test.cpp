@@ -29,7 +29,7 @@ struct Flights {
     const Eigen::Index each = 400, size = flights * each;
     samples.values.resize(size, kNumScanVariables);
     samples.commanded = Eigen::MatrixXf::Constant(size, kNumScanVariables, std::nanf(""));
-    samples.residual.resize(size, 6);
+    samples.residual = Eigen::MatrixXf::Zero(size, kTowardColumn + 1);
     samples.axes = Eigen::MatrixXf::Zero(size, 9);
     for (const int k : {0, 4, 8}) samples.axes.col(k).setOnes();
     samples.neighbours.lateral_m = Eigen::MatrixXf::Constant(size, NeighbourPlaces::kLags, std::nanf(""));
@@ -49,7 +49,7 @@ struct Flights {
       samples.flight.push_back(static_cast<int>(i / each));
       samples.block.push_back(static_cast<int>(i / kBlockSamples));
       for (int k = 0; k < 3; ++k) samples.residual(i, k) = static_cast<float>(kNoise_N * bell(generator));
-      samples.residual.row(i).tail(3) = samples.residual.row(i).head(3);
+      samples.residual.row(i).segment(3, 3) = samples.residual.row(i).head(3);
     }
     samples.flights = flights;
     samples.blocks = static_cast<int>(size) / kBlockSamples;
@@ -66,6 +66,29 @@ struct Flights {
     }
   }
 };
+
+TEST(Scan, FindsAPullTowardsANeighbourThatPassesAllAround) {
+  Flights flights(40);
+  ScanSamples& samples = flights.samples;
+  for (Eigen::Index i = 0; i < samples.size(); ++i) {
+    const double lateral_m = 0.35 + 0.3 * std::sin(0.11 * static_cast<double>(i)),
+                 bearing = 0.37 * static_cast<double>(i);
+    samples.neighbours.lateral_m.row(i).setConstant(static_cast<float>(lateral_m));
+    samples.neighbours.height_m.row(i).setConstant(0.2F);
+    const double pull_N = 0.02 * std::exp(-lateral_m / 0.2);
+    const Eigen::RowVector2f toward(static_cast<float>(std::cos(bearing)),
+                                    static_cast<float>(std::sin(bearing)));
+    samples.residual.row(i).head<2>() += static_cast<float>(pull_N) * toward;
+    samples.residual.row(i).segment<2>(3) = samples.residual.row(i).head<2>();
+    samples.residual(i, kTowardColumn) = samples.residual.row(i).head<2>().dot(toward);
+  }
+  const Scan found = scan(samples, 1);
+  ASSERT_FALSE(found.entries.empty());
+  EXPECT_EQ(found.entries[0].variable, "neighbour");
+  EXPECT_EQ(found.entries[0].frame, "neighbour");
+  EXPECT_EQ(found.entries[0].axis, "toward");
+  EXPECT_GT(found.entries[0].share, 0.5);
+}
 
 TEST(Scan, FindsTheVariableOfEachForm) {
   struct Case {
