@@ -114,14 +114,15 @@ double taken_N2(const Missing& missing) {
   return finding.rmse_before_N * finding.rmse_before_N - finding.rmse_after_N * finding.rmse_after_N;
 }
 
-/// Whether a name may be the mean, or the edge, of something else: a force of a place or a moment, which few vehicles
-/// meet, and a share of the thrust of less than two percent of the weight. Every vehicle has drag and a lag.
+/// Whether a name may be the mean, the edge or a shadow of something else: a force of a place or a moment, which few
+/// vehicles meet, a thrust that depends on the climb, which any force along the velocity looks like, and a share of the
+/// thrust of less than two percent of the weight. Every vehicle has drag and a lag.
 bool may_be_part(const Missing& missing, double weight_N) {
   constexpr double kSmall = 0.02;
   const std::string& effect = missing.effect;
   if (effect == "thrust_ratio" || effect == "constant_force")
     return taken_N2(missing) < kSmall * weight_N * (kSmall * weight_N);
-  return needs_scan(effect) || effect == "ground" || effect == "ceiling";
+  return needs_scan(effect) || effect == "ground" || effect == "ceiling" || effect == "inflow";
 }
 
 /// Whether a name is no match for what is left beside it.
@@ -135,7 +136,7 @@ bool is_doubtful(const Missing& missing, const Explained& explained, double weig
   const double left = first.rmse_before * first.rmse_before - first.rmse_after * first.rmse_after;
   // Where one variable explains most of what is left, thrust and its history answer it.
   if (is_answer_of_thrust(missing) && taken <= left) return true;
-  // A name that varies with this variable has not its form.
+  // A name of this variable that leaves most of what depends on it has the wrong form.
   return points_to(first.variable, missing.effect) && kOfSameVariable * taken < left;
 }
 
@@ -239,11 +240,13 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   return result;
 }
 
-/// Times of lags and delays as the innovations show them; what is left is scanned anew where one moved.
+/// Lags and delays as the innovations of the residual show them, with the other numbers fitted and checked beside them
+/// as fit_effects() does. What is left is scanned anew where a time moved.
 void correct_memories(const Passes& passes, Explained& explained) {
   constexpr double kMoved = 0.1;
   std::vector<Missing>& ranking = explained.settled.ranking;
   std::vector<Refined> refined;
+  bool has_memory = false;
   for (const Missing& missing : ranking) {
     const std::vector<Refined>& all = explained.settled.selected.refined;
     const auto found = std::find_if(all.begin(), all.end(), [&](const Refined& effect) {
@@ -251,17 +254,21 @@ void correct_memories(const Passes& passes, Explained& explained) {
     });
     if (found == all.end()) return;
     refined.push_back(*found);
+    has_memory = has_memory || found->candidate.info.remembers;
   }
-  const std::vector<Refined> corrected = with_innovations(passes, refined);
+  if (!has_memory) return;
+  std::vector<Refined> corrected = with_innovations(passes, refined);
+  const std::vector<std::vector<InstrumentedValue>> checks = instrument(passes, candidates_of(corrected));
+  widen_by_bias(checks, instrument_with_shapes(passes, corrected), corrected);
   bool has_moved = false;
   for (std::size_t i = 0; i < corrected.size(); ++i) {
-    if (corrected[i].candidate.info.remembers)
-      has_moved =
-          has_moved || std::abs(corrected[i].theta[0] - refined[i].theta[0]) > kMoved * refined[i].theta[0];
+    ranking[i] = with_numbers(passes, corrected[i], ranking[i], explained.settled.selected.grams);
+    if (!checks.empty()) ranking[i].instrument = checks[i];
+    if (corrected[i].candidate.info.remembers &&
+        std::abs(corrected[i].theta[0] - refined[i].theta[0]) > kMoved * refined[i].theta[0])
+      has_moved = true;
   }
   if (!has_moved) return;
-  for (std::size_t i = 0; i < corrected.size(); ++i)
-    ranking[i] = with_numbers(passes, corrected[i], ranking[i], explained.settled.selected.grams);
   explained.settled.rest = remainder(passes, specs_of(ranking));
   scan_what_is_left(passes, explained);
 }

@@ -291,7 +291,7 @@ class Refinement {
 
 /// Of the vertical residual that `refined` leaves.
 Noise noise_beside(const Passes& passes, const std::vector<Refined>& refined) {
-  residuals::Inputs inputs = passes.inputs;
+  const residuals::Inputs& inputs = passes.inputs;
   std::vector<stability::EffectSpec> specs;
   for (const Refined& effect : refined) {
     for (stability::EffectSpec& spec : specs_of(effect.candidate, effect.coefficients, effect.theta,

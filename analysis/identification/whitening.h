@@ -3,10 +3,10 @@
 /// A gust that forgets itself, beside white noise: r = g + w with corr(g(t), g(t + d)) = exp(-d / forget_s). One record
 /// to the next this is an ARMA(1, 1) process with the innovations e_t = r_t - phi r_(t-1) + theta e_(t-1).
 ///
-/// Where a controller answers gusts, least squares take the answer for a lag of the thrust. Thrust answers what was, so
-/// that it is not correlated with the innovations to come: least squares of filtered residuals on filtered columns are
-/// consistent in a closed loop if the noise is of this kind (direct identification: Ljung, System Identification, 1999,
-/// 13.4).
+/// Where a controller answers gusts, least squares take the answer for a lag of the thrust. Thrust responds to past
+/// disturbances only, so it is uncorrelated with later innovations: least squares of filtered residuals on filtered
+/// columns are consistent in a closed loop if the noise is of this kind (direct identification: Ljung, System
+/// Identification, 1999, 13.4).
 #pragma once
 
 #include <Eigen/Core>
@@ -27,7 +27,7 @@ struct Autocovariance {
 
   /// @param values at times `step` records of which make kStep_s; restarts[i] != 0 where record i does not follow.
   void add(const std::vector<double>& values, const std::vector<char>& restarts, std::size_t step);
-  /// Nothing worth filtering where a tenth of a second later less than a tenth is left: forget_s is 0 then.
+  /// forget_s is 0, and no filter is needed, where the correlation over a tenth of a second is below 0.1.
   Noise noise() const;
 };
 

@@ -230,10 +230,10 @@ std::vector<RawTrack> fitted_tracks(const std::vector<std::vector<RawTrack>>& fl
     if (data.split_by_blocks || held_back.of_flight(f, flights.size()) == Use::kFit)
       fitted.insert(fitted.end(), flights[f].begin(), flights[f].end());
   }
-  const auto refuse = [&](const std::string& what, const std::string& mend) {
+  const auto refuse = [&](const std::string& what, const std::string& hint) {
     throw files::InputError(
         {inputs.found.flights.empty() ? "" : inputs.found.flights.front().logs.front().second, "", "flights",
-         "", what, mend});
+         "", what, hint});
   };
   if (fitted.empty()) {
     refuse("no usable record of a vehicle with a model among the flights to fit",

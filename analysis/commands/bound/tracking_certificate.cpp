@@ -77,7 +77,7 @@ stability::VerifiedNorms enclosures_of(const Json& row) {
   return known;
 }
 
-/// The entry of this loop, with an empty axis; or, as text, why there is none.
+/// The certificate entry of this loop, with its axis left empty; or a string with the reason why it has none.
 Json entry_or_reason(const stability::AxisLoop& loop, const Json& row) {
   if (row["status"] != "proved") return row["why"];
   if (row["loop"] != "continuous") return "sampled loops are not certified, only enclosed";

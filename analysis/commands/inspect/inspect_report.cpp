@@ -33,7 +33,7 @@ std::string words_of(const Json& list) {
   return words.empty() ? "none" : words;
 }
 
-/// The folder that all logs lie in, with its slash; empty for one log, and where there is none.
+/// The common parent folder of all logs, with a trailing slash; empty for a single log, or where they share none.
 std::string common_folder(const std::vector<InspectedLog>& logs) {
   if (logs.size() < 2) return "";
   std::string common = logs[0].path;

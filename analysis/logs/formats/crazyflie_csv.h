@@ -14,9 +14,8 @@ namespace swarmcert::logs {
 bool looks_like_crazyflie_csv(std::string_view head);
 
 /// One topic, "csv", with all columns, that of the time included. Cells that are no numbers are NaN; columns without a
-/// single number are named in `skipped`. The unit of the time is that in the head, else the one in which the median
-/// step is that of a log: ms, as cfclient writes, for 0.5 to 1500; s below, then us, ns. It stands in
-/// `texts["time_unit"]`.
+/// single number are named in `skipped`. The unit of time is the one in the header; without one, the median step
+/// decides: 0.5 to 1500 is ms, as cfclient writes, less is s, more is us, then ns. `texts["time_unit"]` holds it.
 /// @throws files::InputError if the file is empty or its head names a column twice.
 RawLog read_crazyflie_csv(std::istream& in, const std::string& path);
 
