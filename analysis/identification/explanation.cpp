@@ -246,7 +246,6 @@ void correct_memories(const Passes& passes, Explained& explained) {
   constexpr double kMoved = 0.1;
   std::vector<Missing>& ranking = explained.settled.ranking;
   std::vector<Refined> refined;
-  bool has_memory = false;
   for (const Missing& missing : ranking) {
     const std::vector<Refined>& all = explained.settled.selected.refined;
     const auto found = std::find_if(all.begin(), all.end(), [&](const Refined& effect) {
@@ -254,19 +253,21 @@ void correct_memories(const Passes& passes, Explained& explained) {
     });
     if (found == all.end()) return;
     refined.push_back(*found);
-    has_memory = has_memory || found->candidate.info.remembers;
   }
-  if (!has_memory) return;
   std::vector<Refined> corrected = with_innovations(passes, refined);
+  bool is_other = false, has_moved = false;
+  for (std::size_t i = 0; i < corrected.size(); ++i) {
+    if (!corrected[i].candidate.info.remembers) continue;
+    const double moved = std::abs(corrected[i].theta[0] - refined[i].theta[0]);
+    is_other = is_other || moved > 0;
+    has_moved = has_moved || moved > kMoved * refined[i].theta[0];
+  }
+  if (!is_other) return;  // no lag, or white noise: the numbers and their intervals stand
   const std::vector<std::vector<InstrumentedValue>> checks = instrument(passes, candidates_of(corrected));
   widen_by_bias(checks, instrument_with_shapes(passes, corrected), corrected);
-  bool has_moved = false;
   for (std::size_t i = 0; i < corrected.size(); ++i) {
     ranking[i] = with_numbers(passes, corrected[i], ranking[i], explained.settled.selected.grams);
     if (!checks.empty()) ranking[i].instrument = checks[i];
-    if (corrected[i].candidate.info.remembers &&
-        std::abs(corrected[i].theta[0] - refined[i].theta[0]) > kMoved * refined[i].theta[0])
-      has_moved = true;
   }
   if (!has_moved) return;
   explained.settled.rest = remainder(passes, specs_of(ranking));
