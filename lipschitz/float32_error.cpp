@@ -9,8 +9,8 @@
 
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/eclipse_fast.h"
+#include "lipschitz/extremes.h"
 #include "lipschitz/range.h"
-#include "lipschitz/reach.h"
 #include "lipschitz/sdp_bound.h"
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"

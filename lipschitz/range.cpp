@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <optional>
 
+#include "lipschitz/extremes.h"
+#include "lipschitz/sum_support.h"
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"
 #include "nn/weights/functions.h"
@@ -20,13 +24,10 @@ Box box_of(const Bounds& bounds) {
   return {{bounds.lower.begin(), bounds.lower.end()}, {bounds.upper.begin(), bounds.upper.end()}};
 }
 
-/// [a] + [b], rounded outwards.
-Bounds sum(const Bounds& a, const Bounds& b) {
-  Bounds result{a.lower + b.lower, a.upper + b.upper};
-  for (double& x : result.lower) x = next_down(x);
-  for (double& x : result.upper) x = next_up(x);
-  return result;
-}
+/// Searches end where the bound is this close to what was found, relatively.
+constexpr double kCloseEnough = 0.01;
+/// Parts of phi's box, at most; and the share of the boxes that a search over sums gets, which needs several.
+constexpr int kMostParts = 2400, kShareOfSums = 4, kShareOfHints = 16;
 
 /// Makes `layer` add anything within `bounds` to its output.
 void add_interval(ReachLayer& layer, const Bounds& bounds) {
@@ -39,6 +40,16 @@ void add_interval(ReachLayer& layer, const Bounds& bounds) {
     layer.bias(i) = middle;
     layer.bias_radius(i) = next_up(half + rounding);
   }
+}
+
+/// Boxes per search where nobody says: a box costs about the square of the number of weights.
+int usual_nodes(const Network& network, const std::string& function) {
+  constexpr double kNodes = 4000, kFewest = 300, kWeights = 8000;
+  double weights = 0;
+  const auto parts = files::parts(network);
+  for (const std::string& name : files::networks_of(function))
+    for (const files::Layer& layer : parts.at(name)->layers) weights += layer.inputs * layer.outputs;
+  return static_cast<int>(std::clamp(kNodes * std::pow(kWeights / weights, 2), kFewest, kNodes));
 }
 
 std::vector<float> float_point(const VectorXd& x, const Box& box) {
@@ -66,23 +77,23 @@ bool within(const std::vector<float>& point, const Box& box) {
 class Ranger {
  public:
   Ranger(const Network& network, const std::map<std::string, Box>& domain, const std::string& function,
-         int nodes)
+         int nodes, int jobs)
       : network_(network),
         domain_(domain),
         names_(files::networks_of(function)),
         nodes_(nodes),
+        jobs_(jobs),
         function_(function) {
     const auto parts = files::parts(network);
     has_ground_ = names_.size() == 2 && parts.count(files::kGroundPhi) == 1;
     first_ = reach_network(*parts.at(names_[0]));
     if (names_.size() == 1) return;
     rho_ = reach_network(*parts.at(names_[1]));
-    phi_hull_ = hull(first_, domain.at(names_[0]), 8 * nodes);
-    const Index hidden = first_.back().bias.size();
-    ground_ = {VectorXd::Zero(hidden), VectorXd::Zero(hidden)};
+    const int most = std::min(8 * nodes, kMostParts);
+    phi_hull_ = hull(first_, domain.at(names_[0]), most);
     if (!has_ground_) return;
     ground_network_ = reach_network(*parts.at(files::kGroundPhi));
-    ground_ = hull(ground_network_, domain.at(files::kGroundPhi), 8 * nodes).bounds;
+    ground_hull_ = hull(ground_network_, domain.at(files::kGroundPhi), most);
   }
 
   Index outputs() const { return names_.size() == 1 ? first_.back().bias.size() : rho_.back().bias.size(); }
@@ -90,25 +101,23 @@ class Ranger {
 
   /// At least every value of sign * f_output with exactly `neighbours` neighbours; proposes points where it is
   /// attained.
-  double largest(int output, double sign, int neighbours,
-                 std::vector<std::vector<VectorXd>>& candidates) const {
+  double largest(int output, double sign, int neighbours, std::vector<std::vector<VectorXd>>& candidates) {
     RowVectorXd direction = RowVectorXd::Zero(outputs());
     direction(output) = sign;
     if (names_.size() == 1) {
-      const Maximum found = maximise(first_, direction, domain_.at(names_[0]), nodes_);
+      const Maximum found = maximise(first_, direction, domain_.at(names_[0]), search(1));
       candidates.push_back({found.x});
       return found.upper;
     }
-    if (neighbours == 1) {
-      ReachNetwork chain = first_;
-      add_interval(chain.back(), ground_);
-      chain.insert(chain.end(), rho_.begin(), rho_.end());
-      const Maximum found = maximise(chain, direction, domain_.at(names_[0]), nodes_);
-      candidates.push_back(with_ground({found.x}, ground_middle()));
-      if (has_ground_) propose_ground(direction, found.x, candidates);
-      return std::min(found.upper, by_support(direction, neighbours, candidates));
-    }
-    return by_support(direction, neighbours, candidates);
+    if (neighbours != 1) return by_support(direction, neighbours, candidates);
+    ReachNetwork chain = first_;
+    if (has_ground_) add_interval(chain.back(), ground_hull_.bounds);
+    chain.insert(chain.end(), rho_.begin(), rho_.end());
+    const Maximum found = maximise(chain, direction, domain_.at(names_[0]), search(1));
+    candidates.push_back(with_ground({found.x}, ground_middle()));
+    if (!has_ground_) return found.upper;
+    propose_ground(direction, found.x, candidates);
+    return std::min(found.upper, by_support(direction, neighbours, candidates));
   }
 
   Attained attained(int output, double sign, const std::vector<std::vector<VectorXd>>& candidates) const {
@@ -133,10 +142,27 @@ class Ranger {
   }
 
  private:
+  /// rho over the sums with a number of neighbours.
+  struct Sums {
+    SumSupport support;
+    std::unique_ptr<const Reach> reach;
+  };
+
   static double round_down(const mpq_class& exact) {
     double result = exact.get_d();  // truncates
     while (mpq_class(result) > exact) result = std::nextafter(result, -kInfinity);
     return result;
+  }
+
+  MaximiseOptions search(int share) const { return {nodes_ / share + 2, kCloseEnough, jobs_}; }
+
+  const Sums& sums(int neighbours) {
+    Sums& sums = sums_[neighbours];
+    if (!sums.reach) {
+      sums.support = {&phi_hull_, neighbours, has_ground_ ? &ground_hull_ : nullptr, jobs_};
+      sums.reach = std::make_unique<const Reach>(rho_, box_of(sums.support.bounds()), sums.support);
+    }
+    return sums;
   }
 
   VectorXd ground_middle() const {
@@ -160,51 +186,107 @@ class Ranger {
     ReachNetwork chain = ground_network_;
     chain.back().bias += evaluate_roughly(first_, x);
     chain.insert(chain.end(), rho_.begin(), rho_.end());
-    candidates.push_back({x, maximise(chain, direction, domain_.at(files::kGroundPhi), nodes_ / 4 + 2).x});
+    candidates.push_back(
+        {x, maximise(chain, direction, domain_.at(files::kGroundPhi), search(kShareOfSums)).x});
   }
 
+  /// phi and the ground where a form of their sum is largest: each for itself.
+  struct Terms {
+    std::optional<Maximum> phi, ground;
+  };
+  Terms largest_terms(const LinearForms& form, int neighbours, int share) const {
+    Terms terms;
+    const RowVectorXd row = form.rows.row(0);
+    if (neighbours > 0) terms.phi = maximise(first_, row, domain_.at(names_[0]), search(share));
+    if (has_ground_)
+      terms.ground = maximise(ground_network_, row, domain_.at(files::kGroundPhi), search(share));
+    return terms;
+  }
+
+  /// A linear form above rho over the sums, f <= c s + d, and the largest values of its terms.
   double by_support(const RowVectorXd& direction, int neighbours,
-                    std::vector<std::vector<VectorXd>>& candidates) const {
-    Bounds s = ground_;
-    for (int j = 0; j < neighbours; ++j) s = sum(s, phi_hull_.bounds);
-    const Reach reach(rho_, box_of(s));
-    const LinearForms form = reach.upper_forms(direction);
-    const double from_box = reach.largest(form)(0);
+                    std::vector<std::vector<VectorXd>>& candidates) {
+    const Reach& reach = *sums(neighbours).reach;
     if (neighbours == 0 && !has_ground_) {
       candidates.emplace_back();
-      return from_box;
+      return reach.largest(reach.upper_forms(direction))(0);
     }
+    const LinearForms form = reach.sharpened_form(direction, [&](const LinearForms& one) -> VectorXd {
+      const Terms terms = largest_terms(one, neighbours, kShareOfHints);
+      VectorXd sum = VectorXd::Zero(one.rows.cols());
+      if (terms.phi) sum += neighbours * evaluate_roughly(first_, terms.phi->x);
+      if (terms.ground) sum += evaluate_roughly(ground_network_, terms.ground->x);
+      return sum;
+    });
+    const Terms terms = largest_terms(form, neighbours, kShareOfSums);
     double total = form.constants(0);
     std::vector<VectorXd> points;
-    if (neighbours > 0) {
-      const Maximum phi = maximise(first_, form.rows.row(0), domain_.at(names_[0]), nodes_);
-      // A sum of n equal terms, rounded at most n times.
-      total += neighbours * phi.upper + 0x1p-50 * neighbours * std::abs(neighbours * phi.upper);
-      points.assign(static_cast<std::size_t>(neighbours), phi.x);
+    if (terms.phi) {
+      total = sum_rounded_up(total, neighbours, terms.phi->upper);
+      points.assign(static_cast<std::size_t>(neighbours), terms.phi->x);
     }
-    if (has_ground_) {
-      const Maximum ground =
-          maximise(ground_network_, form.rows.row(0), domain_.at(files::kGroundPhi), nodes_);
-      total += ground.upper;
-      points.push_back(ground.x);
+    if (terms.ground) {
+      total = sum_rounded_up(total, 1, terms.ground->upper);
+      points.push_back(terms.ground->x);
     }
     candidates.push_back(points);
-    // Each addition above is off by at most half a unit of a partial sum: covered by 2^-50 of the terms.
-    const double with_support =
-        next_up(total + 0x1p-50 * (std::abs(total) + std::abs(form.constants(0))) + 1e-300);
-    return std::isnan(with_support) ? from_box : std::min(from_box, with_support);
+    const double by_parts = reach.largest(form)(0);
+    return std::isnan(total) ? by_parts : std::min(by_parts, total);
   }
 
   const Network& network_;
   const std::map<std::string, Box>& domain_;
   std::vector<std::string> names_;
-  int nodes_;
+  int nodes_, jobs_;
   std::string function_;
   bool has_ground_ = false;
   ReachNetwork first_, rho_, ground_network_;
-  Hull phi_hull_;
-  Bounds ground_;
+  Hull phi_hull_, ground_hull_;
+  std::map<int, Sums> sums_;
 };
+
+/// Bounds of all outputs of one function, for 1, 2, ... neighbours.
+std::vector<CertifiedRange> ranges_of(const Network& network, const std::map<std::string, Box>& domain,
+                                      const std::string& function,
+                                      const std::map<std::string, double>& rho_bound,
+                                      const RangeOptions& options, const std::function<void()>& searched) {
+  std::vector<CertifiedRange> found;
+  const bool is_set = function != "network";
+  const bool only_kind = network.phi.size() == 1 + network.phi.count(files::kGroundKind);
+  const int nodes = options.nodes > 0 ? options.nodes : usual_nodes(network, function);
+  Ranger ranger(network, domain, function, nodes, options.jobs);
+  for (int output = 0; output < ranger.outputs(); ++output) {
+    std::vector<std::vector<VectorXd>> high, low;
+    CertifiedRange range;
+    range.function = function;
+    range.output = output;
+    range.upper = -kInfinity;
+    range.lower = kInfinity;
+    double jump_at_any_sum = 0, jump_between = 0, upper_before = 0, lower_before = 0;
+    if (is_set)
+      jump_at_any_sum =
+          next_up(ranger.jump_norm() * rho_bound.at(files::kind_of(files::networks_of(function)[1])));
+    for (int n = is_set ? 0 : 1; n <= (is_set ? options.neighbours : 1); ++n) {
+      const double upper = ranger.largest(output, 1, n, high);
+      searched();
+      const double lower = -ranger.largest(output, -1, n, low);
+      searched();
+      range.upper = std::max(range.upper, upper);
+      range.lower = std::min(range.lower, lower);
+      if (n > 0)
+        jump_between = std::max({jump_between, next_up(upper - lower_before), next_up(upper_before - lower)});
+      upper_before = upper;
+      lower_before = lower;
+      if (is_set && n == 0) continue;
+      range.neighbours_at_most = is_set ? n : 0;
+      if (is_set) range.jump = only_kind ? std::min(jump_between, jump_at_any_sum) : jump_at_any_sum;
+      range.greatest = ranger.attained(output, 1, high);
+      range.least = ranger.attained(output, -1, low);
+      found.push_back(range);
+    }
+  }
+  return found;
+}
 
 }  // namespace
 
@@ -240,35 +322,21 @@ std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::s
     if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
       functions.push_back(function);
   }
-  std::vector<std::vector<CertifiedRange>> found(functions.size());
-  files::parallel_for(static_cast<int>(functions.size()), options.jobs, [&](int index) {
-    const std::string& function = functions[static_cast<std::size_t>(index)];
-    const bool is_set = function != "network";
-    const Ranger ranger(network, inner, function, options.nodes);
-    for (int output = 0; output < ranger.outputs(); ++output) {
-      std::vector<std::vector<VectorXd>> high, low;
-      CertifiedRange range;
-      range.function = function;
-      range.output = output;
-      range.upper = -kInfinity;
-      range.lower = kInfinity;
-      if (is_set) {
-        const std::string rho = files::kind_of(files::networks_of(function)[1]);
-        range.jump = next_up(ranger.jump_norm() * rho_bound.at(rho));
-      }
-      for (int n = is_set ? 0 : 1; n <= (is_set ? options.neighbours : 1); ++n) {
-        range.upper = std::max(range.upper, ranger.largest(output, 1, n, high));
-        range.lower = std::min(range.lower, -ranger.largest(output, -1, n, low));
-        if (is_set && n == 0) continue;
-        range.neighbours_at_most = is_set ? n : 0;
-        range.greatest = ranger.attained(output, 1, high);
-        range.least = ranger.attained(output, -1, low);
-        found[static_cast<std::size_t>(index)].push_back(range);
-      }
-    }
-  });
+  // One function after the other: each search uses all threads.
   std::vector<CertifiedRange> result;
-  for (auto& group : found) result.insert(result.end(), group.begin(), group.end());
+  int done = 0, total = 0;
+  for (const std::string& function : functions) {
+    const int outputs = files::parts(network).at(files::networks_of(function).back())->outputs();
+    total += outputs * (files::is_set(function) ? 2 * (1 + options.neighbours) : 2);
+  }
+  const auto searched = [&] {
+    if (options.progress) options.progress(++done, total);
+  };
+  for (const std::string& function : functions) {
+    const std::vector<CertifiedRange> found =
+        ranges_of(network, inner, function, rho_bound, options, searched);
+    result.insert(result.end(), found.begin(), found.end());
+  }
   return result;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -29,23 +30,26 @@ struct CertifiedRange {
   double lower = 0, upper = 0;
   Attained least, greatest;  ///< lower <= least.value, greatest.value <= upper
   /// A neighbour that comes or goes while the others stay, anywhere in its box, as at a cut-off of the distance:
-  /// |f(with it) - f(without it)| <= jump, whatever the others do. 0 for a plain network.
+  /// |f(with it) - f(without it)| <= jump. Where NET knows one kind, with at most `neighbours_at_most` of them, each in
+  /// its box; else whatever the others do. 0 for a plain network.
   double jump = 0;
   double largest() const { return std::max(-lower, upper); }
 };
 
 struct RangeOptions {
   int neighbours = 1;  ///< up to this many, at least 1
-  int nodes = 300;     ///< boxes per search
+  int nodes = 0;       ///< boxes per search; 0: 4000, fewer for large networks, but at least 300
   int jobs = 0;
+  std::function<void(int done, int total)> progress;  ///< searches; may be empty
 };
 
 /// Ranges of the plain network or of every set function, for 1, 2, ... neighbours of one kind; with the ground's term
 /// where there is one. The clamp of NET acts first: with it the range holds for every input, where its interval lies
 /// in the box.
 ///
-/// One neighbour: branch and bound over its box, the ground's term as an interval. More: with a linear form a s + c
-/// above rho on the box that the sum s lies in, f <= c + sum_j max a phi(x_j), each maximum by branch and bound.
+/// One neighbour: branch and bound over its box, the ground's term as an interval. More: a linear form a s + c above
+/// rho on the sums s, whose neurons are bounded by such forms too (sum_support.h); f <= c + sum_j max a phi(x_j), each
+/// maximum by branch and bound.
 /// @param domain by part, finite.
 /// @param rho_bound a proved Lipschitz bound of rho, by its kind; for the jump |f - f'| <= L |phi(x)|.
 std::vector<CertifiedRange> ranges(const files::Network& network, const std::map<std::string, Box>& domain,

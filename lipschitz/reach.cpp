@@ -1,8 +1,7 @@
 #include "lipschitz/reach.h"
 
 #include <cmath>
-#include <memory>
-#include <queue>
+#include <utility>
 
 #include "lipschitz/dense_kernels.h"
 #include "nn/base/doubles.h"
@@ -45,6 +44,11 @@ Reach::Reach(const ReachNetwork& network, const Box& box, const Reach* around, s
              std::vector<LinearForms>* forms, std::vector<check::Decision>* decided)
     : network_(network), box_(box) {
   add_layers(around, slopes, forms, decided);
+}
+
+Reach::Reach(const ReachNetwork& network, const Box& box, Support support)
+    : network_(network), box_(box), support_(std::move(support)) {
+  add_layers(nullptr, nullptr, nullptr, nullptr);
 }
 
 Reach::Reach(const ReachNetwork& network, const Reach& first, const Reach* around,
@@ -167,7 +171,26 @@ VectorXd Reach::largest(const LinearForms& forms) const {
   const double relative = 4 * static_cast<double>(forms.rows.cols() + 8) * kUnit;
   VectorXd result = value + relative * absolute + VectorXd::Constant(value.size(), kUnderflow);
   for (double& x : result) x = std::isnan(x) ? kInfinity : next_up(x);
-  return result;
+  return support_ ? VectorXd(result.cwiseMin(support_(forms))) : result;
+}
+
+VectorXd Reach::influence(const Eigen::RowVectorXd& direction) const {
+  VectorXd least = direction.transpose(), most = least;
+  for (std::size_t j = network_.size(); j-- > 0;) {
+    const MatrixXd positive = network_[j].weights.transpose().cwiseMax(0.0);
+    const MatrixXd negative = network_[j].weights.transpose().cwiseMin(0.0);
+    const VectorXd below = positive * least + negative * most;
+    most = positive * most + negative * least;
+    least = below;
+    if (j == 0 || !network_[j - 1].has_relu) continue;
+    const Bounds& bounds = bounds_[j - 1];
+    for (Index i = 0; i < least.size(); ++i) {
+      if (bounds.lower(i) >= 0) continue;
+      least(i) = bounds.upper(i) <= 0 ? 0 : std::min(0.0, least(i));
+      most(i) = bounds.upper(i) <= 0 ? 0 : std::max(0.0, most(i));
+    }
+  }
+  return least.cwiseAbs().cwiseMax(most.cwiseAbs());
 }
 
 VectorXd evaluate_roughly(const ReachNetwork& network, const VectorXd& x) {
@@ -184,87 +207,6 @@ std::pair<Box, Box> halves(const Box& box, Index k) {
   const auto i = static_cast<std::size_t>(k);
   const double middle = box.lower[i] + (box.upper[i] - box.lower[i]) / 2;
   result.first.upper[i] = result.second.lower[i] = middle;
-  return result;
-}
-
-Maximum maximise(const ReachNetwork& network, const Eigen::RowVectorXd& direction, const Box& box,
-                 int nodes) {
-  struct Node {
-    double upper;
-    std::shared_ptr<const Reach> reach;
-    VectorXd gain;  ///< per dimension: what its width may cost
-    bool operator<(const Node& other) const { return upper < other.upper; }
-  };
-  Maximum best;
-  best.value = -kInfinity;
-  const auto node_at = [&](const Box& part, const Reach* around) {
-    auto reach = std::make_shared<const Reach>(network, part, around);
-    const LinearForms form = reach->upper_forms(direction);
-    const VectorXd lower = side(part.lower);
-    const VectorXd upper = side(part.upper);
-    VectorXd vertex = lower;
-    for (Index i = 0; i < vertex.size(); ++i)
-      if (form.rows(0, i) > 0) vertex(i) = upper(i);
-    for (const VectorXd& x : {vertex, VectorXd((lower + upper) / 2)}) {
-      const double value = direction.dot(evaluate_roughly(network, x));
-      if (value > best.value) best.value = value, best.x = x;
-    }
-    // The form tells how the value changes along a dimension; the width keeps dimensions alive that it does not see.
-    const VectorXd gain =
-        (form.rows.row(0).transpose().cwiseAbs().array() + 1e-3 * form.rows.cwiseAbs().maxCoeff()) *
-        (upper - lower).array();
-    ++best.nodes;
-    return Node{reach->largest(form)(0), std::move(reach), gain};
-  };
-  std::priority_queue<Node> queue;
-  queue.push(node_at(box, nullptr));
-  while (best.nodes + 2 <= nodes) {
-    const Node top = queue.top();
-    if (!(top.upper > best.value + 1e-6 * std::abs(best.value))) break;
-    Index k = 0;
-    if (!(top.gain.maxCoeff(&k) > 0)) break;
-    queue.pop();
-    const auto [first, second] = halves(top.reach->box(), k);
-    for (const Box& part : {first, second}) {
-      Node child = node_at(part, top.reach.get());
-      child.upper = std::min(child.upper, top.upper);
-      queue.push(std::move(child));
-    }
-  }
-  best.upper = queue.top().upper;
-  return best;
-}
-
-Hull hull(const ReachNetwork& network, const Box& box, int nodes) {
-  struct Part {
-    double norm;
-    std::shared_ptr<const Reach> reach;
-    bool operator<(const Part& other) const { return norm < other.norm; }
-  };
-  const auto part_of = [&](const Box& part, const Reach* around) {
-    auto reach = std::make_shared<const Reach>(network, part, around);
-    const double norm = (1 + 1e-9) * reach->output().magnitude().norm();
-    return Part{std::isnan(norm) ? kInfinity : norm, std::move(reach)};
-  };
-  std::priority_queue<Part> queue;
-  queue.push(part_of(box, nullptr));
-  for (int done = 1; done + 2 <= nodes; done += 2) {
-    const Part top = queue.top();
-    const VectorXd widths = side(top.reach->box().upper) - side(top.reach->box().lower);
-    Index k = 0;
-    // Widths relative to the whole box, so that units do not matter.
-    const VectorXd whole = (side(box.upper) - side(box.lower)).cwiseMax(1e-300);
-    if (!(widths.cwiseQuotient(whole).maxCoeff(&k) > 0)) break;
-    queue.pop();
-    const auto [first, second] = halves(top.reach->box(), k);
-    for (const Box& piece : {first, second}) queue.push(part_of(piece, top.reach.get()));
-  }
-  Hull result{queue.top().reach->output(), queue.top().norm};
-  for (; !queue.empty(); queue.pop()) {
-    const Bounds& bounds = queue.top().reach->output();
-    result.bounds.lower = result.bounds.lower.cwiseMin(bounds.lower);
-    result.bounds.upper = result.bounds.upper.cwiseMax(bounds.upper);
-  }
   return result;
 }
 

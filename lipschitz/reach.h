@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "lipschitz/box.h"
@@ -35,6 +36,12 @@ struct LinearForms {
   Eigen::VectorXd constants;
 };
 
+/// The largest values of linear forms over a set of inputs within a box, rounded up.
+using Support = std::function<Eigen::VectorXd(const LinearForms&)>;
+
+/// The point of the inputs at which a form is about largest: a hint.
+using Steepest = std::function<Eigen::VectorXd(const LinearForms&)>;
+
 /// Bounds on every layer over a box by backward substitution of linear relaxations of ReLU (CROWN, Zhang et al. 2018):
 /// on l <= y <= u with l < 0 < u,  alpha y <= relu(y) <= s y + t  with s near u / (u - l), t = max(u - s u, -s l)
 /// rounded up, alpha 0 or 1: 1 where u > -l.
@@ -64,6 +71,9 @@ class Reach {
         std::vector<Eigen::MatrixXd>* slopes = nullptr, std::vector<LinearForms>* forms = nullptr,
         std::vector<check::Decision>* decided = nullptr);
 
+  /// Over the inputs within the box for which `support` answers, e.g. sums of outputs of another network.
+  Reach(const ReachNetwork& network, const Box& box, Support support);
+
   /// Of a longer network over the same box: `first` are the bounds of its first layers, which are taken as they are.
   Reach(const ReachNetwork& network, const Reach& first, const Reach* around,
         std::vector<check::Decision>* decided = nullptr);
@@ -78,8 +88,16 @@ class Reach {
 
   /// directions y_K <= rows x + constants over the box.
   LinearForms upper_forms(const Eigen::MatrixXd& directions) const;
-  /// The largest values of `forms` over the box, rounded up.
+  /// One form above direction y_K: the best of a few whose lower slopes move from those of upper_forms() towards the
+  /// states of the neurons, 0 off and 1 on, at the point where the form before was largest.
+  LinearForms sharpened_form(const Eigen::RowVectorXd& direction, const Steepest& steepest) const;
+  /// The same with the corners of the box as such points.
+  LinearForms sharpened_form(const Eigen::RowVectorXd& direction) const;
+  /// The largest values of `forms` over the inputs, rounded up.
   Eigen::VectorXd largest(const LinearForms& forms) const;
+  /// About the largest |d(direction y_K) / dx_k| that the bounds allow, by interval arithmetic without rounding: tells
+  /// along which dimension to split, and proves nothing.
+  Eigen::VectorXd influence(const Eigen::RowVectorXd& direction) const;
 
  private:
   void add_layers(const Reach* around, std::vector<Eigen::MatrixXd>* slopes, std::vector<LinearForms>* forms,
@@ -87,8 +105,10 @@ class Reach {
   /// @param given_below if not null, the lower slopes of each layer's undecided neurons, [rows of lambda x neurons].
   LinearForms substituted(std::size_t top, Eigen::MatrixXd lambda,
                           const std::vector<Eigen::MatrixXd>* given_below = nullptr) const;
-  /// The lower slopes of layers before `top` that are tight at the corners where `forms` are largest.
-  std::vector<Eigen::MatrixXd> slopes_at_corners(const Eigen::MatrixXd& forms, std::size_t top) const;
+  /// The corners of the box where the forms are largest, [inputs x rows].
+  Eigen::MatrixXd corners(const Eigen::MatrixXd& forms) const;
+  /// The lower slopes of layers before `top` that are tight at the points x, [inputs x rows].
+  std::vector<Eigen::MatrixXd> slopes_at(Eigen::MatrixXd x, std::size_t top) const;
   /// Tries better lower slopes for outputs `open` of layer k, whose forms are `found`, above y and then above -y.
   /// @param ends their largest values, improved where that decides.
   void decide(std::size_t k, const std::vector<Eigen::Index>& open, const LinearForms& found,
@@ -96,6 +116,7 @@ class Reach {
 
   const ReachNetwork& network_;
   Box box_;
+  Support support_;  ///< empty: the inputs are the box
   std::vector<Bounds> bounds_;
   std::vector<Eigen::VectorXd> input_magnitude_;
   std::vector<Eigen::VectorXd> term_magnitude_;  ///< |W_k| max|h_{k-1}| + |b_k| + radius
@@ -103,24 +124,6 @@ class Reach {
 
 /// f(x) in floating point: an estimate.
 Eigen::VectorXd evaluate_roughly(const ReachNetwork& network, const Eigen::VectorXd& x);
-
-/// What a search for the largest value of direction y_K over a box found.
-struct Maximum {
-  double upper = 0;   ///< at least the true maximum
-  double value = 0;   ///< near direction f(x): an estimate
-  Eigen::VectorXd x;  ///< in the box
-  int nodes = 0;
-};
-
-/// Best-first branch and bound with up to `nodes` boxes; a box is halved where its linear form depends on it most.
-Maximum maximise(const ReachNetwork& network, const Eigen::RowVectorXd& direction, const Box& box, int nodes);
-
-/// All outputs over the box, as the hull over up to `nodes` parts of it; and the largest Euclidean norm of the output.
-struct Hull {
-  Bounds bounds;
-  double norm = 0;  ///< at least |y_K|_2
-};
-Hull hull(const ReachNetwork& network, const Box& box, int nodes);
 
 /// The two halves of `box` across dimension k.
 std::pair<Box, Box> halves(const Box& box, Eigen::Index k);

@@ -1,4 +1,4 @@
-// Reach's better lower slopes: tight at the corner of the box where a form is largest.
+// Reach's better lower slopes: tight at the point, mostly a corner of the box, where a form is largest.
 #include <cmath>
 
 #include "lipschitz/reach.h"
@@ -17,15 +17,23 @@ constexpr double kNearlyDecided = 0.1;
 /// rounding does not matter.
 constexpr double kShareOfRange = 1e-7, kShareOfTerms = 1e-12;
 
+/// Forms that sharpened_form() tries; each moves the slopes less. More gain little.
+constexpr int kSharpened = 3;
+constexpr double kShorterSteps = 0.7;
+
 }  // namespace
 
-std::vector<MatrixXd> Reach::slopes_at_corners(const MatrixXd& forms, std::size_t top) const {
+MatrixXd Reach::corners(const MatrixXd& forms) const {
   MatrixXd x(forms.cols(), forms.rows());
   for (Index row = 0; row < x.cols(); ++row)
     for (Index j = 0; j < x.rows(); ++j) {
       const auto k = static_cast<std::size_t>(j);
       x(j, row) = forms(row, j) > 0 ? box_.upper[k] : box_.lower[k];
     }
+  return x;
+}
+
+std::vector<MatrixXd> Reach::slopes_at(MatrixXd x, std::size_t top) const {
   std::vector<MatrixXd> slopes;
   for (std::size_t j = 0; j < top; ++j) {
     const ReachLayer& layer = network_[j];
@@ -35,6 +43,28 @@ std::vector<MatrixXd> Reach::slopes_at_corners(const MatrixXd& forms, std::size_
     if (layer.has_relu) x = x.cwiseMax(0.0);
   }
   return slopes;
+}
+
+LinearForms Reach::sharpened_form(const Eigen::RowVectorXd& direction) const {
+  return sharpened_form(direction, [&](const LinearForms& form) -> VectorXd { return corners(form.rows); });
+}
+
+LinearForms Reach::sharpened_form(const Eigen::RowVectorXd& direction, const Steepest& steepest) const {
+  const std::size_t top = network_.size() - 1;
+  LinearForms form = substituted(top, direction), best = form;
+  double least = largest(form)(0), step = 1;
+  std::vector<MatrixXd> slopes;
+  for (std::size_t j = 0; j < top; ++j)
+    slopes.emplace_back(
+        (bounds_[j].upper.array() > -bounds_[j].lower.array()).cast<double>().matrix().transpose());
+  for (int tried = 0; tried < kSharpened; ++tried, step *= kShorterSteps) {
+    const std::vector<MatrixXd> states = slopes_at(steepest(form), top);
+    for (std::size_t j = 0; j < top; ++j) slopes[j] += step * (states[j] - slopes[j]);
+    form = substituted(top, direction, &slopes);
+    const double value = largest(form)(0);
+    if (value < least) least = value, best = form;
+  }
+  return best;
 }
 
 void Reach::decide(std::size_t k, const std::vector<Index>& open, const LinearForms& found, VectorXd& ends,
@@ -56,7 +86,7 @@ void Reach::decide(std::size_t k, const std::vector<Index>& open, const LinearFo
     forms.row(n) = found.rows.row(row);
     lambda(n, open[static_cast<std::size_t>(row % count)]) = row < count ? 1 : -1;
   }
-  const std::vector<MatrixXd> slopes = slopes_at_corners(forms, k);
+  const std::vector<MatrixXd> slopes = slopes_at(corners(forms), k);
   const VectorXd better = largest(substituted(k, std::move(lambda), &slopes));
   std::size_t first = 0;
   for (std::size_t j = 0; j < k; ++j) first += static_cast<std::size_t>(network_[j].weights.rows());

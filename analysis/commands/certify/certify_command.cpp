@@ -44,6 +44,7 @@ struct CertifyOptions {
   bool range = false;
   bool explain = false;
   double input_step = 0;
+  int range_nodes = 0;  ///< boxes per end of a range; 0: as many as usual
   std::string output;
   std::string report;
   std::optional<int> nodes;
@@ -177,7 +178,8 @@ void add_slope_estimates(const files::Network& network, const lipschitz::Certify
 }
 
 /// Range and float32 error over the box of --domain, or over what the clamp lets through.
-void add_ranges(const files::Network& network, const CertifyOptions& options, CertifyOutput& output) {
+void add_ranges(const files::Network& network, const CertifyOptions& options, Progress& progress,
+                CertifyOutput& output) {
   const std::map<std::string, lipschitz::Box> domain =
       options.domain.empty() ? lipschitz::clamp_domain(network) : options.certify.domain;
   if (domain.empty()) throw UsageError("--range needs a box: give --domain, or a clamp in network.toml");
@@ -190,6 +192,8 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Ce
   lipschitz::RangeOptions range;
   range.neighbours = std::max(1, options.certify.neighbours);
   range.jobs = options.certify.jobs;
+  range.nodes = options.range_nodes;
+  range.progress = [&progress](int done, int total) { progress.show(done, total, "ends of the range"); };
   const lipschitz::Stop stop(options.certify.cancelled);
   output.ranges_cut_short = stop.now();
   if (output.ranges_cut_short) range.nodes = 1;  // wider, and proved all the same
@@ -294,7 +298,7 @@ CertifyOutput find_all(const files::Network& network, const CertifyOptions& opti
   output.domain_file = options.domain;
   add_slope_estimates(network, options.certify, output);
   if (options.explain) add_comparisons(network, options.certify, output);
-  if (!options.domain.empty() || options.range) add_ranges(network, options, output);
+  if (!options.domain.empty() || options.range) add_ranges(network, options, progress, output);
   if (!options.map.empty()) {
     output.map = options.slope_map;
     output.map.progress = [&progress](int done, int total) {
@@ -433,6 +437,11 @@ void declare_search_on_a_box(CLI::App& app, CertifyOptions& options) {
 void declare_limits(CLI::App& app, CertifyOptions& options) {
   app.add_flag("--range", options.range,
                "Range, jump at a cut-off and float32 error over the clamp's box; --domain implies it");
+  app.add_option(
+         "--range-nodes", options.range_nodes,
+         "Maximum number of boxes of branch and bound per end of a range (default: 4000, fewer for large "
+         "networks)")
+      ->check(CLI::Range(1, 10'000'000));
   app.add_option("--input-step", options.input_step,
                  "Inputs are quantised to multiples of this (float32 error)")
       ->check(CLI::NonNegativeNumber);
