@@ -5,6 +5,7 @@
 
 #include "analysis/gate/baseline.h"
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/flight_errors.h"
 #include "analysis/residuals/flight_peaks.h"
 #include "analysis/residuals/inputs.h"
 #include "lipschitz/certify.h"
@@ -155,6 +156,16 @@ residuals::Inputs Evidence::read_flights() const {
   arguments.columns = release().columns;
   if (release().feed_forward) arguments.network = release().network.file;
   return residuals::read_inputs(arguments);
+}
+
+const residuals::VelocityError* Evidence::velocity_error() {
+  if (!looked_for_velocity_error_) {
+    residual_comparison();
+    const auto found = residuals::velocity_error(residuals::flight_errors(read_flights(), settings_.jobs));
+    if (found) velocity_error_ = std::make_unique<residuals::VelocityError>(*found);
+    looked_for_velocity_error_ = true;
+  }
+  return velocity_error_.get();
 }
 
 std::vector<residuals::FlightPeak> Evidence::flight_peaks() {

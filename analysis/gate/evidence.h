@@ -22,6 +22,7 @@ namespace swarmcert::residuals {
 struct Comparison;
 struct FlightPeak;
 struct Inputs;
+struct VelocityError;
 }  // namespace swarmcert::residuals
 namespace swarmcert::stability {
 struct TrackingSetup;
@@ -89,6 +90,9 @@ class Evidence {
   /// As comparison(), but without the closed loop where that cannot be flown.
   const residuals::Comparison& residual_comparison();
 
+  /// Error of the velocity that the reference flights' law was given; null where no log measures it.
+  const residuals::VelocityError* velocity_error();
+
   /// Largest tracking errors of the reference flights, which comparison() has found sound.
   std::vector<residuals::FlightPeak> flight_peaks();
 
@@ -108,6 +112,8 @@ class Evidence {
   std::unique_ptr<std::vector<LipschitzBound>> bounds_, computed_;
   std::unique_ptr<stability::TrackingSetup> tracking_;
   std::unique_ptr<residuals::Comparison> comparison_, residual_comparison_;
+  std::unique_ptr<residuals::VelocityError> velocity_error_;
+  bool looked_for_velocity_error_ = false;
   std::unique_ptr<Baseline> baseline_;
 };
 

@@ -50,7 +50,7 @@ std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
 double nominal_bound(const Gains& gains, const Plant& plant, const DisturbanceSource& source, int axis,
                      Channel channel) {
   const Disturbance& d = source.axis[axis];
-  const OtherErrors other = source.other(axis, {});
+  const OtherErrors other = source.other(axis, {}, plant);
   const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(axis)];
   if (const std::optional<SampledLoop> sampled = sampled_axis_loop(gains, plant, axis)) {
     return axis_bounds(*sampled, channel, sampled_norms(*sampled, channel, Instants::kAll), d, other,
@@ -71,7 +71,9 @@ bool repeats(const Gains& pid, const DisturbanceSource& source, int axis) {
          pid.pid->Ki_1_s3[i] == pid.pid->Ki_1_s3[i - 1] &&
          pid.integrator_limit_m_s[i] == pid.integrator_limit_m_s[i - 1] &&
          (axis < 2 || pid.attitude_lag_s == 0) && source.axis[axis] == source.axis[axis - 1] &&
-         source.bias_N[axis] == source.bias_N[axis - 1];
+         source.bias_N[axis] == source.bias_N[axis - 1] &&
+         source.velocity_error[axis] == source.velocity_error[axis - 1] &&
+         source.position_error[axis] == source.position_error[axis - 1];
 }
 
 void add_reached(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
@@ -116,6 +118,19 @@ UncertainNorms norms_over(const Gains& pid, const AxisLoop& loop, const Uncertai
   return uncertain_norms(SampledLoop{loop, 1 / pid.rate_hz, pid.integrator_step_s}, box, channel);
 }
 
+/// What errors of the estimates add, as errors of the command: m Kd n for the velocity, m (Kp n + Ki int n) for the
+/// position, of which the last changes at a rate of at most m Ki |n|.
+/// @param command gains of the loop that answers them. @param told gains and mass as the firmware has them.
+double of_estimates(const Gains& pid, const AxisLoop& told, const UncertainPlant& box,
+                    const DisturbanceSource& source, int axis, const UncertainNorms& command) {
+  const double period_share = pid.rate_hz > 0 ? pid.integrator_step_s * pid.rate_hz : 1;
+  const double force_N = box.thrust_scale.to * told.mass_kg;
+  const double velocity = source.velocity_error[axis].largest();
+  const double position = source.position_error[axis].largest();
+  return force_N * (times(command.amplitude.upper, told.Kd * velocity + told.Kp * position) +
+                    times(command.rate.upper, told.Ki * period_share * position));
+}
+
 /// Largest bound of one axis and channel in the box.
 double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPlant& box,
                 const DisturbanceSource& source, int axis, Channel channel) {
@@ -128,6 +143,13 @@ double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPla
   const Disturbance& d = source.axis[axis];
   const double bias = std::abs(source.bias_N[axis]);
   const UncertainNorms norms = norms_over(pid, loop, box, channel);
+  const auto of_command = [&](const AxisLoop& of, const UncertainNorms& same) {
+    return channel == Channel::kCommand ? same : norms_over(pid, of, box, Channel::kCommand);
+  };
+  const bool has_estimates = !source.velocity_error[axis].is_zero() || !source.position_error[axis].is_zero();
+  const auto estimates_m = [&](const AxisLoop& of, const UncertainNorms& command) {
+    return has_estimates ? of_estimates(pid, of, box, source, axis, command) : 0;
+  };
   // The bias is a step; a measured amplitude or impulse contains it.
   const double step_m = times(norms.edge.upper, bias);
   double with_bias = times(norms.amplitude.upper, d.amplitude_N);
@@ -135,18 +157,20 @@ double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPla
   if (!source.classes_contain_bias) with_bias += step_m;
   double least = std::min(with_bias, times(norms.rate.upper, d.rate_N_s) + step_m);
   if (d.passes == 1) least = std::min(least, times(norms.edge.upper, d.variation_N) + step_m);
+  if (has_estimates) least += estimates_m(loop, of_command(loop, norms));
   if (!has_clamp(pid, axis)) return least;
-  // int e answers to f as e does to its integral: |int e| <= |h|_1 sup|f|, of a bias as well.
+  // int e answers to f as e does to its integral: |int e| <= |h|_1 sup|f|, of a bias as well. What the integral makes
+  // of errors of the estimates is not enclosed.
   const double limit_m_s = pid.integrator_limit_m_s[static_cast<std::size_t>(axis)];
   const double bias_beside = source.classes_contain_bias ? 0 : bias;
-  if (times(norms.rate.upper, d.amplitude_N + bias_beside) <= limit_m_s) return least;
-  const double Ki = loop.Ki;
-  loop.Ki = 0;
-  const UncertainNorms without = norms_over(pid, loop, box, channel);
-  const UncertainNorms command =
-      channel == Channel::kCommand ? without : norms_over(pid, loop, box, Channel::kCommand);
+  if (!has_estimates && times(norms.rate.upper, d.amplitude_N + bias_beside) <= limit_m_s) return least;
+  AxisLoop no_integral = loop;
+  no_integral.Ki = 0;
+  const UncertainNorms without = norms_over(pid, no_integral, box, channel);
+  const UncertainNorms command = of_command(no_integral, without);
   return times(without.amplitude.upper, d.amplitude_N) + times(without.edge.upper, bias_beside) +
-         times(command.amplitude.upper, told.mass_kg * Ki * limit_m_s);
+         times(command.amplitude.upper, box.thrust_scale.to * told.mass_kg * loop.Ki * limit_m_s) +
+         estimates_m(no_integral, command);
 }
 
 }  // namespace

@@ -55,4 +55,16 @@ std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs) {
   return result;
 }
 
+std::optional<VelocityError> velocity_error(const std::vector<FlightError>& errors) {
+  std::vector<Eigen::Vector4d> bias;
+  std::vector<ErrorWindow> windows;
+  for (const FlightError& error : errors) {
+    if (error.velocity.windows.empty()) continue;
+    bias.push_back(error.velocity.bias);
+    windows.insert(windows.end(), error.velocity.windows.begin(), error.velocity.windows.end());
+  }
+  if (windows.empty()) return std::nullopt;
+  return velocity_error(bias, windows);
+}
+
 }  // namespace swarmcert::residuals

@@ -1,6 +1,7 @@
 /// @file The learning error of single flights, from which conformal prediction over flights starts.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,5 +28,8 @@ struct FlightError {
 /// One per vehicle whose force is judged and whose log holds a window at least, in the order of flights. The logs are
 /// taken from the cache of `inputs`.
 std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs);
+
+/// The velocity's error over all windows of all flights; nothing where no log measures it.
+std::optional<VelocityError> velocity_error(const std::vector<FlightError>& errors);
 
 }  // namespace swarmcert::residuals

@@ -49,6 +49,7 @@ stability::DisturbanceSource source_of(const Json& force, const Json& velocity, 
 
 /// Adds what acts beside the class; a declared error of the velocity takes the place of the measured one.
 void add_declared(const stability::DisturbanceSource& declared, stability::DisturbanceSource& source) {
+  source.thrust_ratio_error = declared.thrust_ratio_error;
   for (int axis = 0; axis < 3; ++axis) {
     if (declared.bias_N[axis] != 0) source.classes_contain_bias = false;
     source.bias_N[axis] += std::abs(declared.bias_N[axis]);
@@ -62,7 +63,7 @@ double bound_m(const stability::Gains& gains, const stability::Plant& plant,
                const stability::InitialError& initial) {
   const double limit_m_s = gains.integrator_limit_m_s[static_cast<std::size_t>(exact.axis)];
   const stability::Disturbance& known = source.axis[exact.axis];
-  const stability::OtherErrors other = source.other(exact.axis, initial);
+  const stability::OtherErrors other = source.other(exact.axis, initial, plant);
   if (exact.loop == stability::Loop::kSampled) {
     return axis_bounds(*sampled_axis_loop(gains, plant, exact.axis), exact.channel, exact.all_times, known,
                        other, source.classes_contain_bias, limit_m_s)

@@ -250,33 +250,34 @@ double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErr
          reference_demand(loop, errors.reference, position, by_speed, by_force);
 }
 
-double integral_demand_m_s(const SampledLoop& loop, Channel channel, const OtherErrors& errors) {
-  const SampledAdjoint adjoint(loop, SampledAdjoint::Output::kIntegral);
-  if (!adjoint.is_stable()) return kInfinity;
-  const Eigen::RowVectorXd integral = adjoint.output_after_control(0);
+namespace {
+
+/// The largest value that all of them can give an output, a row over the state after control.
+double largest_output(const SampledLoop& loop, const SampledAdjoint& adjoint,
+                      const Eigen::RowVectorXd& output, Channel channel, const OtherErrors& errors) {
   const auto step = [&] {
     double edge = 0;
     if (channel == Channel::kCommand) {
-      edge = command_gains(adjoint, integral).edge;
+      edge = command_gains(adjoint, output).edge;
     } else {
       KernelSum sum;
-      add_force_kernel(adjoint, integral, sum);
+      add_force_kernel(adjoint, output, sum);
       edge = sum.norms().edge;
     }
     return edge / loop.plant.mass_kg;
   };
-  const auto speed = [&] { return initial_response(adjoint, integral).to_velocity; };
-  const auto position = [&] { return initial_response(adjoint, integral).to_position; };
+  const auto speed = [&] { return initial_response(adjoint, output).to_velocity; };
+  const auto position = [&] { return initial_response(adjoint, output).to_position; };
   // A jump of the speed between two samples has moved the set point by at most a period of it when the law sees it.
   const auto speed_step = [&] { return speed() + loop.period_s * position(); };
   const auto force = [&] {
     KernelSum sum;
-    add_force_kernel(adjoint, integral, sum);
+    add_force_kernel(adjoint, output, sum);
     return sum.norms().amplitude;
   };
   const auto demand = [&](const EstimateError& n, const Eigen::VectorXd& input) {
     if (n.is_zero()) return 0.0;
-    const GainNorms gains = input_gains(adjoint, integral, input);
+    const GainNorms gains = input_gains(adjoint, output, input);
     return least_demand(
         n, [&] { return gains.amplitude; }, [&] { return gains.edge; }, [&] { return gains.impulse; });
   };
@@ -284,6 +285,32 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
          demand(errors.velocity_error, adjoint.model().measured_velocity()) +
          demand(errors.position_error, adjoint.model().measured_position()) +
          reference_demand(loop, errors.reference, position, speed_step, force);
+}
+
+Eigen::RowVectorXd commanded(const SampledAdjoint& adjoint) {
+  return Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, adjoint.model().command_index());
+}
+
+}  // namespace
+
+double integral_demand_m_s(const SampledLoop& loop, Channel channel, const OtherErrors& errors) {
+  const SampledAdjoint adjoint(loop, SampledAdjoint::Output::kIntegral);
+  if (!adjoint.is_stable()) return kInfinity;
+  return largest_output(loop, adjoint, adjoint.output_after_control(0), channel, errors);
+}
+
+double effort_gain(const SampledLoop& loop) {
+  const SampledAdjoint adjoint(loop);
+  if (!adjoint.is_stable()) return kInfinity;
+  KernelSum sum;
+  add_force_kernel(adjoint, commanded(adjoint), sum);
+  return sum.norms().amplitude;
+}
+
+double effort_N(const SampledLoop& loop, const OtherErrors& errors) {
+  const SampledAdjoint adjoint(loop);
+  if (!adjoint.is_stable()) return kInfinity;
+  return loop.plant.mass_kg * largest_output(loop, adjoint, commanded(adjoint), Channel::kForce, errors);
 }
 
 double effort_N(const AxisLoop& loop, const OtherErrors& errors) {

@@ -49,13 +49,17 @@ struct OtherErrors {
   EstimateError velocity_error{};  ///< estimated - true velocity
   EstimateError position_error{};  ///< estimated - true position
   ReferenceMotion reference{};
+  double thrust_ratio_error =
+      0;               ///< |d|: the force that acts is (1 + d) times that of the model (thrust_ratio.h)
+  double hover_N = 0;  ///< the force commanded at hover along this axis, which d scales too
 
   /// The step that the force error makes at t = 0.
   double step_N() const;
   bool operator==(const OtherErrors& o) const {
     return bias_N == o.bias_N && start_N == o.start_N && position_m == o.position_m &&
            velocity_m_s == o.velocity_m_s && velocity_error == o.velocity_error &&
-           position_error == o.position_error && reference == o.reference;
+           position_error == o.position_error && reference == o.reference &&
+           thrust_ratio_error == o.thrust_ratio_error && hover_N == o.hover_N;
   }
 };
 
@@ -65,11 +69,14 @@ struct ErrorParts {
   double initial_m = 0;  ///< of position_m and velocity_m_s
   double velocity_error_m = 0, position_error_m = 0;
   double reference_m = 0;
+  double thrust_ratio_m = 0;  ///< beside what it does to the class; see thrust_ratio.h
 
-  double total_m() const { return bias_m + initial_m + velocity_error_m + position_error_m + reference_m; }
+  double total_m() const {
+    return bias_m + initial_m + velocity_error_m + position_error_m + reference_m + thrust_ratio_m;
+  }
 };
 
-/// Bounds for all t >= 0 from zero integral and lags at rest; infinite where a part is not zero and the loop unstable.
+/// All parts but thrust_ratio_m: bounds for all t >= 0 from zero integral and lags at rest; infinite where a part is not zero and the loop unstable.
 /// Those of the bias are exact; that of the initial position is without a delay. Those of the estimates are the least
 /// of what amplitude, rate, both together, variation and impulse of their errors give, each exact for its class alone.
 /// A jump of the set point counts as an initial error of the same size. Its jerk enters by the gain lag_floor().rate,
@@ -98,5 +105,6 @@ double drift_gain(const SampledLoop& loop);
 
 /// What they ask of the feedback, N: sup of its part of the commanded force, force channel.
 double effort_N(const AxisLoop& loop, const OtherErrors& errors);
+double effort_N(const SampledLoop& loop, const OtherErrors& errors);
 
 }  // namespace swarmcert::stability

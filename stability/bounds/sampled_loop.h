@@ -33,6 +33,9 @@ GainNorms sampled_norms(const SampledLoop& loop, Channel channel, Instants insta
 /// The same for an error of an estimate, which the loop reads once per period, per m/s or per m.
 GainNorms sampled_norms(const SampledLoop& loop, Estimate estimate, Instants instants);
 
+/// |u|_oo per |f|_oo for the feedback part u of the commanded force, N/N (force channel).
+double effort_gain(const SampledLoop& loop);
+
 /// Largest modulus of an eigenvalue of the map from one sample to the next.
 double spectral_radius(const SampledLoop& loop);
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/base/doubles.h"
 #include "stability/bounds/sampled_bounds.h"
+#include "stability/bounds/thrust_ratio.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -53,7 +55,12 @@ void add_assumptions(const Gains& gains, const DisturbanceSource& source, Tracki
         source.kind + " numbers bound the learning error: " + source.note);
   }
   for (const std::string& assumption : source.further_assumptions) add(assumption, "assumed", "");
-  add("mass and thrust scale as in the model", "assumed", "--uncertain encloses intervals");
+  if (source.thrust_ratio_error > 0) {
+    add("mass as in the model; the thrust ratio within the error declared, and constant", "assumed",
+        "what a network feeds forward, times that error, belongs to the force error");
+  } else {
+    add("mass and thrust scale as in the model", "assumed", "--uncertain encloses intervals");
+  }
   const bool has_thrust = report.thrust_margin_N && *report.thrust_margin_N >= 0;
   add("no saturation of the collective thrust",
       !has_thrust                 ? "assumed"
@@ -95,13 +102,19 @@ double integrator_limit(const Gains& gains, int axis) {
 
 /// @param of_class what disturbance_bounds() says of the class alone.
 template <class AnyLoop>
-AxisBounds bounds_of(const AnyLoop& loop, const DisturbanceBounds& of_class, Channel channel,
-                     const GainNorms& gains, const Disturbance& known, const OtherErrors& other,
-                     bool classes_contain_bias, double limit_m_s) {
+AxisBounds bounds_of(const AnyLoop& loop, DisturbanceBounds of_class, Channel channel, const GainNorms& gains,
+                     const Disturbance& known, const OtherErrors& other, bool classes_contain_bias,
+                     double limit_m_s) {
   AxisBounds row;
   row.channel = channel;
   row.bounds = of_class;
   row.parts = error_parts(loop, gains.edge, other);
+  std::optional<ThrustRatioGains> ratio;
+  if (other.thrust_ratio_error > 0) {
+    ratio = thrust_ratio_gains(loop, channel, other.thrust_ratio_error);
+    of_class = row.bounds = disturbance_bounds(*ratio, known);
+    row.parts.thrust_ratio_m = thrust_ratio_part(*ratio, other, effort_N(loop, with_hover_share(other)));
+  }
   row.bounds.add(row.parts.total_m());
   OtherErrors beside_amplitude = other;
   if (classes_contain_bias) {
@@ -115,6 +128,7 @@ AxisBounds bounds_of(const AnyLoop& loop, const DisturbanceBounds& of_class, Cha
     beside_amplitude.bias_N = beside_amplitude.start_N = 0;
   }
   row.clamp = clamp_bounds(loop, channel, known, beside_amplitude, limit_m_s);
+  if (ratio) row.clamp = clamp_bounds(loop, channel, row.clamp, *ratio, known, beside_amplitude, limit_m_s);
   return row;
 }
 
@@ -154,11 +168,12 @@ void add_gains(const AxisLoop& loop, const std::optional<SampledLoop>& sampled, 
 }
 
 /// What the disturbance can ask of the integrator of the loop that flies.
-double integrator_need(const Gains& gains, const AxisLoop& loop, const std::optional<SampledLoop>& sampled,
-                       int axis, const DisturbanceSource& source, const InitialError& initial) {
+double integrator_need(const Gains& gains, const Plant& plant, const AxisLoop& loop,
+                       const std::optional<SampledLoop>& sampled, int axis, const DisturbanceSource& source,
+                       const InitialError& initial) {
   const double limit_m_s = integrator_limit(gains, axis);
   const Disturbance& known = source.axis[axis];
-  OtherErrors other = source.other(axis, initial);
+  OtherErrors other = source.other(axis, initial, plant);
   if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
   const ClampBounds clamp = sampled ? clamp_bounds(*sampled, Channel::kForce, known, other, limit_m_s)
                                     : clamp_bounds(loop, Channel::kForce, known, other, limit_m_s);
@@ -166,9 +181,9 @@ double integrator_need(const Gains& gains, const AxisLoop& loop, const std::opti
 }
 
 /// Bounds of an axis, one row per row of gains, copied where all is as on the axis before.
-void add_bounds(const Gains& gains, const AxisLoop& loop, const std::optional<SampledLoop>& sampled, int axis,
-                bool is_as_before, const DisturbanceSource& source, const InitialError& initial,
-                TrackingReport& report) {
+void add_bounds(const Gains& gains, const Plant& plant, const AxisLoop& loop,
+                const std::optional<SampledLoop>& sampled, int axis, bool is_as_before,
+                const DisturbanceSource& source, const InitialError& initial, TrackingReport& report) {
   const std::size_t count = report.bounds.size();
   for (std::size_t k = 0; k < count && is_as_before; ++k) {
     if (report.bounds[k].axis != axis - 1) continue;
@@ -178,7 +193,7 @@ void add_bounds(const Gains& gains, const AxisLoop& loop, const std::optional<Sa
   }
   if (is_as_before) return;
   const Disturbance& known = source.axis[axis];
-  const OtherErrors other = source.other(axis, initial);
+  const OtherErrors other = source.other(axis, initial, plant);
   const double limit_m_s = integrator_limit(gains, axis);
   for (const ExactGains& of : report.exact) {
     if (of.axis != axis) continue;
@@ -202,13 +217,18 @@ void add_thrust_margin(const Plant& plant, const AxisLoop& loop, const Disturban
   const double amplitude_N = source.axis[2].amplitude_N;
   if (!(plant.largest_thrust_N > 0) || !std::isfinite(amplitude_N)) return;
   if (source.has_moving_reference()) return;  // what is fed forward takes thrust too, and is not bounded
-  OtherErrors other = source.other(2, initial);
+  OtherErrors other = source.other(2, initial, plant);
   if (source.classes_contain_bias) other.bias_N = other.start_N = 0;
   const double weight_N = plant.mass_kg * kGravity_m_s2;
-  const double others_N = effort_N(loop, other);
-  if (!std::isfinite(others_N)) return;
-  report.thrust_margin_N = std::min(plant.thrust_scale * plant.largest_thrust_N - weight_N, weight_N) -
-                           report.facts.back().effort_gain * amplitude_N - others_N;
+  const double effort = report.facts.back().effort_gain;
+  const double ratio = other.thrust_ratio_error;
+  double needed_N = effort * amplitude_N + effort_N(loop, with_hover_share(other));
+  // d u is one more force on the loop of the model; see thrust_ratio.h.
+  if (ratio > 0) needed_N = ratio * effort < 1 ? needed_N / (1 - ratio * effort) : kInfinity;
+  if (!std::isfinite(needed_N)) return;
+  report.thrust_margin_N =
+      std::min((1 - ratio) * plant.thrust_scale * plant.largest_thrust_N - weight_N, (1 - ratio) * weight_N) -
+      needed_N;
 }
 
 /// Largest sum of the absolute values of a row, an upper bound of the 2-norm of a symmetric matrix.
@@ -253,6 +273,7 @@ void add_theorem(const Plant& plant, const DisturbanceSource& source, const Init
            std::to_string(plant.thrust_scale));
   }
   if (source.has_estimate_errors()) object("the estimated position or velocity errs, as declared");
+  if (source.thrust_ratio_error > 0) object("the thrust ratio errs, as declared");
   if (source.has_moving_reference()) object("the set point moves as declared");
   if (!theorem.composite) return;
   report.vector = vector_peak_gain(theorem.composite->Lambda_1_s, theorem.composite->K_kg_s, plant.mass_kg);
@@ -307,7 +328,7 @@ bool DisturbanceSource::amplitudes_reach_bias() const {
   return true;
 }
 
-OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial) const {
+OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial, const Plant& plant) const {
   OtherErrors errors;
   errors.bias_N = bias_N[of_axis];
   errors.start_N = initial.learning_error_N;
@@ -316,6 +337,9 @@ OtherErrors DisturbanceSource::other(int of_axis, const InitialError& initial) c
   errors.reference = reference[of_axis];
   errors.velocity_error = velocity_error[of_axis];
   errors.position_error = position_error[of_axis];
+  errors.thrust_ratio_error = thrust_ratio_error;
+  if (of_axis == 2 && thrust_ratio_error > 0)
+    errors.hover_N = plant.thrust_scale * plant.mass_kg * kGravity_m_s2;
   return errors;
 }
 
@@ -352,14 +376,14 @@ TrackingReport tracking_bounds(const Gains& gains, const Plant& plant, const Dis
         axis > 0 ? axis_loop(gains, plant, axis - 1) : std::optional<AxisLoop>();
     const bool is_same_loop = before && same(*before, *loop);
     add_gains(*loop, sampled, axis, is_same_loop, report);
-    const bool is_same = is_same_loop && source.other(axis, initial) == source.other(axis - 1, initial) &&
-                         known == source.axis[axis - 1] &&
-                         integrator_limit(gains, axis) == integrator_limit(gains, axis - 1);
+    const bool is_same =
+        is_same_loop && source.other(axis, initial, plant) == source.other(axis - 1, initial, plant) &&
+        known == source.axis[axis - 1] && integrator_limit(gains, axis) == integrator_limit(gains, axis - 1);
     const auto i = static_cast<std::size_t>(axis);
-    integrator_needs[i] =
-        is_same ? integrator_needs[i - 1] : integrator_need(gains, *loop, sampled, axis, source, initial);
+    integrator_needs[i] = is_same ? integrator_needs[i - 1]
+                                  : integrator_need(gains, plant, *loop, sampled, axis, source, initial);
     if (source.kind != "none") {
-      add_bounds(gains, *loop, sampled, axis, is_same, source, initial, report);
+      add_bounds(gains, plant, *loop, sampled, axis, is_same, source, initial, report);
     }
     if (axis == 2) add_thrust_margin(plant, *loop, source, initial, report);
   }

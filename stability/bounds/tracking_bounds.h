@@ -46,12 +46,14 @@ struct DisturbanceSource {
   EstimateError position_error[3];  ///< estimated - true position
   ReferenceMotion reference[3];
   bool has_moving_reference() const;
+  /// |d|: every rotor gives (1 + d) times the thrust of the model, with one constant d; see thrust_ratio.h.
+  double thrust_ratio_error = 0;
   bool declares_velocity_error = false;  ///< velocity_error was stated, not measured
   bool has_estimate_errors() const;
   /// Whether the amplitude is at least the bias on every axis, as one is that was measured with the bias in it.
   bool amplitudes_reach_bias() const;
   /// All that acts on an axis beside its class.
-  OtherErrors other(int of_axis, const InitialError& initial) const;
+  OtherErrors other(int of_axis, const InitialError& initial, const Plant& plant) const;
   /// "declared", "declared truth", "measured" or "rate of f_hat": the last bounds the learned force alone, not its
   /// error, and so gives no ball.
   std::string kind = "none";

@@ -9,6 +9,7 @@
 #include "gate/release.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/refusal.h"
 
 namespace swarmcert::tests {
 namespace {
@@ -164,6 +165,24 @@ TEST(GateChecks, CornersPassForTheWholeBoxOnlyWhereThePolicySaysSo) {
   EXPECT_NE(corners.witness.find("not enclosed"), std::string::npos) << corners.witness;
   EXPECT_EQ(row_of("max_error_m = 1e-4").verdict, gate::Verdict::kFail)
       << "a corner beyond the limit is enough";
+}
+
+TEST(GateChecks, ErrorsOfTheEstimatesCountAmongWhatMovesTheVehicle) {
+  const ReleaseFolder release;
+  const auto row_of = [&](const std::string& body) {
+    return release
+        .judge(
+            release.policy_of({"tracking\namplitude_N = 0.01\nguard_factor = 1\nmax_error_m = 10\n" + body}))
+        .checks.at(0);
+  };
+  const gate::Check without = row_of(""), velocity = row_of("velocity_error_m_s = 0.1"),
+                    position = row_of("position_error_m = 0.01");
+  ASSERT_TRUE(without.value && velocity.value && position.value);
+  EXPECT_GT(*velocity.value, *without.value);
+  EXPECT_GT(*position.value, *without.value);
+  EXPECT_NE(velocity.witness.find("velocity error 0.1 m/s"), std::string::npos) << velocity.witness;
+  EXPECT_TRUE(refuses([&] { row_of("velocity_error_m_s = -1"); },
+                      {"policy.toml", "velocity_error_m_s", "-1", "must not be negative"}));
 }
 
 TEST(GateChecks, AnUnstablePlantInTheBoxNeverPasses) {

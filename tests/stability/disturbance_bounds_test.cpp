@@ -200,12 +200,12 @@ TEST(DisturbanceBounds, AMeasuredAmplitudeThatContainsTheBiasIsNotChargedTwice) 
   const AxisLoop loop = {kMass_kg, 10, 5, 10, {}, 0};
   const GainNorms gains = continuous_norms(loop, Channel::kForce);
   const AxisBounds once =
-      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}), true, INFINITY);
+      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}, {}), true, INFINITY);
   EXPECT_DOUBLE_EQ(once.bounds.by_amplitude, gains.amplitude * 0.1);
   EXPECT_DOUBLE_EQ(once.bounds.by_rate, gains.rate * 0.05 + gains.edge * 0.04)
       << "a rate does not contain it";
   const AxisBounds beside =
-      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}), false, INFINITY);
+      axis_bounds(loop, Channel::kForce, gains, source.axis[0], source.other(0, {}, {}), false, INFINITY);
   EXPECT_DOUBLE_EQ(beside.bounds.by_amplitude, gains.amplitude * 0.1 + gains.edge * 0.04);
   source.bias_N[1] = 0.2;
   EXPECT_FALSE(source.amplitudes_reach_bias()) << "no amplitude contains a larger bias";

@@ -216,6 +216,72 @@ TEST(ErrorParts, EverythingDeclaredTogetherStaysBelowTheBound_slow) {
   check_everything(40, {0.15, 0.3, 0.6, 1.2, 2.5, 6});
 }
 
+/// The vehicle that flies where every thrust is (1 + d) times that of the model, and what then acts on it.
+Case with_ratio(Case c, double d) {
+  for (double* const gain : {&c.loop.Kp, &c.loop.Kd, &c.loop.Ki}) *gain *= 1 + d;
+  return c;
+}
+Declared with_hover_force(Declared declared, double d) {
+  const double force_N = std::abs(d) * declared.other.hover_N;
+  declared.other.bias_N = declared.other.step_N() + force_N;
+  return declared;
+}
+
+/// The largest |e| over ratios within the error, over the bound that knows only the error.
+void check_ratios(double limit_m_s, double least_closest) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const Case& c : cases()) {
+    if (std::isfinite(limit_m_s) && (c.steps == 0 || c.loop.Ki == 0)) continue;
+    SCOPED_TRACE(c.name);
+    double closest = 0;
+    int clamped = 0;
+    for (const double error : {0.02, 0.15}) {
+      for (Declared declared : random_declarations(random, c.loop.Ki > 0)) {
+        declared.other.thrust_ratio_error = error;
+        declared.other.hover_N = kMass_kg * 9.81;
+        const AxisBounds bounds = bounds_of(c, declared, limit_m_s);
+        clamped += !bounds.clamp.never_acts;
+        if (!std::isfinite(bounds.least())) continue;
+        for (const double d : {-error, error, unit(random) * error}) {
+          const Case flown = with_ratio(c, d);
+          for (const double end_s : {0.4, 1.5, 5.0}) {
+            const Worst worst = worst_of(flown, static_cast<int>(end_s / kStep_s));
+            const double ratio =
+                largest_error(flown, with_hover_force(declared, d), worst, 0, random, limit_m_s) /
+                bounds.least();
+            closest = std::max(closest, ratio);
+            ASSERT_LE(ratio, 1 + stepping_error(c)) << "d " << d << " of " << error;
+          }
+        }
+      }
+    }
+    EXPECT_GT(closest, least_closest) << "the inputs did not try hard";
+    EXPECT_TRUE(clamped > 0 || std::isinf(limit_m_s));
+  }
+}
+
+TEST(ErrorParts, NoThrustRatioWithinItsErrorLeavesTheBound) { check_ratios(kInfinite, 0.7); }
+
+TEST(ErrorParts, NoThrustRatioWithinItsErrorLeavesTheBoundWithAnActingClamp) { check_ratios(0.02, 0.5); }
+
+TEST(ErrorParts, AnErrorOfTheThrustRatioCostsASagThatIsKnownWithoutIntegrator) {
+  // m e'' = -(1 + d) m (Kp e + Kd e') + d m g rests at e = d g / ((1 + d) Kp).
+  const double error = 0.1, Kp = 30;
+  const Case c = {"no integrator, no lag", {kMass_kg, Kp, 12, 0, {}, 0}, 0};
+  Declared declared;
+  declared.known.amplitude_N = 0;
+  declared.other.thrust_ratio_error = error;
+  declared.other.hover_N = kMass_kg * 9.81;
+  const double sag_m = error * 9.81 / ((1 - error) * Kp);
+  const double bound_m = bounds_of(c, declared).least();
+  EXPECT_GE(bound_m, sag_m);
+  EXPECT_LE(bound_m, 1.1 * sag_m);
+  // A feedback that an error of the ratio could turn round has no bound by small gain.
+  declared.other.thrust_ratio_error = 0.89;
+  EXPECT_TRUE(std::isinf(bounds_of(c, declared).parts.thrust_ratio_m));
+}
+
 TEST(ErrorParts, EachPartAloneIsReached) {
   std::mt19937 random(1);
   const std::pair<const char*, OtherErrors> parts[] = {

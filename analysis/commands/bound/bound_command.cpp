@@ -61,6 +61,11 @@ bool has_initial(const stability::InitialError& initial) {
 /// Through a thrust ratio r other than 1 the acceleration that is fed forward leaves the force (r - 1) m p_d'', which a
 /// jerk does not limit.
 void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, const Tracking& input) {
+  if (source.thrust_ratio_error > 0 && source.has_moving_reference()) {
+    throw UsageError(
+        "--thrust-ratio-error: it also scales the acceleration that a moving set point feeds forward, which "
+        "--reference-step, --reference-speed-step and --reference-jerk do not bound: leave one of them out");
+  }
   for (const stability::ReferenceMotion& motion : source.reference) {
     if (motion.jerk_m_s3 == 0 || input.plant.thrust_scale == 1) continue;
     throw UsageError(
@@ -83,6 +88,8 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
                                     ? "the error of the velocity that was measured (--velocity-error 0)"
                                     : "--velocity-error and --position-error";
   if (asked != nullptr && source.has_estimate_errors()) refuse(asked, estimates);
+  if (source.thrust_ratio_error > 0 && (asked != nullptr || !options.swarm.empty()))
+    refuse(asked != nullptr ? asked : "--swarm", "--thrust-ratio-error");
   if ((asked != nullptr || !options.swarm.empty()) && source.has_moving_reference()) {
     refuse(asked != nullptr ? asked : "--swarm",
            "--reference-step, --reference-speed-step and --reference-jerk");

@@ -79,7 +79,8 @@ Json bounds_json(const AxisBounds& row) {
             {"initial", finite(row.parts.initial_m)},
             {"velocity_error", finite(row.parts.velocity_error_m)},
             {"position_error", finite(row.parts.position_error_m)},
-            {"reference", finite(row.parts.reference_m)}}},
+            {"reference", finite(row.parts.reference_m)},
+            {"thrust_ratio", finite(row.parts.thrust_ratio_m)}}},
           {"staircase", finite(row.staircase_m)},
           {"float32", finite(row.float32_m)},
           {"total", finite(row.total_m())}};
@@ -233,6 +234,7 @@ void print_parts(const AxisBounds& row) {
   add("velocity error", row.parts.velocity_error_m);
   add("position error", row.parts.position_error_m);
   add("moving set point", row.parts.reference_m);
+  add("thrust ratio", row.parts.thrust_ratio_m);
   if (!parts.empty()) fmt::print("       each contains: {}\n", fmt::join(parts, ", "));
   if (row.staircase_m > 0)
     fmt::print("       the total contains {} for the staircase of f_hat\n", cell(row.staircase_m));
@@ -277,6 +279,7 @@ void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSou
                            {"f_hat_rate_N_s", source.f_hat_rate_known ? Json(source.f_hat_rate_N_s) : Json()},
                            {"bias_N", source.bias_N},
                            {"velocity_error_m_s", amplitudes_json(source.velocity_error)},
+                           {"thrust_ratio_error", source.thrust_ratio_error},
                            {"position_error_m", amplitudes_json(source.position_error)},
                            {"of_estimates", estimate_errors_json(source)}};
   result["theorem"] = theorem_json(report);

@@ -256,6 +256,11 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--bias", arguments.bias,
                  "Constant part of the force error, N, on top of the rest; for all axes, or X,Y,Z");
+  app.add_option(
+         "--thrust-ratio-error", arguments.thrust_ratio_error,
+         "Largest constant error of the thrust ratio, as a fraction: the force that acts is (1 + d) times "
+         "that of the model, |d| at most this; weight and gains included")
+      ->check(CLI::Range(0.0, 0.9));
   declare_estimate(app, "velocity", "m/s", "the law sees through Kd", arguments.velocity_error);
   declare_estimate(app, "position", "m", "the law sees through Kp and Ki", arguments.position_error);
   const std::string axes = "; for all axes, or X,Y,Z";
@@ -380,6 +385,7 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
       source.bias_N[axis] = std::abs(source.bias_N[axis]) + std::abs(bias_N[axis]);
     source.classes_contain_bias = false;
   }
+  source.thrust_ratio_error = arguments.thrust_ratio_error;
   source.declares_velocity_error = arguments.velocity_error.are_given();
   read_estimate("--velocity-error", arguments.velocity_error, source.velocity_error);
   read_estimate("--position-error", arguments.position_error, source.position_error);
@@ -393,8 +399,9 @@ LoadedDisturbance load_disturbance(const DisturbanceArguments& arguments, const 
     result.truth = read_truth(arguments, tracking);
     add_truth(*result.truth, source);
   }
-  const bool has_others = !arguments.bias.empty() || arguments.velocity_error.are_given() ||
-                          arguments.position_error.are_given() || source.has_moving_reference();
+  const bool has_others = !arguments.bias.empty() || source.thrust_ratio_error > 0 ||
+                          arguments.velocity_error.are_given() || arguments.position_error.are_given() ||
+                          source.has_moving_reference();
   if (has_others && source.kind == "none") declare_no_class(source);
   return result;
 }

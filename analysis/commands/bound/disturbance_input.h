@@ -18,6 +18,7 @@ struct EstimateArguments {
 struct DisturbanceArguments {
   double rate = -1, amplitude = -1, edge = -1, impulse = -1;  ///< negative: not given
   std::string bias;  ///< a number for all axes, or X,Y,Z; empty: not given
+  double thrust_ratio_error = 0;
   EstimateArguments velocity_error, position_error;
   std::string reference_step, reference_speed_step, reference_jerk;  ///< as bias
   int passes = 1;

@@ -143,27 +143,12 @@ files::Json largest_json(const residuals::ErrorOfFlight& error, const std::funct
           {"variation", axes(largest.variation)}, {"impulse", axes(largest.impulse)}};
 }
 
-/// Quantiles over the windows of all flights; null where no log measures the velocity.
-files::Json velocity_error_json(const std::map<std::string, residuals::FlightError>& errors) {
-  std::vector<Eigen::Vector4d> bias;
-  std::vector<residuals::ErrorWindow> windows;
-  for (const auto& [path, error] : errors) {
-    if (error.velocity.windows.empty()) continue;
-    bias.push_back(error.velocity.bias);
-    windows.insert(windows.end(), error.velocity.windows.begin(), error.velocity.windows.end());
-  }
-  if (windows.empty()) return nullptr;
-  return json_of(residuals::velocity_error(bias, windows));
-}
-
 /// flights[].learning_error and flights[].velocity_error, from which bound --coverage makes its promise, and the
 /// quantiles of the velocity's error over all windows.
 void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& result) {
-  std::map<std::string, residuals::FlightError> errors;
-  for (residuals::FlightError& error : residuals::flight_errors(inputs, jobs)) {
-    const std::string path = error.path;
-    errors[path] = std::move(error);
-  }
+  const std::vector<residuals::FlightError> all = residuals::flight_errors(inputs, jobs);
+  std::map<std::string, const residuals::FlightError*> errors;
+  for (const residuals::FlightError& error : all) errors[error.path] = &error;
   for (files::Json& flight : result["flights"]) {
     flight["learning_error"] = flight["velocity_error"] = nullptr;
     const auto found = errors.find(flight["file"].get<std::string>());
@@ -173,11 +158,12 @@ void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& r
       const char* const kNames[] = {"x", "y", "z"};
       return k == 3 || !flight["rmse"][kNames[k]].is_null();
     };
-    flight["learning_error"] = largest_json(found->second.force, is_judged);
-    if (!found->second.velocity.windows.empty())
-      flight["velocity_error"] = largest_json(found->second.velocity, [](int) { return true; });
+    flight["learning_error"] = largest_json(found->second->force, is_judged);
+    if (!found->second->velocity.windows.empty())
+      flight["velocity_error"] = largest_json(found->second->velocity, [](int) { return true; });
   }
-  result["velocity_error"] = velocity_error_json(errors);
+  const std::optional<residuals::VelocityError> velocity = residuals::velocity_error(all);
+  result["velocity_error"] = velocity ? json_of(*velocity) : files::Json();
 }
 
 /// How often a promise held on FLIGHTS, and where.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/residuals/comparison.h"
+#include "analysis/residuals/velocity_error.h"
 #include "analysis/tracking/measured_source.h"
 #include "nn/base/toml.h"
 
@@ -23,14 +24,18 @@ double of_axis(const residuals::Axes& axes, int axis) {
   return axis == 0 ? axes.x : axis == 1 ? axes.y : axes.z;
 }
 
+/// Of one axis, the quantile of what was measured.
+double at(const LearningError::Quantiles& all, const std::string& quantile, int axis) {
+  return std::abs(of_axis(quantile_of(all, quantile), axis));
+}
+
 stability::DisturbanceSource measured(const LearningError& error, const std::string& quantile) {
   std::array<analysis::MeasuredAxis, 3> axes;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto get = [&](const LearningError::Quantiles& all) {
-      return std::abs(of_axis(quantile_of(all, quantile), axis));
-    };
-    axes[static_cast<std::size_t>(axis)] = {get(error.bias_N), get(error.amplitude_N), get(error.rate_N_s),
-                                            get(error.variation_N), get(error.impulse_N_s)};
+    axes[static_cast<std::size_t>(axis)] = {
+        at(error.bias_N, quantile, axis), at(error.amplitude_N, quantile, axis),
+        at(error.rate_N_s, quantile, axis), at(error.variation_N, quantile, axis),
+        at(error.impulse_N_s, quantile, axis)};
   }
   stability::DisturbanceSource source = analysis::measured_source(axes, LearningError::kWindow_s);
   source.note = fmt::format("{} over windows of {} s", quantile, LearningError::kWindow_s);
@@ -89,6 +94,42 @@ stability::DisturbanceSource disturbance(const DisturbanceTable& table, Evidence
   return measured(comparison.learning_error, table.quantile);
 }
 
+std::vector<std::string> estimate_keys() { return {"velocity_error_m_s", "position_error_m"}; }
+
+EstimateTable read_estimates(const files::TomlTable& table) {
+  EstimateTable result;
+  const auto number = [&table](const char* key) {
+    const double value = table.number(key);
+    if (value < 0) table.refuse(key, fmt::format("{}", value), "must not be negative");
+    return value;
+  };
+  if (table.has("velocity_error_m_s")) result.velocity_m_s = number("velocity_error_m_s");
+  if (table.has("position_error_m")) result.position_m = number("position_error_m");
+  return result;
+}
+
+void add_estimates(const EstimateTable& estimates, const DisturbanceTable& force, Evidence& evidence,
+                   stability::DisturbanceSource& source) {
+  const auto set = [](stability::EstimateError& error, double amplitude) {
+    error = {};
+    error.amplitude = amplitude;
+  };
+  const bool is_measured =
+      !estimates.velocity_m_s && !evidence.release().flights.empty() && !force.is_declared();
+  const residuals::VelocityError* const velocity = is_measured ? evidence.velocity_error() : nullptr;
+  for (int axis = 0; axis < 3; ++axis) {
+    set(source.velocity_error[axis], estimates.velocity_m_s.value_or(0));
+    set(source.position_error[axis], estimates.position_m);
+    if (velocity == nullptr) continue;
+    const std::string& q = force.quantile;
+    source.velocity_error[axis] =
+        analysis::measured_estimate({at(velocity->bias_m_s, q, axis), at(velocity->amplitude_m_s, q, axis),
+                                     at(velocity->rate_m_s2, q, axis), at(velocity->variation_m_s, q, axis),
+                                     at(velocity->impulse_m, q, axis)},
+                                    LearningError::kWindow_s);
+  }
+}
+
 std::string words(const stability::DisturbanceSource& source, int axis) {
   const stability::Disturbance& d = source.axis[axis];
   std::string text = source.kind;
@@ -100,6 +141,12 @@ std::string words(const stability::DisturbanceSource& source, int axis) {
   add("variation", d.variation_N, "N");
   add("impulse", d.impulse_N_s, "N s");
   if (source.bias_N[axis] != 0) add("bias", source.bias_N[axis], "N");
+  const auto add_estimate = [&add](const char* what, const stability::EstimateError& error,
+                                   const char* unit) {
+    if (!error.is_zero()) add(what, error.largest(), unit);
+  };
+  add_estimate("velocity error", source.velocity_error[axis], "m/s");
+  add_estimate("position error", source.position_error[axis], "m");
   return text;
 }
 

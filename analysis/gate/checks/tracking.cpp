@@ -72,10 +72,12 @@ double guard_factor(Evidence& evidence, const Guard& guard, int axis) {
   return std::isnan(value) ? value : std::max(1.0, value);
 }
 
-void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const Uncertainty& uncertainty,
-                    const Guard& guard, Over over, const Limit& limit, Checks& checks) {
+void judge_tracking(Evidence& evidence, const DisturbanceTable& declared, const EstimateTable& estimates,
+                    const Uncertainty& uncertainty, const Guard& guard, Over over, const Limit& limit,
+                    Checks& checks) {
   const stability::TrackingSetup& setup = evidence.tracking();
-  const stability::DisturbanceSource source = disturbance(declared, evidence);
+  stability::DisturbanceSource source = disturbance(declared, evidence);
+  add_estimates(estimates, declared, evidence, source);
   const BoxBound bound = bound_over(setup, box_of(setup, uncertainty), source);
   Check check = row("tracking", limit);
   double proved = 0, attained = -1;
@@ -140,6 +142,8 @@ void judge_promise(Evidence& evidence, const Limit& limit, Checks& checks) {
 
 Run read_tracking(const files::TomlTable& table, Policy& policy) {
   std::vector<std::string> known = disturbance_keys();
+  const std::vector<std::string> of_estimates = estimate_keys();
+  known.insert(known.end(), of_estimates.begin(), of_estimates.end());
   known.insert(known.end(),
                {"max_error_m", "guard_factor", "guard_quantile", "over", "uncertainty", "min_promise_kept"});
   table.allow_only(known);
@@ -148,6 +152,7 @@ Run read_tracking(const files::TomlTable& table, Policy& policy) {
   const std::optional<Limit> limit = gate::limit(table, "max_error_m", "m");
   if (!limit) refuse_without_limit(table, "max_error_m = 0.15");
   const DisturbanceTable declared = read_disturbance(table);
+  const EstimateTable estimates = read_estimates(table);
   Guard guard;
   if (table.has("guard_factor")) {
     guard.declared = table.number("guard_factor");
@@ -172,9 +177,9 @@ Run read_tracking(const files::TomlTable& table, Policy& policy) {
   }
   const Over over =
       table.has("over") && table.choice("over", {"box", "corners"}) == 1 ? Over::kCorners : Over::kBox;
-  return [declared, over, uncertainty = read_uncertainty(table), guard, limit = *limit, kept](
+  return [declared, estimates, over, uncertainty = read_uncertainty(table), guard, limit = *limit, kept](
              Evidence& evidence, Checks& checks) {
-    judge_tracking(evidence, declared, uncertainty, guard, over, limit, checks);
+    judge_tracking(evidence, declared, estimates, uncertainty, guard, over, limit, checks);
     if (kept) judge_promise(evidence, *kept, checks);
   };
 }

@@ -1,0 +1,103 @@
+// Tracking bounds over an uncertain vehicle: what is enclosed is nowhere below what a plant of the box reaches.
+#include "analysis/gate/plant_box.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "stability/vehicle.h"
+
+namespace swarmcert::gate {
+namespace {
+
+using stability::DisturbanceSource;
+using stability::TrackingSetup;
+using stability::UncertainPlant;
+
+/// A continuous loop of known gains. @param limit_m_s of the integrator.
+TrackingSetup continuous_setup(double limit_m_s) {
+  TrackingSetup setup;
+  setup.model = tests::small_vehicle();
+  setup.plant.mass_kg = setup.model.mass_kg;
+  setup.gains = stability::load_gains(tests::source_path("controller/gains/crazyflie-small.toml"));
+  setup.gains.rate_hz = setup.gains.integrator_step_s = 0;
+  setup.gains.network_rate_hz = setup.gains.network_latency_s = 0;
+  setup.gains.motor_lag_s = setup.gains.delay_s = 0;
+  setup.gains.integrator_limit_m_s = {limit_m_s, limit_m_s, limit_m_s};
+  return setup;
+}
+
+UncertainPlant box_about(const TrackingSetup& setup) {
+  const double m = setup.plant.mass_kg;
+  return {{0.95 * m, 1.05 * m}, {0.9, 1.2}, {0.03, 0.03}, {0, 0}};
+}
+
+DisturbanceSource force_and_estimates(double amplitude_N, double velocity_m_s, double position_m) {
+  DisturbanceSource source;
+  source.kind = "declared";
+  for (int axis = 0; axis < 3; ++axis) {
+    source.axis[axis].amplitude_N = amplitude_N;
+    source.velocity_error[axis].amplitude = velocity_m_s;
+    source.position_error[axis].amplitude = position_m;
+  }
+  return source;
+}
+
+TEST(PlantBox, NoCornerIsAboveTheEnclosure) {
+  for (const double limit_m_s : {std::numeric_limits<double>::infinity(), 2.0, 0.02}) {
+    const TrackingSetup setup = continuous_setup(limit_m_s);
+    for (const auto& [amplitude_N, velocity_m_s, position_m] :
+         {std::array<double, 3>{0.02, 0, 0}, {0.02, 0.1, 0}, {0.02, 0, 0.01}, {0, 0.1, 0.02}}) {
+      const BoxBound bound =
+          bound_over(setup, box_about(setup), force_and_estimates(amplitude_N, velocity_m_s, position_m));
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_TRUE(std::isfinite(bound.reached_m[axis])) << axis;
+        EXPECT_GT(bound.reached_m[axis], 0);
+        if (bound.is_enclosed) {
+          EXPECT_GE(bound.enclosed_m[axis], bound.reached_m[axis] * (1 - 1e-9))
+              << "limit " << limit_m_s << ", axis " << axis;
+        }
+      }
+      EXPECT_TRUE(bound.is_enclosed);
+    }
+  }
+}
+
+TEST(PlantBox, TheIntegralOfAnActingClampPassesTheLargestThrustScale) {
+  // Thrust of 1.3 times what the law commands: its integral's command acts 1.3 times, too.
+  const TrackingSetup setup = continuous_setup(0.5);
+  UncertainPlant box = box_about(setup);
+  box.lag_s = box.delay_s = {0, 0};
+  box.mass_kg = {setup.plant.mass_kg, setup.plant.mass_kg};
+  box.thrust_scale = {1.3, 1.5};
+  TrackingSetup strong = setup;
+  strong.plant.thrust_scale = 1.3;
+  const DisturbanceSource source = force_and_estimates(0.25, 0, 0);
+  const BoxBound bound = bound_over(setup, box, source);
+  const stability::TrackingReport corner = stability::tracking_bounds(strong.gains, strong.plant, source, {});
+  int acting = 0;
+  for (const stability::AxisBounds& row : corner.bounds) {
+    if (row.loop != stability::Loop::kContinuous) continue;
+    acting += !row.clamp.never_acts;
+    EXPECT_GE(bound.enclosed_m[row.axis], row.least() * (1 - 1e-9)) << row.axis;
+  }
+  EXPECT_GT(acting, 0);
+}
+
+TEST(PlantBox, ErrorsOfTheEstimatesWidenTheBound) {
+  const TrackingSetup setup = continuous_setup(std::numeric_limits<double>::infinity());
+  const BoxBound without = bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0));
+  const BoxBound velocity = bound_over(setup, box_about(setup), force_and_estimates(0.02, 0.1, 0));
+  const BoxBound position = bound_over(setup, box_about(setup), force_and_estimates(0.02, 0, 0.01));
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_GT(velocity.reached_m[axis], 1.1 * without.reached_m[axis]);
+    EXPECT_GT(velocity.enclosed_m[axis], 1.1 * without.enclosed_m[axis]);
+    // The vehicle follows the wrong position.
+    EXPECT_GT(position.reached_m[axis], without.reached_m[axis] + 0.01);
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert::gate
