@@ -19,6 +19,12 @@ def expression(target, text, **parameters):
             f'{target} = "{text}"\nlinear = [{quoted}]\n')
 
 
+def pull(law, **parameters):
+    """A horizontal force towards every neighbour."""
+    text = expression("force_x_N", law.format("dx"), **parameters)
+    return text + f'force_y_N = "{law.format("dy")}"\nper_neighbour = true\n'
+
+
 def wall(a=0.03, at=0.6, reach=0.2):
     return lambda s: (-a * math.exp(-(at - min(s.p[0], at)) / reach), 0, 0)
 
@@ -201,6 +207,7 @@ EFFECTS = {
     "sideslip": dict(force=sideslip(), variables={"vx"}),
     "tilt loss": dict(force=tilt_loss(), variables={"tilt"}, speed=1.6),
     "lane": dict(force=lane(), variables={"y", "xy"}),
-    "suction": dict(force=suction(), variables={"neighbour"}, vehicles=2),
+    "suction": dict(force=suction(), variables={"neighbour"}, vehicles=2, formula=pull(
+        "a_N * exp(-sqrt(dx^2 + dy^2 + dz^2) / reach_m) * {} / sqrt(dx^2 + dy^2 + dz^2)", a_N=0.03, reach_m=0.3)),
     "slow drain": dict(force=slow_drain(), variables={"time", "battery"}, names={"payload_step"}),
 }

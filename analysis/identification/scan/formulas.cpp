@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/identification/scan/form_fit.h"
+#include "analysis/identification/scan/formula_trial.h"
+#include "analysis/identification/scan/pull.h"
 #include "nn/base/doubles.h"
 #include "nn/base/parallel.h"
 #include "stability/effect_text.h"
@@ -16,27 +17,10 @@ namespace {
 
 constexpr Eigen::Index kSamplesOfFit = 3000;
 constexpr const char* kBodyConstant = "body_constant";
-constexpr const char* kLetters[] = {"{a}", "{b}", "{c}"};
 /// What a form may be multiplied with.
 constexpr ScanVariable kFactors[] = {ScanVariable::kThrust, ScanVariable::kX,    ScanVariable::kY,
                                      ScanVariable::kZ,      ScanVariable::kVx,   ScanVariable::kVy,
                                      ScanVariable::kVz,     ScanVariable::kSpeed};
-
-/// One form with one factor, fitted.
-struct FormulaTrial {
-  Form form;
-  FormFit fit;
-  ScanVariable factor = ScanVariable::kCount;  ///< kCount: none
-  double saved_bits = -kInfinity;
-};
-
-/// The samples of an entry: all in order, and those that the search looks at.
-struct EntryData {
-  FormData all, few;
-  std::vector<int> flight;               ///< of `all`
-  std::vector<Eigen::Index> rows, thin;  ///< of ScanSamples, for `all` and `few`
-  double mean_square = 0;                ///< about the mean
-};
 
 bool is_velocity(ScanVariable v) {
   return v == ScanVariable::kVx || v == ScanVariable::kVy || v == ScanVariable::kVz ||
@@ -85,43 +69,6 @@ Eigen::VectorXd factor_of(const ScanSamples& samples, const std::vector<Eigen::I
   for (std::size_t i = 0; i < rows.size(); ++i)
     values[static_cast<Eigen::Index>(i)] = samples.values(rows[i], static_cast<Eigen::Index>(factor));
   return values;
-}
-
-/// How many of the samples are worth one each: n (1 - rho) / (1 + rho), rho the correlation of what `trial` leaves from
-/// one sample to the next.
-double independent_samples(const EntryData& data, const FormulaTrial& trial) {
-  double last = 0, products = 0, squares = 0;
-  for (Eigen::Index i = 0; i < data.all.target.size(); ++i) {
-    const double inputs[2] = {data.all.inputs(i, 0), data.all.inputs.cols() > 1 ? data.all.inputs(i, 1) : 0};
-    const double left = data.all.target[i] - value_of(trial.form, trial.fit, inputs, 1);
-    const auto k = static_cast<std::size_t>(i);
-    if (i > 0 && data.flight[k] == data.flight[k - 1]) products += left * last;
-    squares += left * left;
-    last = left;
-  }
-  const double rho = squares > 0 ? std::clamp(products / squares, 0.0, 0.98) : 0;
-  return std::max(static_cast<double>(data.all.target.size()) * (1 - rho) / (1 + rho), 4.0);
-}
-
-int numbers_of(const FormulaTrial& trial) {
-  int count = static_cast<int>(trial.form.texts.size()) + (trial.factor == ScanVariable::kCount ? 0 : 1);
-  for (const FormParameter& parameter : trial.form.shape) count += parameter.lower < parameter.upper ? 1 : 0;
-  return count;
-}
-
-double saved_bits(const EntryData& data, const FormulaTrial& trial, double independent) {
-  const double left = std::max(trial.fit.mean_square, 1e-300);
-  return 0.5 * independent * std::log2(data.mean_square / left) -
-         0.5 * numbers_of(trial) * std::log2(independent);
-}
-
-FormRange range_of(const Eigen::VectorXd& values) {
-  std::vector<double> sorted(values.begin(), values.end());
-  std::sort(sorted.begin(), sorted.end());
-  const auto at = [&](double p) {
-    return sorted[static_cast<std::size_t>(p * static_cast<double>(sorted.size() - 1))];
-  };
-  return {at(0.01), at(0.99)};
 }
 
 std::vector<Form> forms_of(const ScanEntry& entry, const EntryData& data) {
@@ -173,23 +120,8 @@ FormulaTrial best_trial(const ScanSamples& samples, const ScanEntry& entry, Entr
   return best;
 }
 
-void replace_all(std::string& text, const std::string& from, const std::string& to) {
-  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
-    text.replace(at, from.size(), to);
-}
-
 const ScanColumn& column_of_entry(const ScanSamples& samples, int column) {
   return scan_columns(samples.quantity)[static_cast<std::size_t>(column)];
-}
-
-std::string unit_of_coefficient(const std::string& unit, const std::string& variable_unit, int power) {
-  if (power == 0 || variable_unit.empty()) return unit;
-  return unit + "_per_" + variable_unit + (power > 1 ? std::to_string(power) : "");
-}
-
-std::string unit_of(const FormParameter& parameter, const std::string& variable_unit) {
-  if (parameter.unit == FormUnit::kNone || variable_unit.empty()) return "";
-  return (parameter.unit == FormUnit::kInverse ? "_1_" : "_") + variable_unit;
 }
 
 /// Vertical forces act along the world's axis or along the thrust, whichever leaves less.
@@ -211,24 +143,6 @@ int column_of(const ScanSamples& samples, const ScanEntry& entry, const EntryDat
   return body > world ? kThrust : kVertical;
 }
 
-void add_shapes(const FormulaTrial& trial, const std::string& unit, stability::EffectSpec& spec,
-                std::vector<std::string>& texts) {
-  for (std::size_t k = 0; k < trial.form.shape.size(); ++k) {
-    const FormParameter& parameter = trial.form.shape[k];
-    const std::string name = parameter.name + unit_of(parameter, unit);
-    const double value = trial.fit.theta[k];
-    spec.parameters[name] = value;
-    spec.expression.bounds[name] = {std::min(parameter.lower, value), std::max(parameter.upper, value)};
-    for (std::string& text : texts) replace_all(text, kLetters[k], name);
-    if (parameter.lower == parameter.upper) continue;
-    // What identification tries around it; the step also says how far it may be off where it is near zero.
-    const double step = std::max(0.2 * std::abs(value), 0.02 * (parameter.upper - parameter.lower));
-    std::vector<double>& grid = spec.expression.grid[name];
-    for (const double tried : {value - step, value, value + step})
-      grid.push_back(std::clamp(tried, parameter.lower, parameter.upper));
-  }
-}
-
 stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const FormulaTrial& trial) {
   stability::EffectSpec spec;
   const std::string unit = scan_variable(entry.variables[0]).unit;
@@ -242,10 +156,7 @@ stability::EffectSpec spec_of(const ScanEntry& entry, const char* target, const 
   const auto add = [&](const std::string& letter, const std::string& text, double value,
                        const std::string& of) {
     const std::string name = letter + "_" + of;
-    spec.parameters[name] = value;
-    spec.expression.linear.push_back(name);
-    const double most = 4 * std::abs(value) + 1e-3;
-    spec.expression.bounds[name] = {-most, most};
+    add_coefficient(name, value, spec);
     formula += (formula.empty() ? "" : " + ") + name + (text.empty() ? "" : " * " + text);
   };
   const char* const letters[] = {"a", "b"};
@@ -281,15 +192,14 @@ Formula body_constant(const ScanSamples& samples, const ScanEntry& entry) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::string name = fmt::format("b{}_N", axis + 1);
     const double value = samples.residual.col(3 + axis).mean();
-    spec.parameters[name] = value;
-    spec.expression.linear.push_back(name);
-    spec.expression.bounds[name] = {-4 * std::abs(value) - 1e-3, 4 * std::abs(value) + 1e-3};
+    add_coefficient(name, value, spec);
     spec.expression.formulas[fmt::format("force_b{}_N", axis + 1)] = name;
   }
   return formula;
 }
 
 bool has_formula(const ScanSamples& samples, const ScanEntry& entry) {
+  if (is_pull(samples, entry)) return true;
   if (column_of_entry(samples, entry.column).target[0] == '\0') return false;
   if (entry.variable == kBodyConstant) return true;
   return !entry.variables.empty() &&
@@ -321,11 +231,20 @@ std::vector<Formula> find_formulas(const ScanSamples& samples, const Scan& scan,
       formulas[static_cast<std::size_t>(i)].entry = e;
       return;
     }
-    EntryData data = data_of(samples, entry);
-    const FormulaTrial trial = best_trial(samples, entry, data);
     Formula& formula = formulas[static_cast<std::size_t>(i)];
     formula.entry = e;
     formula.variable = entry.variable;
+    if (is_pull(samples, entry)) {
+      const Pull pull = find_pull(samples);
+      formula.form = pull.form;
+      formula.saved_bits = pull.saved_bits;
+      formula.share = pull.explained_N2 / std::max(total, 1e-300);
+      formula.effect = pull.effect;
+      formula.effect.name = kFormulaPrefix + pull.form + "_toward_neighbours";
+      return;
+    }
+    EntryData data = data_of(samples, entry);
+    const FormulaTrial trial = best_trial(samples, entry, data);
     formula.form = trial.form.name;
     formula.saved_bits = trial.saved_bits;
     if (!(trial.saved_bits > 0)) return;
