@@ -16,6 +16,8 @@ struct FlightFiles {
   int run = 0;
   std::vector<std::pair<std::string, std::string>> logs;  ///< vehicle ("cf50") and path, in order of vehicles
   std::string why;                                        ///< these files are one flight
+  /// By path of a log: by how much its clock is ahead of the first log's, where that was found from the flight itself.
+  std::map<std::string, double> clock_offsets_s;
   std::set<std::string> position_only;  ///< paths of logs of which flights.toml takes the position only
 };
 

@@ -335,6 +335,8 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
         !rules.published && !all.empty() && log.epoch_s > 0 && all.front().log->epoch_s > 0;
     if (track.has_absolute_clock)
       track.clock_offset_s = all.front().log->epoch_s - log.epoch_s;
+    else if (flight.clock_offsets_s.count(path) == 1)
+      track.clock_offset_s = flight.clock_offsets_s.at(path);
     else if (!rules.published && !all.empty())
       track.clock_offset_s = clock_offset_s(onsets[0], onsets.back(), &track.clock_onsets);
     tracks.push_back(std::move(track));

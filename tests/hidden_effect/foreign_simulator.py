@@ -114,6 +114,7 @@ class Sensors:
     def __init__(self, rng):
         self.rng = rng
         self.late_s, self.skew = rng.uniform(0, 0.03), rng.uniform(-1e-4, 1e-4)
+        self.ahead_s, self.from_s = 0.0, 0.0  # of the clock; when the log begins
         self.y, self.dy = None, [0.0, 0.0, 0.0]
         self.records = []
 
@@ -131,7 +132,9 @@ class Sensors:
 
     def log(self, state, target, duties, commanded_N):
         noise = self.rng.gauss
-        tick = int(1e6 * ((state.t - self.late_s) * (1 + self.skew)) + noise(0, 60))
+        if state.t < self.from_s:
+            return
+        tick = int(1e6 * ((state.t + self.ahead_s - self.late_s) * (1 + self.skew)) + noise(0, 60))
         if tick < 0:
             return
         a = state.to_world([self.y[i] + noise(0, 0.1) for i in range(3)])
@@ -256,7 +259,9 @@ def wrapped(angle):
 
 def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
     """Flies and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the body, both in SI
-    units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale."""
+    units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale; clocks_s, by how
+    much each log's clock is ahead, and from_s, when the logs begin. Returns how far each log's clock is ahead in truth,
+    s."""
     rng = random.Random(seed * 1000 + run)
     scale = truth.get("speed", 1.0)
     fleet = []
@@ -269,6 +274,8 @@ def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
             path = Around(path, Wave(rng, 0.1, 0.4), Wave(rng, 0.1, 0.4))
         fleet.append(Vehicle(random.Random(seed * 77 + run * 13 + k), path))
     for k, vehicle in enumerate(fleet):
+        vehicle.sensors.ahead_s = truth.get("clocks_s", (0.0,) * vehicles)[k]
+        vehicle.sensors.from_s = truth.get("from_s", 0.0)
         vehicle.state.others = [ago(other) for j, other in enumerate(fleet) if j != k]
     for step in range(int(duration_s / STEP_S)):
         targets = [vehicle.path.at(vehicle.state.t) for vehicle in fleet]
@@ -282,6 +289,7 @@ def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
     for k, vehicle in enumerate(fleet):
         with open(os.path.join(folder, f"cf{k + 1}_{run:02d}"), "wb") as file:
             file.write(usd_file(vehicle.sensors.records))
+    return [vehicle.sensors.ahead_s - vehicle.sensors.late_s for vehicle in fleet]
 
 
 class Around:

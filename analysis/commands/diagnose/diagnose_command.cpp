@@ -8,6 +8,7 @@
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
 #include "analysis/commands/diagnose/balance_output.h"
+#include "analysis/commands/diagnose/clock_output.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/each_output.h"
@@ -89,7 +90,9 @@ void print(const Answers& answers) {
 int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
-  const residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  const std::vector<identification::ClockOffset> clocks = identification::clock_offsets(inputs, common.jobs);
+  identification::correct_clocks(clocks, inputs);
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
@@ -107,6 +110,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   const bool names_torque = !others && judge_torques(inputs, common.jobs, common.prints_text(), result);
   const bool names_sensor =
       !others && judge_accelerometers(inputs, common.jobs, common.prints_text(), result);
+  const bool names_clock = judge_clocks(clocks, common.prints_text(), result);
   if (options.each) add_each(answers.each, result);
   if (options.next) add_next(answers.diagnoses, result);
   if (options.next && common.prints_text()) print_next(answers.diagnoses);
@@ -114,7 +118,8 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   write_result(common, result);
   std::string reason;
   identification::Verdict verdict = identification::verdict_of(answers.diagnoses, reason);
-  if (names_rotor || ((names_torque || names_sensor) && verdict != identification::Verdict::kInconclusive))
+  if (names_rotor ||
+      ((names_torque || names_sensor || names_clock) && verdict != identification::Verdict::kInconclusive))
     verdict = identification::Verdict::kMissingEffect;
   if (common.prints_text()) fmt::print("verdict: {}\n", name(verdict));
   if (!options.report.empty()) {

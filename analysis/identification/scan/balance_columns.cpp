@@ -8,14 +8,14 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr std::size_t kRotors = 4;
+constexpr std::size_t kBalancedRotors = 4;
 constexpr Eigen::Index kBalanceColumns = 7;
 
 /// From (force along b3, torque) to rotors.
 Eigen::Matrix4d inverse_mixing(const stability::Model& model,
                                const std::vector<stability::RotorPlace>& rotors) {
   Eigen::Matrix4d mixing;
-  for (std::size_t k = 0; k < kRotors; ++k)
+  for (std::size_t k = 0; k < kBalancedRotors; ++k)
     mixing.col(static_cast<Eigen::Index>(k)) << 1, rotors[k].y_m, -rotors[k].x_m,
         rotors[k].yaw_m(model.torque_per_thrust_m);
   return mixing.inverse();
@@ -32,7 +32,7 @@ Eigen::MatrixXd balance_columns(const stability::Model& model, const residuals::
   for (std::size_t i = 0; i < torque_B_Nm.size(); ++i)
     columns.col(static_cast<Eigen::Index>(i)).head<3>() = torque_B_Nm[i];
   const std::vector<stability::RotorPlace> rotors = rotor_places(model);
-  if (rotors.size() != kRotors || track.judged.minCoeff() < 1) return columns;
+  if (rotors.size() != kBalancedRotors || track.judged.minCoeff() < 1) return columns;
   const Eigen::Matrix4d to_rotors = inverse_mixing(model, rotors);
   const auto force_W_N = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
   for (std::size_t i = 0; i < torque_B_Nm.size(); ++i) {

@@ -1,0 +1,55 @@
+#include "analysis/commands/diagnose/clock_output.h"
+
+#include <fmt/core.h>
+
+#include "analysis/identification/verdict.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+using identification::ClockOffset;
+
+files::Json ranking_entry_of(const ClockOffset& offset) {
+  return {
+      {"effect", "clock_offset"},
+      {"kind", offset.kind},
+      {"vehicle", offset.vehicle},
+      {"rmse_before", offset.rmse_before_N},
+      {"rmse_after", offset.rmse_after_N},
+      {"drop", 1 - offset.rmse_after_N / offset.rmse_before_N},
+      {"drop_ci", {nullptr, nullptr}},
+      {"parameters",
+       {{"offset_s",
+         {{"value", offset.offset_s}, {"interval_90", {offset.interval.first, offset.interval.second}}}}}},
+      {"per_vehicle", true},
+      {"model_form", files::Json::object()},
+      {"instrument", files::Json::object()},
+      {"class", "clock offset"},
+      {"confounded_with", files::Json::array()},
+      {"rivals", files::Json::array()},
+      {"separated_by", "passes in which each vehicle disturbs the other"},
+      {"paired_z", offset.z},
+      {"wald_z", nullptr},
+      {"records_in_support", offset.records},
+      {"blocks_in_support", offset.records},
+      {"flights_in_support", 1},
+      {"statement", identification::in_words(offset)},
+      {"sensor", true}};
+}
+
+}  // namespace
+
+bool judge_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Json& result) {
+  for (const ClockOffset& offset : offsets) {
+    result["ranking"].push_back(ranking_entry_of(offset));
+    if (prints) fmt::print("  {}; all else was judged with it corrected\n", identification::in_words(offset));
+  }
+  if (offsets.empty()) return false;
+  if (result["verdict"] != identification::name(identification::Verdict::kInconclusive)) {
+    result["verdict"] = identification::name(identification::Verdict::kMissingEffect);
+    result.erase("reason");
+  }
+  return true;
+}
+
+}  // namespace swarmcert::analysis

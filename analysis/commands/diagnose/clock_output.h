@@ -1,0 +1,16 @@
+/// @file Offsets of clocks as JSON and as text.
+#pragma once
+
+#include <vector>
+
+#include "analysis/identification/clock_offset.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::analysis {
+
+/// To the end of `ranking` as clock_offset, which makes the verdict missing_effect; what stands before was judged with
+/// the clocks corrected. Prints them where `prints`.
+/// @return whether there are any.
+bool judge_clocks(const std::vector<identification::ClockOffset>& offsets, bool prints, files::Json& result);
+
+}  // namespace swarmcert::analysis
