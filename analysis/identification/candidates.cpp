@@ -9,6 +9,7 @@
 
 #include "analysis/identification/column_run.h"
 #include "analysis/identification/scan/named_forms.h"
+#include "analysis/identification/swinging_load.h"
 #include "analysis/logs/read_log.h"
 #include "analysis/residuals/thrust_stage.h"
 #include "nn/base/parallel.h"
@@ -222,7 +223,7 @@ std::vector<Candidate> all_candidates(const stability::Model& model, const Cover
     if (name == kVehicleOffset && coverage.vehicles.size() < 2) continue;
     if (is_taken(name, model)) continue;
     // Of those that the model has already, what is missing of them.
-    if (needs_scan(name) && find(model, name) == nullptr) continue;
+    if ((needs_scan(name) || name == kPendulum) && find(model, name) == nullptr) continue;
     Candidate next = candidate(name, model, coverage);
     if (next.info.needs_neighbours && coverage.most_neighbours == 0) continue;
     // Nobody has felt the ground from higher up.

@@ -48,7 +48,8 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
 /// Every effect of the registry that a force can reveal, with its grid fitted to the coverage, and those that the
 /// model file defines by formulas. Of the ceiling only thetas that a flight comes away from. Effects of neighbours are
 /// left out where nobody has one, lags and delays where `model` has them; deep sets always, because a network must be
-/// named; those of needs_scan() where `model` has none. Where several vehicles flew, also a constant force of each.
+/// named; those of needs_scan() and the pendulum
+/// where `model` has none. Where several vehicles flew, also a constant force of each.
 std::vector<Candidate> all_candidates(const stability::Model& model, const Coverage& coverage);
 
 /// One candidate by name. Of an effect that `model` has already, the candidate is a change of its coefficients; of a

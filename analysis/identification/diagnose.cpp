@@ -8,6 +8,7 @@
 
 #include "analysis/identification/closed_loop.h"
 #include "analysis/identification/scan/named_forms.h"
+#include "analysis/identification/swinging_load.h"
 #include "analysis/identification/torque_balance.h"
 #include "nn/base/doubles.h"
 #include "stability/effects/registry.h"
@@ -130,11 +131,13 @@ void scan_balance(const Passes& passes, Diagnosis& result) {
   result.balance_formulas = find_formulas(left, result.balance, kMostFormulas, passes.jobs);
 }
 
-/// candidate(), at the place where a scan of what the model leaves beside `others` finds it if that is how it is found.
+/// candidate(), at the place where a scan of what the model leaves beside `others` finds it if that is how it is found;
+/// of a pendulum with the length that suits best.
 Candidate candidate_to_fit(const Passes& passes, const std::string& name, const Coverage& covered,
                            const std::vector<stability::EffectSpec>& others) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   Candidate result = candidate(name, model, covered);
+  if (name == kPendulum && result.thetas.size() > 1) return best_pendulum(passes, covered, others);
   if (!needs_scan(name)) return result;
   const ScanSamples samples = scan_samples(passes, others);
   const std::vector<Formula> formulas =
@@ -207,7 +210,8 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
   const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
   std::vector<Candidate> candidates;
   std::vector<std::string> others;
-  std::remove_copy_if(names.begin(), names.end(), std::back_inserter(others), needs_scan);
+  std::remove_copy_if(names.begin(), names.end(), std::back_inserter(others),
+                      [](const std::string& name) { return needs_scan(name) || name == kPendulum; });
   std::vector<stability::EffectSpec> beside;
   if (others.size() < names.size() && !others.empty())
     beside = specs_of(fit_effects(inputs, kind, others, which, jobs, progress));

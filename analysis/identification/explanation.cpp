@@ -7,6 +7,7 @@
 
 #include "analysis/identification/closed_loop.h"
 #include "analysis/identification/scan/named_forms.h"
+#include "analysis/identification/swinging_load.h"
 #include "nn/base/doubles.h"
 #include "stability/effects/registry.h"
 
@@ -68,6 +69,41 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
 }
 
 bool is_named(const Missing& missing) { return !is_formula(missing.effect); }
+
+/// Whether a load may be what is missing: something of the weight is.
+bool may_be_load(const Settled& settled) {
+  const auto is_of_weight = [](const std::string& name) {
+    return is_scale(name) || name == "constant_force";
+  };
+  const auto has = [&](const std::vector<std::string>& names) {
+    return std::any_of(names.begin(), names.end(), is_of_weight);
+  };
+  return has(settled.suspected) || has(settled.selected.contradicted) ||
+         std::any_of(settled.ranking.begin(), settled.ranking.end(),
+                     [&](const Missing& missing) { return is_of_weight(missing.effect); });
+}
+
+/// Puts a load that swings in the place of a scale of the thrust where flights show the swing.
+/// @return the candidate that it was named with, if it was.
+std::vector<Candidate> name_swinging_load(const Passes& passes, const Coverage& covered, Settled& settled) {
+  const stability::Model& model = *passes.inputs.model_of(passes.kind);
+  const bool is_in_model = std::any_of(model.effects.begin(), model.effects.end(),
+                                       [](const auto& spec) { return spec.name == kPendulum; });
+  if (is_in_model || !may_be_load(settled)) return {};
+  std::vector<stability::EffectSpec> beside;
+  for (const Missing& missing : settled.ranking) {
+    if (is_scale(missing.effect) || missing.effect == "constant_force") continue;
+    beside.insert(beside.end(), missing.specs.begin(), missing.specs.end());
+  }
+  const std::optional<Candidate> load = visible_pendulum(passes, covered, beside);
+  if (!load) return {};
+  Settled swinging = settle(passes, covered, {*load}, {kPendulum});
+  const bool is_named = std::any_of(swinging.ranking.begin(), swinging.ranking.end(),
+                                    [](const Missing& missing) { return missing.effect == kPendulum; });
+  if (!is_named) return {};
+  settled = std::move(swinging);
+  return {*load};
+}
 
 /// What the model leaves without any name.
 struct Nominal {
@@ -207,6 +243,7 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   constexpr double kClearlyLess = 0.9, kMuchLess = 0.7;  // of the mean square: names are worth a little
   Explained result;
   result.settled = settle(passes, covered, {}, {});
+  const std::vector<Candidate> loads = name_swinging_load(passes, covered, result.settled);
   scan_what_is_left(passes, result);
   std::optional<Nominal> nominal;
   if (!result.settled.ranking.empty()) {
@@ -218,6 +255,7 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   std::vector<Candidate> rivals = named_forms(formulas, model, covered);
   if (rivals.empty() && (formulas.empty() || result.settled.ranking.empty())) return result;
   for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
+  rivals.insert(rivals.end(), loads.begin(), loads.end());
   std::vector<std::string> names;
   for (const Missing& missing : result.settled.ranking) names.push_back(missing.effect);
   Settled again = settle_with_formulas(passes, covered, rivals, names);

@@ -27,13 +27,15 @@ bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, 
 }
 
 /// Where the voltage falls by little, its effect is a change of scale; where speed or thrust vary by little, every drag
-/// is a linear one; and a wake whose neighbours move slowly has no delay. The plain form is what flights show unless
+/// is a linear one; a wake whose neighbours move slowly has no delay; and a load
+/// that never swings is a scale of the thrust. The plain form is what flights show unless
 /// they clearly say more.
 int Selection::plain_form(int which) const {
   const std::string& name = grams().candidates[static_cast<std::size_t>(which)].name;
   if (name == "battery") return index_of("thrust_ratio");
   if (name == "drag_quadratic" || name == "drag_rotor") return index_of("drag_linear");
   if (name == "wake_delay") return index_of("downwash");
+  if (name == "pendulum") return index_of("thrust_ratio");
   return -1;
 }
 

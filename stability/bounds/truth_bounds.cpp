@@ -313,6 +313,8 @@ EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const Mo
     bound_tether(value, motion, result);
   } else if (name == "payload_step") {
     bound_step(value, result);
+  } else if (name == "pendulum") {
+    nothing_known("the swing of a load depends on all of the past: it has no enclosure here");
   } else if (name == "battery") {
     nothing_known("scales the thrust with the voltage: enclose it with --uncertain battery=A:B");
   } else {

@@ -48,6 +48,7 @@ struct EffectBounds {
 ///   voltage_sag, thrust_saturation, translational_lift, vortex_ring, wall, wind_field   likewise;
 ///   payload_step           its weight; the step itself has no rate;
 ///   constant_force         a bias.
+/// The swing of a pendulum depends on all of the past and has no bounds here.
 /// Effects that act through the loop (motor_lag, delay, thrust_ratio) and on rotation alone add nothing here. For
 /// others (networks, formulas of the user) the bounds are infinite and `unbounded` says so.
 /// The Gaussian tails that downwash and upper_lift cut off at seven spreads count as if they were not cut.

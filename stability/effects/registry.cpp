@@ -23,6 +23,7 @@
 #include "stability/effects/inflow.h"
 #include "stability/effects/motor_lag.h"
 #include "stability/effects/payload_step.h"
+#include "stability/effects/pendulum.h"
 #include "stability/effects/rotor_thrust.h"
 #include "stability/effects/sensor_delay.h"
 #include "stability/effects/tether.h"
@@ -70,6 +71,7 @@ std::deque<Entry>& entries() {
       entry<WindField>(),        entry<Wall>(),          entry<VortexRing>(),
       entry<RotorThrust>(),      entry<ComOffset>(),     entry<ImuTilt>(),
       entry<WakeDelay>(),        entry<Tether>(),        entry<AccelerometerScale>(),
+      entry<Pendulum>(),
   };
   return all;
 }

@@ -47,7 +47,7 @@ ContinuousFlight::ContinuousFlight(Swarm& swarm, const Gains& gains, const Task&
     networks_.push_back(std::make_unique<DeepSetForce>(*network, kinds[i], kinds));
   }
   const int n = swarm.size();
-  std::vector<double> start(static_cast<std::size_t>(n * (kVehicleStateSize + kControllerSize)));
+  std::vector<double> start(static_cast<std::size_t>(swarm.state_size() + n * kControllerSize));
   y_ = dy_ = start;
   std::vector<double> absolute(start.size(), 1e-10);
   inputs_.resize(static_cast<std::size_t>(n));
@@ -74,12 +74,14 @@ ContinuousFlight::ContinuousFlight(Swarm& swarm, const Gains& gains, const Task&
   std::vector<double> tolerances;
   for (std::size_t k = 0; k < start.size(); ++k) {
     const bool is_plant = k < static_cast<std::size_t>(swarm.state_size());
+    const std::size_t vehicle = k / kVehicleStateSize;
+    const bool is_of_effect = is_plant && vehicle >= static_cast<std::size_t>(n);
     const int within =
         static_cast<int>(is_plant ? k % kVehicleStateSize
                                   : (k - static_cast<std::size_t>(swarm.state_size())) % kControllerSize);
-    const int vehicle = static_cast<int>(k / kVehicleStateSize);
-    const bool moves = is_plant ? within < kRotors || swarm.path(vehicle).motor_lag_s > 0
-                                : within < 3 || rates_are_integrated;
+    const bool moves =
+        is_of_effect || (is_plant ? within < kRotors || swarm.path(static_cast<int>(vehicle)).motor_lag_s > 0
+                                  : within < 3 || rates_are_integrated);
     if (!moves) continue;
     moving_.push_back(k);
     tolerances.push_back(absolute[k] * options.absolute_scale);
@@ -237,6 +239,7 @@ void ContinuousFlight::meet(int event, double t, double* y) {
   std::fill(x + kVelocity, x + kQuaternion, 0.0);
   std::fill(x + kQuaternion, x + kRotors, 0.0);
   x[kQuaternion + 3] = 1;
+  swarm_.rest_effects(i, y + swarm_.size() * kVehicleStateSize);
 }
 
 void ContinuousFlight::fly_to(double end_s, double limit_s) {

@@ -284,6 +284,7 @@ void SampledFlight::touch_ground() {
     at(kPosition + 2) = options_.ground_m;
     for (int axis = 0; axis < 3; ++axis) at(kVelocity + axis) = at(kOmega + axis) = 0;
     for (int c = 0; c < 4; ++c) at(kQuaternion + c) = c == 3 ? 1 : 0;
+    swarm_.rest_effects(i, swarm_.effect_states(rows_.data()));
   }
 }
 

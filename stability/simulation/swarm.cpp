@@ -19,11 +19,9 @@ namespace {
 
 using Vector3Map = Eigen::Map<const Eigen::Vector3d>;
 
-constexpr int kEvery = -1;
-
 /// Simulated vehicles are named as their logs: the first is cf1. A vehicle that does not fly is none of them.
 int only_vehicle(const EffectSpec& spec) {
-  if (spec.vehicle.empty()) return kEvery;
+  if (spec.vehicle.empty()) return kEveryVehicle;
   const bool is_number = spec.vehicle.size() > 2 && spec.vehicle.size() < 9 &&
                          spec.vehicle.compare(0, 2, "cf") == 0 &&
                          spec.vehicle.find_first_not_of("0123456789", 2) == std::string::npos;
@@ -55,6 +53,9 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
       AppliedEffect applied(spec, {model.kind, names, model.path});
       if (applied.effect().info().remembers) {
         applied.effect().add_to(kind.path, applied.coefficients().data(), applied.shape().data());
+      } else if (dynamic_cast<const StateEffect*>(&applied.effect()) != nullptr) {
+        kind.with_states.push_back(std::move(applied));
+        kind.with_states_only.push_back(only_vehicle(spec));
       } else {
         kind.effects.push_back(std::move(applied));
         kind.only.push_back(only_vehicle(spec));
@@ -68,8 +69,8 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
     }
     interacts_ = interacts_ || !kind.wide.empty();
     kind.reach_m = ReachTable(kind.wide);
-    kind.only_pairs =
-        kind.effects.size() == 1 && kind.only[0] == kEvery && kind.effects[0].effect().takes_pairs();
+    kind.only_pairs = kind.with_states.empty() && kind.effects.size() == 1 && kind.only[0] == kEveryVehicle &&
+                      kind.effects[0].effect().takes_pairs();
     if (kind.only_pairs) batches_[i].applied = &kind.effects[0];
     batches_[i].pairs = SwarmPairs(size());
     set_lag(&kind);
@@ -77,6 +78,7 @@ Swarm::Swarm(std::vector<Model> models, std::vector<int> kind_of)
   near_.resize(kind_of_.size());
   rested_.resize(kind_of_.size());
   neighbours_.resize(kind_of_.size());
+  place_effect_states();
   rows_ = sum_ = ahead_ = make_rows();
   set_bodies();
 }
@@ -173,26 +175,26 @@ const Instant& Swarm::instant(int vehicle, double time_s, const double* state, c
 
 Wrench Swarm::effects_on(int vehicle, double time_s, const double* state, const VehicleInput& input) {
   instant(vehicle, time_s, state, input);
-  return sum_of_effects(vehicle, input);
+  return sum_of_effects(vehicle, input, state + size() * kVehicleStateSize);
 }
 
 /// At instant_.
-Wrench Swarm::sum_of_effects(int vehicle, const VehicleInput& input) const {
+Wrench Swarm::sum_of_effects(int vehicle, const VehicleInput& input, const double* effect_states) {
   Wrench sum;
   sum.force_W_N = input.disturbance_W_N;
   const Kind& own = kind(vehicle);
   for (std::size_t e = 0; e < own.effects.size(); ++e) {
-    if (own.only[e] != kEvery && own.only[e] != vehicle) continue;
+    if (own.only[e] != kEveryVehicle && own.only[e] != vehicle) continue;
     const Wrench wrench = own.effects[e].wrench(instant_);
     sum.force_W_N += wrench.force_W_N;
     sum.torque_B_Nm += wrench.torque_B_Nm;
   }
-  return sum;
+  return has_effect_states(vehicle) ? act_with_states(vehicle, effect_states, sum) : sum;
 }
 
 Rows Swarm::make_rows() const {
   const std::size_t lines = lines_for(kind_of_.size());
-  Rows rows(lines * kVehicleStateSize);
+  Rows rows(lines * kVehicleStateSize + lines_for(rates_.size()));
   for (std::size_t line = 0; line < lines; ++line) {
     const std::size_t at = row_index(static_cast<int>(line) * kRowLength, kVehicleStateSize);
     std::fill_n(rows.data() + at + (kQuaternion + 3) * kRowLength, kRowLength, 1.0);
@@ -206,6 +208,7 @@ void Swarm::to_rows(const double* state, double* rows) const {
     double* const to = rows + row_index(i, kVehicleStateSize);
     for (int c = 0; c < kVehicleStateSize; ++c) to[c * kRowLength] = from[c];
   }
+  std::copy_n(state + size() * kVehicleStateSize, num_effect_states(), effect_states(rows));
 }
 
 void Swarm::from_rows(const double* rows, double* state) const {
@@ -214,6 +217,7 @@ void Swarm::from_rows(const double* rows, double* state) const {
     double* const to = state + i * kVehicleStateSize;
     for (int c = 0; c < kVehicleStateSize; ++c) to[c] = from[c * kRowLength];
   }
+  std::copy_n(effect_states(rows), num_effect_states(), state + size() * kVehicleStateSize);
 }
 
 void Swarm::hold(const VehicleInput* inputs) {
@@ -248,7 +252,7 @@ void Swarm::pair_up(const VehicleInput* inputs) {
     // Where only neighbours matter and none is near, there is nothing to add.
     const bool alone = listed_ && near_[static_cast<std::size_t>(i)].empty();
     const bool nothing = own.effects.empty() || (alone && own.wide.size() == own.effects.size());
-    if (inputs[i].resting || nothing) continue;
+    if (inputs[i].resting || (nothing && !has_effect_states(i))) continue;
     if (!own.only_pairs) {
       acted_on_.push_back(i);
       continue;
@@ -280,11 +284,12 @@ void Swarm::act(double time_s, const double* rows, const VehicleInput* inputs) {
   act_on_pairs(&rows, 1);
   const States states = {rows, true};
   instant_.time_s = time_s;
+  std::fill(rates_.begin(), rates_.end(), 0.0);
   for (const int i : acted_on_) {
     fill(i, states, inputs[i]);
     instant_.num_neighbours = 0;
     if (!kind(i).wide.empty()) gather(i, states, false);
-    const Wrench sum = sum_of_effects(i, inputs[i]);
+    const Wrench sum = sum_of_effects(i, inputs[i], effect_states(rows));
     for (int axis = 0; axis < 3; ++axis) {
       bodies_.at(RigidBodies::kForce + axis, i) = sum.force_W_N[axis];
       bodies_.at(RigidBodies::kTorque + axis, i) = sum.torque_B_Nm[axis];
@@ -318,6 +323,7 @@ void Swarm::derivative_in_rows(double time_s, const double* rows, const VehicleI
   hold(inputs);
   act(time_s, rows, inputs);
   bodies_.derivative(rows, stabilise, derivative_rows);
+  std::copy(rates_.begin(), rates_.end(), effect_states(derivative_rows));
 }
 
 void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleInput* inputs, double* start) {
@@ -339,6 +345,8 @@ void Swarm::runge_kutta(double time_s, double step_s, int steps, const VehicleIn
     for (int stage = 0; stage < 4; ++stage) {
       act(at_s[stage], stage == 0 ? start : rows, inputs);
       bodies_.stage(stage, step_s, start, rows, sum_.data());
+      stage_effect_states(stage, step_s, effect_states(start), effect_states(rows),
+                          effect_states(sum_.data()));
     }
   }
 }

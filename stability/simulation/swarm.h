@@ -12,6 +12,7 @@
 #include "stability/bodies/vehicle_state.h"
 #include "stability/effects/effect.h"
 #include "stability/effects/signal_path.h"
+#include "stability/effects/state_effect.h"
 #include "stability/model.h"
 
 namespace swarmcert::stability {
@@ -36,7 +37,9 @@ class Swarm {
   ~Swarm();
 
   int size() const { return static_cast<int>(kind_of_.size()); }
-  int state_size() const { return size() * kVehicleStateSize; }
+  /// Numbers of a state: kVehicleStateSize per vehicle, then those of effects with states (StateEffect).
+  int state_size() const { return size() * kVehicleStateSize + num_effect_states(); }
+  int num_effect_states() const { return static_cast<int>(rates_.size()); }
   const Model& model(int vehicle) const { return models_[static_cast<std::size_t>(kind_of_[vehicle])]; }
   int kind_of(int vehicle) const { return kind_of_[static_cast<std::size_t>(vehicle)]; }
   const std::vector<Model>& models() const { return models_; }
@@ -60,6 +63,11 @@ class Swarm {
   /// A state in rows (rigid_bodies.h), and back.
   void to_rows(const double* state, double* rows) const;
   void from_rows(const double* rows, double* state) const;
+  /// Where the states of effects begin in a state in rows: behind the lines of the vehicles.
+  double* effect_states(double* rows) const { return rows + effect_row_; }
+  const double* effect_states(const double* rows) const { return rows + effect_row_; }
+  /// Puts the states of effects on a vehicle at rest, among the `effect_states` of all.
+  void rest_effects(int vehicle, double* effect_states) const;
   /// Rows for a state, in which lanes without a vehicle are at rest.
   Rows make_rows() const;
 
@@ -107,6 +115,17 @@ class Swarm {
     }
   };
 
+  /// A StateEffect on one vehicle.
+  struct StateUse {
+    const AppliedEffect* applied;
+    const StateEffect* effect;
+    std::size_t first;  ///< of its states among those of all effects
+  };
+
+  void place_effect_states();
+  bool has_effect_states(int vehicle) const;
+  Wrench act_with_states(int vehicle, const double* effect_states, const Wrench& others);
+  void stage_effect_states(int which, double step_s, double* start, double* rows, double* sum) const;
   void find_meetings(const double* rows, double horizon_s);
   static void set_lag(Kind* kind);
   const Kind& kind(int vehicle) const;
@@ -114,7 +133,7 @@ class Swarm {
   void fill(int vehicle, const States& states, const VehicleInput& input);
   void add_neighbour(int vehicle, int other, const States& states);
   void gather(int vehicle, const States& states, bool all);
-  Wrench sum_of_effects(int vehicle, const VehicleInput& input) const;
+  Wrench sum_of_effects(int vehicle, const VehicleInput& input, const double* effect_states);
   void hold(const VehicleInput* inputs);
   void pair_up(const VehicleInput* inputs);
   void act(double time_s, const double* rows, const VehicleInput* inputs);
@@ -141,6 +160,10 @@ class Swarm {
   bool sees_ahead_ = false;
   bool pairs_hold_ = false;   ///< acted_on_ and batches_ are those of near_ and of the vehicles that rest
   std::vector<char> rested_;  ///< by vehicle, when they were made
+  std::vector<StateUse> state_uses_;    ///< vehicle after vehicle
+  std::vector<std::size_t> first_use_;  ///< by vehicle, and one more
+  std::vector<double> rates_;           ///< d / dt of the states of effects
+  std::size_t effect_row_ = 0;
   Instant instant_;
   std::vector<Neighbour> neighbours_;
   RigidBodies bodies_;

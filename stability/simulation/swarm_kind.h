@@ -9,13 +9,18 @@
 
 namespace swarmcert::stability {
 
+/// Stands for an effect that acts on all vehicles of its kind, in Kind::only.
+inline constexpr int kEveryVehicle = -1;
+
 struct Swarm::Kind {
   double mass_kg = 0, offset_m = 0, yaw_m = 0;
   double lag_rate_1_s = 0, lag_share = 0;  ///< 1 / tau and gain of the motor lag, 0 without
   Eigen::Vector3d inertia = Eigen::Vector3d::Zero();
   SignalPath path;
   std::vector<AppliedEffect> effects;      ///< without those that live in `path`
-  std::vector<int> only;                   ///< by effect: the one vehicle that it acts on; kEvery: all
+  std::vector<int> only;                   ///< by effect: the one vehicle that it acts on; kEveryVehicle: all
+  std::vector<AppliedEffect> with_states;  ///< whose effect is a StateEffect
+  std::vector<int> with_states_only;       ///< as `only`
   std::vector<const AppliedEffect*> wide;  ///< that look at neighbours
   ReachTable reach_m;                      ///< of those
   std::vector<double> bends_m;             ///< of those

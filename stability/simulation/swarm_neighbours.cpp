@@ -93,6 +93,12 @@ void Swarm::copy_unreached(const double* from, double* rows) const {
     if (!near_[static_cast<std::size_t>(i)].empty()) continue;
     const std::size_t at = row_index(i, kVehicleStateSize);
     for (std::size_t c = 0; c < kVehicleStateSize; ++c) rows[at + c * kRowLength] = from[at + c * kRowLength];
+    const auto own = static_cast<std::size_t>(i);
+    if (!has_effect_states(i)) continue;
+    const std::size_t first = state_uses_[first_use_[own]].first;
+    const StateUse& last = state_uses_[first_use_[own + 1] - 1];
+    const std::size_t end = last.first + static_cast<std::size_t>(last.effect->num_states());
+    std::copy(effect_states(from) + first, effect_states(from) + end, effect_states(rows) + first);
   }
 }
 

@@ -45,6 +45,7 @@ TEST(Swarm, ARungeKuttaStepIsThatOfItsDerivativeToTheBit) {
          {std::vector<EffectSpec>{an_effect("downwash")},
           {an_effect("downwash"), an_effect("motor_lag")},
           {an_effect("downwash", {{"convection_s_m", 0.1}})},
+          {an_effect("downwash"), an_effect("pendulum", {{"mass_kg", 0.006}, {"length_m", 0.3}})},
           {an_effect("downwash"), an_effect("drag_linear", {{"drag_N_s_m", 0.013}})}}) {
       for (const bool listed : {false, true}) {
         Model small = tests::small_vehicle(), large = tests::small_vehicle();

@@ -1,0 +1,133 @@
+#include "analysis/identification/swinging_load.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "analysis/identification/remainder.h"
+#include "analysis/identification/selection.h"
+
+namespace swarmcert::identification {
+namespace {
+
+enum Place { kRatio, kPush, kLoad };
+
+const Members kFixedLoad = {{kRatio, 0}, {kPush, 0}};
+
+double frequency_rad_s(double length_m) { return std::sqrt(stability::kGravity_m_s2 / length_m); }
+
+/// A constant force that is horizontal: the weight is for the other two.
+Candidate horizontal_push(const stability::Model& model, const Coverage& covered) {
+  Candidate push = candidate("constant_force", model, covered);
+  push.info.linear[2].lower = push.info.linear[2].upper = 0;
+  return push;
+}
+
+/// How far round `k` of the search moves from the best of the round before.
+struct Zoom {
+  double step_rad_s;
+  std::vector<double> damping_factors;
+};
+const std::vector<Zoom> kZooms = {{0.25, {1, 0.5, 0.25}}, {0.12, {2, 1, 0.5}}, {0.06, {1.4, 1, 0.7}}};
+
+std::vector<std::vector<double>> around(const std::vector<double>& best, const Zoom& zoom,
+                                        const stability::EffectInfo& info) {
+  std::vector<std::vector<double>> thetas;
+  for (const int steps : {-2, -1, 0, 1, 2}) {
+    const double omega = frequency_rad_s(best[0]) + steps * zoom.step_rad_s;
+    for (const double factor : zoom.damping_factors) {
+      thetas.push_back({stability::kGravity_m_s2 / (omega * omega), factor * best[1]});
+      for (std::size_t i = 0; i < 2; ++i)
+        thetas.back()[i] = std::clamp(thetas.back()[i], info.shape[i].lower, info.shape[i].upper);
+    }
+  }
+  return thetas;
+}
+
+class PendulumSearch {
+ public:
+  PendulumSearch(const Passes& passes, const Coverage& covered,
+                 const std::vector<stability::EffectSpec>& beside)
+      : passes_(passes), inputs_(inputs_with(passes, beside)), flights_(inputs_.found.flights.size()) {
+    std::iota(flights_.begin(), flights_.end(), 0);
+    const stability::Model& model = *inputs_.model_of(passes.kind);
+    fixed_ = {candidate("thrust_ratio", model, covered), horizontal_push(model, covered)};
+    load_ = candidate(kPendulum, model, covered);
+    condense();
+  }
+
+  void zoom() {
+    for (const Zoom& zoom : kZooms) {
+      load_.thetas = around(best(), zoom, load_.info);
+      condense();
+    }
+  }
+
+  bool is_acceptable() const {
+    const Selection selection(grams_);
+    return selection.is_sound() && selection.is_acceptable(kFixedLoad, member_);
+  }
+
+  bool swings() const {
+    constexpr double kMostDamping = 0.5;  // of the frequency: a quarter of what is critical
+    return best()[1] <= kMostDamping * frequency_rad_s(best()[0]);
+  }
+
+  bool explains_weight() const {
+    constexpr double kShare = 0.5;
+    const Selection selection(grams_);
+    const Members swinging = with(kFixedLoad, member_);
+    const double ratio = selection.coefficients(kFixedLoad)[0];
+    const Eigen::VectorXd c = selection.coefficients(swinging);
+    return ratio < 0 && c[c.size() - 1] > 0 && std::abs(c[0]) <= kShare * std::abs(ratio);
+  }
+
+  Candidate found() const {
+    constexpr double kLengthStep = 1.05, kDampingStep = 1.4;
+    Candidate result = load_;
+    const double length_m = best()[0], damping_1_s = best()[1];
+    result.thetas = {best(),
+                     {length_m * kLengthStep, damping_1_s},
+                     {length_m / kLengthStep, damping_1_s},
+                     {length_m, damping_1_s * kDampingStep}};
+    return result;
+  }
+
+ private:
+  const std::vector<double>& best() const { return load_.thetas[static_cast<std::size_t>(member_.theta)]; }
+
+  void condense() {
+    grams_ = block_grams(inputs_, passes_.kind, {fixed_[0], fixed_[1], load_}, flights_, passes_.jobs,
+                         passes_.progress);
+    member_ = Selection(grams_).best_theta(kFixedLoad, kLoad);
+  }
+
+  const Passes& passes_;
+  const residuals::Inputs inputs_;
+  std::vector<int> flights_;
+  std::vector<Candidate> fixed_;
+  Candidate load_;
+  Grams grams_;
+  Member member_;
+};
+
+}  // namespace
+
+Candidate best_pendulum(const Passes& passes, const Coverage& covered,
+                        const std::vector<stability::EffectSpec>& beside) {
+  PendulumSearch search(passes, covered, beside);
+  search.zoom();
+  return search.found();
+}
+
+std::optional<Candidate> visible_pendulum(const Passes& passes, const Coverage& covered,
+                                          const std::vector<stability::EffectSpec>& beside) {
+  PendulumSearch search(passes, covered, beside);
+  // A resonance stands out even where the grid is damped too much for it.
+  if (!search.is_acceptable()) return std::nullopt;
+  search.zoom();
+  if (!search.is_acceptable() || !search.swings() || !search.explains_weight()) return std::nullopt;
+  return search.found();
+}
+
+}  // namespace swarmcert::identification
