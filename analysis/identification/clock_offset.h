@@ -30,8 +30,8 @@ inline constexpr double kClockSample_s = 0.05;
 inline constexpr double kLargestClockOffset_s = 0.4, kLongestWakeDelay_s = 0.3;
 
 /// Of flights of two vehicles whose clocks nothing else relates: no absolute times, no common starts of their set
-/// points. Empty where the vehicles hardly disturb each other, only one of them feels the other, or the offset is within
-/// three standard deviations of zero.
+/// points. Empty where the vehicles hardly disturb each other, only one of them feels the other, or the offset is
+/// within three standard deviations of zero.
 std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs);
 
 /// Lets the logs of `inputs` be read with these offsets.

@@ -35,9 +35,9 @@ DisturbanceBounds disturbance_bounds(const ThrustRatioGains& gains, const Distur
 /// @param errors with thrust_ratio_error and hover_N. @param errors_N effort_N() of them, hover's share included.
 double thrust_ratio_part(const ThrustRatioGains& gains, const OtherErrors& errors, double errors_N);
 
-/// What a clamp of the integrator does then. The demand grows by what d w0 and d u ask of the integrator; the bounds with
-/// an acting clamp are those of the loop without integral, over the interval of the ratio, which the integral's command
-/// passes too.
+/// What a clamp of the integrator does then. The demand grows by what d w0 and d u ask of the integrator; the bounds
+/// with an acting clamp are those of the loop without integral, over the interval of the ratio, which the integral's
+/// command passes too.
 /// @param exact what clamp_bounds() says of the loop of the model. @param of_class the gains of the whole loop.
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const ClampBounds& exact,
                          const ThrustRatioGains& of_class, const Disturbance& known,

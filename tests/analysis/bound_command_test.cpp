@@ -50,6 +50,11 @@ TEST(BoundCommand, WritesACertificateOfTheContinuousGainsThatCheckAcceptsAndList
       run_shell("swarmcert check cert.json --gains " + kSourceFolder + "/controller/gains/composite.toml",
                 folder.path());
   EXPECT_EQ(foreign.exit_code, 1) << foreign.output;
+  const Json shown = json_of(folder, "inspect cert.json")["files"].at(0);
+  EXPECT_EQ(shown["kind"], "tracking_certificate");
+  ASSERT_EQ(shown["loops"].size(), certificate["loops"].size());
+  EXPECT_EQ(shown["loops"][0]["gains"]["amplitude"], certificate["loops"][0]["gains"]["amplitude"]);
+  EXPECT_EQ(shown["left_out"], certificate["left_out"]);
 }
 
 TEST(BoundCommand, WritesNoCertificateWhereTheDelayIsLongAgainstTheLagsAndSaysWhy) {

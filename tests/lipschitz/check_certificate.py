@@ -560,8 +560,14 @@ class Network:
             self.order = document.get("input", {}).get("order", [])
             clamp = document.get("input", {}).get("clamp")
             self.clamp = clamp and (clamp["lower"], clamp["upper"])
+
+            def activation_of(entry):
+                stated = entry.get("activation", activation)
+                assert activation in (None, stated), f"{net} states another activation, {stated}"
+                return stated
+
             self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key, entry.get("order"),
-                                                          entry.get("activation", activation))
+                                                          activation_of(entry))
                           for role in ("phi", "rho") for kind, entry in sorted(document[role].items())}
         else:
             self.parts = {"network": read_weights(net, key, orders.get("network"), activation)}

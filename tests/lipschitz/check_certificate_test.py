@@ -348,6 +348,11 @@ def run():
                 ([str(demo / "network.toml")], ["--as", "float32", "--neighbours", "2", "--domain", str(folder / "box.toml")]),
                 (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
         smooth_net = str(smooth(folder))
+        try:
+            second.Network(smooth_net, activation="silu")
+            raise SystemExit("an activation beside another one in network.toml is taken")
+        except AssertionError as refusal:
+            assert "states another activation" in str(refusal), refusal
         nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
         beside_net = str(beside(folder))
         nets += [([beside_net], ["--method", "product"])]

@@ -10,6 +10,7 @@
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/inspect/inspect_certificate.h"
 #include "analysis/commands/inspect/inspect_log.h"
 #include "analysis/commands/inspect/inspect_report.h"
 #include "analysis/commands/shared/collection_table.h"
@@ -42,6 +43,7 @@ files::Json describe(const files::Weights& weights) {
   return {{"file", weights.path},
           {"sha256", weights.sha256},
           {"precision", files::name(weights.precision)},
+          {"activation", files::function_of(weights.activation).op},
           {"layers", std::move(layers)},
           {"notes", weights.notes},
           {"rounding_of_slope", files::rounding_of_slope(weights)}};
@@ -51,47 +53,6 @@ bool is_json(const std::string& path) {
   const std::string text = files::read_file(path);
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   return first != std::string::npos && text[first] == '{';
-}
-
-/// A member as people read it; nothing in it can reach the terminal unescaped.
-std::string cell(const files::Json& object, const char* key) {
-  if (!object.is_object() || !object.contains(key) || object[key].is_null()) return "-";
-  const files::Json& value = object[key];
-  if (value.is_number_float()) return fmt::format("{:.10g}", value.get<double>());
-  const std::string text = value.dump();
-  return value.is_string() ? text.substr(1, text.size() - 2) : text;
-}
-
-void print_bound_row(const std::string& function, const files::Json& bound) {
-  fmt::print("  {:<22} {:<10} {:<8} {:<14} {:>14} {:<8} {:>14}  {}\n", function, cell(bound, "block"),
-             cell(bound, "domain"), cell(bound, "law"), cell(bound, "upper"), cell(bound, "upper_method"),
-             cell(bound, "lower"), cell(bound, "unit"));
-}
-
-files::Json inspect_certificate(const std::string& path, bool print) {
-  const files::Json certificate = files::read_json(path, "swarmcert/certificate/1");
-  files::Json bounds = files::Json::array();
-  if (print) {
-    fmt::print("{}: certificate, not checked here ('swarmcert check' does)\n", path);
-    fmt::print("  {:<22} {:<10} {:<8} {:<14} {:>14} {:<8} {:>14}  {}\n", "function", "block", "domain", "law",
-               "upper", "method", "witnessed", "unit");
-  }
-  for (const files::Json& bound : certificate.value("bounds", files::Json::array())) {
-    files::Json line = files::Json::object();
-    for (const char* key : {"function", "domain", "block", "law", "norm", "scale", "unit", "upper",
-                            "upper_method", "lower", "neighbours"}) {
-      if (bound.contains(key)) line[key] = bound[key];
-    }
-    if (print) print_bound_row(cell(bound, "function"), bound);
-    bounds.push_back(std::move(line));
-  }
-  for (const files::Json& law : certificate.value("laws", files::Json::array())) {
-    files::Json line = law;
-    if (line.is_object()) line.erase("upper_hex");
-    if (print) print_bound_row(files::rho_name(cell(law, "rho")) + " " + cell(law, "neighbours"), law);
-    bounds.push_back(std::move(line));
-  }
-  return {{"file", path}, {"kind", "certificate"}, {"bounds", std::move(bounds)}};
 }
 
 /// What network.toml says beyond its weights, null where it says nothing.

@@ -9,8 +9,8 @@
 namespace swarmcert::identification {
 
 /// A horizontal force towards every neighbour that falls with its distance, as an effect with per_neighbour: either
-/// f(r) along the horizontal direction, r the horizontal distance, or the horizontal part of f(d) along the line between
-/// the vehicles, d their distance.
+/// f(r) along the horizontal direction, r the horizontal distance, or the horizontal part of f(d) along the line
+/// between the vehicles, d their distance.
 struct Pull {
   std::string form;              ///< "decay"
   stability::EffectSpec effect;  ///< with its numbers, without a name
