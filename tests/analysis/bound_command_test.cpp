@@ -273,6 +273,30 @@ TEST(BoundCommand, TheTransientStartsWithTheBias) {
   EXPECT_DOUBLE_EQ(at_a_quarter(" --bias 0,0,0.05"), at_a_quarter(" --initial-learning-error 0.05"));
 }
 
+TEST(BoundCommand, TheTubeOverTimeRisesToTheBoundOfAllThatIsDeclared) {
+  const ScratchFolder folder;
+  const std::string gains =
+      gains_file(folder, "[position]\nKp = 12\nKd = 7\nKi = 20\n[lag]\nmotor_s = 0.04\n");
+  const Json result =
+      json_of(folder, "bound" + gains +
+                          " --tube --amplitude 0.03 --velocity-error 0.1,0,0.2 --position-error 0,0.01,0.02");
+  ASSERT_EQ(result["tube"].size(), 3u);
+  for (const Json& tube : result["tube"]) {
+    double before = 0;
+    for (const Json& at : tube["at"]) {
+      EXPECT_GE(at["error_m"].get<double>(), before);
+      before = at["error_m"].get<double>();
+    }
+    for (const Json& row : result["bounds"]) {
+      if (row["axis"] != tube["axis"] || row["channel"] != "force" || row["loop"] != "continuous") continue;
+      EXPECT_NEAR(before, row["amplitude"].get<double>(), 2e-3 * before) << tube["axis"];
+    }
+  }
+  const Json unknown =
+      json_of(folder, "bound" + gains + " --tube --amplitude 0.03 --velocity-error-rate 0.1");
+  EXPECT_EQ(unknown["tube"][0]["status"], "inconclusive");
+}
+
 TEST(BoundCommand, WhatABoundWouldLeaveOutIsRefused) {
   const ScratchFolder folder;
   const std::string setup = biased_flight(folder);
@@ -280,8 +304,7 @@ TEST(BoundCommand, WhatABoundWouldLeaveOutIsRefused) {
                            "/nn/networks/demo/network.toml --truth " + kSourceFolder +
                            "/stability/models/crazyflie-small-effects.toml";
   for (const std::string& options :
-       {std::string(" --amplitude 0.1 --tube --velocity-error 0.1"),
-        std::string(" --amplitude 0.1 --tube --initial-error 0.1"), task + " --bias 0.1",
+       {std::string(" --amplitude 0.1 --tube --initial-error 0.1"), task + " --bias 0.1",
         task + " --position-error 0.01", std::string(" --bias 1,2"), std::string(" --bias 1,2,3,4"),
         std::string(" --bias nan"), std::string(" --velocity-error -1"), std::string(" --position-error 1x"),
         std::string(" --initial-error -0.1")}) {

@@ -76,8 +76,8 @@ void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, co
   }
 }
 
-/// The tubes and the swarm bound start from rest and know exact estimates; the tube around a task knows no force but
-/// that of the declared truth. What they would leave out is refused.
+/// The tubes and the swarm bound start from rest; the tube around a task and the swarm know exact estimates, and that
+/// tube no force but that of the declared truth. What they would leave out is refused.
 void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
   const auto refuse = [](const char* what, const char* without) {
     throw UsageError(fmt::format("{} does not contain {}: leave one of them out", what, without));
@@ -87,7 +87,7 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
   const char* const estimates = source.kind == "measured" && !source.declares_velocity_error
                                     ? "the error of the velocity that was measured (--velocity-error 0)"
                                     : "--velocity-error and --position-error";
-  if (asked != nullptr && source.has_estimate_errors()) refuse(asked, estimates);
+  if (has_task && source.has_estimate_errors()) refuse(asked, estimates);
   if (source.thrust_ratio_error > 0 && (asked != nullptr || !options.swarm.empty()))
     refuse(asked != nullptr ? asked : "--swarm", "--thrust-ratio-error");
   if ((asked != nullptr || !options.swarm.empty()) && source.has_moving_reference()) {

@@ -357,54 +357,83 @@ void print_verified(const Json& verified) {
   }
 }
 
+namespace {
+
+constexpr int kTubeSamples = 20001;
+constexpr double kTubeHorizon_s = 10, kTubeStep_s = kTubeHorizon_s / (kTubeSamples - 1);
+
+/// int |y| from zero to every sample, times `size`; zeros where that is 0.
+std::vector<double> areas_of(const TransferFunction& y, double size) {
+  std::vector<double> areas(kTubeSamples, 0.0);
+  if (size == 0) return areas;
+  const std::vector<double> response = sampled_response(y, kTubeStep_s, kTubeSamples);
+  for (std::size_t k = 1; k < areas.size(); ++k)
+    areas[k] = areas[k - 1] + size * (std::abs(response[k]) + std::abs(response[k - 1])) / 2 * kTubeStep_s;
+  return areas;
+}
+
+/// Why there is no tube; nothing where there is one.
+const char* no_tube(const AxisLoop& loop, const DisturbanceSource& source, int axis) {
+  const Disturbance& d = source.axis[axis];
+  if (!is_stable(loop)) return "unstable";
+  if (!std::isfinite(d.amplitude_N) && !std::isfinite(d.impulse_N_s))
+    return "neither amplitude nor impulse is known";
+  if (!std::isfinite(source.velocity_error[axis].largest() + source.position_error[axis].largest()))
+    return "the amplitude of an estimate's error is not known";
+  return nullptr;
+}
+
+/// |e(t)| at most, at every `every`-th sample. Errors of the estimates count by their amplitude; a delay would only let
+/// them act later.
+Json tube_of(const AxisLoop& loop, const DisturbanceSource& source, int axis, int every) {
+  const Disturbance& d = source.axis[axis];
+  const std::vector<double> kernel =
+      sampled_response(impulse_transfer(loop, Channel::kForce), kTubeStep_s, kTubeSamples);
+  const std::vector<double> velocity_m =
+      areas_of(impulse_transfer(loop, Channel::kCommand),
+               loop.mass_kg * loop.Kd * source.velocity_error[axis].largest());
+  const std::vector<double> position_m =
+      areas_of(position_error_transfer(loop), source.position_error[axis].largest());
+  double area = 0;
+  double peak = 0;
+  double step = 0;  // response to a unit step, and the largest so far
+  double step_peak = 0;
+  Json at = Json::array();
+  for (int i = 0; i < kTubeSamples; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (i > 0) area += (std::abs(kernel[k]) + std::abs(kernel[k - 1])) / 2 * kTubeStep_s;
+    if (i > 0) step += (kernel[k] + kernel[k - 1]) / 2 * kTubeStep_s;
+    peak = std::max(peak, std::abs(kernel[k]));
+    step_peak = std::max(step_peak, std::abs(step));
+    if (i % every != 0) continue;
+    double bound = std::numeric_limits<double>::infinity();
+    if (std::isfinite(d.amplitude_N)) bound = area * d.amplitude_N;
+    if (std::isfinite(d.impulse_N_s)) {
+      // Of every pass that has begun by now.
+      const double begun = d.pass_period_s > 0 ? 1 + std::floor(i * kTubeStep_s / d.pass_period_s) : d.passes;
+      bound = std::min(bound, std::min<double>(d.passes, begun) * peak * d.impulse_N_s);
+    }
+    if (!source.classes_contain_bias) bound += step_peak * std::abs(source.bias_N[axis]);
+    at.push_back({{"t_s", i * kTubeStep_s}, {"error_m", bound + velocity_m[k] + position_m[k]}});
+  }
+  return at;
+}
+
+}  // namespace
+
 Json tube_json(const Tracking& input, const DisturbanceSource& source, int count) {
   Json rows = Json::array();
-  constexpr int kSamples = 20001;
-  constexpr double kHorizon_s = 10;
   for (int axis = 0; axis < 3; ++axis) {
     const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
-    const Disturbance& d = source.axis[axis];
     if (!loop) continue;
-    if (!is_stable(*loop) || !(std::isfinite(d.amplitude_N) || std::isfinite(d.impulse_N_s))) {
-      rows.push_back({{"axis", axis_name(axis)},
-                      {"channel", "force"},
-                      {"loop", "continuous"},
-                      {"status", "inconclusive"},
-                      {"why", is_stable(*loop) ? "neither amplitude nor impulse is known" : "unstable"},
-                      {"at", Json::array()}});
-      continue;
+    Json row = {{"axis", axis_name(axis)}, {"channel", "force"}, {"loop", "continuous"}};
+    if (const char* const why = no_tube(*loop, source, axis)) {
+      row.update({{"status", "inconclusive"}, {"why", why}, {"at", Json::array()}});
+    } else {
+      row.update(
+          {{"status", "estimate"}, {"at", tube_of(*loop, source, axis, (kTubeSamples - 1) / (count - 1))}});
     }
-    const double step_s = kHorizon_s / (kSamples - 1);
-    const std::vector<double> kernel =
-        sampled_response(impulse_transfer(*loop, Channel::kForce), step_s, kSamples);
-    double area = 0;
-    double peak = 0;
-    double step = 0;  // response to a unit step, and the largest so far
-    double step_peak = 0;
-    Json at = Json::array();
-    const int every = (kSamples - 1) / (count - 1);
-    for (int i = 0; i < kSamples; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (i > 0) area += (std::abs(kernel[k]) + std::abs(kernel[k - 1])) / 2 * step_s;
-      if (i > 0) step += (kernel[k] + kernel[k - 1]) / 2 * step_s;
-      peak = std::max(peak, std::abs(kernel[k]));
-      step_peak = std::max(step_peak, std::abs(step));
-      if (i % every != 0) continue;
-      double bound = std::numeric_limits<double>::infinity();
-      if (std::isfinite(d.amplitude_N)) bound = area * d.amplitude_N;
-      if (std::isfinite(d.impulse_N_s)) {
-        // Of every pass that has begun by now.
-        const double begun = d.pass_period_s > 0 ? 1 + std::floor(i * step_s / d.pass_period_s) : d.passes;
-        bound = std::min(bound, std::min<double>(d.passes, begun) * peak * d.impulse_N_s);
-      }
-      if (!source.classes_contain_bias) bound += step_peak * std::abs(source.bias_N[axis]);
-      at.push_back({{"t_s", i * step_s}, {"error_m", bound}});
-    }
-    rows.push_back({{"axis", axis_name(axis)},
-                    {"channel", "force"},
-                    {"loop", "continuous"},
-                    {"status", "estimate"},
-                    {"at", std::move(at)}});
+    rows.push_back(std::move(row));
   }
   return rows;
 }
