@@ -19,7 +19,7 @@ Candidate best_pendulum(const Passes& passes, const Coverage& covered,
 
 /// best_pendulum() if the flights show that a load swings: beside a scale of the thrust, which is what a fixed payload
 /// looks like, it lowers the error of blocks left out as an effect must (Selection::is_acceptable()); it is damped so
-/// little that it oscillates; and its weight explains half of that scale or more.
+/// little that it oscillates; and it has a tenth of the vehicle's mass, or its weight explains half of that scale.
 std::optional<Candidate> visible_pendulum(const Passes& passes, const Coverage& covered,
                                           const std::vector<stability::EffectSpec>& beside);
 
