@@ -34,13 +34,14 @@ swarmcert::files::NetworkArguments arguments(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   if (argc < 2 || argc > 4) return 2;
-  const swarmcert::files::Network network = swarmcert::files::load_network(arguments(argc, argv));
+  const swarmcert::files::Network network = swarmcert::files::load_any_network(arguments(argc, argv));
   for (std::string path; std::getline(std::cin, path);) {
     int code = 3;
     std::string reason;
     try {
+      const auto certificate = swarmcert::files::read_json(path, swarmcert::check::kCertificateSchema);
       const auto verdict = swarmcert::check::check(
-          swarmcert::files::read_json(path, swarmcert::check::kCertificateSchema), network);
+          certificate, swarmcert::check::with_stated_activations(certificate, network));
       code = verdict.accepted ? 0 : 1;
       reason = verdict.reason;
     } catch (const swarmcert::files::InputError& error) {

@@ -103,6 +103,9 @@ def kinds(folder, generator):
         ("values on a clamp", [clamped], [*float32, "--range", "--neighbours", "2", "--input-step", "0.001"], 0.05),
         ("parts of a box", [cube], ["--method", "branch", "--domain", folder / "cube.toml"], 0.02),
         ("pair and parts of a box", pair, ["--method", "branch", "--domain", folder / "part.toml"], 0.02),
+        ("tanh", [tiny], ["--activation", "tanh"], 0.05),
+        ("silu", [tiny], ["--activation", "silu", "--blocks"], 0.05),
+        ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"], 0.03),
         ("cover by parts", [tiny], parts, 0.03),
     ] + slow * (MUTATIONS > 0)
 
