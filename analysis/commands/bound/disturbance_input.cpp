@@ -245,9 +245,8 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
   source.axis[2].rate_N_s = source.f_hat_rate_N_s;  // the network's output is the force along z
 }
 
-}  // namespace
-
-void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
+/// What acts: classes of the force error, its bias, errors of the ratio and of the estimates.
+void declare_force(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--rate", arguments.rate, "sup |eps'|, N/s: how fast the force error changes")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--amplitude", arguments.amplitude, "sup |eps|, N")->check(CLI::NonNegativeNumber);
@@ -263,6 +262,10 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
       ->check(CLI::Range(0.0, 0.9));
   declare_estimate(app, "velocity", "m/s", "the law sees through Kd", arguments.velocity_error);
   declare_estimate(app, "position", "m", "the law sees through Kp and Ki", arguments.position_error);
+}
+
+/// How the set point moves, and how often passes follow one another.
+void declare_motion_of_reference(CLI::App& app, DisturbanceArguments& arguments) {
   const std::string axes = "; for all axes, or X,Y,Z";
   app.add_option("--reference-step", arguments.reference_step, "Sum of all jumps of the set point, m" + axes);
   app.add_option("--reference-speed-step", arguments.reference_speed_step,
@@ -278,6 +281,10 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--pass-length", arguments.pass_s, "How long one pass lasts, s")
       ->check(CLI::NonNegativeNumber)
       ->needs(passes);
+}
+
+/// Where numbers come from that the user does not give.
+void declare_sources(CLI::App& app, DisturbanceArguments& arguments) {
   auto* from =
       app.add_option("--from", arguments.from, "Result of compare: measured quantiles of the learning error");
   app.add_option("--quantile", arguments.quantile, "Which quantile of --from (default p99)")->needs(from);
@@ -287,6 +294,10 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--phi", arguments.network.phi, "Weight file of phi, with --rho");
   app.add_option("--rho", arguments.network.rho, "Weight file of rho, with --phi");
   declare_order(app, arguments.network);
+}
+
+/// How vehicles move, for a learned force or a declared truth.
+void declare_motions(CLI::App& app, DisturbanceArguments& arguments) {
   app.add_option("--speed", arguments.speed, "Largest relative speed of a neighbour, m/s")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--accel", arguments.acceleration, "Largest relative acceleration of a neighbour, m/s^2")
@@ -314,6 +325,15 @@ void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
                  "Mass of the heaviest neighbour, kg (with --truth; default: that of the truth's vehicle)")
       ->check(CLI::PositiveNumber)
       ->needs(truth);
+}
+
+}  // namespace
+
+void declare_disturbance(CLI::App& app, DisturbanceArguments& arguments) {
+  declare_force(app, arguments);
+  declare_motion_of_reference(app, arguments);
+  declare_sources(app, arguments);
+  declare_motions(app, arguments);
 }
 
 namespace {
