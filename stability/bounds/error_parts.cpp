@@ -7,6 +7,7 @@
 #include "nn/base/doubles.h"
 #include "stability/bounds/disturbance_bounds.h"
 #include "stability/bounds/kernel_sum.h"
+#include "stability/bounds/reference_jerk.h"
 #include "stability/bounds/sampled_adjoint.h"
 #include "stability/bounds/sampled_bounds.h"
 
@@ -101,14 +102,6 @@ double least_demand(const EstimateError& n, const Amplitude& amplitude, const Ed
   return least;
 }
 
-/// How old the reference's acceleration that acts is at most, on average over what the lags let through.
-double acceleration_age_s(const AxisLoop& loop) {
-  double age_s = loop.delay_s;
-  for (const double lag_s : loop.lags_s) age_s += lag_s;
-  return age_s;
-}
-double acceleration_age_s(const SampledLoop& loop) { return acceleration_age_s(loop.plant) + loop.period_s; }
-
 /// What the reference demands of the integrator: its jumps as starts away from it, its jerk as a force of age times
 /// jerk.
 /// @param position, speed, force demands per m, per m/s and per m/s^2.
@@ -168,8 +161,7 @@ ErrorParts error_parts(const SampledLoop& loop, double step_gain, const OtherErr
   const auto force = [&] { return sampled_norms(loop, Channel::kForce, Instants::kAll); };
   parts.reference_m = part(reference.steps_m, [&] { return initial_position_gain(loop); }) +
                       part(reference.speed_steps_m_s, [&] { return loop.plant.mass_kg * force().impulse; }) +
-                      part(reference.jerk_m_s3 * acceleration_age_s(loop),
-                           [&] { return loop.plant.mass_kg * force().amplitude; });
+                      part(reference.jerk_m_s3, [&] { return jerk_gain(loop); });
   return parts;
 }
 

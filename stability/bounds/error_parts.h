@@ -80,8 +80,8 @@ struct ErrorParts {
 /// not zero and the loop unstable. Those of the bias are exact; that of the initial position is without a delay. Those
 /// of the estimates are the least of what amplitude, rate, both together, variation and impulse of their errors give,
 /// each exact for its class alone. A jump of the set point counts as an initial error of the same size. Its jerk enters
-/// by the gain lag_floor().rate, exact without a delay; for a sampled loop, by the amplitude gain times the greatest
-/// age of the acceleration that acts, which is the sum of lags, delay and one period.
+/// by the gain lag_floor().rate, exact without a delay; for a sampled loop by jerk_gain(), which contains hold, delay
+/// and lags exactly (reference_jerk.h).
 /// @param step_gain m/N: the edge gain of the channel by which the force error enters.
 ErrorParts error_parts(const AxisLoop& loop, double step_gain, const OtherErrors& errors);
 /// t = 0 is a sampling instant.

@@ -16,9 +16,10 @@ void KernelSum::add_linear(double start, double slope, double length) {
   }
 }
 
-void KernelSum::add_series(double start, double slope, double length, double ratio) {
+void KernelSum::add_series(double jump, double start, double slope, double length, double ratio) {
   const GainNorms before = norms_;
   const double from = integral_;
+  add_jump(jump);
   add_linear(start, slope, length);
   norms_.rate = before.rate + (norms_.rate - before.rate) / (1 - ratio);
   norms_.amplitude = before.amplitude + (norms_.amplitude - before.amplitude) / (1 - ratio);

@@ -19,8 +19,14 @@ class KernelSum {
 
   /// A stretch of `length` on which the kernel is slope u + start, u growing backwards in time.
   void add_linear(double start, double slope, double length);
+  /// The integral alone jumps.
+  void add_jump(double jump) { integral_ += jump; }
   /// That stretch, then again and again `ratio` times smaller; the integral goes to its limit in proportion.
-  void add_series(double start, double slope, double length, double ratio);
+  void add_series(double start, double slope, double length, double ratio) {
+    add_series(0, start, slope, length, ratio);
+  }
+  /// The same with a jump before each of them, smaller by the same ratio.
+  void add_series(double jump, double start, double slope, double length, double ratio);
 
   const GainNorms& norms() const { return norms_; }
 
