@@ -5,17 +5,13 @@
 
 #include <cmath>
 
-#include "tube/continuous_flight.h"
+#include "tube/axes_flight.h"
 #include "tube/scenes.h"
 
 namespace swarmcert::analysis {
 namespace {
 
 constexpr double kTolerance_N = 1e-3;
-
-double network_age_s(const stability::Gains& gains) {
-  return gains.network_latency_s + (gains.network_rate_hz > 0 ? 1 / gains.network_rate_hz : 0);
-}
 
 EnclosureOptions boxes(int count) {
   EnclosureOptions options;
@@ -31,10 +27,10 @@ struct Seen {
 };
 
 Seen fly(const stability::TrackingSetup& loop, const stability::Model& truth, const stability::Task& task,
-         const SlicedTube& tube, double slice_s, int flights) {
+         const SlicedTube& tube, double slice_s, int flights, bool is_sampled = false) {
   const int vehicles = static_cast<int>(tube.slices.front().size());
   const files::Network network = tests::demo_network();
-  tests::ContinuousFlight flight(loop, truth, network, task, vehicles);
+  tests::AxesFlight flight(loop, truth, network, task, vehicles, is_sampled);
   files::Random random(11);
   Seen seen;
   const auto check = [&seen](Interval range, double value) {
@@ -76,6 +72,49 @@ TEST(SlicedTube, HoldsEveryFlightInEverySliceForAllShippedGainsAndTwoAndThreeVeh
     const Seen seen = fly(loop, truth, *task, tube, scene.motion().slice_s, 3);
     EXPECT_EQ(seen.outside, 0) << "of " << seen.looks;
     EXPECT_GT(seen.nearest, 0.4) << "a tube that no flight comes near to would hide a fault";
+  }
+}
+
+TEST(SlicedTube, SampledFlightsThatLeaveTheContinuousTubeStayInTheSampledOne) {
+  const files::Network network = tests::demo_network();
+  stability::Model truth = tests::truth_model();
+  truth.effects.clear();
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  stability::TrackingSetup loop = tests::loop_of("firmware-defaults");
+  loop.gains.rate_hz = 40;
+  loop.gains.integrator_step_s = 0.025;
+  const auto tube_of = [&](bool is_sampled) {
+    const Scene scene(loop, truth, network, *task, 2, network_age_s(loop.gains, is_sampled), kSlice_s,
+                      is_sampled);
+    EXPECT_EQ(scene.loops().is_sampled(), is_sampled);
+    return sliced_tube(scene, boxes(8), kTolerance_N);
+  };
+  const SlicedTube narrow = tube_of(false), wide = tube_of(true);
+  ASSERT_TRUE(narrow.proved) << narrow.why;
+  ASSERT_TRUE(wide.proved) << wide.why;
+  const double slice_s = task->duration_s() / static_cast<double>(wide.slices.size());
+  EXPECT_EQ(fly(loop, truth, *task, narrow, slice_s, 1).outside, 0);
+  EXPECT_GT(fly(loop, truth, *task, narrow, slice_s, 1, true).outside, 0);
+  const Seen seen = fly(loop, truth, *task, wide, slice_s, 3, true);
+  EXPECT_EQ(seen.outside, 0) << "of " << seen.looks;
+  EXPECT_GT(seen.nearest, 0.2) << "a tube that no flight comes near to would hide a fault";
+}
+
+TEST(SlicedTube, AtTheUsualRateTheSampledTubeIsLittleWiderThanTheContinuousOne) {
+  const files::Network network = tests::demo_network();
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  const stability::TrackingSetup loop = tests::loop_of("firmware-defaults");
+  double radius_m[2][3];
+  for (const bool is_sampled : {false, true}) {
+    const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, is_sampled),
+                      kSlice_s, is_sampled);
+    const SlicedTube tube = sliced_tube(scene, boxes(8), kTolerance_N);
+    ASSERT_TRUE(tube.proved) << tube.why;
+    for (int k = 0; k < 3; ++k) radius_m[is_sampled ? 1 : 0][k] = tube.radii().largest_position_m(k);
+  }
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_GE(radius_m[1][k], radius_m[0][k]) << k;
+    EXPECT_LE(radius_m[1][k], 1.5 * radius_m[0][k]) << k;
   }
 }
 

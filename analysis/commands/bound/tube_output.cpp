@@ -127,7 +127,7 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
   Json json = {{"task", arguments.task},
                {"vehicles", arguments.vehicles},
                {"duration_s", tube.duration_s},
-               {"loop", "continuous"}};
+               {"loop", tube.is_sampled ? "sampled" : "continuous"}};
   LeastTube shown = tube.tube;
   shown.proved = tube.proved;
   shown.why = tube.why;

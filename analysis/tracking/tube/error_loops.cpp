@@ -23,8 +23,11 @@ bool same_loop(const AxisLoop& a, const AxisLoop& b) {
   return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
 }
 
-ErrorLoop error_loop(const AxisLoop& loop, double slice_s, int slices) {
+/// @param period_s of a sampled loop; 0: continuous.
+ErrorLoop error_loop(const AxisLoop& loop, double period_s, double slice_s, int slices) {
   ErrorLoop result;
+  result.mass_kg = loop.mass_kg;
+  result.period_s = period_s;
   result.Kp = loop.Kp;
   result.Kd = loop.Kd;
   result.Ki = loop.Ki;
@@ -46,6 +49,11 @@ ErrorLoop error_loop(const AxisLoop& loop, double slice_s, int slices) {
   result.h1 = cells(times_s_to(integrates, unit));
   result.h2 = cells(times_s_to(integrates + 1, unit));
   result.has_lag = lag.size() > 1;
+  if (period_s > 0) {
+    Polynomial numerator = stability::scaled(feedback, 1 / loop.mass_kg);
+    if (result.has_lag) numerator = stability::sum(numerator, times_s_to(2 + integrates, unit));
+    result.direct_rest = cells(numerator);
+  }
   if (!result.has_lag) return result;
   const Polynomial rest = stability::scaled(Polynomial(lag.begin() + 1, lag.end()), 1 / loop.mass_kg);
   result.g = cells(times_s_to(integrates, rest));
@@ -68,7 +76,8 @@ std::vector<double> least(const std::optional<KernelCells>& by_size,
 
 }  // namespace
 
-ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices) {
+ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices,
+                       bool is_sampled) {
   ErrorLoops loops;
   if (tracking.gains.delay_s > 0) {
     loops.refusal = "the loop has a delay, whose kernel has no enclosure: set [lag] delay_s = 0";
@@ -86,13 +95,16 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
       loops.refusal = "Lambda or K couples the axes";
       return loops;
     }
+    double period_s = 0;
     if (const auto sampled = sampled_axis_loop(tracking.gains, tracking.plant, axis)) {
       loop->Ki = stability::effective_Ki(*sampled);
+      if (is_sampled) period_s = up(sampled->period_s);
     }
     loops.axis[axis] =
-        last && same_loop(*loop, *last) ? loops.axis[axis - 1] : error_loop(*loop, slice_s, slices);
+        last && same_loop(*loop, *last) ? loops.axis[axis - 1] : error_loop(*loop, period_s, slice_s, slices);
     const ErrorLoop& made = loops.axis[axis];
-    if (!made.h1 || !made.h2 || (made.has_lag && (!made.g1 || !made.g2 || !made.h3))) {
+    if (!made.h1 || !made.h2 || (made.has_lag && (!made.g1 || !made.g2 || !made.h3)) ||
+        (made.period_s > 0 && !made.direct_rest)) {
       loops.refusal =
           std::string("the loop of axis ") + stability::axis_name(axis) + " is not verifiably stable";
       return loops;

@@ -13,28 +13,37 @@ namespace swarmcert::analysis {
 
 using stability::Interval;
 
-/// One axis of the continuous loop without delay: m D e = s (f_a - f_hat) + s (L - 1)(f_a - m p_d''), with f_a the
-/// force that acts, f_hat what the controller believes, L the lags of its command. So e = h' * (f_a - f_hat) + g' * w
-/// with
+/// One axis of the loop that flies, without delay: m D e = s (f_a - f_hat + m x) + s (L - 1)(f_a - m p_d''), with f_a
+/// the force that acts, f_hat what the controller believes, L the lags of its command. x is what the command, an
+/// acceleration that a sampled loop holds over its period, differs from the continuous law's (hold_error.h); in a
+/// continuous loop it is 0. So e = h' * (f_a - f_hat + m x) + g' * w with
 ///   h = L^-1[1/(m D)] (command channel),   g = L^-1[(L - 1)/(m D)],   w = f_a - m p_d''.
 /// Each entry bounds its kernel in real arithmetic. h and g, which do not decay where Ki = 0, may be missing.
 struct ErrorLoop {
   std::optional<stability::KernelCells> h, h1, h2;  ///< h, h', h''
   std::optional<stability::KernelCells> h3;         ///< h'''; missing where there is no lag
   std::optional<stability::KernelCells> g, g1, g2;  ///< all missing where there is no lag
+  /// e'' is 1/m times w where there is a lag, of f_a - f_hat + m x where there is none, less this kernel's answer to
+  /// it, and with a lag h''' * (f_a - f_hat + m x).
+  std::optional<stability::KernelCells> direct_rest;  ///< missing where the loop is continuous
   bool has_lag = false;
+  double mass_kg = 0;
   double Kp = 0, Kd = 0, Ki = 0;
-  double lags_s = 0;  ///< sum of the time constants
+  double lags_s = 0;    ///< sum of the time constants
+  double period_s = 0;  ///< of a sampled loop; 0: continuous
 };
 
 struct ErrorLoops {
   ErrorLoop axis[3];
   std::string refusal;  ///< why there are none; empty where there are
+  bool is_sampled() const { return axis[0].period_s > 0; }
 };
 
 /// The loops of all axes, their kernels over `slices` slices, with the integral gain as the firmware's step makes it
 /// act.
-ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices);
+/// @param is_sampled the command is held over a period of the gains' rate; else the law is continuous.
+ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices,
+                       bool is_sampled = false);
 
 /// Bounds of |e| and |e'| at the times of each slice.
 struct ErrorHistory {

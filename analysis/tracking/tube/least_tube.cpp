@@ -30,8 +30,10 @@ class Trial {
     for (int i = 0; i < scene_.vehicles(); ++i) {
       const auto at = static_cast<std::size_t>(i);
       const std::array<ErrorHistory, 3>& other = others_[at];
+      const std::array<ErrorHistory, 3> hold = scene_.hold_errors(i, radii, force_N, truth_);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const ErrorHistory history = axis == 2 ? scene_.errors_z(i, force_N, other[2]) : other[axis];
+        ErrorHistory history = axis == 2 ? scene_.errors_z(i, force_N, other[2]) : other[axis];
+        history.add(hold[axis]);
         result.position_m[at][axis] = history.largest_position_m();
         result.velocity_m_s[at][axis] = history.largest_velocity_m_s();
       }

@@ -22,14 +22,15 @@ struct LeastTube {
 };
 
 /// Looks for the least radii r with B(r) < r, entry by entry, where B(r) are the bounds of e and e' that the force
-/// error within r allows (Scene::errors_z(), Scene::other_errors()).
+/// error within r allows (Scene::errors_z(), Scene::other_errors(), Scene::hold_errors()).
 ///
 /// Why such a tube holds. Errors start at zero and are continuous. Were one to leave the tube, there would be a first
 /// time t at which one reaches its radius; until then every state lies in the tube, the controller and the network have
 /// seen nothing else, and so the errors up to t are at most B(r) < r: a contradiction. This needs the loop of
-/// error_loops.h to be the one that flies: continuous position loop, exact measurements, thrust not saturated, axes
-/// uncoupled, the integrator within its limit (see LocalTube::assumptions). f_hat may be a staircase: that its states
-/// are up to Scene::network_age_s() old is in the bounds of the force error.
+/// error_loops.h to be the one that flies: continuous, or sampled with its first command at t = 0; exact measurements,
+/// thrust not saturated, axes uncoupled, the integrator within its limit (see LocalTube::assumptions). That the sampled
+/// loop acts on states of the last period is in Scene::hold_errors() and Scene::network_age_s(). f_hat may be a
+/// staircase: that its states are up to Scene::network_age_s() old is in the bounds of the force error.
 ///
 /// How it is found. B is monotone, so r <- B(r) from r = 0 rises to the least fixed point; the bounds of the force
 /// error are prepared for a larger tube, and cheap inside it. A tube that is proved is the larger one of the next

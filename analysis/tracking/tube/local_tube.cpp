@@ -10,8 +10,6 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 /// How much wider than the tube the box is on which local constants are sought.
@@ -76,15 +74,16 @@ double ForceErrorBounds::least_m() const {
   return std::min({by_rate_m, by_amplitude_m, by_edges_m, by_impulse_m, by_slices_m});
 }
 
-LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,
-                     const files::Network& network, const stability::Task& task, int vehicles,
-                     const LocalTubeOptions& options) {
+namespace {
+
+LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability::Model& truth,
+                       const files::Network& network, const stability::Task& task, int vehicles,
+                       const LocalTubeOptions& options, bool is_sampled) {
   LocalTube result;
-  const stability::Gains& gains = tracking.gains;
-  double age_s = gains.network_latency_s;
-  if (gains.network_rate_hz > 0) age_s = up(up(1 / gains.network_rate_hz) + age_s);
-  const Scene scene(tracking, truth, network, task, vehicles, age_s);
+  const Scene scene(tracking, truth, network, task, vehicles, network_age_s(tracking.gains, is_sampled),
+                    kSlice_s, is_sampled);
   result.why = scene.refusal();
+  result.is_sampled = is_sampled;
   result.duration_s = task.duration_s();
   result.slice_s = scene.motion().slice_s;
   if (!result.why.empty()) return result;
@@ -168,6 +167,18 @@ LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::
     check_tube(scene, constants, result);
   }
   return result;
+}
+
+}  // namespace
+
+LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,
+                     const files::Network& network, const stability::Task& task, int vehicles,
+                     const LocalTubeOptions& options) {
+  if (tracking.gains.rate_hz > 0) {
+    LocalTube sampled = tube_of_loop(tracking, truth, network, task, vehicles, options, true);
+    if (sampled.proved || sampled.cancelled) return sampled;
+  }
+  return tube_of_loop(tracking, truth, network, task, vehicles, options, false);
 }
 
 }  // namespace swarmcert::analysis

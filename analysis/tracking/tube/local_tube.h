@@ -22,12 +22,12 @@ struct LocalTubeOptions {
 };
 
 /// The force error of one vehicle along z within the tube, and what each bound of the reference makes of it. All hold
-/// in real arithmetic for the continuous loop of error_loops.h, from rest, up to the end of the task.
+/// in real arithmetic for the loop of error_loops.h, from rest, up to the end of the task.
 struct ForceErrorBounds {
   int vehicle = 0;
   double amplitude_N = 0, rate_N_s = 0, variation_N = 0,
          impulse_N_s = 0;  ///< sup|eps|, sup|eps'|, TV, int|eps| dt
-  double lag_m = 0;        ///< what the lag of the feed-forward adds to each of the following
+  double lag_m = 0;  ///< what the lag of the feed-forward and the held command add to each of the following
   double by_rate_m = 0, by_amplitude_m = 0, by_edges_m = 0, by_impulse_m = 0;  ///< B1 .. B4
   double by_slices_m = 0;  ///< B2 and B4 slice by slice: LocalTube::slices
   double least_m() const;
@@ -42,8 +42,9 @@ struct TubeRow {
 
 struct LocalTube {
   bool proved = false;
-  std::string why;  ///< where not proved
-  LeastTube tube;   ///< the smallest that follows from all of the following together
+  bool is_sampled = false;  ///< of the loop that holds its command over a period; else of a continuous one
+  std::string why;          ///< where not proved
+  LeastTube tube;           ///< the smallest that follows from all of the following together
   LeastTube
       one_radius;  ///< for the whole flight, from the difference of both forces or from the local constants
   SlicedTube sliced;  ///< from the difference of both forces, an interval per slice
@@ -64,9 +65,9 @@ struct LocalTube {
 /// bounds.
 /// @param tracking gains and model of every vehicle; @param truth what the force really is; @param vehicles 2 to 10.
 /// @param task one whose trajectories have enclosures (Task::over()).
-/// @return an upper bound in real arithmetic of the continuous loop under `assumptions`; where `proved` is false
-/// nothing is
-///   known (inconclusive), for the reason in `why`.
+/// @return an upper bound in real arithmetic of the loop of error_loops.h under `assumptions`: of the sampled loop
+///   where gains state a rate and it is proved for that one, else of the continuous one (LocalTube::is_sampled); where
+///   `proved` is false nothing is known (inconclusive), for the reason in `why`.
 /// @throws files::InputError if the network lacks functions of these vehicles' kind or has no unit of force.
 LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,
                      const files::Network& network, const stability::Task& task, int vehicles,

@@ -92,15 +92,23 @@ Deviations all_within(const Radii& radii) {
   return result;
 }
 
+double network_age_s(const stability::Gains& gains, bool is_sampled) {
+  double age_s = gains.network_latency_s;
+  if (gains.network_rate_hz > 0) age_s = up(up(1 / gains.network_rate_hz) + age_s);
+  if (is_sampled && gains.rate_hz > 0) age_s = up(up(1 / gains.rate_hz) + age_s);
+  return age_s;
+}
+
 Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
-             double longest_slice_s)
+             double longest_slice_s, bool is_sampled)
     : tracking_(tracking),
       network_age_s_(network_age_s),
       learned_(network, tracking.model.kind, vehicles - 1),
       truth_(truth, tracking.plant.largest_thrust_N),
       motion_(sliced(task, vehicles, network_age_s, longest_slice_s)),
-      loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices) : ErrorLoops{}),
+      loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices, is_sampled)
+                                : ErrorLoops{}),
       excess_N_(static_cast<std::size_t>(vehicles), Interval(0)) {
   if (!refusal().empty() || !loops_.axis[2].has_lag) return;
   lag_start_z_ = lag_start(loops_.axis[2], motion_.slice_s);
@@ -211,6 +219,62 @@ ErrorHistory Scene::start_errors(int vehicle) const {
     history.velocity_m_s.push_back((excess_N * lag_start_z_.velocity_m_s[n]).mag());
   }
   return history;
+}
+
+LoopHistory Scene::in_slice(const Stretch& stretch, int slice, std::size_t axis, double force_N,
+                            const TruthSizes& truth, double position_m, double velocity_m_s) const {
+  LoopHistory history;
+  history.position_m = position_m;
+  history.velocity_m_s = velocity_m_s;
+  history.truth_N = truth.force_N[axis].mag();
+  history.force_N = axis == 2 ? force_N : history.truth_N;
+  history.planned_m_s2 = stretch.acceleration_m_s2[axis].mag();
+  history.jerk_m_s3 = stretch.jerk_m_s3[axis];
+  history.time_s = (slice + 1) * motion_.slice_s * (1 + 1e-12);
+  return history;
+}
+
+double Scene::hold_error_N(int vehicle, std::size_t axis, const LoopHistory& history) const {
+  const ErrorLoop& loop = loops_.axis[axis];
+  const int first = motion_.stretch_of[static_cast<std::size_t>(vehicle)].front();
+  const Stretch& stretch = motion_.stretches[static_cast<std::size_t>(first)];
+  const double excess_N = axis == 2 && loop.has_lag ? excess_at_start_N(vehicle).mag() : 0;
+  return analysis::hold_error_N(loop, history, stretch.acceleration_m_s2[axis].mag(), excess_N);
+}
+
+std::array<std::vector<double>, 3> Scene::hold_sizes_N(int vehicle, const Radii& radii,
+                                                       const std::vector<double>& force_N,
+                                                       const std::vector<TruthSizes>& truth) const {
+  std::array<std::vector<double>, 3> sizes;
+  const auto i = static_cast<std::size_t>(vehicle);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    LoopHistory history;
+    for (int n = 0; n < motion_.slices; ++n) {
+      const auto s = static_cast<std::size_t>(motion_.stretch_of[i][static_cast<std::size_t>(n)]);
+      history.add(in_slice(motion_.stretches[s], n, axis, force_N[s], truth[s], radii.position_m[i][axis],
+                           radii.velocity_m_s[i][axis]));
+      sizes[axis].push_back(hold_error_N(vehicle, axis, history));
+    }
+  }
+  return sizes;
+}
+
+std::array<ErrorHistory, 3> Scene::hold_errors(int vehicle, const Radii& radii,
+                                               const std::vector<double>& force_N,
+                                               const std::vector<TruthSizes>& truth) const {
+  std::array<ErrorHistory, 3> result;
+  const auto count = static_cast<std::size_t>(motion_.slices);
+  if (!loops_.is_sampled()) {
+    result.fill({std::vector<double>(count, 0.0), std::vector<double>(count, 0.0)});
+    return result;
+  }
+  std::array<std::vector<double>, 3> sizes_N = hold_sizes_N(vehicle, radii, force_N, truth);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Signal signal;
+    signal.size = std::move(sizes_N[axis]);
+    result[axis] = respond(loops_.axis[axis], false, signal);
+  }
+  return result;
 }
 
 std::vector<double> Scene::by_slice(int vehicle, const std::vector<double>& by_stretch) const {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/tracking/tube/error_loops.h"
+#include "analysis/tracking/tube/hold_error.h"
 #include "analysis/tracking/tube/learned_force.h"
 #include "analysis/tracking/tube/motion.h"
 #include "analysis/tracking/tube/truth_force.h"
@@ -45,13 +45,18 @@ struct TruthSizes {
   std::vector<double> gradient_N_m;  ///< per neighbour, |d f_z / d p_j|; infinite where the field jumps
 };
 
+/// How old the states are, at most, that a prediction rests on when it acts: a period of the network and its latency,
+/// and one of a sampled loop, which acts for that long on what it was told.
+double network_age_s(const stability::Gains& gains, bool is_sampled = false);
+
 class Scene {
  public:
   /// @param network_age_s how old the states are, at most, that a prediction rests on when it acts.
+  /// @param is_sampled see error_loops().
   /// @throws files::InputError as LearnedForce.
   Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
         const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
-        double longest_slice_s = kSlice_s);
+        double longest_slice_s = kSlice_s, bool is_sampled = false);
 
   const stability::TrackingSetup& tracking() const { return tracking_; }
   const LearnedForce& learned() const { return learned_; }
@@ -80,6 +85,18 @@ class Scene {
   /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's
   /// lag and the rotors' start, and along x and y the truth itself.
   std::array<ErrorHistory, 3> other_errors(int vehicle, const std::vector<TruthSizes>& truth) const;
+  /// What one axis adds to its history in one slice.
+  LoopHistory in_slice(const Stretch& stretch, int slice, std::size_t axis, double force_N,
+                       const TruthSizes& truth, double position_m, double velocity_m_s) const;
+  /// hold_error_N() of a vehicle's axis.
+  double hold_error_N(int vehicle, std::size_t axis, const LoopHistory& history) const;
+  /// The same slice by slice while all are within `radii`. @param force_N of |f_hat - f_a| along z, per stretch.
+  std::array<std::vector<double>, 3> hold_sizes_N(int vehicle, const Radii& radii,
+                                                  const std::vector<double>& force_N,
+                                                  const std::vector<TruthSizes>& truth) const;
+  /// Bounds of the errors that hold_sizes_N() causes; nothing to add where the loop is continuous.
+  std::array<ErrorHistory, 3> hold_errors(int vehicle, const Radii& radii, const std::vector<double>& force_N,
+                                          const std::vector<TruthSizes>& truth) const;
   /// One number per slice from one per stretch.
   std::vector<double> by_slice(int vehicle, const std::vector<double>& by_stretch) const;
   /// Of |e_z| while |f_hat - f_a| is at most `force_N` (per stretch), `other` included.

@@ -55,6 +55,7 @@ Deviations hull_of(const Deviations& a, const Deviations& b) {
 struct Axis {
   const ErrorLoop* loop = nullptr;
   std::vector<Interval> force, lagging;  ///< d and w, slices so far
+  LoopHistory met;                       ///< likewise
   const LagStart* start = nullptr;       ///< of the rotors; null: there is none
   Interval excess_N{0};                  ///< their thrust beyond the weight at the start
   Interval position_m, velocity_m_s;     ///< from the slices before
@@ -139,6 +140,8 @@ class Sweep {
     Interval difference_N;  ///< f_hat - f_a
     TruthSizes truth;
     Interval lagging_N[3];
+    LoopHistory met[3];            ///< up to the end of the slice
+    double hold_N[3] = {0, 0, 0};  ///< bounds |m x|
   };
   using Signals = std::vector<Signal>;
 
@@ -152,13 +155,21 @@ class Sweep {
     signal.difference_N = difference.over(seen);
     signal.truth = scene_.truth_sizes(stretch, seen);
     const Interval mass_kg(scene_.tracking().plant.mass_kg);
-    for (std::size_t k = 0; k < 3; ++k)
+    const auto i = static_cast<std::size_t>(vehicle);
+    for (std::size_t k = 0; k < 3; ++k) {
       signal.lagging_N[k] = signal.truth.force_N[k] - mass_kg * stretch.acceleration_m_s2[k];
+      signal.met[k] = axes_[i][k].met;
+      signal.met[k].add(scene_.in_slice(stretch, slice, k, signal.difference_N.mag(), signal.truth,
+                                        seen[i].position_m[k].mag(), seen[i].velocity_m_s[k].mag()));
+      signal.hold_N[k] = scene_.hold_error_N(vehicle, k, signal.met[k]);
+    }
     return signal;
   }
 
   static Interval force(const Signal& signal, std::size_t axis) {
-    return axis == 2 ? -signal.difference_N : signal.truth.force_N[axis];
+    const Interval known = axis == 2 ? -signal.difference_N : signal.truth.force_N[axis];
+    const double hold_N = signal.hold_N[axis];
+    return hold_N > 0 ? known + Interval(-hold_N, hold_N) : known;
   }
 
   Deviations answers(const Signals& signals) const {
@@ -177,6 +188,7 @@ class Sweep {
       for (std::size_t k = 0; k < 3; ++k) {
         axes_[i][k].force.push_back(force(signals[i], k));
         axes_[i][k].lagging.push_back(signals[i].lagging_N[k]);
+        axes_[i][k].met = signals[i].met[k];
       }
       tube.force_error_N[i].push_back(signals[i].difference_N);
       tube.truth[i].push_back(signals[i].truth);

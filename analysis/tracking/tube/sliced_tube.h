@@ -24,7 +24,8 @@ struct SlicedTube {
 ///
 /// The loop of error_loops.h gives, for t in slice n,
 ///   e(t) = (h' * d)(t) + (g' * w)(t),   e'(t) = (h'' * d)(t) + (g'' * w)(t),   w = f_a - m p_d'',
-/// with d = f_a - f_hat along z and d = f_a along x and y. A convolution is linear: where the signals of cell k lie in
+/// with d = f_a - f_hat + m x along z and d = f_a + m x along x and y; of x only a bound of its size is known
+/// (hold_error.h), from all that was met so far. A convolution is linear: where the signals of cell k lie in
 /// intervals D_k and W_k, errors lie in sums over the kernel's cells m of
 ///   net_m c + [-1, 1] |.|_m r,   c -+ r = D_{n-m} u D_{n-m-1}   (kernel_cells.h: answer()).
 /// So what is known of the signals, the feed-forward and the predicted part of the forces, moves the middle of the

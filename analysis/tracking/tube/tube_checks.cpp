@@ -44,15 +44,22 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const ErrorLoop& loop = scene.loops().axis[axis];
     std::vector<double> error_N, lagged_N, planned_m_s2, jerk_m_s3;
+    LoopHistory met;
     for (const int s : motion.stretch_of[i]) {
       const auto at = static_cast<std::size_t>(s);
       const double truth_N = tube.tube.truth[at].force_N[axis].mag();
       error_N.push_back(axis == 2 ? tube.tube.force_N[at] : truth_N);
+      met.add(scene.in_slice(motion.stretches[at], motion.slices - 1, axis, error_N.back(),
+                             tube.tube.truth[at], tube.tube.radii.position_m[i][axis],
+                             tube.tube.radii.velocity_m_s[i][axis]));
       planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis].mag());
       jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis]);
       lagged_N.push_back(up(truth_N + up(mass_kg * planned_m_s2.back())));
     }
-    // int e = h * (f_a - f_hat) + g * w
+    const double hold_N = scene.hold_error_N(vehicle, axis, met);
+    if (hold_N > 0)
+      for (double& x : error_N) x = up(x + hold_N);
+    // int e = h * (f_a - f_hat + m x) + g * w
     if (loop.h) result.integral_m_s[axis] = largest(convolved(*loop.h, error_N));
     if (loop.g && loop.Ki > 0)
       result.integral_m_s[axis] = up(result.integral_m_s[axis] + largest(convolved(*loop.g, lagged_N)));
@@ -62,7 +69,8 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
       result.integral_m_s[axis] =
           up(result.integral_m_s[axis] + times(up(excess_N * loop.lags_s), loop.h->peak));
     }
-    const double feedback = up(times(loop.Kp, tube.tube.radii.position_m[i][axis]) +
+    // A held command differs from the continuous law's by x.
+    const double feedback = up(up(hold_N / mass_kg) + times(loop.Kp, tube.tube.radii.position_m[i][axis]) +
                                up(times(loop.Kd, tube.tube.radii.velocity_m_s[i][axis]) +
                                   times(loop.Ki, result.integral_m_s[axis])));
     // A lag is a mean over the past: it moves w by at most its time constants times sup |w'|, or by twice sup |w|.
@@ -77,6 +85,8 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
       lag_N = up(2 * truth_N + up(mass_kg * std::min(2 * planned, by_jerk)));
     }
     result.acceleration_m_s2[axis] = up(feedback + up(up(up(largest(error_N) + lag_N) + excess_N) / mass_kg));
+    result.integral_m_s[axis] =
+        up(result.integral_m_s[axis] + sum_excess_m_s(loop, met, result.acceleration_m_s2[axis]));
     // f_hat = f_a + (f_hat - f_a) is fed forward along z.
     double fed_N = 0;
     if (axis == 2) {
@@ -231,8 +241,17 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
     tube.assumptions.push_back({name, status, note});
   };
   add("the force is that of the declared truth", "assumed", "enclosed at every state of the tube");
-  add("continuous position loop, axes apart, first-order lags", "assumed",
-      "Ki as the firmware's step makes it act; sampling and the tilt of the thrust are left out");
+  if (scene.loops().is_sampled()) {
+    add("sampled position loop, axes apart, first-order lags", "assumed",
+        fmt::format("the hold of the command over {:.3g} s and the integrator's steps are in the bounds; the "
+                    "tilt of the thrust is left out",
+                    scene.loops().axis[2].period_s));
+  } else {
+    add("continuous position loop, axes apart, first-order lags", "assumed",
+        gains.rate_hz > 0
+            ? "no tube was proved for the sampled loop; sampling and the tilt of the thrust are left out"
+            : "the gains state no rate; the tilt of the thrust is left out");
+  }
   const double truth_lag_s = scene.truth().motor_lag_s();
   if (std::abs(truth_lag_s - gains.motor_lag_s) > 0.01 * truth_lag_s) {
     add("motors lag as in [lag]", "assumed",
@@ -271,6 +290,9 @@ void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants
   if (tube.sliced.proved) tube.slices = tube.sliced.slices;
   for (int i = 0; i < scene.vehicles(); ++i) {
     std::array<ErrorHistory, 3> history = scene.other_errors(i, tube.tube.truth);
+    const std::array<ErrorHistory, 3> hold =
+        scene.hold_errors(i, tube.tube.radii, tube.tube.force_N, tube.tube.truth);
+    for (std::size_t axis = 0; axis < 3; ++axis) history[axis].add(hold[axis]);
     const ErrorHistory lag = history[2];
     history[2] = scene.errors_z(i, tube.tube.force_N, lag);
     add_slices(history, static_cast<std::size_t>(i), tube.slices);

@@ -1,4 +1,5 @@
-/// @file Flights of the loop that tubes are about: continuous, axes apart, first-order lags, predictions a staircase.
+/// @file Flights of the loop that tubes are about: axes apart, first-order lags, predictions a staircase; continuous, or
+/// with a command held over a period of the gains' rate and the firmware's integrator.
 #pragma once
 
 #include <array>
@@ -13,15 +14,20 @@
 
 namespace swarmcert::tests {
 
-/// Runge-Kutta in steps of a millisecond. When each vehicle predicts is random; predictions reach the controller late.
-class ContinuousFlight {
+/// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts is random; predictions reach the controller late.
+class AxesFlight {
  public:
   /// Called with the time, the vehicle, e and e'.
   using Look = std::function<void(double, int, const std::array<double, 3>&, const std::array<double, 3>&)>;
 
-  ContinuousFlight(const stability::TrackingSetup& tracking, const stability::Model& truth,
-                   const files::Network& network, const stability::Task& task, int vehicles)
-      : gains_(tracking.gains), task_(task), vehicles_(vehicles), forces_(network, truth) {
+  AxesFlight(const stability::TrackingSetup& tracking, const stability::Model& truth,
+             const files::Network& network, const stability::Task& task, int vehicles,
+             bool is_sampled = false)
+      : gains_(tracking.gains),
+        task_(task),
+        vehicles_(vehicles),
+        is_sampled_(is_sampled),
+        forces_(network, truth) {
     for (int k = 0; k < 3; ++k) {
       loops_[k] = *axis_loop(gains_, tracking.plant, k);
       if (const auto sampled = sampled_axis_loop(gains_, tracking.plant, k))
@@ -38,6 +44,8 @@ class ContinuousFlight {
       predicted.push_back(forces_.learned(forces_.at(state(now, i, 0), vehicles_ - 1)));
     }
     acting = predicted;
+    const int every = is_sampled_ ? static_cast<int>(std::lround(1 / (gains_.rate_hz * kStep_s))) : 0;
+    std::vector<std::array<double, 3>> sums(now.size()), held(now.size());
     const int steps = static_cast<int>(std::lround(task_.duration_s() / kStep_s));
     for (int s = 0; s < steps; ++s) {
       const double t = s * kStep_s;
@@ -50,13 +58,25 @@ class ContinuousFlight {
         // next_s - period_s is when the last prediction was made.
         if (t > next_s[at] - period_s + gains_.network_latency_s - kStep_s / 2) acting[at] = predicted[at];
       }
+      for (int i = 0; i < vehicles_ && every > 0 && s % every == 0; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        const double learned =
+            period_s > 0 ? acting[at] : forces_.learned(forces_.at(state(now, i, t), vehicles_ - 1));
+        for (std::size_t k = 0; k < 3; ++k) {
+          sums[at][k] += every * kStep_s * now[at][k][0];
+          Axis sampled = now[at][k];
+          sampled[2] = sums[at][k];
+          held[at][k] = command(sampled, k, task_.at(i, t).a_W_m_s2, learned);
+        }
+      }
       const auto rate = [&](const std::vector<Vehicle>& x, double time_s) {
         std::vector<Vehicle> result(x.size());
         for (int i = 0; i < vehicles_; ++i) {
           const auto at = static_cast<std::size_t>(i);
           const stability::Instant instant = forces_.at(state(x, i, time_s), vehicles_ - 1);
           result[at] = derivative(x[at], task_.at(i, time_s).a_W_m_s2, forces_.truth(instant),
-                                  period_s > 0 ? acting[at] : forces_.learned(instant));
+                                  period_s > 0 ? acting[at] : forces_.learned(instant),
+                                  every > 0 ? &held[at] : nullptr);
         }
         return result;
       };
@@ -86,16 +106,22 @@ class ContinuousFlight {
     return x;
   }
 
+  double command(const Axis& a, std::size_t k, const Eigen::Vector3d& planned, double learned) const {
+    const stability::AxisLoop& loop = loops_[k];
+    return loop.mass_kg * (planned[static_cast<int>(k)] - loop.Kp * a[0] - loop.Kd * a[1] - loop.Ki * a[2]) -
+           (k == 2 ? learned : 0);
+  }
+
+  /// @param held the command along each axis; null: it follows the state.
   Vehicle derivative(const Vehicle& x, const Eigen::Vector3d& planned, const Eigen::Vector3d& force,
-                     double learned) const {
+                     double learned, const std::array<double, 3>* held) const {
     Vehicle result{};
     for (int k = 0; k < 3; ++k) {
       const auto at = static_cast<std::size_t>(k);
       const stability::AxisLoop& loop = loops_[at];
       const Axis& a = x[at];
       Axis& d = result[at];
-      double applied = loop.mass_kg * (planned[k] - loop.Kp * a[0] - loop.Kd * a[1] - loop.Ki * a[2]) -
-                       (k == 2 ? learned : 0);
+      double applied = held != nullptr ? (*held)[at] : command(a, at, planned, learned);
       std::size_t c = 3;
       for (const double tau_s : loop.lags_s) {
         if (tau_s <= 0) continue;
@@ -133,6 +159,7 @@ class ContinuousFlight {
   const stability::Gains& gains_;
   const stability::Task& task_;
   int vehicles_;
+  bool is_sampled_;
   Forces forces_;
   std::array<stability::AxisLoop, 3> loops_;
 };
