@@ -5,16 +5,19 @@
 namespace swarmcert::residuals {
 namespace {
 
-constexpr std::size_t kCapacity = 256;
+constexpr int kCapacity = 256;
+
+/// One number per record of a window, on the stack: every record of every fit comes here.
+using WindowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCapacity, 1>;
 
 /// Weights whose product with values is the derivative of order `order` (1, 2) of the polynomial of that degree fitted
 /// to them; by the orthogonal polynomials of the times.
-Eigen::VectorXd derivative_weights(const Eigen::VectorXd& times_s, int order) {
-  const Eigen::VectorXd t = times_s.array() - times_s.mean();
+WindowVector derivative_weights(const WindowVector& times_s, int order) {
+  const WindowVector t = times_s.array() - times_s.mean();
   const double tt = t.squaredNorm();
   if (order == 1) return t / tt;
-  const Eigen::VectorXd square = t.cwiseAbs2();
-  const Eigen::VectorXd second = square.array() - square.mean() - t.array() * (square.dot(t) / tt);
+  const WindowVector square = t.cwiseAbs2();
+  const WindowVector second = square.array() - square.mean() - t.array() * (square.dot(t) / tt);
   return 2 * second / second.dot(square);
 }
 
@@ -57,22 +60,25 @@ void SmoothingWindow::average(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values
   has_past_ = true;
   last_s_ = time_s;
   last_ = values;
-  values = order_ == 2 ? twice_ : once_;
+  if (order_ == 2)
+    values = twice_;
+  else
+    values = once_;
   differentiate(time_s, values);
 }
 
 void SmoothingWindow::differentiate(double time_s, Eigen::Ref<Eigen::Matrix3Xd> values) {
   if (history_.size() == 0) history_.resize(values.size(), kCapacity);
-  if (times_s_.size() == kCapacity) {  // keep what the window still covers, at most half
-    const std::size_t kept = std::min(kCapacity / 2, times_s_.size() - first_);
+  if (times_s_.size() == std::size_t{kCapacity}) {  // keep what the window still covers, at most half
+    const std::size_t kept = std::min(std::size_t{kCapacity} / 2, times_s_.size() - first_);
     const auto columns = static_cast<Eigen::Index>(kept);
     history_.leftCols(columns) =
         history_.middleCols(static_cast<Eigen::Index>(times_s_.size() - kept), columns).eval();
     times_s_.erase(times_s_.begin(), times_s_.end() - static_cast<std::ptrdiff_t>(kept));
     first_ = 0;
   }
-  history_.col(static_cast<Eigen::Index>(times_s_.size())) =
-      Eigen::Map<const Eigen::VectorXd>(Eigen::Matrix3Xd(values).data(), values.size());
+  Eigen::Map<Eigen::Matrix3Xd>(history_.col(static_cast<Eigen::Index>(times_s_.size())).data(), 3,
+                               values.cols()) = values;
   times_s_.push_back(time_s);
   while (times_s_[first_] < time_s - length_s_) ++first_;
   const auto count = static_cast<Eigen::Index>(times_s_.size() - first_);
@@ -80,11 +86,16 @@ void SmoothingWindow::differentiate(double time_s, Eigen::Ref<Eigen::Matrix3Xd> 
     values.setZero();
     return;
   }
-  const Eigen::VectorXd t =
+  const WindowVector t =
       Eigen::Map<const Eigen::VectorXd>(times_s_.data() + first_, count).array() - times_s_[first_];
-  const Eigen::VectorXd mean =
-      history_.middleCols(static_cast<Eigen::Index>(first_), count) * derivative_weights(t, order_);
-  values = Eigen::Map<const Eigen::Matrix3Xd>(mean.data(), 3, values.cols());
+  const WindowVector weights = derivative_weights(t, order_);
+  const auto window = history_.middleCols(static_cast<Eigen::Index>(first_), count);
+  if (values.outerStride() == values.rows()) {
+    Eigen::Map<Eigen::VectorXd>(values.data(), values.size()).noalias() = window * weights;
+  } else {
+    const Eigen::VectorXd mean = window * weights;
+    values = Eigen::Map<const Eigen::Matrix3Xd>(mean.data(), 3, values.cols());
+  }
 }
 
 }  // namespace swarmcert::residuals
