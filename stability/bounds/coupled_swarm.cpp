@@ -7,6 +7,7 @@
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/toml.h"
+#include "stability/bounds/estimate_motion.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -60,16 +61,18 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
   return swarm;
 }
 
-CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant) {
+CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
+                      const OtherErrors& estimates) {
   const std::optional<AxisLoop> loop = axis_loop(gains, plant, 2);
   if (!loop) throw std::invalid_argument("Lambda or K couples the z axis to others");
   AxisLoop acting = *loop;
   if (const auto sampled = sampled_axis_loop(gains, plant, 2)) acting.Ki = effective_Ki(*sampled);
   const RateGains rate = rate_gains(acting);
-  const std::vector<LoopGains> loops(static_cast<std::size_t>(swarm.vehicles),
-                                     {rate.position, rate.velocity, rate.acceleration});
+  const auto vehicles = static_cast<std::size_t>(swarm.vehicles);
+  const std::vector<LoopGains> loops(vehicles, {rate.position, rate.velocity, rate.acceleration});
   CoupledVerdict verdict;
-  verdict.small_gain = small_gain(loops, swarm.couplings);
+  verdict.own = estimate_motion(acting, estimates);
+  verdict.small_gain = small_gain(loops, swarm.couplings, std::vector<OwnMotion>(vehicles, verdict.own));
   if (!verdict.small_gain.proved)
     verdict.unstable = find_unstable_swarm(acting, swarm.vehicles, swarm.couplings);
   return verdict;

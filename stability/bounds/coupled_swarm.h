@@ -24,14 +24,18 @@ CoupledSwarm read_coupled_swarm(const std::string& path);
 
 struct CoupledVerdict {
   SmallGain small_gain;
+  OwnMotion own;  ///< of every vehicle, by errors of its estimates
   /// Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
   std::optional<UnstableSwarm> unstable;
   bool is_refuted() const { return unstable && unstable->is_declared; }
 };
 
 /// Small gain of the z loops (continuous, command channel, the integrator as it acts when sampled) of vehicles that all
-/// have these gains.
+/// have these gains. The couplings hold for how vehicles really move; what a network makes of wrong estimates of its
+/// inputs is not in them, and belongs into cross_rate_N_s.
+/// @param estimates velocity_error and position_error of every vehicle's z axis; nothing else of it is read.
 /// @throws std::invalid_argument if Lambda or K couples the z axis to others.
-CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant);
+CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
+                      const OtherErrors& estimates = {});
 
 }  // namespace swarmcert::stability

@@ -43,6 +43,27 @@ void enclose(const MatrixXd& Gamma, double& lower, double& upper) {
   lower = std::max(0.0, ratio.minCoeff() * (1 - 1e-14 * static_cast<double>(n)));
 }
 
+/// What the references' motion and the vehicles' own make of the couplings, per vehicle, N/s.
+VectorXd rates_from_outside(std::size_t vehicles, const std::vector<Coupling>& couplings,
+                            const std::vector<OwnMotion>& own) {
+  VectorXd b = VectorXd::Zero(static_cast<Index>(vehicles));
+  for (const Coupling& c : couplings) {
+    double speed_m_s = c.speed_m_s;
+    double acceleration_m_s2 = c.acceleration_m_s2;
+    for (const int vehicle : {c.on, c.by}) {
+      if (own.empty()) break;
+      const OwnMotion& motion = own[static_cast<std::size_t>(vehicle)];
+      speed_m_s += motion.speed_m_s;
+      acceleration_m_s2 += motion.acceleration_m_s2;
+    }
+    // A coupling that is absent feels no motion, not even an unbounded one.
+    if (c.position_N_m > 0) b[c.on] += c.position_N_m * speed_m_s;
+    if (c.velocity_N_s_m > 0) b[c.on] += c.velocity_N_s_m * acceleration_m_s2;
+    b[c.on] += c.cross_rate_N_s;
+  }
+  return b;
+}
+
 bool closes(const MatrixXd& Gamma) {
   double lower = 0;
   double upper = 0;
@@ -65,7 +86,8 @@ void check_couplings(const std::vector<Coupling>& couplings, int vehicles) {
   }
 }
 
-SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings) {
+SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings,
+                     const std::vector<OwnMotion>& own) {
   const auto n = static_cast<Index>(loops.size());
   check_couplings(couplings, static_cast<int>(n));
   SmallGain result;
@@ -97,14 +119,13 @@ SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coup
     }
     return result;
   }
-  VectorXd b = VectorXd::Zero(n);
-  for (const Coupling& c : couplings) {
-    b[c.on] += c.position_N_m * c.speed_m_s + c.velocity_N_s_m * c.acceleration_m_s2 + c.cross_rate_N_s;
-  }
-  const VectorXd D = (MatrixXd::Identity(n, n) - Gamma).partialPivLu().solve(b);
-  for (Index i = 0; i < n; ++i) {
-    result.rate_N_s.push_back(D[i]);
-    result.error_m.push_back(loops[static_cast<std::size_t>(i)].position * D[i]);
+  const VectorXd b = rates_from_outside(loops.size(), couplings, own);
+  const VectorXd D = b.allFinite() ? VectorXd((MatrixXd::Identity(n, n) - Gamma).partialPivLu().solve(b))
+                                   : VectorXd(VectorXd::Constant(n, std::numeric_limits<double>::infinity()));
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    const double rate_N_s = D[static_cast<Index>(i)];
+    result.rate_N_s.push_back(rate_N_s);
+    result.error_m.push_back(loops[i].position * rate_N_s + (own.empty() ? 0 : own[i].error_m));
   }
   return result;
 }

@@ -27,6 +27,13 @@ struct LoopGains {
   double acceleration = 0;  ///< |h''|_1, m/s^2
 };
 
+/// How far a vehicle moves, in the long run, by what disturbs it beside the couplings: sup |e|, |e'| and |e''|.
+struct OwnMotion {
+  double error_m = 0;
+  double speed_m_s = 0;
+  double acceleration_m_s2 = 0;
+};
+
 struct SmallGain {
   std::vector<std::vector<double>> Gamma;
   double spectral_radius_upper = 0;  ///< proved: max over rows of (Gamma x)_i / x_i for a positive x
@@ -34,7 +41,7 @@ struct SmallGain {
   bool proved = false;               ///< spectral_radius_upper < 1
   std::vector<double>
       rate_N_s;  ///< where proved: D with |eps_i'| <= D_i in the long run, D <= (I - Gamma)^-1 b
-  std::vector<double> error_m;  ///< position gain times D_i
+  std::vector<double> error_m;  ///< position gain times D_i, and the vehicle's own error_m
   /// Where not proved: by what common factor all entries of Gamma would have to shrink, and for each coupling by what
   /// factor it alone would have to; 0 where even removing it does not suffice.
   double missing_factor = 1;
@@ -43,10 +50,12 @@ struct SmallGain {
 
 /// Gamma_ij = Lp_ij g1 + Lv_ij g2 (i != j), Gamma_ii = sum_j Gamma_ij, b_i = sum_j (Lp_ij V_ij + Lv_ij A_ij + cross):
 /// if the spectral radius of Gamma is below 1, D <= (I - Gamma)^-1 b (asymptotically: transients add what decays).
+/// V_ij and A_ij are those of the references and, as loops are linear, of both vehicles' own motion.
 /// Says nothing where it is not: small gain is sufficient, not necessary.
-/// @param loops one per vehicle.
+/// @param loops one per vehicle. @param own one per vehicle, or none; where it is infinite, so are all bounds.
 /// @throws std::invalid_argument if a coupling names a vehicle that is not there, or a negative number.
-SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings);
+SmallGain small_gain(const std::vector<LoopGains>& loops, const std::vector<Coupling>& couplings,
+                     const std::vector<OwnMotion>& own = {});
 
 /// @throws std::invalid_argument if a coupling names a vehicle that is not there, or a negative number.
 void check_couplings(const std::vector<Coupling>& couplings, int vehicles);

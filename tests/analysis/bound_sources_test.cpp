@@ -294,6 +294,28 @@ TEST(BoundCommand, CoupledAxesAreNamedAndWhatNeedsASingleAxisIsRefused) {
   EXPECT_EQ(one_axis["verified"].size(), 4u);
 }
 
+TEST(BoundCommand, ASwarmsBoundContainsTheErrorsOfItsEstimatesOrSaysWhichAreMissing) {
+  const ScratchFolder folder;
+  const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");
+  const std::string proved =
+      "bound" + gains + " --swarm " + kSourceFolder + "/stability/bounds/swarms/one-way-pair.toml";
+  const Json exact = json_of(folder, proved)["swarm"];
+  EXPECT_EQ(exact["of_estimates"]["error_m"], 0);
+  const Json errs = json_of(folder, proved + " --velocity-error 0.1 --position-error 0.01")["swarm"];
+  EXPECT_EQ(errs["verdict"], "proved");
+  for (std::size_t vehicle = 0; vehicle < 2; ++vehicle) {
+    const double own_m = errs["of_estimates"]["error_m"].get<double>();
+    EXPECT_GT(own_m, 0.01);
+    EXPECT_GE(errs["error_m"][vehicle].get<double>(), exact["error_m"][vehicle].get<double>() + own_m);
+  }
+  for (const std::string& options : {std::string(" --velocity-error-edge 0.1 --position-error-rate 1"),
+                                     std::string(" --velocity-error-impulse 0.1")}) {
+    const Outcome missing = run_shell("swarmcert " + proved + options, folder.path());
+    EXPECT_EQ(missing.exit_code, 2) << options << missing.output;
+    EXPECT_NE(missing.output.find("--position-error P"), std::string::npos) << missing.output;
+  }
+}
+
 TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");

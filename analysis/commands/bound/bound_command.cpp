@@ -76,8 +76,8 @@ void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, co
   }
 }
 
-/// The tubes and the swarm bound start from rest; the tube around a task and the swarm know exact estimates, and that
-/// tube no force but that of the declared truth. What they would leave out is refused.
+/// The tubes start from rest; the tube around a task knows exact estimates, and no force but that of the declared truth.
+/// What they or the swarm bound would leave out is refused.
 void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
   const auto refuse = [](const char* what, const char* without) {
     throw UsageError(fmt::format("{} does not contain {}: leave one of them out", what, without));
@@ -99,9 +99,6 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
   }
   if (has_task && (source.kind == "declared" || source.kind == "measured")) {
     refuse(asked, "the force error of --rate, --amplitude, --edge, --impulse, --bias or --from");
-  }
-  if (!options.swarm.empty() && source.has_estimate_errors()) {
-    refuse("--swarm", estimates);
   }
 }
 
@@ -158,7 +155,7 @@ void add_extras(const BoundOptions& options, const CommonOptions& common, const 
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
   if (local) result["local_tube"] = local_tube_json(options.task, *local);
-  if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm);
+  if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm, source);
 }
 
 /// The extras as text, where there are any.
@@ -283,7 +280,9 @@ Command bound_command() {
                      "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "
                      "trajectories that the network and the truth prove");
         declare_tube(app, options->task);
-        app.add_option("--swarm", options->swarm, "swarm.toml: do the vehicles' mutual forces stay bounded?");
+        app.add_option(
+            "--swarm", options->swarm,
+            "swarm.toml: do the vehicles' mutual forces stay bounded? Errors of the estimates count");
         add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
         return [options, uncertain](const CommonOptions& common) {
           options->is_uncertain = uncertain->count() > 0;

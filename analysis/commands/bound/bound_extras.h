@@ -38,8 +38,10 @@ files::Json tube_json(const Tracking& input, const stability::DisturbanceSource&
 /// --swarm FILE (schema swarmcert/swarm/1): vehicles = N, [[coupling]] on, by, position_N_m, velocity_N_s_m, speed_m_s,
 /// acceleration_m_s2, cross_rate_N_s, direction = "apart" | "together" where the force's sign is known; every vehicle
 /// has the gains and the model given, its z loop is studied. Refuted: the forces as stated, with their directions, make
-/// errors grow in a simulation.
-files::Json swarm_json(const Tracking& input, const std::string& path);
+/// errors grow in a simulation. The errors of the estimates that `source` states are in the bounds.
+/// @throws UsageError where they are known neither by their size nor by their rate.
+files::Json swarm_json(const Tracking& input, const std::string& path,
+                       const stability::DisturbanceSource& source);
 void print_swarm(const files::Json& swarm);
 
 }  // namespace swarmcert::analysis

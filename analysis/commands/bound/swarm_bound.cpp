@@ -1,6 +1,9 @@
 #include <fmt/core.h>
 
+#include <cmath>
+
 #include "analysis/commands/bound/bound_extras.h"
+#include "analysis/commands/bound/bound_output.h"
 #include "stability/bounds/coupled_swarm.h"
 
 namespace swarmcert::analysis {
@@ -8,11 +11,31 @@ namespace swarmcert::analysis {
 using files::Json;
 using namespace stability;  // NOLINT: every name below is of that library
 
-Json swarm_json(const Tracking& input, const std::string& path) {
+namespace {
+
+/// A bound that is not finite would not tell the user what to add.
+void refuse_unbounded_estimates(const CoupledVerdict& verdict) {
+  if (!verdict.small_gain.proved) return;
+  for (std::size_t i = 0; i < verdict.small_gain.error_m.size(); ++i) {
+    if (std::isfinite(verdict.small_gain.error_m[i]) && std::isfinite(verdict.small_gain.rate_N_s[i]))
+      continue;
+    throw UsageError(
+        "--swarm needs how large the errors of the estimates are, or how fast that of the velocity changes: "
+        "add --velocity-error A or --velocity-error-rate R, and --position-error P");
+  }
+}
+
+}  // namespace
+
+Json swarm_json(const Tracking& input, const std::string& path, const DisturbanceSource& source) {
   const CoupledSwarm swarm = read_coupled_swarm(path);
   if (!axis_loop(input.gains, input.plant, 2))
     throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
-  const CoupledVerdict verdict = couple(swarm, input.gains, input.plant);
+  OtherErrors estimates;
+  estimates.velocity_error = source.velocity_error[2];
+  estimates.position_error = source.position_error[2];
+  const CoupledVerdict verdict = couple(swarm, input.gains, input.plant, estimates);
+  refuse_unbounded_estimates(verdict);
   const SmallGain& found = verdict.small_gain;
   Json entries = Json::array();
   for (std::size_t i = 0; i < swarm.couplings.size(); ++i) {
@@ -39,6 +62,10 @@ Json swarm_json(const Tracking& input, const std::string& path) {
           {"spectral_radius", {found.spectral_radius_lower, found.spectral_radius_upper}},
           {"rate_N_s", found.rate_N_s},
           {"error_m", found.error_m},
+          {"of_estimates",
+           {{"error_m", finite(verdict.own.error_m)},
+            {"speed_m_s", finite(verdict.own.speed_m_s)},
+            {"acceleration_m_s2", finite(verdict.own.acceleration_m_s2)}}},
           {"missing_factor", found.missing_factor},
           {"couplings", std::move(entries)}};
 }
@@ -50,6 +77,13 @@ void print_swarm(const Json& swarm) {
     for (std::size_t i = 0; i < swarm["rate_N_s"].size(); ++i) {
       fmt::print("  vehicle {}: |eps'| at most {:.6g} N/s, |e| at most {:.6g} m in the long run\n", i,
                  swarm["rate_N_s"][i].get<double>(), swarm["error_m"][i].get<double>());
+    }
+    const double of_estimates_m = swarm["of_estimates"]["error_m"];
+    if (of_estimates_m > 0) {
+      fmt::print(
+          "  of which {:.6g} m directly by errors of the estimates; what a network makes of them is not "
+          "in it, and belongs into cross_rate_N_s\n",
+          of_estimates_m);
     }
     return;
   }
