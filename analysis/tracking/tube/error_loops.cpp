@@ -139,16 +139,18 @@ LagStart lag_start(const ErrorLoop& loop, double slice_s) {
   const Interval tau_s(loop.lags_s * (1 - 1e-15), loop.lags_s),
       cell_s = Interval(slice_s) * Interval(1 - 1e-12, 1 + 1e-12);
   // A kernel leaves its mean over a cell by at most the integral of its slope's absolute value there.
-  const auto values = [&](const KernelCells& kernel, const KernelCells& slope) {
+  const auto values = [&](const KernelCells& kernel, const KernelCells& slope, Interval slope_scale = 1) {
     std::vector<Interval> of_cell;
     for (std::size_t n = 0; n < kernel.net.size(); ++n) {
-      const double away = slope.integral[n];
+      const double away = (slope_scale * slope.integral[n]).hi;
       of_cell.push_back(tau_s * (kernel.net[n] / cell_s + Interval(-away, away)));
     }
     return of_cell;
   };
   result.position_m = values(*loop.h1, *loop.h2);
   result.velocity_m_s = values(*loop.h2, *loop.h3);
+  // With one lag h'''' = -direct_rest/tau.
+  if (loop.direct_rest) result.acceleration_m_s2 = values(*loop.h3, *loop.direct_rest, Interval(1) / tau_s);
   return result;
 }
 

@@ -64,6 +64,7 @@ struct Signal {
 /// that starts there adds exp(-t/tau) to the force, so that e = tau h'. Of a loop with one lag.
 struct LagStart {
   std::vector<Interval> position_m, velocity_m_s;  ///< empty without a lag: then the thrust follows at once
+  std::vector<Interval> acceleration_m_s2;         ///< m/s^2 per N; empty where the loop is continuous
 };
 LagStart lag_start(const ErrorLoop& loop, double slice_s);
 

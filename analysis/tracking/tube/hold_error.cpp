@@ -54,6 +54,37 @@ double hold_error_N(const ErrorLoop& loop, const LoopHistory& history, double pl
   return std::isnan(bound.hi) ? std::numeric_limits<double>::infinity() : bound.hi;
 }
 
+HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice) {
+  const double unknown = std::numeric_limits<double>::infinity();
+  const HeldAnswer nothing{Interval(-unknown, unknown), Interval(-unknown, unknown)};
+  const Interval T(loop.period_s);
+  const Interval mass(loop.mass_kg);
+  const Interval trapezoidal = Interval(loop.Ki) * T * T * slice.history.time_s / Interval(12);
+  const Interval per_acceleration = T * loop.Kd + trapezoidal;
+  const Interval rest =
+      T * (Interval(slice.jerk_m_s3) +
+           Interval(loop.Ki) * (slice.history.position_m + T * slice.history.velocity_m_s) / Interval(2));
+  const double known_m_s2 = std::max(
+      {slice.acceleration_m_s2.mag(), slice.acceleration_before_m_s2.mag(), slice.largest_acceleration_m_s2});
+  const Interval left = Interval(1) - per_acceleration * slice.per_N * mass;
+  if (!(left.lo > 0)) return nothing;
+  const double size_N =
+      (mass * (T * loop.Kp * slice.velocity_m_s.mag() + rest + per_acceleration * known_m_s2) /
+       Interval(left.lo))
+          .hi;
+  const double more_m_s2 = (Interval(slice.per_N) * size_N).hi;
+  HeldAnswer result;
+  result.acceleration_m_s2 = slice.acceleration_m_s2 + Interval(-more_m_s2, more_m_s2);
+  const Interval slope =
+      Interval(loop.Kp) * slice.velocity_m_s +
+      Interval(loop.Kd) * stability::hull(result.acceleration_m_s2, slice.acceleration_before_m_s2);
+  const double largest_m_s2 = std::max(slice.largest_acceleration_m_s2, result.acceleration_m_s2.mag());
+  const double away = (rest + trapezoidal * largest_m_s2).hi;
+  result.hold_N = mass * (Interval(0, T.hi) * slope + Interval(-away, away));
+  const bool is_known = std::isfinite(result.hold_N.lo) && std::isfinite(result.hold_N.hi);
+  return is_known ? result : nothing;
+}
+
 double sum_excess_m_s(const ErrorLoop& loop, const LoopHistory& history, double acceleration_m_s2) {
   if (loop.period_s == 0) return 0;
   const Interval T(loop.period_s);

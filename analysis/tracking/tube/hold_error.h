@@ -33,6 +33,29 @@ struct LoopHistory {
 double hold_error_N(const ErrorLoop& loop, const LoopHistory& history, double planned_at_start_m_s2,
                     double excess_N);
 
+/// What is known of one axis over a slice and a period of the loop before it.
+struct HeldSlice {
+  Interval velocity_m_s;                 ///< e'
+  Interval acceleration_m_s2;            ///< e'' without what x adds in the slice itself
+  Interval acceleration_before_m_s2;     ///< e'' over the period before
+  LoopHistory history;                   ///< up to the end of the slice
+  double largest_acceleration_m_s2 = 0;  ///< sup |e''| up to the slice's start
+  double jerk_m_s3 = 0;                  ///< sup |p_d'''|
+  double per_N = 0;                      ///< what |m x| <= 1 N in the slice adds to |e''| in it
+};
+
+/// Contains m x and e'' of the slice.
+struct HeldAnswer {
+  Interval hold_N, acceleration_m_s2;
+};
+
+/// The same bound slice by slice and with its sign: as c(t) - c(t_k) = int_{t_k}^t (Kp e' + Kd e'') + the integral's
+/// part,
+///   x(t) lies in [0, T] (Kp E' + Kd E'') + [-1, 1] (T sup|p_d'''| + Ki (T/2 sup|e| + (T^2/2) sup|e'| + |R|)),
+/// E' and E'' intervals of e' and e'' over the slice and a period before it. What x adds to E'' in its own slice is
+/// solved for as above. Both are infinite where nothing is known.
+HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice);
+
 /// At least what the firmware's sum T sum e(t_j) exceeds the largest |int e| by, m s; 0 where the loop is continuous.
 double sum_excess_m_s(const ErrorLoop& loop, const LoopHistory& history, double acceleration_m_s2);
 

@@ -55,15 +55,18 @@ Deviations hull_of(const Deviations& a, const Deviations& b) {
 struct Axis {
   const ErrorLoop* loop = nullptr;
   std::vector<Interval> force, lagging;  ///< d and w, slices so far
+  std::vector<Interval> acceleration;    ///< e'', likewise
   LoopHistory met;                       ///< likewise
   const LagStart* start = nullptr;       ///< of the rotors; null: there is none
   Interval excess_N{0};                  ///< their thrust beyond the weight at the start
   Interval position_m, velocity_m_s;     ///< from the slices before
+  Interval acceleration_m_s2;            ///< likewise; where the loop is sampled
 
   void begin_slice() {
     const std::size_t n = force.size();
     position_m = answer_to_past(*loop->h1, force, n);
     velocity_m_s = answer_to_past(*loop->h2, force, n);
+    if (loop->period_s > 0) begin_acceleration(n);
     if (!loop->has_lag) return;
     if (start != nullptr) {
       position_m += excess_N * start->position_m[n];
@@ -71,6 +74,47 @@ struct Axis {
     }
     position_m += answer_to_past(*loop->g1, lagging, n);
     velocity_m_s += answer_to_past(*loop->g2, lagging, n);
+  }
+
+  void begin_acceleration(std::size_t n) {
+    if (!loop->has_lag) {
+      acceleration_m_s2 = -answer_to_past(*loop->direct_rest, force, n);
+      return;
+    }
+    acceleration_m_s2 = answer_to_past(*loop->h3, force, n) - answer_to_past(*loop->direct_rest, lagging, n);
+    if (start != nullptr) acceleration_m_s2 += excess_N * start->acceleration_m_s2[n];
+  }
+
+  /// m x and e'' of this slice if its signals without m x are d and w, e' is `velocity` since a period ago.
+  /// @param back slices before this one in which a command that acts in this one may have been made.
+  HeldAnswer held(Interval d, Interval w, Interval velocity, double jerk_m_s3, const LoopHistory& history,
+                  std::size_t back) const {
+    const std::size_t n = force.size();
+    const auto with_last = [](Interval now, const std::vector<Interval>& past) {
+      return stability::hull(now, past.empty() ? Interval(0) : past.back());
+    };
+    const Interval direct = Interval(1) / loop->mass_kg;
+    HeldSlice slice;
+    slice.velocity_m_s = velocity;
+    slice.history = history;
+    slice.jerk_m_s3 = jerk_m_s3;
+    const KernelCells& rest = *loop->direct_rest;
+    if (loop->has_lag) {
+      slice.acceleration_m_s2 = acceleration_m_s2 + stability::answer(*loop->h3, 0, with_last(d, force)) +
+                                direct * w - stability::answer(rest, 0, with_last(w, lagging));
+      slice.per_N = loop->h3->integral[0];
+    } else {
+      slice.acceleration_m_s2 =
+          acceleration_m_s2 + direct * d - stability::answer(rest, 0, with_last(d, force));
+      slice.per_N = (direct + rest.integral[0]).hi;
+    }
+    slice.acceleration_before_m_s2 = slice.acceleration_m_s2;
+    for (std::size_t k = n - std::min(back, n); k < n; ++k) {
+      slice.acceleration_before_m_s2 = stability::hull(slice.acceleration_before_m_s2, acceleration[k]);
+    }
+    for (const Interval& a : acceleration)
+      slice.largest_acceleration_m_s2 = std::max(slice.largest_acceleration_m_s2, a.mag());
+    return hold_error(*loop, slice);
   }
 
   /// The errors of this slice if its signals are these.
@@ -140,8 +184,8 @@ class Sweep {
     Interval difference_N;  ///< f_hat - f_a
     TruthSizes truth;
     Interval lagging_N[3];
-    LoopHistory met[3];            ///< up to the end of the slice
-    double hold_N[3] = {0, 0, 0};  ///< bounds |m x|
+    LoopHistory met[3];  ///< up to the end of the slice
+    HeldAnswer held[3];  ///< 0 where the loop is continuous
   };
   using Signals = std::vector<Signal>;
 
@@ -161,15 +205,22 @@ class Sweep {
       signal.met[k] = axes_[i][k].met;
       signal.met[k].add(scene_.in_slice(stretch, slice, k, signal.difference_N.mag(), signal.truth,
                                         seen[i].position_m[k].mag(), seen[i].velocity_m_s[k].mag()));
-      signal.hold_N[k] = scene_.hold_error_N(vehicle, k, signal.met[k]);
+      if (scene_.loops().is_sampled()) {
+        signal.held[k] =
+            axes_[i][k].held(known_force(signal, k), signal.lagging_N[k], seen[i].velocity_m_s[k],
+                             stretch.jerk_m_s3[k], signal.met[k], static_cast<std::size_t>(remembered_));
+      }
     }
     return signal;
   }
 
-  static Interval force(const Signal& signal, std::size_t axis) {
-    const Interval known = axis == 2 ? -signal.difference_N : signal.truth.force_N[axis];
-    const double hold_N = signal.hold_N[axis];
-    return hold_N > 0 ? known + Interval(-hold_N, hold_N) : known;
+  static Interval known_force(const Signal& signal, std::size_t axis) {
+    return axis == 2 ? -signal.difference_N : signal.truth.force_N[axis];
+  }
+
+  Interval force(const Signal& signal, std::size_t axis) const {
+    const Interval known = known_force(signal, axis);
+    return scene_.loops().is_sampled() ? known + signal.held[axis].hold_N : known;
   }
 
   Deviations answers(const Signals& signals) const {
@@ -189,6 +240,8 @@ class Sweep {
         axes_[i][k].force.push_back(force(signals[i], k));
         axes_[i][k].lagging.push_back(signals[i].lagging_N[k]);
         axes_[i][k].met = signals[i].met[k];
+        axes_[i][k].acceleration.push_back(signals[i].held[k].acceleration_m_s2);
+        tube.hold_N[i][k].push_back(signals[i].held[k].hold_N.mag());
       }
       tube.force_error_N[i].push_back(signals[i].difference_N);
       tube.truth[i].push_back(signals[i].truth);
@@ -225,6 +278,7 @@ SlicedTube sliced_tube(const Scene& scene, const EnclosureOptions& options, doub
   SlicedTube tube;
   tube.force_error_N.resize(static_cast<std::size_t>(scene.vehicles()));
   tube.truth.resize(tube.force_error_N.size());
+  tube.hold_N.resize(tube.force_error_N.size());
   Sweep sweep(scene, options, tolerance_N);
   for (int n = 0; n < scene.motion().slices; ++n) {
     if (!sweep.advance(tube, farthest_m)) {

@@ -1,6 +1,7 @@
 /// @file A tube whose width and middle change over time: intervals of the errors, slice after slice.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -12,9 +13,10 @@ namespace swarmcert::analysis {
 struct SlicedTube {
   bool proved = false;
   std::vector<Deviations> slices;  ///< e and e' of every vehicle, slice by slice; where proved
-  std::vector<std::vector<Interval>> force_error_N;  ///< [vehicle][slice]: f_hat - f_a along z
-  std::vector<std::vector<TruthSizes>> truth;        ///< likewise
-  std::string why;                                   ///< where not proved
+  std::vector<std::vector<Interval>> force_error_N;        ///< [vehicle][slice]: f_hat - f_a along z
+  std::vector<std::vector<TruthSizes>> truth;              ///< likewise
+  std::vector<std::array<std::vector<double>, 3>> hold_N;  ///< [vehicle][axis][slice]: sup |m x|
+  std::string why;                                         ///< where not proved
   bool cancelled = false;
 
   Radii radii() const;  ///< the largest of all slices
@@ -24,9 +26,9 @@ struct SlicedTube {
 ///
 /// The loop of error_loops.h gives, for t in slice n,
 ///   e(t) = (h' * d)(t) + (g' * w)(t),   e'(t) = (h'' * d)(t) + (g'' * w)(t),   w = f_a - m p_d'',
-/// with d = f_a - f_hat + m x along z and d = f_a + m x along x and y; of x only a bound of its size is known
-/// (hold_error.h), from all that was met so far. A convolution is linear: where the signals of cell k lie in
-/// intervals D_k and W_k, errors lie in sums over the kernel's cells m of
+/// with d = f_a - f_hat + m x along z and d = f_a + m x along x and y; x lies in what e' and e'' of the slice and of
+/// the period before it allow (hold_error.h). A convolution is linear: where the signals of cell k lie in intervals D_k
+/// and W_k, errors lie in sums over the kernel's cells m of
 ///   net_m c + [-1, 1] |.|_m r,   c -+ r = D_{n-m} u D_{n-m-1}   (kernel_cells.h: answer()).
 /// So what is known of the signals, the feed-forward and the predicted part of the forces, moves the middle of the
 /// tube; only what is not known widens it, through the |kernel| of the time since. Before the start all signals are 0:

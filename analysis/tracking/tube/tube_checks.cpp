@@ -56,9 +56,12 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
       jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis]);
       lagged_N.push_back(up(truth_N + up(mass_kg * planned_m_s2.back())));
     }
-    const double hold_N = scene.hold_error_N(vehicle, axis, met);
-    if (hold_N > 0)
-      for (double& x : error_N) x = up(x + hold_N);
+    const std::vector<double> hold_by_slice_N =
+        tube.sliced.proved ? tube.sliced.hold_N[i][axis]
+                           : std::vector<double>(error_N.size(), scene.hold_error_N(vehicle, axis, met));
+    const double hold_N = largest(hold_by_slice_N);
+    for (std::size_t n = 0; hold_N > 0 && n < error_N.size(); ++n)
+      error_N[n] = up(error_N[n] + hold_by_slice_N[n]);
     // int e = h * (f_a - f_hat + m x) + g * w
     if (loop.h) result.integral_m_s[axis] = largest(convolved(*loop.h, error_N));
     if (loop.g && loop.Ki > 0)
