@@ -1,5 +1,5 @@
-/// @file Flights of the loop that tubes are about: axes apart, first-order lags, predictions a staircase; continuous, or
-/// with a command held over a period of the gains' rate and the firmware's integrator.
+/// @file Flights of the loop that tubes are about: axes apart, first-order lags, predictions a staircase; continuous,
+/// or with a command held over a period of the gains' rate and the firmware's integrator.
 #pragma once
 
 #include <array>
@@ -14,7 +14,8 @@
 
 namespace swarmcert::tests {
 
-/// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts is random; predictions reach the controller late.
+/// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts
+/// is random; predictions reach the controller late.
 class AxesFlight {
  public:
   /// Called with the time, the vehicle, e and e'.

@@ -76,8 +76,8 @@ void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, co
   }
 }
 
-/// The tubes start from rest; the tube around a task knows exact estimates, and no force but that of the declared truth.
-/// What they or the swarm bound would leave out is refused.
+/// The tubes start from rest; the tube around a task knows exact estimates, and no force but that of the declared
+/// truth. What they or the swarm bound would leave out is refused.
 void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
   const auto refuse = [](const char* what, const char* without) {
     throw UsageError(fmt::format("{} does not contain {}: leave one of them out", what, without));
