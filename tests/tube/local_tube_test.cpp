@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "stability/simulation/simulate.h"
+#include "tube/axes_flight.h"
 #include "tube/scenes.h"
 
 namespace swarmcert::analysis {
@@ -90,6 +91,35 @@ TEST(LocalTube, HoldsEveryFlightOfItsSwapAndOrdersTheBounds) {
   }
 }
 
+TEST(LocalTube, MotorsLagAsTheTruthSaysWhateverTheGainsState) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  stability::TrackingSetup stated = tests::loop_of("firmware-defaults");
+  stated.gains.motor_lag_s = stated.gains.attitude_lag_s = 0;
+  stability::TrackingSetup flies = stated;
+  for (const stability::EffectSpec& effect : truth.effects)
+    if (effect.name == "motor_lag") flies.gains.motor_lag_s = effect.parameters.at("tau_s");
+  const auto outside = [&](const LocalTube& tube) {
+    int count = 0;
+    files::Random random(3);
+    tests::AxesFlight(flies, truth, network, *task, 2, true)
+        .fly(random, [&](double t, int vehicle, const std::array<double, 3>& e, const auto&) {
+          const auto at = static_cast<std::size_t>(std::floor((t - 1e-9) / tube.slice_s));
+          const Deviation& slice = tube.slices[at][static_cast<std::size_t>(vehicle)];
+          for (std::size_t k = 0; k < 3; ++k)
+            if (e[k] < slice.position_m[k].lo || e[k] > slice.position_m[k].hi) ++count;
+        });
+    return count;
+  };
+  const LocalTube tube = local_tube(stated, truth, network, *task, 2, quick());
+  ASSERT_TRUE(tube.proved && tube.is_sampled) << tube.why;
+  EXPECT_EQ(outside(tube), 0);
+  const LocalTube without = local_tube(stated, truth_for(stated.gains), network, *task, 2, quick());
+  ASSERT_TRUE(without.proved && without.is_sampled) << without.why;
+  EXPECT_GT(outside(without), 0) << "the lag must show";
+}
+
 TEST(LocalTube, GainsTooWeakForTheForceAreInconclusiveAndSayHowMuchComesBack) {
   stability::TrackingSetup loop = tests::loop_of("composite");
   loop.gains.composite->Lambda_1_s = scaled(0.03, loop.gains.composite->Lambda_1_s);
@@ -109,8 +139,8 @@ TEST(LocalTube, SliceBySliceTheShippedGainsAreProvedWhereOneRadiusHasAGainAboveO
   for (const auto& [gains, one_radius] : {std::pair("composite", true), std::pair("crazyflie-small", false),
                                           std::pair("crazyflie-large", false)}) {
     SCOPED_TRACE(gains);
-    const LocalTube tube =
-        local_tube(tests::loop_of(gains), tests::truth_model(), network, *task, 2, quick());
+    const stability::TrackingSetup loop = tests::loop_of(gains);
+    const LocalTube tube = local_tube(loop, truth_for(loop.gains), network, *task, 2, quick());
     ASSERT_TRUE(tube.proved) << tube.why;
     ASSERT_TRUE(tube.sliced.proved);
     EXPECT_EQ(tube.one_radius.proved, one_radius);
@@ -140,9 +170,10 @@ TEST(LocalTube, UnstableOrDelayedLoopsAndTruthsWithoutEnclosureAreRefused) {
   delayed.gains.delay_s = 0.01;
   EXPECT_NE(local_tube(delayed, tests::truth_model(), network, *task, 2, quick()).why.find("delay"),
             std::string::npos);
-  stability::TrackingSetup unstable = tests::loop_of("composite");
-  unstable.gains.motor_lag_s = 0.3;  // Routh: at most 8/(9 x 4) s
-  EXPECT_NE(local_tube(unstable, tests::truth_model(), network, *task, 2, quick()).why.find("stable"),
+  stability::Model slow = tests::truth_model();
+  for (stability::EffectSpec& effect : slow.effects)
+    if (effect.name == "motor_lag") effect.parameters["tau_s"] = 0.3;  // Routh: at most 8/(9 x 4) s
+  EXPECT_NE(local_tube(tests::loop_of("composite"), slow, network, *task, 2, quick()).why.find("stable"),
             std::string::npos);
   stability::Model tail = tests::truth_model();
   for (stability::EffectSpec& effect : tail.effects)

@@ -63,13 +63,14 @@ struct LocalTube {
 ///
 /// Beside it least_tube() from constants of the network alone: product of spectral norms, global and local Lipschitz
 /// bounds.
-/// @param tracking gains and model of every vehicle; @param truth what the force really is; @param vehicles 2 to 10.
+/// @param stated gains and model of every vehicle; the motors lag as the truth says, or as stated where it does not.
+/// @param truth what the force really is; @param vehicles 2 to 10.
 /// @param task one whose trajectories have enclosures (Task::over()).
 /// @return an upper bound in real arithmetic of the loop of error_loops.h under `assumptions`: of the sampled loop
 ///   where gains state a rate and it is proved for that one, else of the continuous one (LocalTube::is_sampled); where
 ///   `proved` is false nothing is known (inconclusive), for the reason in `why`.
 /// @throws files::InputError if the network lacks functions of these vehicles' kind or has no unit of force.
-LocalTube local_tube(const stability::TrackingSetup& tracking, const stability::Model& truth,
+LocalTube local_tube(const stability::TrackingSetup& stated, const stability::Model& truth,
                      const files::Network& network, const stability::Task& task, int vehicles,
                      const LocalTubeOptions& options);
 
