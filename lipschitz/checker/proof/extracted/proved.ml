@@ -1,4 +1,10 @@
 
+(** val option_map : ('a1 -> 'a2) -> 'a1 option -> 'a2 option **)
+
+let option_map f = function
+| Some a -> Some (f a)
+| None -> None
+
 (** val fst : ('a1 * 'a2) -> 'a1 **)
 
 let fst = function
@@ -916,12 +922,6 @@ let steepest = function
     ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
     ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))
 | _ -> one
-
-(** val is_known : activation -> bool **)
-
-let is_known = function
-| Gelu -> false
-| _ -> true
 
 (** val is_rising : activation -> bool **)
 
@@ -1911,12 +1911,8 @@ let with_slopes c hidden0 u =
 
 let norm_of ps accepted p =
   let q = part_at ps p in
-  (match norms accepted p 0 (layers q) with
-   | Some u ->
-     if is_known q.between
-     then Some (with_slopes (steepest q.between) q.hidden u)
-     else None
-   | None -> None)
+  option_map (with_slopes (steepest q.between) q.hidden)
+    (norms accepted p 0 (layers q))
 
 (** val largest : dyadic -> dyadic list -> dyadic **)
 

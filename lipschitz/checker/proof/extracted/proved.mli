@@ -1,4 +1,6 @@
 
+val option_map : ('a1 -> 'a2) -> 'a1 option -> 'a2 option
+
 val fst : ('a1 * 'a2) -> 'a1
 
 val snd : ('a1 * 'a2) -> 'a2
@@ -255,8 +257,6 @@ type claim =
 | Sum_float_error of (term * dyadic list) list * int * dyadic
 
 val steepest : activation -> dyadic
-
-val is_known : activation -> bool
 
 val is_rising : activation -> bool
 

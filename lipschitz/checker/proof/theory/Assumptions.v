@@ -5,8 +5,8 @@ Open Scope R_scope.
 Set Printing Width 120.
 Check rising_slopes.
 Print Assumptions rising_slopes.
-Check known_slopes.
-Print Assumptions known_slopes.
+Check all_slopes.
+Print Assumptions all_slopes.
 Check check_sound.
 Print Assumptions check_sound.
 Check check_parts_sound.

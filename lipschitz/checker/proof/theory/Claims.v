@@ -67,11 +67,7 @@ Fixpoint norms (accepted : list claim) (p layer : nat) (ls : list layerD) : opti
 Definition with_slopes {A} (c : dyadic) (hidden : list A) (u : dyadic) : dyadic :=
   fold_right (fun _ v => mul c v) u hidden.
 Definition norm_of (ps : list part) (accepted : list claim) (p : nat) : option dyadic :=
-  let q := part_at ps p in
-  match norms accepted p O (layers q) with
-  | Some u => if is_known (between q) then Some (with_slopes (steepest (between q)) (hidden q) u) else None
-  | None => None
-  end.
+  let q := part_at ps p in option_map (with_slopes (steepest (between q)) (hidden q)) (norms accepted p O (layers q)).
 Fixpoint largest (m : dyadic) (scale : list dyadic) : dyadic :=
   match scale with [] => m | s :: scale' => largest (if at_most m s then s else m) scale' end.
 Definition product_of (ps : list part) (accepted : list claim) (f : function) : option dyadic :=

@@ -75,6 +75,24 @@ Proof.
   lra.
 Qed.
 
+(** Lower bounds of values: a parabola, and doubling of the argument. *)
+Lemma exp_square q : 0 <= q -> 1 + q + q * q / 2 <= exp q.
+Proof.
+  intros H.
+  pose proof (at_least_the_derivative (fun x => exp x - (1 + x + x * x / 2)) (fun x => exp x - (0 + 1 + x)) 0 0 q H)
+    as D. cbv beta in D. rewrite exp_0 in D.
+  assert (0 * (q - 0) <= exp q - (1 + q + q * q / 2) - (1 - (1 + 0 + 0 * 0 / 2))); [|lra]. apply D. intros x Hx. split.
+  - apply (derivable_pt_lim_minus exp); [apply derivable_pt_lim_exp|].
+    apply (derivable_pt_lim_plus (fun x => 1 + x) (fun x => x * x / 2)).
+    + apply (derivable_pt_lim_plus (fun _ => 1) id); [apply derivable_pt_lim_const|apply derivable_pt_lim_id].
+    + replace x with ((1 * x + x * 1) * (/ 2) + x * x * 0) at 2 by field.
+      apply (derivable_pt_lim_mult (fun x => x * x) (fun _ => / 2)); [|apply derivable_pt_lim_const].
+      apply (derivable_pt_lim_mult id id); apply derivable_pt_lim_id.
+  - pose proof (exp_above_line x). lra.
+Qed.
+Lemma exp_double a b x : 0 <= a -> a <= exp x -> b <= a * a -> b <= exp (2 * x).
+Proof. intros H G K. replace (2 * x) with (x + x) by ring. rewrite exp_plus. nra. Qed.
+
 (** The natural logarithm. *)
 Lemma logarithm (y : R) : 0 < y -> { x : R | exp x = y }.
 Proof.

@@ -232,7 +232,7 @@ Lemma part_bound ps accepted p v : Forall (holds ps) accepted -> fits_part (part
   norm (minus (unclamped (part_at ps p) x) (unclamped (part_at ps p) y)) <= real v * norm (minus x y).
 Proof.
   unfold norm_of. intros HA Hf Hv. destruct (norms accepted p 0 _) as [w|] eqn:Hw; [|discriminate].
-  destruct (is_known _) eqn:K; [|discriminate]. inversion Hv. destruct (known_slopes _ K) as [C S].
+  inversion Hv. destruct (all_slopes (between (part_at ps p))) as [C S].
   destruct (norms_sound ps accepted p w HA _ [] eq_refl Hw) as (us & B & E). rewrite real_with_slopes, E. split.
   - apply with_slopes_nonneg; auto. eapply product_nonneg; eauto.
   - intros x y. apply network_bound; auto. intros k. now apply fits_layer.

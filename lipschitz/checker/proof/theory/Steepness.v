@@ -1,9 +1,9 @@
 (** How steep the functions between layers are, by their derivatives. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz.
-From Swarmcert Require Import Exponential Activations Form Network Checker Meaning.
+From Swarmcert Require Import Exponential Activations ErrorFunction Form Network Checker Meaning.
 Open Scope R_scope.
 
-(** No slope is larger in absolute value. That of GELU is not proved, and no theorem uses it. *)
+(** No slope is larger in absolute value. *)
 Definition steepest (a : activation) : dyadic :=
   match a with
   | Relu | Tanh | Softplus | Elu => one
@@ -12,7 +12,6 @@ Definition steepest (a : activation) : dyadic :=
   | Silu => (72089, -16)%Z
   | Gelu => (4625, -12)%Z
   end.
-Definition is_known (a : activation) : bool := match a with Gelu => false | _ => true end.
 (** No slope is negative. *)
 Definition is_rising (a : activation) : bool := match a with Silu | Gelu => false | _ => true end.
 Definition is_relu (a : activation) : bool := match a with Relu => true | _ => false end.
@@ -129,22 +128,6 @@ Proof.
   pose proof (exp_pos (- x)).
   apply (derivable_pt_lim_div id (fun x => 1 + exp (- x))); [apply derivable_pt_lim_id|apply one_and_exp|lra].
 Qed.
-Lemma exp_square q : 0 <= q -> 1 + q + q * q / 2 <= exp q.
-Proof.
-  intros H.
-  pose proof (at_least_the_derivative (fun x => exp x - (1 + x + x * x / 2)) (fun x => exp x - (0 + 1 + x)) 0 0 q H)
-    as D. cbv beta in D. rewrite exp_0 in D.
-  assert (0 * (q - 0) <= exp q - (1 + q + q * q / 2) - (1 - (1 + 0 + 0 * 0 / 2))); [|lra]. apply D. intros x Hx. split.
-  - apply (derivable_pt_lim_minus exp); [apply derivable_pt_lim_exp|].
-    apply (derivable_pt_lim_plus (fun x => 1 + x) (fun x => x * x / 2)).
-    + apply (derivable_pt_lim_plus (fun _ => 1) id); [apply derivable_pt_lim_const|apply derivable_pt_lim_id].
-    + replace x with ((1 * x + x * 1) * (/ 2) + x * x * 0) at 2 by field.
-      apply (derivable_pt_lim_mult (fun x => x * x) (fun _ => / 2)); [|apply derivable_pt_lim_const].
-      apply (derivable_pt_lim_mult id id); apply derivable_pt_lim_id.
-  - pose proof (exp_above_line x). lra.
-Qed.
-Lemma exp_double a b x : 0 <= a -> a <= exp x -> b <= a * a -> b <= exp (2 * x).
-Proof. intros H G K. replace (2 * x) with (x + x) by ring. rewrite exp_plus. nra. Qed.
 (** ln 11.01 <= 2.3996. *)
 Lemma exp_bound : 1101 / 100 <= exp (23996 / 10000).
 Proof.
@@ -200,10 +183,12 @@ Proof.
   - auto.
   - exact selu_slopes.
 Qed.
-Theorem known_slopes a : is_known a = true ->
-  0 <= real (steepest a) /\ slopes (act a) (- real (steepest a)) (real (steepest a)).
+Theorem all_slopes a : 0 <= real (steepest a) /\ slopes (act a) (- real (steepest a)) (real (steepest a)).
 Proof.
-  intros H. destruct (is_rising a) eqn:E.
+  destruct (is_rising a) eqn:E.
   - destruct (rising_slopes a E) as [P S]. split; [lra|]. intros x y L. specialize (S x y L). nra.
-  - destruct a; try discriminate. split; [|exact silu_slopes]. apply Rlt_le, real_positive. reflexivity.
+  - destruct a; try discriminate; (split; [apply Rlt_le, real_positive; reflexivity|]); [exact silu_slopes|].
+    intros x y L. pose proof (gelu_slopes x y L).
+    assert (real (steepest Gelu) = 4625 / 4096) as ->
+      by (unfold steepest; rewrite real_below; change (Pos.to_nat 12) with 12%nat; lra). nra.
 Qed.
