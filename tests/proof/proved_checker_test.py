@@ -138,6 +138,7 @@ def mutate(name, net, certificate, folder, generator, count):
     chosen = [generator.choice(some) for some in by_pattern.values()]
     chosen += [generator.choice(by_pattern[p]) for p in generator.choices(list(by_pattern), k=max(0, count - len(chosen)))]
     network = second.Network(**arguments(net))
+    stated = {part: weights.activation for part, weights in network.parts.items()}
     words = list(map(str, net))
     pair = words[:1] == ["--phi"]
     one_command = [MANY, words[1], words[3], "--pair"] if pair else [MANY, words[0], *words[2:]]
@@ -150,6 +151,8 @@ def mutate(name, net, certificate, folder, generator, count):
             three.ask(path)
             if "as" in mutation.get("network", {}) and mutation["network"]["as"] != certificate["network"]["as"]:
                 network = second.Network(**arguments(net))  # the second checker rounds it in place
+            for part, weights in network.parts.items():  # the second checker takes what no file states from a certificate
+                weights.activation = stated[part]
             reason = second.check(mutation, network) if mutation.get("schema") == certificate["schema"] else "schema"
             (code, words_of_one), (code_of_three, words_of_three) = one.answer(), three.answer()
             assert code in (0, 1, 3) and code_of_three in (0, 1, 3, 4), (words_of_one, words_of_three)
