@@ -107,6 +107,7 @@ def kinds(folder, generator):
         ("silu", [tiny], ["--activation", "silu", "--blocks"], 0.05),
         ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"], 0.03),
         ("cover by parts", [tiny], parts, 0.03),
+        ("pair and cover by parts", pair, parts, 0.02),
     ] + slow * (MUTATIONS > 0)
 
 
@@ -116,7 +117,7 @@ def arguments(net):
 
 def is_beyond(name):
     """Whether some of what is proved by parts is beyond the proved checker."""
-    return name in ("cover by parts", "kinds by parts for a number of neighbours")
+    return name == "kinds by parts for a number of neighbours"
 
 
 def decided_alike(code, accepted, second_accepts, by_parts):

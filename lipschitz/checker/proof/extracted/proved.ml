@@ -1,4 +1,10 @@
 
+(** val negb : bool -> bool **)
+
+let negb = function
+| true -> false
+| false -> true
+
 (** val option_map : ('a1 -> 'a2) -> 'a1 option -> 'a2 option **)
 
 let option_map f = function
@@ -364,6 +370,12 @@ let rec last l d =
 let rec map f = function
 | [] -> []
 | a :: t -> (f a) :: (map f t)
+
+(** val flat_map : ('a1 -> 'a2 list) -> 'a1 list -> 'a2 list **)
+
+let rec flat_map f = function
+| [] -> []
+| x :: t -> app (f x) (flat_map f t)
 
 (** val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1 **)
 
@@ -1789,6 +1801,75 @@ let rec check_tree o ls inequality b around = function
        (check_tree o ls inequality (cut k m true b) lines upper)
    | None -> false)
 
+(** val widened : matrixD -> dyadic list -> matrixD **)
+
+let rec widened w c =
+  match w with
+  | [] -> []
+  | r :: w' ->
+    (match c with
+     | [] -> []
+     | a :: c' -> (app r (a :: [])) :: (widened w' c'))
+
+(** val homogeneous : int -> layerD list -> layerD list **)
+
+let rec homogeneous n = function
+| [] -> []
+| l :: ls' ->
+  let (w, c) = l in
+  let wide =
+    app (widened w c)
+      (match ls' with
+       | [] -> []
+       | _ :: _ -> (unit_form n) :: [])
+  in
+  (wide, (map (fun _ -> zero) wide)) :: (homogeneous (length w) ls')
+
+(** val is_chain : int -> layerD list -> bool **)
+
+let rec is_chain n = function
+| [] -> true
+| l :: ls' ->
+  let (w, _) = l in
+  (&&) (forallb (fun r -> (=) (length r) n) w) (is_chain (length w) ls')
+
+(** val face : dyadic list -> int -> dyadic -> box **)
+
+let face radius k s =
+  let n = length radius in
+  map (fun j ->
+    if (=) j k
+    then (s, s)
+    else if (=) j n
+         then (zero, one)
+         else ((neg (nth j radius zero)), (nth j radius zero)))
+    (seq 0 (Stdlib.Int.succ n))
+
+(** val all_faces : dyadic list -> box list **)
+
+let all_faces radius =
+  let n = length radius in
+  (face radius n one) :: (flat_map (fun k ->
+                           (face radius k (neg (nth k radius zero))) :: (
+                           (face radius k (nth k radius zero)) :: []))
+                           (seq 0 n))
+
+(** val check_trees :
+    hints -> layerD list -> (line list list -> conflict list -> dyadic list
+    -> matrixD) -> box list -> tree list -> bool **)
+
+let rec check_trees o ls inequality bs ts =
+  match bs with
+  | [] -> (match ts with
+           | [] -> true
+           | _ :: _ -> false)
+  | b :: bs' ->
+    (match ts with
+     | [] -> false
+     | t :: ts' ->
+       (&&) (check_tree o ls inequality b [] t)
+         (check_trees o ls inequality bs' ts'))
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
@@ -1796,6 +1877,8 @@ type proof =
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
 | By_parts of dyadic * proved_form option * hints * tree
+| By_all_parts of dyadic * proved_form option * hints * dyadic list
+   * tree list
 | By_layers of box list
 | By_sum of box
 | By_norm
@@ -1945,16 +2028,11 @@ let check_product ps accepted f moves scale0 u =
      | Some k -> at_most (mul0 m k) u
      | None -> false)
 
-(** val check_parts_of_box :
-    part list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
-    dyadic -> proved_form option -> hints -> tree -> bool **)
+(** val check_parts_with :
+    part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
+    proved_form option -> (matrixD option -> bool) -> bool **)
 
-let check_parts_of_box ps f moves scale0 b u r form o t =
-  let p = part_at ps (moved f) in
-  let covers = fun q ->
-    check_tree o p.hidden (part_inequality p.hidden p.outer q moves scale0 r)
-      (clamp_ends p.clamp b) [] t
-  in
+let check_parts_with ps f moves scale0 u r form covers =
   (&&)
     ((&&)
       ((&&)
@@ -1969,9 +2047,38 @@ let check_parts_of_box ps f moves scale0 b u r form o t =
        (match form with
         | Some q ->
           (&&)
-            ((&&) ((=) (length (fst p.outer)) (inputs_of (part_at ps rho)))
-              (check_form (part_at ps rho) q)) (covers (Some q.lower_rows))
+            ((&&)
+              ((=) (length (fst (part_at ps (moved f)).outer))
+                (inputs_of (part_at ps rho))) (check_form (part_at ps rho) q))
+            (covers (Some q.lower_rows))
         | None -> false))
+
+(** val check_parts_of_box :
+    part list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
+    dyadic -> proved_form option -> hints -> tree -> bool **)
+
+let check_parts_of_box ps f moves scale0 b u r form o t =
+  let p = part_at ps (moved f) in
+  check_parts_with ps f moves scale0 u r form (fun q ->
+    check_tree o p.hidden (part_inequality p.hidden p.outer q moves scale0 r)
+      (clamp_ends p.clamp b) [] t)
+
+(** val check_parts_of_all :
+    part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
+    proved_form option -> hints -> dyadic list -> tree list -> bool **)
+
+let check_parts_of_all ps f moves scale0 u r form o radius ts =
+  let p = part_at ps (moved f) in
+  let n = inputs_of p in
+  let ls = homogeneous n p.hidden in
+  (&&)
+    ((&&)
+      ((&&) ((&&) (negb (is_nil p.hidden)) (is_chain n p.hidden))
+        ((=) (length radius) n)) (forallb is_positive radius))
+    (check_parts_with ps f moves scale0 u r form (fun q ->
+      check_trees o ls
+        (part_inequality ls p.outer q (app moves (false :: [])) scale0 r)
+        (all_faces radius) ts))
 
 (** val valueD : part -> dyadic list -> dyadic list **)
 
@@ -2361,6 +2468,8 @@ let check_claim ps accepted c p =
     (match p with
      | By_inequality (rho, t, r) -> check_slope ps f moves scale0 u rho t r
      | By_product -> check_product ps accepted f moves scale0 u
+     | By_all_parts (r, form, o, radius, ts) ->
+       check_parts_of_all ps f moves scale0 u r form o radius ts
      | _ -> false)
   | Slope_at_least (f, moves, scale0, l) ->
     (match p with

@@ -1,4 +1,6 @@
 
+val negb : bool -> bool
+
 val option_map : ('a1 -> 'a2) -> 'a1 option -> 'a2 option
 
 val fst : ('a1 * 'a2) -> 'a1
@@ -77,6 +79,8 @@ val nth_error : 'a1 list -> int -> 'a1 option
 val last : 'a1 list -> 'a1 -> 'a1
 
 val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
+
+val flat_map : ('a1 -> 'a2 list) -> 'a1 list -> 'a2 list
 
 val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1
 
@@ -464,6 +468,20 @@ val check_tree :
   hints -> layerD list -> (line list list -> conflict list -> dyadic list ->
   matrixD) -> box -> line list list -> tree -> bool
 
+val widened : matrixD -> dyadic list -> matrixD
+
+val homogeneous : int -> layerD list -> layerD list
+
+val is_chain : int -> layerD list -> bool
+
+val face : dyadic list -> int -> dyadic -> box
+
+val all_faces : dyadic list -> box list
+
+val check_trees :
+  hints -> layerD list -> (line list list -> conflict list -> dyadic list ->
+  matrixD) -> box list -> tree list -> bool
+
 type proof =
 | By_inequality of dyadic * dyadic list * factor
 | By_vector of dyadic list
@@ -471,6 +489,8 @@ type proof =
 | By_points of dyadic list * dyadic list * (int * dyadic list) list
 | By_triangle
 | By_parts of dyadic * proved_form option * hints * tree
+| By_all_parts of dyadic * proved_form option * hints * dyadic list
+   * tree list
 | By_layers of box list
 | By_sum of box
 | By_norm
@@ -515,9 +535,17 @@ val check_product :
   part list -> claim list -> function0 -> bool list -> dyadic list -> dyadic
   -> bool
 
+val check_parts_with :
+  part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
+  proved_form option -> (matrixD option -> bool) -> bool
+
 val check_parts_of_box :
   part list -> function0 -> bool list -> dyadic list -> box -> dyadic ->
   dyadic -> proved_form option -> hints -> tree -> bool
+
+val check_parts_of_all :
+  part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->
+  proved_form option -> hints -> dyadic list -> tree list -> bool
 
 val valueD : part -> dyadic list -> dyadic list
 

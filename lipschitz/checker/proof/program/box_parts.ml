@@ -1,4 +1,4 @@
-(* Proofs by parts of a box: the tree of a certificate as a proof of the theorems, with the numbers that only have to be good
+(* Proofs by parts of a box, or of boxes that hold a multiple of every (x, 1): the tree of a certificate as a proof of the theorems, with the numbers that only have to be good
    guesses, in floating point. *)
 
 open Refusal
@@ -10,12 +10,10 @@ let deepest = 2000
 let largest_input = 0x1p100
 let on_at_corner = 0x1p-30
 
-type beyond = Global | Coupled
-type found = Beyond of beyond | Proof of Proved.box * (unit -> Proved.proof) * (unit -> string)
+type domain = Box of Proved.box | Everywhere
+type found = Beyond | Proof of domain * (unit -> Proved.proof) * (unit -> string)
 
-let words_of = function
-  | Global -> "proved by parts of a cover of all inputs"
-  | Coupled -> "proved by parts of boxes with forms for a number of neighbours"
+let words_of_beyond = "proved by parts of boxes with forms for a number of neighbours"
 
 (* Guesses. None of them can make a false claim accepted. *)
 
@@ -129,8 +127,26 @@ let conflicts_of where sizes json =
     | _ -> rejected "%s: a conflict lacks words" where in
   read (Exact.words (text where json))
 
-(* The tree, and the number of the word of each leaf. *)
-let tree_of ~where ~(layers : Weights.layer list) ~multipliers ~low ~high text =
+(* Layers of which the last input is multiplied by the biases, and is the last output of all but the last layer. *)
+let homogeneous (layers : Weights.layer list) =
+  let count = List.length layers in
+  List.mapi (fun k (layer : Weights.layer) ->
+      let wide = Array.mapi (fun i row -> Array.append row [| layer.biases.(i) |]) layer.weights in
+      let last = Array.make (Weights.inputs layer) 0. in
+      let weights = if k + 1 < count then Array.append wide [| Array.append last [| 1. |] |] else wide in
+      { layer with weights; biases = Array.map (fun _ -> 0.) weights }) layers
+
+(* Their boxes, as `all_faces` of the theorems. *)
+let all_faces radius =
+  let n = Array.length radius in
+  let low = Array.append (Array.map Float.neg radius) [| 0. |] and high = Array.append radius [| 1. |] in
+  let face k side =
+    let at ends = let ends = Array.copy ends in ends.(k) <- side; ends in
+    at low, at high in
+  face n 1. :: List.concat_map (fun k -> [ face k (-. radius.(k)); face k radius.(k) ]) (List.init n Fun.id)
+
+(* The tree of each box, and the number of the word of each leaf. `passes`: neurons that pass their input on. *)
+let trees_of ~where ~(layers : Weights.layer list) ~passes ~multipliers ~boxes text =
   let words = if text = "" then [||] else Array.of_list (String.split_on_char ' ' text) in
   let fails at reason = rejected "%s: word %d of the tree: %s" where (at + 1) reason in
   let at = ref 0 and leaves = ref [] in
@@ -143,7 +159,7 @@ let tree_of ~where ~(layers : Weights.layer list) ~multipliers ~low ~high text =
     | Some (Decided (neuron, is_on, corner)) ->
       (match place neuron 0 sizes with
        | None -> fails !at "a neuron is decided that nothing looks at"
-       | Some _ when Array.length low > most_inputs_of_a_corner -> fails !at "a neuron is not decided by its slopes"
+       | Some place when Array.length low > most_inputs_of_a_corner || passes place -> fails !at "a neuron is not decided by its slopes"
        | Some (layer, neuron) ->
          let point = Array.mapi (fun k l -> if (corner lsr k) land 1 = 1 then high.(k) else l) low in
          incr at;
@@ -163,7 +179,7 @@ let tree_of ~where ~(layers : Weights.layer list) ~multipliers ~low ~high text =
       let conflicts, t = multipliers.(k) in
       Proved.Leaf (decided, conflicts, t)
     | Split k ->
-      if pending > deepest + 1 then fails here "the tree is too deep";
+      if pending > deepest + List.length boxes then fails here "the tree is too deep";
       if k >= Array.length low then fails here "there is no such coordinate";
       let middle = low.(k) +. (high.(k) -. low.(k)) /. 2. in
       if not (low.(k) <= middle && middle <= high.(k)) then fails here "the side cannot be halved";
@@ -172,9 +188,10 @@ let tree_of ~where ~(layers : Weights.layer list) ~multipliers ~low ~high text =
       let upper = tree pending (with_middle low) high in
       Proved.Halve (decided, k, Exact.of_float middle, lower, upper)
     | Of_rho | Decided _ -> assert false in
-  let result = tree 0 low high in
+  let last = List.length boxes - 1 in
+  let trees = List.mapi (fun k (low, high) -> tree (last - k) low high) boxes in
   if !at < Array.length words then fails !at "the box is covered already";
-  result, Array.of_list (List.rev !leaves)
+  trees, Array.of_list (List.rev !leaves)
 
 (* |drho|^2 <= dv' Q dv. *)
 let form_of net rho where json =
@@ -214,17 +231,27 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper 
   let lists = list where (find where "multipliers" json) in
   require (not has_conflicts || List.length conflicts = List.length lists) "%s: there are conflicts for other multipliers" where;
   let tree_text = text where (find where "tree" json) in
-  if is_coupled then Beyond Coupled
-  else if is_global then Beyond Global
-  else begin
+  if is_coupled then Beyond else begin
     let weights = Functions.weights net moved in
     require (List.length weights.layers > 1) "%s: no hidden layer" where;
     let form_json = find where "form" json in
     require ((form_json = Null) = (List.length names = 1)) "%s: a form for set functions, and only for those" where;
-    let box, low, high = box_of net certificate moved where in
-    let layers = List.filteri (fun k _ -> k + 1 < List.length weights.layers) weights.layers in
-    let neurons = List.fold_left (fun n l -> n + Weights.outputs l) 0 layers in
+    let radius = if is_global then begin
+        let radius = Exact.hex_floats where (find where "radius" json) in
+        require (List.length radius = Functions.inputs net moved && List.for_all (fun r -> r > 0.) radius)
+          "%s: needs a positive radius per input" where;
+        require (List.for_all (fun r -> r <= largest_input) radius)
+          "%s: the box is empty, too large or of another size" where;
+        radius
+      end else [] in
+    let domain, boxes = if is_global then Everywhere, all_faces (Array.of_list radius)
+      else let box, low, high = box_of net certificate moved where in Box box, [ low, high ] in
+    let hidden = List.filteri (fun k _ -> k + 1 < List.length weights.layers) weights.layers in
+    let layers = if is_global then homogeneous hidden else hidden in
+    let passes (layer, neuron) =
+      is_global && layer + 1 < List.length hidden && neuron = Weights.outputs (List.nth hidden layer) in
     let sizes = List.map Weights.outputs layers in
+    let neurons = List.fold_left (+) 0 sizes in
     let conflicts = if has_conflicts then List.map (conflicts_of where sizes) conflicts else List.map (fun _ -> []) lists in
     let multipliers = Array.of_list (List.map2 (fun conflicts some ->
         let t = hex_words where some in
@@ -234,15 +261,17 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper 
     require (0x1p-400 <= rho && rho <= 0x1p400) "%s: rho is not positive, or out of range" where;
     let moving = List.filteri (fun k _ -> List.nth moves k) scale in
     require (List.for_all (fun w -> 0x1p-200 <= w && w <= 0x1p200) moving) "%s: scale is out of range" where;
-    let tree, leaves = tree_of ~where ~layers ~multipliers ~low ~high tree_text in
+    let trees, leaves = trees_of ~where ~layers ~passes ~multipliers ~boxes tree_text in
     let form = match names with [ _; name ] -> Some (form_of net name (where ^ ".form") form_json) | _ -> None in
     let guesses = new_guesses () in
-    let proof () =
-      Proved.By_parts (exact_rho, form, { slope_between; rounded_up; factor_number = next_factor guesses }, tree) in
+    let hints = { Proved.slope_between; rounded_up; factor_number = next_factor guesses } in
+    let proof () = match domain, trees with
+      | Box _, [ tree ] -> Proved.By_parts (exact_rho, form, hints, tree)
+      | _ -> By_all_parts (exact_rho, form, hints, List.map Exact.of_float radius, trees) in
     let reason () =
       let k = guesses.matrices in
       if k > 0 && not guesses.is_shown then
         Printf.sprintf "%s: word %d of the tree: its multipliers do not show the bound there" where leaves.(k - 1)
       else Printf.sprintf "%s: the tree does not prove the bound after leaf %d: a neuron is not decided by its slopes" where k in
-    Proof (box, proof, reason)
+    Proof (domain, proof, reason)
   end

@@ -4,7 +4,8 @@
 open Refusal
 open Json
 
-type source = Proved_here | In_box | Not_checked
+(* By parts: proved for all inputs, and not written by --coq. *)
+type source = Proved_here | By_parts | In_box | Not_checked
 type t = {
   net : Network.t;
   json : Json.t;
@@ -159,13 +160,15 @@ let check_product state where names claim scale upper =
 (* By parts of boxes: the claim is one of the box, and what is beyond the theorems is not checked. *)
 let check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper =
   match Box_parts.read state.net state.json bound ~where ~names ~moves ~scale ~upper with
-  | Beyond what ->
-    not_checked state (Printf.sprintf "%s <= %s: %s" where (text where (find where "upper_hex" bound)) (Box_parts.words_of what));
+  | Beyond ->
+    not_checked state (Printf.sprintf "%s <= %s: %s" where (text where (find where "upper_hex" bound)) Box_parts.words_of_beyond);
     Not_checked
-  | Proof (box, proof, reason) ->
-    let claim = Proved.Slope_in_box (func, moves, exact_scale, box, upper) in
+  | Proof (domain, proof, reason) ->
+    let claim, source = match domain with
+      | Box_parts.Box box -> Proved.Slope_in_box (func, moves, exact_scale, box, upper), In_box
+      | Everywhere -> Slope_at_most (func, moves, exact_scale, upper), By_parts in
     prove_unwritten state claim (proof ()) reason;
-    In_box
+    source
 
 (* What is not stated of functions with other activations than ReLU. *)
 let check_activations state where bound names =
@@ -261,7 +264,8 @@ let check_law state law =
   let has_box (f, _, _, _) = match state.json with
     | Object members -> (match List.assoc_opt "box" members with Some box -> has (part f) box | None -> false)
     | _ -> false in
-  let everywhere = List.for_all (fun (_, _, _, source) -> source = Proved_here) bounds in
+  let is_written = List.for_all (fun (_, _, _, source) -> source = Proved_here) bounds in
+  let everywhere = List.for_all (fun (_, _, _, source) -> source = Proved_here || source = By_parts) bounds in
   if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds || not (everywhere || List.for_all has_box bounds) then
     not_checked state (Printf.sprintf "%s: rests on a bound that is not checked" where)
   else begin
@@ -269,7 +273,9 @@ let check_law state law =
     let in_box ((f, _, _, _) as bound) =
       let box, _, _ = Box_parts.box_of state.net state.json (part f) where in kind bound, box in
     let rho = Functions.index state.net ("rho:" ^ rho) in
-    if everywhere then prove state (Law (stacked, List.map kind bounds, rho, upper)) By_triangle reason
+    let law = Proved.Law (stacked, List.map kind bounds, rho, upper) in
+    if is_written then prove state law By_triangle reason
+    else if everywhere then prove_unwritten state law By_triangle (fun () -> reason)
     else prove_unwritten state (Law_in_box (stacked, List.map in_box bounds, rho, upper)) By_triangle (fun () -> reason);
     state.upper_bounds <- state.upper_bounds + 1
   end

@@ -10,6 +10,7 @@ Inductive proof :=
 | By_points (x y : list dyadic) (others : list (nat * list dyadic))
 | By_triangle
 | By_parts (rho : dyadic) (form : option proved_form) (o : hints) (t : tree)
+| By_all_parts (rho : dyadic) (form : option proved_form) (o : hints) (radius : list dyadic) (ts : list tree)
 | By_layers (bounds : list box)
 | By_sum (sums : box)
 | By_norm
@@ -82,17 +83,25 @@ Definition check_product ps accepted f moves scale u : bool :=
   && match product_of ps accepted f with Some k => at_most (mul m k) u | None => false end.
 
 (** Slopes in a box, part by part. *)
-Definition check_parts_of_box ps f moves scale (b : box) u r (form : option proved_form) (o : hints) (t : tree) : bool :=
-  let p := part_at ps (moved f) in
-  let covers q := check_tree o (hidden p) (part_inequality (hidden p) (outer p) q moves scale r) (clamp_ends (clamp p) b) [] t in
+Definition check_parts_with ps f moves scale u r (form : option proved_form) (covers : option matrixD -> bool) : bool :=
   well_formed ps f moves scale && forallb relu_between (parts_of ps f) && is_nonnegative u && at_most r (mul u u)
   && match f, form with
      | Alone _, None => covers None
      | Set_of _ rho, Some q =>
-         (length (fst (outer p)) =? inputs_of (part_at ps rho))%nat && check_form (part_at ps rho) q
+         (length (fst (outer (part_at ps (moved f)))) =? inputs_of (part_at ps rho))%nat && check_form (part_at ps rho) q
          && covers (Some (lower_rows q))
      | _, _ => false
      end.
+Definition check_parts_of_box ps f moves scale (b : box) u r form (o : hints) (t : tree) : bool :=
+  let p := part_at ps (moved f) in
+  check_parts_with ps f moves scale u r form (fun q =>
+    check_tree o (hidden p) (part_inequality (hidden p) (outer p) q moves scale r) (clamp_ends (clamp p) b) [] t).
+(** The same for all inputs. *)
+Definition check_parts_of_all ps f moves scale u r form (o : hints) (radius : list dyadic) (ts : list tree) : bool :=
+  let p := part_at ps (moved f) in let n := inputs_of p in let ls := homogeneous n (hidden p) in
+  negb (is_nil (hidden p)) && is_chain n (hidden p) && (length radius =? n)%nat && forallb is_positive radius
+  && check_parts_with ps f moves scale u r form (fun q =>
+    check_trees o ls (part_inequality ls (outer p) q (moves ++ [false]) scale r) (all_faces radius) ts).
 
 (** Slopes from below, between two points. *)
 Definition valueD (p : part) (x : list dyadic) : list dyadic := networkD (hidden p) (outer p) (clampedD (clamp p) x).
@@ -269,6 +278,7 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Norm_at_least p layer l, By_vector v => check_norm_below (matrix_at ps p layer) l v
   | Slope_at_most f moves scale u, By_inequality rho t r => check_slope ps f moves scale u rho t r
   | Slope_at_most f moves scale u, By_product => check_product ps accepted f moves scale u
+  | Slope_at_most f moves scale u, By_all_parts r form o radius ts => check_parts_of_all ps f moves scale u r form o radius ts
   | Slope_in_box f moves scale b u, By_parts r form o t => check_parts_of_box ps f moves scale b u r form o t
   | Slope_at_least f moves scale l, By_points x y others => check_points ps f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u

@@ -275,7 +275,7 @@ Definition measured (form : option matrixD) (d : list R) : R :=
   match form with None => square d | Some q => triangle q d d end.
 Lemma part_holds ls (last : layerD) form moves scale rho lines cs ts x x' : same_signs ls x x' ->
   Forall (fun c => excluded ls c x /\ excluded ls c x') cs ->
-  lines_hold ls lines x -> lines_hold ls lines x' -> agree moves x x' -> positive_scale scale = true ->
+  signs_hold ls lines x -> signs_hold ls lines x' -> agree moves x x' -> positive_scale scale = true ->
   Forall (fun l : layerD => length (snd l) = length (fst l)) ls -> length (snd last) = length (fst last) ->
   forallb is_nonnegative ts = true ->
   nonnegative (realm (part_inequality ls last form moves scale rho lines cs ts)) ->
@@ -304,7 +304,7 @@ Proof.
       + apply Forall_map. eapply Forall_impl; [|apply IH]. simpl. intros r Hr. now rewrite Hr.
       + apply repeat_length.
       + apply IH. }
-  pose proof (chain_holds ls lines (split ts (map fst ls)) (selector moves scale) x x' dx last (signs_of_lines _ _ _ H) (signs_of_lines _ _ _ H') F
+  pose proof (chain_holds ls lines (split ts (map fst ls)) (selector moves scale) x x' dx last H H' F
     (split_forall _ _ T) (fun post w => f_equal (applyR w) (D post)) L) as C.
   destruct (chain_pairs ls lines (split ts (map fst ls)) (selector moves scale) (length dx)) as [[p z] all].
   destruct C as (post & C1 & C3 & C2). intros N. specialize (N (dx ++ post)).

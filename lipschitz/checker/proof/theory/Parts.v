@@ -241,3 +241,34 @@ Fixpoint check_tree (o : hints) (ls : list layerD) (inequality : list (list line
       | None => false
       end
   end.
+
+(** All inputs. A last input s is multiplied by the biases, and passes through all layers but the last: at s = 1 the
+  numbers are those of x, and at (a x, a), a > 0, all of them are a times as large. *)
+Fixpoint widened (w : matrixD) (c : list dyadic) : matrixD :=
+  match w, c with r :: w', a :: c' => (r ++ [a]) :: widened w' c' | _, _ => [] end.
+Fixpoint homogeneous (n : nat) (ls : list layerD) : list layerD :=
+  match ls with
+  | [] => []
+  | (w, c) :: ls' =>
+      let wide := widened w c ++ match ls' with [] => [] | _ => [unit_form n] end in
+      (wide, map (fun _ => zero) wide) :: homogeneous (length w) ls'
+  end.
+(** Every row is as long as the layer's inputs are many. *)
+Fixpoint is_chain (n : nat) (ls : list layerD) : bool :=
+  match ls with [] => true | (w, _) :: ls' => forallb (fun r => length r =? n)%nat w && is_chain (length w) ls' end.
+(** The face at s of coordinate k of the box of this radius, the last input in [0, 1]. *)
+Definition face (radius : list dyadic) (k : nat) (s : dyadic) : box :=
+  let n := length radius in
+  map (fun j => if (j =? k)%nat then (s, s) else if (j =? n)%nat then (zero, one)
+                else (neg (nth j radius zero), nth j radius zero)) (seq 0 (S n)).
+(** One of them has a multiple of every (x, 1). *)
+Definition all_faces (radius : list dyadic) : list box :=
+  let n := length radius in
+  face radius n one ::
+  flat_map (fun k => [face radius k (neg (nth k radius zero)); face radius k (nth k radius zero)]) (seq 0 n).
+Fixpoint check_trees (o : hints) (ls : list layerD) inequality (bs : list box) (ts : list tree) : bool :=
+  match bs, ts with
+  | [], [] => true
+  | b :: bs', t :: ts' => check_tree o ls inequality b [] t && check_trees o ls inequality bs' ts'
+  | _, _ => false
+  end.

@@ -2,7 +2,7 @@
 From Coq Require Import List ZArith Reals Lra Lia Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
     Values Claims Slopes Witness Laws Ranges Roundings
-    Relaxation Increments Cover.
+    Relaxation Increments Cover Everywhere.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -13,6 +13,7 @@ Proof.
   - exact (norm_below_sound _ _ _ H).
   - now apply slope_sound in H.
   - now apply product_sound in H.
+  - now apply slope_everywhere_sound in H.
   - now apply points_sound in H.
   - now apply slope_in_box_sound in H.
   - now apply law_sound in H.
