@@ -30,6 +30,13 @@ void check_axis(const Json& entry) {
   demand_field(entry["axis"] == "x" || entry["axis"] == "y" || entry["axis"] == "z", "axis is unknown");
 }
 
+std::vector<std::vector<double>> parse_form(const Json& entry) {
+  demand_field(entry["P"].is_array(), "P is not an array");
+  std::vector<std::vector<double>> P;
+  for (const Json& row : entry["P"]) P.push_back(files::parse_hex_floats(row));
+  return P;
+}
+
 LoopWitness parse_loop(const Json& entry) {
   files::require_keys(entry,
                       {"axis", "input", "mass_kg", "Kp", "Kd", "Ki", "lags_s", "delay_s", "delay_order",
@@ -49,8 +56,28 @@ LoopWitness parse_loop(const Json& entry) {
   loop.step_exponent = small_integer(entry, "step_exponent");
   loop.steps = small_integer(entry, "steps");
   loop.decay = hex_number(entry, "decay");
-  demand_field(entry["P"].is_array(), "P is not an array");
-  for (const Json& row : entry["P"]) loop.P.push_back(files::parse_hex_floats(row));
+  loop.P = parse_form(entry);
+  return loop;
+}
+
+SampledWitness parse_sampled(const Json& entry) {
+  files::require_keys(entry,
+                      {"axis", "mass_kg", "Kp", "Kd", "Ki", "lags_s", "delay_s", "period_s",
+                       "integrator_step_s", "steps", "contraction", "P", "gains"},
+                      "sampled loop");
+  check_axis(entry);
+  SampledWitness loop;
+  loop.mass_kg = hex_number(entry, "mass_kg");
+  loop.Kp = hex_number(entry, "Kp");
+  loop.Kd = hex_number(entry, "Kd");
+  loop.Ki = hex_number(entry, "Ki");
+  loop.lags_s = files::parse_hex_floats(entry["lags_s"]);
+  loop.delay_s = hex_number(entry, "delay_s");
+  loop.period_s = hex_number(entry, "period_s");
+  loop.integrator_step_s = hex_number(entry, "integrator_step_s");
+  loop.steps = small_integer(entry, "steps");
+  loop.contraction = hex_number(entry, "contraction");
+  loop.P = parse_form(entry);
   return loop;
 }
 
@@ -77,6 +104,54 @@ bool check_gain(const Json& gains, const std::string& name, const std::optional<
   return true;
 }
 
+/// @returns how many numbers are claimed.
+int check_gains(const Json& gains, const GainBounds& proved) {
+  files::require_keys(
+      gains, {"rate", "rate_hex", "amplitude", "amplitude_hex", "edge", "edge_hex", "impulse", "impulse_hex"},
+      "gains");
+  int count = 0;
+  for (const bool is_claimed :
+       {check_gain(gains, "rate", proved.rate), check_gain(gains, "amplitude", proved.amplitude),
+        check_gain(gains, "edge", proved.edge), check_gain(gains, "impulse", proved.impulse)})
+    count += is_claimed ? 1 : 0;
+  return count;
+}
+
+void check_loops(const Json& loops, TrackingVerdict& verdict) {
+  demand_field(loops.is_array() && loops.size() <= 12, "loops are more than 12");
+  std::set<std::string> seen;
+  std::map<std::string, GainBounds> known;  // axes that are the same are computed once
+  for (const Json& entry : loops) {
+    const LoopWitness loop = parse_loop(entry);
+    demand_field(seen.insert(entry["axis"].get<std::string>() + " " + loop.input).second,
+                 "loops: one stands twice");
+    const auto [place, is_new] = known.try_emplace(witness_text(entry));
+    if (is_new) place->second = upper_gains(loop);
+    verdict.gains += check_gains(entry["gains"], place->second);
+    ++verdict.loops;
+  }
+}
+
+void check_sampled_loops(const Json& loops, TrackingVerdict& verdict) {
+  demand_field(loops.is_array() && loops.size() <= 3, "sampled_loops are more than 3");
+  std::set<std::string> seen;
+  std::map<std::string, SampledGainBounds> known;
+  for (const Json& entry : loops) {
+    const SampledWitness loop = parse_sampled(entry);
+    demand_field(seen.insert(entry["axis"].get<std::string>()).second, "sampled_loops: one stands twice");
+    const auto [place, is_new] = known.try_emplace(witness_text(entry));
+    if (is_new) place->second = sampled_upper_gains(loop);
+    const Json& gains = entry["gains"];
+    files::require_keys(gains, {"force", "command", "velocity", "position"}, "gains");
+    const SampledGainBounds& proved = place->second;
+    verdict.gains += check_gains(gains["force"], proved.force);
+    verdict.gains += check_gains(gains["command"], proved.command);
+    verdict.gains += check_gains(gains["velocity"], proved.velocity);
+    verdict.gains += check_gains(gains["position"], proved.position);
+    ++verdict.loops;
+  }
+}
+
 void check_left_out(const Json& left_out) {
   demand_field(left_out.is_array(), "left_out is not an array");
   for (const Json& entry : left_out) {
@@ -89,10 +164,10 @@ void check_left_out(const Json& left_out) {
 
 TrackingVerdict verified(const Json& certificate, const std::string& gains_sha256,
                          const std::string& model_sha256) {
-  files::require_keys(
-      certificate,
-      {"schema", "tool", "statement", "gains_sha256", "model_sha256", "loops", "left_out", "content_sha256"},
-      "certificate");
+  files::require_keys(certificate,
+                      {"schema", "tool", "statement", "gains_sha256", "model_sha256", "loops",
+                       "sampled_loops", "left_out", "content_sha256"},
+                      "certificate");
   demand_field(certificate["schema"] == kTrackingSchema, "schema is not " + std::string(kTrackingSchema));
   demand_field(certificate["statement"] == kTrackingStatement, "statement is not the one that is checked");
   demand_field(certificate["content_sha256"] == files::content_sha256(certificate),
@@ -105,29 +180,10 @@ TrackingVerdict verified(const Json& certificate, const std::string& gains_sha25
   demand_field(model_sha256.empty() || certificate["model_sha256"] == model_sha256,
                "model_sha256 is of another file");
   check_left_out(certificate["left_out"]);
-  const Json& loops = certificate["loops"];
-  demand_field(loops.is_array() && !loops.empty() && loops.size() <= 12, "loops are none, or more than 12");
   TrackingVerdict verdict;
-  std::set<std::string> seen;
-  std::map<std::string, GainBounds> known;  // axes that are the same are computed once
-  for (const Json& entry : loops) {
-    const LoopWitness loop = parse_loop(entry);
-    demand_field(seen.insert(entry["axis"].get<std::string>() + " " + loop.input).second,
-                 "loops: one stands twice");
-    const Json& gains = entry["gains"];
-    files::require_keys(
-        gains,
-        {"rate", "rate_hex", "amplitude", "amplitude_hex", "edge", "edge_hex", "impulse", "impulse_hex"},
-        "gains");
-    const auto [place, is_new] = known.try_emplace(witness_text(entry));
-    if (is_new) place->second = upper_gains(loop);
-    const GainBounds& proved = place->second;
-    verdict.gains += check_gain(gains, "rate", proved.rate) ? 1 : 0;
-    verdict.gains += check_gain(gains, "amplitude", proved.amplitude) ? 1 : 0;
-    verdict.gains += check_gain(gains, "edge", proved.edge) ? 1 : 0;
-    verdict.gains += check_gain(gains, "impulse", proved.impulse) ? 1 : 0;
-    ++verdict.loops;
-  }
+  check_loops(certificate["loops"], verdict);
+  check_sampled_loops(certificate["sampled_loops"], verdict);
+  demand_field(verdict.loops > 0, "there is no loop");
   verdict.accepted = true;
   verdict.reason = "every gain verified from its witness";
   return verdict;

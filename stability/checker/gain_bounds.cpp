@@ -5,42 +5,14 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "stability/checker/fixed_point.h"
+
 namespace swarmcert::check {
 namespace {
 
-using Rational = mpq_class;
-using Integer = mpz_class;
-using Row = std::vector<Rational>;
-using Square = std::vector<Row>;
-
-constexpr mp_bitcnt_t kBits = 128;  // a fixed-point number is an integer over 2^kBits
-constexpr mp_bitcnt_t kPBits = 96;  // the entries of P are integers over 2^kPBits
 constexpr long kMostSteps = 1 << 18;
 constexpr std::size_t kMostLags = 4;
 constexpr int kTerms = 24;
-
-void demand(bool condition, const char* reason) {
-  if (!condition) throw std::runtime_error(reason);
-}
-
-/// 2^exponent
-Rational two_to(long exponent) {
-  const Integer power = Integer(1) << static_cast<mp_bitcnt_t>(std::labs(exponent));
-  return exponent >= 0 ? Rational(power) : Rational(1, power);
-}
-
-Integer floor_fixed(const Rational& x) {
-  const Integer numerator = x.get_num() << kBits;
-  Integer result;
-  mpz_fdiv_q(result.get_mpz_t(), numerator.get_mpz_t(), x.get_den_mpz_t());
-  return result;
-}
-Integer ceil_fixed(const Rational& x) { return -floor_fixed(-x); }
-
-/// At least the product of two nonnegative fixed-point numbers.
-Integer times_up(const Integer& a, const Integer& b) { return ((a * b) >> kBits) + 1; }
-
-Integer root_up(const Integer& x) { return sqrt(x) + 1; }
 
 Row times(const Row& row, const Square& m) {
   Row result(m.size());
@@ -58,51 +30,23 @@ Row product(const Row& a, const Row& b) {
   return result;
 }
 
-/// Elimination of a symmetric matrix without exchange of rows, with `right` beside it.
-/// @returns right' m^-1 right; nothing unless every pivot is positive, that is, m positive definite.
-std::optional<Rational> inverse_form(Square m, Row right) {
-  Rational sum;
-  for (std::size_t k = 0; k < m.size(); ++k) {
-    if (sgn(m[k][k]) <= 0) return std::nullopt;
-    sum += right[k] * right[k] / m[k][k];
-    for (std::size_t i = k + 1; i < m.size(); ++i) {
-      const Rational factor = m[i][k] / m[k][k];
-      for (std::size_t j = k; j < m.size(); ++j) m[i][j] -= factor * m[k][j];
-      right[i] -= factor * right[k];
-    }
-  }
-  return sum;
-}
-
 void check_ranges(const LoopWitness& loop) {
-  const auto usual = [](double x) { return x >= 0x1p-40 && x <= 0x1p40; };
   demand(loop.input == "force" || loop.input == "command" || loop.input == "velocity" ||
              loop.input == "position",
          "input is none of force, command, velocity, position");
-  demand(usual(loop.mass_kg) && usual(loop.Kp) && usual(loop.Kd) && (loop.Ki == 0 || usual(loop.Ki)),
-         "mass_kg, Kp, Kd or Ki is out of range");
-  demand(loop.lags_s.size() <= kMostLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), usual),
+  demand(
+      is_usual(loop.mass_kg) && is_usual(loop.Kp) && is_usual(loop.Kd) && (loop.Ki == 0 || is_usual(loop.Ki)),
+      "mass_kg, Kp, Kd or Ki is out of range");
+  demand(loop.lags_s.size() <= kMostLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), is_usual),
          "lags_s are more than four, or out of range");
   demand(loop.delay_s == 0 ? loop.delay_order == 0
-                           : usual(loop.delay_s) && loop.delay_order >= 0 &&
+                           : is_usual(loop.delay_s) && loop.delay_order >= 0 &&
                                  static_cast<std::size_t>(loop.delay_order) <= loop.lags_s.size(),
          "delay_s or delay_order is out of range");
   demand(loop.time_exponent >= -64 && loop.time_exponent <= 64, "time_exponent is out of range");
   demand(loop.step_exponent >= 0 && loop.step_exponent <= 64, "step_exponent is out of range");
   demand(loop.steps >= 1 && loop.steps <= kMostSteps, "steps is out of range");
-  demand(usual(loop.decay), "decay is out of range");
-  const std::size_t n = order(loop);
-  demand(loop.P.size() == n, "P has another size than the loop");
-  for (std::size_t i = 0; i < n; ++i) {
-    demand(loop.P[i].size() == n, "P has another size than the loop");
-    for (std::size_t j = 0; j < n; ++j) {
-      const double scaled = std::ldexp(loop.P[i][j], static_cast<int>(kPBits));
-      demand(std::abs(loop.P[i][j]) <= 0x1p64 && scaled == std::floor(scaled), "P has an entry out of range");
-    }
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < i; ++j) demand(loop.P[i][j] == loop.P[j][i], "P is not symmetric");
-  }
+  demand(is_usual(loop.decay), "decay is out of range");
 }
 
 /// y = numerator/denominator, and everything that follows from them and from P exactly.
@@ -179,10 +123,7 @@ System system_of(const LoopWitness& loop) {
   system.A.assign(n, Row(n));
   for (std::size_t k = 0; k + 1 < n; ++k) system.A[k][k + 1] = 1;
   for (std::size_t k = 0; k < n; ++k) system.A[n - 1][k] = -a[k];
-  system.P.assign(n, Row(n));
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j) system.P[i][j] = loop.P[i][j];
-  }
+  system.P = exact_form(loop.P, n);
   system.initial = initial_state(numerator, denominator, a, loop.time_exponent);
   if (loop.delay_s > 0) {
     Row rest(n + 1);  // s^(k+1) feedback, less its multiple of the denominator
@@ -248,9 +189,9 @@ class Trajectory {
     }
     Rational sum;
     for (const Row& row : system.P) {
-      for (const Rational& x : row) sum += abs(x), P_.push_back(Integer(x * two_to(kPBits)));
+      for (const Rational& x : row) sum += abs(x), P_.push_back(Integer(x * two_to(kFormBits)));
     }
-    from_largest_ = root_up(ceil_fixed(sum) << kBits);
+    from_largest_ = fixed_root_up(sum);
     for (const Rational& x : initial) state.push_back(floor_fixed(x));
     error = times_up(from_largest_, 1);
     measure();
@@ -283,7 +224,7 @@ class Trajectory {
       for (std::size_t j = 0; j < n_; ++j) sum += P_[i * n_ + j] * state[j];
       form += sum * state[i];
     }
-    size = root_up((form >> kPBits) + 1) + error;
+    size = root_up((form >> kFormBits) + 1) + error;
   }
 
   std::size_t n_;
@@ -299,7 +240,7 @@ struct Form {
 
   Form(const Row& exact, const Square& P) {
     for (const Rational& x : exact) row.push_back(floor_fixed(x));
-    norm = root_up(ceil_fixed(*inverse_form(P, exact)) << kBits);
+    norm = fixed_root_up(*inverse_form(P, exact));
   }
   /// At least |offset + r x|, for the true state x.
   Integer above(const Trajectory& at, const Integer& offset) const {

@@ -26,23 +26,31 @@ TEST(BoundCommand, TheTheoremAppliesToIsotropicCompositeGainsWithTheBallOfTheRef
   EXPECT_EQ(result["exact"].size(), 12u);  // four channels; no rate_hz: continuous only
 }
 
-TEST(BoundCommand, WritesACertificateOfTheContinuousGainsThatCheckAcceptsAndListsTheOthers) {
+TEST(BoundCommand, WritesACertificateOfTheGainsOfBothLoopsThatCheckAccepts) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nKp = 12\nKd = 7\nKi = 20\nrate_hz = 100\n");
   const Json result = json_of(folder, "bound" + gains + " --verified -o cert.json");
   EXPECT_EQ(result["certificate"]["loops"], 12);
-  EXPECT_EQ(result["certificate"]["left_out"].size(), 12u);
+  EXPECT_EQ(result["certificate"]["sampled_loops"], 3);
+  EXPECT_TRUE(result["certificate"]["left_out"].empty());
   const Json certificate = files::parse_json(read_text(folder / "cert.json"), "cert.json");
-  for (const Json& loop : certificate["loops"]) {
-    for (const Json& row : result["verified"]) {
-      if (row["axis"] != loop["axis"] || row["channel"] != loop["input"] || row["loop"] != "continuous")
-        continue;
-      for (const char* gain : {"amplitude", "edge", "impulse"}) {
-        EXPECT_GE(loop["gains"][gain].get<double>(), row[gain][0].get<double>());
-        EXPECT_LE(loop["gains"][gain].get<double>(), 1.05 * row[gain][1].get<double>());
-      }
+  int compared = 0;
+  const auto compare = [&](const Json& claimed, const Json& enclosed) {
+    for (const char* gain : {"amplitude", "edge", "impulse"}) {
+      EXPECT_GE(claimed[gain].get<double>(), enclosed[gain][0].get<double>());
+      EXPECT_LE(claimed[gain].get<double>(), 1.05 * enclosed[gain][1].get<double>());
+      ++compared;
     }
+  };
+  for (const Json& row : result["verified"]) {
+    for (const Json& loop : certificate["loops"])
+      if (row["loop"] == "continuous" && row["axis"] == loop["axis"] && row["channel"] == loop["input"])
+        compare(loop["gains"], row);
+    for (const Json& loop : certificate["sampled_loops"])
+      if (row["loop"] == "sampled" && row["axis"] == loop["axis"])
+        compare(loop["gains"][row["channel"].get<std::string>()], row["between_samples"]);
   }
+  EXPECT_EQ(compared, 3 * 24);
   const Outcome checked = run_shell("swarmcert check cert.json" + gains, folder.path());
   EXPECT_EQ(checked.exit_code, 0) << checked.output;
   EXPECT_NE(checked.output.find("accepted"), std::string::npos) << checked.output;
@@ -52,7 +60,7 @@ TEST(BoundCommand, WritesACertificateOfTheContinuousGainsThatCheckAcceptsAndList
   EXPECT_EQ(foreign.exit_code, 1) << foreign.output;
   const Json shown = json_of(folder, "inspect cert.json")["files"].at(0);
   EXPECT_EQ(shown["kind"], "tracking_certificate");
-  ASSERT_EQ(shown["loops"].size(), certificate["loops"].size());
+  ASSERT_EQ(shown["loops"].size(), 24u) << "of both kinds, an input each";
   EXPECT_EQ(shown["loops"][0]["gains"]["amplitude"], certificate["loops"][0]["gains"]["amplitude"]);
   EXPECT_EQ(shown["left_out"], certificate["left_out"]);
 }

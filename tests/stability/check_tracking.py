@@ -10,6 +10,9 @@ Along one axis y, the response of e to an impulse of the input, solves a linear 
 With x the vector of y and its derivatives, in the certificate's unit of time, x' = A x. The certificate gives P with
 A'P + PA + 2 decay P < 0, so that sqrt(x'Px) falls at least like e^(-decay t). The step response, less its limit, is a
 linear form of x, too. Four numbers follow: the integrals and the largest values of both.
+
+A sampled loop goes from period to period by a matrix M, in intervals of integers over 2^128; P with M P M' < contraction^2 P
+bounds the rows that give e some periods later. The same four numbers are sums over the periods.
 """
 import hashlib
 import json
@@ -27,11 +30,14 @@ STATEMENT = (
     "delay_s and first-order lags of the time constants listed, in continuous time and without limits. The input w is f (force), c "
     "(command), v (velocity, an error of that estimate) or p (position); the others are zero. Then at all times, in exact "
     "arithmetic, |e| <= rate sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total "
-    "variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. Lengths "
+    "variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. For each "
+    "sampled loop the same, but every period_s the law reads e + p and e' + v, adds integrator_step_s (e + p) to I, which "
+    "starts at zero, and holds the command -m (Kp (e + p) + Kd (e' + v) + Ki I) + c until the next one, behind the delay and "
+    "the lags; f is a function of time, and c, v and p are one number per period, whose rate is the difference to the one "
+    "before over period_s, the one before the first being zero, and whose integral of |w| is the sum of |w| period_s. Lengths "
     "are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name the files from which the loops "
     "were derived; where both are given, checking compares the hashes and derives the loops anew, up to a relative 1e-12 "
-    "for rounding. What is listed "
-    "under left_out, and every bound made from these gains, is not certified here.")
+    "for rounding. What is listed under left_out, and every bound made from these gains, is not certified here.")
 
 BITS = 128  # of a fixed-point number after the point
 DEEPEST = 64
@@ -217,12 +223,29 @@ class Derived:
 
     def compare(self, entry):
         axis = "xyz".index(entry["axis"])
-        stated = [exact(entry[key]) for key in ("mass_kg", "Kp", "Kd", "Ki", "delay_s")] + sorted(map(exact, entry["lags_s"]))
+        keys, sampling = ["mass_kg", "Kp", "Kd", "Ki", "delay_s"], []
+        if "period_s" in entry:
+            rate = self.position.get("rate_hz", 0)
+            require(rate > 0, "the loop of the files is not sampled")
+            keys, sampling = keys + ["period_s", "integrator_step_s"], [1 / rate, self.position.get("integrator_step_s", 1 / rate)]
+        stated = [exact(entry[key]) for key in keys] + sorted(map(exact, entry["lags_s"]))
         lags = sorted(x for x in (self.motor, self.attitude if axis < 2 else 0) if x > 0)
-        derived = [self.mass] + [self.ratio * x for x in self.gains(axis)] + [self.delay] + lags
+        derived = [self.mass] + [self.ratio * x for x in self.gains(axis)] + [self.delay] + sampling + lags
         require(len(stated) == len(derived) and
                 all(abs(x - Fraction(y)) <= Fraction(1, 10 ** 12) * abs(Fraction(y)) for x, y in zip(stated, derived)),
                 f"the loop of axis {entry['axis']} is not that of the files")
+
+
+def read_form(rows, n):
+    require(isinstance(rows, list) and len(rows) == n, "P has another size than the loop")
+    require(all(isinstance(row, list) and len(row) == n for row in rows), "P has another size than the loop")
+    form = [[exact(x) for x in row] for row in rows]
+    for i in range(n):
+        for j in range(n):
+            x = form[i][j]
+            require(abs(x) <= 2 ** 64 and x.denominator <= 2 ** 96, "P has an entry out of range")
+            require(x == form[j][i], "P is not symmetric")
+    return form
 
 
 class Loop:
@@ -245,18 +268,8 @@ class Loop:
         self.time = whole(entry, "time_exponent", -64, 64)
         self.cell = whole(entry, "step_exponent", 0, 64)
         self.steps = whole(entry, "steps", 1, 2 ** 18)
-        self.read_form(entry["P"], len(lags) + (3 if self.ki else 2))
+        self.P = read_form(entry["P"], len(lags) + (3 if self.ki else 2))
         self.build(mass, kp, kd, lags)
-
-    def read_form(self, rows, n):
-        require(isinstance(rows, list) and len(rows) == n, "P has another size than the loop")
-        require(all(isinstance(row, list) and len(row) == n for row in rows), "P has another size than the loop")
-        self.P = [[exact(x) for x in row] for row in rows]
-        for i in range(n):
-            for j in range(n):
-                x = self.P[i][j]
-                require(abs(x) <= 2 ** 64 and x.denominator <= 2 ** 96, "P has an entry out of range")
-                require(x == self.P[j][i], "P is not symmetric")
 
     def build(self, mass, kp, kd, lags):
         lag = [Fraction(1)]
@@ -370,6 +383,273 @@ class Loop:
                 "impulse": Fraction(supremum[1], 2 ** BITS)}
 
 
+# --- sampled loops -------------------------------------------------------------------------------------------------
+# An interval is a pair of integers over 2^BITS.
+
+def grid(x):
+    return fixed_below(Fraction(x)), fixed_above(Fraction(x))
+
+
+def interval_product(a, b):
+    ends = [x * y for x in a for y in b]
+    return min(ends) >> BITS, (max(ends) >> BITS) + 1
+
+
+def interval_sum(terms):
+    terms = list(terms)
+    return sum(low for low, _ in terms), sum(high for _, high in terms)
+
+
+def matrix_product(a, b):
+    return [[interval_sum(interval_product(x, y[j]) for x, y in zip(row, b) if x != (0, 0)) for j in range(len(b[0]))] for row in a]
+
+
+def matrix_exponential(generator, t):
+    """exp(generator t) for t >= 0: the Taylor sum of a part of it in fractions, squared in intervals."""
+    n, halvings = len(generator), 0
+    largest = max(sum(map(abs, row)) for row in generator) * t
+    while largest > Fraction(2) ** (halvings - 1):
+        halvings += 1
+        require(halvings <= 12, "a lag is too short against the period")
+    part = [[x * t / 2 ** halvings for x in row] for row in generator]
+    power = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
+    total = [list(row) for row in power]
+    for k in range(1, 25):
+        power = [[x / k for x in times(row, part)] for row in power]
+        total = [[x + y for x, y in zip(r, s)] for r, s in zip(total, power)]
+    missed = Fraction(1, 2 ** 24 * factorial(25))
+    result = [[(fixed_below(x - missed), fixed_above(x + missed)) for x in row] for row in total]
+    for _ in range(halvings):
+        result = matrix_product(result, result)
+    return result
+
+
+def solve(matrix, right):
+    rows = [list(row) + [x] for row, x in zip(matrix, right)]
+    n = len(rows)
+    for k in range(n):
+        pivot = next((i for i in range(k, n) if rows[i][k] != 0), None)
+        require(pivot is not None, "the loop has no limit under a constant input")
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        for i in range(n):
+            if i != k and rows[i][k] != 0:
+                ratio = rows[i][k] / rows[k][k]
+                rows[i] = [x - ratio * y for x, y in zip(rows[i], rows[k])]
+    return [row[n] / row[i] for i, row in enumerate(rows)]
+
+
+class Sampled:
+    """One axis. States before a control: e, e', outputs of the lags, the integral, past commands; after it the new
+    command stands before the past ones."""
+    INPUTS = ("force", "command", "velocity", "position")
+
+    def __init__(self, entry):
+        require_keys(entry, "axis mass_kg Kp Kd Ki lags_s delay_s period_s integrator_step_s steps contraction P gains",
+                     "sampled loop")
+        require(entry["axis"] in ("x", "y", "z"), "axis is unknown")
+        self.mass, self.kp, self.kd, self.ki, self.period, self.increment = (
+            exact(entry[key]) for key in ("mass_kg", "Kp", "Kd", "Ki", "period_s", "integrator_step_s"))
+        require(isinstance(entry["lags_s"], list), "lags_s is not an array")
+        self.lags, self.delay = [exact(x) for x in entry["lags_s"]], exact(entry["delay_s"])
+        usual = [self.mass, self.kp, self.kd, self.period, self.increment, *self.lags]
+        usual += [x for x in (self.ki, self.delay) if x]
+        require(all(two_to(-40) <= x <= two_to(40) for x in usual), "a number of the loop is out of range")
+        require(len(self.lags) <= 4, "more than four lags")
+        self.steps, self.factor = whole(entry, "steps", 1, 2 ** 18), exact(entry["contraction"])
+        require(two_to(-10) <= self.factor <= 1 - two_to(-40), "contraction is out of range")
+        self.plant = 2 + len(self.lags)
+        self.command = self.plant + (1 if self.ki else 0)
+        self.newest = self.delay // self.period
+        require(self.newest < 8, "delay_s is too long")
+        self.shift = self.delay - self.newest * self.period
+        self.past = self.newest + (1 if self.shift else 0)
+        self.n = self.command + self.past
+        self.P = read_form(entry["P"], self.n)
+
+    def after_control(self):
+        n, c = self.n, self.command
+        rows = [[Fraction(int(i == j)) for j in range(n)] for i in range(c)]
+        law = [Fraction(0)] * n
+        law[0], law[1] = -self.kp - self.ki * self.increment, -self.kd
+        if self.ki:
+            rows[self.plant][0], law[self.plant] = self.increment, -self.ki
+        return rows + [law] + [[Fraction(int(j == c + i)) for j in range(n)] for i in range(self.past)]
+
+    def next_period(self):
+        """From the state after control, in intervals."""
+        n, plant, unit = self.n, self.plant, (1 << BITS, 1 << BITS)
+        g = [[Fraction(0)] * (plant + 1) for _ in range(plant + 1)]
+        g[0][1] = g[1][2] = Fraction(1)
+        for i, tau in enumerate(self.lags):
+            g[2 + i][2 + i], g[2 + i][3 + i] = -1 / tau, 1 / tau
+        moved = [[unit if i == j else (0, 0) for j in range(n + 1)] for i in range(plant)]
+        stretches = [(self.shift, self.newest + 1)] if self.shift else []
+        for duration, command in stretches + [(self.period - self.shift, self.newest)]:
+            e = matrix_exponential(g, duration)
+            moved = matrix_product([row[:plant] for row in e[:plant]], moved)
+            for i in range(plant):
+                moved[i][self.command + command] = interval_sum((moved[i][self.command + command], e[i][plant]))
+        kept = ([self.plant] if self.ki else []) + [self.command + i for i in range(self.past)]
+        return moved + [[unit if j == k else (0, 0) for j in range(n + 1)] for k in kept]
+
+    def build(self):
+        n = self.n
+        control, hold = self.after_control(), self.next_period()
+        self.M = matrix_product(hold, [[grid(x) for x in row] for row in control])
+        self.middle = [[(low + high) >> 1 for low, high in row] for row in self.M]
+        self.spread = max(high - low + 1 for row in self.M for low, high in row)
+        self.columns = list(zip(*self.middle))
+        self.scaled = [[int(x * 2 ** 96) for x in row] for row in self.P]
+        self.widest = root_above(fixed_above(sum(abs(x) for row in self.P for x in row)) << BITS)
+        self.reach = []  # |r_i| <= reach_i |r|
+        for i in range(n):
+            form = inverse_form(self.P, [Fraction(int(i == j)) for j in range(n)])
+            require(form is not None, "P is not positive definite")
+            self.reach.append(root_above(fixed_above(form) << BITS))
+        m = [[Fraction(x, 2 ** BITS) for x in row] for row in self.middle]
+        factor = self.factor - two_to(-60)
+        half = [times(row, self.P) for row in m]
+        falls = [[factor ** 2 * self.P[i][j] - sum(x * y for x, y in zip(half[i], m[j])) for j in range(n)] for i in range(n)]
+        require(inverse_form(falls, [Fraction(0)] * n) is not None, "P does not show that the loop contracts as stated")
+        unknown = product_above(self.widest, product_above(n * self.spread, max(self.reach)))
+        require(unknown <= 1 << (BITS - 60), "P has an entry out of range")
+        return control, hold
+
+    def column(self, intervals):
+        """The middle, its norm, and how far from it the true column may be."""
+        unknown = sum(product_above(high - low + 1, reach) for (low, high), reach in zip(intervals, self.reach))
+        return self.finished([(low + high) >> 1 for low, high in intervals], unknown)
+
+    def finished(self, middle, unknown):
+        norm = root_above(fixed_above(inverse_form(self.P, [Fraction(x, 2 ** BITS) for x in middle])) << BITS)
+        return middle, norm, unknown
+
+    def summed(self, effect):
+        """(I - M)^-1 effect."""
+        n = self.n
+        left = [[int(i == j) - Fraction(self.middle[i][j], 2 ** BITS) for j in range(n)] for i in range(n)]
+        x = [fixed_below(v) for v in solve(left, [Fraction(low + high >> 1, 2 ** BITS) for low, high in effect])]
+        wrong = 0
+        for i in range(n):
+            low, high = interval_sum([effect[i], (-x[i], -x[i])] + [interval_product(a, (v, v)) for a, v in zip(self.M[i], x)])
+            wrong += product_above(max(abs(low), abs(high)), self.reach[i])
+        return self.finished(x, fixed_above(Fraction(wrong, 2 ** BITS) / (1 - self.factor)))
+
+    def run(self, output, effects, own, limits):
+        """Gains of one output to the four inputs, as dictionaries. `effects`: columns of the inputs but the force."""
+        T, n, fixed = self.period, self.n, 2 ** BITS
+        bow = T * T / 8
+        rest_of_row = [(0, 0)] * (n - 2)
+        force = [self.column([grid(a), grid(b)] + rest_of_row) for a, b in ((0, 1), (T, 1), (1, 0))]
+        columns = [self.column(effect) for effect in effects]
+        lefts = [self.summed([grid(T * T / 2), grid(T)] + rest_of_row)] + [self.summed(effect) for effect in effects]
+        offsets = [fixed_below(x) for x in limits]
+        own = [fixed_above(abs(x)) for x in own]
+        row = [fixed_below(x) for x in output]
+        error = product_above(self.widest, 1)
+        spread, length = n * self.spread, 0
+
+        def measure():
+            square = sum(x * sum(p * y for p, y in zip(line, row)) for x, line in zip(row, self.scaled))
+            return root_above((square >> 96) + 1) + error
+
+        def above(column, offset=0):
+            middle, norm, unknown = column
+            value = abs((offset << BITS) - sum(c * x for c, x in zip(middle, row)))
+            return (value >> BITS) + 2 + product_above(norm, error) + product_above(unknown, length)
+
+        length = measure()
+        ends = bends = halves = force_peak = 0
+        force_highest, force_left = 0, above(lefts[0], offsets[0])
+        effect_sum, left_sum = [0] * 3, [0] * 3
+        effect_peak, left_peak = list(own), list(own)
+        for _ in range(self.steps):
+            for k in range(3):
+                effect, left = above(columns[k]), above(lefts[k + 1], offsets[k + 1])
+                effect_sum[k] += effect
+                left_sum[k] += left
+                effect_peak[k] = max(effect_peak[k], effect)
+                left_peak[k] = max(left_peak[k], left)
+            late, early, bend = map(above, force)
+            ends += late + early
+            bends += bend
+            force_peak = max(force_peak, late, early)
+            largest = max(map(abs, row))
+            row = [sum(x * m for x, m in zip(row, line)) >> BITS for line in self.columns]
+            error += product_above(self.widest, product_above(spread, largest) + 1)
+            length = measure()
+            left = above(lefts[0], offsets[0])
+            halves += force_left + left
+            force_highest = max(force_highest, max(force_left, left) * bow.denominator + bend * bow.numerator)
+            force_left = left
+        size = Fraction(length, fixed)
+        tail = size / (1 - self.factor)
+        most = [Fraction(norm + unknown, fixed) for _, norm, unknown in force + columns + lefts]
+        force_most, bend_most, columns_most, lefts_most = max(most[:2]), most[2], most[3:6], most[6:]
+        bent = T ** 3 / 12
+        gains = [{
+            "rate": None if limits[0] else Fraction(halves, fixed) * T / 2 + bent * Fraction(bends, fixed) +
+            (T * lefts_most[0] + bent * bend_most) * tail,
+            "amplitude": T / 2 * Fraction(ends, fixed) + T * force_most * tail,
+            "edge": max(Fraction(force_highest, fixed * bow.denominator), abs(limits[0]) + (lefts_most[0] + T * T / 8 * bend_most) * size),
+            "impulse": max(Fraction(force_peak, fixed), force_most * size)}]
+        for k in range(3):
+            gains.append({
+                "rate": None if limits[k + 1] else T * (Fraction(left_sum[k], fixed) + lefts_most[k + 1] * tail),
+                "amplitude": Fraction(own[k] + effect_sum[k], fixed) + columns_most[k] * tail,
+                "edge": max(Fraction(left_peak[k], fixed), abs(limits[k + 1]) + lefts_most[k + 1] * size),
+                "impulse": max(Fraction(effect_peak[k], fixed), columns_most[k] * size) / T})
+        return gains
+
+    def gains(self):
+        control, hold = self.build()
+        n, c, zero = self.n, self.command, Fraction(0)
+        inputs = [[Fraction(int(i == c)) for i in range(n + 1)]] + [
+            [control[i][k] - int(i == k) for i in range(n + 1)] for k in (1, 0)]
+        effects = [[row[0] for row in matrix_product(hold, [[grid(x)] for x in column])] for column in inputs]
+        limits = [zero, zero, zero, Fraction(-1)]
+        if not self.ki:
+            limits[:3] = 1 / self.kp, 1 / self.kp, -self.kd / self.kp
+        error = self.run([Fraction(int(i == 0)) for i in range(n)], effects, [zero] * 3, limits)
+        command = self.run(control[c], effects, [column[c] for column in inputs], [zero] * 4)
+        bend, age = self.period ** 2 / 8, sum(self.lags) + self.delay + self.period
+        for k, (here, of_command) in enumerate(zip(error, command)):
+            acting = 1 if k == 0 else 0
+            if here["rate"] is not None:
+                here["rate"] += bend * (of_command["rate"] + acting * age)
+            here["edge"] += bend * (of_command["amplitude"] + acting)
+            here["amplitude"] += bend * (of_command["amplitude"] + acting)
+            here["impulse"] += bend * of_command["impulse"]
+        error[0]["impulse"] = max(error[0]["impulse"], self.period)
+        for here in error[:2]:
+            for name in here:
+                here[name] = None if here[name] is None else here[name] / self.mass
+        return dict(zip(self.INPUTS, error))
+
+
+GAINS = "rate rate_hex amplitude amplitude_hex edge edge_hex impulse impulse_hex"
+
+
+def check_sampled(loops, derived):
+    require(isinstance(loops, list) and len(loops) <= 3, "more than 3 sampled loops")
+    seen, known = set(), {}
+    for entry in loops:
+        loop = Sampled(entry)
+        require(entry["axis"] not in seen, "a sampled loop stands twice")
+        seen.add(entry["axis"])
+        require_keys(entry["gains"], " ".join(Sampled.INPUTS), "gains")
+        for name in Sampled.INPUTS:
+            require_keys(entry["gains"][name], GAINS, "gains")
+        if derived is not None:
+            derived.compare(entry)
+        same = json.dumps({k: v for k, v in entry.items() if k not in ("axis", "gains")}, sort_keys=True)
+        if same not in known:
+            known[same] = loop.gains()
+        for name in Sampled.INPUTS:
+            for gain, proved in known[same][name].items():
+                check_gain(entry["gains"][name], gain, proved)
+
+
 def check_gain(claims, name, proved):
     decimal, text = claims[name], claims[name + "_hex"]
     if decimal is None and text is None:
@@ -383,7 +663,7 @@ def check_gain(claims, name, proved):
 
 
 def check(c, hashes, derived):
-    require_keys(c, "schema tool statement gains_sha256 model_sha256 loops left_out content_sha256", "certificate")
+    require_keys(c, "schema tool statement gains_sha256 model_sha256 loops sampled_loops left_out content_sha256", "certificate")
     require(c["statement"] == STATEMENT, "another statement")
     require(c["content_sha256"] == content_sha256(c), "content_sha256 does not match")
     for key in ("tool", "gains_sha256", "model_sha256"):
@@ -395,13 +675,14 @@ def check(c, hashes, derived):
         require_keys(entry, "axis input loop why", "left_out")
         require(entry["axis"] in ("x", "y", "z") and all(isinstance(x, str) for x in entry.values()), "left_out")
     loops = c["loops"]
-    require(isinstance(loops, list) and 0 < len(loops) <= 12, "loops are none, or more than 12")
+    require(isinstance(loops, list) and len(loops) <= 12, "more than 12 loops")
+    require(loops or c["sampled_loops"], "there is no loop")
     seen, known = set(), {}
     for entry in loops:
         loop = Loop(entry)
         require((entry["axis"], loop.input) not in seen, "a loop stands twice")
         seen.add((entry["axis"], loop.input))
-        require_keys(entry["gains"], "rate rate_hex amplitude amplitude_hex edge edge_hex impulse impulse_hex", "gains")
+        require_keys(entry["gains"], GAINS, "gains")
         if derived is not None:
             derived.compare(entry)
         same = json.dumps({k: v for k, v in entry.items() if k not in ("axis", "gains")}, sort_keys=True)
@@ -409,7 +690,8 @@ def check(c, hashes, derived):
             known[same] = loop.gains()
         for name, proved in known[same].items():
             check_gain(entry["gains"], name, proved)
-    return len(loops)
+    check_sampled(c["sampled_loops"], derived)
+    return len(loops) + len(c["sampled_loops"])
 
 
 def main(words):

@@ -120,6 +120,43 @@ def least_gains(loop):
     return {"rate": integral, "amplitude": variation, "edge": peak, "impulse": steepest}
 
 
+def least_sampled_gains(loop, source):
+    """Of the sampled loop from below: sums over the sampling times of the response to a step of one input, which begins
+    at a sampling time. Held commands pass the lags by Runge and Kutta in short steps; a delay is a whole number of them."""
+    m, kp, kd, ki, period, increment, delay = (float.fromhex(loop[k]) for k in (
+        "mass_kg", "Kp", "Kd", "Ki", "period_s", "integrator_step_s", "delay_s"))
+    lags = [float.fromhex(x) for x in loop["lags_s"]]
+    pieces = 8
+    dt, late = period / pieces, round(delay / period * pieces)
+    assert abs(late * dt - delay) < 1e-9
+
+    def slope(x, command):
+        chain, lagged = command, []
+        for tau, y in zip(lags, x[2:]):
+            lagged.append((chain - y) / tau)
+            chain = y
+        return [x[1], chain + (1 / m if source == "force" else 0), *lagged]
+
+    x, total, integral, commands, peak = [0.0] * (2 + len(lags)), 0.0, 0.0, [], 0.0
+    variation = steepest = 0.0
+    for _ in range(int(12 / period)):
+        wrong, fast = float(source == "position"), float(source == "velocity")
+        total += increment * (x[0] + wrong)
+        command = -(kp * (x[0] + wrong) + kd * (x[1] + fast) + ki * total) + (1 / m if source == "command" else 0)
+        before = x[0]
+        for _ in range(pieces):
+            commands.append(command)
+            acting = commands[len(commands) - 1 - late] if len(commands) > late else 0.0
+            k1 = slope(x, acting)
+            k2 = slope([a + dt / 2 * b for a, b in zip(x, k1)], acting)
+            k3 = slope([a + dt / 2 * b for a, b in zip(x, k2)], acting)
+            k4 = slope([a + dt * b for a, b in zip(x, k3)], acting)
+            x = [a + dt / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(x, k1, k2, k3, k4)]
+        peak, integral = max(peak, abs(x[0])), integral + period * abs(x[0])
+        variation, steepest = variation + abs(x[0] - before), max(steepest, abs(x[0] - before) / period)
+    return {"rate": integral, "amplitude": variation, "edge": peak, "impulse": steepest}
+
+
 def agree_on_mutations(folder, document):
     seen = accepted = 0
     loop = document["loops"][0]
@@ -146,6 +183,58 @@ def agree_on_mutations(folder, document):
                     assert claimed is None or claimed >= gain * (1 - 1e-4), (path, value, name)
     assert seen > 300 and 0 < accepted < seen / 2, (seen, accepted)
     print(f"{seen} mutations decided alike, {accepted} of them accepted")
+
+
+@contextlib.contextmanager
+def gains_computed_once():
+    """The second checker finds the gains of a witness once: most mutations change a claim only."""
+    known, compute = {}, second.Sampled.gains
+
+    def gains(loop):
+        witness = str(sorted(vars(loop).items()))
+        if witness not in known:
+            known[witness] = compute(loop)
+        return known[witness]
+
+    second.Sampled.gains = gains
+    yield
+    second.Sampled.gains = compute
+
+
+def agree_on_sampled_mutations(folder, document):
+    """Every field of a sampled loop with a past command; of P, a form as of the other loops, the diagonal and a corner."""
+    seen = accepted = 0
+    loop = document["sampled_loops"][0]
+    witness = ("axis", "steps", "contraction", "P", "gains")  # they change nothing of what is true
+    truth = {source: least_sampled_gains(loop, source) for source in loop["gains"]}
+    assert [exit_codes(folder, forged({**document, "loops": [], "sampled_loops": some})) for some in ([loop], [])] == [[0, 0], [1, 1]]
+    for path in places(loop):
+        if path[:1] == ("P",) and len(path) == 3 and path[1] != path[2] and path != ("P", 0, 1):
+            continue
+        for value in mutations(at(loop, path)) if path else ({}, [], None):
+            mutated = {**document, "loops": [], "sampled_loops": [copy.deepcopy(loop)]}
+            full = ("sampled_loops", 0, *path)
+            at(mutated, full[:-1])[full[-1]] = value
+            codes = exit_codes(folder, forged(mutated))
+            assert codes[0] == codes[1] and codes[0] in (0, 1, 3), (path, value, codes)
+            seen += 1
+            if codes[0] == 0:
+                accepted += 1
+                hold_from_below(mutated["sampled_loops"][0], 2e-2, truth if path and path[0] in witness else None)
+    assert seen > 200 and 0 < accepted < seen / 2, (seen, accepted)
+    print(f"{seen} mutations of a sampled loop decided alike, {accepted} of them accepted")
+
+
+def hold_from_below(loop, rate_slack, truth=None):
+    """No certified gain is below what stepping finds; the integral over sampling times is a sum, wrong by `rate_slack`."""
+    compared = 0
+    for source, claims in loop["gains"].items():
+        for name, least in (truth[source] if truth else least_sampled_gains(loop, source)).items():
+            slack = rate_slack if name == "rate" and source == "force" else 1e-4
+            if claims[name] is not None:
+                assert least * (1 - slack) <= claims[name], (loop, source, name, least)
+                compared += 1
+    return compared
 
 
 def refuse_low_claims(folder, document):
@@ -196,10 +285,32 @@ def hold_for_random_loops(folder):
     print(f"{compared} gains of random loops compared")
 
 
+def hold_for_random_sampled_loops(folder):
+    """The same for sampled loops: with and without integral, lags, delays of a part of a period and of several."""
+    generator, compared = random.Random(29), 0
+    for run, delay_periods in enumerate((0, 0.5, 2, 1.25)):
+        kp, kd, rate = generator.uniform(6, 20), generator.uniform(5, 8), (50, 100, 200, 100)[run]
+        ki = 0.3 * kp * kd if run % 2 else 0
+        lag = f"[lag]\nmotor_s = {generator.uniform(0.01, 0.04)}\ndelay_s = {delay_periods / rate}\n"
+        document = certificate(folder, f"Kp = {kp}\nKd = {kd}\nKi = {ki}\nrate_hz = {rate}\nintegrator_step_s = {0.8 / rate}", lag)
+        own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
+        assert exit_codes(folder, forged(document), *own) == [0, 0]
+        assert [loop["axis"] for loop in document["sampled_loops"]] == ["x", "y", "z"], document["left_out"]
+        loop = document["sampled_loops"][2]
+        compared += hold_from_below(loop, 2e-2)
+        for source, claims in loop["gains"].items():
+            least = least_sampled_gains(loop, source)
+            for name in ("amplitude", "edge", "impulse"):  # between the sampling times a force does a little more
+                assert claims[name] <= 1.1 * least[name], (run, source, name, claims[name], least[name])
+    assert compared > 50, compared
+    print(f"{compared} gains of sampled random loops compared")
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         hold_for_random_loops(folder)
+        hold_for_random_sampled_loops(folder)
         document = certificate(folder, "Kp = 12\nKd = 7\nKi = 20", "[lag]\nmotor_s = 0.03\n")
         own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
         assert exit_codes(folder, forged(document), *own) == [0, 0]
@@ -236,6 +347,21 @@ def main():
         changed = copy.deepcopy(document)
         changed["tool"] = "another"
         assert exit_codes(folder, json.dumps(changed)) == [1, 1]  # the hash of the content is of the other one
+        sampled = certificate(folder, "Kp = 12\nKd = 7\nKi = 20\nrate_hz = 50", "[lag]\nmotor_s = 0.03\ndelay_s = 0.005\n")
+        assert exit_codes(folder, forged(sampled), *own) == [0, 0]
+        for number in ("period_s", "integrator_step_s"):
+            other = copy.deepcopy(sampled)
+            for loop in other["sampled_loops"]:
+                loop[number] = (float.fromhex(loop[number]) * (1 - 1e-9)).hex()
+                for claims in loop["gains"].values():
+                    for name in ("rate", "amplitude", "edge", "impulse"):
+                        if claims[name] is not None:
+                            claims.update({name: claims[name] * 1.1, name + "_hex": (claims[name] * 1.1).hex()})
+            assert exit_codes(folder, forged(other)) == [0, 0]
+            assert exit_codes(folder, forged(other), *own) == [1, 1]
+        with gains_computed_once():
+            agree_on_sampled_mutations(folder, sampled)
+        document["sampled_loops"] = []
         refuse_low_claims(folder, document)
         refuse_hostile_files(folder, document)
         agree_on_mutations(folder, document)

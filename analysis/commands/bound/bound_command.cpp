@@ -200,7 +200,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   if (!options.certificate.empty()) {
     certificate = tracking_certificate(input, options.tracking, result["verified"]);
     result["certificate"] = certificate_summary(*certificate);
-    if (!(*certificate)["loops"].empty())
+    if (!is_empty_certificate(*certificate))
       files::write_file(options.certificate, files::to_text(*certificate), common.force);
   }
   std::string report_path;
@@ -274,7 +274,7 @@ Command bound_command() {
             ->needs("--from");
         app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
         add_output(app, "-o,--output", options->certificate,
-                   "File for a certificate of the gains of --verified, for check: continuous loops")
+                   "File for a certificate of the gains of --verified, for check: continuous and sampled loops")
             ->needs("--verified");
         app.add_flag("--tube", options->tube,
                      "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
 #include "stability/bounds/polynomial.h"
@@ -16,6 +17,8 @@ using Eigen::VectorXd;
 using stability::Polynomial;
 
 constexpr double kMostSteps = 1 << 18;
+constexpr const char* kTooFarAbove =
+    "the bounds that the checker can verify are more than 5 % above the enclosure";
 
 /// The characteristic polynomial, without the factor s that it has for Ki = 0; a delay is expanded.
 Polynomial characteristic(const stability::AxisLoop& loop, const std::vector<double>& lags_s,
@@ -120,9 +123,82 @@ std::optional<ProvedGains> search_witness(const stability::AxisLoop& loop, const
         if (excess(found.bounds, known) < 1.01) return found;
       }
       if (excess(found.bounds, known) < 1.05) return found;
-      why = "the bounds that the checker can verify are more than 5 % above the enclosure";
+      why = kTooFarAbove;
     } catch (const std::runtime_error& refusal) {
       why = std::string("no witness was found: ") + refusal.what();
+    }
+  }
+  return std::nullopt;
+}
+
+/// The largest modulus of an eigenvalue.
+double radius_of(const MatrixXd& M) {
+  return Eigen::EigenSolver<MatrixXd>(M, false).eigenvalues().cwiseAbs().maxCoeff();
+}
+
+/// P of P - (M/factor) P (M/factor)' = I in units in which the states are alike: w^k for the k-th derivative of e.
+MatrixXd contracted_form(const check::SampledWitness& loop, const MatrixXd& M, double factor) {
+  const Index n = M.rows();
+  const double w = std::sqrt(loop.Kp);
+  VectorXd unit = VectorXd::Constant(n, 1 / (w * w));
+  unit[0] = 1;
+  unit[1] = 1 / w;
+  if (loop.Ki > 0) unit[2 + static_cast<Index>(loop.lags_s.size())] = w;
+  const VectorXd back = unit.cwiseInverse();
+  MatrixXd power = unit.asDiagonal() * M * back.asDiagonal();
+  power /= factor;
+  MatrixXd P = MatrixXd::Identity(n, n);
+  for (int i = 0; i < 60 && power.norm() > 1e-12; ++i) {
+    P += (power * P * power.transpose()).eval();
+    power = (power * power).eval();
+  }
+  P = (back.asDiagonal() * P * back.asDiagonal()).eval();
+  return (P + P.transpose()) / 2;
+}
+
+double excess(const check::SampledGainBounds& bounds, const SampledEnclosures& known) {
+  return std::max({excess(bounds.force, known.force), excess(bounds.command, known.command),
+                   excess(bounds.velocity, known.velocity), excess(bounds.position, known.position)});
+}
+
+check::SampledWitness numbers_of(const stability::SampledLoop& loop) {
+  check::SampledWitness witness;
+  witness.mass_kg = loop.plant.mass_kg;
+  witness.Kp = loop.plant.Kp, witness.Kd = loop.plant.Kd, witness.Ki = loop.plant.Ki;
+  std::copy_if(loop.plant.lags_s.begin(), loop.plant.lags_s.end(), std::back_inserter(witness.lags_s),
+               [](double tau) { return tau > 0; });
+  witness.delay_s = loop.plant.delay_s;
+  witness.period_s = loop.period_s;
+  witness.integrator_step_s = loop.integrator_step_s;
+  return witness;
+}
+
+std::optional<ProvedSampledGains> search_sampled(const stability::SampledLoop& loop,
+                                                 const SampledEnclosures& known, std::string& why) {
+  ProvedSampledGains found{numbers_of(loop), {}};
+  check::SampledWitness& witness = found.witness;
+  const std::vector<std::vector<double>> map = check::period_map(witness);
+  const auto n = static_cast<Index>(map.size());
+  MatrixXd M(n, n);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < n; ++j) M(i, j) = map[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+  const double gap = 1 - radius_of(M);
+  why = "no witness was found";
+  if (!(gap > 0)) return std::nullopt;
+  for (const double share : {0.8, 0.5, 0.2}) {
+    witness.P = in_fixed_point(contracted_form(witness, M, 1 - share * gap));
+    witness.contraction = 1 - 0.9 * share * gap;
+    for (const double reduction : {1e5, 1e9}) {
+      witness.steps = static_cast<long>(std::clamp(std::log(reduction) / gap, 1.0, kMostSteps));
+      try {
+        found.bounds = check::sampled_upper_gains(witness);
+      } catch (const std::runtime_error& refusal) {
+        why = std::string("no witness was found: ") + refusal.what();
+        break;
+      }
+      if (excess(found.bounds, known) < 1.05) return found;
+      why = kTooFarAbove;
     }
   }
   return std::nullopt;
@@ -137,6 +213,16 @@ std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const s
     if (auto found = search_witness(loop, input, delay_order, known, why)) return found;
   }
   return std::nullopt;
+}
+
+std::optional<ProvedSampledGains> sampled_gain_witness(const stability::SampledLoop& loop,
+                                                       const SampledEnclosures& known, std::string& why) {
+  try {
+    return search_sampled(loop, known, why);
+  } catch (const std::runtime_error& refusal) {  // of numbers that the checker does not take
+    why = std::string("no witness was found: ") + refusal.what();
+    return std::nullopt;
+  }
 }
 
 }  // namespace swarmcert::analysis

@@ -5,8 +5,10 @@
 #include <string>
 
 #include "stability/bounds/axis_loop.h"
+#include "stability/bounds/sampled_loop.h"
 #include "stability/bounds/verified_norms.h"
 #include "stability/checker/gain_bounds.h"
+#include "stability/checker/sampled_gain_bounds.h"
 
 namespace swarmcert::analysis {
 
@@ -20,5 +22,19 @@ struct ProvedGains {
 /// @returns nothing, and in `why` the reason, where no form was found or the bounds remain 5 % above `known`.
 std::optional<ProvedGains> gain_witness(const stability::AxisLoop& loop, const std::string& input,
                                         const stability::VerifiedNorms& known, std::string& why);
+
+struct ProvedSampledGains {
+  check::SampledWitness witness;
+  check::SampledGainBounds bounds;  ///< as the checker finds them
+};
+
+/// What is known of the four inputs of a sampled loop, at all times.
+struct SampledEnclosures {
+  stability::VerifiedNorms force, command, velocity, position;
+};
+
+/// The same for a sampled loop, all inputs at once.
+std::optional<ProvedSampledGains> sampled_gain_witness(const stability::SampledLoop& loop,
+                                                       const SampledEnclosures& known, std::string& why);
 
 }  // namespace swarmcert::analysis

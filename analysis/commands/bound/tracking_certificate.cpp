@@ -31,6 +31,12 @@ Json hex_array(const std::vector<double>& values) {
   return result;
 }
 
+Json hex_rows(const std::vector<std::vector<double>>& matrix) {
+  Json result = Json::array();
+  for (const std::vector<double>& row : matrix) result.push_back(hex_array(row));
+  return result;
+}
+
 Json gains_of(const check::GainBounds& bounds) {
   Json gains;
   const auto add = [&gains](const std::string& key, const std::optional<mpq_class>& exact) {
@@ -47,8 +53,6 @@ Json gains_of(const check::GainBounds& bounds) {
 
 Json loop_entry(const ProvedGains& found) {
   const check::LoopWitness& w = found.witness;
-  Json P = Json::array();
-  for (const std::vector<double>& row : w.P) P.push_back(hex_array(row));
   return {{"axis", ""},
           {"input", w.input},
           {"mass_kg", files::hex_float(w.mass_kg)},
@@ -62,14 +66,35 @@ Json loop_entry(const ProvedGains& found) {
           {"step_exponent", w.step_exponent},
           {"steps", w.steps},
           {"decay", files::hex_float(w.decay)},
-          {"P", std::move(P)},
+          {"P", hex_rows(w.P)},
           {"gains", gains_of(found.bounds)}};
 }
 
-stability::VerifiedNorms enclosures_of(const Json& row) {
+Json sampled_entry(const ProvedSampledGains& found) {
+  const check::SampledWitness& w = found.witness;
+  return {{"axis", ""},
+          {"mass_kg", files::hex_float(w.mass_kg)},
+          {"Kp", files::hex_float(w.Kp)},
+          {"Kd", files::hex_float(w.Kd)},
+          {"Ki", files::hex_float(w.Ki)},
+          {"lags_s", hex_array(w.lags_s)},
+          {"delay_s", files::hex_float(w.delay_s)},
+          {"period_s", files::hex_float(w.period_s)},
+          {"integrator_step_s", files::hex_float(w.integrator_step_s)},
+          {"steps", w.steps},
+          {"contraction", files::hex_float(w.contraction)},
+          {"P", hex_rows(w.P)},
+          {"gains",
+           {{"force", gains_of(found.bounds.force)},
+            {"command", gains_of(found.bounds.command)},
+            {"velocity", gains_of(found.bounds.velocity)},
+            {"position", gains_of(found.bounds.position)}}}};
+}
+
+stability::VerifiedNorms enclosures_of(const Json& gains) {
   stability::VerifiedNorms known;
-  const auto upper = [&row](const char* key) {
-    const Json& x = row.at(key).at(1);
+  const auto upper = [&gains](const char* key) {
+    const Json& x = gains.at(key).at(1);
     return x.is_null() ? std::numeric_limits<double>::infinity() : x.get<double>();
   };
   known.rate.hi = upper("rate"), known.amplitude.hi = upper("amplitude");
@@ -80,58 +105,117 @@ stability::VerifiedNorms enclosures_of(const Json& row) {
 /// The certificate entry of this loop, with its axis left empty; or a string with the reason why it has none.
 Json entry_or_reason(const stability::AxisLoop& loop, const Json& row) {
   if (row["status"] != "proved") return row["why"];
-  if (row["loop"] != "continuous") return "sampled loops are not certified, only enclosed";
   std::string why;
   const auto found = gain_witness(loop, row["channel"].get<std::string>(), enclosures_of(row), why);
   return found ? loop_entry(*found) : Json(why);
 }
 
+/// The same for a sampled loop.
+/// @param rows of its inputs: force, command, velocity and position.
+Json sampled_entry_or_reason(const stability::SampledLoop& loop, const std::map<std::string, Json>& rows) {
+  for (const auto& [input, row] : rows) {
+    if (row["status"] != "proved") return row["why"];
+  }
+  const auto known = [&rows](const char* input) { return enclosures_of(rows.at(input)["between_samples"]); };
+  std::string why;
+  const auto found = sampled_gain_witness(
+      loop, {known("force"), known("command"), known("velocity"), known("position")}, why);
+  return found ? sampled_entry(*found) : Json(why);
+}
+
+/// What becomes of the rows of --verified: entries of loops, and rows that have none.
+class Entries {
+ public:
+  void add(const Json& row, Json entry) {
+    if (entry.is_object()) {
+      entry["axis"] = row["axis"];
+      (row["loop"] == "sampled" ? sampled : continuous).push_back(std::move(entry));
+    } else {
+      leave_out(row, entry);
+    }
+  }
+  void leave_out(const Json& row, const Json& why) {
+    left_out.push_back(
+        {{"axis", row["axis"]}, {"input", row["channel"]}, {"loop", row["loop"]}, {"why", why}});
+  }
+  Json continuous = Json::array(), sampled = Json::array(), left_out = Json::array();
+};
+
+int axis_of(const Json& row) {
+  int axis = 0;
+  while (stability::axis_name(axis) != row["axis"].get<std::string>()) ++axis;
+  return axis;
+}
+
+std::string numbers_of(const stability::AxisLoop& loop) {
+  return Json({loop.mass_kg, loop.Kp, loop.Kd, loop.Ki, loop.lags_s, loop.delay_s}).dump();
+}
+
+/// Axes that are the same are searched once.
+void add_continuous(const Tracking& input, const Json& verified, Entries& entries) {
+  std::map<std::string, Json> known;
+  for (const Json& row : verified) {
+    if (row["loop"] != "continuous") continue;
+    const stability::AxisLoop loop = *axis_loop(input.gains, input.plant, axis_of(row));
+    const auto [place, is_new] = known.try_emplace(numbers_of(loop) + row["channel"].get<std::string>());
+    if (is_new) place->second = entry_or_reason(loop, row);
+    entries.add(row, place->second);
+  }
+}
+
+void add_sampled(const Tracking& input, const Json& verified, Entries& entries) {
+  std::map<int, std::map<std::string, Json>> rows;
+  for (const Json& row : verified) {
+    if (row["loop"] == "sampled") rows[axis_of(row)][row["channel"].get<std::string>()] = row;
+  }
+  std::map<std::string, Json> known;
+  for (const auto& [axis, inputs] : rows) {
+    const stability::SampledLoop loop = *sampled_axis_loop(input.gains, input.plant, axis);
+    const auto [place, is_new] = known.try_emplace(numbers_of(loop.plant));
+    if (is_new) place->second = sampled_entry_or_reason(loop, inputs);
+    if (place->second.is_object()) {
+      entries.add(inputs.begin()->second, place->second);
+    } else {
+      for (const auto& [name, row] : inputs) entries.leave_out(row, place->second);
+    }
+  }
+}
+
 }  // namespace
 
 Json tracking_certificate(const Tracking& input, const TrackingArguments& arguments, const Json& verified) {
-  Json loops = Json::array(), left_out = Json::array();
-  std::map<std::string, Json> known;  // axes that are the same are searched once
-  for (const Json& row : verified) {
-    int axis = 0;
-    while (stability::axis_name(axis) != row["axis"].get<std::string>()) ++axis;
-    const stability::AxisLoop loop = *axis_loop(input.gains, input.plant, axis);
-    Json numbers = {loop.mass_kg, loop.Kp,      loop.Kd,        loop.Ki,
-                    loop.lags_s,  loop.delay_s, row["channel"], row["loop"]};
-    const auto [place, is_new] = known.try_emplace(numbers.dump());
-    if (is_new) place->second = entry_or_reason(loop, row);
-    Json entry = place->second;
-    if (entry.is_object()) {
-      entry["axis"] = row["axis"];
-      loops.push_back(std::move(entry));
-    } else {
-      left_out.push_back({{"axis", row["axis"]},
-                          {"input", row["channel"]},
-                          {"loop", row["loop"]},
-                          {"why", std::move(entry)}});
-    }
-  }
+  Entries entries;
+  add_continuous(input, verified, entries);
+  add_sampled(input, verified, entries);
   Json result = {{"schema", check::kTrackingSchema},
                  {"tool", "swarmcert " SWARMCERT_VERSION},
                  {"statement", check::kTrackingStatement},
                  {"gains_sha256", files::sha256(files::read_file(arguments.gains))},
                  {"model_sha256", files::sha256(files::read_file(arguments.model))},
-                 {"loops", std::move(loops)},
-                 {"left_out", std::move(left_out)}};
+                 {"loops", std::move(entries.continuous)},
+                 {"sampled_loops", std::move(entries.sampled)},
+                 {"left_out", std::move(entries.left_out)}};
   result["content_sha256"] = files::content_sha256(result);
   return result;
+}
+
+bool is_empty_certificate(const Json& certificate) {
+  return certificate["loops"].empty() && certificate["sampled_loops"].empty();
 }
 
 Json certificate_summary(const Json& certificate) {
   return {{"content_sha256", certificate["content_sha256"]},
           {"loops", certificate["loops"].size()},
+          {"sampled_loops", certificate["sampled_loops"].size()},
           {"left_out", certificate["left_out"]}};
 }
 
 void print_certificate_summary(const Json& certificate, const std::string& path) {
-  if (certificate["loops"].empty()) {
+  if (is_empty_certificate(certificate)) {
     fmt::print("\nno certificate: none of these gains could be certified\n");
   } else {
-    fmt::print("\ncertificate of the gains of {} loops: {}\n", certificate["loops"].size(), path);
+    fmt::print("\ncertificate of the gains of {} continuous loops and of {} sampled axes: {}\n",
+               certificate["loops"].size(), certificate["sampled_loops"].size(), path);
   }
   std::map<std::string, std::string> reasons;
   for (const Json& row : certificate["left_out"]) {

@@ -50,18 +50,35 @@ bool states(const files::Json& entry, const stability::AxisLoop& loop) {
          std::equal(stated.begin(), stated.end(), derived.begin(), derived.end(), is_close);
 }
 
+int axis_of(const files::Json& entry) {
+  const std::string axis = entry["axis"].get<std::string>();
+  return axis == "x" ? 0 : axis == "y" ? 1 : 2;
+}
+
+/// The same for an entry of a sampled loop.
+bool states(const files::Json& entry, const stability::SampledLoop& loop) {
+  const auto fits = [&entry](const char* key, double derived) {
+    return is_close(files::parse_hex_float(entry[key].get<std::string>()), derived);
+  };
+  return states(entry, loop.plant) && fits("period_s", loop.period_s) &&
+         fits("integrator_step_s", loop.integrator_step_s);
+}
+
 /// Rejects an accepted certificate whose loops are not those of the files.
 void compare_loops(const CheckOptions& options, const files::Json& certificate,
                    check::TrackingVerdict& verdict) {
   const stability::TrackingSetup setup = stability::load_tracking_setup(options.gains, options.model);
-  for (const files::Json& entry : certificate["loops"]) {
-    const std::string axis = entry["axis"].get<std::string>();
-    const auto loop = stability::axis_loop(setup.gains, setup.plant, axis == "x" ? 0 : axis == "y" ? 1 : 2);
-    if (!loop || !states(entry, *loop)) {
-      verdict = {false, "loops: that of axis " + axis + " is not the one of the files given", 0, 0};
-      return;
+  const auto compare = [&](const char* kind, const auto& loop_of) {
+    for (const files::Json& entry : certificate[kind]) {
+      const auto loop = loop_of(setup.gains, setup.plant, axis_of(entry));
+      if (loop && states(entry, *loop)) continue;
+      const std::string axis = entry["axis"].get<std::string>();
+      verdict = {false, std::string(kind) + ": that of axis " + axis + " is not the one of the files given",
+                 0, 0};
     }
-  }
+  };
+  compare("loops", stability::axis_loop);
+  compare("sampled_loops", stability::sampled_axis_loop);
 }
 
 int check_gains(const CheckOptions& options, const CommonOptions& common, const std::string& text) {

@@ -50,29 +50,45 @@ files::Json inspect_network_certificate(const std::string& path, const files::Js
   return {{"file", path}, {"kind", "certificate"}, {"bounds", std::move(bounds)}};
 }
 
+/// The gains of one loop to one input, of a certificate that nobody has checked yet.
+files::Json gain_row(const files::Json& loop, const char* kind, const files::Json& input,
+                     const files::Json& stated) {
+  files::Json row = {{"loop", kind}, {"gains", files::Json::object()}};
+  if (loop.is_object() && loop.contains("axis")) row["axis"] = loop["axis"];
+  if (!input.is_null()) row["input"] = input;
+  for (const char* key : {"rate", "amplitude", "edge", "impulse"})
+    row["gains"][key] = stated.is_object() && stated.contains(key) ? stated[key] : files::Json();
+  return row;
+}
+
+files::Json gain_rows(const files::Json& certificate) {
+  const auto member = [](const files::Json& object, const char* key) {
+    return object.is_object() ? object.value(key, files::Json()) : files::Json();
+  };
+  files::Json rows = files::Json::array();
+  for (const files::Json& loop : certificate.value("loops", files::Json::array()))
+    rows.push_back(gain_row(loop, "continuous", member(loop, "input"), member(loop, "gains")));
+  for (const files::Json& loop : certificate.value("sampled_loops", files::Json::array())) {
+    for (const char* input : {"force", "command", "velocity", "position"})
+      rows.push_back(gain_row(loop, "sampled", input, member(member(loop, "gains"), input)));
+  }
+  return rows;
+}
+
 files::Json inspect_tracking_certificate(const std::string& path, const files::Json& certificate,
                                          bool print) {
-  files::Json loops = files::Json::array();
+  files::Json loops = gain_rows(certificate);
+  files::Json left_out = certificate.value("left_out", files::Json::array());
   if (print) {
     fmt::print("{}: certificate of tracking gains, not checked here ('swarmcert check' does)\n", path);
-    fmt::print("  {:<4} {:<10} {:>14} {:>14} {:>14} {:>14}\n", "axis", "input", "rate m/(N/s)",
+    fmt::print("  {:<4} {:<10} {:<10} {:>14} {:>14} {:>14} {:>15}\n", "axis", "input", "loop", "rate m/(N/s)",
                "amplitude m/N", "edge m/N", "impulse m/(N s)");
+    for (const files::Json& row : loops)
+      fmt::print("  {:<4} {:<10} {:<10} {:>14} {:>14} {:>14} {:>15}\n", cell(row, "axis"), cell(row, "input"),
+                 cell(row, "loop"), cell(row["gains"], "rate"), cell(row["gains"], "amplitude"),
+                 cell(row["gains"], "edge"), cell(row["gains"], "impulse"));
+    if (!left_out.empty()) fmt::print("  without a certificate: {} loops\n", left_out.size());
   }
-  for (const files::Json& loop : certificate.value("loops", files::Json::array())) {
-    files::Json line = files::Json::object(), gains = files::Json::object();
-    for (const char* key : {"axis", "input"})
-      if (loop.contains(key)) line[key] = loop[key];
-    const files::Json stated = loop.is_object() ? loop.value("gains", files::Json::object()) : files::Json();
-    for (const char* key : {"rate", "amplitude", "edge", "impulse"})
-      gains[key] = stated.is_object() && stated.contains(key) ? stated[key] : files::Json();
-    if (print)
-      fmt::print("  {:<4} {:<10} {:>14} {:>14} {:>14} {:>14}\n", cell(loop, "axis"), cell(loop, "input"),
-                 cell(gains, "rate"), cell(gains, "amplitude"), cell(gains, "edge"), cell(gains, "impulse"));
-    line["gains"] = std::move(gains);
-    loops.push_back(std::move(line));
-  }
-  files::Json left_out = certificate.value("left_out", files::Json::array());
-  if (print && !left_out.empty()) fmt::print("  without a certificate: {} loops\n", left_out.size());
   return {{"file", path},
           {"kind", "tracking_certificate"},
           {"loops", std::move(loops)},

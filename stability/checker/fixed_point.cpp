@@ -1,0 +1,36 @@
+#include "stability/checker/fixed_point.h"
+
+namespace swarmcert::check {
+
+std::optional<Rational> inverse_form(Square m, Row right) {
+  Rational sum;
+  for (std::size_t k = 0; k < m.size(); ++k) {
+    if (sgn(m[k][k]) <= 0) return std::nullopt;
+    sum += right[k] * right[k] / m[k][k];
+    for (std::size_t i = k + 1; i < m.size(); ++i) {
+      const Rational factor = m[i][k] / m[k][k];
+      for (std::size_t j = k; j < m.size(); ++j) m[i][j] -= factor * m[k][j];
+      right[i] -= factor * right[k];
+    }
+  }
+  return sum;
+}
+
+Square exact_form(const std::vector<std::vector<double>>& stated, std::size_t n) {
+  demand(stated.size() == n, "P has another size than the loop");
+  Square exact(n, Row(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    demand(stated[i].size() == n, "P has another size than the loop");
+    for (std::size_t j = 0; j < n; ++j) {
+      const double x = stated[i][j], scaled = std::ldexp(x, static_cast<int>(kFormBits));
+      demand(std::abs(x) <= 0x1p64 && scaled == std::floor(scaled), "P has an entry out of range");
+      exact[i][j] = x;
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < i; ++j) demand(exact[i][j] == exact[j][i], "P is not symmetric");
+  }
+  return exact;
+}
+
+}  // namespace swarmcert::check

@@ -1,0 +1,62 @@
+/// @file Fixed-point numbers, fractions and the elimination that the checks of tracking gains share. Not for users.
+#pragma once
+
+#include <gmpxx.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+namespace swarmcert::check {
+
+using Rational = mpq_class;
+using Integer = mpz_class;
+using Row = std::vector<Rational>;
+using Square = std::vector<Row>;
+
+inline constexpr mp_bitcnt_t kBits = 128;  ///< a fixed-point number is an integer over 2^kBits
+inline constexpr mp_bitcnt_t kFormBits =
+    96;  ///< the entries of a stated quadratic form are integers over 2^kFormBits
+
+inline void demand(bool condition, const char* reason) {
+  if (!condition) throw std::runtime_error(reason);
+}
+
+/// Numbers of a loop outside of this are refused: underflow and overflow are out of reach then.
+inline bool is_usual(double x) { return x >= 0x1p-40 && x <= 0x1p40; }
+
+/// 2^exponent
+inline Rational two_to(long exponent) {
+  const Integer power = Integer(1) << static_cast<mp_bitcnt_t>(std::labs(exponent));
+  return exponent >= 0 ? Rational(power) : Rational(1, power);
+}
+
+inline Integer floor_fixed(const Rational& x) {
+  const Integer numerator = x.get_num() << kBits;
+  Integer result;
+  mpz_fdiv_q(result.get_mpz_t(), numerator.get_mpz_t(), x.get_den_mpz_t());
+  return result;
+}
+inline Integer ceil_fixed(const Rational& x) { return -floor_fixed(-x); }
+inline Rational as_fraction(const Integer& fixed) {
+  return Rational(fixed) * two_to(-static_cast<long>(kBits));
+}
+
+/// At least the product of two nonnegative fixed-point numbers.
+inline Integer times_up(const Integer& a, const Integer& b) { return ((a * b) >> kBits) + 1; }
+
+inline Integer root_up(const Integer& x) { return sqrt(x) + 1; }
+/// At least the root of x >= 0, as a fixed-point number.
+inline Integer fixed_root_up(const Rational& x) { return root_up(ceil_fixed(x) << kBits); }
+
+/// Elimination of a symmetric matrix without exchange of rows, with `right` beside it.
+/// @returns right' m^-1 right; nothing unless every pivot is positive, that is, m positive definite.
+std::optional<Rational> inverse_form(Square m, Row right);
+
+/// The form stated by a witness as fractions.
+/// @throws std::runtime_error unless it is symmetric, of n rows, with entries that are integers over 2^kFormBits.
+Square exact_form(const std::vector<std::vector<double>>& stated, std::size_t n);
+
+}  // namespace swarmcert::check
