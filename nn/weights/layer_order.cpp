@@ -270,4 +270,13 @@ LayerOrder decide_layer_order(const std::vector<LayerShape>& layers, Listing lis
   return stated.empty() ? decision.decide() : decision.as_stated(stated);
 }
 
+OrderSource stated_order(const std::vector<Layer>& layers, const std::vector<std::string>& stated,
+                         const std::string& path) {
+  std::vector<LayerShape> shapes;
+  for (const Layer& layer : layers)
+    shapes.push_back(
+        {layer.name, static_cast<std::uint64_t>(layer.inputs), static_cast<std::uint64_t>(layer.outputs)});
+  return decide_layer_order(shapes, Listing::kEvaluation, stated, path).source;
+}
+
 }  // namespace swarmcert::files

@@ -36,6 +36,11 @@ struct LayerOrder {
 LayerOrder decide_layer_order(const std::vector<LayerShape>& layers, Listing listing,
                               const std::vector<std::string>& stated, const std::string& path);
 
+/// Where the order of `layers` comes from, which their file lists in the order of evaluation.
+/// @param stated as for decide_layer_order(), which throws where it contradicts the file.
+OrderSource stated_order(const std::vector<Layer>& layers, const std::vector<std::string>& stated,
+                         const std::string& path);
+
 /// Compares runs of digits by value, so that fc2 comes before fc10.
 bool naturally_before(const std::string& a, const std::string& b);
 

@@ -152,11 +152,7 @@ Weights parse_nnet(const std::string& bytes, const std::string& path, const std:
   }
   weights.notes = {"the normalization of inputs and outputs is folded into the first and the last layer",
                    "the clamp of inputs to their least and largest values is left out"};
-  std::vector<LayerShape> shapes;
-  for (const Layer& layer : weights.layers)
-    shapes.push_back(
-        {layer.name, static_cast<std::uint64_t>(layer.inputs), static_cast<std::uint64_t>(layer.outputs)});
-  weights.order_source = decide_layer_order(shapes, Listing::kEvaluation, order, path).source;
+  weights.order_source = stated_order(weights.layers, order, path);
   return weights;
 }
 

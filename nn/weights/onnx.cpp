@@ -16,11 +16,7 @@ bool looks_like_onnx(const std::string& bytes) {
 Weights parse_onnx(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
   Weights weights = OnnxGraph(read_onnx_model(bytes, path), path).run();
   weights.path = path;
-  std::vector<LayerShape> shapes;
-  for (const Layer& layer : weights.layers)
-    shapes.push_back(
-        {layer.name, static_cast<std::uint64_t>(layer.inputs), static_cast<std::uint64_t>(layer.outputs)});
-  weights.order_source = decide_layer_order(shapes, Listing::kEvaluation, order, path).source;
+  weights.order_source = stated_order(weights.layers, order, path);
   return weights;
 }
 
