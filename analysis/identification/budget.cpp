@@ -6,6 +6,7 @@
 #include <set>
 
 #include "analysis/identification/kind_fit.h"
+#include "analysis/residuals/published_vehicle.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
@@ -41,24 +42,24 @@ void set_mass(Inputs& inputs, const std::string& kind, double mass_kg) {
   }
 }
 
-/// What the networks' authors weighed.
-constexpr double kWeighedSmall_kg = 0.032;
+/// Vertical error of the vehicles of `kind`; infinite where there are none.
+double error_N(const Inputs& inputs, const std::string& kind, int jobs) {
+  const BudgetRow row = judged("nominal", inputs, jobs);
+  const auto found = row.of.find("kind " + kind);
+  return found == row.of.end() ? INFINITY : found->second.rmse.z;
+}
 
-/// The mass of a kind "small", its model's or kWeighedSmall_kg, that leaves less vertical residual on the flights that
-/// are fitted; 0 where these hold no such vehicle.
-double better_small_mass_kg(const Inputs& fit, int jobs) {
-  const Model* const small = fit.model_of("small");
-  if (small == nullptr) return 0;
-  Inputs lighter = fit;
-  set_mass(lighter, "small", kWeighedSmall_kg);
-  const auto error_N = [jobs](const Inputs& inputs) {
-    const BudgetRow row = judged("nominal", inputs, jobs);
-    const auto found = row.of.find("kind small");
-    return found == row.of.end() ? INFINITY : found->second.rmse.z;
-  };
-  const double stated_N = error_N(fit), weighed_N = error_N(lighter);
-  if (std::isinf(stated_N) && std::isinf(weighed_N)) return 0;
-  return weighed_N < stated_N ? kWeighedSmall_kg : small->mass_kg;
+/// Gives each kind that was published the published mass, where it leaves less vertical residual on the flights that
+/// are fitted than its model's.
+void choose_masses(Inputs& fit, Inputs& test, int jobs) {
+  for (const Model& model : std::vector<Model>(fit.models)) {
+    const residuals::PublishedVehicle* const published = residuals::published_vehicle(model.kind);
+    if (published == nullptr || published->mass_kg == model.mass_kg) continue;
+    Inputs other = fit;
+    set_mass(other, model.kind, published->mass_kg);
+    if (!(error_N(other, model.kind, jobs) < error_N(fit, model.kind, jobs))) continue;
+    for (Inputs* inputs : {&fit, &test}) set_mass(*inputs, model.kind, published->mass_kg);
+  }
 }
 
 /// Vehicles of `kind` in `inputs`.
@@ -70,6 +71,48 @@ std::set<std::string> vehicles_of(const Inputs& inputs, const std::string& kind)
     }
   }
   return names;
+}
+
+/// A row of the budget between the nominal one and the network's.
+struct Stage {
+  const char* name;
+  std::set<std::string> effects;
+  bool has_offsets;
+};
+
+std::vector<Stage> all_stages() {
+  std::set<std::string> everything(kKnown.begin(), kKnown.end());
+  everything.insert(kRest.begin(), kRest.end());
+  return {{"lag", {"motor_lag"}, false},
+          {"offset", {"motor_lag"}, true},
+          {"ground", {"motor_lag", "ground"}, true},
+          {"jet", {"motor_lag", "ground", "downwash"}, true},
+          {"rest", everything, true}};
+}
+
+/// Gives the vehicles of the model's kind in `inputs` the model with what `joint` says of the stage's effects.
+void apply(const Stage& stage, const KindFit& joint, const Model& model, Inputs& inputs) {
+  for (const std::string& vehicle : vehicles_of(inputs, model.kind)) {
+    Model own = model;
+    own.effects = joint.specs(stage.effects);
+    const auto offset = joint.offsets_N().find(vehicle);
+    if (stage.has_offsets && offset != joint.offsets_N().end())
+      own.effects.push_back(offset_spec(offset->second));
+    inputs.vehicle_models[vehicle] = std::move(own);
+  }
+}
+
+/// The model of every kind is the learned force alone, with the mass that the network was trained with.
+Inputs with_network(Inputs inputs, const std::string& network) {
+  inputs.rules.published_signals = true;
+  for (Model& model : inputs.models) {
+    if (const auto* published = residuals::published_vehicle(model.kind)) model.mass_kg = published->mass_kg;
+    EffectSpec spec;
+    spec.name = "deep_set";
+    spec.network = std::filesystem::absolute(network).string();
+    model.effects = {spec};
+  }
+  return inputs;
 }
 
 }  // namespace
@@ -85,60 +128,31 @@ Budget error_budget(const Inputs& given_fit, const Inputs& given_test, const std
     inputs->vehicle_models.clear();
     for (Model& model : inputs->models) model.effects.clear();
   }
-  if (const double mass_kg = better_small_mass_kg(fit, jobs); mass_kg > 0) {
-    set_mass(fit, "small", mass_kg);
-    set_mass(test, "small", mass_kg);
-  }
+  choose_masses(fit, test, jobs);
   budget.rows.push_back(judged("nominal", test, jobs));
-  const int kinds = static_cast<int>(test.models.size());
-  const int work = kinds * (kPasses + kRestPasses);
+  const int work = static_cast<int>(test.models.size()) * (kPasses + kRestPasses);
   int done = 0;
-  std::vector<Inputs> stages(5, test);  // lag, offset, ground, jet, rest
+  const auto show = [&](int, int) { progress(++done, work); };
+  const std::vector<Stage> stages = all_stages();
+  const std::size_t last = stages.size() - 1;
+  std::vector<Inputs> staged(stages.size(), test);
   for (const Model& model : test.models) {
     budget.masses_kg[model.kind] = model.mass_kg;
     KindFit joint(fit, model.kind, jobs);
     if (joint.is_empty()) continue;
-    const auto show = [&](int, int) { progress(++done, work); };
     joint.add(kKnown);
     joint.search(kPasses, show);
-    const auto apply = [&](Inputs& stage, const std::set<std::string>& names, bool offsets) {
-      for (const std::string& vehicle : vehicles_of(test, model.kind)) {
-        Model own = model;
-        own.effects = joint.specs(names);
-        const auto offset = joint.offsets_N().find(vehicle);
-        if (offsets && offset != joint.offsets_N().end()) own.effects.push_back(offset_spec(offset->second));
-        stage.vehicle_models[vehicle] = std::move(own);
-      }
-    };
-    apply(stages[0], {"motor_lag"}, false);
-    apply(stages[1], {"motor_lag"}, true);
-    apply(stages[2], {"motor_lag", "ground"}, true);
-    apply(stages[3], {"motor_lag", "ground", "downwash"}, true);
+    for (std::size_t k = 0; k < last; ++k) apply(stages[k], joint, model, staged[k]);
     joint.add(kRest);
     joint.search(kRestPasses, show);
-    std::set<std::string> everything(kKnown.begin(), kKnown.end());
-    everything.insert(kRest.begin(), kRest.end());
-    apply(stages[4], everything, true);
-    for (const std::string& vehicle : vehicles_of(test, model.kind))
-      budget.fitted[vehicle] = stages[4].vehicle_models.at(vehicle);
+    apply(stages[last], joint, model, staged[last]);
   }
-  const char* const kNames[] = {"lag", "offset", "ground", "jet", "rest"};
   for (std::size_t k = 0; k < stages.size(); ++k) {
-    budget.rows.push_back(judged(kNames[k], stages[k], jobs));
-    budget.rows.back().models = stages[k].vehicle_models;
+    budget.rows.push_back(judged(stages[k].name, staged[k], jobs));
+    budget.rows.back().models = staged[k].vehicle_models;
   }
-  if (!network.empty()) {
-    Inputs learned = test;
-    learned.rules.published_signals = true;
-    for (Model& model : learned.models) {
-      if (model.kind == "small") model.mass_kg = kWeighedSmall_kg;
-      EffectSpec spec;
-      spec.name = "deep_set";
-      spec.network = std::filesystem::absolute(network).string();
-      model.effects = {spec};
-    }
-    budget.rows.push_back(judged("network", learned, jobs));
-  }
+  budget.fitted = staged[last].vehicle_models;
+  if (!network.empty()) budget.rows.push_back(judged("network", with_network(test, network), jobs));
   return budget;
 }
 

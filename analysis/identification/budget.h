@@ -27,9 +27,9 @@ struct Budget {
   std::size_t fit_flights = 0, test_flights = 0;
 };
 
-/// @param fit, test Inputs with the same models. A kind "small" is tried with its model's mass and with 0.032 kg, which
-///                  the networks' authors weighed; the one that is better on `fit` is
-///                  nominal. `test` is judged and chooses nothing.
+/// @param fit, test Inputs with the same models. Kinds of published vehicles are tried with their model's mass and with
+///                  the published one (published_vehicle()); the one that is better on `fit` is nominal. `test` is
+///                  judged and chooses nothing.
 /// @param network   a learned force for one more row, with the authors' masses, thrust lag and unfiltered acceleration,
 ///                  on the same records; empty: none.
 Budget error_budget(const residuals::Inputs& fit, const residuals::Inputs& test, const std::string& network,

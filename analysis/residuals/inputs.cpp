@@ -9,6 +9,7 @@
 
 #include "analysis/residuals/force_residual.h"
 #include "analysis/residuals/plausibility.h"
+#include "analysis/residuals/published_vehicle.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 #include "nn/weights/network.h"
@@ -26,10 +27,8 @@ void add_kind(Kinds& kinds, const std::string& kind, double mass_kg) {
   kinds.masses_kg.push_back(mass_kg);
 }
 
-/// What the networks' authors weighed; their labels rest on it.
 void set_published_mass(stability::Model& model) {
-  if (model.kind == "small") model.mass_kg = 0.032;
-  if (model.kind == "large") model.mass_kg = 0.067;
+  if (const auto* published = published_vehicle(model.kind)) model.mass_kg = published->mass_kg;
 }
 
 void set_network(stability::Model& model, const std::string& network) {

@@ -7,6 +7,7 @@
 
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/read_log.h"
+#include "analysis/residuals/published_vehicle.h"
 #include "analysis/residuals/smoothing_window.h"
 #include "nn/base/input_error.h"
 
@@ -23,8 +24,8 @@ constexpr double kClear_m = 0.01;  // of the ground, wherever the vehicle stands
 
 /// Where the published vehicles stand; NaN for others, whose logs have to show it.
 double contact_height_m(const std::string& kind) {
-  if (kind == "large") return 0.085;
-  return kind == "small" ? 0.07 : std::numeric_limits<double>::quiet_NaN();
+  const PublishedVehicle* const published = published_vehicle(kind);
+  return published != nullptr ? published->standing_height_m : std::numeric_limits<double>::quiet_NaN();
 }
 
 Eigen::Vector3d vector(const logs::Vector& v) { return {v[0], v[1], v[2]}; }

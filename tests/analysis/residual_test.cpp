@@ -313,6 +313,28 @@ double rmse_z_N(const files::Json& budget, const std::string& row, const std::st
   return 0;
 }
 
+/// What flew weighed as published; its model says 60 g.
+TEST(Budget, TriesThePublishedMassOfEveryPublishedKind) {
+  const ScratchFolder folder;
+  const std::string flown = source_path("stability/models/crazyflie-large.toml");
+  std::string light = read_text(flown);
+  light.replace(light.find("mass_kg = 0.067"), 15, "mass_kg = 0.060");
+  write_text(folder / "light.toml", light);
+  for (const std::string seed : {"1", "2"}) {
+    ASSERT_EQ(run_shell("swarmcert simulate random-walk -q --vehicles 2 --duration 8 --seed " + seed +
+                            " --model " + flown + " --gains " +
+                            source_path("controller/gains/crazyflie-large.toml") + " -o " + seed,
+                        folder.path())
+                  .exit_code,
+              0);
+  }
+  const Outcome outcome =
+      run_shell("swarmcert compare light.toml 2 --budget 1 --json budget.json", folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json budget = files::read_json(folder / "budget.json", "swarmcert/compare/1")["budget"];
+  EXPECT_EQ(budget["nominal_mass_kg"]["large"], 0.067);
+}
+
 TEST(Budget, FallsToTheNoiseOnFlightsWhoseEffectsItKnowsAndItsModelsReproduceTheLastRow) {
   const ScratchFolder folder;
   const std::string gains = source_path("controller/gains/crazyflie-small.toml");
