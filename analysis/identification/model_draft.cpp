@@ -74,7 +74,7 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
       result.least_V = std::min(result.least_V, s.battery_V);
       result.most_V = std::max(result.most_V, s.battery_V);
     }
-    const auto R = logs::rotation(s);
+    const auto R = s.attitude.rotation();
     if (R[2][2] < 0.7) continue;
     if (1e-6 * s.time_us - start_s > kDraftBlock_s) {
       close();

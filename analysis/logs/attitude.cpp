@@ -14,7 +14,7 @@ constexpr double kBelieved = 0.4;  ///< correlation from which a sign or a unit 
 
 /// The firmware's packed quaternion: two bits name the largest component, which is positive; the others have a sign
 /// and nine bits each, from the last component down to the first.
-std::array<double, 4> unpacked(double packed) {
+Attitude unpacked(double packed) {
   auto bits = static_cast<std::uint32_t>(packed);
   const std::uint32_t largest = bits >> 30;
   std::array<double, 4> q{};
@@ -28,19 +28,20 @@ std::array<double, 4> unpacked(double packed) {
     sum += value * value;
   }
   q[largest] = std::sqrt(std::max(0.0, 1 - sum));
-  return q;
+  return {q[0], q[1], q[2], q[3]};
 }
 
 /// Rz(yaw) Ry(pitch) Rx(roll)
-std::array<double, 4> quaternion_of(double roll, double pitch, double yaw) {
+Attitude quaternion_of(double roll, double pitch, double yaw) {
   const double cr = std::cos(roll / 2), sr = std::sin(roll / 2), cp = std::cos(pitch / 2),
                sp = std::sin(pitch / 2), cy = std::cos(yaw / 2), sy = std::sin(yaw / 2);
   return {sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
           cr * cp * cy + sr * sp * sy};
 }
 
-void set_attitude(SignalTable& table, std::size_t record, const std::array<double, 4>& q) {
-  for (int k = 0; k < 4; ++k) table[kAttitude + k][record] = q[static_cast<std::size_t>(k)];
+void set_attitude(SignalTable& table, std::size_t record, const Attitude& attitude) {
+  const std::array<double, 4> xyzw = attitude.xyzw();
+  for (int k = 0; k < 4; ++k) table[kAttitude + k][record] = xyzw[static_cast<std::size_t>(k)];
 }
 
 void make_room(SignalTable& table) {
@@ -218,8 +219,7 @@ void settle_rates(Draft& draft) {
 
 }  // namespace
 
-std::array<Vector, 3> rotation(const Sample& sample) {
-  const auto& [x, y, z, w] = sample.attitude;
+std::array<Vector, 3> Attitude::rotation() const {
   return {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
            {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
            {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}}};

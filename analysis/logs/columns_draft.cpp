@@ -78,7 +78,7 @@ const std::vector<SignalWords>& signal_words() {
 double interpreted(const Log& log, std::size_t i, int signal) {
   const Sample& s = log.samples[i];
   const auto part = [&](int first) { return static_cast<std::size_t>(signal - first); };
-  const auto R = rotation(s);
+  const auto R = s.attitude.rotation();
   if (signal < kVelocity) return s.position_m[part(kPosition)];
   if (signal < kForceWorld) return s.velocity_m_s[part(kVelocity)];
   if (signal < kForceBody) return s.specific_force_m_s2[part(kForceWorld)];
@@ -87,7 +87,7 @@ double interpreted(const Log& log, std::size_t i, int signal) {
     return R[0][k] * s.specific_force_m_s2[0] + R[1][k] * s.specific_force_m_s2[1] +
            R[2][k] * s.specific_force_m_s2[2];
   }
-  if (signal >= kAttitude && signal < kPackedAttitude) return s.attitude[part(kAttitude)];
+  if (signal >= kAttitude && signal < kPackedAttitude) return s.attitude.xyzw()[part(kAttitude)];
   if (signal >= kRates && signal < kDuty) return s.rates_rad_s[part(kRates)];
   if (signal == kEuler) return std::atan2(R[2][1], R[2][2]);
   if (signal == kEuler + 1) return -std::asin(std::min(std::max(R[2][0], -1.0), 1.0));

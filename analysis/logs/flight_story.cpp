@@ -125,7 +125,7 @@ void add_events(const Log& log, const std::vector<char>& air, FlightStory& story
   if (log.signals.attitude) {
     add_runs(
         log, "impact", 0, "thrust axis more than 60 degrees from the vertical",
-        [&](std::size_t i) { return rotation(log.samples[i])[2][2] < 0.5; }, story.events);
+        [&](std::size_t i) { return log.samples[i].attitude.rotation()[2][2] < 0.5; }, story.events);
   }
   if (log.signals.thrust == ThrustSource::kDuty) {
     add_runs(

@@ -17,7 +17,7 @@ Candidate scaled(const Log& log, std::vector<double> thrust) {
   const double high = quantile_of(thrust, 0.9);
   std::vector<double> ratios;
   for (std::size_t i = 0; i < thrust.size(); ++i) {
-    const auto R = rotation(log.samples[i]);
+    const auto R = log.samples[i].attitude.rotation();
     const double load = log.samples[i].specific_force_m_s2[2] / kGravity_m_s2 / std::max(R[2][2], 0.1);
     if (thrust[i] > high / 3 && load > 0.5 && load < 2) ratios.push_back(thrust[i] / load);
   }

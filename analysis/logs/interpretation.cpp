@@ -71,9 +71,9 @@ Sample sample_of(const SignalTable& t, std::size_t i, const Signals& signals) {
   };
   sample.position_m = three(kPosition, 0);
   sample.velocity_m_s = three(kVelocity, 0);
+  if (t.has(kAttitude)) sample.attitude = t.attitude(i);
   for (int k = 0; k < 4; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    if (t.has(kAttitude)) sample.attitude[at] = t[kAttitude + k][i];
     sample.duty[at] = signal_value(t, kDuty + k, i, signals.force ? 0 : kNaN);
     sample.motor_force_N[at] = signal_value(t, kMotorForce + k, i, kNaN);
   }

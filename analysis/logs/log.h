@@ -19,15 +19,25 @@ inline constexpr double kGravity_m_s2 = 9.81;
 /// logs slower than 50 Hz it is two and a half steps instead.
 inline constexpr double kLongestGap_s = 0.030;
 
+/// A unit quaternion that turns B into W. Wherever it stands as four numbers, their order is that of xyzw(), which is
+/// also that of Eigen::Quaterniond::coeffs() and of the simulated state.
+struct Attitude {
+  double x = 0, y = 0, z = 0, w = 1;
+
+  std::array<double, 4> xyzw() const { return {x, y, z, w}; }
+  /// Row by row.
+  std::array<Vector, 3> rotation() const;
+};
+
 /// One record. Frames: W world, z up; B body, x forward, y left, z up.
 struct Sample {
   double time_us = 0;     ///< on the vehicle's own clock, which starts with the log; strictly increasing
   Vector position_m{};    ///< W
   Vector velocity_m_s{};  ///< W
-  Vector specific_force_m_s2{};                ///< W; what an accelerometer feels: +9.81 in z at rest
-  std::array<double, 4> attitude{0, 0, 0, 1};  ///< unit quaternion x, y, z, w that turns B into W
-  Vector rates_rad_s{};                        ///< B
-  std::array<double, 4> duty{};                ///< PWM/65536 per motor, in [0, 1]
+  Vector specific_force_m_s2{};  ///< W; what an accelerometer feels: +9.81 in z at rest
+  Attitude attitude;
+  Vector rates_rad_s{};          ///< B
+  std::array<double, 4> duty{};  ///< PWM/65536 per motor, in [0, 1]
   double battery_V = 0;
   Vector target_position_m{}, target_velocity_m_s{};  ///< W; NaN where the log has none
   std::array<double, 4> motor_force_N{};  ///< what the controller asked of each motor; unsaturated
@@ -146,8 +156,5 @@ struct Log {
   std::vector<std::string> channels;  ///< as the file names them
   std::vector<Sample> samples;
 };
-
-/// Rotation matrix of `sample`'s attitude, row by row: turns vectors of B into W.
-std::array<Vector, 3> rotation(const Sample& sample);
 
 }  // namespace swarmcert::logs

@@ -61,9 +61,7 @@ double root_mean_square(const std::vector<double>& values) {
 }
 
 Vector rotated(const SignalTable& t, std::size_t i, const Vector& body) {
-  Sample sample;
-  for (int k = 0; k < 4; ++k) sample.attitude[static_cast<std::size_t>(k)] = t[kAttitude + k][i];
-  const auto R = rotation(sample);
+  const auto R = t.attitude(i).rotation();
   Vector world{};
   for (std::size_t r = 0; r < 3; ++r) world[r] = R[r][0] * body[0] + R[r][1] * body[1] + R[r][2] * body[2];
   return world;

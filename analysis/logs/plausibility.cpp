@@ -189,9 +189,9 @@ void check_rates(const Log& log, std::vector<Doubt>& doubts) {
   constexpr double kStretch_s = 0.05, kLeastTurn_rad = 0.01, kLargestTurn_rad = 1, kDoubt = 10;
   double by_attitude = 0, by_rate = 0, count = 0;
   for_each_stretch(log, kStretch_s, [&](std::size_t first, std::size_t last) {
-    const auto& a = log.samples[first].attitude;
-    const auto& b = log.samples[last].attitude;
-    const double cosine = std::abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
+    const Attitude& a = log.samples[first].attitude;
+    const Attitude& b = log.samples[last].attitude;
+    const double cosine = std::abs(a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w);
     const double angle_rad = 2 * std::acos(std::min(cosine, 1.0));
     Vector turned{};
     for (std::size_t i = first + 1; i <= last; ++i) {

@@ -230,7 +230,7 @@ void write_csv(const Log& log, double t0_s, double t1_s, std::ostream& out) {
     add(s.position_m);
     add(s.velocity_m_s);
     add(s.specific_force_m_s2);
-    add(s.attitude);
+    add(s.attitude.xyzw());
     add(s.motor_force_N);
     add(s.duty);
     add(std::array<double, 2>{s.battery_V, s.thrust_command_N / kGravity_m_s2 * 1000});

@@ -27,6 +27,11 @@ struct SignalTable {
   Vector three(int first, std::size_t record) const {
     return {(*this)[first][record], (*this)[first + 1][record], (*this)[first + 2][record]};
   }
+  /// From the four columns from kAttitude on.
+  Attitude attitude(std::size_t record) const {
+    const Vector xyz = three(kAttitude, record);
+    return {xyz[0], xyz[1], xyz[2], (*this)[kAttitude + 3][record]};
+  }
   /// y and z of a group change their signs: between axes forward, right, down and forward, left, up.
   void turn_half_about_x(int first);
   /// Median step between records, in seconds; 0 with fewer than two. Goes through all records.

@@ -60,7 +60,7 @@ py::dict signals_of(const logs::Log& log) {
     signals["specific_force_m_s2"] =
         columns_of<3>(all, [](const Sample& s) { return s.specific_force_m_s2; });
   if (log.signals.attitude)
-    signals["attitude"] = columns_of<4>(all, [](const Sample& s) { return s.attitude; });
+    signals["attitude"] = columns_of<4>(all, [](const Sample& s) { return s.attitude.xyzw(); });
   if (log.signals.rates)
     signals["rates_rad_s"] = columns_of<3>(all, [](const Sample& s) { return s.rates_rad_s; });
   if (log.signals.thrust == logs::ThrustSource::kDuty) {

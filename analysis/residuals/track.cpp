@@ -103,7 +103,7 @@ void fill_instants(Track& track, const logs::Log& log) {
     now.time_s = 1e-6 * s.time_us - track.clock_offset_s;
     now.p_W_m = vector(s.position_m);
     now.v_W_m_s = vector(s.velocity_m_s);
-    const auto R = logs::rotation(s);
+    const auto R = s.attitude.rotation();
     for (int row = 0; row < 3; ++row)
       now.R_WB.row(row) = vector(R[static_cast<std::size_t>(row)]).transpose();
     if (log.signals.rates) now.omega_B_rad_s = vector(s.rates_rad_s);

@@ -66,7 +66,7 @@ TEST(UsdLog, AndTheAuthorsCsvGiveTheSameSamples) {
   for (std::size_t i = 0; i < csv.samples.size(); ++i) {
     EXPECT_EQ(binary.samples[i].time_us, csv.samples[i].time_us);
     EXPECT_EQ(binary.samples[i].specific_force_m_s2, csv.samples[i].specific_force_m_s2);
-    EXPECT_EQ(binary.samples[i].attitude, csv.samples[i].attitude);
+    EXPECT_EQ(binary.samples[i].attitude.xyzw(), csv.samples[i].attitude.xyzw());
     EXPECT_EQ(binary.samples[i].duty, csv.samples[i].duty);
     EXPECT_EQ(binary.samples[i].restarts, csv.samples[i].restarts);
   }

@@ -22,7 +22,7 @@ void check_invariant(const logs::Log& log) {
     demand(std::isfinite(sample.time_us) && sample.time_us > last_us);
     last_us = sample.time_us;
     for (const double x : sample.position_m) demand(std::isfinite(x));
-    for (const double x : sample.attitude) demand(std::isfinite(x));
+    for (const double x : sample.attitude.xyzw()) demand(std::isfinite(x));
     if (!log.signals.force) continue;
     for (const double x : sample.specific_force_m_s2) demand(std::isfinite(x));
     for (const double x : sample.duty) demand(std::isfinite(x));

@@ -71,7 +71,7 @@ TEST_F(ColumnsDraftOfValues, NamesEveryColumnThatItsValuesTellAndReadsTheFlight)
   const Flight truth(1e-6 * sample.time_us - 1);  // the clock starts at 1000 ms
   EXPECT_NEAR(sample.position_m[0], truth.x, 2e-3);
   EXPECT_NEAR(sample.velocity_m_s[1], truth.vy, 2e-3);
-  EXPECT_NEAR(logs::rotation(sample)[0][2], std::sin(truth.pitch) * std::cos(truth.roll), 2e-3);
+  EXPECT_NEAR(sample.attitude.rotation()[0][2], std::sin(truth.pitch) * std::cos(truth.roll), 2e-3);
 }
 
 TEST_F(ColumnsDraftOfValues, AnglesFollowFromTheLateralAccelerationAndWhatIsMissingIsToBeFilledIn) {

@@ -153,7 +153,7 @@ void expect_climb(const logs::Log& log) {
     EXPECT_NEAR(sample.position_m[1], 2 * t, 1e-6);
     EXPECT_NEAR(sample.position_m[2], t * t / 4, 1e-6);
     EXPECT_NEAR(sample.velocity_m_s[2], t / 2, 1e-6);
-    EXPECT_NEAR(sample.attitude[2], 0.25881904510252074, 1e-8);
+    EXPECT_NEAR(sample.attitude.z, 0.25881904510252074, 1e-8);
   }
 }
 

@@ -74,7 +74,7 @@ double axis_error(const logs::Log& log) {
   double largest = 0;
   for (std::size_t i = 50; i + 50 < log.samples.size(); ++i) {
     const Swing s(1e-6 * log.samples[i].time_us);
-    const auto R = logs::rotation(log.samples[i]);
+    const auto R = log.samples[i].attitude.rotation();
     largest = std::max({largest, std::abs(R[0][2] - s.ax / s.load()), std::abs(R[1][2] - s.ay / s.load())});
   }
   return largest;

@@ -63,7 +63,7 @@ TEST(LogTraps, AYawThatWrapsTurnsOn) {
   std::size_t half_turns = 0;
   for (const logs::Sample& sample : log.samples) {
     const double t = 1e-6 * sample.time_us;
-    const auto R = logs::rotation(sample);
+    const auto R = sample.attitude.rotation();
     EXPECT_NEAR(std::remainder(std::atan2(R[1][0], R[0][0]) - (0.8 * t + 2), kTurn_rad), 0, 1e-3) << t;
     half_turns += std::abs(std::remainder(0.8 * t + 2, kTurn_rad)) > 3.1 ? 1 : 0;
   }
