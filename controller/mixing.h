@@ -268,6 +268,21 @@ inline TorqueShares<Scalar> relieved_by_yaw(int count, const Scalar* base, const
   return shares;
 }
 
+/// The thrust nearest to `thrust_N` at which all forces, which are proportional to it, are within the limits.
+template <typename Scalar>
+inline Scalar nearest_thrust_N(const Allocation<Scalar>& allocation, const ForceLimits<Scalar>& limits,
+                               Scalar thrust_N) {
+  for (int i = 0; i < allocation.count; ++i) {
+    const Scalar per_N = allocation.inverse[i][0];
+    if (product(per_N, thrust_N) > limits.upper_N && per_N > Scalar(0)) thrust_N = limits.upper_N / per_N;
+  }
+  for (int i = 0; i < allocation.count; ++i) {
+    const Scalar per_N = allocation.inverse[i][0];
+    if (product(per_N, thrust_N) < limits.lower_N && per_N > Scalar(0)) thrust_N = limits.lower_N / per_N;
+  }
+  return thrust_N;
+}
+
 }  // namespace detail
 
 /// Thrust mixing by priority: yaw torque is given up first, then roll and pitch torque (both by the same share), and
@@ -297,18 +312,7 @@ inline Mixed<Scalar> mix(const Allocation<Scalar>& allocation, const ForceLimits
     return result;
   }
 
-  // Thrust alone: every force is proportional to T.
-  result.thrust_N = wanted.thrust_N;
-  for (int i = 0; i < allocation.count; ++i) {
-    const Scalar per_N = allocation.inverse[i][0];
-    const Scalar force = product(per_N, result.thrust_N);
-    if (force > limits.upper_N && per_N > zero) result.thrust_N = limits.upper_N / per_N;
-  }
-  for (int i = 0; i < allocation.count; ++i) {
-    const Scalar per_N = allocation.inverse[i][0];
-    if (product(per_N, result.thrust_N) < limits.lower_N && per_N > zero)
-      result.thrust_N = limits.lower_N / per_N;
-  }
+  result.thrust_N = detail::nearest_thrust_N(allocation, limits, wanted.thrust_N);
   result.thrust_limited = result.thrust_N < wanted.thrust_N || result.thrust_N > wanted.thrust_N;
 
   Scalar force[kMostRotors], added[kMostRotors], yaw[kMostRotors];

@@ -153,21 +153,8 @@ std::string parameter_line(const ExportOptions& options) {
                      certificate.empty() ? "none" : certificate);
 }
 
-std::string header_text(const files::Network& network, const ExportOptions& options) {
-  const std::vector<std::string> kinds = neighbour_kinds(network);
-  const int inputs = network.phi.at(kinds.front()).inputs();
-  std::string neighbour_list, own_list, input_list;
-  for (std::size_t i = 0; i < kinds.size(); ++i)
-    neighbour_list += fmt::format("///   {}: {}\n", i, comment(kinds[i]));
-  int index = 0;
-  for (const auto& [kind, weights] : network.rho)
-    own_list += fmt::format("///   {}: {}\n", index++, comment(kind));
-  for (const std::string& name : network.input_order)
-    input_list += (input_list.empty() ? "" : ", ") + comment(name);
-  if (input_list.empty())
-    input_list = "not named in the network; published ones: p_j - p_i in m, then v_j - v_i in m/s, in W";
-  return fmt::format(
-      R"(/// @file {mark} from certified weights. Do not edit: 'swarmcert match NET FOLDER' regenerates the
+constexpr char kHeader[] =
+    R"(/// @file {mark} from certified weights. Do not edit: 'swarmcert match NET FOLDER' regenerates the
 /// exported files and finds every change to one of them.
 {parameters}
 #pragma once
@@ -218,8 +205,23 @@ enum class SelfTest : std::uint8_t {{
 SelfTest self_test(int* failed);
 
 }}  // namespace swarmcert_network
-)",
-      fmt::arg("mark", kGeneratedMark), fmt::arg("parameters", parameter_line(options)),
+)";
+
+std::string header_text(const files::Network& network, const ExportOptions& options) {
+  const std::vector<std::string> kinds = neighbour_kinds(network);
+  const int inputs = network.phi.at(kinds.front()).inputs();
+  std::string neighbour_list, own_list, input_list;
+  for (std::size_t i = 0; i < kinds.size(); ++i)
+    neighbour_list += fmt::format("///   {}: {}\n", i, comment(kinds[i]));
+  int index = 0;
+  for (const auto& [kind, weights] : network.rho)
+    own_list += fmt::format("///   {}: {}\n", index++, comment(kind));
+  for (const std::string& name : network.input_order)
+    input_list += (input_list.empty() ? "" : ", ") + comment(name);
+  if (input_list.empty())
+    input_list = "not named in the network; published ones: p_j - p_i in m, then v_j - v_i in m/s, in W";
+  return fmt::format(
+      kHeader, fmt::arg("mark", kGeneratedMark), fmt::arg("parameters", parameter_line(options)),
       fmt::arg("certificate", options.certificate_sha256), fmt::arg("most", options.most_neighbours),
       fmt::arg("inputs", inputs), fmt::arg("input_list", input_list),
       fmt::arg("relative", takes_relative_state(network, inputs)),

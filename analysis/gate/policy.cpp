@@ -20,6 +20,31 @@ std::string resolve(const std::string& policy, const std::string& path) {
   return (std::filesystem::path(policy).parent_path() / path).lexically_normal().string();
 }
 
+/// The order of layers under `key`, for a file that the policy must name.
+std::vector<std::string> read_order(const TomlTable& table, const char* key, bool has_file) {
+  if (!table.has(key)) return {};
+  if (!has_file) table.refuse(key, "", "is of a file that is not named here");
+  std::vector<std::string> layers = table.texts(key);
+  if (layers.empty()) table.refuse(key, "[]", "names no layer");
+  return layers;
+}
+
+/// Flights, and how many logs they are.
+void read_recordings(const TomlTable& table, const std::string& policy, Release& release) {
+  if (!table.has("flights")) return;
+  const std::vector<std::string> words =
+      table.is_list("flights") ? table.texts("flights") : std::vector<std::string>{table.text("flights")};
+  if (words.empty()) table.refuse("flights", "[]", "names no flight");
+  for (const std::string& word : words) release.flights.push_back(resolve(policy, word));
+  if (!table.has("logs"))
+    table.refuse("logs", "", "is missing",
+                 "say how many logs the flights are, so that none is lost unnoticed");
+  const double logs = table.number("logs");
+  if (!(logs >= 1 && logs <= 1e6) || logs != std::floor(logs))
+    table.refuse("logs", "", "must be a whole number from 1 on");
+  release.logs = static_cast<int>(logs);
+}
+
 Release read_release(const TomlTable& table, const std::string& policy) {
   table.allow_only({"network",     "phi",       "rho",       "key",          "precision",
                     "certificate", "box",       "gains",     "model",        "source",
@@ -36,16 +61,9 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   release.network.phi = file("phi");
   release.network.rho = file("rho");
   if (table.has("key")) release.network.key = table.text("key");
-  const auto order = [&](const char* key, bool has_file) {
-    if (!table.has(key)) return std::vector<std::string>();
-    if (!has_file) table.refuse(key, "", "is of a file that is not named here");
-    std::vector<std::string> layers = table.texts(key);
-    if (layers.empty()) table.refuse(key, "[]", "names no layer");
-    return layers;
-  };
-  release.network.order = order("order", !release.network.file.empty());
-  release.network.phi_order = order("phi_order", !release.network.phi.empty());
-  release.network.rho_order = order("rho_order", !release.network.rho.empty());
+  release.network.order = read_order(table, "order", !release.network.file.empty());
+  release.network.phi_order = read_order(table, "phi_order", !release.network.phi.empty());
+  release.network.rho_order = read_order(table, "rho_order", !release.network.rho.empty());
   if (release.network.phi.empty() != release.network.rho.empty())
     table.refuse(release.network.phi.empty() ? "rho" : "phi", "", "needs both phi and rho");
   if (!release.network.phi.empty() && !release.network.file.empty())
@@ -62,19 +80,7 @@ Release read_release(const TomlTable& table, const std::string& policy) {
   release.promise = file("promise");
   release.vehicles = file("vehicles");
   release.columns = file("columns");
-  if (table.has("flights")) {
-    const std::vector<std::string> words =
-        table.is_list("flights") ? table.texts("flights") : std::vector<std::string>{table.text("flights")};
-    if (words.empty()) table.refuse("flights", "[]", "names no flight");
-    for (const std::string& word : words) release.flights.push_back(resolve(policy, word));
-    if (!table.has("logs"))
-      table.refuse("logs", "", "is missing",
-                   "say how many logs the flights are, so that none is lost unnoticed");
-    const double logs = table.number("logs");
-    if (!(logs >= 1 && logs <= 1e6) || logs != std::floor(logs))
-      table.refuse("logs", "", "must be a whole number from 1 on");
-    release.logs = static_cast<int>(logs);
-  }
+  read_recordings(table, policy, release);
   if (table.has("battery_V")) release.battery_V = table.number("battery_V");
   if (!(release.battery_V > 0)) table.refuse("battery_V", "", "must be positive");
   if (table.has("most_neighbours")) release.most_neighbours = whole_number(table, "most_neighbours", 0);

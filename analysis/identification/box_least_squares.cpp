@@ -6,6 +6,29 @@
 #include <vector>
 
 namespace swarmcert::identification {
+namespace {
+
+/// Coefficients at their bounds stay there; sets the free ones to the minimum over them.
+void solve_free(const Eigen::MatrixXd& gram, const Eigen::VectorXd& b, const std::vector<int>& state,
+                const std::vector<int>& free, Eigen::VectorXd& c) {
+  if (free.empty()) return;
+  const auto m = static_cast<int>(free.size());
+  Eigen::MatrixXd g(m, m);
+  Eigen::VectorXd rhs(m);
+  for (int i = 0; i < m; ++i) {
+    const int fi = free[static_cast<std::size_t>(i)];
+    rhs[i] = b[fi];
+    for (int k = 0; k < static_cast<int>(b.size()); ++k) {
+      if (state[static_cast<std::size_t>(k)] != 0) rhs[i] -= gram(fi, k) * c[k];
+    }
+    for (int j = 0; j < m; ++j) g(i, j) = gram(fi, free[static_cast<std::size_t>(j)]);
+    g(i, i) += 1e-10 * gram(fi, fi) + 1e-18;
+  }
+  const Eigen::VectorXd solution = g.ldlt().solve(rhs);
+  for (int i = 0; i < m; ++i) c[free[static_cast<std::size_t>(i)]] = solution[i];
+}
+
+}  // namespace
 
 Eigen::VectorXd box_least_squares(const Eigen::MatrixXd& gram, const Eigen::VectorXd& b,
                                   const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
@@ -24,22 +47,7 @@ Eigen::VectorXd box_least_squares(const Eigen::MatrixXd& gram, const Eigen::Vect
       else
         c[i] = s < 0 ? lower[i] : upper[i];
     }
-    const auto m = static_cast<int>(free.size());
-    Eigen::MatrixXd g(m, m);
-    Eigen::VectorXd rhs(m);
-    for (int i = 0; i < m; ++i) {
-      const int fi = free[static_cast<std::size_t>(i)];
-      rhs[i] = b[fi];
-      for (int k = 0; k < n; ++k) {
-        if (state[static_cast<std::size_t>(k)] != 0) rhs[i] -= gram(fi, k) * c[k];
-      }
-      for (int j = 0; j < m; ++j) g(i, j) = gram(fi, free[static_cast<std::size_t>(j)]);
-      g(i, i) += 1e-10 * gram(fi, fi) + 1e-18;
-    }
-    if (m > 0) {
-      const Eigen::VectorXd solution = g.ldlt().solve(rhs);
-      for (int i = 0; i < m; ++i) c[free[static_cast<std::size_t>(i)]] = solution[i];
-    }
+    solve_free(gram, b, state, free, c);
     int worst = -1;
     double most = 0;
     for (const int i : free) {

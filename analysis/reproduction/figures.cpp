@@ -156,6 +156,47 @@ double force_gf(Interaction& function, const Placement& placement, double y, dou
   return function.force_z_gf(neighbours);
 }
 
+/// Forces on a grid of places, as gnuplot reads them, and how far they are from the truth.
+struct HeatMap {
+  std::string data;
+  double least_gf = INFINITY, most_gf = -INFINITY, rms_gf = 0;
+};
+
+HeatMap heat_map(Interaction& learned, Interaction& truth, const Placement& placement) {
+  constexpr int kSteps = 61;
+  HeatMap map;
+  double squares = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      const double y = -0.5 + i / (kSteps - 1.0), z = -0.8 + 1.2 * j / (kSteps - 1.0);
+      const double force = force_gf(learned, placement, y, z), actual = force_gf(truth, placement, y, z);
+      map.least_gf = std::min(map.least_gf, force);
+      map.most_gf = std::max(map.most_gf, force);
+      squares += (force - actual) * (force - actual) / (kSteps * kSteps);
+      map.data += fmt::format("{:.4f} {:.4f} {:.4f} {:.4f}\n", y, z, force, actual);
+    }
+    map.data += "\n";
+  }
+  map.data += "\n";
+  for (const Relative& star : placement.stars) map.data += fmt::format("{} {}\n", star[1], star[2]);
+  map.rms_gf = std::sqrt(squares);
+  return map;
+}
+
+/// The network's map beside that of the truth.
+std::string heat_map_script(const std::string& name) {
+  const auto plot = [&name](const char* title, int column) {
+    return fmt::format(
+        "set title '{0}'\nplot '{1}.dat' index 0 using 1:2:{2} with image notitle, '{1}.dat' index 1 with "
+        "points pt 3 lc 'blue' ps 2 notitle\n",
+        title, name, column);
+  };
+  return "set multiplot layout 1,2\nset xrange [-0.5:0.5]\nset yrange [-0.8:0.4]\nset xlabel 'y [m]'\nset "
+         "ylabel 'z [m]'\nset cblabel 'f_{a,z} [gf]'\nset palette defined (0 '#2166ac', 0.7 '#f7f7f7', 1 "
+         "'#b2182b')\nset cbrange [-14:6]\n" +
+         plot("network", 3) + plot("truth", 4) + "unset multiplot\n";
+}
+
 }  // namespace
 
 Finding figure_heatmap(const Setting& setting) {
@@ -168,45 +209,23 @@ Finding figure_heatmap(const Setting& setting) {
   Table table = {"Force along z over places (0, y, z), network trained with 3",
                  {"map", "places", "least [gf]", "largest [gf]", "RMS from the truth [gf]"},
                  {}};
-  constexpr int kSteps = 61;
   for (const Placement& placement : placements()) {
-    std::string data;
-    double least = INFINITY, most = -INFINITY, squares = 0;
-    for (int i = 0; i < kSteps; ++i) {
-      for (int j = 0; j < kSteps; ++j) {
-        const double y = -0.5 + i / (kSteps - 1.0), z = -0.8 + 1.2 * j / (kSteps - 1.0);
-        const double force = force_gf(learned, placement, y, z), actual = force_gf(truth, placement, y, z);
-        least = std::min(least, force);
-        most = std::max(most, force);
-        squares += (force - actual) * (force - actual) / (kSteps * kSteps);
-        data += fmt::format("{:.4f} {:.4f} {:.4f} {:.4f}\n", y, z, force, actual);
-      }
-      data += "\n";
-    }
-    data += "\n";
-    for (const Relative& star : placement.stars) data += fmt::format("{} {}\n", star[1], star[2]);
-    const std::string name = fmt::format("heatmap_{}", placement.name);
-    finding.figures.push_back(
-        {name, data,
-         "set multiplot layout 1,2\nset xrange [-0.5:0.5]\nset yrange [-0.8:0.4]\nset xlabel 'y [m]'\nset "
-         "ylabel 'z [m]'\nset cblabel 'f_{a,z} [gf]'\nset palette defined (0 '#2166ac', 0.7 '#f7f7f7', 1 "
-         "'#b2182b')\nset cbrange [-14:6]\nset title 'network'\nplot '" +
-             name + ".dat' index 0 using 1:2:3 with image notitle, '" + name +
-             ".dat' index 1 with points pt 3 lc 'blue' ps 2 notitle\nset title 'truth'\nplot '" + name +
-             ".dat' index 0 using 1:2:4 with image notitle, '" + name +
-             ".dat' index 1 with points pt 3 lc 'blue' ps 2 notitle\nunset multiplot\n",
-         fmt::format("({}) {}; {}.", placement.name, placement.words,
-                     placement.from_text ? "places from the paper's text" : "places chosen by us")});
+    HeatMap map = heat_map(learned, truth, placement);
     table.rows.push_back({placement.name,
                           std::string(placement.words) + (placement.from_text ? "" : " (ours)"),
-                          fmt::format("{:.1f}", least), fmt::format("{:.1f}", most),
-                          fmt::format("{:.2f}", std::sqrt(squares))});
+                          fmt::format("{:.1f}", map.least_gf), fmt::format("{:.1f}", map.most_gf),
+                          fmt::format("{:.2f}", map.rms_gf)});
     finding.json["maps"].push_back({{"map", placement.name},
                                     {"words", placement.words},
                                     {"places_from_the_text", placement.from_text},
-                                    {"least_gf", least},
-                                    {"most_gf", most},
-                                    {"rms_from_truth_gf", std::sqrt(squares)}});
+                                    {"least_gf", map.least_gf},
+                                    {"most_gf", map.most_gf},
+                                    {"rms_from_truth_gf", map.rms_gf}});
+    const std::string name = fmt::format("heatmap_{}", placement.name);
+    finding.figures.push_back(
+        {name, std::move(map.data), heat_map_script(name),
+         fmt::format("({}) {}; {}.", placement.name, placement.words,
+                     placement.from_text ? "places from the paper's text" : "places chosen by us")});
   }
   finding.tables.push_back(std::move(table));
   const double probe = force_gf(learned, placements()[2], -0.3, -0.5),

@@ -55,6 +55,18 @@ Bounded check_layers(const files::Weights& weights, const files::Json& json, Bou
   return input;
 }
 
+/// Verifies what is stated of the sum of `terms` and of every layer of rho behind it; returns that of the last one.
+Bounded check_sum(const files::Json& entry, const std::vector<SumTerm>& terms, const files::Weights& rho,
+                  const std::string& name, const std::string& where) {
+  const bool with_error = !entry["input_error"].is_null();
+  require(!with_error || rho.precision == files::Precision::kFloat32, where + kNotFloat32);
+  const auto size = static_cast<std::size_t>(rho.inputs());
+  Bounded sum = stated(entry["sum"], size, with_error, where + ": sum");
+  require_encloses(sum, sum_intervals(terms, size), with_error ? sum_error(terms, size) : std::nullopt,
+                   where + ": sum");
+  return check_layers(rho, entry["networks"].at(name), std::move(sum), where + ": " + name);
+}
+
 }  // namespace
 
 void CertificateChecker::check_values(const Json& entry) {
@@ -97,13 +109,7 @@ void CertificateChecker::check_values(const Json& entry) {
   require(entry["sum"].is_null() != is_set, where + ": a sum of set functions, and only of those");
   if (is_set) {
     require(parts_.count(names[1]) == 1, where + ": there is no network " + names[1]);
-    const files::Weights& rho = *parts_.at(names[1]);
-    require(!with_error || rho.precision == files::Precision::kFloat32, where + kNotFloat32);
-    const auto size = static_cast<std::size_t>(rho.inputs());
-    Bounded sum = stated(entry["sum"], size, with_error, where + ": sum");
-    require_encloses(sum, sum_intervals(terms, size), with_error ? sum_error(terms, size) : std::nullopt,
-                     where + ": sum");
-    result = check_layers(rho, entry["networks"].at(names[1]), std::move(sum), where + ": " + names[1]);
+    result = check_sum(entry, terms, *parts_.at(names[1]), names[1], where);
   }
   const std::vector<Dyadic> lower = exact(files::parse_hex_floats(entry["lower"]));
   const std::vector<Dyadic> upper = exact(files::parse_hex_floats(entry["upper"]));

@@ -59,6 +59,97 @@ std::string reason(const std::string& message) {
   return "is not JSON (" + (colon == std::string::npos ? message : message.substr(colon + 2)) + ")";
 }
 
+/// Reads a hex float from the left. What is no such number refuses the text.
+class HexFloatReader {
+ public:
+  explicit HexFloatReader(const std::string& text) : text_(text) {}
+
+  double read() {
+    const bool is_negative = accept('-');
+    if (!accept('0') || !accept('x')) refuse();
+    read_mantissa();
+    if (!accept('p')) refuse();
+    read_exponent();
+    if (at_ != text_.size()) refuse();
+    return is_negative ? -value() : value();
+  }
+
+ private:
+  [[noreturn]] void refuse() const {
+    throw std::invalid_argument("parse_hex_float: " + in_quotes(text_) +
+                                " is not a finite hex float of a double");
+  }
+
+  bool accept(char lower) {
+    const bool is_here =
+        at_ < text_.size() && (text_[at_] == lower || (lower >= 'a' && text_[at_] == lower - 'a' + 'A'));
+    if (is_here) ++at_;
+    return is_here;
+  }
+
+  /// The hex digit that comes next; -1: there is none.
+  int digit() const {
+    const char c = at_ < text_.size() ? text_[at_] : '\0';
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+  }
+
+  void read_mantissa() {
+    bool has_digits = false;
+    bool is_fraction = false;
+    for (;;) {
+      if (!is_fraction && accept('.')) {
+        is_fraction = true;
+        continue;
+      }
+      const int next = digit();
+      if (next < 0) break;
+      has_digits = true;
+      ++at_;
+      if (mantissa_ >> 60 == 0) {
+        mantissa_ = mantissa_ << 4 | static_cast<std::uint64_t>(next);
+        exponent_ -= is_fraction ? 4 : 0;
+      } else {  // 64 bits are full: more digits may only be zeros
+        if (next != 0) refuse();
+        exponent_ += is_fraction ? 0 : 4;
+      }
+    }
+    if (!has_digits) refuse();
+  }
+
+  void read_exponent() {
+    const bool is_small = accept('-');
+    if (!is_small) accept('+');
+    long power = 0;
+    const std::size_t first = at_;
+    for (; at_ < text_.size() && text_[at_] >= '0' && text_[at_] <= '9'; ++at_) {
+      if (power > 100'000) refuse();
+      power = 10 * power + (text_[at_] - '0');
+    }
+    if (at_ == first) refuse();
+    exponent_ += is_small ? -power : power;
+  }
+
+  double value() const {
+    if (mantissa_ == 0) return 0;
+    std::uint64_t mantissa = mantissa_;
+    long exponent = exponent_;
+    while (mantissa % 2 == 0) mantissa /= 2, ++exponent;
+    const bool is_exact =
+        mantissa >> 53 == 0 && exponent >= -1074;  // 53 bits, and none below the least subnormal
+    const double value =
+        is_exact ? std::ldexp(static_cast<double>(mantissa), static_cast<int>(exponent)) : INFINITY;
+    if (std::isinf(value)) refuse();
+    return value;
+  }
+
+  const std::string& text_;
+  std::size_t at_ = 0;
+  std::uint64_t mantissa_ = 0;
+  long exponent_ = 0;  ///< of the mantissa's last digit
+};
+
 }  // namespace
 
 std::string hex_float(double value) {
@@ -69,67 +160,7 @@ std::string hex_float(double value) {
   return (std::signbit(value) ? "-0x" : "0x") + std::string(digits, result.ptr);
 }
 
-double parse_hex_float(const std::string& text) {
-  const auto refuse = [&text]() -> double {
-    throw std::invalid_argument("parse_hex_float: " + in_quotes(text) +
-                                " is not a finite hex float of a double");
-  };
-  std::size_t at = 0;
-  const auto accept = [&](char lower) {
-    const bool is_here =
-        at < text.size() && (text[at] == lower || (lower >= 'a' && text[at] == lower - 'a' + 'A'));
-    if (is_here) ++at;
-    return is_here;
-  };
-  const bool is_negative = accept('-');
-  if (!accept('0') || !accept('x')) return refuse();
-
-  std::uint64_t mantissa = 0;
-  long exponent = 0;  // of the mantissa's last digit
-  bool has_digits = false;
-  bool is_fraction = false;
-  for (;;) {
-    if (!is_fraction && accept('.')) {
-      is_fraction = true;
-      continue;
-    }
-    const char c = at < text.size() ? text[at] : '\0';
-    const int digit = c >= '0' && c <= '9'   ? c - '0'
-                      : c >= 'a' && c <= 'f' ? c - 'a' + 10
-                      : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                             : -1;
-    if (digit < 0) break;
-    has_digits = true;
-    ++at;
-    if (mantissa >> 60 == 0) {
-      mantissa = mantissa << 4 | static_cast<std::uint64_t>(digit);
-      exponent -= is_fraction ? 4 : 0;
-    } else {  // 64 bits are full: more digits may only be zeros
-      if (digit != 0) return refuse();
-      exponent += is_fraction ? 0 : 4;
-    }
-  }
-  if (!has_digits || !accept('p')) return refuse();
-  const bool is_small = accept('-');
-  if (!is_small) accept('+');
-  long power = 0;
-  const std::size_t first = at;
-  for (; at < text.size() && text[at] >= '0' && text[at] <= '9'; ++at) {
-    if (power > 100'000) return refuse();
-    power = 10 * power + (text[at] - '0');
-  }
-  if (at == first || at != text.size()) return refuse();
-  exponent += is_small ? -power : power;
-
-  if (mantissa == 0) return is_negative ? -0.0 : 0.0;
-  while (mantissa % 2 == 0) mantissa /= 2, ++exponent;
-  const bool is_exact =
-      mantissa >> 53 == 0 && exponent >= -1074;  // 53 bits, and none below the least subnormal
-  const double value =
-      is_exact ? std::ldexp(static_cast<double>(mantissa), static_cast<int>(exponent)) : INFINITY;
-  if (std::isinf(value)) return refuse();
-  return is_negative ? -value : value;
-}
+double parse_hex_float(const std::string& text) { return HexFloatReader(text).read(); }
 
 void require_keys(const Json& object, const std::set<std::string>& keys, const std::string& where) {
   if (!object.is_object()) throw std::invalid_argument(where + " is not an object");

@@ -157,27 +157,98 @@ struct OverBox {
   double of_ramp = 0;               ///< N f for ramps, or N A c
 };
 
+/// What the centre gives at all times, and what the small gain over the box makes of it.
+struct BoxTerms {
+  Actuators actuators;
+  OutputGains e;
+  double bend = 0;           ///< h^2/8: of the second derivative between samples
+  double n_rate = 0;         ///< N f for ramps
+  double further = 0;        ///< of e, per sup of a0
+  double lambda = 0;         ///< of a0, per sup of a0
+  double through = 0;        ///< of a, per a0
+  double inverse_ratio = 0;  ///< largest, times the centre's
+  double lag_and_delay_s = 0;
+  double delay_s = 0;                 ///< largest change
+  double slope_left = 0, of_sup = 0;  ///< slopes of a0: the delay acts through them
+  bool has_slope = false;
+};
+
+/// e between samples as well: a force of variation 1 from rest stays below 1, and f moves less than |f'| (T0 + 2 h)
+/// until it acts.
+void add_bend(bool is_force, const SampledLoop& loop, BoxTerms& terms) {
+  const double h = loop.period_s;
+  const OutputGains& a = terms.actuators.a;
+  OutputGains& e = terms.e;
+  terms.bend = h * h / 8;
+  terms.n_rate = is_force ? a.force.rate + loop.plant.delay_s + 2 * h : a.command.rate;
+  e.force.rate += terms.bend * terms.n_rate;
+  e.force.amplitude += terms.bend * (1 + a.force.amplitude);
+  e.force.edge += terms.bend * (1 + a.force.amplitude);
+  e.force.impulse += terms.bend * a.force.impulse;
+  e.variation += terms.bend * a.variation + h / 2;
+  for (const auto gain : kUncertainGains) e.command.*gain += terms.bend * a.command.*gain;
+}
+
+/// Classes of the force. Sets what errors gain between samples, too.
+void add_force_gains(const BoxTerms& t, OverBox& over, PlantBends& bends) {
+  const OutputGains& a = t.actuators.a;
+  for (std::size_t k = 1; k < 4; ++k) {
+    const double a0 = a.force.*kUncertainGains[k] / (1 - t.lambda);
+    over.first_order[k] = t.e.force.*kUncertainGains[k] + t.further * a0;
+    over.answer[k] = t.through * a0;
+    if (t.has_slope)
+      over.slope[k] = t.through * (t.actuators.slope.*kUncertainGains[k] + t.of_sup * a0) / t.slope_left;
+    bends.between_samples[k] = t.bend * ((k < 3 ? 1 : 0) + over.answer[k]);
+  }
+  const double n = (t.inverse_ratio * t.n_rate + a.force.amplitude * t.lag_and_delay_s) / (1 - t.lambda);
+  over.first_order[0] =
+      t.inverse_ratio * t.e.force.rate + t.further * n + t.e.force.amplitude * t.lag_and_delay_s;
+  over.answer[0] = kInfinity;
+  over.of_ramp = t.through * n + t.lag_and_delay_s;
+  if (t.has_slope) {
+    over.slope[0] = t.through *
+                    (t.inverse_ratio * t.actuators.slope.rate + t.of_sup * n +
+                     t.actuators.slope_by_amplitude * (t.delay_s + t.lag_and_delay_s)) /
+                    t.slope_left;
+  }
+  bends.between_samples[0] = t.bend * over.of_ramp;
+}
+
+/// Classes of the command.
+void add_command_gains(const BoxTerms& t, OverBox& over, PlantBends& bends) {
+  const OutputGains& a = t.actuators.a;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double a0 = t.inverse_ratio * a.command.*kUncertainGains[k] / (1 - t.lambda);
+    over.first_order[k] = t.inverse_ratio * t.e.command.*kUncertainGains[k] + t.further * a0;
+    over.total[k] = t.through * a0;
+    over.answer[k] = k == 0 ? kInfinity : over.total[k] + 1;
+    if (t.has_slope) {
+      over.slope[k] = t.through * (t.inverse_ratio * t.actuators.slope.*kUncertainGains[k] + t.of_sup * a0) /
+                      t.slope_left;
+    }
+    bends.between_samples[k] = t.bend * over.total[k];
+  }
+  const double answer = (a.answer.impulse + t.lag_and_delay_s * a.change_of_pulse) / (1 - t.lambda);
+  over.answer[3] = t.through * answer;
+  over.first_order[3] = std::min(
+      over.first_order[3], t.e.command.impulse + t.further * answer +
+                               t.lag_and_delay_s * (t.e.change_of_pulse + t.bend * a.change_of_pulse + 0.5));
+  over.of_ramp = over.total[0];
+}
+
 /// Nothing where small gain gives none. Sets the shares of `bends`, and what errors gain between samples.
 std::optional<OverBox> over_box(const SampledLoop& loop, Channel channel, const PlantBox& box,
                                 PlantBends& bends) {
-  const double h = loop.period_s;
   bends.share = {box.ratio_change(), loop.plant.Kd * box.lag_change(), loop.plant.Kd * box.delay_change()};
   const SampledAdjoint adjoint(loop);
   if (!adjoint.is_stable()) return std::nullopt;
   const bool is_force = channel == Channel::kForce;
-  const Actuators actuators = actuator_gains(loop, adjoint, channel);
-  const OutputGains& a = actuators.a;
-  OutputGains e = output_gains(adjoint, adjoint.output_after_control(0), false, channel);
-  // Between samples; a force of variation 1 from rest stays below 1, and f moves less than |f'| (T0 + 2 h) until it
-  // acts.
-  const double bend = h * h / 8;
-  const double n_rate = is_force ? a.force.rate + loop.plant.delay_s + 2 * h : a.command.rate;
-  e.force.rate += bend * n_rate;
-  e.force.amplitude += bend * (1 + a.force.amplitude);
-  e.force.edge += bend * (1 + a.force.amplitude);
-  e.force.impulse += bend * a.force.impulse;
-  e.variation += bend * a.variation + h / 2;
-  for (const auto gain : kUncertainGains) e.command.*gain += bend * a.command.*gain;
+  BoxTerms terms;
+  terms.actuators = actuator_gains(loop, adjoint, channel);
+  terms.e = output_gains(adjoint, adjoint.output_after_control(0), false, channel);
+  add_bend(is_force, loop, terms);
+  const OutputGains& a = terms.actuators.a;
+  const OutputGains& e = terms.e;
 
   const double r = box.largest_ratio();
   const double eps = box.ratio_change();
@@ -189,62 +260,29 @@ std::optional<OverBox> over_box(const SampledLoop& loop, Channel channel, const 
   };
   const auto of_delay = [&](double V) { return r * box.delay_change() * V; };
   bends.share = {eps * G_a, of_lag(G_a, a.variation), of_delay(a.variation)};
-  const double lambda = bends.share[0] + bends.share[1] + bends.share[2];
-  if (!(lambda < 1)) return std::nullopt;
-  const double further = eps * G_e + of_lag(G_e, e.variation) + of_delay(e.variation);
-  const double inverse_ratio = box.centre()[0] / box.from[0];
-  const double W = box.lag_change() + box.delay_change();
-  const double through = r * (1 + box.lag_ratio());  // of a per a0
+  terms.lambda = bends.share[0] + bends.share[1] + bends.share[2];
+  if (!(terms.lambda < 1)) return std::nullopt;
+  terms.further = eps * G_e + of_lag(G_e, e.variation) + of_delay(e.variation);
+  terms.inverse_ratio = box.centre()[0] / box.from[0];
+  terms.delay_s = box.delay_change();
+  terms.lag_and_delay_s = box.lag_change() + box.delay_change();
+  terms.through = r * (1 + box.lag_ratio());
+  terms.slope_left = 1 - times(r * box.delay_change(), terms.actuators.slope_by_amplitude);
+  terms.of_sup = terms.actuators.slope_by_amplitude * (eps + times(r, box.lag_ratio()));
+  terms.has_slope = terms.slope_left > 0 && std::isfinite(terms.of_sup);
 
   OverBox over;
-  over.ge = G_e + further * G_a / (1 - lambda);
-  over.ga = through * G_a / (1 - lambda);
-  over.ve = e.variation + further * a.variation / (1 - lambda);
-  over.va = through * a.variation / (1 - lambda);
-  over.pulse_e = e.change_of_pulse + further * a.change_of_pulse / (1 - lambda);
-  over.pulse_a = through * a.change_of_pulse / (1 - lambda);
-  // Slopes of a0: the delay acts through them.
-  const double left = 1 - times(r * box.delay_change(), actuators.slope_by_amplitude);
-  const double of_sup = actuators.slope_by_amplitude * (eps + times(r, box.lag_ratio()));
+  over.ge = G_e + terms.further * G_a / (1 - terms.lambda);
+  over.ga = terms.through * G_a / (1 - terms.lambda);
+  over.ve = e.variation + terms.further * a.variation / (1 - terms.lambda);
+  over.va = terms.through * a.variation / (1 - terms.lambda);
+  over.pulse_e = e.change_of_pulse + terms.further * a.change_of_pulse / (1 - terms.lambda);
+  over.pulse_a = terms.through * a.change_of_pulse / (1 - terms.lambda);
   over.slope.fill(kInfinity);
-  const bool has_slope = left > 0 && std::isfinite(of_sup);
-  if (is_force) {
-    for (std::size_t k = 1; k < 4; ++k) {
-      const double a0 = a.force.*kUncertainGains[k] / (1 - lambda);
-      over.first_order[k] = e.force.*kUncertainGains[k] + further * a0;
-      over.answer[k] = through * a0;
-      if (has_slope) over.slope[k] = through * (actuators.slope.*kUncertainGains[k] + of_sup * a0) / left;
-      bends.between_samples[k] = bend * ((k < 3 ? 1 : 0) + over.answer[k]);
-    }
-    const double n = (inverse_ratio * n_rate + G_a * W) / (1 - lambda);
-    over.first_order[0] = inverse_ratio * e.force.rate + further * n + G_e * W;
-    over.answer[0] = kInfinity;
-    over.of_ramp = through * n + W;
-    if (has_slope) {
-      over.slope[0] = through *
-                      (inverse_ratio * actuators.slope.rate + of_sup * n +
-                       actuators.slope_by_amplitude * (box.delay_change() + W)) /
-                      left;
-    }
-    bends.between_samples[0] = bend * over.of_ramp;
-    return over;
-  }
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double a0 = inverse_ratio * a.command.*kUncertainGains[k] / (1 - lambda);
-    over.first_order[k] = inverse_ratio * e.command.*kUncertainGains[k] + further * a0;
-    over.total[k] = through * a0;
-    over.answer[k] = k == 0 ? kInfinity : over.total[k] + 1;
-    if (has_slope) {
-      over.slope[k] = through * (inverse_ratio * actuators.slope.*kUncertainGains[k] + of_sup * a0) / left;
-    }
-    bends.between_samples[k] = bend * over.total[k];
-  }
-  const double answer = (a.answer.impulse + W * a.change_of_pulse) / (1 - lambda);
-  over.answer[3] = through * answer;
-  over.first_order[3] =
-      std::min(over.first_order[3], e.command.impulse + further * answer +
-                                        W * (e.change_of_pulse + bend * a.change_of_pulse + 0.5));
-  over.of_ramp = over.total[0];
+  if (is_force)
+    add_force_gains(terms, over, bends);
+  else
+    add_command_gains(terms, over, bends);
   return over;
 }
 

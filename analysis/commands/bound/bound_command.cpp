@@ -222,6 +222,52 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   return verdict == "proved" && !(local && !local->proved) ? kDone : kInconclusive;
 }
 
+void declare_initial(CLI::App& app, stability::InitialError& initial) {
+  app.add_option("--initial-error", initial.position_m, "|e| at t = 0, m")->check(CLI::NonNegativeNumber);
+  app.add_option("--initial-speed", initial.velocity_m_s, "|e'| at t = 0, m/s")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--initial-learning-error", initial.learning_error_N,
+                 "|f_hat - f_a| at t = 0, bias included, N")
+      ->check(CLI::NonNegativeNumber);
+}
+
+/// What the result holds beside the bounds.
+/// @return the option --uncertain, whose intervals may be left out.
+CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
+  CLI::Option* const uncertain =
+      app.add_option("--uncertain", options.uncertain,
+                     "Worst over intervals: mass=A:B, thrust=A:B, lag=A:B, delay=A:B, "
+                     "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")
+          ->expected(0, -1)
+          ->default_str("default");
+  app.add_option("--loops", options.most_loops,
+                 "Maximum number of loops evaluated per row of --uncertain; results remain valid "
+                 "bounds if the limit is reached")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option(
+      "--attitude-gains", options.attitude,
+      "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade "
+      "(default: [attitude] of gains.toml, where it has them)");
+  app.add_option("--coverage", options.coverage,
+                 "Bound that a further flight like those of --from keeps with this probability "
+                 "(split-conformal prediction over flights)")
+      ->check(CLI::Range(0.5, 0.999))
+      ->needs("--from");
+  app.add_flag("--verified", options.verified, "Rigorous enclosures of the gains (intervals)");
+  add_output(app, "-o,--output", options.certificate,
+             "File for a certificate of the gains of --verified, for check: continuous and sampled loops")
+      ->needs("--verified");
+  app.add_flag("--tube", options.tube,
+               "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "
+               "trajectories that the network and the truth prove");
+  declare_tube(app, options.task);
+  app.add_option("--swarm", options.swarm,
+                 "swarm.toml: do the vehicles' mutual forces stay bounded? Errors of the estimates count");
+  add_output(app, "--report", options.report, "Write an HTML report with plots into this folder");
+  return uncertain;
+}
+
 }  // namespace
 
 Command bound_command() {
@@ -246,44 +292,8 @@ Command bound_command() {
         const auto options = std::make_shared<BoundOptions>();
         declare_tracking(app, options->tracking);
         declare_disturbance(app, options->disturbance);
-        app.add_option("--initial-error", options->initial.position_m, "|e| at t = 0, m")
-            ->check(CLI::NonNegativeNumber);
-        app.add_option("--initial-speed", options->initial.velocity_m_s, "|e'| at t = 0, m/s")
-            ->check(CLI::NonNegativeNumber);
-        app.add_option("--initial-learning-error", options->initial.learning_error_N,
-                       "|f_hat - f_a| at t = 0, bias included, N")
-            ->check(CLI::NonNegativeNumber);
-        auto* uncertain = app.add_option("--uncertain", options->uncertain,
-                                         "Worst over intervals: mass=A:B, thrust=A:B, lag=A:B, delay=A:B, "
-                                         "battery=A:B; alone: 5 %, 10 %, 20 %, 20 %")
-                              ->expected(0, -1)
-                              ->default_str("default");
-        app.add_option("--loops", options->most_loops,
-                       "Maximum number of loops evaluated per row of --uncertain; results remain valid "
-                       "bounds if the limit is reached")
-            ->check(CLI::PositiveNumber)
-            ->capture_default_str();
-        app.add_option(
-            "--attitude-gains", options->attitude,
-            "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade "
-            "(default: [attitude] of gains.toml, where it has them)");
-        app.add_option("--coverage", options->coverage,
-                       "Bound that a further flight like those of --from keeps with this probability "
-                       "(split-conformal prediction over flights)")
-            ->check(CLI::Range(0.5, 0.999))
-            ->needs("--from");
-        app.add_flag("--verified", options->verified, "Rigorous enclosures of the gains (intervals)");
-        add_output(app, "-o,--output", options->certificate,
-                   "File for a certificate of the gains of --verified, for check: continuous and sampled loops")
-            ->needs("--verified");
-        app.add_flag("--tube", options->tube,
-                     "Bound of |e(t)| over time, from rest (JSON); with --task: the least tube around its "
-                     "trajectories that the network and the truth prove");
-        declare_tube(app, options->task);
-        app.add_option(
-            "--swarm", options->swarm,
-            "swarm.toml: do the vehicles' mutual forces stay bounded? Errors of the estimates count");
-        add_output(app, "--report", options->report, "Write an HTML report with plots into this folder");
+        declare_initial(app, options->initial);
+        const CLI::Option* const uncertain = declare_extras(app, *options);
         return [options, uncertain](const CommonOptions& common) {
           options->is_uncertain = uncertain->count() > 0;
           return run_bound(*options, common);

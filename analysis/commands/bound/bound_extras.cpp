@@ -179,33 +179,21 @@ void repeat_rows(Json& rows, std::size_t count, int axis) {
   }
 }
 
-}  // namespace
+/// One row of --uncertain: an axis, what acts on it, and the loop.
+struct UncertainTask {
+  int axis;
+  Channel channel;
+  Loop loop;
+};
 
-Json uncertain_json(const Tracking& input, const std::vector<std::string>& words, const UncertainRun& run) {
-  const UncertainPlant plant = intervals_of(input, words);
-  const std::size_t rows_per_axis = input.gains.rate_hz > 0 ? 4 : 2;
-  const auto repeats = [&](int axis) {
-    return axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
-           is_same(fixed_part(input, axis), fixed_part(input, axis - 1));
-  };
-  struct Task {
-    int axis;
-    Channel channel;
-    Loop loop;
-  };
-  std::vector<Task> tasks;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!axis_loop(input.gains, input.plant, axis) || repeats(axis)) continue;
-    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-      tasks.push_back({axis, channel, Loop::kContinuous});
-      if (input.gains.rate_hz > 0) tasks.push_back({axis, channel, Loop::kSampled});
-    }
-  }
+/// The norms of each task, computed in parallel.
+std::vector<UncertainNorms> norms_of(const std::vector<UncertainTask>& tasks, const Tracking& input,
+                                     const UncertainPlant& plant, const UncertainRun& run) {
   std::vector<UncertainNorms> found(tasks.size());
   const int total = static_cast<int>(tasks.size());
   std::atomic<int> percent_done{0};  // of each task, added up
   files::parallel_for(total, run.jobs, [&](int i) {
-    const Task& task = tasks[static_cast<std::size_t>(i)];
+    const UncertainTask& task = tasks[static_cast<std::size_t>(i)];
     const AxisLoop fixed = fixed_part(input, task.axis);
     WayToGap way;
     int shown = 0;
@@ -225,6 +213,27 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
             : uncertain_norms(fixed, plant, task.channel, effort);
     show(100);
   });
+  return found;
+}
+
+}  // namespace
+
+Json uncertain_json(const Tracking& input, const std::vector<std::string>& words, const UncertainRun& run) {
+  const UncertainPlant plant = intervals_of(input, words);
+  const std::size_t rows_per_axis = input.gains.rate_hz > 0 ? 4 : 2;
+  const auto repeats = [&](int axis) {
+    return axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
+           is_same(fixed_part(input, axis), fixed_part(input, axis - 1));
+  };
+  std::vector<UncertainTask> tasks;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!axis_loop(input.gains, input.plant, axis) || repeats(axis)) continue;
+    for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
+      tasks.push_back({axis, channel, Loop::kContinuous});
+      if (input.gains.rate_hz > 0) tasks.push_back({axis, channel, Loop::kSampled});
+    }
+  }
+  const std::vector<UncertainNorms> found = norms_of(tasks, input, plant, run);
   Json gains = Json::array();
   std::size_t next = 0;
   for (int axis = 0; axis < 3; ++axis) {

@@ -176,6 +176,55 @@ Constants largest(const Bounds& bounds, const Function& function, const Upper& u
   return result;
 }
 
+files::Network force_network(const DisturbanceArguments& arguments, std::vector<std::string>& inputs) {
+  files::Network network = load_net(arguments.network);
+  files::require_force_z(network);
+  for (const std::string& path : input_files(network)) inputs.push_back(path);
+  return network;
+}
+
+/// Those of a certificate, which the checker must accept for the network.
+Constants certified_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs) {
+  inputs.push_back(arguments.certificate);
+  const Json certificate = files::read_json(arguments.certificate, check::kCertificateSchema);
+  if (arguments.network.file.empty() && arguments.network.phi.empty()) {
+    throw UsageError(
+        "--certificate C proves nothing without the network that it is about: add --network NET");
+  }
+  const files::Network network = force_network(arguments, inputs);
+  const check::CheckResult verdict = check::check(certificate, network);
+  if (!verdict.accepted) {
+    throw InputError({arguments.certificate, "", "", "", "is rejected by the checker: " + verdict.reason,
+                      "certify the network again"});
+  }
+  return largest(
+      certificate["bounds"],
+      [](const Json& b) {
+        // Only what bounds one neighbour's whole input, anywhere, in the Euclidean norm; the checker knows the rest.
+        const bool is_plain = b.value("block", "all") == "all" && b.value("domain", "global") == "global" &&
+                              (!b.contains("scale") || b["scale"].empty());
+        return is_plain ? b.value("function", "") : std::string();
+      },
+      [](const Json& b) { return b["upper"].get<double>(); },
+      [&](const Json& b) { return files::unit(network, b["function"].get<std::string>()); },
+      arguments.certificate);
+}
+
+/// Products of the layers' norms.
+Constants product_constants(const DisturbanceArguments& arguments, std::vector<std::string>& inputs) {
+  const files::Network network = force_network(arguments, inputs);
+  lipschitz::CertifyOptions options;
+  options.method = lipschitz::UpperMethod::kProduct;
+  options.lower.rounds = 0;
+  const lipschitz::Certification found = certify(network, options);
+  return largest(
+      found.bounds, [](const lipschitz::CertifiedBound& b) { return b.function; },
+      [](const lipschitz::CertifiedBound& b) { return b.upper.value(); },
+      [&](const lipschitz::CertifiedBound& b) { return files::unit(network, b.function); },
+      arguments.network.file.empty() ? arguments.network.phi + ", " + arguments.network.rho
+                                     : arguments.network.file);
+}
+
 void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& source,
                     std::vector<std::string>& inputs, std::vector<std::string>& notes) {
   if (arguments.speed < 0) {
@@ -183,49 +232,8 @@ void read_lipschitz(const DisturbanceArguments& arguments, DisturbanceSource& so
         "a Lipschitz constant gives a rate only with --speed V (and --accel A) of a neighbour "
         "relative to the vehicle");
   }
-  const bool has_network = !arguments.network.file.empty() || !arguments.network.phi.empty();
-  Constants lipschitz_N;
-  if (!arguments.certificate.empty()) {
-    inputs.push_back(arguments.certificate);
-    const Json certificate = files::read_json(arguments.certificate, check::kCertificateSchema);
-    if (!has_network) {
-      throw UsageError(
-          "--certificate C proves nothing without the network that it is about: add --network NET");
-    }
-    const files::Network network = load_net(arguments.network);
-    files::require_force_z(network);
-    for (const std::string& path : input_files(network)) inputs.push_back(path);
-    const check::CheckResult verdict = check::check(certificate, network);
-    if (!verdict.accepted) {
-      throw InputError({arguments.certificate, "", "", "", "is rejected by the checker: " + verdict.reason,
-                        "certify the network again"});
-    }
-    lipschitz_N = largest(
-        certificate["bounds"],
-        [](const Json& b) {
-          // Only what bounds one neighbour's whole input, anywhere, in the Euclidean norm; the checker knows the rest.
-          const bool is_plain = b.value("block", "all") == "all" && b.value("domain", "global") == "global" &&
-                                (!b.contains("scale") || b["scale"].empty());
-          return is_plain ? b.value("function", "") : std::string();
-        },
-        [](const Json& b) { return b["upper"].get<double>(); },
-        [&](const Json& b) { return files::unit(network, b["function"].get<std::string>()); },
-        arguments.certificate);
-  } else {
-    const files::Network network = load_net(arguments.network);
-    files::require_force_z(network);
-    for (const std::string& path : input_files(network)) inputs.push_back(path);
-    lipschitz::CertifyOptions options;
-    options.method = lipschitz::UpperMethod::kProduct;
-    options.lower.rounds = 0;
-    const lipschitz::Certification found = certify(network, options);
-    lipschitz_N = largest(
-        found.bounds, [](const lipschitz::CertifiedBound& b) { return b.function; },
-        [](const lipschitz::CertifiedBound& b) { return b.upper.value(); },
-        [&](const lipschitz::CertifiedBound& b) { return files::unit(network, b.function); },
-        arguments.network.file.empty() ? arguments.network.phi + ", " + arguments.network.rho
-                                       : arguments.network.file);
-  }
+  const Constants lipschitz_N = arguments.certificate.empty() ? product_constants(arguments, inputs)
+                                                              : certified_constants(arguments, inputs);
   // A neighbour's input moves at |(v_rel, a_rel)|, and every neighbour adds its own; the ground's input is the own
   // state.
   if (arguments.acceleration < 0) notes.emplace_back("neighbours fly at constant velocity: no --accel");

@@ -66,11 +66,7 @@ std::vector<Form> with_powers(std::vector<Form> forms) {
   return forms;
 }
 
-}  // namespace
-
-std::vector<Form> forms_over(const FormRange& range, bool is_velocity) {
-  const double span = range.span();
-  std::vector<Form> forms;
+void add_polynomials(bool is_velocity, std::vector<Form>& forms) {
   forms.push_back(
       {"linear", 1, {}, [](const double* v, const double*, double* to) { to[0] = v[0]; }, {"{0}"}});
   forms.push_back({"quadratic",
@@ -87,6 +83,39 @@ std::vector<Form> forms_over(const FormRange& range, bool is_velocity) {
                      {},
                      [](const double* v, const double*, double* to) { to[0] = v[0] * std::abs(v[0]); },
                      {"{0} * abs({0})"}});
+}
+
+Form sinusoid(double span) {
+  FormParameter wave = {"wave_number", FormUnit::kInverse, 0.2 * kTwoPi / span, 30 * kTwoPi / span, {}};
+  for (int k = 2; k <= 40; ++k) wave.starts.push_back(0.25 * k * kTwoPi / span);
+  return {"sinusoid",
+          1,
+          {wave},
+          [](const double* v, const double* t, double* to) {
+            to[0] = std::sin(t[0] * v[0]);
+            to[1] = std::cos(t[0] * v[0]);
+          },
+          {"sin({a} * {0})", "cos({a} * {0})"}};
+}
+
+Form resonance(const FormRange& range) {
+  return {"resonance",
+          1,
+          {place("at", {range.lower + 0.1 * range.span(), range.upper}, 12),
+           {"damping", FormUnit::kNone, 0.02, 1, {0.05, 0.1, 0.2, 0.4}}},
+          [](const double* v, const double* t, double* to) {
+            const double u = v[0] / t[0];
+            to[0] = 1 / std::sqrt(square(1 - u * u) + square(2 * t[1] * u));
+          },
+          {"1 / sqrt((1 - ({0} / {a})^2)^2 + (2 * {b} * {0} / {a})^2)"}};
+}
+
+}  // namespace
+
+std::vector<Form> forms_over(const FormRange& range, bool is_velocity) {
+  const double span = range.span();
+  std::vector<Form> forms;
+  add_polynomials(is_velocity, forms);
   forms.push_back(decay(range, true));
   forms.push_back(decay(range, false));
   forms.push_back({"gaussian",
@@ -117,27 +146,8 @@ std::vector<Form> forms_over(const FormRange& range, bool is_velocity) {
                      to[0] = t[1] * t[1] / (square(v[0] - t[0]) + t[1] * t[1]);
                    },
                    {"{b}^2 / (({0} - {a})^2 + {b}^2)"}});
-  if (range.lower >= 0) {
-    forms.push_back({"resonance",
-                     1,
-                     {place("at", {range.lower + 0.1 * span, range.upper}, 12),
-                      {"damping", FormUnit::kNone, 0.02, 1, {0.05, 0.1, 0.2, 0.4}}},
-                     [](const double* v, const double* t, double* to) {
-                       const double u = v[0] / t[0];
-                       to[0] = 1 / std::sqrt(square(1 - u * u) + square(2 * t[1] * u));
-                     },
-                     {"1 / sqrt((1 - ({0} / {a})^2)^2 + (2 * {b} * {0} / {a})^2)"}});
-  }
-  FormParameter wave = {"wave_number", FormUnit::kInverse, 0.2 * kTwoPi / span, 30 * kTwoPi / span, {}};
-  for (int k = 2; k <= 40; ++k) wave.starts.push_back(0.25 * k * kTwoPi / span);
-  forms.push_back({"sinusoid",
-                   1,
-                   {wave},
-                   [](const double* v, const double* t, double* to) {
-                     to[0] = std::sin(t[0] * v[0]);
-                     to[1] = std::cos(t[0] * v[0]);
-                   },
-                   {"sin({a} * {0})", "cos({a} * {0})"}});
+  if (range.lower >= 0) forms.push_back(resonance(range));
+  forms.push_back(sinusoid(span));
   return with_powers(std::move(forms));
 }
 

@@ -36,69 +36,86 @@ struct Loads {
   double command_N[3] = {0, 0, 0};          ///< sup of the force commanded, without gravity
 };
 
+/// What acts on one axis of one vehicle, stretch by stretch.
+struct AxisLoads {
+  std::vector<double> error_N;       ///< force that is not modelled, with that of the held command
+  std::vector<double> truth_N;       ///< sup of the true force
+  std::vector<double> lagged_N;      ///< sup of what passes the lags
+  std::vector<double> planned_m_s2;  ///< sup of the planned acceleration
+  std::vector<double> jerk_m_s3;
+  LoopHistory met;
+  double hold_N = 0;  ///< largest part of the held command in error_N
+};
+
+AxisLoads axis_loads(const Scene& scene, const LocalTube& tube, int vehicle, std::size_t axis) {
+  const Motion& motion = scene.motion();
+  const double mass_kg = scene.tracking().plant.mass_kg;
+  const auto i = static_cast<std::size_t>(vehicle);
+  AxisLoads result;
+  for (const int s : motion.stretch_of[i]) {
+    const auto at = static_cast<std::size_t>(s);
+    result.truth_N.push_back(tube.tube.truth[at].force_N[axis].mag());
+    result.error_N.push_back(axis == 2 ? tube.tube.force_N[at] : result.truth_N.back());
+    result.met.add(scene.in_slice(motion.stretches[at], motion.slices - 1, axis, result.error_N.back(),
+                                  tube.tube.truth[at], tube.tube.radii.position_m[i][axis],
+                                  tube.tube.radii.velocity_m_s[i][axis]));
+    result.planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis].mag());
+    result.jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis]);
+    result.lagged_N.push_back(up(result.truth_N.back() + up(mass_kg * result.planned_m_s2.back())));
+  }
+  const std::vector<double> hold_by_slice_N =
+      tube.sliced.proved
+          ? tube.sliced.hold_N[i][axis]
+          : std::vector<double>(result.error_N.size(), scene.hold_error_N(vehicle, axis, result.met));
+  result.hold_N = largest(hold_by_slice_N);
+  for (std::size_t n = 0; result.hold_N > 0 && n < result.error_N.size(); ++n)
+    result.error_N[n] = up(result.error_N[n] + hold_by_slice_N[n]);
+  return result;
+}
+
+/// A lag is a mean over the past: it moves w by at most its time constants times sup |w'|, or by twice sup |w|.
+double lag_error_N(const ErrorLoop& loop, const AxisLoads& acting, double mass_kg) {
+  if (!loop.has_lag) return 0;
+  const bool starts_at_rest = acting.planned_m_s2.front() < 1e-6;
+  const double by_jerk = starts_at_rest ? up(up(loop.lags_s * largest(acting.jerk_m_s3)) + 1e-6) : kNotKnown;
+  return up(2 * largest(acting.truth_N) + up(mass_kg * std::min(2 * largest(acting.planned_m_s2), by_jerk)));
+}
+
+/// f_hat = f_a + (f_hat - f_a) is fed forward along z.
+double fed_forward_N(const LocalTube& tube, const std::vector<int>& stretches) {
+  double fed_N = 0;
+  for (const int s : stretches) {
+    const auto at = static_cast<std::size_t>(s);
+    fed_N = std::max(fed_N, up(tube.tube.truth[at].force_N[2].mag() + tube.tube.force_N[at]));
+  }
+  return fed_N;
+}
+
 Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
   Loads result;
-  const Motion& motion = scene.motion();
   const double mass_kg = scene.tracking().plant.mass_kg;
   const auto i = static_cast<std::size_t>(vehicle);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const ErrorLoop& loop = scene.loops().axis[axis];
-    std::vector<double> error_N, lagged_N, planned_m_s2, jerk_m_s3;
-    LoopHistory met;
-    for (const int s : motion.stretch_of[i]) {
-      const auto at = static_cast<std::size_t>(s);
-      const double truth_N = tube.tube.truth[at].force_N[axis].mag();
-      error_N.push_back(axis == 2 ? tube.tube.force_N[at] : truth_N);
-      met.add(scene.in_slice(motion.stretches[at], motion.slices - 1, axis, error_N.back(),
-                             tube.tube.truth[at], tube.tube.radii.position_m[i][axis],
-                             tube.tube.radii.velocity_m_s[i][axis]));
-      planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis].mag());
-      jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis]);
-      lagged_N.push_back(up(truth_N + up(mass_kg * planned_m_s2.back())));
-    }
-    const std::vector<double> hold_by_slice_N =
-        tube.sliced.proved ? tube.sliced.hold_N[i][axis]
-                           : std::vector<double>(error_N.size(), scene.hold_error_N(vehicle, axis, met));
-    const double hold_N = largest(hold_by_slice_N);
-    for (std::size_t n = 0; hold_N > 0 && n < error_N.size(); ++n)
-      error_N[n] = up(error_N[n] + hold_by_slice_N[n]);
+    const AxisLoads acting = axis_loads(scene, tube, vehicle, axis);
+    double& integral_m_s = result.integral_m_s[axis];
     // int e = h * (f_a - f_hat + m x) + g * w
-    if (loop.h) result.integral_m_s[axis] = largest(convolved(*loop.h, error_N));
-    if (loop.g && loop.Ki > 0)
-      result.integral_m_s[axis] = up(result.integral_m_s[axis] + largest(convolved(*loop.g, lagged_N)));
+    if (loop.h) integral_m_s = largest(convolved(*loop.h, acting.error_N));
+    if (loop.g && loop.Ki > 0) integral_m_s = up(integral_m_s + largest(convolved(*loop.g, acting.lagged_N)));
     // Rotors that start with an excess add exp(-t/tau) of it to the force.
     const double excess_N = axis == 2 ? scene.excess_at_start_N(vehicle).mag() : 0;
-    if (loop.h && loop.has_lag) {
-      result.integral_m_s[axis] =
-          up(result.integral_m_s[axis] + times(up(excess_N * loop.lags_s), loop.h->peak));
-    }
+    if (loop.h && loop.has_lag)
+      integral_m_s = up(integral_m_s + times(up(excess_N * loop.lags_s), loop.h->peak));
     // A held command differs from the continuous law's by x.
-    const double feedback = up(up(hold_N / mass_kg) + times(loop.Kp, tube.tube.radii.position_m[i][axis]) +
-                               up(times(loop.Kd, tube.tube.radii.velocity_m_s[i][axis]) +
-                                  times(loop.Ki, result.integral_m_s[axis])));
-    // A lag is a mean over the past: it moves w by at most its time constants times sup |w'|, or by twice sup |w|.
-    double lag_N = 0;
-    if (loop.has_lag) {
-      const double planned = largest(planned_m_s2);
-      const bool starts_at_rest = planned_m_s2.front() < 1e-6;
-      const double by_jerk = starts_at_rest ? up(up(loop.lags_s * largest(jerk_m_s3)) + 1e-6) : kNotKnown;
-      double truth_N = 0;
-      for (const int s : motion.stretch_of[i])
-        truth_N = std::max(truth_N, tube.tube.truth[static_cast<std::size_t>(s)].force_N[axis].mag());
-      lag_N = up(2 * truth_N + up(mass_kg * std::min(2 * planned, by_jerk)));
-    }
-    result.acceleration_m_s2[axis] = up(feedback + up(up(up(largest(error_N) + lag_N) + excess_N) / mass_kg));
-    result.integral_m_s[axis] =
-        up(result.integral_m_s[axis] + sum_excess_m_s(loop, met, result.acceleration_m_s2[axis]));
-    // f_hat = f_a + (f_hat - f_a) is fed forward along z.
-    double fed_N = 0;
-    if (axis == 2) {
-      for (const int s : motion.stretch_of[i]) {
-        const auto at = static_cast<std::size_t>(s);
-        fed_N = std::max(fed_N, up(tube.tube.truth[at].force_N[2].mag() + tube.tube.force_N[at]));
-      }
-    }
-    result.command_N[axis] = up(up(mass_kg * up(feedback + largest(planned_m_s2))) + fed_N);
+    const double feedback =
+        up(up(acting.hold_N / mass_kg) + times(loop.Kp, tube.tube.radii.position_m[i][axis]) +
+           up(times(loop.Kd, tube.tube.radii.velocity_m_s[i][axis]) + times(loop.Ki, integral_m_s)));
+    const double lag_N = lag_error_N(loop, acting, mass_kg);
+    result.acceleration_m_s2[axis] =
+        up(feedback + up(up(up(largest(acting.error_N) + lag_N) + excess_N) / mass_kg));
+    integral_m_s = up(integral_m_s + sum_excess_m_s(loop, acting.met, result.acceleration_m_s2[axis]));
+    const double fed_N = axis == 2 ? fed_forward_N(tube, scene.motion().stretch_of[i]) : 0;
+    result.command_N[axis] = up(up(mass_kg * up(feedback + largest(acting.planned_m_s2))) + fed_N);
   }
   return result;
 }
