@@ -1,21 +1,31 @@
-#include "stability/effects/constant_force.h"
+/// @file A constant force in the world: steady wind, a tilted thrust axis, a biased accelerometer.
+#include "stability/effects/effect.h"
+#include "stability/effects/effect_entry.h"
 
 namespace swarmcert::stability {
+namespace {
 
-EffectInfo ConstantForce::describe() {
-  return {"constant_force",
-          "f = (f_x, f_y, f_z) in the world",
-          "what wind times linear drag, a tilted thrust axis and a biased accelerometer have in common",
-          "wind / tilt / IMU bias",
-          "yaw through more than 90 degrees (world against body), tilt changes (bias against thrust axis)",
-          {{"force_x_N", "world x", 0, -0.3, 0.3},
-           {"force_y_N", "world y", 0, -0.3, 0.3},
-           {"force_z_N", "world z", 0, -0.3, 0.3}},
-          {}};
-}
+class ConstantForce : public Effect {
+ public:
+  ConstantForce()
+      : Effect(
+            {"constant_force",
+             "f = (f_x, f_y, f_z) in the world",
+             "what wind times linear drag, a tilted thrust axis and a biased accelerometer have in common",
+             "wind / tilt / IMU bias",
+             "yaw through more than 90 degrees (world against body), tilt changes (bias against thrust axis)",
+             {{"force_x_N", "world x", 0, -0.3, 0.3},
+              {"force_y_N", "world y", 0, -0.3, 0.3},
+              {"force_z_N", "world z", 0, -0.3, 0.3}},
+             {}}) {}
+  void columns(const Instant&, const double*, Wrench* columns) const override {
+    for (int axis = 0; axis < 3; ++axis)
+      columns[axis] = {Eigen::Vector3d::Unit(axis), Eigen::Vector3d::Zero()};
+  }
+};
 
-void ConstantForce::columns(const Instant&, const double*, Wrench* columns) const {
-  for (int axis = 0; axis < 3; ++axis) columns[axis] = {Eigen::Vector3d::Unit(axis), Eigen::Vector3d::Zero()};
-}
+}  // namespace
+
+EffectEntry effects::constant_force() { return effect_entry<ConstantForce>(); }
 
 }  // namespace swarmcert::stability

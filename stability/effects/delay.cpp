@@ -1,5 +1,6 @@
-#include "stability/effects/delay.h"
-
+/// @file Delayed command: f = c (T(t - d) - T) b3, and torque likewise.
+#include "stability/effects/effect_entry.h"
+#include "stability/effects/memory_effect.h"
 #include "stability/effects/signal_path.h"
 
 namespace swarmcert::stability {
@@ -24,27 +25,30 @@ class DelayStream : public ColumnStream {
   DelayLine<4> past_;
 };
 
+class Delay : public MemoryEffect {
+ public:
+  Delay()
+      : MemoryEffect(
+            {"delay",
+             "f = c (T(t - d) - T) b3; torque likewise",
+             "radio, computation and motor drivers; 10 .. 20 ms in published flights, beside the motor lag",
+             "delay",
+             "vertical commands with content at 2 .. 8 Hz, where a lag attenuates and a delay does not",
+             {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
+             // Less than a record is a matter of when the log reads the command.
+             {{"delay_s", "d", 0.01, 0, 0.5, {0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06}}},
+             true}) {}
+  std::unique_ptr<ColumnStream> stream(const double* shape) const override {
+    return std::make_unique<DelayStream>(shape[0]);
+  }
+  void add_to(SignalPath& path, const double* coefficients, const double* shape) const override {
+    path.delay_s = shape[0];
+    path.delay_gain = coefficients[0];
+  }
+};
+
 }  // namespace
 
-EffectInfo Delay::describe() {
-  return {"delay",
-          "f = c (T(t - d) - T) b3; torque likewise",
-          "radio, computation and motor drivers; 10 .. 20 ms in published flights, beside the motor lag",
-          "delay",
-          "vertical commands with content at 2 .. 8 Hz, where a lag attenuates and a delay does not",
-          {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
-          // Less than a record is a matter of when the log reads the command.
-          {{"delay_s", "d", 0.01, 0, 0.5, {0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06}}},
-          true};
-}
-
-std::unique_ptr<ColumnStream> Delay::stream(const double* shape) const {
-  return std::make_unique<DelayStream>(shape[0]);
-}
-
-void Delay::add_to(SignalPath& path, const double* coefficients, const double* shape) const {
-  path.delay_s = shape[0];
-  path.delay_gain = coefficients[0];
-}
+EffectEntry effects::delay() { return effect_entry<Delay>(); }
 
 }  // namespace swarmcert::stability

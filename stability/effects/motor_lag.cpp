@@ -1,7 +1,8 @@
-#include "stability/effects/motor_lag.h"
-
+/// @file Rotors follow their command like a first-order lag: tau x' = u - x, f = c (x - T) b3 and torque likewise.
 #include <cmath>
 
+#include "stability/effects/effect_entry.h"
+#include "stability/effects/memory_effect.h"
 #include "stability/effects/signal_path.h"
 
 namespace swarmcert::stability {
@@ -43,27 +44,34 @@ class MotorLagStream : public ColumnStream {
   Vector4 input_, lagged_;
 };
 
+class MotorLag : public MemoryEffect {
+ public:
+  MotorLag()
+      : MemoryEffect({"motor_lag",
+                      "f = c (x - T) b3, tau x' = T - x; torque likewise",
+                      "published system identification 1 / tau = 16 .. 17.4 1/s; rotor speeds of brushed "
+                      "motors 70 .. 90 ms",
+                      "motor_lag",
+                      "vertical commands with content at 2 .. 8 Hz",
+                      {{"gain", "1 is the lag itself; a fit far from 1 is no motor lag", 1, 0, 1.3}},
+                      {{"tau_s",
+                        "time constant",
+                        1 / 17.4,
+                        0.001,
+                        1,
+                        {0.015, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.1}}},
+                      true}) {}
+  std::unique_ptr<ColumnStream> stream(const double* shape) const override {
+    return std::make_unique<MotorLagStream>(shape[0]);
+  }
+  void add_to(SignalPath& path, const double* coefficients, const double* shape) const override {
+    path.motor_lag_s = shape[0];
+    path.motor_lag_gain = coefficients[0];
+  }
+};
+
 }  // namespace
 
-EffectInfo MotorLag::describe() {
-  return {
-      "motor_lag",
-      "f = c (x - T) b3, tau x' = T - x; torque likewise",
-      "published system identification 1 / tau = 16 .. 17.4 1/s; rotor speeds of brushed motors 70 .. 90 ms",
-      "motor_lag",
-      "vertical commands with content at 2 .. 8 Hz",
-      {{"gain", "1 is the lag itself; a fit far from 1 is no motor lag", 1, 0, 1.3}},
-      {{"tau_s", "time constant", 1 / 17.4, 0.001, 1, {0.015, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.1}}},
-      true};
-}
-
-std::unique_ptr<ColumnStream> MotorLag::stream(const double* shape) const {
-  return std::make_unique<MotorLagStream>(shape[0]);
-}
-
-void MotorLag::add_to(SignalPath& path, const double* coefficients, const double* shape) const {
-  path.motor_lag_s = shape[0];
-  path.motor_lag_gain = coefficients[0];
-}
+EffectEntry effects::motor_lag() { return effect_entry<MotorLag>(); }
 
 }  // namespace swarmcert::stability

@@ -1,26 +1,34 @@
-#include "stability/effects/payload_step.h"
+/// @file A payload that is dropped or picked up: f = -g (m_before or m_after) e_z.
+#include "stability/effects/effect.h"
+#include "stability/effects/effect_entry.h"
 
 namespace swarmcert::stability {
+namespace {
 
-EffectInfo PayloadStep::describe() {
-  return {"payload_step",
-          "f = -g m_before e_z until the time t_0 of the log, -g m_after e_z from then on",
-          "the weight of a load that is dropped or picked up; its inertia is left out, which is exact at "
-          "constant velocity",
-          "payload_step",
-          "half a minute with the load and half a minute without, the same motion in both",
-          {{"mass_before_kg", "of the load before the step", 0, -0.05, 0.2},
-           {"mass_after_kg", "of the load after the step", 0, -0.05, 0.2}},
-          {{"time_s", "t_0, on the log's clock", 10, 0, 1e5}}};
-}
+class PayloadStep : public Effect {
+ public:
+  PayloadStep()
+      : Effect(
+            {"payload_step",
+             "f = -g m_before e_z until the time t_0 of the log, -g m_after e_z from then on",
+             "the weight of a load that is dropped or picked up; its inertia is left out, which is exact at "
+             "constant velocity",
+             "payload_step",
+             "half a minute with the load and half a minute without, the same motion in both",
+             {{"mass_before_kg", "of the load before the step", 0, -0.05, 0.2},
+              {"mass_after_kg", "of the load after the step", 0, -0.05, 0.2}},
+             {{"time_s", "t_0, on the log's clock", 10, 0, 1e5}}}) {}
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override {
+    const Eigen::Vector3d weight(0, 0, -kGravity_m_s2);
+    const bool is_after = now.time_s >= shape[0];
+    columns[0] = {is_after ? Eigen::Vector3d::Zero().eval() : weight, Eigen::Vector3d::Zero()};
+    columns[1] = {is_after ? weight : Eigen::Vector3d::Zero().eval(), Eigen::Vector3d::Zero()};
+  }
+  bool in_support(const Instant&, const double*) const override { return true; }
+};
 
-void PayloadStep::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  const Eigen::Vector3d weight(0, 0, -kGravity_m_s2);
-  const bool is_after = now.time_s >= shape[0];
-  columns[0] = {is_after ? Eigen::Vector3d::Zero().eval() : weight, Eigen::Vector3d::Zero()};
-  columns[1] = {is_after ? weight : Eigen::Vector3d::Zero().eval(), Eigen::Vector3d::Zero()};
-}
+}  // namespace
 
-bool PayloadStep::in_support(const Instant&, const double*) const { return true; }
+EffectEntry effects::payload_step() { return effect_entry<PayloadStep>(); }
 
 }  // namespace swarmcert::stability

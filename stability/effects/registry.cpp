@@ -5,79 +5,53 @@
 #include <functional>
 #include <stdexcept>
 
-#include "stability/effects/accelerometer_scale.h"
-#include "stability/effects/battery.h"
-#include "stability/effects/ceiling.h"
-#include "stability/effects/com_offset.h"
-#include "stability/effects/constant_force.h"
 #include "stability/effects/deep_set.h"
-#include "stability/effects/delay.h"
 #include "stability/effects/downwash.h"
-#include "stability/effects/downwash_torque.h"
-#include "stability/effects/drag_linear.h"
-#include "stability/effects/drag_quadratic.h"
-#include "stability/effects/drag_rotor.h"
+#include "stability/effects/effect_entry.h"
 #include "stability/effects/expression.h"
-#include "stability/effects/ground.h"
-#include "stability/effects/imu_tilt.h"
-#include "stability/effects/inflow.h"
-#include "stability/effects/motor_lag.h"
-#include "stability/effects/payload_step.h"
 #include "stability/effects/pendulum.h"
-#include "stability/effects/rotor_thrust.h"
-#include "stability/effects/sensor_delay.h"
-#include "stability/effects/tether.h"
-#include "stability/effects/thrust_ratio.h"
-#include "stability/effects/thrust_saturation.h"
-#include "stability/effects/torque_bias.h"
-#include "stability/effects/translational_lift.h"
-#include "stability/effects/upper_lift.h"
-#include "stability/effects/voltage_sag.h"
-#include "stability/effects/vortex_ring.h"
-#include "stability/effects/wake_delay.h"
-#include "stability/effects/wall.h"
-#include "stability/effects/wind_field.h"
 
 namespace swarmcert::stability {
 namespace {
 
-struct Entry {
-  EffectInfo info;
-  EffectMaker make;
-};
-
-template <typename T>
-Entry entry() {
-  return {T::describe(), [](const EffectSpec& spec, const EffectContext& context) -> std::unique_ptr<Effect> {
-            if constexpr (std::is_constructible_v<T, const EffectSpec&, const EffectContext&>) {
-              return std::make_unique<T>(spec, context);
-            } else {
-              return std::make_unique<T>();
-            }
-          }};
-}
-
-/// A new effect is one line here.
-std::deque<Entry>& entries() {
-  static std::deque<Entry> all = {
-      // a deque keeps references when users add theirs
-      entry<MotorLag>(),         entry<Delay>(),         entry<SensorDelay>(),
-      entry<ThrustRatio>(),      entry<Battery>(),       entry<DragLinear>(),
-      entry<DragQuadratic>(),    entry<DragRotor>(),     entry<Inflow>(),
-      entry<Ground>(),           entry<Ceiling>(),       entry<Downwash>(),
-      entry<UpperLift>(),        entry<ConstantForce>(), entry<TorqueBias>(),
-      entry<DownwashTorque>(),   entry<DeepSetEffect>(), entry<VoltageSag>(),
-      entry<ThrustSaturation>(), entry<PayloadStep>(),   entry<TranslationalLift>(),
-      entry<WindField>(),        entry<Wall>(),          entry<VortexRing>(),
-      entry<RotorThrust>(),      entry<ComOffset>(),     entry<ImuTilt>(),
-      entry<WakeDelay>(),        entry<Tether>(),        entry<AccelerometerScale>(),
-      entry<Pendulum>(),
-  };
+/// A new effect is one line here. A deque keeps references when users add theirs.
+std::deque<EffectEntry>& entries() {
+  static std::deque<EffectEntry> all = {effects::motor_lag(),
+                                        effects::delay(),
+                                        effects::sensor_delay(),
+                                        effects::thrust_ratio(),
+                                        effects::battery(),
+                                        effects::drag_linear(),
+                                        effects::drag_quadratic(),
+                                        effects::drag_rotor(),
+                                        effects::inflow(),
+                                        effects::ground(),
+                                        effects::ceiling(),
+                                        effect_entry<Downwash>(),
+                                        effects::upper_lift(),
+                                        effects::constant_force(),
+                                        effects::torque_bias(),
+                                        effects::downwash_torque(),
+                                        effect_entry<DeepSetEffect>(),
+                                        effects::voltage_sag(),
+                                        effects::thrust_saturation(),
+                                        effects::payload_step(),
+                                        effects::translational_lift(),
+                                        effects::wind_field(),
+                                        effects::wall(),
+                                        effects::vortex_ring(),
+                                        effects::rotor_thrust(),
+                                        effects::com_offset(),
+                                        effects::imu_tilt(),
+                                        effects::wake_delay(),
+                                        effects::tether(),
+                                        effects::accelerometer_scale(),
+                                        effect_entry<Pendulum>()};
   return all;
 }
 
-const Entry& find(const std::string& name) {
-  for (const Entry& entry : entries()) {
+const EffectEntry& find(const std::string& name) {
+  for (const EffectEntry& entry : entries()) {
     if (entry.info.name == name) return entry;
   }
   throw std::invalid_argument("there is no effect named " + name);
@@ -87,7 +61,7 @@ const Entry& find(const std::string& name) {
 
 std::vector<std::string> effect_names() {
   std::vector<std::string> names;
-  for (const Entry& entry : entries()) names.push_back(entry.info.name);
+  for (const EffectEntry& entry : entries()) names.push_back(entry.info.name);
   return names;
 }
 

@@ -1,5 +1,6 @@
-#include "stability/effects/sensor_delay.h"
-
+/// @file Delayed accelerometer: the log shows c ((T b3)(t - d) - T b3) as a force.
+#include "stability/effects/effect_entry.h"
+#include "stability/effects/memory_effect.h"
 #include "stability/effects/signal_path.h"
 
 namespace swarmcert::stability {
@@ -22,26 +23,29 @@ class SensorDelayStream : public ColumnStream {
   DelayLine<3> past_;
 };
 
+class SensorDelay : public MemoryEffect {
+ public:
+  SensorDelay()
+      : MemoryEffect(
+            {"sensor_delay",
+             "r = c ((T b3)(t - d) - T b3)",
+             "group delay of the accelerometer's filter: 7.5 ms for two poles at 30 Hz",
+             "sensor_delay",
+             "tilt of more than 5 degrees at more than 1 Hz: a motor lag does not delay the thrust axis",
+             {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
+             {{"delay_s", "d", 0.0075, 0, 0.5, {0.01, 0.015, 0.02, 0.03, 0.04}}},
+             true}) {}
+  std::unique_ptr<ColumnStream> stream(const double* shape) const override {
+    return std::make_unique<SensorDelayStream>(shape[0]);
+  }
+  void add_to(SignalPath& path, const double* coefficients, const double* shape) const override {
+    path.sensor_delay_s = shape[0];
+    path.sensor_delay_gain = coefficients[0];
+  }
+};
+
 }  // namespace
 
-EffectInfo SensorDelay::describe() {
-  return {"sensor_delay",
-          "r = c ((T b3)(t - d) - T b3)",
-          "group delay of the accelerometer's filter: 7.5 ms for two poles at 30 Hz",
-          "sensor_delay",
-          "tilt of more than 5 degrees at more than 1 Hz: a motor lag does not delay the thrust axis",
-          {{"gain", "1 is the delay itself; a fit far from 1 is no delay", 1, 0, 1.3}},
-          {{"delay_s", "d", 0.0075, 0, 0.5, {0.01, 0.015, 0.02, 0.03, 0.04}}},
-          true};
-}
-
-std::unique_ptr<ColumnStream> SensorDelay::stream(const double* shape) const {
-  return std::make_unique<SensorDelayStream>(shape[0]);
-}
-
-void SensorDelay::add_to(SignalPath& path, const double* coefficients, const double* shape) const {
-  path.sensor_delay_s = shape[0];
-  path.sensor_delay_gain = coefficients[0];
-}
+EffectEntry effects::sensor_delay() { return effect_entry<SensorDelay>(); }
 
 }  // namespace swarmcert::stability

@@ -1,19 +1,27 @@
-#include "stability/effects/thrust_ratio.h"
+/// @file Thrust scale, mass or payload: f = e T b3. Only the ratio of thrust to mass enters a flight's kinematics.
+#include "stability/effects/effect.h"
+#include "stability/effects/effect_entry.h"
 
 namespace swarmcert::stability {
+namespace {
 
-EffectInfo ThrustRatio::describe() {
-  return {"thrust_ratio",
-          "f = e T b3, where 1 + e = (true thrust / mapped thrust) (stated mass / true mass)",
-          "m a = s T: kinematics show s / m only",
-          "mass / payload / thrust scale",
-          "thrust changes of more than 15 %; weigh the vehicle to tell mass from thrust",
-          {{"ratio", "relative excess of thrust over mass", 0, -0.7, 0.7}},
-          {}};
-}
+class ThrustRatio : public Effect {
+ public:
+  ThrustRatio()
+      : Effect({"thrust_ratio",
+                "f = e T b3, where 1 + e = (true thrust / mapped thrust) (stated mass / true mass)",
+                "m a = s T: kinematics show s / m only",
+                "mass / payload / thrust scale",
+                "thrust changes of more than 15 %; weigh the vehicle to tell mass from thrust",
+                {{"ratio", "relative excess of thrust over mass", 0, -0.7, 0.7}},
+                {}}) {}
+  void columns(const Instant& now, const double*, Wrench* columns) const override {
+    columns[0] = {now.thrust_N * now.b3_W(), Eigen::Vector3d::Zero()};
+  }
+};
 
-void ThrustRatio::columns(const Instant& now, const double*, Wrench* columns) const {
-  columns[0] = {now.thrust_N * now.b3_W(), Eigen::Vector3d::Zero()};
-}
+}  // namespace
+
+EffectEntry effects::thrust_ratio() { return effect_entry<ThrustRatio>(); }
 
 }  // namespace swarmcert::stability

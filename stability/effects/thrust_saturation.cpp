@@ -1,32 +1,40 @@
-#include "stability/effects/thrust_saturation.h"
-
+/// @file Thrust that is missing above a knee, because propellers saturate: f = -c max(0, T - k W) b3.
 #include <algorithm>
 
+#include "stability/effects/effect.h"
+#include "stability/effects/effect_entry.h"
+
 namespace swarmcert::stability {
+namespace {
 
-EffectInfo ThrustSaturation::describe() {
-  return {"thrust_saturation",
-          "f = -c max(0, T - k W) b3",
-          "propellers and motors at their limit: the thrust of a command above the knee is only a share of "
-          "what the map says; W is the weight",
-          "thrust_saturation",
-          "climbs and turns that ask for much more thrust than hovering",
-          {{"loss", "share that is lost of the thrust above the knee", 0, 0, 1}},
-          {{"knee_weights",
-            "k: thrust over weight from which on thrust is lost; hovering is not beyond it",
-            1.3,
-            1,
-            5,
-            {1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6}}}};
-}
+class ThrustSaturation : public Effect {
+ public:
+  ThrustSaturation()
+      : Effect({"thrust_saturation",
+                "f = -c max(0, T - k W) b3",
+                "propellers and motors at their limit: the thrust of a command above the knee is only a "
+                "share of "
+                "what the map says; W is the weight",
+                "thrust_saturation",
+                "climbs and turns that ask for much more thrust than hovering",
+                {{"loss", "share that is lost of the thrust above the knee", 0, 0, 1}},
+                {{"knee_weights",
+                  "k: thrust over weight from which on thrust is lost; hovering is not beyond it",
+                  1.3,
+                  1,
+                  5,
+                  {1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6}}}}) {}
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override {
+    const double over_N = now.thrust_N - shape[0] * now.mass_kg * kGravity_m_s2;
+    columns[0] = {-std::max(over_N, 0.0) * now.b3_W(), Eigen::Vector3d::Zero()};
+  }
+  bool in_support(const Instant& now, const double* shape) const override {
+    return now.thrust_N > shape[0] * now.mass_kg * kGravity_m_s2;
+  }
+};
 
-void ThrustSaturation::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  const double over_N = now.thrust_N - shape[0] * now.mass_kg * kGravity_m_s2;
-  columns[0] = {-std::max(over_N, 0.0) * now.b3_W(), Eigen::Vector3d::Zero()};
-}
+}  // namespace
 
-bool ThrustSaturation::in_support(const Instant& now, const double* shape) const {
-  return now.thrust_N > shape[0] * now.mass_kg * kGravity_m_s2;
-}
+EffectEntry effects::thrust_saturation() { return effect_entry<ThrustSaturation>(); }
 
 }  // namespace swarmcert::stability

@@ -1,6 +1,8 @@
-#include "stability/effects/vortex_ring.h"
-
+/// @file Thrust lost in the vehicle's own wake as it descends: f = -a T exp(-((v_c + v_0) / w)^2 / 2) b3.
 #include <cmath>
+
+#include "stability/effects/effect.h"
+#include "stability/effects/effect_entry.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -11,32 +13,35 @@ double descent_offset(const Instant& now, const double* shape) {
   return (now.b3_W().dot(now.v_W_m_s) + shape[kDescent]) / shape[kVortexWidth];
 }
 
+class VortexRing : public Effect {
+ public:
+  VortexRing()
+      : Effect(
+            {"vortex_ring",
+             "f = -a T exp(-((v_c + v_0) / w)^2 / 2) b3, v_c the velocity along the thrust axis",
+             "thrust is lost where the descent is about as fast as the rotor's own induced velocity (vortex "
+             "ring state: half to one and a half times it), and not below or beyond",
+             "vortex_ring",
+             "straight descents at several speeds up to twice v_0",
+             {{"loss", "a: share of the thrust lost at the descent v_0", 0, 0, 0.6}},
+             {{"descent_m_s",
+               "v_0: speed of descent at which most is lost",
+               1,
+               0.05,
+               20,
+               {0.3, 0.5, 0.8, 1.2, 2, 4}},
+              {"width_m_s", "w", 0.3, 0.02, 10, {0.1, 0.2, 0.5, 1}}}}) {}
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override {
+    const double x = descent_offset(now, shape);
+    columns[0] = {-now.thrust_N * std::exp(-x * x / 2) * now.b3_W(), Eigen::Vector3d::Zero()};
+  }
+  bool in_support(const Instant& now, const double* shape) const override {
+    return std::abs(descent_offset(now, shape)) < 2;
+  }
+};
+
 }  // namespace
 
-EffectInfo VortexRing::describe() {
-  return {"vortex_ring",
-          "f = -a T exp(-((v_c + v_0) / w)^2 / 2) b3, v_c the velocity along the thrust axis",
-          "thrust is lost where the descent is about as fast as the rotor's own induced velocity (vortex "
-          "ring state: half to one and a half times it), and not below or beyond",
-          "vortex_ring",
-          "straight descents at several speeds up to twice v_0",
-          {{"loss", "a: share of the thrust lost at the descent v_0", 0, 0, 0.6}},
-          {{"descent_m_s",
-            "v_0: speed of descent at which most is lost",
-            1,
-            0.05,
-            20,
-            {0.3, 0.5, 0.8, 1.2, 2, 4}},
-           {"width_m_s", "w", 0.3, 0.02, 10, {0.1, 0.2, 0.5, 1}}}};
-}
-
-void VortexRing::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  const double x = descent_offset(now, shape);
-  columns[0] = {-now.thrust_N * std::exp(-x * x / 2) * now.b3_W(), Eigen::Vector3d::Zero()};
-}
-
-bool VortexRing::in_support(const Instant& now, const double* shape) const {
-  return std::abs(descent_offset(now, shape)) < 2;
-}
+EffectEntry effects::vortex_ring() { return effect_entry<VortexRing>(); }
 
 }  // namespace swarmcert::stability

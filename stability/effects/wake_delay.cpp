@@ -1,7 +1,9 @@
-#include "stability/effects/wake_delay.h"
-
+/// @file Downwash that takes time to arrive, and drifts with the wind meanwhile.
 #include <algorithm>
 #include <array>
+
+#include "stability/effects/downwash.h"
+#include "stability/effects/effect_entry.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -44,52 +46,59 @@ Instant with_past_neighbours(const Instant& now, const double* shape, Neighbour*
   return then;
 }
 
+/// The wake of downwash.h, of neighbours where they were delay_s ago, carried along by a horizontal wind w since: as if
+/// they were at p_j + delay_s (w - v_j), their velocity taken as constant meanwhile. With a delay of 0 it is the
+/// downwash without convection.
+class WakeDelay : public Effect {
+ public:
+  WakeDelay()
+      : Effect({"wake_delay",
+                "downwash of neighbours at p_j + d (w - v_j)",
+                "a wake sinks at 2 to 7 m/s: what arrives now left the rotors 0.05 to 0.3 s ago",
+                "wake_delay",
+                "pass below a vehicle that crosses at 0.5 m/s or more, in all directions",
+                {{"amplitude_N", "force 0.3 m straight below a vehicle of 0.034 kg", 0.09, 0, 0.6}},
+                {{"delay_s", "d", 0, 0, 0.5, {0.1, 0.2, 0.3, 0.4}},
+                 {"decay_exponent", "as of downwash", 0.44084819, 0, 4, {0, 0.44084819}},
+                 {"spread_m", "as of downwash", 0.0259477, 0.005, 0.3, {0.0259477, 0.06}},
+                 {"spread_slope", "as of downwash", 0.08181592, 0, 1, {0.028, 0.08181592}},
+                 {"norm_exponent", "as of downwash", 1.3, 1, 10},
+                 {"wind_x_m_s", "w: wind that carries the wake along", 0, -5, 5, {0, 1.6}},
+                 {"wind_y_m_s", "", 0, -5, 5, {0, 1.6}}},
+                false,
+                true}) {}
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override {
+    std::array<Neighbour, kMostAtOnce> past;
+    wake_.columns(with_past_neighbours(now, shape, past.data()), downwash_shape(shape).data(), columns);
+  }
+  bool in_support(const Instant& now, const double* shape) const override {
+    std::array<Neighbour, kMostAtOnce> past;
+    return wake_.in_support(with_past_neighbours(now, shape, past.data()), downwash_shape(shape).data());
+  }
+  std::vector<std::vector<double>> grid(const FlightRange&) const override {
+    const double spreads[][2] = {{0.0259477, 0.08181592}, {0.06, 0.06}, {0.13, 0.03}};
+    const double decay = info().shape[kDelayedDecay].value, norm = info().shape[kDelayedNorm].value;
+    std::vector<std::vector<double>> thetas;
+    for (const double delay_s : info().shape[kDelay].grid) {
+      for (const auto& spread : spreads) thetas.push_back({delay_s, decay, spread[0], spread[1], norm, 0, 0});
+    }
+    // Drifts of 0.16 m and 0.32 m to eight sides, of a wide wake: refinement moves them from there.
+    constexpr double kDiagonal = 0.7071067811865476;
+    const double sides[][2] = {{1, 0},  {kDiagonal, kDiagonal},   {0, 1},  {-kDiagonal, kDiagonal},
+                               {-1, 0}, {-kDiagonal, -kDiagonal}, {0, -1}, {kDiagonal, -kDiagonal}};
+    for (const double wind_m_s : {0.8, 1.6}) {
+      for (const auto& side : sides)
+        thetas.push_back({0.2, decay, 0.13, 0.03, norm, wind_m_s * side[0], wind_m_s * side[1]});
+    }
+    return thetas;
+  }
+
+ private:
+  Downwash wake_;
+};
+
 }  // namespace
 
-EffectInfo WakeDelay::describe() {
-  return {"wake_delay",
-          "downwash of neighbours at p_j + d (w - v_j)",
-          "a wake sinks at 2 to 7 m/s: what arrives now left the rotors 0.05 to 0.3 s ago",
-          "wake_delay",
-          "pass below a vehicle that crosses at 0.5 m/s or more, in all directions",
-          {{"amplitude_N", "force 0.3 m straight below a vehicle of 0.034 kg", 0.09, 0, 0.6}},
-          {{"delay_s", "d", 0, 0, 0.5, {0.1, 0.2, 0.3, 0.4}},
-           {"decay_exponent", "as of downwash", 0.44084819, 0, 4, {0, 0.44084819}},
-           {"spread_m", "as of downwash", 0.0259477, 0.005, 0.3, {0.0259477, 0.06}},
-           {"spread_slope", "as of downwash", 0.08181592, 0, 1, {0.028, 0.08181592}},
-           {"norm_exponent", "as of downwash", 1.3, 1, 10},
-           {"wind_x_m_s", "w: wind that carries the wake along", 0, -5, 5, {0, 1.6}},
-           {"wind_y_m_s", "", 0, -5, 5, {0, 1.6}}},
-          false,
-          true};
-}
-
-void WakeDelay::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  std::array<Neighbour, kMostAtOnce> past;
-  wake_.columns(with_past_neighbours(now, shape, past.data()), downwash_shape(shape).data(), columns);
-}
-
-bool WakeDelay::in_support(const Instant& now, const double* shape) const {
-  std::array<Neighbour, kMostAtOnce> past;
-  return wake_.in_support(with_past_neighbours(now, shape, past.data()), downwash_shape(shape).data());
-}
-
-std::vector<std::vector<double>> WakeDelay::grid(const FlightRange&) const {
-  const double spreads[][2] = {{0.0259477, 0.08181592}, {0.06, 0.06}, {0.13, 0.03}};
-  const double decay = info().shape[kDelayedDecay].value, norm = info().shape[kDelayedNorm].value;
-  std::vector<std::vector<double>> thetas;
-  for (const double delay_s : info().shape[kDelay].grid) {
-    for (const auto& spread : spreads) thetas.push_back({delay_s, decay, spread[0], spread[1], norm, 0, 0});
-  }
-  // Drifts of 0.16 m and 0.32 m to eight sides, of a wide wake: refinement moves them from there.
-  constexpr double kDiagonal = 0.7071067811865476;
-  const double sides[][2] = {{1, 0},  {kDiagonal, kDiagonal},   {0, 1},  {-kDiagonal, kDiagonal},
-                             {-1, 0}, {-kDiagonal, -kDiagonal}, {0, -1}, {kDiagonal, -kDiagonal}};
-  for (const double wind_m_s : {0.8, 1.6}) {
-    for (const auto& side : sides)
-      thetas.push_back({0.2, decay, 0.13, 0.03, norm, wind_m_s * side[0], wind_m_s * side[1]});
-  }
-  return thetas;
-}
+EffectEntry effects::wake_delay() { return effect_entry<WakeDelay>(); }
 
 }  // namespace swarmcert::stability

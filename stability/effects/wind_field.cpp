@@ -1,7 +1,9 @@
-#include "stability/effects/wind_field.h"
-
+/// @file Wind that varies over the room: a shear layer over the height, and a column of rising or sinking air.
 #include <algorithm>
 #include <cmath>
+
+#include "stability/effects/effect.h"
+#include "stability/effects/effect_entry.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -18,36 +20,38 @@ double column_share(const Instant& now, const double* shape) {
   return std::exp(-(x * x + y * y) / (2 * shape[kColumnRadius] * shape[kColumnRadius]));
 }
 
+class WindField : public Effect {
+ public:
+  WindField()
+      : Effect({"wind_field",
+                "f_xy = F / (1 + exp(-(z - z_0) / d)), f_z = G exp(-((x - x_0)^2 + (y - y_0)^2) / (2 r^2))",
+                "a shear layer between still and moving air, and a thermal or the draught of a fan; forces, "
+                "since drag "
+                "times wind is all that flights show",
+                "wind_field",
+                "the same heights and places at several speeds and headings",
+                {{"shear_x_N", "force above the layer, world x", 0, -0.3, 0.3},
+                 {"shear_y_N", "force above the layer, world y", 0, -0.3, 0.3},
+                 {"thermal_N", "force in the middle of the column, upwards", 0, -0.3, 0.3}},
+                {{"height_m", "z_0: middle of the shear layer", 1, -100, 100, {}},
+                 {"thickness_m", "d of the shear layer", 0.1, 0.005, 100, {}},
+                 {"x_m", "x_0: middle of the column", 0, -1000, 1000, {}},
+                 {"y_m", "y_0", 0, -1000, 1000, {}},
+                 {"radius_m", "r of the column", 0.3, 0.01, 100, {}}}}) {}
+  void columns(const Instant& now, const double* shape, Wrench* columns) const override {
+    const double layer = shear_share(now, shape);
+    columns[0] = {layer * Eigen::Vector3d::UnitX(), Eigen::Vector3d::Zero()};
+    columns[1] = {layer * Eigen::Vector3d::UnitY(), Eigen::Vector3d::Zero()};
+    columns[2] = {column_share(now, shape) * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::Zero()};
+  }
+  bool in_support(const Instant& now, const double* shape) const override {
+    constexpr double kClear = 0.1;
+    return shear_share(now, shape) > kClear || column_share(now, shape) > kClear;
+  }
+};
+
 }  // namespace
 
-EffectInfo WindField::describe() {
-  return {
-      "wind_field",
-      "f_xy = F / (1 + exp(-(z - z_0) / d)), f_z = G exp(-((x - x_0)^2 + (y - y_0)^2) / (2 r^2))",
-      "a shear layer between still and moving air, and a thermal or the draught of a fan; forces, since drag "
-      "times wind is all that flights show",
-      "wind_field",
-      "the same heights and places at several speeds and headings",
-      {{"shear_x_N", "force above the layer, world x", 0, -0.3, 0.3},
-       {"shear_y_N", "force above the layer, world y", 0, -0.3, 0.3},
-       {"thermal_N", "force in the middle of the column, upwards", 0, -0.3, 0.3}},
-      {{"height_m", "z_0: middle of the shear layer", 1, -100, 100, {}},
-       {"thickness_m", "d of the shear layer", 0.1, 0.005, 100, {}},
-       {"x_m", "x_0: middle of the column", 0, -1000, 1000, {}},
-       {"y_m", "y_0", 0, -1000, 1000, {}},
-       {"radius_m", "r of the column", 0.3, 0.01, 100, {}}}};
-}
-
-void WindField::columns(const Instant& now, const double* shape, Wrench* columns) const {
-  const double layer = shear_share(now, shape);
-  columns[0] = {layer * Eigen::Vector3d::UnitX(), Eigen::Vector3d::Zero()};
-  columns[1] = {layer * Eigen::Vector3d::UnitY(), Eigen::Vector3d::Zero()};
-  columns[2] = {column_share(now, shape) * Eigen::Vector3d::UnitZ(), Eigen::Vector3d::Zero()};
-}
-
-bool WindField::in_support(const Instant& now, const double* shape) const {
-  constexpr double kClear = 0.1;
-  return shear_share(now, shape) > kClear || column_share(now, shape) > kClear;
-}
+EffectEntry effects::wind_field() { return effect_entry<WindField>(); }
 
 }  // namespace swarmcert::stability
