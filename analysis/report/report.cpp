@@ -11,7 +11,6 @@
 #include "analysis/report/report_drawing.h"
 #include "analysis/report/report_interactive.h"
 #include "analysis/report/report_scripts.h"
-#include "analysis/report/report_svg.h"
 #include "analysis/report/report_text.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -20,13 +19,24 @@
 namespace swarmcert::analysis {
 namespace {
 
+std::string base64(const unsigned char* bytes, std::size_t size) {
+  std::string text(4 * ((size + 2) / 3) + 1, '\0');
+  text.resize(static_cast<std::size_t>(
+      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes, static_cast<int>(size))));
+  return text;
+}
+
 /// The source "'sha256-...'" by which a policy admits exactly this script or style.
 std::string policy_source(std::string_view text) {
   unsigned char digest[SHA256_DIGEST_LENGTH];
   SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest);
-  unsigned char base64[4 * ((SHA256_DIGEST_LENGTH + 2) / 3) + 1];
-  EVP_EncodeBlock(base64, digest, sizeof digest);
-  return "'sha256-" + std::string(reinterpret_cast<const char*>(base64)) + "'";
+  return "'sha256-" + base64(digest, sizeof digest) + "'";
+}
+
+/// A drawing as the address of an image: browsers run no script of images and load nothing for them.
+std::string image_address(const std::string& svg) {
+  return "data:image/svg+xml;base64," +
+         base64(reinterpret_cast<const unsigned char*>(svg.data()), svg.size());
 }
 
 /// Numbers with their units stand to the right.
@@ -136,15 +146,14 @@ std::string Report::drawn(const Figure& figure, const std::string& folder) const
   const std::string script = figure.name + ".gp";
   files::write_file((path / (figure.name + ".dat")).string(), figure.data, true);
   files::write_file((path / script).string(), plot_script(figure.script, figure.height), true);
-  const std::string wide = draw(folder, script, false);
+  const std::string wide = draw(folder, script, false), narrow = draw(folder, script, true);
   std::string html = "<figure class=\"drawing\">\n";
-  const std::string label = "Plot: " + figure.caption;
-  const std::string wide_part = inline_svg(wide, figure.name + "-", "wide", label);
-  const std::string narrow_part =
-      inline_svg(draw(folder, script, true), figure.name + "-narrow-", "narrow", label);
-  if (!wide_part.empty() && !narrow_part.empty()) {
+  if (!wide.empty() && !narrow.empty()) {
     files::write_file((path / (figure.name + ".svg")).string(), wide, true);
-    html += wide_part + narrow_part;
+    html += fmt::format(
+        "<picture><source media=\"screen and (max-width:40rem)\" srcset=\"{}\"><img src=\"{}\" "
+        "alt=\"Plot: {}\"></picture>\n",
+        image_address(narrow), image_address(wide), html_text(figure.caption));
   } else {
     html += "<p>Not drawn: gnuplot is missing or failed. The data are in " + html_text(figure.name) +
             ".dat.</p>\n";

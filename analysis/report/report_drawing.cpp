@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 extern char** environ;
@@ -51,6 +52,21 @@ double tick_step(double length) {
   return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
 }
 
+namespace {
+
+/// What gnuplot 5.4 writes into text but XML does not allow there: browsers would not show such an image.
+std::string well_formed(std::string svg) {
+  const std::pair<const char*, const char*> kReplaced[] = {
+      {"]]>", "]]&gt;"}, {"\xEF\xBF\xBE", "\xEF\xBF\xBD"}, {"\xEF\xBF\xBF", "\xEF\xBF\xBD"}};
+  for (const auto& [from, to] : kReplaced) {
+    for (std::size_t at = svg.find(from); at != std::string::npos; at = svg.find(from, at))
+      svg.replace(at, 3, to);
+  }
+  return svg;
+}
+
+}  // namespace
+
 std::string draw(const std::string& folder, const std::string& script, bool is_narrow) {
   int pipe_ends[2];
   if (pipe2(pipe_ends, O_CLOEXEC) != 0) return "";
@@ -77,7 +93,12 @@ std::string draw(const std::string& folder, const std::string& script, bool is_n
   close(pipe_ends[0]);
   int status = 0;
   if (failed != 0 || waitpid(child, &status, 0) != child) return "";
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0 ? svg : "";
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) return "";
+  // Cells of heat maps neither blur nor leave gaps.
+  const std::size_t head = svg.find("<title>");
+  if (head == std::string::npos) return "";
+  svg.insert(head, "<style>image{image-rendering:pixelated}polygon{shape-rendering:crispEdges}</style>\n");
+  return well_formed(std::move(svg));
 }
 
 }  // namespace swarmcert::analysis

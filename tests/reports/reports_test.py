@@ -5,6 +5,7 @@ SCREENSHOTS is a folder for pictures of the top of every page at three widths. A
 Ends with 77 (skipped) where there is no Chromium. First a good report is damaged in every way that the browser must see.
 """
 
+import base64
 import json
 import os
 import pathlib
@@ -19,7 +20,7 @@ import browser
 
 # A folder, a subfolder and a prefix of logs, as a hostile uploader would name them. `touch` would leave a file behind.
 HOSTILE = ["a'b\"c`touch pwned`$(touch pwned)<", "script><script>window.pwned=1<", "script><img src=x onerror=alert(1)>"]
-HOSTILE_KIND = "k'\\\"`touch pwned`$(touch pwned)</script><script>window.pwned=1</script><!--\\n"
+HOSTILE_KIND = "k'\\\"`touch pwned`$(touch pwned)</script><script>window.pwned=1</script><!--]]>\\n"
 
 
 class Reports:
@@ -158,6 +159,15 @@ def refuse_full_folders(r):
         sys.exit("a refused report was written")
 
 
+def in_drawings(text, change):
+    """The page with the source of every drawing changed."""
+    def changed(match):
+        drawing = base64.b64decode(match.group(1)).decode()
+        return "data:image/svg+xml;base64," + base64.b64encode(change(drawing).encode()).decode()
+
+    return re.sub(r"data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)", changed, text)
+
+
 def planted(good):
     """A good page damaged in one way, with the kind of fault that must be seen."""
     text = good.read_text()
@@ -165,9 +175,7 @@ def planted(good):
     lax = text.replace(policy, "")
     end = "</body>"
     assert text.count(end) == 1
-    drawing = re.search(r"<svg.*?</svg>\n<svg.*?</svg>", text, re.S).group()
-    without_curves = re.sub(r'(<g id="[^"]*gnuplot_plot_.*?)(?=<g id="[^"]*gnuplot_plot_|</svg>)', "", drawing, flags=re.S)
-    assert without_curves != drawing
+    drawing = re.search(r"<picture>.*?</picture>", text, re.S).group()
     yield "console", lax.replace(end, "<script>console.error('planted')</script>" + end)
     yield "console", lax.replace(end, "<script>undefined.planted</script>" + end)
     yield "policy", text.replace(end, "<p style='color:red'>planted</p>" + end)
@@ -176,13 +184,13 @@ def planted(good):
     yield "wide table", re.sub(r'<div class="scroll"[^>]*>', "<div>", text)
     yield "overflow", text.replace(end, "<canvas width='2000'></canvas>" + end)
     yield "missing plot", text.replace(drawing, "")
-    yield "empty plot", text.replace(drawing, without_curves)
-    yield "small text", text.replace('font-size="1', 'font-size="0')
-    yield "raw unit", text.replace("time [s]", "time [m_s]")
-    yield "cut text", text.replace("<text> 0</text>", f"<text> {80 * 'm'}</text>")
-    label = r'translate\(([0-9.]+),[0-9.]+\)(?=" stroke="none" fill="currentColor" font-size)'
-    yield "overlapping text", re.sub(label, r"translate(\1,200)", text)
-    yield "contrast", text.replace('fill="currentColor"', 'fill="#777777"')
+    yield "empty plot", in_drawings(text, lambda d: d.replace('id="gnuplot_plot_', 'id="gnuplot_other_'))
+    yield "small text", in_drawings(text, lambda d: d.replace('font-size="1', 'font-size="0'))
+    yield "raw unit", in_drawings(text, lambda d: d.replace("time [s]", "time [m_s]"))
+    yield "cut text", in_drawings(text, lambda d: d.replace("<text> 0</text>", f"<text> {80 * 'm'}</text>"))
+    label = r'translate\(([0-9.]+),[0-9.]+\)(?=" stroke="none" fill="black" font-family)'
+    yield "overlapping text", in_drawings(text, lambda d: re.sub(label, r"translate(\1,200)", d))
+    yield "contrast", in_drawings(text, lambda d: d.replace('fill="black"', 'fill="#888888"'))
     yield "no caption", re.sub(r"<figcaption>.*?</figcaption>", "", text, flags=re.S)
     yield "no name", text.replace(end, "<button type='button'></button>" + end)
     yield "no result", text.replace('id="result"', 'id="other"')
