@@ -3,9 +3,8 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <map>
 
-#include "nn/base/parallel.h"
+#include "analysis/identification/vehicle_blocks.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -104,33 +103,13 @@ stability::EffectSpec spec_of(const AccelerometerBalance& balance) {
 
 std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs& inputs,
                                                          const std::string& kind, int jobs) {
-  struct OneLog {
-    std::string vehicle;
-    std::vector<MotionBlock> blocks;
-  };
-  std::vector<std::vector<OneLog>> parts(inputs.found.flights.size());
-  files::parallel_for(static_cast<int>(parts.size()), jobs, [&](int i) {
-    const auto flight = static_cast<std::size_t>(i);
-    std::vector<std::string> problems;
-    for (const Track& track : inputs.load(flight, problems)) {
-      const bool measures = track.force_source == logs::ForceSource::kAccelerometer && track.judged.z() > 0;
-      if (track.position_only || track.kind != kind || !measures) continue;
-      const double scale = modelled_accelerometer_scale(inputs.model_for(track), track.vehicle);
-      parts[flight].push_back({track.vehicle, motion_blocks(track, scale)});
-    }
-  });
-  struct Vehicle {
-    int flights = 0;
-    std::vector<MotionBlock> blocks;
-  };
-  std::map<std::string, Vehicle> vehicles;
-  for (const auto& part : parts) {
-    for (const OneLog& log : part) {
-      Vehicle& vehicle = vehicles[log.vehicle];
-      ++vehicle.flights;
-      vehicle.blocks.insert(vehicle.blocks.end(), log.blocks.begin(), log.blocks.end());
-    }
-  }
+  const auto vehicles = blocks_by_vehicle<MotionBlock>(
+      inputs, kind, jobs, [&](const Track& track) -> std::optional<std::vector<MotionBlock>> {
+        if (track.force_source != logs::ForceSource::kAccelerometer || !(track.judged.z() > 0))
+          return std::nullopt;
+        const double scale = modelled_accelerometer_scale(inputs.model_for(track), track.vehicle);
+        return motion_blocks(track, scale);
+      });
   std::vector<AccelerometerBalance> all;
   for (const auto& [name, vehicle] : vehicles) {
     if (vehicle.blocks.size() < kFewestMotionBlocks) continue;

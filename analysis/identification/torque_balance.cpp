@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "analysis/identification/mean_fit.h"
 #include "analysis/identification/rotors/rotor_balance.h"
+#include "analysis/identification/vehicle_blocks.h"
 #include "analysis/residuals/torque_blocks.h"
-#include "nn/base/parallel.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -76,32 +75,12 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
 
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
                                            int jobs) {
-  struct OneTrack {
-    std::string vehicle;
-    std::vector<TorqueBlock> blocks;
-  };
-  std::vector<std::vector<OneTrack>> parts(inputs.found.flights.size());
-  files::parallel_for(static_cast<int>(parts.size()), jobs, [&](int i) {
-    const auto flight = static_cast<std::size_t>(i);
-    std::vector<std::string> problems;
-    for (const residuals::Track& track : inputs.load(flight, problems)) {
-      if (track.position_only || track.kind != kind) continue;
-      auto blocks = residuals::torque_blocks(inputs.model_for(track), inputs.kinds, track, kTorqueBlock_s);
-      if (!blocks.empty()) parts[flight].push_back({track.vehicle, std::move(blocks)});
-    }
-  });
-  struct Vehicle {
-    int flights = 0;
-    std::vector<TorqueBlock> blocks;
-  };
-  std::map<std::string, Vehicle> vehicles;
-  for (const auto& part : parts) {
-    for (const OneTrack& track : part) {
-      Vehicle& vehicle = vehicles[track.vehicle];
-      ++vehicle.flights;
-      vehicle.blocks.insert(vehicle.blocks.end(), track.blocks.begin(), track.blocks.end());
-    }
-  }
+  const auto vehicles = blocks_by_vehicle<TorqueBlock>(
+      inputs, kind, jobs, [&](const residuals::Track& track) -> std::optional<std::vector<TorqueBlock>> {
+        auto blocks = residuals::torque_blocks(inputs.model_for(track), inputs.kinds, track, kTorqueBlock_s);
+        if (blocks.empty()) return std::nullopt;
+        return blocks;
+      });
   std::vector<TorqueBalance> all;
   for (const auto& [name, vehicle] : vehicles) {
     if (vehicle.blocks.size() < kFewestTorqueBlocks) continue;

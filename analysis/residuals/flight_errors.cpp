@@ -2,7 +2,7 @@
 
 #include "analysis/residuals/force_residual.h"
 #include "analysis/residuals/log_cache.h"
-#include "nn/base/parallel.h"
+#include "analysis/residuals/over_tracks.h"
 
 namespace swarmcert::residuals {
 
@@ -32,27 +32,18 @@ ErrorWindow ErrorOfFlight::largest() const {
 }
 
 std::vector<FlightError> flight_errors(const Inputs& inputs, int jobs) {
-  const std::size_t count = inputs.found.flights.size();
-  std::vector<std::vector<FlightError>> by_flight(count);
-  files::parallel_for(static_cast<int>(count), jobs, [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    std::vector<std::string> problems;  // compare() has told them
-    for (const Track& track : inputs.load(k, problems)) {
-      if (track.position_only || track.used == 0) continue;
-      const std::vector<Eigen::Vector3d> r =
-          force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
-      FlightError error;
-      error.path = track.path;
-      error.force = error_of(track, r);
-      if (error.force.windows.empty()) continue;
-      if (measures_velocity(*inputs.cache->log(track.path, inputs.map)))
-        error.velocity = error_of(track, velocity_error(track));
-      by_flight[k].push_back(std::move(error));
-    }
+  return over_tracks<FlightError>(inputs, jobs, [&](const Track& track, std::vector<FlightError>& errors) {
+    if (track.used == 0) return;
+    const std::vector<Eigen::Vector3d> r =
+        force_residual(inputs.model_for(track), inputs.kinds, inputs.rules, track);
+    FlightError error;
+    error.path = track.path;
+    error.force = error_of(track, r);
+    if (error.force.windows.empty()) return;
+    if (measures_velocity(*inputs.cache->log(track.path, inputs.map)))
+      error.velocity = error_of(track, velocity_error(track));
+    errors.push_back(std::move(error));
   });
-  std::vector<FlightError> result;
-  for (std::vector<FlightError>& some : by_flight) result.insert(result.end(), some.begin(), some.end());
-  return result;
 }
 
 std::optional<VelocityError> velocity_error(const std::vector<FlightError>& errors) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/base/parallel.h"
+#include "analysis/residuals/over_tracks.h"
 
 namespace swarmcert::residuals {
 namespace {
@@ -22,22 +22,13 @@ double peak_along(const Track& track, int axis) {
 }  // namespace
 
 std::vector<FlightPeak> flight_peaks(const Inputs& inputs, int jobs) {
-  const std::size_t count = inputs.found.flights.size();
-  std::vector<std::vector<FlightPeak>> by_flight(count);
-  files::parallel_for(static_cast<int>(count), jobs, [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    std::vector<std::string> problems;  // compare() has told them
-    for (const Track& track : inputs.load(k, problems)) {
-      if (track.position_only || track.used == 0) continue;
-      by_flight[k].push_back({track.flight,
-                              track.vehicle,
-                              track.path,
-                              {peak_along(track, 0), peak_along(track, 1), peak_along(track, 2)}});
-    }
+  return over_tracks<FlightPeak>(inputs, jobs, [](const Track& track, std::vector<FlightPeak>& peaks) {
+    if (track.used == 0) return;
+    peaks.push_back({track.flight,
+                     track.vehicle,
+                     track.path,
+                     {peak_along(track, 0), peak_along(track, 1), peak_along(track, 2)}});
   });
-  std::vector<FlightPeak> result;
-  for (std::vector<FlightPeak>& some : by_flight) result.insert(result.end(), some.begin(), some.end());
-  return result;
 }
 
 }  // namespace swarmcert::residuals

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/base/parallel.h"
+#include "analysis/residuals/over_tracks.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -53,22 +53,15 @@ RotorLoads loads_of(const Track& track, const stability::Model& model) {
 }  // namespace
 
 std::vector<RotorLoads> rotor_loads(const residuals::Inputs& inputs, const std::string& kind, int jobs) {
-  std::vector<std::vector<RotorLoads>> parts(inputs.found.flights.size());
-  files::parallel_for(static_cast<int>(parts.size()), jobs, [&](int i) {
-    const auto flight = static_cast<std::size_t>(i);
-    std::vector<std::string> problems;
-    for (const Track& track : inputs.load(flight, problems)) {
-      if (track.position_only || track.kind != kind) continue;
-      if (track.thrust_source != logs::ThrustSource::kDuty || !track.has_height) continue;
-      const stability::Model model = inputs.model_for(track);
-      if (model.num_rotors() != 4) continue;
-      RotorLoads loads = loads_of(track, model);
-      if (loads.records > 0) parts[flight].push_back(std::move(loads));
-    }
-  });
-  std::vector<RotorLoads> all;
-  for (auto& part : parts) all.insert(all.end(), part.begin(), part.end());
-  return all;
+  return residuals::over_tracks<RotorLoads>(
+      inputs, jobs, [&](const Track& track, std::vector<RotorLoads>& all) {
+        if (track.kind != kind || track.thrust_source != logs::ThrustSource::kDuty || !track.has_height)
+          return;
+        const stability::Model model = inputs.model_for(track);
+        if (model.num_rotors() != 4) return;
+        RotorLoads loads = loads_of(track, model);
+        if (loads.records > 0) all.push_back(std::move(loads));
+      });
 }
 
 }  // namespace swarmcert::identification

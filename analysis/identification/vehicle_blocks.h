@@ -1,0 +1,42 @@
+/// @file Blocks of flight, put together by vehicle.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/residuals/over_tracks.h"
+
+namespace swarmcert::identification {
+
+template <typename Block>
+struct VehicleBlocks {
+  int flights = 0;
+  std::vector<Block> blocks;
+};
+
+/// @param blocks_of std::optional<std::vector<Block>>(track): the blocks of a track of this kind; nothing: it does not
+///                  count.
+template <typename Block, typename BlocksOf>
+std::map<std::string, VehicleBlocks<Block>> blocks_by_vehicle(const residuals::Inputs& inputs,
+                                                              const std::string& kind, int jobs,
+                                                              const BlocksOf& blocks_of) {
+  using OfTrack = std::pair<std::string, std::vector<Block>>;
+  const std::vector<OfTrack> tracks = residuals::over_tracks<OfTrack>(
+      inputs, jobs, [&](const residuals::Track& track, std::vector<OfTrack>& all) {
+        if (track.kind != kind) return;
+        std::optional<std::vector<Block>> blocks = blocks_of(track);
+        if (blocks) all.emplace_back(track.vehicle, std::move(*blocks));
+      });
+  std::map<std::string, VehicleBlocks<Block>> vehicles;
+  for (const auto& [name, blocks] : tracks) {
+    VehicleBlocks<Block>& vehicle = vehicles[name];
+    ++vehicle.flights;
+    vehicle.blocks.insert(vehicle.blocks.end(), blocks.begin(), blocks.end());
+  }
+  return vehicles;
+}
+
+}  // namespace swarmcert::identification
