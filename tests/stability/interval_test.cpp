@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "nn/base/random.h"
 
 namespace swarmcert::stability {
@@ -54,6 +57,23 @@ TEST(Interval, OperationsContainTheResultForNumbersOfTheIntervals) {
     by_zero += contains(b, 0) ? 1 : 0;
   }
   EXPECT_GT(by_zero, 5000);
+}
+
+TEST(Interval, NeighboursOfADoubleAreThoseOfNextafter) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto check = [infinity](double x) {
+    EXPECT_EQ(up(x), std::nextafter(x, infinity)) << x;
+    EXPECT_EQ(down(x), std::nextafter(x, -infinity)) << x;
+  };
+  using Limits = std::numeric_limits<double>;
+  for (const double x : {0.0, 1.0, Limits::denorm_min(), Limits::min(), Limits::max(), infinity}) {
+    check(x);
+    check(-x);
+  }
+  files::Random random(5);
+  for (int i = 0; i < 20000; ++i)
+    check(std::ldexp(random.symmetric(), static_cast<int>(random.below(2000)) - 1000));
+  EXPECT_TRUE(std::isnan(up(Limits::quiet_NaN())) && std::isnan(down(Limits::quiet_NaN())));
 }
 
 TEST(Interval, PowersAreMultipliedOut) {

@@ -53,6 +53,7 @@ ErrorLoop error_loop(const AxisLoop& loop, double period_s, double slice_s, int 
     Polynomial numerator = stability::scaled(feedback, 1 / loop.mass_kg);
     if (result.has_lag) numerator = stability::sum(numerator, times_s_to(2 + integrates, unit));
     result.direct_rest = cells(numerator);
+    if (result.direct_rest) result.direct_rest_total = result.direct_rest->total();
   }
   if (!result.has_lag) return result;
   const Polynomial rest = stability::scaled(Polynomial(lag.begin() + 1, lag.end()), 1 / loop.mass_kg);
@@ -60,6 +61,8 @@ ErrorLoop error_loop(const AxisLoop& loop, double period_s, double slice_s, int 
   result.g1 = cells(times_s_to(integrates + 1, rest));
   result.g2 = cells(times_s_to(integrates + 2, rest));
   result.h3 = cells(times_s_to(integrates + 2, unit));
+  if (period_s > 0 && result.h3) result.h3_total = result.h3->total();
+  if (period_s > 0 && result.g2) result.g2_total = result.g2->total();
   return result;
 }
 

@@ -26,6 +26,8 @@ struct ErrorLoop {
   /// e'' is 1/m times w where there is a lag, of f_a - f_hat + m x where there is none, less this kernel's answer to
   /// it, and with a lag h''' * (f_a - f_hat + m x).
   std::optional<stability::KernelCells> direct_rest;  ///< missing where the loop is continuous
+  /// KernelCells::total() of these kernels where the loop is sampled, else 0.
+  double direct_rest_total = 0, h3_total = 0, g2_total = 0;
   bool has_lag = false;
   double mass_kg = 0;
   double Kp = 0, Kd = 0, Ki = 0;

@@ -15,13 +15,13 @@ struct AccelerationBound {
 AccelerationBound acceleration_bound(const ErrorLoop& loop, const LoopHistory& history,
                                      double planned_at_start_m_s2, double excess_N) {
   const Interval direct = Interval(1) / loop.mass_kg;
-  const Interval whole = direct + loop.direct_rest->total();
+  const Interval whole = direct + loop.direct_rest_total;
   if (!loop.has_lag) return {whole * history.force_N, whole};
   const Interval mass(loop.mass_kg);
-  const Interval per_N(loop.h3->total());
+  const Interval per_N(loop.h3_total);
   const Interval by_size = whole * mass * history.planned_m_s2;
-  const Interval by_jerk = mass * (Interval(loop.g2->total()) * history.jerk_m_s3 +
-                                   Interval(loop.g2->peak) * planned_at_start_m_s2);
+  const Interval by_jerk =
+      mass * (Interval(loop.g2_total) * history.jerk_m_s3 + Interval(loop.g2->peak) * planned_at_start_m_s2);
   return {per_N * history.force_N + std::min(by_size.hi, by_jerk.hi) + whole * history.truth_N +
               Interval(loop.lags_s) * loop.h3->peak * excess_N,
           per_N};

@@ -17,6 +17,9 @@ constexpr double kLocalBox = 1.6;
 /// More parts slice by slice, where each slice is made ready once or twice, than for one radius, where all are many
 /// times.
 constexpr int kSlicedParts = 4;
+/// How many times as wide as the tube slice by slice one radius for the whole flight may be.
+constexpr double kWidest = 4;
+constexpr double kFarthest_m = 0.5;
 
 /// The bound of a row that has better constants is at most that of a row with worse ones: a tube proved by the latter
 /// is proved by the former.
@@ -54,6 +57,10 @@ LeastTube narrowed(const LeastTube& tube, const SlicedTube& sliced, const Motion
   result.proved = true;
   result.why.clear();
   return result;
+}
+
+double largest_position_m(const Radii& radii) {
+  return std::max({radii.largest_position_m(0), radii.largest_position_m(1), radii.largest_position_m(2)});
 }
 
 class Steps {
@@ -110,9 +117,18 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
     EnclosureOptions finer = with_progress;
     finer.boxes *= kSlicedParts;
     result.sliced = sliced_tube(scene, finer, tolerance_N);
+    // What is much wider than a tube that is proved already adds nothing to it.
+    const double farthest_m = result.sliced.proved
+                                  ? std::min(kFarthest_m, kWidest * largest_position_m(result.sliced.radii()))
+                                  : kFarthest_m;
     show(2, "tube of one radius");
     Enclosure enclosure(scene, with_progress);
-    result.one_radius = least_tube(scene, enclosure);
+    result.one_radius = least_tube(scene, enclosure, farthest_m);
+  }
+  // Constants of the network prove no tube of the sampled loop where the forces themselves do not.
+  if (is_sampled && has_start && !is_cancelled() && !result.sliced.proved && !result.one_radius.proved) {
+    result.why = result.sliced.why;
+    return result;
   }
   steps.next("tubes from global constants");
   if (!has_start || is_cancelled()) {
@@ -180,6 +196,12 @@ LocalTube local_tube(const stability::TrackingSetup& stated, const stability::Mo
   if (tracking.gains.rate_hz > 0) {
     LocalTube sampled = tube_of_loop(tracking, truth, network, task, vehicles, options, true);
     if (sampled.proved || sampled.cancelled) return sampled;
+    LocalTube continuous = tube_of_loop(tracking, truth, network, task, vehicles, options, false);
+    for (stability::Assumption& a : continuous.assumptions) {
+      if (a.name.rfind("continuous position loop", 0) == 0)
+        a.note = "no tube was proved for the sampled loop (" + sampled.why + "); " + a.note;
+    }
+    return continuous;
   }
   return tube_of_loop(tracking, truth, network, task, vehicles, options, false);
 }

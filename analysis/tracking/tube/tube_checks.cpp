@@ -268,9 +268,8 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
                     scene.loops().axis[2].period_s));
   } else {
     add("continuous position loop, axes apart, first-order lags", "assumed",
-        gains.rate_hz > 0
-            ? "no tube was proved for the sampled loop; sampling and the tilt of the thrust are left out"
-            : "the gains state no rate; the tilt of the thrust is left out");
+        gains.rate_hz > 0 ? "sampling and the tilt of the thrust are left out"
+                          : "the gains state no rate; the tilt of the thrust is left out");
   }
   if (scene.truth().motor_lag_s() > 0) {
     add("motors lag as the truth says", "assumed",
