@@ -26,6 +26,11 @@ from itertools import islice
 from operator import mul
 from pathlib import Path
 
+try:
+    import parts_in_double
+except ImportError:  # without numpy
+    parts_in_double = None
+
 STATEMENT = (
     "The functions are the operations listed under chain, in that order, with the weights stored in the files named by "
     "sha256, rounded to float32 where `as` says so: linear is W x + b; of each number t, relu is the positive part, tanh "
@@ -122,6 +127,7 @@ def shifted(integer, by):
 
 # --- JSON ----------------------------------------------------------------------------------------------------------
 
+PLAIN_HEX_FLOATS = re.compile(r"(0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4} )*0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
 HEX_FLOAT = re.compile(r"-?0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,6})")
 
 
@@ -1101,6 +1107,30 @@ def tree_fails(layers, boxes, text, proves, forms=None):
     return "the tree ends early" if open_parts else ""
 
 
+def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
+    """Whether floating point with bounded errors accepts the tree, which takes seconds where fractions take hours. Needs
+    numpy; where it is absent, or in doubt, fractions decide."""
+    texts = proof["multipliers"]
+    if parts_in_double is None or not isinstance(proof["tree"], str) or not isinstance(texts, list) or not texts:
+        return False
+    if not all(isinstance(text, str) and PLAIN_HEX_FLOATS.fullmatch(text) for text in texts):
+        return False
+    rows = [list(map(float.fromhex, text.split(" "))) for text in texts]
+    neurons = sum(len(layer.biases) for layer in layers)
+    if any(len(row) != neurons or min(row) < 0 or max(row) == math.inf for row in rows):
+        return False
+    near = [[float(x) for x in row] for row in gram]
+    if not all(map(math.isfinite, (x for row in near for x in row))):
+        return False
+    error = [[float(abs(x - Fraction(y))) * (1 + 2.0 ** -50) for x, y in zip(*pair)] for pair in zip(gram, near)]
+    as_doubles = lambda row: [float(x) for x in row]
+    return parts_in_double.holds(
+        [([as_doubles(row) for row in layer.weights], as_doubles(layer.biases), layer.without_relu) for layer in layers],
+        [(as_doubles(low), as_doubles(high)) for low, high in boxes], proof["tree"],
+        (parts_in_double.np.array(near), parts_in_double.np.array(error)), moving, as_doubles(weight), rho,
+        parts_in_double.np.array(rows))
+
+
 def evaluate(weights, values, exponent):
     """The network at integers times 2^exponent; exact."""
     for k, layer in enumerate(weights.layers):
@@ -1436,6 +1466,8 @@ class Checker:
             boxes = [self.box_of(names[0], where)]
         require(2.0 ** -400 <= rho <= 2.0 ** 400, f"{where}: rho is out of range")
         require(all(2.0 ** -200 <= w <= 2.0 ** 200 for w in weight), f"{where}: scale is out of range")
+        if not coupled and "conflicts" not in proof and proves_in_double(hidden, boxes, proof, gram, moving, weight, rho):
+            return
         multipliers = []
         for text in listed(proof["multipliers"]):
             multipliers.append([Fraction(x) for x in hex_floats([w for w in re.split("[ \t\n\v\f\r]+", text) if w])])
