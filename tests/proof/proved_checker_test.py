@@ -79,6 +79,8 @@ def kinds(folder, generator):
     line.write_bytes(common.safetensors([3, 2], generator))
     cube = folder / "cube.safetensors"
     cube.write_bytes(common.safetensors([3, 8, 8, 2], generator))
+    deep = folder / "deep.safetensors"  # more than 64 neurons
+    deep.write_bytes(common.safetensors([3, 22, 22, 22, 2], generator))
     (folder / "cube.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, -1]\nupper = [1, 1, 1]\n')
     ordered = [square, "--order", "first,after,last"]
     samples = folder / "square.json"
@@ -94,6 +96,7 @@ def kinds(folder, generator):
     return [
         ("plain", [tiny], [], 0.16),
         ("one layer", [line], ["--blocks"], 0.2),
+        ("factors left out", [deep], [], 0.01),
         ("order and samples", ordered, ["--samples", samples], 0.2),
         ("kinds, blocks, laws, scale", hetero, ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"], 0.05),
         ("float32 and products", hetero, ["--as", "float32", "--neighbours", "2", "--method", "product"], 0.1),

@@ -34,15 +34,16 @@ let factorised rows first shift =
   done;
   if !works then Some r else None
 
-(* Candidates for a factor of P, the closest first. Row i of P begins on the diagonal. *)
+(* Candidates for a factor of P, the closest first. Row i of P begins on the diagonal; zeros follow its end. *)
 let factors (p : Proved.dyadic list list) : Proved.factor Seq.t =
   let p = Array.of_list (List.map Array.of_list p) in
   let n = Array.length p in
-  let scales = Array.init n (fun i -> scale p.(i).(0)) in
-  let entry i j = to_float (fst p.(j).(i - j), Z.add (snd p.(j).(i - j)) (Z.of_int (scales.(i) + scales.(j)))) in
+  let at i j = if i - j < Array.length p.(j) then p.(j).(i - j) else Exact.zero in
+  let scales = Array.init n (fun i -> scale (at i i)) in
+  let entry i j = let m, e = at i j in to_float (m, Z.add e (Z.of_int (scales.(i) + scales.(j)))) in
   let first = Array.init n (fun i ->
       let j = ref 0 in
-      while !j < i && Z.sign (fst p.(!j).(i - !j)) = 0 do incr j done; !j) in
+      while !j < i && Z.sign (fst (at i !j)) = 0 do incr j done; !j) in
   let rows = Array.init n (fun i -> Array.init (i + 1 - first.(i)) (fun k -> entry i (first.(i) + k))) in
   let widest = Array.fold_left (fun most row ->
       Float.max most (2. *. Array.fold_left (fun sum x -> sum +. Float.abs x) 0. row)) 0. rows in
