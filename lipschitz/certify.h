@@ -53,7 +53,7 @@ struct CertifiedLayer {
 
 struct CertifiedBound : Claim {
   bool is_relu = true;      ///< otherwise there are no witness and no branch and bound
-  bool has_program = true;  ///< false where an activation is not monotone: the product only
+  bool is_monotone = true;  ///< otherwise the layer-wise bound is that of the product
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
   std::optional<UpperProof> proof;  ///< where method is kSdp
@@ -103,10 +103,10 @@ std::vector<Verdict> respects_gamma(const files::GammaStatement& gamma, const st
 
 /// Certifies NET as a whole. Upper bounds hold in exact arithmetic for the weights as stored, over all inputs and so
 /// over every box; lower bounds are exact slopes between two float32 points. The clamp of NET, which never increases
-/// a distance, leaves the upper bounds valid. Functions with another activation than ReLU, and set
-/// functions where any phi has one, get upper bounds only; where the activation is monotone, by the same matrix
-/// inequality (checker/stages.h). Branch and bound runs on what the clamp lets through of the box, or on a projective
-/// cover of all inputs where there is no box.
+/// a distance, leaves the upper bounds valid. Functions with another activation than ReLU, and set functions where any
+/// phi has one, get upper bounds only: by the same matrix inequality where the activation is monotone
+/// (checker/stages.h), else, up to the size that bent_bound.h states, by its extension. Branch and bound runs on what
+/// the clamp lets through of the box, or on a projective cover of all inputs where there is no box.
 /// @throws std::invalid_argument if gamma is not positive, if there is a domain or branch and bound is asked for and an
 ///   activation is not ReLU, or as claims() and law_claims().
 Certification certify(const files::Network& network, const CertifyOptions& options);

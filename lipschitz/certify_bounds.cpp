@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lipschitz/bent_bound.h"
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/eclipse_fast.h"
 #include "lipschitz/range.h"
@@ -23,7 +24,7 @@ std::string called(const CertifiedBound& bound) {
 }
 
 bool has_program(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method != UpperMethod::kProduct && bound.neighbours.empty() && bound.has_program;
+  return options.method != UpperMethod::kProduct && bound.neighbours.empty();
 }
 
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {
@@ -49,10 +50,12 @@ void bound_layer_by_layer(const Network& network, CertifiedBound& bound) {
 
 void solve_program(const Network& network, const CertifyOptions& options, const Stop& stop,
                    CertifiedBound& bound) {
+  const check::BentChain chain = check::bent_chain(network, bound.function, bound.block, bound.scale);
   bound.sdp =
-      sdp_bound(check::stages(network, bound.function, bound.block, bound.scale), {stop, bound.upper});
+      chain.is_bent() ? bent_bound(chain, {stop, bound.upper}) : sdp_bound(chain.stages, {stop, bound.upper});
   if (!bound.sdp.proof) return;
-  const bool is_wanted = options.method == UpperMethod::kSdp && !is_interrupted(bound.sdp.stop);
+  const bool is_wanted =
+      options.method == UpperMethod::kSdp && !is_interrupted(bound.sdp.stop) && !chain.is_bent();
   if (!is_wanted && !(bound.sdp.proof->upper.value() < bound.upper.value())) return;
   bound.upper = bound.sdp.proof->upper;
   bound.method = UpperMethod::kSdp;
@@ -152,7 +155,7 @@ void find_bounds(const Network& network, const CertifyOptions& options, const St
   files::parallel_for(count, options.jobs, [&](int i) {
     CertifiedBound& bound = bounds[static_cast<std::size_t>(i)];
     progress.run("layer-wise bound of " + called(bound), [&] {
-      if (has_program(options, bound)) bound_layer_by_layer(network, bound);
+      if (has_program(options, bound) && bound.is_monotone) bound_layer_by_layer(network, bound);
     });
   });
 

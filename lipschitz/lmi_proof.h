@@ -28,6 +28,8 @@ inline constexpr std::size_t kMostFactorRows = 64;
 /// margin for rounding. `upper` is the smallest double whose square is at least rho.
 std::optional<UpperProof> prove(const std::vector<check::Matrix>& stages, double rho,
                                 const std::vector<double>& t);
+/// The same for functions of other slopes between the stages, through its lipschitz_lmi().
+std::optional<UpperProof> prove(const check::BentChain& chain, double rho, const std::vector<double>& t);
 
 using check::to_double;
 

@@ -21,12 +21,11 @@ void check_status(const files::Json& entry, const std::string& where) {
 }
 
 /// Shows that sqrt(rho) <= `upper` bounds the chain's Lipschitz constant.
-void check_upper(const std::vector<Matrix>& chain, const files::Json& proof, double upper,
-                 const std::string& where) {
+void check_upper(const BentChain& chain, const files::Json& proof, double upper, const std::string& where) {
   files::require_keys(proof, {"rho", "t", "factor"}, where + ".proof");
   const Dyadic rho = files::parse_hex_float(proof["rho"].get<std::string>());
   const std::vector<double> t = files::parse_hex_floats(proof["t"]);
-  require(t.size() == hidden_neurons(chain), where + ": needs one multiplier t per hidden neuron");
+  require(t.size() == hidden_neurons(chain.stages), where + ": needs one multiplier t per hidden neuron");
   require(rho.sign() > 0 && std::all_of(t.begin(), t.end(), [](double x) { return x >= 0; }),
           where + ": rho is not positive, or a t negative");
   require(Dyadic(upper) * upper >= rho, where + ": claims less than sqrt(rho)");
@@ -145,7 +144,7 @@ void CertificateChecker::check_layer(const Json& entry, const std::string& netwo
   require(v.rows == w.cols && squared_norm(v).sign() > 0, where + ": unusable lower_vector");
   require(squared_norm(product(w, v)) >= Dyadic(lower) * lower * squared_norm(v),
           where + ": claims more than |W v| / |v|");
-  check_upper({w}, entry["proof"]["upper"], upper, where);
+  check_upper({{w}, {}}, entry["proof"]["upper"], upper, where);
   norms_[network] = norms_.emplace(network, 1.0).first->second * upper;
   ++spectral_norms_;
 }
@@ -177,7 +176,7 @@ void CertificateChecker::check_bound(const Json& bound) {
   check_activations(bound, names, where);
   files::block_coordinates(network_, function, block);  // refuses what is no block of the function
   if (bound["upper_method"] == "sdp" || bound["upper_method"] == "eclipse_fast") {
-    check_upper(stages(network_, function, block, scale), bound["proof"], upper, where);
+    check_upper(bent_chain(network_, function, block, scale), bound["proof"], upper, where);
   } else if (bound["upper_method"] == "branch") {
     check_local(bound, upper, scale, where);
   } else {
@@ -222,8 +221,6 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
             where + ": a bound on a box" + with);
     require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
             where + ": a lower bound" + with);
-    require(function.is_monotone() || bound["upper_method"] == "product",
-            where + ": a matrix inequality" + with + ", which is not monotone");
   }
 }
 

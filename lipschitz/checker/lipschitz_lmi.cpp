@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 
 #include "lipschitz/checker/integer_rows.h"
 #include "lipschitz/checker/proposed_factor.h"
@@ -163,6 +164,32 @@ Matrix quadratic_lmi(const std::vector<Matrix>& stages, const Matrix& q, const s
   const Matrix last_gram = row_gram(transposed(stages.back()));
   for (int i = 0; i < last_gram.rows; ++i) {
     for (int j = 0; j < last_gram.cols; ++j) p(before + i, before + j) += -last_gram(i, j);
+  }
+  return p;
+}
+
+bool BentChain::is_bent() const {
+  return std::any_of(bends.begin(), bends.end(), [](const Dyadic& g) { return g.sign() > 0; });
+}
+
+SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& t) {
+  if (chain.bends.size() + 1 != chain.stages.size())
+    throw std::invalid_argument("lipschitz_lmi: there is not one bend per hidden layer");
+  if (!chain.is_bent()) return lipschitz_lmi(chain.stages, rho, t);
+  Matrix q(chain.stages.front().cols, chain.stages.front().cols);
+  for (int i = 0; i < q.rows; ++i) q(i, i) = rho;
+  Matrix p = quadratic_lmi(chain.stages, q, t);
+  int before = 0, next = 0;  // index of the first variable that enters stage k, and of its first neuron
+  for (std::size_t k = 0; k < chain.bends.size(); ++k) {
+    const Matrix& m = chain.stages[k];
+    Matrix weighted = m;  // 2 g T M
+    for (int i = 0; i < m.rows; ++i)
+      for (int j = 0; j < m.cols; ++j) weighted(i, j) = Dyadic(2.0) * chain.bends[k] * t[next + i] * m(i, j);
+    const Matrix bend = product(transposed(m), weighted);
+    for (int i = 0; i < m.cols; ++i)
+      for (int j = 0; j < m.cols; ++j) p(before + i, before + j) += -bend(i, j);
+    before += m.cols;
+    next += m.rows;
   }
   return p;
 }

@@ -66,6 +66,21 @@ std::size_t hidden_neurons(const std::vector<Matrix>& stages);
 SymmetricMatrix lipschitz_lmi(const std::vector<Matrix>& stages, const Dyadic& rho,
                               const std::vector<Dyadic>& t);
 
+/// M_1 .. M_K with what lies between them: per hidden layer g >= 0, which is zero for functions of slopes in [0, 1] and
+/// c (c - 1) for those of slopes in [1 - c, c], as SiLU and GELU have.
+struct BentChain {
+  std::vector<Matrix> stages;
+  std::vector<Dyadic> bends;
+
+  bool is_bent() const;  ///< whether a g is positive
+};
+
+/// lipschitz_lmi() of such a chain. Slopes in [1 - c, c] give (dz - (1 - c) dy) (c dy - dz) =
+/// dz (dy - dz) + g dy^2 >= 0 for each neuron. Where a g is positive, nothing is minimised out, and the matrix over
+/// (dx, dz_1, ..., dz_{K-1}) is quadratic_lmi() with Q = rho I, less 2 g_k M_k' T_k M_k in the block (k - 1, k - 1).
+/// @throws std::invalid_argument if there is not one g per hidden layer.
+SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& t);
+
 /// The symmetric matrix whose positive semidefiniteness proves |g(v) - g(w)|^2 <= (v - w)' Q (v - w) for the same kind
 /// of chain g: the form above with Q in place of rho I, over (dv, dz_1, ..., dz_{K-1}), nothing minimised out. Blocks:
 ///   (0, 0) Q,  (k, k) 2 T_k,  (k, k - 1) - T_k M_k,  and - M_K' M_K in the last one.

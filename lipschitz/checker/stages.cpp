@@ -21,18 +21,31 @@ Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const s
   return result;
 }
 
-/// Slopes of the activation lie between 0 and this.
-double greatest_slope(const files::Weights& weights) {
-  const files::ActivationFunction& function = files::function_of(weights.activation);
-  if (!function.is_monotone())
-    throw std::domain_error(std::string(function.words) + " is not monotone: there is no matrix inequality");
-  return function.greatest_slope;
+/// What an activation is divided by, and g of BentChain for the quotient, whose slopes lie in [0, 1] or [1 - c, c].
+struct Unit {
+  Dyadic slope, bend;
+};
+
+Unit unit_of(const files::ActivationFunction& function) {
+  if (function.is_monotone()) return {function.greatest_slope, {}};
+  const Dyadic c = function.greatest_slope;
+  if (function.least_slope != 1 - function.greatest_slope)
+    throw std::logic_error(std::string(function.op) + ": slopes that do not add up to 1");
+  return {1.0, c * (c + -Dyadic(1.0))};
 }
 
 }  // namespace
 
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block, const std::vector<double>& scale) {
+  BentChain chain = bent_chain(network, function, block, scale);
+  if (chain.is_bent())
+    throw std::domain_error(function + " has activations that are not monotone: slopes are not in [0, b]");
+  return std::move(chain.stages);
+}
+
+BentChain bent_chain(const files::Network& network, const std::string& function, const std::string& block,
+                     const std::vector<double>& scale) {
   const std::map<std::string, const files::Weights*> parts = files::parts(network);
   const std::vector<std::string> names = files::networks_of(function);
   const std::vector<int> coordinates = files::block_coordinates(network, function, block);
@@ -41,14 +54,16 @@ std::vector<Matrix> stages(const files::Network& network, const std::string& fun
     throw std::invalid_argument("scale has " + std::to_string(scale.size()) + " numbers, " + function +
                                 " has " + std::to_string(inputs) + " inputs");
   }
-  std::vector<Matrix> chain;
+  BentChain result;
+  std::vector<Matrix>& chain = result.stages;
   for (const std::string& name : names) {
-    const Dyadic slope = greatest_slope(*parts.at(name));
+    const Unit unit = unit_of(files::function_of(parts.at(name)->activation));
+    result.bends.insert(result.bends.end(), parts.at(name)->layers.size() - 1, unit.bend);
     bool joins = true;  // the first layer acts on the selected inputs, and that of rho on the last of phi
     for (const files::Layer& layer : parts.at(name)->layers) {
       Matrix w(layer.outputs, layer.inputs, layer.weights);
       for (Dyadic& entry : w.entries)
-        if (!joins) entry = entry * slope;
+        if (!joins) entry = entry * unit.slope;
       if (chain.empty()) {
         chain.push_back(selected_columns(w, coordinates, scale));
       } else if (joins) {
@@ -59,7 +74,7 @@ std::vector<Matrix> stages(const files::Network& network, const std::string& fun
       joins = false;
     }
   }
-  return chain;
+  return result;
 }
 
 namespace {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lipschitz/checker/dyadic.h"
+#include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/tree_proof.h"
 #include "nn/weights/network.h"
 
@@ -15,10 +16,16 @@ namespace swarmcert::check {
 /// phi and the first of rho, which no activation separates, are one stage: their product.
 /// An activation s of slopes in [0, b] is b times one of slopes in [0, 1]: the stage behind it is multiplied by b. ReLU
 /// has b = 1.
-/// @throws std::domain_error if an activation of `function` is not monotone; std::out_of_range or std::invalid_argument
-///   if NET has no such function or block, or `scale` has not one number per input.
+/// @throws std::domain_error if an activation of `function` is not monotone: see bent_chain(); std::out_of_range or
+///   std::invalid_argument if NET has no such function or block, or `scale` has not one number per input.
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});
+
+/// The same for any activations, with the bend of each hidden layer. Functions of slopes in [1 - c, c], 1 < c, are not
+/// divided by their largest slope.
+/// @throws as stages(), but for monotony.
+BentChain bent_chain(const files::Network& network, const std::string& function,
+                     const std::string& block = "all", const std::vector<double>& scale = {});
 
 /// "network" or "phi:<kind>" in front of |.|^2, or of the form Q, exactly, as a proof on a box sees it.
 /// @param q [outputs x outputs]; no rows: the identity.

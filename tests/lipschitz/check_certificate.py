@@ -53,7 +53,7 @@ STATEMENT = (
 
 
 # What lies between layers, by the name that a chain gives it: its slopes are in [0, steepest] where it is monotone,
-# else in [-steepest, steepest].
+# else in [1 - steepest, steepest], because s(t) - t / 2 is even.
 MONOTONE = {"relu": Fraction(1), "tanh": Fraction(1), "sigmoid": Fraction(1, 4), "softplus": Fraction(1), "elu": Fraction(1),
             # at least 1.0507009873554805 * 1.6732632423543772
             "selu": Fraction(0x1c212cc640f031, 2 ** 52)}
@@ -636,7 +636,7 @@ def unit_of(network, function, block):
 
 def stages(network, function, block, scale):
     """The matrices between the activations, from the block's inputs in units of their scale to the output. An activation
-    of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it."""
+    of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it. Others stay as they are."""
     names = networks_of(function)
     require(all(name in network.parts for name in names), f"there is no {function}")
     inputs = network.parts[names[0]].layers[0].inputs
@@ -652,7 +652,7 @@ def stages(network, function, block, scale):
             if index == 0:
                 chain[-1] = w @ chain[-1]
             else:
-                b = MONOTONE[network.parts[name].activation]
+                b = MONOTONE.get(network.parts[name].activation, Fraction(1))
                 chain.append(Matrix([[x * b.numerator for x in row] for row in w.rows],
                                     w.exponent + 1 - b.denominator.bit_length()))
     return chain
@@ -695,6 +695,34 @@ def lmi(chain, rho, t):
         for j, x in enumerate(row):
             p[before + i][before + j] -= shifted(rho_integer * x, exponents[2] - exponent)
     return Matrix(p, exponent)
+
+
+def bends(network, function):
+    """Per hidden layer c (c - 1) where slopes lie in [1 - c, c], c > 1; 0 where stages() makes them lie in [0, 1]."""
+    return [0 if op in MONOTONE else STEEPEST[op] * (STEEPEST[op] - 1)
+            for part in (network.parts[name] for name in networks_of(function))
+            for op in [part.activation or "relu"] * (len(part.layers) - 1)]
+
+
+def bent_lmi(chain, gs, rho, t):
+    """The matrix over (dx, dz) of rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i (dz_i (dy_i - dz_i) + g_i dy_i^2) >= 0: each
+    square (row m_i of a stage times what enters) gives - 2 t_i g_i m_i' m_i."""
+    (integer,), exponent = dyadics([rho])
+    inputs = range(len(chain[0].rows[0]))
+    p = quadratic_lmi(chain, Matrix([[integer * (i == j) for j in inputs] for i in inputs], exponent), t)
+    before, neuron = 0, 0
+    for m, g in zip(chain, gs):
+        width = len(m.rows[0])
+        if g:
+            weights, exponent = dyadics([-2 * g * Fraction(t[neuron + i]) for i in range(len(m.rows))])
+            square = m.transposed() @ Matrix([[w * x for x in row] for w, row in zip(weights, m.rows)], m.exponent + exponent)
+            common = min(square.exponent, p.exponent)
+            p = Matrix([[shifted(x, p.exponent - common) for x in row] for row in p.rows], common)
+            for i in range(width):
+                for j in range(width):
+                    p.rows[before + i][before + j] += shifted(square.rows[i][j], square.exponent - common)
+        before, neuron = before + width, neuron + len(m.rows)
+    return p
 
 
 def parse_factor(factor, where):
@@ -1298,13 +1326,13 @@ class Checker:
         self.check_upper([w], entry["proof"]["upper"], upper, where)
         self.norms[name] = self.norms.get(name, 1) * Fraction(upper)
 
-    def check_upper(self, chain, proof, upper, where):
+    def check_upper(self, chain, proof, upper, where, gs=()):
         require_keys(proof, ["rho", "t", "factor"], where)
         rho, t, factor = hex_float(proof["rho"]), hex_floats(proof["t"]), proof["factor"]
         require(rho > 0 and all(x >= 0 for x in t), f"{where}: rho is not positive, or a t negative")
         require(len(t) == sum(len(m.rows) for m in chain[:-1]), f"{where}: needs one t per hidden neuron")
         require(Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
-        require(shows_or_finds(lmi(chain, rho, t), parse_factor(factor, where)),
+        require(shows_or_finds(bent_lmi(chain, gs, rho, t) if any(gs) else lmi(chain, rho, t), parse_factor(factor, where)),
                 f"{where}: the factor does not show that the matrix inequality holds")
 
     def check_bound(self, bound):
@@ -1332,10 +1360,9 @@ class Checker:
             require(not boxed and bound["upper_method"] != "branch", f"{where}: a bound on a box is for ReLU only")
             require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
                     f"{where}: a lower bound is for ReLU only")
-            require(bound["upper_method"] == "product" or all(a in MONOTONE for a in activations),
-                    f"{where}: a matrix inequality is for monotone activations only")
         if bound["upper_method"] in ("sdp", "eclipse_fast"):
-            self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where)
+            self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where,
+                             bends(self.network, function))
         elif bound["upper_method"] == "branch":
             self.check_local(bound, upper, scale, where)
         else:

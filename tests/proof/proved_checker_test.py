@@ -108,6 +108,7 @@ def kinds(folder, generator):
         ("pair and parts of a box", pair, ["--method", "branch", "--domain", folder / "part.toml"], 0.02),
         ("tanh", [tiny], ["--activation", "tanh"], 0.05),
         ("silu", [tiny], ["--activation", "silu", "--blocks"], 0.05),
+        ("gelu, factors left out", [deep], ["--activation", "gelu"], 0.01),
         ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"], 0.03),
         ("cover by parts", [tiny], parts, 0.03),
         ("pair and cover by parts", pair, parts, 0.02),

@@ -481,6 +481,16 @@ let scale mul1 a u =
 let scale_all mul1 a m =
   map (scale mul1 a) m
 
+(** val times : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list -> 'a1 list **)
+
+let rec times mul1 u v =
+  match u with
+  | [] -> []
+  | a :: u' ->
+    (match v with
+     | [] -> []
+     | b :: v' -> (mul1 a b) :: (times mul1 u' v'))
+
 (** val scale_rows :
     ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list list -> 'a1 list list **)
 
@@ -582,6 +592,43 @@ type activation =
 | Selu
 | Silu
 | Gelu
+
+(** val weighted_gram :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
+    list -> 'a1 list list **)
+
+let rec weighted_gram zero0 add1 mul1 s m = match m with
+| [] -> []
+| row :: m' ->
+  (map (dot zero0 add1 mul1 (times mul1 s row)) m) :: (weighted_gram zero0
+                                                        add1 mul1 s m')
+
+type 't bent_layer = ('t * 't list) * 't list list
+
+(** val bends :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1
+    bent_layer list -> 'a1 list list **)
+
+let rec bends zero0 add1 mul1 n = function
+| [] -> []
+| b :: hidden' ->
+  let (p, m) = b in
+  let (g, t) = p in
+  app (weighted_gram zero0 add1 mul1 (scale mul1 g t) (columns zero0 n m))
+    (bends zero0 add1 mul1 (length t) hidden')
+
+(** val unbent : 'a1 bent_layer list -> ('a1 list * 'a1 list list) list **)
+
+let unbent hidden0 =
+  map (fun k -> ((snd (fst k)), (snd k))) hidden0
+
+(** val bent_lmi :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 ->
+    'a1 list -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list **)
+
+let bent_lmi zero0 add1 mul1 two minus_one minus_two t hidden0 last0 =
+  sum add1 (band zero0 add1 mul1 two minus_one t (unbent hidden0) last0)
+    (scale_all mul1 minus_two (bends zero0 add1 mul1 (length t) hidden0))
 
 (** val dotZ : Big.t list -> Big.t list -> Big.t **)
 
@@ -769,20 +816,31 @@ let neurons ms =
 let inputs hidden0 last0 =
   length (hd [] (hd last0 hidden0))
 
-(** val matrix_inequality :
-    matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD **)
+(** val is_zero : dyadic -> bool **)
 
-let matrix_inequality hidden0 last0 rho t =
-  match hidden0 with
-  | [] ->
-    let n = length (hd [] last0) in
-    norm_inequality rho
-      (if (<=) (length last0) n then last0 else columns zero n last0)
-  | first0 :: later ->
-    lmi zero add0 mul0 ((Big.neg Big.one), Big.zero)
-      (mul0 (((fun p -> p) Big.one), ((fun p -> p) Big.one)) rho) (neg rho)
-      (firstn (length first0) t) first0
-      (combine (split (skipn (length first0) t) later) later) last0
+let is_zero x =
+  Big.equal (fst x) Big.zero
+
+(** val matrix_inequality :
+    dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD **)
+
+let matrix_inequality gs hidden0 last0 rho t =
+  if forallb is_zero gs
+  then (match hidden0 with
+        | [] ->
+          let n = length (hd [] last0) in
+          norm_inequality rho
+            (if (<=) (length last0) n then last0 else columns zero n last0)
+        | first0 :: later ->
+          lmi zero add0 mul0 ((Big.neg Big.one), Big.zero)
+            (mul0 (((fun p -> p) Big.one), ((fun p -> p) Big.one)) rho)
+            (neg rho) (firstn (length first0) t) first0
+            (combine (split (skipn (length first0) t) later) later) last0)
+  else bent_lmi zero add0 mul0 (((fun p -> p) Big.one), ((fun p -> p)
+         Big.one)) ((Big.neg Big.one), Big.zero) ((Big.neg Big.one),
+         ((fun p -> p) Big.one))
+         (repeat (shift (Big.neg Big.one) rho) (inputs hidden0 last0))
+         (combine (combine gs (split t hidden0)) hidden0) last0
 
 (** val shapes : int -> matrixD list -> matrixD -> bool **)
 
@@ -794,10 +852,10 @@ let rec shapes n hidden0 last0 =
       (shapes (length m) hidden' last0)
 
 (** val check :
-    matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list -> factor ->
-    bool **)
+    dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list
+    -> factor -> bool **)
 
-let check hidden0 last0 upper rho t f =
+let check gs hidden0 last0 upper rho t f =
   (&&) (shapes (inputs hidden0 last0) hidden0 last0)
     ((&&)
       ((&&)
@@ -807,7 +865,7 @@ let check hidden0 last0 upper rho t f =
               (forallb is_nonnegative t)) (is_positive rho))
           (is_nonnegative upper))
         (is_nonnegative (add0 (mul0 upper upper) (neg rho))))
-      (shows_nonnegative (matrix_inequality hidden0 last0 rho t) f))
+      (shows_nonnegative (matrix_inequality gs hidden0 last0 rho t) f))
 
 type stack = matrixD list * matrixD
 
@@ -948,6 +1006,18 @@ let is_relu = function
 | Relu -> true
 | _ -> false
 
+(** val unit_of : activation -> dyadic **)
+
+let unit_of a =
+  if is_rising a then steepest a else one
+
+(** val bend_of : activation -> dyadic **)
+
+let bend_of a =
+  if is_rising a
+  then zero
+  else mul0 (steepest a) (add0 (steepest a) (neg one))
+
 (** val set_stages :
     matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD
     list * matrixD **)
@@ -963,11 +1033,12 @@ let outputs hidden0 n =
   length (last hidden0 (repeat [] n))
 
 (** val check_parts :
-    stack -> stack list -> dyadic -> dyadic -> dyadic list -> factor -> bool **)
+    dyadic list -> stack -> stack list -> dyadic -> dyadic -> dyadic list ->
+    factor -> bool **)
 
-let rec check_parts p ps upper r t f =
+let rec check_parts gs p ps upper r t f =
   match ps with
-  | [] -> check (fst p) (snd p) upper r t f
+  | [] -> check gs (fst p) (snd p) upper r t f
   | q :: ps' ->
     let joined = set_stages (fst p) (snd p) (fst q) (snd q) in
     let n = inputs (fst p) (snd p) in
@@ -978,7 +1049,7 @@ let rec check_parts p ps upper r t f =
             ((=) (inputs (fst joined) (snd joined)) n))
           (shapes n (fst p) (snd p)))
         (shapes (length (snd p)) (fst q) (snd q)))
-      (check_parts joined ps' upper r t f)
+      (check_parts gs joined ps' upper r t f)
 
 (** val count : bool list -> int **)
 
@@ -1916,13 +1987,13 @@ let matrices p =
   match p.hidden with
   | [] -> ([], (fst p.outer))
   | first0 :: later ->
-    let scaled = fun l -> scale_all mul0 (steepest p.between) (fst l) in
+    let scaled = fun l -> scale_all mul0 (unit_of p.between) (fst l) in
     (((fst first0) :: (map scaled later)), (scaled p.outer))
 
-(** val rising : part -> bool **)
+(** val bends_of : part -> dyadic list **)
 
-let rising p =
-  is_rising p.between
+let bends_of p =
+  map (fun _ -> bend_of p.between) p.hidden
 
 (** val relu_between : part -> bool **)
 
@@ -1953,12 +2024,9 @@ let well_formed ps f moves scale0 =
     dyadic list -> factor -> bool **)
 
 let check_slope ps f moves scale0 u rho t factor0 =
-  (&&)
-    ((&&)
-      ((&&) (well_formed ps f moves scale0) (forallb rising (parts_of ps f)))
-      (is_nonnegative u))
-    (check_parts ([], (selector moves scale0)) (map matrices (parts_of ps f))
-      u rho t factor0)
+  (&&) ((&&) (well_formed ps f moves scale0) (is_nonnegative u))
+    (check_parts (flat_map bends_of (parts_of ps f)) ([],
+      (selector moves scale0)) (map matrices (parts_of ps f)) u rho t factor0)
 
 (** val find_norm : claim list -> int -> int -> dyadic option **)
 
@@ -2458,7 +2526,8 @@ let check_claim ps accepted c p =
   match c with
   | Norm_at_most (p0, layer, u) ->
     (match p with
-     | By_inequality (rho, t, f) -> check [] (matrix_at ps p0 layer) u rho t f
+     | By_inequality (rho, t, f) ->
+       check [] [] (matrix_at ps p0 layer) u rho t f
      | _ -> false)
   | Norm_at_least (p0, layer, l) ->
     (match p with

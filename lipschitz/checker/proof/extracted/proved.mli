@@ -112,6 +112,8 @@ val scale : ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list -> 'a1 list
 
 val scale_all : ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 list list -> 'a1 list list
 
+val times : ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list -> 'a1 list
+
 val scale_rows :
   ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list list -> 'a1 list list
 
@@ -150,6 +152,22 @@ type activation =
 | Selu
 | Silu
 | Gelu
+
+val weighted_gram :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
+  list -> 'a1 list list
+
+type 't bent_layer = ('t * 't list) * 't list list
+
+val bends :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1 bent_layer
+  list -> 'a1 list list
+
+val unbent : 'a1 bent_layer list -> ('a1 list * 'a1 list list) list
+
+val bent_lmi :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 ->
+  'a1 list -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list
 
 val dotZ : Big.t list -> Big.t list -> Big.t
 
@@ -209,13 +227,16 @@ val neurons : matrixD list -> int
 
 val inputs : matrixD list -> matrixD -> int
 
+val is_zero : dyadic -> bool
+
 val matrix_inequality :
-  matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD
+  dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic list -> matrixD
 
 val shapes : int -> matrixD list -> matrixD -> bool
 
 val check :
-  matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list -> factor -> bool
+  dyadic list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic list
+  -> factor -> bool
 
 type stack = matrixD list * matrixD
 
@@ -266,13 +287,18 @@ val is_rising : activation -> bool
 
 val is_relu : activation -> bool
 
+val unit_of : activation -> dyadic
+
+val bend_of : activation -> dyadic
+
 val set_stages :
   matrixD list -> matrixD -> matrixD list -> matrixD -> matrixD list * matrixD
 
 val outputs : matrixD list -> int -> int
 
 val check_parts :
-  stack -> stack list -> dyadic -> dyadic -> dyadic list -> factor -> bool
+  dyadic list -> stack -> stack list -> dyadic -> dyadic -> dyadic list ->
+  factor -> bool
 
 val count : bool list -> int
 
@@ -507,7 +533,7 @@ val fits_part : part -> bool
 
 val matrices : part -> stack
 
-val rising : part -> bool
+val bends_of : part -> dyadic list
 
 val relu_between : part -> bool
 

@@ -39,13 +39,15 @@ let prove_unwritten state claim proof reason = match Proved.step state.parts sta
 
 let prove state claim proof reason = prove_by state claim (Seq.return proof) reason
 
-(* The chain of matrices that a bound is about. *)
+(* The chain of matrices that a bound is about, with what is known of the functions between them. *)
 let stages state claim = match claim with
-  | Proved.Norm_at_most (p, k, _) -> [], Proved.matrix_at state.parts p k
+  | Proved.Norm_at_most (p, k, _) -> [], ([], Proved.matrix_at state.parts p k)
   | Slope_at_most (f, moves, scale, _) ->
+    let parts = Proved.parts_of state.parts f in
+    List.concat_map Proved.bends_of parts,
     List.fold_left (fun (hidden, last) part ->
         let w, v = Proved.matrices part in Proved.set_stages hidden last w v)
-      ([], Proved.selector moves scale) (Proved.parts_of state.parts f)
+      ([], Proved.selector moves scale) parts
   | _ -> assert false
 
 let not_checked state what = state.not_checked <- what :: state.not_checked
@@ -72,8 +74,8 @@ let inequality state claim where ~neurons ~upper json =
   let by factor = Proved.By_inequality (rho, t, factor) in
   match find here "factor" json with
   | Null ->
-    let hidden, last = stages state claim in
-    Seq.map by (Proposal.factors (Proved.matrix_inequality hidden last rho t))
+    let bends, (hidden, last) = stages state claim in
+    Seq.map by (Proposal.factors (Proved.matrix_inequality bends hidden last rho t))
   | factor -> Seq.return (by (Exact.factor (where ^ ".factor") factor))
 
 let no_factor where = where ^ ": the factor does not show that the matrix inequality holds"
@@ -179,9 +181,7 @@ let check_activations state where bound names =
         let by method_ = find where "upper_method" bound = Text method_ in
         require (find where "domain" bound = Text "global" && not (by "branch")) "%s: a bound on a box%s" where of_;
         require (List.for_all (fun key -> find where key bound = Null) [ "lower"; "lower_hex"; "lower_witness" ])
-          "%s: a lower bound%s" where of_;
-        require (Proved.is_rising activation || by "product")
-          "%s: a matrix inequality%s, which is not monotone" where of_
+          "%s: a lower bound%s" where of_
       end) names
 
 let check_bound state bound =

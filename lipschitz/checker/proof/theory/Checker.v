@@ -1,6 +1,6 @@
 (** The executable checker over dyadic numbers, and what its acceptance means. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
-From Swarmcert Require Import Algebra Activations Form Network Gram.
+From Swarmcert Require Import Algebra Activations Form Network Bent Gram.
 Import ListNotations.
 Open Scope Z_scope.
 
@@ -65,15 +65,22 @@ Fixpoint split (t : list dyadic) (ms : list matrixD) : list (list dyadic) :=
 Definition neurons (ms : list matrixD) : nat := fold_right (fun m n => (length m + n)%nat) O ms.
 
 Definition inputs (hidden : list matrixD) (last : matrixD) : nat := length (hd [] (hd last hidden)).
-Definition matrix_inequality (hidden : list matrixD) (last : matrixD) (rho : dyadic) (t : list dyadic) : matrixD :=
-  match hidden with
-  | [] =>
-      let n := length (hd [] last) in
-      norm_inequality rho (if (length last <=? n)%nat then last else columns zero n last)
-  | first :: later =>
-      lmi zero add mul (-1, 0) (mul (1, 1) rho) (neg rho) (firstn (length first) t) first
-        (List.combine (split (skipn (length first) t) later) later) last
-  end.
+Definition is_zero (x : dyadic) : bool := fst x =? 0.
+(** `gs`: one number for each hidden layer, zero where slopes lie in [0, 1], else as in Network.v. *)
+Definition matrix_inequality (gs : list dyadic) (hidden : list matrixD) (last : matrixD) (rho : dyadic)
+    (t : list dyadic) : matrixD :=
+  if forallb is_zero gs then
+    match hidden with
+    | [] =>
+        let n := length (hd [] last) in
+        norm_inequality rho (if (length last <=? n)%nat then last else columns zero n last)
+    | first :: later =>
+        lmi zero add mul (-1, 0) (mul (1, 1) rho) (neg rho) (firstn (length first) t) first
+          (List.combine (split (skipn (length first) t) later) later) last
+    end
+  else
+    bent_lmi zero add mul (1, 1) (-1, 0) (-1, 1) (repeat (shift (-1) rho) (inputs hidden last))
+      (List.combine (List.combine gs (split t hidden)) hidden) last.
 (** Every row as long as the stage before it has rows; the first stage takes n inputs. *)
 Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
   match hidden with
@@ -81,12 +88,12 @@ Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
   | m :: hidden' => forallb (fun row => length row =? n)%nat m && shapes (length m) hidden' last
   end.
 (** Accepts |f(x) - f(x')| <= upper |x - x'| of the chain with these stages. *)
-Definition check (hidden : list matrixD) (last : matrixD) (upper rho : dyadic) (t : list dyadic) (f : factor) :
-  bool :=
+Definition check (gs : list dyadic) (hidden : list matrixD) (last : matrixD) (upper rho : dyadic) (t : list dyadic)
+    (f : factor) : bool :=
   shapes (inputs hidden last) hidden last &&
   ((length t =? neurons hidden)%nat && forallb is_nonnegative t && is_positive rho && is_nonnegative upper
   && is_nonnegative (add (mul upper upper) (neg rho))
-  && shows_nonnegative (matrix_inequality hidden last rho t) f).
+  && shows_nonnegative (matrix_inequality gs hidden last rho t) f).
 
 (** Meaning *)
 Open Scope R_scope.
@@ -247,21 +254,42 @@ Proof.
   - apply IH; [rewrite skipn_length; lia|]. rewrite <- (firstn_skipn (length m) t) in Ht. now apply Forall_app in Ht.
 Qed.
 
-(** A network with these matrices, any biases and any functions with slopes in [0, 1]. *)
+(** A network with these matrices, any biases and any functions; and what is known of the slopes of these. *)
 Definition stack := (list matrixD * matrixD)%type.
 Definition real_stack := (list ((R -> R) * layer) * layer)%type.
 Definition run (l : real_stack) : list R -> list R := network (fst l) (snd l).
 Definition of_matrix (m : matrixD) (l : layer) := fst l = realm m /\ length (snd l) = length m.
-Definition of_stage (m : matrixD) (k : (R -> R) * layer) := slopes (fst k) 0 1 /\ of_matrix m (snd k).
+Definition of_stage (m : matrixD) (k : (R -> R) * layer) := of_matrix m (snd k).
 Definition instance (p : stack) (l : real_stack) := Forall2 of_stage (fst p) (fst l) /\ of_matrix (snd p) (snd l).
+Definition has_bend (g : dyadic) (f : R -> R) := bent (real g) f.
+Definition functions (l : real_stack) : list (R -> R) := map fst (fst l).
 
 Lemma matrix_fits m l : of_matrix m l -> bias_fits l.
 Proof. intros [E H]. unfold bias_fits. now rewrite E, map_length. Qed.
-Lemma stages_tame ms ks : Forall2 of_stage ms ks -> Forall tame ks /\ map weights ks = map realm ms.
+Lemma stages_fit ms ks : Forall2 of_stage ms ks ->
+  Forall (fun k => bias_fits (snd k)) ks /\ map weights ks = map realm ms.
 Proof.
-  intros H. induction H as [|m k ms ks [S H] Hs [IH1 IH2]]; simpl; split; auto.
-  - constructor; auto. split; auto. eapply matrix_fits; eauto.
+  intros H. induction H as [|m k ms ks H Hs [IH1 IH2]]; simpl; split; auto.
+  - constructor; auto. eapply matrix_fits; eauto.
   - f_equal; auto. apply H.
+Qed.
+Lemma stages_tame gs ks : Forall (fun k => bias_fits (snd k)) ks -> Forall2 has_bend gs (map fst ks) ->
+  forallb is_zero gs = true -> Forall tame ks.
+Proof.
+  intros H. revert gs. induction H as [|k ks Hk H IH]; simpl; intros gs G Z; inversion G as [|[m e] ? gs' ? B G']; subst;
+    constructor; simpl in Z; apply andb_prop in Z; destruct Z as [Z Zs]; [|now apply (IH gs')].
+  apply Z.eqb_eq in Z. simpl in Z. subst m. split; auto. unfold has_bend in B. replace (real (0, e)%Z) with 0 in B; auto.
+  unfold real. simpl. ring.
+Qed.
+Lemma stages_bend gs ms ks ts : Forall2 has_bend gs (map fst ks) -> Forall2 of_stage ms ks ->
+  Forall2 fits (map realm ms) (map reals ts) ->
+  Forall2 bends_as ks (images real (List.combine (List.combine gs ts) ms)).
+Proof.
+  revert gs ms ts. induction ks as [|k ks IH]; intros gs ms ts G M F; inversion G as [|g ? gs' ? B G']; subst;
+    inversion M as [|m ? ms' ? Hm Hms]; subst; simpl; [constructor|].
+  destruct ts as [|t ts]; simpl in F; inversion F; subst. simpl. constructor; [|now apply IH].
+  pose proof (matrix_fits _ _ Hm) as L. destruct Hm as [E _]. unfold bends_as, weights. simpl.
+  rewrite E. repeat split; auto; apply H2.
 Qed.
 
 Lemma norm_bound upper rho f x x' : 0 <= upper -> rho <= upper * upper ->
@@ -272,12 +300,12 @@ Proof.
 Qed.
 
 (** (d) *)
-Theorem check_sound hidden last upper rho t f : check hidden last upper rho t f = true ->
-  forall l, instance (hidden, last) l ->
+Theorem check_sound gs hidden last upper rho t f : check gs hidden last upper rho t f = true ->
+  forall l, instance (hidden, last) l -> Forall2 has_bend gs (functions l) ->
   forall x x', length x = inputs hidden last -> length x' = inputs hidden last ->
   norm (minus (run l x) (run l x')) <= real upper * norm (minus x x').
 Proof.
-  unfold check. intros H [ks [last' b]] [Hks Hb] x x' Hx Hx'. simpl in Hks, Hb.
+  unfold check. intros H [ks [last' b]] [Hks Hb] G x x' Hx Hx'. unfold functions in G. simpl in Hks, Hb, G.
   apply andb_prop in H. destruct H as [_ H]. repeat (apply andb_prop in H; destruct H as [H ?]).
   apply Nat.eqb_eq in H. rename H into Hn, H0 into HP, H1 into Hur, H2 into Hu, H3 into Hrho, H4 into Ht.
   apply shows_nonnegative_sound in HP. apply real_nonnegative in Hu, Hur. apply real_positive in Hrho.
@@ -285,23 +313,29 @@ Proof.
   pose proof (matrix_fits _ _ Hb) as Hl. destruct Hb as [E Hb]. simpl in E. subst last'.
   apply (norm_bound (real upper) (real rho) (run (ks, (realm last, b)))); [auto|lra|]. unfold run. simpl.
   assert (real (-1, 0)%Z = -1) as M by (unfold real; simpl; ring).
-  destruct Hks as [|first [g [m c]] later ks [Hg [E Hc]] Hks]; simpl in HP.
-  - rewrite real_norm_inequality in HP.
-    destruct (length last <=? _)%nat.
-    + now apply norm_lmi_bounds.
-    + rewrite (f_columns zero 0 real real_zero) in HP. eapply norm_lmi_columns_bounds; eauto.
-  - simpl in E, Hg, Hc. subst m.
-    rewrite (f_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M, real_mul, real_neg in HP.
+  rewrite forallb_forall, <- Forall_forall in Ht. pose proof (split_fits t hidden Hn Ht) as F.
+  unfold matrix_inequality in HP. destruct (forallb is_zero gs) eqn:Z.
+  - destruct (stages_fit _ _ Hks) as [B W]. pose proof (stages_tame _ _ B G Z) as T.
+    destruct Hks as [|first [g [m c]] later ks [E Hc] Hks]; simpl in HP.
+    + rewrite real_norm_inequality in HP.
+      destruct (length last <=? _)%nat.
+      * now apply norm_lmi_bounds.
+      * rewrite (f_columns zero 0 real real_zero) in HP. eapply norm_lmi_columns_bounds; eauto.
+    + simpl in E, Hc. subst m. inversion T; subst. inversion W as [W']. inversion F; subst.
+      rewrite (f_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M, real_mul, real_neg in HP.
+      replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
+      apply lmi_bounds with
+          (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later)); auto.
+      * now rewrite W'.
+      * rewrite W'. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) =
+          List.combine (map reals ts) (map realm ms)) as Q.
+        { clear. induction ts as [|u ts IH]; intros [|m ms]; simpl; auto. now rewrite IH. }
+        now rewrite Q in HP.
+  - rewrite (f_bent_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M in HP.
     replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
-    rewrite forallb_forall, <- Forall_forall in Ht.
-    pose proof (split_fits t (first :: later) Hn Ht) as S. inversion S; subst.
-    destruct (stages_tame _ _ Hks) as [T E].
-    apply lmi_bounds with
-        (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later)); auto.
-    + split; auto. unfold bias_fits. simpl. now rewrite map_length.
-    + now rewrite E.
-    + rewrite E. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) =
-        List.combine (map reals ts) (map realm ms)) as Q.
-      { clear. induction ts as [|u ts IH]; intros [|m ms]; simpl; auto. now rewrite IH. }
-      now rewrite Q in HP.
+    replace (real (-1, 1)%Z) with (-2) in HP by (unfold real; simpl; ring).
+    assert (reals (repeat (shift (-1) rho) (inputs hidden last)) = repeat (real rho / 2) (inputs hidden last)) as Q.
+    { generalize (inputs hidden last). intros n. induction n as [|n IH]; simpl; auto. rewrite IH, real_shift.
+      f_equal. simpl. field. }
+    rewrite Q in HP. eapply bent_lmi_bounds; eauto. now apply stages_bend.
 Qed.

@@ -27,15 +27,16 @@ Definition check_norm_below (w : matrixD) (l : dyadic) (v : list dyadic) : bool 
 
 (** Slopes by a matrix inequality. *)
 Definition fits_part (p : part) : bool := forallb (fun l => length (snd l) =? length (fst l))%nat (layers p).
-(** Of the network whose functions are divided by their largest slope b: M_1, b M_2, b M_3, ... *)
+(** Of the network whose functions are divided by b = unit_of: M_1, b M_2, b M_3, ... *)
 Definition matrices (p : part) : stack :=
   match hidden p with
   | [] => ([], fst (outer p))
   | first :: later =>
-      let scaled l := scale_all mul (steepest (between p)) (fst l) in
+      let scaled l := scale_all mul (unit_of (between p)) (fst l) in
       (fst first :: map scaled later, scaled (outer p))
   end.
-Definition rising (p : part) : bool := is_rising (between p).
+(** Of each hidden layer. *)
+Definition bends_of (p : part) : list dyadic := map (fun _ => bend_of (between p)) (hidden p).
 Definition relu_between (p : part) : bool := is_relu (between p).
 Definition parts_of (ps : list part) (f : function) : list part :=
   match f with Alone p => [part_at ps p] | Set_of phi rho => [part_at ps phi; part_at ps rho] end.
@@ -45,8 +46,8 @@ Definition well_formed (ps : list part) (f : function) (moves : list bool) (scal
   && (length moves =? inputs_of (part_at ps (moved f)))%nat
   && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
 Definition check_slope ps f moves scale u rho t factor : bool :=
-  well_formed ps f moves scale && forallb rising (parts_of ps f) && is_nonnegative u
-  && check_parts ([], selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
+  well_formed ps f moves scale && is_nonnegative u
+  && check_parts (flat_map bends_of (parts_of ps f)) ([], selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
 
 (** Slopes by products of norms that were accepted before. *)
 Fixpoint find_norm (accepted : list claim) (p layer : nat) : option dyadic :=
@@ -274,7 +275,7 @@ Definition check_sum_error ps accepted terms rho u sums errors : bool :=
 
 Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p : proof) : bool :=
   match c, p with
-  | Norm_at_most p layer u, By_inequality rho t f => check [] (matrix_at ps p layer) u rho t f
+  | Norm_at_most p layer u, By_inequality rho t f => check [] [] (matrix_at ps p layer) u rho t f
   | Norm_at_least p layer l, By_vector v => check_norm_below (matrix_at ps p layer) l v
   | Slope_at_most f moves scale u, By_inequality rho t r => check_slope ps f moves scale u rho t r
   | Slope_at_most f moves scale u, By_product => check_product ps accepted f moves scale u

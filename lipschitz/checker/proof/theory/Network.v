@@ -15,8 +15,11 @@ Fixpoint network (hidden : list ((R -> R) * layer)) (last : layer) (x : list R) 
   | (f, (m, b)) :: hidden' => network hidden' last (map f (affine m b x))
   end.
 Definition bias_fits (l : layer) := length (snd l) = length (fst l).
+(** What the inequality of a layer rests on: with slopes in [0, 1], g = 0; with slopes in [1 - c, c], g = c (c - 1). *)
+Definition bent (g : R) (f : R -> R) :=
+  forall y y', 0 <= (f y - f y') * ((y - y') - (f y - f y')) + g * ((y - y') * (y - y')).
 (** A hidden layer whose biases fit, followed by a function with slopes in [0, 1]. *)
-Definition tame (k : (R -> R) * layer) := slopes (fst k) 0 1 /\ bias_fits (snd k).
+Definition tame (k : (R -> R) * layer) := bent 0 (fst k) /\ bias_fits (snd k).
 Definition weights (k : (R -> R) * layer) : matrix := fst (snd k).
 Definition norm (u : list R) := sqrt (square u).
 
@@ -39,13 +42,19 @@ Proof. unfold minus. revert v. induction u as [|a u IH]; intros [|b v]; simpl; t
 (** dz (dy - dz) >= 0, with multipliers. *)
 Lemma slope_increment f y y' : slopes f 0 1 -> 0 <= (f y - f y') * ((y - y') - (f y - f y')).
 Proof. intros S. destruct (Rle_dec y y'); [specialize (S y y')|specialize (S y' y)]; nra. Qed.
-Lemma slope_constraint f t y y' : slopes f 0 1 -> Forall (Rle 0) t -> length y' = length y ->
-  let dz := minus (map f y) (map f y') in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
+Lemma slopes_bent f : slopes f 0 1 -> bent 0 f.
+Proof. intros S y y'. pose proof (slope_increment f y y' S). lra. Qed.
+Lemma bent_constraint g f t y y' : bent g f -> Forall (Rle 0) t -> length y' = length y ->
+  let dz := minus (map f y) (map f y') in let dy := minus y y' in
+  dotR dz (timesR t dz) <= dotR dz (timesR t dy) + g * dotR dy (timesR t dy).
 Proof.
   simpl. unfold minus. intros S Ht. revert y y'.
   induction Ht as [|a t Ha Ht IH]; intros [|b y] [|c y']; simpl; try discriminate; intros; try lra.
-  specialize (IH y y' ltac:(lia)). pose proof (Rmult_le_pos _ _ Ha (slope_increment f b c S)). nra.
+  specialize (IH y y' ltac:(lia)). pose proof (Rmult_le_pos _ _ Ha (S b c)). nra.
 Qed.
+Lemma slope_constraint f t y y' : bent 0 f -> Forall (Rle 0) t -> length y' = length y ->
+  let dz := minus (map f y) (map f y') in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
+Proof. intros S Ht H. pose proof (bent_constraint 0 f t y y' S Ht H). simpl in *. lra. Qed.
 
 Definition fits (m : matrix) (t : list R) := length t = length m /\ Forall (Rle 0) t.
 

@@ -9,15 +9,17 @@ Definition set_stages (phi : list matrixD) (w : matrixD) (rho : list matrixD) (l
     matrixD :=
   match rho with [] => (phi, productD last w) | v :: rho' => (phi ++ productD v w :: rho', last) end.
 Definition outputs (hidden : list matrixD) (n : nat) : nat := length (List.last hidden (repeat [] n)).
-(** One function after the other: `p`, then each of `ps`, nothing but an added vector between them. *)
-Fixpoint check_parts (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic) (f : factor) : bool :=
+(** One function after the other: `p`, then each of `ps`, nothing but an added vector between them. `gs`: of all hidden
+  layers. *)
+Fixpoint check_parts (gs : list dyadic) (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic) (f : factor) :
+  bool :=
   match ps with
-  | [] => check (fst p) (snd p) upper r t f
+  | [] => check gs (fst p) (snd p) upper r t f
   | q :: ps' =>
       let joined := set_stages (fst p) (snd p) (fst q) (snd q) in
       let n := inputs (fst p) (snd p) in
       (length (hd [] (snd p)) =? outputs (fst p) n)%nat && (inputs (fst joined) (snd joined) =? n)%nat
-      && shapes n (fst p) (snd p) && shapes (length (snd p)) (fst q) (snd q) && check_parts joined ps' upper r t f
+      && shapes n (fst p) (snd p) && shapes (length (snd p)) (fst q) (snd q) && check_parts gs joined ps' upper r t f
   end.
 
 Open Scope R_scope.
@@ -41,10 +43,10 @@ Proof. intros H. unfold affine. now rewrite apply_product, (plus_assoc _ b s), !
 (** Through all of the hidden layers. *)
 Definition through (hidden : list ((R -> R) * layer)) (x : list R) : list R :=
   fold_left (fun h k => map (fst k) (affine (fst (snd k)) (snd (snd k)) h)) hidden x.
-Lemma length_through hidden x : Forall tame hidden -> forall n, length x = n ->
+Lemma length_through hidden x : Forall (fun k => bias_fits (snd k)) hidden -> forall n, length x = n ->
   length (through hidden x) = length (List.last (map weights hidden) (repeat [] n)).
 Proof.
-  unfold through. intros H. revert x. induction H as [|[f [m b]] hidden [_ Hb] H IH]; intros x n Hn; simpl.
+  unfold through. intros H. revert x. induction H as [|[f [m b]] hidden Hb H IH]; intros x n Hn; simpl.
   - now rewrite repeat_length.
   - unfold bias_fits in Hb. simpl in Hb.
     rewrite (IH _ (length m)) by (now rewrite map_length, length_affine).
@@ -61,7 +63,7 @@ Definition joined (phi : list ((R -> R) * layer)) (w : matrix) (b s : list R) (r
     (last : layer) : real_stack :=
   let join (l : layer) := (product 0 Rplus Rmult (fst l) w, plusR (applyR (fst l) (plusR b s)) (snd l)) in
   match rho with [] => (phi, join last) | (f, v) :: rho' => (phi ++ (f, join v) :: rho', last) end.
-Lemma network_joined phi w b s rho last x : Forall tame phi ->
+Lemma network_joined phi w b s rho last x : Forall (fun k => bias_fits (snd k)) phi ->
   length (hd [] w) = length (List.last (map weights phi) (repeat [] (length x))) ->
   run (joined phi w b s rho last) x = network rho last (plusR (network phi (w, b) x) s).
 Proof.
@@ -86,15 +88,21 @@ Proof.
     - symmetry. apply (f_product zero add mul 0 Rplus Rmult real real_zero real_add real_mul).
     - change (plusR _ d) with (affine (realm v) d (plusR b s)).
       rewrite length_affine by (now rewrite map_length). unfold product. now rewrite !map_length. }
-  destruct Hr as [|v [f v'] rho lr [Hf Hv] Hr]; simpl in *.
+  destruct Hr as [|v [f v'] rho lr Hv Hr]; simpl in *.
   - split; [exact Hp|]. now apply L.
-  - split; [|exact Hl]. apply Forall2_app; [exact Hp|]. constructor; [|exact Hr]. split; [exact Hf|]. now apply L.
+  - split; [|exact Hl]. apply Forall2_app; [exact Hp|]. constructor; [|exact Hr]. now apply L.
+Qed.
+
+Lemma functions_join l s k : functions (join l s k) = functions l ++ functions k.
+Proof.
+  destruct l as [phi [w b]], k as [[|[f v] rho] last]; unfold functions, join; simpl; [now rewrite app_nil_r|].
+  now rewrite map_app.
 Qed.
 
 Lemma run_join p l s k x : instance p l -> length x = inputs (fst p) (snd p) ->
   length (hd [] (snd p)) = outputs (fst p) (inputs (fst p) (snd p)) -> run (join l s k) x = run k (plusR (run l x) s).
 Proof.
-  destruct l as [lp [w' b]]. intros [Hp [E Hb]] Hx Hw. simpl in *. subst w'. destruct (stages_tame _ _ Hp) as [F M].
+  destruct l as [lp [w' b]]. intros [Hp [E Hb]] Hx Hw. simpl in *. subst w'. destruct (stages_fit _ _ Hp) as [F M].
   unfold join. simpl. rewrite network_joined; auto. rewrite M. unfold outputs in Hw.
   assert (length (hd [] (realm (snd p))) = length (hd [] (snd p))) as ->
       by (destruct (snd p); simpl; auto using map_length).
@@ -107,16 +115,17 @@ Qed.
 Fixpoint run_after (ks : list (list R * real_stack)) (y : list R) : list R :=
   match ks with [] => y | (s, k) :: ks' => run_after ks' (run k (plusR y s)) end.
 
-Theorem check_parts_sound ps p upper r t f : check_parts p ps upper r t f = true ->
+Theorem check_parts_sound gs ps p upper r t f : check_parts gs p ps upper r t f = true ->
   forall l ks, instance p l -> Forall2 (fun q k => instance q (snd k)) ps ks ->
+  Forall2 has_bend gs (functions l ++ flat_map (fun k => functions (snd k)) ks) ->
   forall x x', length x = inputs (fst p) (snd p) -> length x' = inputs (fst p) (snd p) ->
   norm (minus (run_after ks (run l x)) (run_after ks (run l x'))) <= real upper * norm (minus x x').
 Proof.
-  revert p. induction ps as [|q ps IH]; intros p H l ks Hl Hks x x' Hx Hx'; inversion Hks as [|? [s k] ? ks' Hk Hks'];
+  revert p. induction ps as [|q ps IH]; intros p H l ks Hl Hks G x x' Hx Hx'; inversion Hks as [|? [s k] ? ks' Hk Hks'];
       subst; simpl in *.
-  - destruct p. exact (check_sound _ _ _ _ _ _ H l Hl x x' Hx Hx').
+  - destruct p. rewrite app_nil_r in G. exact (check_sound _ _ _ _ _ _ _ H l Hl G x x' Hx Hx').
   - do 3 (apply andb_prop in H; destruct H as [H ?HC]). apply andb_prop in H. destruct H as [HW HI]. apply Nat.eqb_eq in
       HW, HI.
     rewrite <- !(run_join p l s k) by auto.
-    eapply IH; eauto using instance_join; congruence.
+    eapply IH; eauto using instance_join; try congruence. now rewrite functions_join, <- app_assoc.
 Qed.

@@ -23,13 +23,13 @@ Proof. apply (f_dot zero add mul 0 Rplus Rmult real real_zero real_add real_mul)
 (** Norms *)
 Lemma weights_matrix ps p layer : weights_at ps p layer = realm (matrix_at ps p layer).
 Proof. reflexivity. Qed.
-Lemma norm_above_sound w u rho t f : check [] w u rho t f = true ->
+Lemma norm_above_sound w u rho t f : check [] [] w u rho t f = true ->
   forall d, norm (applyR (realm w) d) <= real u * norm d.
 Proof.
   intros H d. set (n := inputs [] w). set (b := repeat 0 (length w)).
   assert (length b = length w) as Hb by apply repeat_length.
   assert (instance ([], w) ([], (realm w, b))) as I by (split; [constructor|split; auto]).
-  pose proof (check_sound [] w u rho t f H _ I (trim n d) (repeat 0 n) (length_trim n d) (repeat_length 0 n)) as B.
+  pose proof (check_sound [] [] w u rho t f H _ I (Forall2_nil _) (trim n d) (repeat 0 n) (length_trim n d) (repeat_length 0 n)) as B.
   unfold run in B. simpl in B. rewrite minus_affine in B by (now rewrite map_length).
   rewrite <- (length_trim n d) in B at 2 4. rewrite minus_zeros in B.
   assert (is_nonnegative u = true /\ shapes n [] w = true) as [Hu Hs].
@@ -51,7 +51,7 @@ Proof.
 Qed.
 
 (** Slopes by a matrix inequality *)
-(** Part p with functions of slopes in [0, 1]: divided by b, and the later matrices multiplied by it. *)
+(** Part p with its functions divided by b, and the later matrices multiplied by it. *)
 Definition scaled_layer (b : R) (l : layer) : layer := (scale_allR b (fst l), snd l).
 Definition scaled_network (b : R) (f : R -> R) (hidden : list layer) (last : layer) : real_stack :=
   match hidden with
@@ -60,7 +60,7 @@ Definition scaled_network (b : R) (f : R -> R) (hidden : list layer) (last : lay
       let g x := / b * f x in ((g, first) :: map (fun l => (g, scaled_layer b l)) later, scaled_layer b last)
   end.
 Definition stack_of (p : part) : real_stack :=
-  scaled_network (real (steepest (between p))) (act (between p)) (map real_layer (hidden p)) (real_layer (outer p)).
+  scaled_network (real (unit_of (between p))) (act (between p)) (map real_layer (hidden p)) (real_layer (outer p)).
 Lemma affine_scaled b (l : layer) x :
   affine (fst (scaled_layer b l)) (snd (scaled_layer b l)) x = affine (fst l) (snd l) (scaleR b x).
 Proof.
@@ -82,27 +82,28 @@ Proof.
   intros H. destruct hidden as [|[m c] later]; [reflexivity|]. unfold run. simpl.
   now rewrite scaled_later, scale_divided.
 Qed.
-Lemma divided_slopes (f : R -> R) b : 0 < b -> slopes f 0 b -> slopes (fun t => / b * f t) 0 1.
-Proof.
-  intros P S x y L. specialize (S x y L). pose proof (Rinv_0_lt_compat b P) as Q.
-  assert (/ b * (b * (y - x)) = y - x) as E by (field; lra). nra.
-Qed.
 Lemma value_network p x : value p x =
   network (map (fun l => (act (between p), l)) (map real_layer (hidden p))) (real_layer (outer p))
     (clamped (clamp p) x).
 Proof. unfold value. now rewrite map_map. Qed.
-Lemma value_run p x : rising p = true -> value p x = run (stack_of p) (clamped (clamp p) x).
+Lemma value_run p x : value p x = run (stack_of p) (clamped (clamp p) x).
 Proof.
-  intros H. destruct (rising_slopes _ H) as [P _]. unfold stack_of. rewrite scaled_run by lra. apply value_network.
+  destruct (function_bent (between p)) as [P _]. unfold stack_of. rewrite scaled_run by lra. apply value_network.
+Qed.
+Lemma bends_hold p : Forall2 has_bend (bends_of p) (functions (stack_of p)).
+Proof.
+  destruct (function_bent (between p)) as [_ B]. unfold bends_of, functions, stack_of, scaled_network.
+  destruct (hidden p) as [|first later]; simpl; constructor; [exact B|]. rewrite !map_map. simpl.
+  induction later as [|l later IH]; simpl; constructor; auto.
 Qed.
 Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
 Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
-Lemma instance_matrices p : fits_part p = true -> rising p = true -> instance (matrices p) (stack_of p).
+Lemma instance_matrices p : fits_part p = true -> instance (matrices p) (stack_of p).
 Proof.
-  intros H G. destruct (rising_slopes _ G) as [P S]. pose proof (divided_slopes _ _ P S) as T.
+  intros H.
   assert (forall l, In l (layers p) -> of_matrix (fst l) (real_layer l)) as F.
   { intros l Hl. split; [reflexivity|]. simpl. rewrite map_length. now apply (fits_layer p). }
-  set (b := steepest (between p)) in *.
+  set (b := unit_of (between p)) in *.
   assert (forall l, In l (layers p) -> of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q.
   { intros l Hl. destruct (F l Hl) as [_ B]. split; simpl in *.
     - symmetry. apply (f_scale_all mul Rmult real real_mul).
@@ -110,10 +111,10 @@ Proof.
   unfold matrices, stack_of, layers in *. fold b. destruct (hidden p) as [|first later]; simpl.
   - split; [constructor|]. apply F. now left.
   - split; [|apply Q; right; apply in_or_app; right; now left].
-    simpl. constructor; [split; [exact T|apply F; now left]|].
+    simpl. constructor; [apply F; now left|].
     assert (forall l, In l later -> of_matrix (scale_all mul b (fst l)) (scaled_layer (real b) (real_layer l))) as Q'
       by (intros; apply Q; right; apply in_or_app; now left).
-    clear - T Q'. induction later as [|l later IH]; simpl; constructor; [split; [exact T|apply Q'; now left]|].
+    clear - Q'. induction later as [|l later IH]; simpl; constructor; [apply Q'; now left|].
     apply IH. intros. apply Q'. now right.
 Qed.
 Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
@@ -141,27 +142,29 @@ Qed.
 Lemma slope_sound ps f moves scale u rho t factor :
   check_slope ps f moves scale u rho t factor = true -> holds ps (Slope_at_most f moves scale u).
 Proof.
-  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 3 both H. do 4 both H.
-  rename H0 into HP, H1 into Hu, H2 into HR, H3 into Hl, H4 into Hs, H5 into Hm, H6 into Hc.
+  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 2 both H. do 4 both H.
+  rename H0 into HP, H1 into Hu, H2 into Hl, H3 into Hs, H4 into Hm, H5 into Hc.
   apply real_nonnegative in Hu. set (S := selector moves scale) in *.
   assert (forall base, length base = length moves -> instance ([], S) ([], (realm S, base))) as I.
   { intros base Hb. split; [constructor|]. split; auto. simpl. unfold S. now rewrite length_selector. }
   assert (inputs [] S = count moves) as Hi by apply selector_columns.
-  pose proof (check_parts_sound _ _ _ _ _ _ HP) as C. clear HP. cbn [fst snd] in C.
-  destruct f as [p|phi k]; cbn [parts_of map forallb tl moved value_of] in *.
-  - both H. both HR. apply instance_matrices in H; auto. rewrite !value_run by auto.
+  pose proof (check_parts_sound _ _ _ _ _ _ _ HP) as C. clear HP. cbn [fst snd] in C.
+  destruct f as [p|phi k]; cbn [parts_of map forallb tl moved value_of flat_map] in *.
+  - both H. apply instance_matrices in H. rewrite !value_run.
     apply (moved_bound moves scale); auto. intros v w base Hv Hw Hb.
     pose proof (C _ [([], stack_of (part_at ps p))] (I base Hb)
-      (Forall2_cons (matrices (part_at ps p)) ([], stack_of (part_at ps p)) H (Forall2_nil _)) v w) as B.
+      (Forall2_cons (matrices (part_at ps p)) ([], stack_of (part_at ps p)) H (Forall2_nil _))
+      (Forall2_app (bends_hold _) (Forall2_nil _)) v w) as B.
     simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
-  - both H. both H0. both HR. both H2. apply instance_matrices in H, H0; auto.
-    both Hc. rewrite !value_run by auto. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
+  - both H. both H0. apply instance_matrices in H, H0.
+    both Hc. rewrite !value_run. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
     apply (moved_bound moves scale _ _
         (fun z => run (stack_of (part_at ps k)) (plusR (run (stack_of (part_at ps phi)) z) rest))); auto.
     intros v w base Hv Hw Hb.
     pose proof (C _ [([], stack_of (part_at ps phi)); (rest, stack_of (part_at ps k))] (I base Hb)
       (Forall2_cons (matrices (part_at ps phi)) ([], stack_of (part_at ps phi)) H
-        (Forall2_cons (matrices (part_at ps k)) (rest, stack_of (part_at ps k)) H0 (Forall2_nil _))) v w) as B.
+        (Forall2_cons (matrices (part_at ps k)) (rest, stack_of (part_at ps k)) H0 (Forall2_nil _)))
+      (Forall2_app (bends_hold _) (Forall2_app (bends_hold _) (Forall2_nil _))) v w) as B.
     simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
 Qed.
 

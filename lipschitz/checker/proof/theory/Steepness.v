@@ -160,15 +160,28 @@ Proof.
     (1101 / 1001 * (exp t * exp (- t) + 2 * exp (- t) + exp (- t) * exp (- t))) in K by ring.
   rewrite P in K. nra.
 Qed.
-Lemma silu_slopes : slopes (act Silu) (- real (steepest Silu)) (real (steepest Silu)).
+(** The derivative at x and that at - x add up to 1. *)
+Lemma silu_least t : (1 - 72089 / 65536) * ((1 + exp (- t)) * (1 + exp (- t))) <= 1 + exp (- t) + t * exp (- t).
 Proof.
-  assert (real (steepest Silu) = 72089 / 65536) as ->
-    by (unfold steepest; rewrite real_below; change (Pos.to_nat 16) with 16%nat; lra).
-  apply (slopes_of_derivative _ _ _ _ silu_derivative). intros x. pose proof (silu_steepest x) as U.
-  pose proof (exp_pos (- x)). pose proof (exp_above_line (- x)). set (e := exp (- x)) in *. unfold Rsqr.
+  pose proof (silu_steepest (- t)) as U. rewrite Ropp_involutive in U. pose proof (exp_opp t) as P.
+  pose proof (exp_pos (- t)). set (e := exp (- t)) in *. set (f := exp t) in *.
+  apply (Rmult_le_compat_l (e * e)) in U; [|nra].
+  replace (e * e * (1 + f + - t * f)) with (e * e + e * (f * e) - t * e * (f * e)) in U by ring.
+  replace (e * e * (72089 / 65536 * ((1 + f) * (1 + f)))) with
+    (72089 / 65536 * ((e + f * e) * (e + f * e))) in U by ring.
+  rewrite P in U. nra.
+Qed.
+Lemma silu_slopes : slopes (act Silu) (1 - 72089 / 65536) (72089 / 65536).
+Proof.
+  apply (slopes_of_derivative _ _ _ _ silu_derivative). intros x. pose proof (silu_steepest x). pose proof (silu_least x).
+  pose proof (exp_pos (- x)). set (e := exp (- x)) in *. unfold Rsqr.
   assert (0 < (1 + e) * (1 + e)) by nra. split; [apply divided_below|apply divided]; auto; nra.
 Qed.
 
+Lemma real_silu : real (steepest Silu) = 72089 / 65536.
+Proof. unfold steepest. rewrite real_below. change (Pos.to_nat 16) with 16%nat. lra. Qed.
+Lemma real_gelu : real (steepest Gelu) = 4625 / 4096.
+Proof. unfold steepest. rewrite real_below. change (Pos.to_nat 12) with 12%nat. lra. Qed.
 Lemma real_one : real one = 1. Proof. unfold one, real. simpl. ring. Qed.
 Theorem rising_slopes a : is_rising a = true -> 0 < real (steepest a) /\ slopes (act a) 0 (real (steepest a)).
 Proof.
@@ -187,8 +200,36 @@ Theorem all_slopes a : 0 <= real (steepest a) /\ slopes (act a) (- real (steepes
 Proof.
   destruct (is_rising a) eqn:E.
   - destruct (rising_slopes a E) as [P S]. split; [lra|]. intros x y L. specialize (S x y L). nra.
-  - destruct a; try discriminate; (split; [apply Rlt_le, real_positive; reflexivity|]); [exact silu_slopes|].
-    intros x y L. pose proof (gelu_slopes x y L).
-    assert (real (steepest Gelu) = 4625 / 4096) as ->
-      by (unfold steepest; rewrite real_below; change (Pos.to_nat 12) with 12%nat; lra). nra.
+  - destruct a; try discriminate; (split; [apply Rlt_le, real_positive; reflexivity|]); rewrite ?real_silu, ?real_gelu.
+    + intros x y L. pose proof (silu_slopes x y L). nra.
+    + intros x y L. pose proof (gelu_slopes x y L). nra.
+Qed.
+
+(** For the matrix inequality: what functions are divided by, and what then is known of them (`bent` in Network.v). *)
+Definition unit_of (a : activation) : dyadic := if is_rising a then steepest a else one.
+Definition bend_of (a : activation) : dyadic :=
+  if is_rising a then zero else mul (steepest a) (add (steepest a) (neg one)).
+Lemma divided_slopes (f : R -> R) b : 0 < b -> slopes f 0 b -> slopes (fun t => / b * f t) 0 1.
+Proof.
+  intros P S x y L. specialize (S x y L). pose proof (Rinv_0_lt_compat b P) as Q.
+  assert (/ b * (b * (y - x)) = y - x) as E by (field; lra). nra.
+Qed.
+(** (dz - (1 - c) dy) (c dy - dz) >= 0. *)
+Lemma slopes_beyond_one f c : slopes f (1 - c) c -> bent (c * (c - 1)) f.
+Proof.
+  intros S y y'.
+  assert (forall a b, a <= b -> 0 <= (f b - f a - (1 - c) * (b - a)) * (c * (b - a) - (f b - f a))) as P
+    by (intros a b L; specialize (S a b L); nra).
+  destruct (Rle_dec y y') as [L|L]; [specialize (P y y' L)|specialize (P y' y ltac:(lra))]; lra.
+Qed.
+Theorem function_bent a : 0 < real (unit_of a) /\ bent (real (bend_of a)) (fun t => / real (unit_of a) * act a t).
+Proof.
+  unfold unit_of, bend_of. destruct (is_rising a) eqn:E.
+  - destruct (rising_slopes a E) as [P S]. split; auto. rewrite real_zero. now apply slopes_bent, divided_slopes.
+  - rewrite real_one, real_mul, real_add, real_neg, real_one. split; [lra|].
+    assert (forall f g, (forall x, f x = g x) -> bent (real (steepest a) * (real (steepest a) + - (1))) f ->
+      bent (real (steepest a) * (real (steepest a) + - (1))) g) as X by (intros f g F B y y'; rewrite <- !F; apply B).
+    apply (X (act a)); [intros; rewrite Rinv_1; ring|].
+    apply slopes_beyond_one. destruct a; try discriminate; rewrite ?real_silu, ?real_gelu; [exact silu_slopes|].
+    intros x y L. pose proof (gelu_slopes x y L). nra.
 Qed.

@@ -1,0 +1,184 @@
+/// The matrix inequality of activations whose slopes lie in [1 - c, c]: values that are known, proofs and refusals.
+#include "lipschitz/bent_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
+#include "lipschitz/checker/stages.h"
+#include "lipschitz/networks.h"
+#include "nn/base/content_hash.h"
+#include "nn/base/json.h"
+
+namespace swarmcert::lipschitz {
+namespace {
+
+using files::Activation;
+using files::Network;
+using files::Weights;
+using tests::layer;
+
+constexpr Activation kBent[] = {Activation::kSilu, Activation::kGelu};
+
+Network bent_network(Weights weights, Activation activation) {
+  weights.activation = activation;
+  return tests::plain(std::move(weights));
+}
+
+double bound_of(const Network& network) {
+  const SdpBound found = bent_bound(check::bent_chain(network, "network"));
+  EXPECT_TRUE(found.proof.has_value());
+  return found.proof ? found.proof->upper.value() : 0;
+}
+
+double product_of(const Network& network) {
+  double product = 1;
+  for (const files::Layer& each : network.plain->layers) product *= spectral_norm(each).norm.upper.value();
+  const double c = files::function_of(network.plain->activation).steepest();
+  return product * std::pow(c, static_cast<double>(network.plain->layers.size() - 1));
+}
+
+TEST(BentBound, OfOneNeuronPerLayerIsTheProductOfWeightsAndLargestSlopes) {
+  for (const Activation activation : kBent) {
+    const double c = files::function_of(activation).steepest();
+    EXPECT_NEAR(bound_of(bent_network(tests::weights({layer(1, 1, {3}), layer(1, 1, {-2})}), activation)),
+                6 * c, 1e-6);
+    const Weights three = tests::weights({layer(1, 1, {3}), layer(1, 1, {0.5}), layer(1, 1, {-2})});
+    EXPECT_NEAR(bound_of(bent_network(three, activation)), 3 * c * c, 1e-6);
+  }
+}
+
+/// s(x) - s(x), seen as two neurons that know nothing of each other: the slopes d_1 - d_2 reach c - (1 - c). With slopes
+/// in [0, 1] it would be 1.
+TEST(BentBound, OfADifferenceCountsTheNegativeSlopes) {
+  const Weights difference = tests::weights({layer(2, 1, {1, 1}), layer(1, 2, {1, -1})});
+  for (const Activation activation : kBent) {
+    const double c = files::function_of(activation).steepest();
+    EXPECT_NEAR(bound_of(bent_network(difference, activation)), 2 * c - 1, 1e-6);
+  }
+  EXPECT_NEAR(tests::proved(sdp_bound(check::stages(tests::plain(difference), "network"))), 1, 1e-6);
+}
+
+TEST(BentBound, IsAtMostTheProductAndAboveThatOfRelu) {
+  std::mt19937 generator(41);
+  for (const Activation activation : kBent) {
+    for (const std::vector<int>& sizes :
+         {std::vector<int>{3, 12, 2}, {9, 4, 6, 2}, {1, 6, 6, 6, 2}, {4, 8, 8, 8, 8, 8, 8, 1}}) {
+      const Network network = bent_network(tests::random_network(sizes, generator), activation);
+      const double upper = bound_of(network);
+      EXPECT_LT(upper, 0.9 * product_of(network));
+      Network relu = network;
+      relu.plain->activation = Activation::kRelu;  // [0, 1] lies in [1 - c, c]
+      EXPECT_GT(upper, tests::proved(sdp_bound(check::stages(relu, "network"))));
+    }
+  }
+}
+
+TEST(BentBound, StandsDespiteNeuronsWithoutInputsOrEffect) {
+  std::mt19937 generator(42);
+  Weights weights = tests::random_network({3, 6, 5, 2}, generator);
+  for (int j = 0; j < 3; ++j) weights.layers[0].weights[static_cast<std::size_t>(j)] = 0;          // neuron 0
+  for (int i = 0; i < 2; ++i) weights.layers[2].weights[static_cast<std::size_t>(5 * i + 1)] = 0;  // neuron 1
+  const Network network = bent_network(weights, Activation::kSilu);
+  EXPECT_LT(bound_of(network), product_of(network));
+  EXPECT_LT(tests::sampled_slope(*network.plain, generator, 300), bound_of(network));
+  const Network constant =
+      bent_network(tests::weights({layer(2, 1, {0, 1}), layer(1, 2, {1, 0})}), Activation::kGelu);
+  EXPECT_LT(bound_of(constant), 1e-100);
+}
+
+TEST(BentBound, StandsForWeightsFarFromOne) {
+  std::mt19937 generator(43);
+  const Weights weights = tests::random_network({3, 6, 5, 2}, generator);
+  const double upper = bound_of(bent_network(weights, Activation::kGelu));
+  Weights scaled = weights;
+  for (double& w : scaled.layers[0].weights) w = std::ldexp(w, 60);
+  for (double& w : scaled.layers[1].weights) w = std::ldexp(w, -90);
+  EXPECT_NEAR(bound_of(bent_network(scaled, Activation::kGelu)), std::ldexp(upper, -30),
+              1e-6 * std::ldexp(upper, -30));
+}
+
+TEST(BentBound, IsLeftToTheProductWhereTheProgramIsTooLarge) {
+  std::mt19937 generator(44);
+  const Network network =
+      bent_network(tests::random_network({1, kMostBentVariables, 1}, generator), Activation::kSilu);
+  EXPECT_FALSE(bent_bound(check::bent_chain(network, "network")).proof.has_value());
+}
+
+TEST(BentChain, HasOneBendPerHiddenLayerAndZeroWhereSlopesAreDivided) {
+  std::mt19937 generator(45);
+  Weights phi = tests::random_network({3, 4, 5}, generator),
+          rho = tests::random_network({5, 6, 7, 1}, generator);
+  phi.activation = Activation::kSigmoid;
+  rho.activation = Activation::kGelu;
+  const check::BentChain chain = check::bent_chain(tests::deep_set(phi, rho), "set:default:default");
+  ASSERT_EQ(chain.stages.size(), 4u);
+  ASSERT_EQ(chain.bends.size(), 3u);
+  const double c = 0x1.211p+0;
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(to_double(chain.bends[k]), k == 0 ? 0 : c * (c - 1));
+  check::BentChain wrong = chain;
+  wrong.bends.pop_back();
+  EXPECT_THROW(check::lipschitz_lmi(wrong, 1.0, {}), std::invalid_argument);
+}
+
+/// c of GELU is above that of SiLU: a proof for GELU holds for SiLU, one for ReLU does not.
+TEST(BentCertificate, IsAcceptedAndRefusedForOtherNumbersAndActivations) {
+  std::mt19937 generator(46);
+  const Network network = bent_network(tests::random_network({3, 6, 5, 2}, generator), Activation::kSilu);
+  CertifyOptions options;
+  options.jobs = 1;
+  const files::Json made = certificate(network, certify(network, options));
+  const files::Json proof = made["bounds"][0]["proof"];
+  ASSERT_EQ(made["bounds"][0]["upper_method"], "sdp");
+  const auto reason = [&](const files::Json& changed_proof) {
+    files::Json changed = made;
+    changed["bounds"][0]["proof"] = changed_proof;
+    changed["content_sha256"] = files::content_sha256(changed);
+    const check::CheckResult result = check::check(changed, network);
+    return result.accepted ? std::string("accepted") : result.reason;
+  };
+  EXPECT_EQ(reason(proof), "accepted");
+  files::Json changed = proof;
+  changed["rho"] = files::hex_float(files::parse_hex_float(proof["rho"].get<std::string>()) * (1 - 1e-4));
+  EXPECT_NE(reason(changed).find("does not show"), std::string::npos);
+  changed = proof;
+  changed["t"].erase(0);
+  EXPECT_NE(reason(changed).find("one multiplier t"), std::string::npos);
+  changed = proof;
+  changed["t"][0] = files::hex_float(2 * files::parse_hex_float(proof["t"][0].get<std::string>()));
+  EXPECT_NE(reason(changed).find("does not show"), std::string::npos);
+
+  const check::BentChain silu = check::bent_chain(network, "network");
+  check::BentChain gelu = silu, relu = silu;
+  const check::Dyadic c = 0x1.211p+0;
+  std::fill(gelu.bends.begin(), gelu.bends.end(), c * (c - 1.0));
+  std::fill(relu.bends.begin(), relu.bends.end(), check::Dyadic());
+  const SdpBound for_gelu = bent_bound(gelu), for_relu = sdp_bound(relu.stages);
+  EXPECT_TRUE(prove(silu, for_gelu.proof->rho, for_gelu.proof->t));
+  EXPECT_FALSE(prove(silu, for_relu.proof->rho, for_relu.proof->t));
+  EXPECT_TRUE(prove(relu, for_relu.proof->rho, for_relu.proof->t));
+}
+
+TEST(BentBound, NoneOfAMillionSlopesIsAbove) {
+  std::mt19937 generator(47);
+  long tried = 0;
+  double closest = 0;
+  for (const Activation activation : kBent) {
+    for (const std::vector<int>& sizes :
+         {std::vector<int>{1, 4, 1}, {2, 6, 6, 1}, {3, 16, 2}, {3, 8, 8, 8, 2}, {6, 16, 16, 3}}) {
+      const Network network = bent_network(tests::random_network(sizes, generator), activation);
+      const double upper = bound_of(network);
+      const double sampled = tests::sampled_slope(*network.plain, generator, 100000);
+      tried += 100000;
+      EXPECT_LE(sampled, upper * (1 + 1e-9));
+      closest = std::max(closest, sampled / upper);
+    }
+  }
+  EXPECT_EQ(tried, 1000000);
+  EXPECT_GT(closest, 0.8) << "the samples are too flat to mean anything";
+}
+
+}  // namespace
+}  // namespace swarmcert::lipschitz
