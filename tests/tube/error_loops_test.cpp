@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace swarmcert::analysis {
 namespace {
@@ -60,6 +61,73 @@ TEST(ErrorLoops, RotorsThatStartWithAnExcessOfThrustAreEnclosedSliceBySlice) {
 
 TEST(ErrorLoops, WithoutALagTheThrustFollowsAtOnce) {
   EXPECT_TRUE(lag_start(ErrorLoop{}, 0.02).position_m.empty());
+}
+
+/// A loop of `lag_s` that is sampled at 100 Hz, with cells of `slice_s`.
+ErrorLoop sampled_loop(double lag_s, double slice_s, int slices) {
+  stability::TrackingSetup tracking;
+  tracking.plant.mass_kg = Start::kMass_kg;
+  tracking.gains.pid = stability::PidGains{{Start::kKp, Start::kKp, Start::kKp},
+                                           {Start::kKd, Start::kKd, Start::kKd},
+                                           {Start::kKi, Start::kKi, Start::kKi}};
+  tracking.gains.motor_lag_s = lag_s;
+  tracking.gains.rate_hz = 100;
+  tracking.gains.integrator_step_s = 0.01;
+  return error_loops(tracking, slice_s, slices, true).axis[2];
+}
+
+TEST(ErrorLoops, RampsBetweenSamplesActAsTheirMeanAndASawtoothThatItsKernelsBound) {
+  constexpr double kPeriod_s = 0.01;
+  constexpr int kPeriods = 300;
+  for (const double lag_s : {0.0, 0.0575}) {
+    SCOPED_TRACE(lag_s);
+    const ErrorLoop loop = sampled_loop(lag_s, kPeriod_s, kPeriods);
+    ASSERT_TRUE(loop.has_whole_periods);
+    EXPECT_EQ(loop.slope3.has_value(), lag_s > 0);
+    EXPECT_FALSE(sampled_loop(lag_s, 0.0125, 4).has_whole_periods);
+    // m e'' = F - the held command behind the lag, where F = (t - t_k)/T s_k N and s_k is the sign that moves the
+    // vehicle furthest at the end: from the kernel's value in a first pass, then flown.
+    const auto answer = [&](const std::vector<double>& signs) {
+      double x[4] = {0, 0, 0, 0};  // e, e', int e, thrust of the law
+      constexpr int kSteps = 40;
+      const double dt = kPeriod_s / kSteps;
+      std::vector<double> ends;
+      for (const double sign : signs) {
+        for (int i = 0; i < kSteps; ++i) {
+          const auto rate = [&](const double* at, double share, double* result) {
+            const double command =
+                sign * (i + share) / kSteps -
+                Start::kMass_kg * (Start::kKp * at[0] + Start::kKd * at[1] + Start::kKi * at[2]);
+            result[0] = at[1];
+            result[1] = (lag_s > 0 ? at[3] : command) / Start::kMass_kg;
+            result[2] = at[0];
+            result[3] = lag_s > 0 ? (command - at[3]) / lag_s : 0;
+          };
+          double first[4], middle[4], second[4];
+          rate(x, 0, first);
+          for (int c = 0; c < 4; ++c) middle[c] = x[c] + dt / 2 * first[c];
+          rate(middle, 0.5, second);
+          for (int c = 0; c < 4; ++c) x[c] += dt * second[c];
+        }
+        ends.push_back(x[0]);
+      }
+      return ends;
+    };
+    std::vector<double> one(kPeriods, 0.0);
+    one[0] = 1;
+    const std::vector<double> kernel = answer(one);  // e at the ends of all periods after one ramp
+    std::vector<double> worst(kPeriods);
+    for (std::size_t k = 0; k < kPeriods; ++k) worst[k] = kernel[kPeriods - 1 - k] >= 0 ? 1 : -1;
+    const double reached_m = answer(worst).back();
+    double bound_m = 0, whole_m = 0;
+    for (std::size_t n = 0; n < kPeriods; ++n) {
+      bound_m += loop.h1->integral[n] / 2 + kPeriod_s / 8 * loop.slope1->integral[n];
+      whole_m += loop.h1->integral[n];
+    }
+    EXPECT_LE(reached_m, bound_m);
+    EXPECT_GT(reached_m, 0.9 * bound_m);
+    EXPECT_LT(bound_m, 0.6 * whole_m) << "what a bound by the largest force would give";
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "analysis/tracking/tube/error_loops.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "stability/bounds/interval.h"
@@ -21,6 +22,38 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
 bool same_loop(const AxisLoop& a, const AxisLoop& b) {
   return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
+}
+
+/// A slice is a whole number of periods up to this, relatively.
+constexpr double kPeriodTolerance = 1e-12;
+
+/// Cells of |k'| for ErrorLoop::slope1 .. slope3.
+/// @param more for a cell that is not quite a whole number of periods, relative to sup |k|.
+std::optional<KernelCells> slope_of(const std::optional<KernelCells>& kernel,
+                                    const std::optional<KernelCells>& slope, double scale, double more) {
+  if (!kernel || !slope) return std::nullopt;
+  KernelCells result = *slope;
+  for (std::size_t n = 0; n < result.integral.size(); ++n) {
+    result.integral[n] = up(up(result.integral[n] * scale) + up(more * kernel->peak));
+    result.net[n] = {-result.integral[n], result.integral[n]};
+  }
+  result.peak = up(result.peak * scale);
+  return result;
+}
+
+/// @param one_lag_s its time constant where the loop has one lag, which makes h'''' = -direct_rest/tau; else 0.
+void add_slopes(double slice_s, double one_lag_s, const std::optional<KernelCells>& h4, ErrorLoop& loop) {
+  const double periods = std::round(slice_s / loop.period_s);
+  if (!(periods >= 1) || !(std::abs(slice_s - periods * loop.period_s) <= kPeriodTolerance * slice_s)) return;
+  // What is left of a cell of P periods T is at most 1e-12 P T long, and t - t_k - T/2 there at most T/2.
+  const double more = 8 * kPeriodTolerance * periods;
+  loop.slope1 = slope_of(loop.h1, loop.h2, 1, more);
+  loop.slope2 = slope_of(loop.h2, loop.has_lag ? loop.h3 : loop.direct_rest, 1, more);
+  if (loop.has_lag) {
+    loop.slope3 = one_lag_s > 0 ? slope_of(loop.h3, loop.direct_rest, up(1 / one_lag_s), more)
+                                : slope_of(loop.h3, h4, 1, more);
+  }
+  loop.has_whole_periods = loop.slope1 && loop.slope2 && (loop.slope3 || !loop.has_lag);
 }
 
 /// @param period_s of a sampled loop; 0: continuous.
@@ -55,14 +88,21 @@ ErrorLoop error_loop(const AxisLoop& loop, double period_s, double slice_s, int 
     result.direct_rest = cells(numerator);
     if (result.direct_rest) result.direct_rest_total = result.direct_rest->total();
   }
-  if (!result.has_lag) return result;
+  if (!result.has_lag) {
+    if (period_s > 0) add_slopes(slice_s, 0, std::nullopt, result);
+    return result;
+  }
   const Polynomial rest = stability::scaled(Polynomial(lag.begin() + 1, lag.end()), 1 / loop.mass_kg);
   result.g = cells(times_s_to(integrates, rest));
   result.g1 = cells(times_s_to(integrates + 1, rest));
   result.g2 = cells(times_s_to(integrates + 2, rest));
   result.h3 = cells(times_s_to(integrates + 2, unit));
-  if (period_s > 0 && result.h3) result.h3_total = result.h3->total();
-  if (period_s > 0 && result.g2) result.g2_total = result.g2->total();
+  if (period_s == 0) return result;
+  if (result.h3) result.h3_total = result.h3->total();
+  if (result.g2) result.g2_total = result.g2->total();
+  const bool has_one_lag = lag.size() == 2;
+  add_slopes(slice_s, has_one_lag ? lag[1] : 0,
+             has_one_lag ? std::nullopt : cells(times_s_to(integrates + 3, unit)), result);
   return result;
 }
 

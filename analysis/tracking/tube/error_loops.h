@@ -28,6 +28,13 @@ struct ErrorLoop {
   std::optional<stability::KernelCells> direct_rest;  ///< missing where the loop is continuous
   /// KernelCells::total() of these kernels where the loop is sampled, else 0.
   double direct_rest_total = 0, h3_total = 0, g2_total = 0;
+  /// Whether the cells of a sampled loop are whole periods of it. Then x = (t - t_k) y for t_k <= t < t_k + T with y in
+  /// [c - r, c + r] is, to a kernel k, T/2 y and a rest whose mean over each cell is 0. By parts,
+  ///   int k x  lies in  T/2 (c int k + [-r, r] int |k|) + [-1, 1] T^2/8 max|y| int |k'|   over a cell,
+  /// as the antiderivative of t - t_k - T/2 that is 0 at both ends of the cell is at most T^2/8. These are |k'| for
+  /// k = h', h'' and h'''. The last one is missing where there is no lag: e'' follows a force at once.
+  bool has_whole_periods = false;
+  std::optional<stability::KernelCells> slope1, slope2, slope3;
   bool has_lag = false;
   double mass_kg = 0;
   double Kp = 0, Kd = 0, Ki = 0;

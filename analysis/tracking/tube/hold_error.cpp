@@ -55,32 +55,39 @@ double hold_error_N(const ErrorLoop& loop, const LoopHistory& history, double pl
 }
 
 HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice) {
-  const double unknown = std::numeric_limits<double>::infinity();
-  const HeldAnswer nothing{Interval(-unknown, unknown), Interval(-unknown, unknown)};
+  const Interval unknown = stability::whole_line();
+  const HeldAnswer nothing{unknown, unknown, unknown, unknown.hi};
   const Interval T(loop.period_s);
   const Interval mass(loop.mass_kg);
+  const Interval per_N = mass * slice.per_N;
+  const Interval per_rising_N = mass * T * slice.per_rising_N;
   const Interval trapezoidal = Interval(loop.Ki) * T * T * slice.history.time_s / Interval(12);
-  const Interval per_acceleration = T * loop.Kd + trapezoidal;
   const Interval rest =
-      T * (Interval(slice.jerk_m_s3) +
-           Interval(loop.Ki) * (slice.history.position_m + T * slice.history.velocity_m_s) / Interval(2));
-  const double known_m_s2 = std::max(
-      {slice.acceleration_m_s2.mag(), slice.acceleration_before_m_s2.mag(), slice.largest_acceleration_m_s2});
-  const Interval left = Interval(1) - per_acceleration * slice.per_N * mass;
+      T * Interval(loop.Ki) * (slice.history.position_m + T * slice.history.velocity_m_s) / Interval(2);
+  const double near_m_s2 = std::max(slice.acceleration_m_s2.mag(), slice.acceleration_before_m_s2.mag());
+  const double ever_m_s2 = std::max(near_m_s2, slice.largest_acceleration_m_s2);
+  // more <= per_rising_N (Kp |e'| + sup|p_d'''| + Kd (near + more)) + per_N (rest + trapezoidal (ever + more))
+  const Interval left = Interval(1) - per_rising_N * loop.Kd - per_N * trapezoidal;
   if (!(left.lo > 0)) return nothing;
-  const double size_N =
-      (mass * (T * loop.Kp * slice.velocity_m_s.mag() + rest + per_acceleration * known_m_s2) /
-       Interval(left.lo))
-          .hi;
-  const double more_m_s2 = (Interval(slice.per_N) * size_N).hi;
+  const double more_m_s2 = ((per_rising_N * (Interval(loop.Kp) * slice.velocity_m_s.mag() + slice.jerk_m_s3 +
+                                             Interval(loop.Kd) * near_m_s2) +
+                             per_N * (rest + trapezoidal * ever_m_s2)) /
+                            Interval(left.lo))
+                               .hi;
   HeldAnswer result;
   result.acceleration_m_s2 = slice.acceleration_m_s2 + Interval(-more_m_s2, more_m_s2);
   const Interval slope =
       Interval(loop.Kp) * slice.velocity_m_s +
-      Interval(loop.Kd) * stability::hull(result.acceleration_m_s2, slice.acceleration_before_m_s2);
+      Interval(loop.Kd) * stability::hull(result.acceleration_m_s2, slice.acceleration_before_m_s2) +
+      Interval(-slice.jerk_m_s3, slice.jerk_m_s3);
   const double largest_m_s2 = std::max(slice.largest_acceleration_m_s2, result.acceleration_m_s2.mag());
   const double away = (rest + trapezoidal * largest_m_s2).hi;
   result.hold_N = mass * (Interval(0, T.hi) * slope + Interval(-away, away));
+  result.mean_N = result.hold_N;
+  if (loop.has_whole_periods) {
+    result.mean_N = mass * (T * slope / Interval(2) + Interval(-away, away));
+    result.sawtooth_N_s = (mass * T * T * slope.mag() / Interval(8)).hi;
+  }
   const bool is_known = std::isfinite(result.hold_N.lo) && std::isfinite(result.hold_N.hi);
   return is_known ? result : nothing;
 }

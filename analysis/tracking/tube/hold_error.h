@@ -42,18 +42,25 @@ struct HeldSlice {
   double largest_acceleration_m_s2 = 0;  ///< sup |e''| up to the slice's start
   double jerk_m_s3 = 0;                  ///< sup |p_d'''|
   double per_N = 0;                      ///< what |m x| <= 1 N in the slice adds to |e''| in it
+  double per_rising_N =
+      0;  ///< the same of |m x| <= (t - t_k)/T 1 N, where t_k is the last sample; at most per_N
 };
 
-/// Contains m x and e'' of the slice.
+/// What is known of m x and e'' in a slice.
 struct HeldAnswer {
-  Interval hold_N, acceleration_m_s2;
+  Interval hold_N, acceleration_m_s2;  ///< contain them
+  /// To the kernels m x is this force and a sawtooth of mean 0, whose integral is at most sawtooth_N_s: see
+  /// ErrorLoop::has_whole_periods. Where cells are no whole periods it is hold_N, without a sawtooth.
+  Interval mean_N;
+  double sawtooth_N_s = 0;
 };
 
 /// The same bound slice by slice and with its sign: as c(t) - c(t_k) = int_{t_k}^t (Kp e' + Kd e'') + the integral's
 /// part,
-///   x(t) lies in [0, T] (Kp E' + Kd E'') + [-1, 1] (T sup|p_d'''| + Ki (T/2 sup|e| + (T^2/2) sup|e'| + |R|)),
+///   x(t) lies in (t - t_k) Y + [-1, 1] Ki (T/2 sup|e| + (T^2/2) sup|e'| + |R|),
+///   Y = Kp E' + Kd E'' + [-1, 1] sup|p_d'''|,
 /// E' and E'' intervals of e' and e'' over the slice and a period before it. What x adds to E'' in its own slice is
-/// solved for as above. Both are infinite where nothing is known.
+/// solved for as above. All are infinite where nothing is known.
 HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice);
 
 /// At least what the firmware's sum T sum e(t_j) exceeds the largest |int e| by, m s; 0 where the loop is continuous.

@@ -119,11 +119,15 @@ class Trial {
   std::vector<std::array<ErrorHistory, 3>> others_;
 };
 
+double farthest_of(const Radii& radii) {
+  return std::max({radii.largest_position_m(0), radii.largest_position_m(1), radii.largest_position_m(2)});
+}
+
 }  // namespace
 
 double LeastTube::radius_m() const { return std::max({radius_m(0), radius_m(1), radius_m(2)}); }
 
-LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m) {
+LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m, double wanted_m) {
   LeastTube result;
   const Radii none = Radii::none(scene.vehicles());
   const auto prepared = [&](const Radii& largest) {
@@ -138,6 +142,14 @@ LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m) {
   // Without any deviation: below every tube.
   const Radii start = Trial(scene, bound, none, std::move(truth)).allowed(none);
   Radii largest = start.scaled(1.4, 1e-4);
+  if (farthest_of(largest) > wanted_m) {
+    result.why = fmt::format(
+        "the force error at the set points alone moves vehicles by {:.3g} m; tubes wider than {:.3g} m were "
+        "not "
+        "tried",
+        farthest_of(start), wanted_m);
+    return result;
+  }
   for (int i = 0; i < kMostTrials; ++i) {
     truth = prepared(largest);
     // What is proved already stays so when a later round is interrupted.
@@ -166,9 +178,7 @@ LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m) {
         "of one metre adds {:.3g} m to its own bound",
         radius_m, at_edge.largest_position_m(2), result.loop_gain);
     const Radii wider = larger(largest, reached).scaled(1.25, 0);
-    const double widest_m =
-        std::max({wider.largest_position_m(0), wider.largest_position_m(1), wider.largest_position_m(2)});
-    if (!(widest_m <= farthest_m)) break;
+    if (!(farthest_of(wider) <= std::min(farthest_m, wanted_m))) break;
     largest = wider;
   }
   if (result.proved) result.why.clear();

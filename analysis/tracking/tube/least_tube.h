@@ -1,6 +1,7 @@
 /// @file The least tube around a task's trajectories that a bound of the force error proves.
 #pragma once
 
+#include <limits>
 #include <string>
 
 #include "analysis/tracking/tube/force_bound.h"
@@ -36,6 +37,8 @@ struct LeastTube {
 /// error are prepared for a larger tube, and cheap inside it. A tube that is proved is the larger one of the next
 /// round. Only B(r) < r, evaluated with every rounding accounted for, proves anything.
 /// @param farthest_m gives up beyond this radius.
-LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m = 0.5);
+/// @param wanted_m a wider tube is of no use: gives up beyond it, and at once where B(0) leaves no room below it.
+LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m = 0.5,
+                     double wanted_m = std::numeric_limits<double>::infinity());
 
 }  // namespace swarmcert::analysis

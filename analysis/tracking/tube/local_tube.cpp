@@ -18,7 +18,7 @@ constexpr double kLocalBox = 1.6;
 /// times.
 constexpr int kSlicedParts = 4;
 /// How many times as wide as the tube slice by slice one radius for the whole flight may be.
-constexpr double kWidest = 4;
+constexpr double kWidest = 2.5;
 constexpr double kFarthest_m = 0.5;
 
 /// The bound of a row that has better constants is at most that of a row with worse ones: a tube proved by the latter
@@ -118,12 +118,11 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
     finer.boxes *= kSlicedParts;
     result.sliced = sliced_tube(scene, finer, tolerance_N);
     // What is much wider than a tube that is proved already adds nothing to it.
-    const double farthest_m = result.sliced.proved
-                                  ? std::min(kFarthest_m, kWidest * largest_position_m(result.sliced.radii()))
-                                  : kFarthest_m;
+    const double wanted_m = result.sliced.proved ? kWidest * largest_position_m(result.sliced.radii())
+                                                 : std::numeric_limits<double>::infinity();
     show(2, "tube of one radius");
     Enclosure enclosure(scene, with_progress);
-    result.one_radius = least_tube(scene, enclosure, farthest_m);
+    result.one_radius = least_tube(scene, enclosure, kFarthest_m, wanted_m);
   }
   // Constants of the network prove no tube of the sampled loop where the forces themselves do not.
   if (is_sampled && has_start && !is_cancelled() && !result.sliced.proved && !result.one_radius.proved) {

@@ -18,6 +18,14 @@ Interval snapped(Interval x) { return {std::floor(x.lo / kGrid) * kGrid, std::ce
 
 }  // namespace
 
+double whole_periods_s(double duration_s, double period_s, double longest_s) {
+  for (double periods = std::floor(longest_s / period_s * (1 + 1e-9)); periods >= 1; --periods) {
+    const double slices = duration_s / (periods * period_s);
+    if (std::abs(slices - std::round(slices)) < 1e-9 && std::round(slices) >= 1) return periods * period_s;
+  }
+  return longest_s;
+}
+
 Motion sliced(const stability::Task& task, int vehicles, double memory_s, double longest_s) {
   Motion motion;
   motion.vehicles = vehicles;

@@ -31,6 +31,10 @@ struct Motion {
 
 inline constexpr double kSlice_s = 0.0125;
 
+/// The longest slices of whole periods, at most `longest_s`, that divide `duration_s`; `longest_s` where there are
+/// none.
+double whole_periods_s(double duration_s, double period_s, double longest_s);
+
 /// Slices of at most `longest_s` that begin and end with the task's knots where these are multiples of it.
 /// @param memory_s how old the states are that a controller may act upon.
 /// @returns no slices where the task has no enclosure.

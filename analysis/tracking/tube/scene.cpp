@@ -106,7 +106,10 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
       network_age_s_(network_age_s),
       learned_(network, tracking.model.kind, vehicles - 1),
       truth_(truth, tracking.plant.largest_thrust_N),
-      motion_(sliced(task, vehicles, network_age_s, longest_slice_s)),
+      motion_(sliced(task, vehicles, network_age_s,
+                     is_sampled && tracking.gains.rate_hz > 0
+                         ? whole_periods_s(task.duration_s(), 1 / tracking.gains.rate_hz, longest_slice_s)
+                         : longest_slice_s)),
       loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices, is_sampled)
                                 : ErrorLoops{}),
       excess_N_(static_cast<std::size_t>(vehicles), Interval(0)) {

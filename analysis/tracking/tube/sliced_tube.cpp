@@ -54,7 +54,9 @@ Deviations hull_of(const Deviations& a, const Deviations& b) {
 /// Signals of one vehicle and axis, and what all but the present slice do to the error.
 struct Axis {
   const ErrorLoop* loop = nullptr;
-  std::vector<Interval> force, lagging;  ///< d and w, slices so far
+  std::vector<Interval> force, lagging;  ///< d and w, slices so far; of m x the part HeldAnswer::mean_N
+  std::vector<Interval> whole_force;     ///< d with all of m x
+  std::vector<Interval> sawtooth;        ///< +- HeldAnswer::sawtooth_N_s
   std::vector<Interval> acceleration;    ///< e'', likewise
   LoopHistory met;                       ///< likewise
   const LagStart* start = nullptr;       ///< of the rotors; null: there is none
@@ -67,6 +69,10 @@ struct Axis {
     position_m = answer_to_past(*loop->h1, force, n);
     velocity_m_s = answer_to_past(*loop->h2, force, n);
     if (loop->period_s > 0) begin_acceleration(n);
+    if (loop->has_whole_periods) {
+      position_m += answer_to_past(*loop->slope1, sawtooth, n);
+      velocity_m_s += answer_to_past(*loop->slope2, sawtooth, n);
+    }
     if (!loop->has_lag) return;
     if (start != nullptr) {
       position_m += excess_N * start->position_m[n];
@@ -76,12 +82,15 @@ struct Axis {
     velocity_m_s += answer_to_past(*loop->g2, lagging, n);
   }
 
+  static Interval last(const std::vector<Interval>& past) { return past.empty() ? Interval(0) : past.back(); }
+
   void begin_acceleration(std::size_t n) {
     if (!loop->has_lag) {
-      acceleration_m_s2 = -answer_to_past(*loop->direct_rest, force, n);
+      acceleration_m_s2 = -answer_to_past(*loop->direct_rest, whole_force, n);
       return;
     }
     acceleration_m_s2 = answer_to_past(*loop->h3, force, n) - answer_to_past(*loop->direct_rest, lagging, n);
+    if (loop->has_whole_periods) acceleration_m_s2 += answer_to_past(*loop->slope3, sawtooth, n);
     if (start != nullptr) acceleration_m_s2 += excess_N * start->acceleration_m_s2[n];
   }
 
@@ -91,7 +100,7 @@ struct Axis {
                   std::size_t back) const {
     const std::size_t n = force.size();
     const auto with_last = [](Interval now, const std::vector<Interval>& past) {
-      return stability::hull(now, past.empty() ? Interval(0) : past.back());
+      return stability::hull(now, last(past));
     };
     const Interval direct = Interval(1) / loop->mass_kg;
     HeldSlice slice;
@@ -102,11 +111,17 @@ struct Axis {
     if (loop->has_lag) {
       slice.acceleration_m_s2 = acceleration_m_s2 + stability::answer(*loop->h3, 0, with_last(d, force)) +
                                 direct * w - stability::answer(rest, 0, with_last(w, lagging));
-      slice.per_N = loop->h3->integral[0];
+      slice.per_N = slice.per_rising_N = loop->h3->integral[0];
+      if (loop->has_whole_periods) {
+        slice.acceleration_m_s2 += stability::answer(*loop->slope3, 0, last(sawtooth));
+        slice.per_rising_N = std::min(
+            slice.per_N,
+            up(up(loop->h3->integral[0] / 2) + up(up(loop->period_s / 8) * loop->slope3->integral[0])));
+      }
     } else {
       slice.acceleration_m_s2 =
-          acceleration_m_s2 + direct * d - stability::answer(rest, 0, with_last(d, force));
-      slice.per_N = (direct + rest.integral[0]).hi;
+          acceleration_m_s2 + direct * d - stability::answer(rest, 0, with_last(d, whole_force));
+      slice.per_N = slice.per_rising_N = (direct + rest.integral[0]).hi;
     }
     slice.acceleration_before_m_s2 = slice.acceleration_m_s2;
     for (std::size_t k = n - std::min(back, n); k < n; ++k) {
@@ -117,13 +132,18 @@ struct Axis {
     return hold_error(*loop, slice);
   }
 
-  /// The errors of this slice if its signals are these.
-  void answer(Interval d, Interval w, Interval& position, Interval& velocity) const {
-    const Interval both_d = stability::hull(d, force.empty() ? Interval(0) : force.back());
+  /// The errors of this slice if its signals are these. @param saw bounds the integral of the sawtooth in d, N s.
+  void answer(Interval d, Interval w, double saw, Interval& position, Interval& velocity) const {
+    const Interval both_d = stability::hull(d, last(force));
     position = position_m + stability::answer(*loop->h1, 0, both_d);
     velocity = velocity_m_s + stability::answer(*loop->h2, 0, both_d);
+    if (loop->has_whole_periods) {
+      const Interval both_saw = stability::hull(Interval(-saw, saw), last(sawtooth));
+      position += stability::answer(*loop->slope1, 0, both_saw);
+      velocity += stability::answer(*loop->slope2, 0, both_saw);
+    }
     if (!loop->has_lag) return;
-    const Interval both_w = stability::hull(w, lagging.empty() ? Interval(0) : lagging.back());
+    const Interval both_w = stability::hull(w, last(lagging));
     position += stability::answer(*loop->g1, 0, both_w);
     velocity += stability::answer(*loop->g2, 0, both_w);
   }
@@ -220,15 +240,15 @@ class Sweep {
 
   Interval force(const Signal& signal, std::size_t axis) const {
     const Interval known = known_force(signal, axis);
-    return scene_.loops().is_sampled() ? known + signal.held[axis].hold_N : known;
+    return scene_.loops().is_sampled() ? known + signal.held[axis].mean_N : known;
   }
 
   Deviations answers(const Signals& signals) const {
     Deviations result(signals.size());
     for (std::size_t i = 0; i < signals.size(); ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
-        axes_[i][k].answer(force(signals[i], k), signals[i].lagging_N[k], result[i].position_m[k],
-                           result[i].velocity_m_s[k]);
+        axes_[i][k].answer(force(signals[i], k), signals[i].lagging_N[k], signals[i].held[k].sawtooth_N_s,
+                           result[i].position_m[k], result[i].velocity_m_s[k]);
       }
     }
     return result;
@@ -237,11 +257,14 @@ class Sweep {
   void keep(const Signals& signals, const Deviations& answered, SlicedTube& tube) {
     for (std::size_t i = 0; i < signals.size(); ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
+        const HeldAnswer& held = signals[i].held[k];
         axes_[i][k].force.push_back(force(signals[i], k));
+        axes_[i][k].whole_force.push_back(known_force(signals[i], k) + held.hold_N);
+        axes_[i][k].sawtooth.emplace_back(-held.sawtooth_N_s, held.sawtooth_N_s);
         axes_[i][k].lagging.push_back(signals[i].lagging_N[k]);
         axes_[i][k].met = signals[i].met[k];
-        axes_[i][k].acceleration.push_back(signals[i].held[k].acceleration_m_s2);
-        tube.hold_N[i][k].push_back(signals[i].held[k].hold_N.mag());
+        axes_[i][k].acceleration.push_back(held.acceleration_m_s2);
+        tube.hold_N[i][k].push_back(held.hold_N.mag());
       }
       tube.force_error_N[i].push_back(signals[i].difference_N);
       tube.truth[i].push_back(signals[i].truth);
