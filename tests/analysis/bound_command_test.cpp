@@ -313,7 +313,7 @@ TEST(BoundCommand, WhatABoundWouldLeaveOutIsRefused) {
                            "/stability/models/crazyflie-small-effects.toml";
   for (const std::string& options :
        {std::string(" --amplitude 0.1 --tube --initial-error 0.1"), task + " --bias 0.1",
-        task + " --position-error 0.01", std::string(" --bias 1,2"), std::string(" --bias 1,2,3,4"),
+        task + " --velocity-error-rate 0.1", std::string(" --bias 1,2"), std::string(" --bias 1,2,3,4"),
         std::string(" --bias nan"), std::string(" --velocity-error -1"), std::string(" --position-error 1x"),
         std::string(" --initial-error -0.1")}) {
     const Outcome outcome = run_shell("swarmcert bound" + setup + options, folder.path());

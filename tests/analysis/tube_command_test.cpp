@@ -109,6 +109,28 @@ TEST(TubeCommand, ProvesTheGainsThatFlewAndThreeVehicles) {
   }
 }
 
+TEST(TubeCommand, ErrorsOfTheEstimatesAreInTheTubeAndInWhatItSays) {
+  const ScratchFolder folder;
+  const std::string command = bound("composite.toml") + kNetwork + kTruth +
+                              " --tube --task swap --duration 2 --json out.json --force";
+  double last_m = 0;
+  for (const std::string errors :
+       {"", " --velocity-error 0.01,0.01,0.02", " --velocity-error 0.02 --position-error 0.004"}) {
+    ASSERT_EQ(run_shell(command + errors, folder.path()).exit_code, 0) << errors;
+    const Json tube = files::parse_json(read_text(folder / "out.json"), "out.json")["local_tube"];
+    EXPECT_EQ(tube["verdict"], "proved");
+    EXPECT_GT(tube["radius_xyz_m"][2].get<double>(), last_m) << errors;
+    last_m = tube["radius_xyz_m"][2].get<double>();
+    EXPECT_EQ(tube["velocity_error_m_s"][2], errors.empty() ? 0 : 0.02);
+    EXPECT_EQ(tube["position_error_m"][0], errors.find("position") == std::string::npos ? 0 : 0.004);
+    const std::string name =
+        errors.empty() ? "exact position and velocity" : "errors of the estimates stay within their bounds";
+    int said = 0;
+    for (const Json& a : tube["assumptions"]) said += a["name"] == name ? 1 : 0;
+    EXPECT_EQ(said, 1) << errors;
+  }
+}
+
 TEST(TubeCommand, TheResultDoesNotDependOnTheThreads) {
   const ScratchFolder folder;
   const std::string command =

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "analysis/tracking/tube/error_loops.h"
 #include "stability/bounds/axis_loop.h"
 #include "stability/bounds/sampled_loop.h"
 #include "stability/tasks/task.h"
@@ -15,7 +16,8 @@
 namespace swarmcert::tests {
 
 /// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts
-/// is random; predictions reach the controller late.
+/// is random; predictions reach the controller late. Errors of the estimates switch between plus and minus their bounds
+/// at random rates, each on its own, or stand still.
 class AxesFlight {
  public:
   /// Called with the time, the vehicle, e and e'.
@@ -23,8 +25,9 @@ class AxesFlight {
 
   AxesFlight(const stability::TrackingSetup& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles,
-             bool is_sampled = false)
-      : gains_(tracking.gains),
+             bool is_sampled = false, const analysis::EstimateErrors& estimates = {})
+      : estimates_(estimates),
+        gains_(tracking.gains),
         task_(task),
         vehicles_(vehicles),
         is_sampled_(is_sampled),
@@ -38,11 +41,12 @@ class AxesFlight {
 
   void fly(files::Random& random, const Look& look) {
     std::vector<Vehicle> now(static_cast<std::size_t>(vehicles_));
+    draw_switching(random);
     const double period_s = gains_.network_rate_hz > 0 ? 1 / gains_.network_rate_hz : 0;
     std::vector<double> next_s, predicted, acting;
     for (int i = 0; i < vehicles_; ++i) {
       next_s.push_back(std::round(between(random, 0, period_s) / kStep_s) * kStep_s);
-      predicted.push_back(forces_.learned(forces_.at(state(now, i, 0), vehicles_ - 1)));
+      predicted.push_back(forces_.learned(forces_.at(state(now, i, 0, true), vehicles_ - 1)));
     }
     acting = predicted;
     const int every = is_sampled_ ? static_cast<int>(std::lround(1 / (gains_.rate_hz * kStep_s))) : 0;
@@ -53,7 +57,7 @@ class AxesFlight {
       for (int i = 0; i < vehicles_ && period_s > 0; ++i) {
         const auto at = static_cast<std::size_t>(i);
         if (t > next_s[at] - kStep_s / 2) {
-          predicted[at] = forces_.learned(forces_.at(state(now, i, t), vehicles_ - 1));
+          predicted[at] = forces_.learned(forces_.at(state(now, i, t, true), vehicles_ - 1));
           next_s[at] += period_s;
         }
         // next_s - period_s is when the last prediction was made.
@@ -62,10 +66,10 @@ class AxesFlight {
       for (int i = 0; i < vehicles_ && every > 0 && s % every == 0; ++i) {
         const auto at = static_cast<std::size_t>(i);
         const double learned =
-            period_s > 0 ? acting[at] : forces_.learned(forces_.at(state(now, i, t), vehicles_ - 1));
+            period_s > 0 ? acting[at] : forces_.learned(forces_.at(state(now, i, t, true), vehicles_ - 1));
         for (std::size_t k = 0; k < 3; ++k) {
-          sums[at][k] += every * kStep_s * now[at][k][0];
-          Axis sampled = now[at][k];
+          Axis sampled = estimated(now[at][k], i, k, t);
+          sums[at][k] += every * kStep_s * sampled[0];
           sampled[2] = sums[at][k];
           held[at][k] = command(sampled, k, task_.at(i, t).a_W_m_s2, learned);
         }
@@ -74,10 +78,11 @@ class AxesFlight {
         std::vector<Vehicle> result(x.size());
         for (int i = 0; i < vehicles_; ++i) {
           const auto at = static_cast<std::size_t>(i);
-          const stability::Instant instant = forces_.at(state(x, i, time_s), vehicles_ - 1);
-          result[at] = derivative(x[at], task_.at(i, time_s).a_W_m_s2, forces_.truth(instant),
-                                  period_s > 0 ? acting[at] : forces_.learned(instant),
-                                  every > 0 ? &held[at] : nullptr);
+          const Eigen::Vector3d force = forces_.truth(forces_.at(state(x, i, time_s), vehicles_ - 1));
+          const double learned = period_s > 0
+                                     ? acting[at]
+                                     : forces_.learned(forces_.at(state(x, i, time_s, true), vehicles_ - 1));
+          result[at] = derivative(x[at], i, time_s, force, learned, every > 0 ? &held[at] : nullptr);
         }
         return result;
       };
@@ -113,16 +118,44 @@ class AxesFlight {
            (k == 2 ? learned : 0);
   }
 
+  void draw_switching(files::Random& random) {
+    switching_.assign(static_cast<std::size_t>(vehicles_), {});
+    for (auto& of_vehicle : switching_) {
+      for (Switching& s : of_vehicle) {
+        // From one switch in twenty seconds, which is none, to ten per second.
+        s.rate_1_s = 0.05 * std::pow(200.0, between(random, 0, 1));
+        s.phase = between(random, 0, 2);
+      }
+    }
+  }
+
+  /// @param quantity 0 to 2: position; 3 to 5: velocity.
+  double estimate_error(int vehicle, std::size_t quantity, double time_s) const {
+    const std::size_t k = quantity % 3;
+    const double size = quantity < 3 ? estimates_.position_m[k] : estimates_.velocity_m_s[k];
+    const Switching& s = switching_[static_cast<std::size_t>(vehicle)][quantity];
+    return std::fmod(s.rate_1_s * time_s + s.phase, 2) < 1 ? size : -size;
+  }
+
+  /// What the law is told of an axis.
+  Axis estimated(Axis a, int vehicle, std::size_t k, double time_s) const {
+    a[0] += estimate_error(vehicle, k, time_s);
+    a[1] += estimate_error(vehicle, k + 3, time_s);
+    return a;
+  }
+
   /// @param held the command along each axis; null: it follows the state.
-  Vehicle derivative(const Vehicle& x, const Eigen::Vector3d& planned, const Eigen::Vector3d& force,
+  Vehicle derivative(const Vehicle& x, int vehicle, double time_s, const Eigen::Vector3d& force,
                      double learned, const std::array<double, 3>* held) const {
     Vehicle result{};
+    const Eigen::Vector3d planned = task_.at(vehicle, time_s).a_W_m_s2;
     for (int k = 0; k < 3; ++k) {
       const auto at = static_cast<std::size_t>(k);
       const stability::AxisLoop& loop = loops_[at];
       const Axis& a = x[at];
       Axis& d = result[at];
-      double applied = held != nullptr ? (*held)[at] : command(a, at, planned, learned);
+      const Axis told = estimated(a, vehicle, at, time_s);
+      double applied = held != nullptr ? (*held)[at] : command(told, at, planned, learned);
       std::size_t c = 3;
       for (const double tau_s : loop.lags_s) {
         if (tau_s <= 0) continue;
@@ -131,16 +164,19 @@ class AxesFlight {
       }
       d[0] = a[1];
       d[1] = (applied + force[k]) / loop.mass_kg - planned[k];
-      d[2] = a[0];
+      d[2] = told[0];
     }
     return result;
   }
 
-  std::vector<double> state(const std::vector<Vehicle>& x, int vehicle, double time_s) const {
+  /// @param is_told with the errors of the estimates.
+  std::vector<double> state(const std::vector<Vehicle>& x, int vehicle, double time_s,
+                            bool is_told = false) const {
     const auto place = [&](int i, bool is_velocity) {
       const stability::Setpoint goal = task_.at(i, time_s);
-      const Vehicle& v = x[static_cast<std::size_t>(i)];
+      Vehicle v = x[static_cast<std::size_t>(i)];
       const std::size_t c = is_velocity ? 1 : 0;
+      for (std::size_t k = 0; is_told && k < 3; ++k) v[k] = estimated(v[k], i, k, time_s);
       return Eigen::Vector3d((is_velocity ? goal.v_W_m_s : goal.p_W_m) +
                              Eigen::Vector3d(v[0][c], v[1][c], v[2][c]));
     };
@@ -157,6 +193,12 @@ class AxesFlight {
     return result;
   }
 
+  struct Switching {
+    double rate_1_s = 0, phase = 0;
+  };
+
+  analysis::EstimateErrors estimates_;
+  std::vector<std::array<Switching, 6>> switching_;  ///< per vehicle and quantity
   const stability::Gains& gains_;
   const stability::Task& task_;
   int vehicles_;

@@ -27,10 +27,11 @@ struct Seen {
 };
 
 Seen fly(const stability::TrackingSetup& loop, const stability::Model& truth, const stability::Task& task,
-         const SlicedTube& tube, double slice_s, int flights, bool is_sampled = false) {
+         const SlicedTube& tube, double slice_s, int flights, bool is_sampled = false,
+         const EstimateErrors& estimates = {}) {
   const int vehicles = static_cast<int>(tube.slices.front().size());
   const files::Network network = tests::demo_network();
-  tests::AxesFlight flight(loop, truth, network, task, vehicles, is_sampled);
+  tests::AxesFlight flight(loop, truth, network, task, vehicles, is_sampled, estimates);
   files::Random random(11);
   Seen seen;
   const auto check = [&seen](Interval range, double value) {
@@ -124,6 +125,36 @@ TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOn
       EXPECT_GE(radius_m[1][k], radius_m[0][k]) << k;
       EXPECT_LE(radius_m[1][k], most * radius_m[0][k]) << k;
     }
+  }
+}
+
+TEST(SlicedTube, HoldsFlightsWhoseEstimatesAreWrongWithinTheirBounds) {
+  const files::Network network = tests::demo_network();
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  struct WrongEstimates {
+    const char* gains;
+    bool is_sampled;
+    EstimateErrors estimates;
+  };
+  for (const WrongEstimates& c :
+       {WrongEstimates{"composite", false, {{0.005, 0.005, 0.005}, {0.001, 0.001, 0.002}}},
+        WrongEstimates{"crazyflie-small", false, {{0.01, 0.01, 0.01}, {0, 0, 0}}},
+        WrongEstimates{"crazyflie-small", true, {{0, 0, 0}, {0.003, 0.002, 0.002}}},
+        WrongEstimates{"firmware-defaults", true, {{0.02, 0.01, 0.02}, {0.002, 0.001, 0.001}}}}) {
+    SCOPED_TRACE(c.gains + std::string(c.is_sampled ? ", sampled" : ", continuous"));
+    const stability::TrackingSetup loop = tests::loop_of(c.gains);
+    const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, c.is_sampled),
+                      kSlice_s, c.is_sampled, c.estimates);
+    const SlicedTube tube = sliced_tube(scene, boxes(4), kTolerance_N);
+    ASSERT_TRUE(tube.proved) << tube.why;
+    const double slice_s = scene.motion().slice_s;
+    const Seen seen = fly(loop, tests::truth_model(), *task, tube, slice_s, 3, c.is_sampled, c.estimates);
+    EXPECT_EQ(seen.outside, 0) << "of " << seen.looks;
+    EXPECT_GT(seen.nearest, 0.4) << "a tube that no flight comes near to would hide a fault";
+    EstimateErrors larger = c.estimates;
+    for (double* const sizes : {larger.velocity_m_s, larger.position_m})
+      for (int k = 0; k < 3; ++k) sizes[k] *= 4;
+    EXPECT_GT(fly(loop, tests::truth_model(), *task, tube, slice_s, 1, c.is_sampled, larger).outside, 0);
   }
 }
 

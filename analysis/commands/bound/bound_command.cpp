@@ -76,18 +76,14 @@ void refuse_jerk_of_scaled_thrust(const stability::DisturbanceSource& source, co
   }
 }
 
-/// The tubes start from rest; the tube around a task knows exact estimates, and no force but that of the declared
-/// truth. What they or the swarm bound would leave out is refused.
+/// The tubes start from rest; the tube around a task knows no force but that of the declared truth. What they or the
+/// swarm bound would leave out is refused.
 void refuse_what_is_left_out(const BoundOptions& options, const stability::DisturbanceSource& source) {
   const auto refuse = [](const char* what, const char* without) {
     throw UsageError(fmt::format("{} does not contain {}: leave one of them out", what, without));
   };
   const bool has_task = !options.task.task.empty();
   const char* const asked = has_task ? "--tube --task" : options.tube ? "--tube" : nullptr;
-  const char* const estimates = source.kind == "measured" && !source.declares_velocity_error
-                                    ? "the error of the velocity that was measured (--velocity-error 0)"
-                                    : "--velocity-error and --position-error";
-  if (has_task && source.has_estimate_errors()) refuse(asked, estimates);
   if (source.thrust_ratio_error > 0 && (asked != nullptr || !options.swarm.empty()))
     refuse(asked != nullptr ? asked : "--swarm", "--thrust-ratio-error");
   if ((asked != nullptr || !options.swarm.empty()) && source.has_moving_reference()) {
@@ -97,7 +93,11 @@ void refuse_what_is_left_out(const BoundOptions& options, const stability::Distu
   if (asked != nullptr && has_initial(options.initial)) {
     refuse(asked, "--initial-error, --initial-speed and --initial-learning-error, as it starts from rest");
   }
-  if (has_task && (source.kind == "declared" || source.kind == "measured")) {
+  const auto has_force = [&source](int axis) {
+    return source.axis[axis].amplitude_N != 0 || source.bias_N[axis] != 0;
+  };
+  if (has_task && (source.kind == "measured" ||
+                   (source.kind == "declared" && (has_force(0) || has_force(1) || has_force(2))))) {
     refuse(asked, "the force error of --rate, --amplitude, --edge, --impulse, --bias or --from");
   }
 }
@@ -186,7 +186,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   const stability::DisturbanceSource& source = disturbance.source;
   std::optional<LocalTube> local;
   if (!options.task.task.empty())
-    local = load_local_tube(options.task, options.disturbance, input, common, inputs);
+    local = load_local_tube(options.task, options.disturbance, input, source, common, inputs);
   stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
   const FloatErrors float32 = float_errors(input, report);
   for (stability::AxisBounds& row : report.bounds) row.float32_m = float32.tracking_error_m[row.axis];

@@ -72,8 +72,10 @@ std::string radius_text(const Json& value) {
 }  // namespace
 
 void declare_tube(CLI::App& app, TubeArguments& arguments) {
-  auto* task = app.add_option("--task", arguments.task,
-                              "Task for --tube (swap, hover); requires --network and --truth");
+  auto* task = app.add_option(
+      "--task", arguments.task,
+      "Task for --tube (swap, hover); requires --network and --truth, contains --velocity-error and "
+      "--position-error");
   app.add_option("--vehicles", arguments.vehicles, "Number of vehicles that fly --task (default 2)")
       ->check(CLI::Range(2, 10))
       ->needs(task);
@@ -84,8 +86,8 @@ void declare_tube(CLI::App& app, TubeArguments& arguments) {
 }
 
 LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
-                          const Tracking& tracking, const CommonOptions& common,
-                          std::vector<std::string>& inputs) {
+                          const Tracking& tracking, const stability::DisturbanceSource& estimates,
+                          const CommonOptions& common, std::vector<std::string>& inputs) {
   const std::vector<std::string> tasks = stability::task_names();
   if (std::find(tasks.begin(), tasks.end(), arguments.task) == tasks.end()) {
     throw UsageError("unknown task " + arguments.task + ": " + files::did_you_mean(arguments.task, tasks));
@@ -117,6 +119,15 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
   options.enclosure.boxes = std::max(1, 2 * options.enclosure.boxes / pairs);
   options.enclosure.jobs = common.jobs;
   options.enclosure.cancelled = interrupt.flag();
+  for (int k = 0; k < 3; ++k) {
+    options.estimates.velocity_m_s[k] = estimates.velocity_error[k].largest();
+    options.estimates.position_m[k] = estimates.position_error[k].largest();
+    if (!std::isfinite(options.estimates.velocity_m_s[k] + options.estimates.position_m[k])) {
+      throw UsageError(
+          "--tube --task needs how large the errors of the estimates are: add --velocity-error V and "
+          "--position-error P");
+    }
+  }
   options.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
   };
@@ -127,7 +138,9 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
   Json json = {{"task", arguments.task},
                {"vehicles", arguments.vehicles},
                {"duration_s", tube.duration_s},
-               {"loop", tube.is_sampled ? "sampled" : "continuous"}};
+               {"loop", tube.is_sampled ? "sampled" : "continuous"},
+               {"velocity_error_m_s", tube.estimates.velocity_m_s},
+               {"position_error_m", tube.estimates.position_m}};
   LeastTube shown = tube.tube;
   shown.proved = tube.proved;
   shown.why = tube.why;

@@ -21,10 +21,11 @@ struct TubeArguments {
 void declare_tube(CLI::App& app, TubeArguments& arguments);
 
 /// Reads the network and the truth that `disturbance` names and looks for the tube, with progress.
+/// @param estimates whose velocity_error and position_error are known; nothing else of it is read.
 /// @throws UsageError where network, truth or task are missing or make no sense; files::InputError for bad files.
 LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
-                          const Tracking& tracking, const CommonOptions& common,
-                          std::vector<std::string>& inputs);
+                          const Tracking& tracking, const stability::DisturbanceSource& estimates,
+                          const CommonOptions& common, std::vector<std::string>& inputs);
 
 files::Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube);
 void print_local_tube(const files::Json& tube);

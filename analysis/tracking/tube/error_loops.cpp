@@ -88,6 +88,11 @@ ErrorLoop error_loop(const AxisLoop& loop, double period_s, double slice_s, int 
     result.direct_rest = cells(numerator);
     if (result.direct_rest) result.direct_rest_total = result.direct_rest->total();
   }
+  if (integrates == 1) {
+    Polynomial numerator = times_s_to(2, lag);
+    numerator[1] += loop.Kd;
+    result.demand = cells(numerator);
+  }
   if (!result.has_lag) {
     if (period_s > 0) add_slopes(slice_s, 0, std::nullopt, result);
     return result;
@@ -194,6 +199,35 @@ LagStart lag_start(const ErrorLoop& loop, double slice_s) {
   result.velocity_m_s = values(*loop.h2, *loop.h3);
   // With one lag h'''' = -direct_rest/tau.
   if (loop.direct_rest) result.acceleration_m_s2 = values(*loop.h3, *loop.direct_rest, Interval(1) / tau_s);
+  return result;
+}
+
+bool EstimateErrors::are_zero() const {
+  for (int k = 0; k < 3; ++k)
+    if (velocity_m_s[k] != 0 || position_m[k] != 0) return false;
+  return true;
+}
+
+EstimateAnswer estimate_answer(const ErrorLoop& loop, double velocity_m_s, double position_m,
+                               std::size_t slices) {
+  EstimateAnswer result;
+  const Interval by_position = Interval(loop.Kp) + Interval(loop.Ki) * loop.period_s;
+  result.force_N =
+      (Interval(loop.mass_kg) * (Interval(loop.Kd) * velocity_m_s + by_position * position_m)).hi;
+  const double integrated_N = (Interval(loop.mass_kg) * loop.Ki * position_m).hi;
+  const auto of = [slices](const std::optional<KernelCells>& kernel, double size) {
+    return size > 0 ? convolved(*kernel, std::vector<double>(slices, size))
+                    : std::vector<double>(slices, 0.0);
+  };
+  result.errors = {of(loop.h1, result.force_N), of(loop.h2, result.force_N)};
+  result.errors.add({of(loop.h, integrated_N), of(loop.h1, integrated_N)});
+  if (loop.period_s == 0) return result;
+  // Without a lag e'' follows a force at once, and then feeds back.
+  result.acceleration_m_s2 = of(loop.has_lag ? loop.h3 : loop.direct_rest, result.force_N);
+  const double at_once_m_s2 = loop.has_lag ? 0 : (Interval(result.force_N) / loop.mass_kg).hi;
+  const std::vector<double> integrated = of(loop.h2, integrated_N);
+  for (std::size_t n = 0; n < slices; ++n)
+    result.acceleration_m_s2[n] = up(up(result.acceleration_m_s2[n] + integrated[n]) + at_once_m_s2);
   return result;
 }
 

@@ -35,6 +35,8 @@ struct ErrorLoop {
   /// k = h', h'' and h'''. The last one is missing where there is no lag: e'' follows a force at once.
   bool has_whole_periods = false;
   std::optional<stability::KernelCells> slope1, slope2, slope3;
+  /// From an error n of the estimated position to int (e + n), m s per m: L^-1[s (s L + Kd)/D]; missing where Ki = 0.
+  std::optional<stability::KernelCells> demand;
   bool has_lag = false;
   double mass_kg = 0;
   double Kp = 0, Kd = 0, Ki = 0;
@@ -81,5 +83,24 @@ LagStart lag_start(const ErrorLoop& loop, double slice_s);
 /// derivative on.
 /// @param lagging the kernels g instead of h.
 ErrorHistory respond(const ErrorLoop& loop, bool lagging, const Signal& signal);
+
+/// Bounds of what is wrong with the position and the velocity that a vehicle's law and its network are given, axis by
+/// axis, at any time and of any course; those of its neighbours, which it is told, have the same.
+struct EstimateErrors {
+  double velocity_m_s[3] = {0, 0, 0}, position_m[3] = {0, 0, 0};
+  bool are_zero() const;
+};
+
+/// What errors of the estimates do to one axis, slice by slice: bounds of |e|, |e'| and, where the loop is sampled,
+/// |e''|. With errors v of the velocity and n of the position, which a sampled loop sees as staircases, the law's
+/// command is off by Kd v + Kp n + Ki int n, and where the loop is sampled its integrator by at most Ki T sup|n| more:
+///   |e| <= |h'| * m (Kd sup|v| + (Kp + Ki T) sup|n|) + |h| * m Ki sup|n|.
+struct EstimateAnswer {
+  ErrorHistory errors;
+  std::vector<double> acceleration_m_s2;  ///< empty where the loop is continuous
+  double force_N = 0;                     ///< m (Kd sup|v| + (Kp + Ki T) sup|n|)
+};
+EstimateAnswer estimate_answer(const ErrorLoop& loop, double velocity_m_s, double position_m,
+                               std::size_t slices);
 
 }  // namespace swarmcert::analysis

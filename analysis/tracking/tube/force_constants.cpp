@@ -80,7 +80,7 @@ std::vector<ForceConstants> local_constants(const files::Network& network, const
     box.upper.assign(components.size(), -kNoConstant);
   }
   for (const Stretch& stretch : scene.motion().stretches) {
-    const std::vector<Interval> states = scene.states(stretch, all_within(radii));
+    const std::vector<Interval> states = scene.seen_states(stretch, all_within(radii));
     lipschitz::Box& box = boxes[static_cast<std::size_t>(stretch.vehicle)];
     for (int n = 0; n + 1 < scene.vehicles(); ++n) {
       for (std::size_t k = 0; k < components.size(); ++k) {

@@ -80,7 +80,7 @@ ForceDifference::WakeForm ForceDifference::wake_form(const Box& box) const {
     states.emplace_back(box.lower[k], box.upper[k]);
     centre(static_cast<Index>(k)) = states[k].lo + (states[k].hi - states[k].lo) / 2;
   }
-  const std::vector<Offset> reach = scene_->offsets(states, all_);
+  const std::vector<Offset> reach = scene_->offsets(states, all_, true);
   const VectorXd zero = VectorXd::Zero(centre.size());
   WakeForm form{scene_->truth().wake(reach), scene_->truth().wake(offsets_at(centre)).value_N, centre, zero,
                 zero};
@@ -169,7 +169,7 @@ ForceDifference::Part ForceDifference::part(const Box& box, const LearnedForce::
 ForceDifference::ForceDifference(const Scene& scene, const Stretch& stretch, const Deviations& largest)
     : scene_(&scene),
       stretch_(&stretch),
-      all_(scene.states(stretch, largest)),
+      all_(scene.seen_states(stretch, largest)),
       rest_(scene.rest(stretch, largest, 0)) {
   parts_.push_back(std::make_shared<const Part>(part(box_of(all_), nullptr)));
 }
@@ -200,7 +200,7 @@ void ForceDifference::refine(int boxes, double tolerance_N, const std::atomic<bo
 }
 
 Interval ForceDifference::over(const Deviations& deviations) const {
-  const Box all = box_of(scene_->states(*stretch_, deviations));
+  const Box all = box_of(scene_->seen_states(*stretch_, deviations));
   double above = -kUnbounded;
   double below = -kUnbounded;
   for (const auto& part : parts_) {

@@ -9,10 +9,11 @@
 
 namespace swarmcert::analysis {
 
-/// f_hat(x(t - age)) - f_a(x(t)) for 0 <= age <= Scene::network_age_s(). On each part of a box, the network lies
-/// between linear forms by outward-rounded relaxation (Reach), the truth between its mean value forms f_a(x_0) + G (x -
-/// x_0) in intervals; their difference is one linear form, so that slopes which agree cancel. A form holds on its whole
-/// part: for smaller deviations its largest value over what is left of the part holds as well, and costs nothing.
+/// f_hat(x(t - age)) - f_a(x(t)) for 0 <= age <= Scene::network_age_s(), where the network is given x with errors of
+/// the estimates. On each part of a box, the network lies between linear forms by outward-rounded relaxation (Reach),
+/// the truth between its mean value forms f_a(x_0) + G (x - x_0) in intervals; their difference is one linear form, so
+/// that slopes which agree cancel. A form holds on its whole part: for smaller deviations its largest value over what
+/// is left of the part holds as well, and costs nothing.
 class ForceDifference {
  public:
   /// @param scene, stretch must outlive this. @param largest deviations for which it is made ready.

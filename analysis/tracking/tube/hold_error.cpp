@@ -16,14 +16,14 @@ AccelerationBound acceleration_bound(const ErrorLoop& loop, const LoopHistory& h
                                      double planned_at_start_m_s2, double excess_N) {
   const Interval direct = Interval(1) / loop.mass_kg;
   const Interval whole = direct + loop.direct_rest_total;
-  if (!loop.has_lag) return {whole * history.force_N, whole};
+  if (!loop.has_lag) return {whole * history.force_N + history.of_estimates_m_s2, whole};
   const Interval mass(loop.mass_kg);
   const Interval per_N(loop.h3_total);
   const Interval by_size = whole * mass * history.planned_m_s2;
   const Interval by_jerk =
       mass * (Interval(loop.g2_total) * history.jerk_m_s3 + Interval(loop.g2->peak) * planned_at_start_m_s2);
-  return {per_N * history.force_N + std::min(by_size.hi, by_jerk.hi) + whole * history.truth_N +
-              Interval(loop.lags_s) * loop.h3->peak * excess_N,
+  return {per_N * history.force_N + history.of_estimates_m_s2 + std::min(by_size.hi, by_jerk.hi) +
+              whole * history.truth_N + Interval(loop.lags_s) * loop.h3->peak * excess_N,
           per_N};
 }
 
@@ -32,7 +32,8 @@ AccelerationBound acceleration_bound(const ErrorLoop& loop, const LoopHistory& h
 void LoopHistory::add(const LoopHistory& later) {
   for (double LoopHistory::*const entry :
        {&LoopHistory::position_m, &LoopHistory::velocity_m_s, &LoopHistory::force_N, &LoopHistory::truth_N,
-        &LoopHistory::planned_m_s2, &LoopHistory::jerk_m_s3, &LoopHistory::time_s}) {
+        &LoopHistory::planned_m_s2, &LoopHistory::jerk_m_s3, &LoopHistory::time_s,
+        &LoopHistory::of_estimates_m_s2}) {
     // NaN, which bounds nothing, stays.
     if (!std::isnan(this->*entry) && !(later.*entry <= this->*entry)) this->*entry = later.*entry;
   }

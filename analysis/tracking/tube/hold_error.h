@@ -12,6 +12,7 @@ struct LoopHistory {
   double truth_N = 0;  ///< |f_a|
   double planned_m_s2 = 0, jerk_m_s3 = 0;  ///< |p_d''|, |p_d'''|
   double time_s = 0;
+  double of_estimates_m_s2 = 0;  ///< what errors of the estimates add to |e''|
 
   void add(const LoopHistory& later);  ///< the larger of both, entry by entry
 };

@@ -16,7 +16,8 @@ namespace swarmcert::analysis {
 
 struct LocalTubeOptions {
   EnclosureOptions enclosure;  ///< its progress is set here
-  int nodes = 100;             ///< boxes of branch and bound per local constant
+  EstimateErrors estimates;
+  int nodes = 100;  ///< boxes of branch and bound per local constant
   /// Steps done, of how many; what is being done. From any thread.
   std::function<void(int done, int total, const std::string& what)> progress;
 };
@@ -42,9 +43,10 @@ struct TubeRow {
 
 struct LocalTube {
   bool proved = false;
-  bool is_sampled = false;  ///< of the loop that holds its command over a period; else of a continuous one
-  std::string why;          ///< where not proved
-  LeastTube tube;           ///< the smallest that follows from all of the following together
+  bool is_sampled = false;   ///< of the loop that holds its command over a period; else of a continuous one
+  EstimateErrors estimates;  ///< for which it holds
+  std::string why;           ///< where not proved
+  LeastTube tube;            ///< the smallest that follows from all of the following together
   LeastTube
       one_radius;  ///< for the whole flight, from the difference of both forces or from the local constants
   SlicedTube sliced;  ///< from the difference of both forces, an interval per slice

@@ -101,7 +101,7 @@ double network_age_s(const stability::Gains& gains, bool is_sampled) {
 
 Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
-             double longest_slice_s, bool is_sampled)
+             double longest_slice_s, bool is_sampled, const EstimateErrors& estimates)
     : tracking_(tracking),
       network_age_s_(network_age_s),
       learned_(network, tracking.model.kind, vehicles - 1),
@@ -112,8 +112,15 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
                          : longest_slice_s)),
       loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices, is_sampled)
                                 : ErrorLoops{}),
+      estimates_(estimates),
       excess_N_(static_cast<std::size_t>(vehicles), Interval(0)) {
-  if (!refusal().empty() || !loops_.axis[2].has_lag) return;
+  if (!refusal().empty()) return;
+  for (std::size_t k = 0; k < 3; ++k) {
+    estimate_answers_[k] =
+        analysis::estimate_answer(loops_.axis[k], estimates.velocity_m_s[k], estimates.position_m[k],
+                                  static_cast<std::size_t>(motion_.slices));
+  }
+  if (!loops_.axis[2].has_lag) return;
   lag_start_z_ = lag_start(loops_.axis[2], motion_.slice_s);
   // Vehicles start at their set points; the prediction is what it differs from the truth, and the truth.
   const Deviations none = all_within(Radii::none(vehicles));
@@ -145,14 +152,32 @@ std::vector<Interval> Scene::states(const Stretch& stretch, const Deviations& de
   return states;
 }
 
-std::vector<Offset> Scene::offsets(const std::vector<Interval>& states,
-                                   const std::vector<Interval>& all) const {
+std::vector<Interval> Scene::seen_states(const Stretch& stretch, const Deviations& deviations) const {
+  std::vector<Interval> states = this->states(stretch, deviations);
+  if (estimates_.are_zero()) return states;
+  std::size_t at = 0;
+  for (int n = 0; n + 1 < vehicles(); ++n) {
+    // The vehicle's own error and its neighbour's.
+    for (std::size_t k = 0; k < 3; ++k, ++at) states[at] = widened(states[at], 2 * estimates_.position_m[k]);
+    for (std::size_t k = 0; k < 3; ++k, ++at)
+      states[at] = widened(states[at], 2 * estimates_.velocity_m_s[k]);
+  }
+  states[at] = widened(states[at], estimates_.position_m[2]);
+  for (std::size_t k = 0; k < 3; ++k)
+    states[at + 1 + k] = widened(states[at + 1 + k], estimates_.velocity_m_s[k]);
+  return states;
+}
+
+std::vector<Offset> Scene::offsets(const std::vector<Interval>& states, const std::vector<Interval>& all,
+                                   bool are_seen) const {
   std::vector<Offset> result;
   for (int n = 0; n + 1 < vehicles(); ++n) {
     const auto at = static_cast<std::size_t>(n * kPerNeighbour);
     Offset offset;
-    for (std::size_t k = 0; k < 3; ++k)
-      offset[k] = widened(states[at + k], up(network_age_s_ * all[at + 3 + k].mag()));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double aged_m = up(network_age_s_ * all[at + 3 + k].mag());
+      offset[k] = widened(states[at + k], are_seen ? up(aged_m + 2 * estimates_.position_m[k]) : aged_m);
+    }
     result.push_back(offset);
   }
   return result;
@@ -210,6 +235,7 @@ std::array<ErrorHistory, 3> Scene::other_errors(int vehicle, const std::vector<T
     result[axis].add(respond(loop, true, force));
     if (axis < 2) result[axis].add(respond(loop, false, force));
     if (axis == 2 && loop.has_lag) result[axis].add(start_errors(vehicle));
+    result[axis].add(estimate_answers_[axis].errors);
   }
   return result;
 }
@@ -234,6 +260,9 @@ LoopHistory Scene::in_slice(const Stretch& stretch, int slice, std::size_t axis,
   history.planned_m_s2 = stretch.acceleration_m_s2[axis].mag();
   history.jerk_m_s3 = stretch.jerk_m_s3[axis];
   history.time_s = (slice + 1) * motion_.slice_s * (1 + 1e-12);
+  const std::vector<double>& of_estimates_m_s2 = estimate_answers_[axis].acceleration_m_s2;
+  if (!of_estimates_m_s2.empty())
+    history.of_estimates_m_s2 = of_estimates_m_s2[static_cast<std::size_t>(slice)];
   return history;
 }
 

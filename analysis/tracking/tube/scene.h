@@ -53,10 +53,11 @@ class Scene {
  public:
   /// @param network_age_s how old the states are, at most, that a prediction rests on when it acts.
   /// @param is_sampled see error_loops().
+  /// @param estimates what is wrong with what every vehicle knows of itself and is told by others.
   /// @throws files::InputError as LearnedForce.
   Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
         const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
-        double longest_slice_s = kSlice_s, bool is_sampled = false);
+        double longest_slice_s = kSlice_s, bool is_sampled = false, const EstimateErrors& estimates = {});
 
   const stability::TrackingSetup& tracking() const { return tracking_; }
   const LearnedForce& learned() const { return learned_; }
@@ -64,15 +65,22 @@ class Scene {
   const Motion& motion() const { return motion_; }
   const ErrorLoops& loops() const { return loops_; }
   double network_age_s() const { return network_age_s_; }
+  const EstimateErrors& estimates() const { return estimates_; }
+  /// What these do to each axis of every vehicle.
+  const EstimateAnswer& estimate_answer(std::size_t axis) const { return estimate_answers_[axis]; }
   int vehicles() const { return motion_.vehicles; }
   /// Why nothing can be said; empty otherwise.
   std::string refusal() const;
 
   /// Every state that a vehicle can meet in a stretch while all are within `radii`.
   std::vector<Interval> states(const Stretch& stretch, const Deviations& deviations) const;
-  /// Offsets of the neighbours, of `states` and of what these become within network_age_s.
+  /// The same states as the network is given them, with the errors of the estimates.
+  std::vector<Interval> seen_states(const Stretch& stretch, const Deviations& deviations) const;
+  /// True offsets of the neighbours, of `states` and of what these become within network_age_s.
   /// @param all the stretch's states: the velocities at which offsets may change.
-  std::vector<Offset> offsets(const std::vector<Interval>& states, const std::vector<Interval>& all) const;
+  /// @param are_seen `states` are what the network was given.
+  std::vector<Offset> offsets(const std::vector<Interval>& states, const std::vector<Interval>& all,
+                              bool are_seen = false) const;
   TruthForce::Rest rest(const Stretch& stretch, const Deviations& deviations, double acceleration_m_s2) const;
   TruthSizes truth_sizes(const Stretch& stretch, const Deviations& deviations) const;
   std::vector<TruthSizes> truth_sizes(const Radii& radii) const;  ///< of every stretch
@@ -83,7 +91,7 @@ class Scene {
   const LagStart& lag_start_z() const { return lag_start_z_; }
 
   /// Bounds of the errors of one vehicle that f_hat - f_a does not cause along z: the feed-forward's and the truth's
-  /// lag and the rotors' start, and along x and y the truth itself.
+  /// lag, the rotors' start and errors of the estimates, and along x and y the truth itself.
   std::array<ErrorHistory, 3> other_errors(int vehicle, const std::vector<TruthSizes>& truth) const;
   /// What one axis adds to its history in one slice.
   LoopHistory in_slice(const Stretch& stretch, int slice, std::size_t axis, double force_N,
@@ -117,6 +125,8 @@ class Scene {
   TruthForce truth_;
   Motion motion_;
   ErrorLoops loops_;
+  EstimateErrors estimates_;
+  std::array<EstimateAnswer, 3> estimate_answers_;
   std::vector<Interval> excess_N_;  ///< per vehicle
   LagStart lag_start_z_;
 };

@@ -61,14 +61,25 @@ struct Axis {
   LoopHistory met;                       ///< likewise
   const LagStart* start = nullptr;       ///< of the rotors; null: there is none
   Interval excess_N{0};                  ///< their thrust beyond the weight at the start
-  Interval position_m, velocity_m_s;     ///< from the slices before
-  Interval acceleration_m_s2;            ///< likewise; where the loop is sampled
+  const EstimateAnswer* estimates = nullptr;
+  Interval position_m, velocity_m_s;  ///< from the slices before
+  Interval acceleration_m_s2;         ///< likewise; where the loop is sampled
 
   void begin_slice() {
     const std::size_t n = force.size();
     position_m = answer_to_past(*loop->h1, force, n);
     velocity_m_s = answer_to_past(*loop->h2, force, n);
-    if (loop->period_s > 0) begin_acceleration(n);
+    const double of_estimates_m = estimates->errors.position_m[n];
+    const double of_estimates_m_s = estimates->errors.velocity_m_s[n];
+    if (of_estimates_m > 0 || of_estimates_m_s > 0) {
+      position_m += Interval(-of_estimates_m, of_estimates_m);
+      velocity_m_s += Interval(-of_estimates_m_s, of_estimates_m_s);
+    }
+    if (loop->period_s > 0) {
+      begin_acceleration(n);
+      const double of_estimates_m_s2 = estimates->acceleration_m_s2[n];
+      if (of_estimates_m_s2 > 0) acceleration_m_s2 += Interval(-of_estimates_m_s2, of_estimates_m_s2);
+    }
     if (loop->has_whole_periods) {
       position_m += answer_to_past(*loop->slope1, sawtooth, n);
       velocity_m_s += answer_to_past(*loop->slope2, sawtooth, n);
@@ -155,7 +166,10 @@ class Sweep {
       : scene_(scene), options_(options), tolerance_N_(tolerance_N) {
     for (int i = 0; i < scene.vehicles(); ++i) {
       axes_.emplace_back();
-      for (std::size_t k = 0; k < 3; ++k) axes_.back()[k].loop = &scene.loops().axis[k];
+      for (std::size_t k = 0; k < 3; ++k) {
+        axes_.back()[k].loop = &scene.loops().axis[k];
+        axes_.back()[k].estimates = &scene.estimate_answer(k);
+      }
       if (!scene.loops().axis[2].has_lag) continue;
       axes_.back()[2].start = &scene.lag_start_z();
       axes_.back()[2].excess_N = scene.excess_at_start_N(i);

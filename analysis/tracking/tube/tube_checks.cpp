@@ -47,6 +47,18 @@ struct AxisLoads {
   double hold_N = 0;  ///< largest part of the held command in error_N
 };
 
+/// What the integrator's steps add to the integral of an error of the estimated position.
+double stepped_m_s(const Scene& scene, std::size_t axis) {
+  return up(scene.loops().axis[axis].period_s * scene.estimates().position_m[axis]);
+}
+
+/// What errors of the estimated velocity, and of the integrator's steps with the position's, add to the command.
+double estimate_error_N(const Scene& scene, std::size_t axis) {
+  const ErrorLoop& loop = scene.loops().axis[axis];
+  return up(scene.tracking().plant.mass_kg * up(times(loop.Kd, scene.estimates().velocity_m_s[axis]) +
+                                                times(loop.Ki, stepped_m_s(scene, axis))));
+}
+
 AxisLoads axis_loads(const Scene& scene, const LocalTube& tube, int vehicle, std::size_t axis) {
   const Motion& motion = scene.motion();
   const double mass_kg = scene.tracking().plant.mass_kg;
@@ -70,6 +82,9 @@ AxisLoads axis_loads(const Scene& scene, const LocalTube& tube, int vehicle, std
   result.hold_N = largest(hold_by_slice_N);
   for (std::size_t n = 0; result.hold_N > 0 && n < result.error_N.size(); ++n)
     result.error_N[n] = up(result.error_N[n] + hold_by_slice_N[n]);
+  const double estimate_N = estimate_error_N(scene, axis);
+  for (double& error : result.error_N)
+    if (estimate_N > 0) error = up(error + estimate_N);
   return result;
 }
 
@@ -102,14 +117,22 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
     // int e = h * (f_a - f_hat + m x) + g * w
     if (loop.h) integral_m_s = largest(convolved(*loop.h, acting.error_N));
     if (loop.g && loop.Ki > 0) integral_m_s = up(integral_m_s + largest(convolved(*loop.g, acting.lagged_N)));
+    // The integrator adds up the position as it is estimated.
+    const double position_error_m = scene.estimates().position_m[axis];
+    const double velocity_error_m_s = scene.estimates().velocity_m_s[axis];
+    if (loop.demand && position_error_m > 0)
+      integral_m_s =
+          up(integral_m_s + up(times(loop.demand->total(), position_error_m) + stepped_m_s(scene, axis)));
     // Rotors that start with an excess add exp(-t/tau) of it to the force.
     const double excess_N = axis == 2 ? scene.excess_at_start_N(vehicle).mag() : 0;
     if (loop.h && loop.has_lag)
       integral_m_s = up(integral_m_s + times(up(excess_N * loop.lags_s), loop.h->peak));
     // A held command differs from the continuous law's by x.
     const double feedback =
-        up(up(acting.hold_N / mass_kg) + times(loop.Kp, tube.tube.radii.position_m[i][axis]) +
-           up(times(loop.Kd, tube.tube.radii.velocity_m_s[i][axis]) + times(loop.Ki, integral_m_s)));
+        up(up(acting.hold_N / mass_kg) +
+           times(loop.Kp, up(tube.tube.radii.position_m[i][axis] + position_error_m)) +
+           up(times(loop.Kd, up(tube.tube.radii.velocity_m_s[i][axis] + velocity_error_m_s)) +
+              times(loop.Ki, integral_m_s)));
     const double lag_N = lag_error_N(loop, acting, mass_kg);
     result.acceleration_m_s2[axis] =
         up(feedback + up(up(up(largest(acting.error_N) + lag_N) + excess_N) / mass_kg));
@@ -141,7 +164,8 @@ ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std:
     const std::vector<Interval> states = scene.states(stretch, deviations);
     const ForceConstants none{kNotKnown, kNotKnown, kNotKnown, kNotKnown};
     const ForceConstants& c = constants.empty() ? none : constants[i];
-    double learned = 0;
+    // What the network is told may jump by the errors of the estimates.
+    double learned = scene.estimates().are_zero() ? 0 : kNotKnown;
     const double own_acceleration =
         up(length(loads[i].acceleration_m_s2) +
            length(stretch.acceleration_m_s2[0], stretch.acceleration_m_s2[1], stretch.acceleration_m_s2[2]));
@@ -245,7 +269,7 @@ ThrustUse thrust_use(const stability::Plant& plant, const std::vector<Loads>& al
 /// Whether no neighbour is ever so far away that it fades.
 bool neighbours_are_near(const Scene& scene, const Deviations& deviations) {
   for (const Stretch& stretch : scene.motion().stretches) {
-    const std::vector<Interval> states = scene.states(stretch, deviations);
+    const std::vector<Interval> states = scene.seen_states(stretch, deviations);
     for (int n = 0; n + 1 < scene.vehicles(); ++n) {
       for (std::size_t k = 0; k < 3; ++k)
         if (!(states[static_cast<std::size_t>(n * kPerNeighbour) + k].mag() <= kFade_m)) return false;
@@ -283,7 +307,17 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
     add("rotors start between the weight and what the first prediction asks for", "assumed",
         fmt::format("at most {:.3g} N away from the weight", excess_N));
   }
-  add("exact position and velocity", "assumed", "also of neighbours, known from the start");
+  if (scene.estimates().are_zero()) {
+    add("exact position and velocity", "assumed", "also of neighbours, known from the start");
+  } else {
+    const EstimateErrors& e = scene.estimates();
+    add("errors of the estimates stay within their bounds", "assumed",
+        fmt::format(
+            "velocity {:.3g}, {:.3g}, {:.3g} m/s, position {:.3g}, {:.3g}, {:.3g} m, of any course; also "
+            "what the network is told, of the vehicle and of its neighbours",
+            e.velocity_m_s[0], e.velocity_m_s[1], e.velocity_m_s[2], e.position_m[0], e.position_m[1],
+            e.position_m[2]));
+  }
   add("predictions are a staircase", "proved",
       fmt::format("states up to {:.3g} s old are in the bounds", scene.network_age_s()));
   add("the integrator stays within its limit", tube.proved ? "proved" : "assumed", "");
