@@ -61,8 +61,14 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
   return swarm;
 }
 
+Disturbance no_force() {
+  Disturbance none;
+  none.amplitude_N = none.rate_N_s = none.variation_N = none.impulse_N_s = 0;
+  return none;
+}
+
 CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
-                      const OtherErrors& estimates) {
+                      const OtherErrors& others, const Disturbance& force) {
   const std::optional<AxisLoop> loop = axis_loop(gains, plant, 2);
   if (!loop) throw std::invalid_argument("Lambda or K couples the z axis to others");
   AxisLoop acting = *loop;
@@ -71,8 +77,12 @@ CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant
   const auto vehicles = static_cast<std::size_t>(swarm.vehicles);
   const std::vector<LoopGains> loops(vehicles, {rate.position, rate.velocity, rate.acceleration});
   CoupledVerdict verdict;
-  verdict.own = estimate_motion(acting, estimates);
-  verdict.small_gain = small_gain(loops, swarm.couplings, std::vector<OwnMotion>(vehicles, verdict.own));
+  verdict.of_estimates = estimate_motion(acting, others);
+  verdict.of_force = force_motion(acting, force, others.bias_N);
+  const OwnMotion own = {verdict.of_estimates.error_m + verdict.of_force.error_m,
+                         verdict.of_estimates.speed_m_s + verdict.of_force.speed_m_s,
+                         verdict.of_estimates.acceleration_m_s2 + verdict.of_force.acceleration_m_s2};
+  verdict.small_gain = small_gain(loops, swarm.couplings, std::vector<OwnMotion>(vehicles, own));
   if (!verdict.small_gain.proved)
     verdict.unstable = find_unstable_swarm(acting, swarm.vehicles, swarm.couplings);
   return verdict;

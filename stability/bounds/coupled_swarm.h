@@ -22,9 +22,13 @@ struct CoupledSwarm {
 /// @throws files::InputError with line, key, value and mend.
 CoupledSwarm read_coupled_swarm(const std::string& path);
 
+/// A class without any force.
+Disturbance no_force();
+
 struct CoupledVerdict {
   SmallGain small_gain;
-  OwnMotion own;  ///< of every vehicle, by errors of its estimates
+  OwnMotion of_estimates;  ///< of every vehicle, by errors of its estimates
+  OwnMotion of_force;      ///< likewise, by its force error beside the couplings
   /// Small gain is sufficient, not necessary: where it fails, an unstable instance of the class decides the matter.
   std::optional<UnstableSwarm> unstable;
   bool is_refuted() const { return unstable && unstable->is_declared; }
@@ -33,9 +37,10 @@ struct CoupledVerdict {
 /// Small gain of the z loops (continuous, command channel, the integrator as it acts when sampled) of vehicles that all
 /// have these gains. The couplings hold for how vehicles really move; what a network makes of wrong estimates of its
 /// inputs is not in them, and belongs into cross_rate_N_s.
-/// @param estimates velocity_error and position_error of every vehicle's z axis; nothing else of it is read.
+/// @param others velocity_error, position_error and bias_N of every vehicle's z axis; nothing else of it is read.
+/// @param force class of every vehicle's force error along z beside the bias and the couplings.
 /// @throws std::invalid_argument if Lambda or K couples the z axis to others.
 CoupledVerdict couple(const CoupledSwarm& swarm, const Gains& gains, const Plant& plant,
-                      const OtherErrors& estimates = {});
+                      const OtherErrors& others = {}, const Disturbance& force = no_force());
 
 }  // namespace swarmcert::stability

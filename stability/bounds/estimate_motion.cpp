@@ -62,4 +62,21 @@ OwnMotion estimate_motion(const AxisLoop& loop, const OtherErrors& errors) {
   return motion;
 }
 
+OwnMotion force_motion(const AxisLoop& loop, const Disturbance& force, double bias_N) {
+  OwnMotion motion;
+  EstimateError class_of;  // of a signal, whatever its unit
+  class_of.amplitude = std::min(force.amplitude_N, force.variation_per_pass ? kInfinity : force.variation_N);
+  class_of.rate = force.rate_N_s;
+  if (!class_of.is_zero()) {
+    const ResponseNorms kernel = response_norms(impulse_transfer(loop, Channel::kCommand));
+    const bool acts_at_once =
+        std::all_of(loop.lags_s.begin(), loop.lags_s.end(), [](double lag_s) { return !(lag_s > 0); });
+    add_motion(class_of, motion_gains(kernel, acts_at_once ? 1 / loop.mass_kg : 0), motion);
+    motion.error_m = std::min(known_times(class_of.largest(), kernel.integral_abs),
+                              known_times(class_of.rate, rate_gains(loop).position));
+  }
+  if (bias_N != 0 && !(loop.Ki > 0)) motion.error_m += std::abs(bias_N) / (loop.mass_kg * loop.Kp);
+  return motion;
+}
+
 }  // namespace swarmcert::stability

@@ -1,4 +1,4 @@
-/// @file How far errors of the estimates move a vehicle, its speed and acceleration included.
+/// @file How far errors of the estimates and a force error move a vehicle, its speed and acceleration included.
 #pragma once
 
 #include "stability/bounds/error_parts.h"
@@ -14,5 +14,10 @@ namespace swarmcert::stability {
 /// same for sup|n'| where that is less. A constant part of n moves nothing in the long run. |e| is that of
 /// error_parts(). Infinite where neither sup|n| nor sup|n'| is known.
 OwnMotion estimate_motion(const AxisLoop& loop, const OtherErrors& errors);
+
+/// The same of a force error eps = f_a - f_hat of the class `force`, in the command channel: e = s/(m D) eps, by
+/// sup|eps| (at most the total variation) or by sup|eps'|, whichever is less, and of a constant one of `bias_N`, which
+/// moves a vehicle by |bias_N|/(m Kp) where no integral takes it over. Infinite where neither is known.
+OwnMotion force_motion(const AxisLoop& loop, const Disturbance& force, double bias_N);
 
 }  // namespace swarmcert::stability

@@ -316,6 +316,27 @@ TEST(BoundCommand, ASwarmsBoundContainsTheErrorsOfItsEstimatesOrSaysWhichAreMiss
   }
 }
 
+TEST(BoundCommand, ASwarmsBoundContainsTheForceDeclaredBesideItsCouplings) {
+  const ScratchFolder folder;
+  const std::string position = "[position]\nKp = 10\nKd = 5\n";
+  const std::string swarm = " --swarm " + kSourceFolder + "/stability/bounds/swarms/one-way-pair.toml";
+  const std::string integrates = "bound" + gains_file(folder, position + "Ki = 10\n") + swarm;
+  const Json alone = json_of(folder, integrates)["swarm"];
+  EXPECT_EQ(alone["of_force"]["error_m"], 0);
+  for (const char* const options : {" --amplitude 0.01", " --rate 0.01", " --edge 0.01"}) {
+    const Json forced = json_of(folder, integrates + options)["swarm"];
+    const double own_m = forced["of_force"]["error_m"].get<double>();
+    EXPECT_GT(own_m, 1e-3) << options;
+    for (std::size_t vehicle = 0; vehicle < 2; ++vehicle)
+      EXPECT_GE(forced["error_m"][vehicle].get<double>(), alone["error_m"][vehicle].get<double>() + own_m);
+  }
+  // The integral takes a constant force over in the long run.
+  EXPECT_EQ(json_of(folder, integrates + " --bias 0.01")["swarm"]["of_force"]["error_m"], 0);
+  const Outcome missing = run_shell("swarmcert " + integrates + " --impulse 0.01", folder.path());
+  EXPECT_EQ(missing.exit_code, 2) << missing.output;
+  EXPECT_NE(missing.output.find("--amplitude E"), std::string::npos) << missing.output;
+}
+
 TEST(BoundCommand, TheShippedSwarmsAreProvedInconclusiveAndRefuted) {
   const ScratchFolder folder;
   const std::string gains = gains_file(folder, "[position]\nKp = 10\nKd = 5\nKi = 10\n");

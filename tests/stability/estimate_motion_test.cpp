@@ -142,7 +142,7 @@ TEST(EstimateMotion, NoSimulatedSwarmLeavesTheBoundThatContainsTheErrorsOfItsEst
   EXPECT_EQ(couple(swarm, gains, plant).small_gain.error_m[0], 0);
   const CoupledVerdict verdict = couple(swarm, gains, plant, errors);
   ASSERT_TRUE(verdict.small_gain.proved);
-  EXPECT_GT(verdict.small_gain.error_m[0], verdict.own.error_m);
+  EXPECT_GT(verdict.small_gain.error_m[0], verdict.of_estimates.error_m);
 
   const AxisLoop loop = *axis_loop(gains, plant, 2);
   std::mt19937 random(7);
@@ -166,6 +166,88 @@ TEST(EstimateMotion, NoSimulatedSwarmLeavesTheBoundThatContainsTheErrorsOfItsEst
   EXPECT_LE(most_rate_N_s, verdict.small_gain.rate_N_s[0]);
   EXPECT_GT(most_m, 0.4 * verdict.small_gain.error_m[0]);
   EXPECT_GT(most_rate_N_s, 0.4 * verdict.small_gain.rate_N_s[0]);
+}
+
+TEST(ForceMotion, IsReachedByTheWorstForceOfItsSizeAndByNoneExceeded) {
+  constexpr double kSize_N = 0.01;
+  constexpr std::size_t kSteps = 12000;
+  for (const AxisLoop& loop : moving_loops()) {
+    Disturbance force;
+    force.amplitude_N = kSize_N;
+    const OwnMotion bound = force_motion(loop, force, 0);
+    const auto under = [&loop](const MotionCourse& course) {
+      MovingVehicle vehicle(loop);
+      std::vector<MotionReached> result;
+      for (const double force_N : course) {
+        vehicle.step(force_N, 0, 0);
+        result.push_back({vehicle.e, vehicle.speed, vehicle.acceleration});
+      }
+      return result;
+    };
+    MotionCourse once(kSteps, 0.0);
+    once[0] = 1;
+    const std::vector<MotionReached> kernel = under(once);
+    for (const auto& [output, limit] :
+         {std::pair(&MotionReached::e, bound.error_m), std::pair(&MotionReached::speed, bound.speed_m_s),
+          std::pair(&MotionReached::acceleration, bound.acceleration_m_s2)}) {
+      MotionCourse worst(kSteps);
+      for (std::size_t i = 0; i < kSteps; ++i)
+        worst[i] = kernel[kSteps - 1 - i].*output < 0 ? -kSize_N : kSize_N;
+      double most = 0;
+      for (const MotionReached& at : under(worst)) most = std::max(most, std::abs(at.*output));
+      EXPECT_LE(most, 1.005 * limit) << loop.Ki;
+      EXPECT_GT(most, 0.97 * limit) << loop.Ki;
+    }
+    // A constant force moves a vehicle for good where nothing integrates.
+    const MotionCourse constant(kSteps, kSize_N);
+    EXPECT_NEAR(std::abs(under(constant).back().e), force_motion(loop, no_force(), kSize_N).error_m,
+                1e-3 * kSize_N);
+  }
+}
+
+TEST(ForceMotion, ASlowForceMovesAVehicleByItsRateAndAnEdgeByItsSize) {
+  const AxisLoop loop = moving_loops()[0];
+  Disturbance force;
+  force.rate_N_s = 0.01;
+  const OwnMotion slow = force_motion(loop, force, 0);
+  EXPECT_NEAR(slow.error_m, 0.01 * rate_gains(loop).position, 1e-12);
+  EXPECT_NEAR(slow.speed_m_s, 0.01 * rate_gains(loop).velocity, 1e-9);
+  Disturbance edge, amplitude;
+  edge.variation_N = amplitude.amplitude_N = 0.02;
+  EXPECT_EQ(force_motion(loop, edge, 0).error_m, force_motion(loop, amplitude, 0).error_m);
+  Disturbance impulse;
+  impulse.impulse_N_s = 1;
+  EXPECT_TRUE(std::isinf(force_motion(loop, impulse, 0).error_m));
+}
+
+TEST(ForceMotion, NoSimulatedSwarmLeavesTheBoundThatContainsItsForces) {
+  Gains gains =
+      parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n", "g.toml");
+  const Plant plant = {0.034, 1, 0};
+  constexpr double kSlope_N_m = 0.06, kSize_N = 0.01;
+  CoupledSwarm swarm;
+  swarm.vehicles = 2;
+  swarm.couplings = {{0, 1, kSlope_N_m, 0, 0, 0, 0}, {1, 0, kSlope_N_m, 0, 0, 0, 0}};
+  Disturbance force;
+  force.amplitude_N = kSize_N;
+  const CoupledVerdict verdict = couple(swarm, gains, plant, {}, force);
+  ASSERT_TRUE(verdict.small_gain.proved);
+  EXPECT_GT(verdict.small_gain.error_m[0], verdict.of_force.error_m);
+  const AxisLoop loop = *axis_loop(gains, plant, 2);
+  double most_m = 0;
+  for (int run = 0; run < 40; ++run) {
+    const double half_s = 0.2 + 0.05 * run;
+    std::vector<MovingVehicle> vehicles(2, MovingVehicle(loop));
+    for (int i = 0; i < 20000; ++i) {
+      const double n = std::fmod(i * kMotionStep_s, 2 * half_s) < half_s ? kSize_N : -kSize_N;
+      const double apart_m = vehicles[0].e - vehicles[1].e;
+      vehicles[0].step(kSlope_N_m * apart_m + n, 0, 0);
+      vehicles[1].step(-kSlope_N_m * apart_m - n, 0, 0);
+      most_m = std::max(most_m, std::abs(vehicles[0].e));
+    }
+  }
+  EXPECT_LE(most_m, verdict.small_gain.error_m[0]);
+  EXPECT_GT(most_m, 0.4 * verdict.small_gain.error_m[0]);
 }
 
 }  // namespace

@@ -263,7 +263,8 @@ CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
                "trajectories that the network and the truth prove");
   declare_tube(app, options.task);
   app.add_option("--swarm", options.swarm,
-                 "swarm.toml: do the vehicles' mutual forces stay bounded? Errors of the estimates count");
+                 "swarm.toml: do the vehicles' mutual forces stay bounded? Errors of the estimates, "
+                 "--amplitude, --rate and --bias count");
   add_output(app, "--report", options.report, "Write an HTML report with plots into this folder");
   return uncertain;
 }

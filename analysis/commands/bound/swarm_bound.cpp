@@ -14,8 +14,14 @@ using namespace stability;  // NOLINT: every name below is of that library
 namespace {
 
 /// A bound that is not finite would not tell the user what to add.
-void refuse_unbounded_estimates(const CoupledVerdict& verdict) {
+void refuse_unbounded(const CoupledVerdict& verdict) {
   if (!verdict.small_gain.proved) return;
+  if (!std::isfinite(verdict.of_force.error_m) || !std::isfinite(verdict.of_force.acceleration_m_s2)) {
+    throw UsageError(
+        "--swarm needs how large the force error beside the couplings is, or how fast it changes: add "
+        "--amplitude E "
+        "or --rate R");
+  }
   for (std::size_t i = 0; i < verdict.small_gain.error_m.size(); ++i) {
     if (std::isfinite(verdict.small_gain.error_m[i]) && std::isfinite(verdict.small_gain.rate_N_s[i]))
       continue;
@@ -31,11 +37,14 @@ Json swarm_json(const Tracking& input, const std::string& path, const Disturbanc
   const CoupledSwarm swarm = read_coupled_swarm(path);
   if (!axis_loop(input.gains, input.plant, 2))
     throw UsageError("Lambda or K couples the z axis to others: a swarm needs its own loop");
-  OtherErrors estimates;
-  estimates.velocity_error = source.velocity_error[2];
-  estimates.position_error = source.position_error[2];
-  const CoupledVerdict verdict = couple(swarm, input.gains, input.plant, estimates);
-  refuse_unbounded_estimates(verdict);
+  OtherErrors others;
+  others.velocity_error = source.velocity_error[2];
+  others.position_error = source.position_error[2];
+  const bool has_force = source.kind == "declared" || source.kind == "measured";
+  if (has_force) others.bias_N = source.bias_N[2];
+  const CoupledVerdict verdict =
+      couple(swarm, input.gains, input.plant, others, has_force ? source.axis[2] : no_force());
+  refuse_unbounded(verdict);
   const SmallGain& found = verdict.small_gain;
   Json entries = Json::array();
   for (std::size_t i = 0; i < swarm.couplings.size(); ++i) {
@@ -52,6 +61,11 @@ Json swarm_json(const Tracking& input, const std::string& path, const Disturbanc
                {"simulated_s", unstable->seconds},
                {"error_over_initial", unstable->largest_error}};
   }
+  const auto motion = [](const OwnMotion& own) {
+    return Json{{"error_m", finite(own.error_m)},
+                {"speed_m_s", finite(own.speed_m_s)},
+                {"acceleration_m_s2", finite(own.acceleration_m_s2)}};
+  };
   return {{"verdict", found.proved           ? "proved"
                       : verdict.is_refuted() ? "refuted"
                                              : "inconclusive"},
@@ -62,10 +76,8 @@ Json swarm_json(const Tracking& input, const std::string& path, const Disturbanc
           {"spectral_radius", {found.spectral_radius_lower, found.spectral_radius_upper}},
           {"rate_N_s", found.rate_N_s},
           {"error_m", found.error_m},
-          {"of_estimates",
-           {{"error_m", finite(verdict.own.error_m)},
-            {"speed_m_s", finite(verdict.own.speed_m_s)},
-            {"acceleration_m_s2", finite(verdict.own.acceleration_m_s2)}}},
+          {"of_estimates", motion(verdict.of_estimates)},
+          {"of_force", motion(verdict.of_force)},
           {"missing_factor", found.missing_factor},
           {"couplings", std::move(entries)}};
 }
@@ -85,6 +97,9 @@ void print_swarm(const Json& swarm) {
           "in it, and belongs into cross_rate_N_s\n",
           of_estimates_m);
     }
+    const double of_force_m = swarm["of_force"]["error_m"];
+    if (of_force_m > 0)
+      fmt::print("  of which {:.6g} m directly by the force error beside the couplings\n", of_force_m);
     return;
   }
   if (!swarm["witness"].is_null()) {
