@@ -17,7 +17,8 @@ namespace swarmcert::tests {
 
 /// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts
 /// is random; predictions reach the controller late. Errors of the estimates switch between plus and minus their bounds
-/// at random rates, each on its own, or stand still.
+/// at random rates, each on its own, or stand still. Behind one lag, rotors start anywhere between the weight and what
+/// the first prediction asks for.
 class AxesFlight {
  public:
   /// Called with the time, the vehicle, e and e'.
@@ -49,6 +50,11 @@ class AxesFlight {
       predicted.push_back(forces_.learned(forces_.at(state(now, i, 0, true), vehicles_ - 1)));
     }
     acting = predicted;
+    for (int i = 0; i < vehicles_; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      const double excess_N = -between(random, 0, 1) * predicted[at];
+      if (has_one_lag(loops_[2])) now[at][2][3] = excess_N;
+    }
     const int every = is_sampled_ ? static_cast<int>(std::lround(1 / (gains_.rate_hz * kStep_s))) : 0;
     std::vector<std::array<double, 3>> sums(now.size()), held(now.size());
     const int steps = static_cast<int>(std::lround(task_.duration_s() / kStep_s));
@@ -110,6 +116,12 @@ class AxesFlight {
       for (std::size_t k = 0; k < 3; ++k)
         for (std::size_t c = 0; c < x[i][k].size(); ++c) x[i][k][c] += step * by[i][k][c];
     return x;
+  }
+
+  static bool has_one_lag(const stability::AxisLoop& loop) {
+    int count = 0;
+    for (const double tau_s : loop.lags_s) count += tau_s > 0 ? 1 : 0;
+    return count == 1;
   }
 
   double command(const Axis& a, std::size_t k, const Eigen::Vector3d& planned, double learned) const {

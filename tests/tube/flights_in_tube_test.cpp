@@ -1,0 +1,78 @@
+// Simulated flights that keep every hypothesis of a tube: none may leave it, and some must come near its edge.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/tracking/tube/local_tube.h"
+#include "tube/axes_flight.h"
+#include "tube/scenes.h"
+
+namespace swarmcert::analysis {
+namespace {
+
+/// What flights did in a tube.
+struct Campaign {
+  long looks = 0, outside = 0;
+  double largest_share_z = 0;  ///< of |e_z| in the tube's radius along z
+  double nearest = 0;          ///< to the edge of a slice: 1 at the edge
+};
+
+/// Flies the swap of two vehicles with random errors of the estimates, starts of the rotors and times of prediction in
+/// the sampled loop of the gains that flew.
+Campaign fly_in_tube(int flights, const EstimateErrors& estimates) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  LocalTubeOptions options;
+  options.estimates = estimates;
+  options.nodes = 1;
+  const LocalTube tube = local_tube(loop, truth, network, *task, 2, options);
+  Campaign campaign;
+  EXPECT_TRUE(tube.proved && tube.is_sampled) << tube.why;
+  if (!tube.proved) return campaign;
+  tests::AxesFlight flight(loop, truth, network, *task, 2, true, estimates);
+  files::Random random(2026);
+  const double radius_z_m = tube.tube.radius_m(2);
+  for (int i = 0; i < flights; ++i) {
+    flight.fly(random, [&](double t, int vehicle, const std::array<double, 3>& e, const auto&) {
+      const auto at = static_cast<std::size_t>(std::floor((t - 1e-9) / tube.slice_s));
+      const Deviation& slice = tube.slices[at][static_cast<std::size_t>(vehicle)];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Interval range = slice.position_m[k];
+        const double middle = (range.lo + range.hi) / 2;
+        ++campaign.looks;
+        if (!(e[k] >= range.lo && e[k] <= range.hi)) ++campaign.outside;
+        // What moves by less than a tenth of a millimetre shows rounding alone.
+        if (range.hi - range.lo > 1e-4)
+          campaign.nearest = std::max(campaign.nearest, std::abs(e[k] - middle) / (range.hi - middle));
+      }
+      campaign.largest_share_z = std::max(campaign.largest_share_z, std::abs(e[2]) / radius_z_m);
+    });
+  }
+  return campaign;
+}
+
+constexpr EstimateErrors kWrong{{0.003, 0.003, 0.003}, {0.0005, 0.0005, 0.0005}};
+
+TEST(FlightsInTube, NoneOfTwentyLeavesItAndSomeReachAFifthOfIt) {
+  const Campaign campaign = fly_in_tube(20, kWrong);
+  EXPECT_EQ(campaign.looks, 20L * 4500 * 2 * 3);
+  EXPECT_EQ(campaign.outside, 0);
+  EXPECT_GT(campaign.nearest, 0.6);
+  EXPECT_GT(campaign.largest_share_z, 0.2);
+}
+
+TEST(FlightsInTube, NoneOfTenThousandLeavesIt_slow) {
+  const Campaign campaign = fly_in_tube(10000, kWrong);
+  EXPECT_EQ(campaign.looks, 10000L * 4500 * 2 * 3);
+  EXPECT_EQ(campaign.outside, 0);
+  EXPECT_GT(campaign.nearest, 0.7);
+  EXPECT_GT(campaign.largest_share_z, 0.25);
+  RecordProperty("nearest", std::to_string(campaign.nearest));
+  RecordProperty("largest_share_z", std::to_string(campaign.largest_share_z));
+}
+
+}  // namespace
+}  // namespace swarmcert::analysis
