@@ -131,9 +131,7 @@ std::map<std::string, Box> read_domain(const std::string& path, const files::Net
   const std::string text = files::read_file(path);
   const toml::table document = files::parse_toml(text, path);
   const files::TomlTable top(document, path);
-  if (top.text("schema") != "swarmcert/box/1")
-    top.refuse("schema", "\"" + top.text("schema") + "\"", "must be \"swarmcert/box/1\"",
-               "is this the right file?");
+  top.require_schema("swarmcert/box/1");
   top.allow_only({"schema", "lower", "upper", "ground"});
   std::map<std::string, Box> domain;
   if (network.plain) {

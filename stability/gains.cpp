@@ -197,10 +197,7 @@ void read_attitude(const TomlTable& table, Gains& gains) {
 Gains parse_gains(const std::string& text, const std::string& path) {
   const toml::table document = files::parse_toml(text, path);
   const TomlTable top(document, path);
-  if (top.text("schema") != kSchema) {
-    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema),
-               "is this the right file?");
-  }
+  top.require_schema(kSchema);
   top.allow_only({"schema", "position", "attitude", "lag", "network"});
   Gains gains;
   gains.path = path;

@@ -278,10 +278,7 @@ LadderRow read_row(const TomlTable& table) {
 Model parse_model(const std::string& text, const std::string& path) {
   const toml::table document = files::parse_toml(text, path);
   const TomlTable top(document, path);
-  if (top.text("schema") != kSchema) {
-    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema),
-               "is this the right file?");
-  }
+  top.require_schema(kSchema);
   top.allow_only({"schema", "vehicle", "sensor", "effect", "ladder"});
   Model model;
   model.path = path;

@@ -96,8 +96,7 @@ Policy read_policy(const std::string& path) {
   const std::string text = files::read_file(path);
   const auto document = files::parse_toml(text, path);
   const TomlTable top(document, path);
-  if (top.text("schema") != kSchema)
-    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema));
+  top.require_schema(kSchema);
   std::vector<std::string> known = {"schema", "release"};
   for (const CheckKind& kind : check_kinds()) known.emplace_back(kind.name);
   top.allow_only(known);

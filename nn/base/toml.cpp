@@ -138,6 +138,11 @@ void TomlTable::allow_only(const std::vector<std::string>& known) const {
   }
 }
 
+void TomlTable::require_schema(const std::string& schema) const {
+  if (const std::string stated = text("schema"); stated != schema)
+    refuse("schema", in_quotes(stated), "must be " + in_quotes(schema), "is this the right file?");
+}
+
 int TomlTable::line(const std::string& key) const {
   const toml::node* const found = key.empty() ? table_ : table_->get(key);
   return found == nullptr ? 0 : static_cast<int>(found->source().begin.line);

@@ -21,6 +21,9 @@ class TomlTable {
   /// @throws InputError at the first key that is not one of `known`, with a did-you-mean.
   void allow_only(const std::vector<std::string>& known) const;
 
+  /// @throws InputError unless `schema`, which every file of ours begins with, is `schema`.
+  void require_schema(const std::string& schema) const;
+
   /// Line of the value of `key`, or of the table itself where `key` is empty; 0 where there is none.
   int line(const std::string& key = "") const;
   bool has(const std::string& key) const { return table_->contains(key); }

@@ -22,10 +22,7 @@ class NetworkReader {
       : top_(top), path_(path), load_(load) {}
 
   Network run() {
-    if (top_.text("schema") != kSchema) {
-      top_.refuse("schema", in_quotes(top_.text("schema")), "must be " + in_quotes(kSchema),
-                  "is this the right file?");
-    }
+    top_.require_schema(kSchema);
     top_.allow_only({"schema", "output", "gamma", "input", "phi", "rho"});
     network_.path = path_;
     if (top_.has("output")) read_output(top_.table("output"));

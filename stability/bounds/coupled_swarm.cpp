@@ -24,10 +24,7 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
   const std::string text = files::read_file(path);
   const auto document = files::parse_toml(text, path);
   const files::TomlTable top(document, path);
-  constexpr char kSchema[] = "swarmcert/swarm/1";
-  if (top.text("schema") != kSchema) {
-    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema));
-  }
+  top.require_schema("swarmcert/swarm/1");
   top.allow_only({"schema", "vehicles", "coupling"});
   const double vehicles = top.number("vehicles");
   if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {

@@ -210,10 +210,7 @@ Grid load_grid(const std::string& path) {
   const std::string text = files::read_file(path);
   const toml::table document = files::parse_toml(text, path);
   const TomlTable top(document, path);
-  if (top.text("schema") != kSchema) {
-    top.refuse("schema", files::in_quotes(top.text("schema")), "must be " + files::in_quotes(kSchema),
-               "is this the right file?");
-  }
+  top.require_schema(kSchema);
   top.allow_only({"schema", "gains", "model", "axis", "axes", "compute", "pareto", "limits", "disturbance"});
   Grid grid;
   grid.path = path;
