@@ -130,29 +130,36 @@ double felt_passes(const Disturbance& disturbance, const std::function<double(do
   return total;
 }
 
-DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance) {
-  const GainNorms gains = continuous_norms(loop, channel);
+DisturbanceBounds bounds_by_class(const GainNorms& gains, const Disturbance& disturbance, bool has_integrator,
+                                  const FeltPasses& felt) {
   DisturbanceBounds bounds;
   bounds.by_rate = times_known(gains.rate, disturbance.rate_N_s);
   bounds.by_amplitude = times_known(gains.amplitude, disturbance.amplitude_N);
   bounds.by_edges = times_known(gains.edge, disturbance.variation_N);
   bounds.by_impulse = times_known(gains.impulse, disturbance.impulse_N_s);
   bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
-  if (!is_stable(loop)) return bounds;
-  if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1) {
-    bounds.by_impulse =
-        disturbance.impulse_N_s * felt_passes(disturbance, FadingResponse(impulse_transfer(loop, channel)));
-  }
+  if (!felt.impulses) return bounds;
+  if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1)
+    bounds.by_impulse = disturbance.impulse_N_s * felt.impulses();
   if (disturbance.variation_per_pass) {
     // The force also rises once from zero; without an integrator every edge is felt for ever.
     bounds.by_edges = kInfinity;
-    if (std::isfinite(disturbance.variation_N) && loop.Ki > 0) {
+    if (std::isfinite(disturbance.variation_N) && has_integrator)
       bounds.by_edges =
-          times_known(gains.edge, disturbance.amplitude_N) +
-          disturbance.variation_N * felt_passes(disturbance, FadingResponse(step_transfer(loop, channel)));
-    }
+          times_known(gains.edge, disturbance.amplitude_N) + disturbance.variation_N * felt.edges();
   }
-  if (std::isfinite(bounds.by_rate) && std::isfinite(bounds.by_amplitude)) {
+  return bounds;
+}
+
+DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance) {
+  const GainNorms gains = continuous_norms(loop, channel);
+  FeltPasses felt;
+  if (is_stable(loop)) {
+    felt.impulses = [&] { return felt_passes(disturbance, FadingResponse(impulse_transfer(loop, channel))); };
+    felt.edges = [&] { return felt_passes(disturbance, FadingResponse(step_transfer(loop, channel))); };
+  }
+  DisturbanceBounds bounds = bounds_by_class(gains, disturbance, loop.Ki > 0, felt);
+  if (is_stable(loop) && std::isfinite(bounds.by_rate) && std::isfinite(bounds.by_amplitude)) {
     bounds.by_both = amplitude_and_rate_bound(loop, channel, disturbance.amplitude_N, disturbance.rate_N_s);
   }
   return bounds;

@@ -55,6 +55,15 @@ struct DisturbanceBounds {
 /// Of a continuous loop. Earlier passes count as far as they can still be felt.
 DisturbanceBounds disturbance_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance);
 
+/// What all passes together can do, per unit of one; empty: of a loop that is not stable.
+struct FeltPasses {
+  std::function<double()> impulses, edges;
+};
+
+/// Gains times what is known of each class, for the continuous and the sampled loop.
+DisturbanceBounds bounds_by_class(const GainNorms& gains, const Disturbance& disturbance, bool has_integrator,
+                                  const FeltPasses& felt);
+
 /// sum over the passes of gain_after(time since the pass ended): what all of them together can do, per unit of one.
 /// @param gain_after falls.
 double felt_passes(const Disturbance& disturbance, const std::function<double(double)>& gain_after);

@@ -107,31 +107,21 @@ double worst_phase(const SampledLoop& loop, const Bound& bound) {
 
 DisturbanceBounds disturbance_bounds(const SampledLoop& loop, Channel channel, const GainNorms& gains,
                                      const Disturbance& disturbance) {
-  DisturbanceBounds bounds;
-  bounds.by_rate = times_known(gains.rate, disturbance.rate_N_s);
-  bounds.by_amplitude = times_known(gains.amplitude, disturbance.amplitude_N);
-  bounds.by_edges = times_known(gains.edge, disturbance.variation_N);
-  bounds.by_impulse = times_known(gains.impulse, disturbance.impulse_N_s);
-  bounds.by_both = std::min(bounds.by_rate, bounds.by_amplitude);
   const SampledAdjoint adjoint(loop);
-  if (!adjoint.is_stable()) return bounds;
   const double mass_kg = loop.plant.mass_kg;
-  if (std::isfinite(bounds.by_impulse) && disturbance.passes > 1) {
-    bounds.by_impulse = disturbance.impulse_N_s * worst_phase(loop, [&](double phase_s) {
-                          const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
-                          return felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
-                        });
+  const auto passes_felt = [&](std::vector<double> Kernel::*peak) {
+    return worst_phase(loop, [&](double phase_s) {
+      const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
+      return felt_passes(disturbance, FadingKernel(kernel, kernel.*peak));
+    });
+  };
+  FeltPasses felt;
+  if (adjoint.is_stable()) {
+    felt.impulses = [&] { return passes_felt(&Kernel::peak); };
+    felt.edges = [&] { return passes_felt(&Kernel::step_peak); };
   }
-  if (disturbance.variation_per_pass) {
-    bounds.by_edges = kInfinity;
-    if (std::isfinite(disturbance.variation_N) && loop.plant.Ki > 0) {
-      bounds.by_edges = times_known(gains.edge, disturbance.amplitude_N) +
-                        disturbance.variation_N * worst_phase(loop, [&](double phase_s) {
-                          const Kernel kernel = kernel_of(adjoint, channel, phase_s, mass_kg);
-                          return felt_passes(disturbance, FadingKernel(kernel, kernel.step_peak));
-                        });
-    }
-  }
+  DisturbanceBounds bounds = bounds_by_class(gains, disturbance, loop.plant.Ki > 0, felt);
+  if (!adjoint.is_stable()) return bounds;
   const double E = disturbance.amplitude_N, d = disturbance.rate_N_s;
   if (std::isfinite(bounds.by_rate) && std::isfinite(bounds.by_amplitude) && E > 0 && d > 0) {
     const double both = worst_phase(loop, [&](double phase_s) {
