@@ -274,12 +274,7 @@ std::vector<Float32Error> float32_errors(const Network& network, const std::map<
     moved[part] = norm(errors);
     inflated_domain[part] = inflated(box, errors);
   }
-  std::vector<std::string> functions;
-  for (const std::string& function : files::functions(network)) {
-    const bool is_set = files::is_set(function);
-    if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
-      functions.push_back(function);
-  }
+  const std::vector<std::string> functions = value_functions(network);
   std::vector<std::vector<Float32Error>> found(functions.size());
   files::parallel_for(static_cast<int>(functions.size()), options.jobs, [&](int index) {
     const std::string& function = functions[static_cast<std::size_t>(index)];

@@ -312,19 +312,24 @@ std::map<std::string, Box> clamp_domain(const Network& network) {
   return result;
 }
 
-std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::string, Box>& domain,
-                                   const std::map<std::string, double>& rho_bound,
-                                   const RangeOptions& options) {
-  const std::map<std::string, Box> inner = clamped(network, domain);
+std::vector<std::string> value_functions(const Network& network) {
   std::vector<std::string> functions;
   for (const std::string& function : files::functions(network)) {
     const bool is_set = files::is_set(function);
     if (function == "network" || (is_set && files::networks_of(function)[0] != files::kGroundPhi))
       functions.push_back(function);
   }
+  return functions;
+}
+
+std::vector<CertifiedRange> ranges(const Network& network, const std::map<std::string, Box>& domain,
+                                   const std::map<std::string, double>& rho_bound,
+                                   const RangeOptions& options) {
+  const std::map<std::string, Box> inner = clamped(network, domain);
   // One function after the other: each search uses all threads.
   std::vector<CertifiedRange> result;
   int done = 0, total = 0;
+  const std::vector<std::string> functions = value_functions(network);
   for (const std::string& function : functions) {
     const int outputs = files::parts(network).at(files::networks_of(function).back())->outputs();
     total += outputs * (files::is_set(function) ? 2 * (1 + options.neighbours) : 2);

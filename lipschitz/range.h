@@ -43,6 +43,9 @@ struct RangeOptions {
   std::function<void(int done, int total)> progress;  ///< searches; may be empty
 };
 
+/// The functions whose values are enclosed: the network, or each set function of neighbours.
+std::vector<std::string> value_functions(const files::Network& network);
+
 /// Ranges of the plain network or of every set function, for 1, 2, ... neighbours of one kind; with the ground's term
 /// where there is one. The clamp of NET acts first: with it the range holds for every input, where its interval lies
 /// in the box.
