@@ -1,4 +1,5 @@
-/// @file A path-following method for LipSDP-Neuron of large chains, whose memory is one matrix over the neurons.
+/// @file A path-following method for LipSDP-Neuron of large chains, whose memory is one matrix over the neurons. Not
+/// for users.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file A chain in double, without the neurons that no input reaches or that reach no output.
+/// @file A chain in double, without the neurons that no input reaches or that reach no output. Not for users.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// @file The boxes of a search, and what is recorded of them.
+/// @file The boxes of a search, and what is recorded of them. Not for users.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
-/// @file Exact inner products of rows of integers: what an exact check of a large network spends its time on.
+/// @file Exact inner products of rows of integers: what an exact check of a large network spends its time on. Not for
+/// users.
 #pragma once
 
 #include <gmpxx.h>

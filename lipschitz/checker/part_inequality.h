@@ -1,4 +1,4 @@
-/// @file The matrix inequality of one part of a box, in double with every rounding accounted for.
+/// @file The matrix inequality of one part of a box, in double with every rounding accounted for. Not for users.
 #pragma once
 
 #include <map>

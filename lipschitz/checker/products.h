@@ -1,5 +1,5 @@
 /// @file The loops in which a check of a proof by parts spends its time: sums in double, in no order that is promised,
-/// so that error bounds must hold for all; no fused products.
+/// so that error bounds must hold for all; no fused products. Not for users.
 #pragma once
 
 #include <cstddef>

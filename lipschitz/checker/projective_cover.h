@@ -1,4 +1,5 @@
-/// @file All of R^n as finitely many bounded boxes, so that a proof on boxes bounds the slope everywhere.
+/// @file All of R^n as finitely many bounded boxes, so that a proof on boxes bounds the slope everywhere. Not for
+/// users.
 #pragma once
 
 #include "lipschitz/checker/tree_proof.h"

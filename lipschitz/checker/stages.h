@@ -1,4 +1,5 @@
-/// @file The functions of NET as chains of exact matrices with activations of slopes between 0 and 1 in between.
+/// @file The functions of NET as chains of exact matrices with activations of slopes between 0 and 1 in between. Not
+/// for users.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-/// @file Text encoding of a proof by parts.
+/// @file Text encoding of a proof by parts. Not for users.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 /// @file Values over boxes in exact arithmetic: intervals of layers and of sums, and how far off a float32 evaluation
-/// is.
+/// is. Not for users.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// @file Upper bounds on the integral of a response's absolute value, cell by cell in time.
+/// @file Upper bounds on the integral of a response's absolute value, cell by cell in time. Not for users.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// @file The tracking error that a sampled loop owes to the jerk of its set point.
+/// @file The tracking error that a sampled loop owes to the jerk of its set point. Not for users.
 #pragma once
 
 #include "stability/bounds/sampled_loop.h"

@@ -187,6 +187,42 @@ TEST(Layout, ACommandIncludesNoOtherCommandButThoseListed) {
   }
 }
 
+/// The headers that CMake installs, by path from the source tree.
+std::set<std::string> installed_headers() {
+  std::set<std::string> found;
+  for (const char* top : {"nn", "controller", "lipschitz", "stability"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(SWARMCERT_SOURCE_DIR) / top)) {
+      if (entry.path().filename() != "CMakeLists.txt") continue;
+      const fs::path folder = fs::relative(entry.path().parent_path(), SWARMCERT_SOURCE_DIR);
+      std::ifstream in(entry.path());
+      bool is_list = false;
+      for (std::string word; in >> word;) {
+        if (word.rfind("swarmcert_install(", 0) == 0) is_list = true;
+        const std::string name = word.substr(0, word.find(')'));
+        if (is_list && fs::path(name).extension() == ".h")
+          found.insert((folder / name).lexically_normal().generic_string());
+        if (word.find(')') != std::string::npos) is_list = false;
+      }
+    }
+  }
+  return found;
+}
+
+TEST(Layout, InstalledHeadersAreForUsersAndIncludeOnlySuch) {
+  const std::set<std::string> installed = installed_headers();
+  EXPECT_GT(installed.size(), 100U);
+  for (const std::string& header : installed) {
+    std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / header);
+    ASSERT_TRUE(in) << header;
+    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    EXPECT_EQ(text.find("Not for users."), std::string::npos) << header << " is internal, but installed";
+    for (const std::string& path : includes(header)) {
+      const bool is_ours = fs::exists(fs::path(SWARMCERT_SOURCE_DIR) / path);
+      EXPECT_TRUE(!is_ours || installed.count(path) == 1) << header << " includes " << path;
+    }
+  }
+}
+
 TEST(Layout, EveryFolderOfSourcesHasAReadmeOfAtMostAPage) {
   std::set<std::string> folders;
   for (const std::string& source : product_sources())
