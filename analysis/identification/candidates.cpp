@@ -152,6 +152,15 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
   return all;
 }
 
+double own_thrust_ratio(const stability::Model& model) {
+  double sum = 0;
+  for (const EffectSpec& spec : model.effects) {
+    const auto ratio = spec.parameters.find("ratio");
+    if (spec.name == "thrust_ratio" && ratio != spec.parameters.end()) sum += ratio->second;
+  }
+  return sum;
+}
+
 bool is_taken(const std::string& name, const stability::Model& model) {
   const EffectSpec* present = find(model, name);
   return present != nullptr && info_of(*present, model.path).remembers;

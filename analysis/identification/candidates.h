@@ -70,6 +70,9 @@ std::vector<std::string> candidate_names(const stability::Model& model);
 /// True for lags and delays that `model` has: a second one cannot be written as a change of the first.
 bool is_taken(const std::string& name, const stability::Model& model);
 
+/// Sum of the excesses over 1 of the thrust ratios that the model has.
+double own_thrust_ratio(const stability::Model& model);
+
 /// True for a coefficient that is left out.
 inline bool is_held_at_zero(const stability::Parameter& coefficient) {
   return coefficient.lower == 0 && coefficient.upper == 0;

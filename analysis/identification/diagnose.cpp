@@ -16,15 +16,6 @@
 namespace swarmcert::identification {
 namespace {
 
-double own_ratio(const stability::Model& model) {
-  double sum = 0;
-  for (const stability::EffectSpec& spec : model.effects) {
-    const auto ratio = spec.parameters.find("ratio");
-    if (spec.name == "thrust_ratio" && ratio != spec.parameters.end()) sum += ratio->second;
-  }
-  return sum;
-}
-
 ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   const auto checks = instrument(
@@ -34,7 +25,7 @@ ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   scale.is_known = true;
   scale.value = checks[0][0];
   // The model's own ratio counts as well.
-  const double own = own_ratio(model);
+  const double own = own_thrust_ratio(model);
   scale.value.least_squares += own;
   scale.value.instrument += own;
   scale.value.interval = {scale.value.interval.first + own, scale.value.interval.second + own};
@@ -47,7 +38,7 @@ void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
                        std::vector<Missing>& ranking) {
   constexpr double kSurely = 2;  // half widths of the 90 % interval
   const Interval& interval = scale.value.interval;
-  const double excess = std::abs(scale.value.instrument - own_ratio(model));
+  const double excess = std::abs(scale.value.instrument - own_thrust_ratio(model));
   if (!scale.is_known || excess <= kSurely * (interval.second - interval.first) / 2) return;
   const auto names_scale = [](const Missing& missing) { return missing.effect == "thrust_ratio"; };
   if (std::any_of(ranking.begin(), ranking.end(), names_scale)) return;

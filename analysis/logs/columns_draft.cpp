@@ -10,6 +10,7 @@
 #include "analysis/logs/angles.h"
 #include "analysis/logs/collector.h"
 #include "analysis/logs/column_guess.h"
+#include "analysis/logs/formats/formats.h"
 #include "analysis/logs/interpretation.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
@@ -150,24 +151,18 @@ struct DraftTable {
   bool clock_is_guessed = false;
 };
 
-std::ifstream open_table(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
-  return in;
-}
-
 /// @throws files::InputError where no column can be a clock.
 DraftTable read_table(const std::string& path) {
   DraftTable table;
   table.raw.path = path;
   table.raw.format = "csv";
-  std::ifstream in = open_table(path);
+  std::ifstream in = open_log(path);
   RawTopic all;
   TableSink sink(all);
   LogHealth health;
   read_csv(in, path, sink, health);
   if (clock_by_name(all) >= 0 || time_column(all, known_columns()).columns[0] >= 0) {
-    std::ifstream again = open_table(path);
+    std::ifstream again = open_log(path);
     Collector collector(table.raw, known_columns());
     read_csv(again, path, collector, table.raw.health);
     collector.end();

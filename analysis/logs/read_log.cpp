@@ -43,12 +43,6 @@ Format kind_of(std::istream& in) {
   return start.find_first_of(",;\t") == std::string::npos ? Format::kUnknown : Format::kCsv;
 }
 
-std::ifstream open(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
-  return in;
-}
-
 std::string other_formats() {
   std::string names;
   for (const LogFormat& format : log_formats()) names += std::string(", ") + format.name;
@@ -72,11 +66,7 @@ std::string other_formats() {
 
 /// Micro-SD logs and CSV are streams of records; formats/formats.h knows the others.
 RawLog raw_of(std::istream& in, const std::string& path, const SignalMap& map) {
-  std::string head(kFormatHead_bytes, '\0');
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(in.gcount()));
-  in.clear();
-  in.seekg(0);
+  const std::string head = format_head(in);
   // The header of an old micro-SD log names variables as a CSV does. What a columns.toml says counts, whoever wrote the
   // CSV.
   const Format kind = kind_of(in);
@@ -120,7 +110,7 @@ Log read_log(const std::string& path, const SignalMap& map) {
   if (std::filesystem::is_directory(path)) {
     raw = read_raw(path);
   } else {
-    std::ifstream in = open(path);
+    std::ifstream in = open_log(path);
     raw = raw_of(in, path, map);
   }
   // What a columns.toml says counts: its columns keep the names that the log itself gives.

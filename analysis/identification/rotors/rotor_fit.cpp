@@ -23,15 +23,6 @@ const stability::EffectSpec* present_in(const stability::Model& model) {
   return found == model.effects.end() ? nullptr : &*found;
 }
 
-double own_scale(const stability::Model& model) {
-  double sum = 0;
-  for (const stability::EffectSpec& spec : model.effects) {
-    const auto ratio = spec.parameters.find("ratio");
-    if (spec.name == "thrust_ratio" && ratio != spec.parameters.end()) sum += ratio->second;
-  }
-  return sum;
-}
-
 /// What with_effects() adds to the effect that the model has, or puts there.
 stability::EffectSpec spec_for(const stability::Model& model, const RotorFactors& factors) {
   const stability::EffectSpec* const present = present_in(model);
@@ -130,7 +121,7 @@ std::vector<Missing> fit_rotors(const residuals::Inputs& inputs, const std::stri
   const stability::Model& model = *inputs.model_of(kind);
   std::vector<double> scale;
   for (const RotorLoads& flight : loads)
-    scale.push_back(model.weight_N() / flight.mean_N.sum() - own_scale(model));
+    scale.push_back(model.weight_N() / flight.mean_N.sum() - own_thrust_ratio(model));
   const RotorFactors factors = rotor_factors(loads, scale, model);
   const stability::EffectInfo& info = stability::effect_info(kRotorThrust);
   Missing missing;

@@ -26,16 +26,6 @@ SWARMCERT_LOG_FORMATS(SWARMCERT_DECLARE)
 
 namespace {
 
-/// The first bytes; the stream stands at its start again.
-std::string head_of(std::istream& in) {
-  std::string head(kFormatHead_bytes, '\0');
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(in.gcount()));
-  in.clear();
-  in.seekg(0);
-  return head;
-}
-
 [[noreturn]] void refuse_unknown(const std::string& path, bool is_empty) {
   if (is_empty)
     throw files::InputError(
@@ -53,6 +43,21 @@ const std::vector<LogFormat>& log_formats() {
   return formats;
 }
 
+std::string format_head(std::istream& in) {
+  std::string head(kFormatHead_bytes, '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  in.clear();
+  in.seekg(0);
+  return head;
+}
+
+std::ifstream open_log(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
+  return in;
+}
+
 const LogFormat* format_of(std::string_view head) {
   for (const LogFormat& format : log_formats())
     if (format.looks_like(head)) return &format;
@@ -61,11 +66,11 @@ const LogFormat* format_of(std::string_view head) {
 
 const LogFormat* format_of_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
-  return in ? format_of(head_of(in)) : nullptr;
+  return in ? format_of(format_head(in)) : nullptr;
 }
 
 RawLog parse_raw(std::istream& in, const std::string& path) {
-  const std::string head = head_of(in);
+  const std::string head = format_head(in);
   const LogFormat* const format = format_of(head);
   if (format == nullptr) refuse_unknown(path, head.empty());
   return format->read(in, path);
@@ -78,8 +83,7 @@ bool is_log_folder(const std::string& path) {
 RawLog read_raw(const std::string& path) {
   if (looks_like_rosbag_folder(path)) return read_rosbag_folder(path);
   if (looks_like_cfclient_folder(path)) return read_cfclient_folder(path);
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw files::InputError({path, "", "", "", "cannot be read", "check its name and permissions"});
+  std::ifstream in = open_log(path);
   return parse_raw(in, path);
 }
 

@@ -1,7 +1,7 @@
 /// @file Every log format that can be read, in one list.
 #pragma once
 
-#include <iosfwd>
+#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +19,12 @@ struct LogFormat {
 };
 
 inline constexpr std::size_t kFormatHead_bytes = 4096;
+
+/// The first kFormatHead_bytes of a stream, which stands at its start again.
+std::string format_head(std::istream& in);
+
+/// @throws files::InputError if the file cannot be read.
+std::ifstream open_log(const std::string& path);
 
 /// In the order in which they are tried.
 const std::vector<LogFormat>& log_formats();
