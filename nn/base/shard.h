@@ -1,6 +1,10 @@
 /// @file Work that is cut into parts for several machines.
 #pragma once
 
+#include <cstdlib>
+#include <optional>
+#include <string>
+
 namespace swarmcert::files {
 
 /// Part `index` of `count`: the units whose number leaves this remainder, so that all parts cover each unit once.
@@ -10,5 +14,19 @@ struct Shard {
   bool is_whole() const { return count == 1; }
   bool has(long unit) const { return unit % count == index; }
 };
+
+/// "I/N" with 0 <= I <= N <= 1'000'000; nothing for other texts. Part N of N is part 0, so that 0/4 .. 3/4 and
+/// 1/4 .. 4/4 both cover all.
+inline std::optional<Shard> shard_of(const std::string& text) {
+  constexpr long kMostParts = 1'000'000;
+  const std::size_t slash = text.find('/');
+  char* end = nullptr;
+  const long index = std::strtol(text.c_str(), &end, 10);
+  const bool has_index = slash != std::string::npos && end == text.c_str() + slash && slash > 0;
+  const long count = has_index ? std::strtol(text.c_str() + slash + 1, &end, 10) : 0;
+  if (!has_index || *end != '\0' || count < 1 || count > kMostParts || index < 0 || index > count)
+    return std::nullopt;
+  return Shard{static_cast<int>(index % count), static_cast<int>(count)};
+}
 
 }  // namespace swarmcert::files

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <boost/math/distributions/beta.hpp>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
@@ -15,6 +14,7 @@
 #include "data.h"
 #include "nn/base/file_io.h"
 #include "nn/base/json.h"
+#include "nn/base/shard.h"
 
 namespace swarmcert::tests {
 namespace {
@@ -134,12 +134,11 @@ std::optional<Answer> ask_once(const std::vector<Hidden>& hidden, Program progra
   const std::string path = std::string(kept) + "/" + name + ".json";
   if (std::filesystem::exists(path)) return answer_of(files::read_json(path, kSchema));
   if (const char* const text = std::getenv("SWARMCERT_CAMPAIGN_SHARD"); text != nullptr) {
-    unsigned shard = 0, shards = 0;
-    const bool is_sound = std::sscanf(text, "%u/%u", &shard, &shards) == 2 && shard >= 1 && shard <= shards;
-    if (!is_sound) throw std::invalid_argument("SWARMCERT_CAMPAIGN_SHARD is not i/N: " + std::string(text));
+    const std::optional<files::Shard> shard = files::shard_of(text);
+    if (!shard) throw std::invalid_argument("SWARMCERT_CAMPAIGN_SHARD is not I/N: " + std::string(text));
     std::uint32_t number = 0;  // of the run, the same in every process
     for (const char letter : name) number = 31 * number + static_cast<unsigned char>(letter);
-    if (number % shards + 1 != shard) return std::nullopt;
+    if (!shard->has(number)) return std::nullopt;
   }
   Answer answer = ask(hidden, program, duration_s, seed, folder, knows_lag);
   std::filesystem::create_directories(kept);

@@ -30,8 +30,8 @@ Answer ask(const std::vector<Hidden>& hidden, Program program, double duration_s
 
 /// As ask(), for campaigns that take longer than one sitting. Where the environment variable SWARMCERT_CAMPAIGN names a
 /// folder, answers are kept there, one file each, and what has one is not flown again; with SWARMCERT_CAMPAIGN_SHARD =
-/// i/N (i from 1) only every N-th run is flown. Empty for a run that belongs to another shard and has no answer yet.
-/// Answers are of the tool that gave them: a folder for each commit.
+/// I/N (as for --shard) only every N-th run is flown. Empty for a run that belongs to another shard and has no answer
+/// yet. Answers are of the tool that gave them: a folder for each commit.
 std::optional<Answer> ask_once(const std::vector<Hidden>& hidden, Program program, double duration_s,
                                std::uint64_t seed, const std::string& folder, bool knows_lag);
 
