@@ -125,10 +125,27 @@ struct FreeShape {
   double width;
 };
 
+constexpr std::ptrdiff_t kHalfWindow = 3;  // of the differences that give accelerations and body rates
+
+/// Roll and pitch rates with which the commanded thrust axis turns.
+void set_commanded_rates(std::vector<stability::Instant>& wanted) {
+  const auto n = static_cast<std::ptrdiff_t>(wanted.size());
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    stability::Instant& now = wanted[static_cast<std::size_t>(i)];
+    const stability::Instant& before =
+        wanted[static_cast<std::size_t>(std::max<std::ptrdiff_t>(i - kHalfWindow, 0))];
+    const stability::Instant& after = wanted[static_cast<std::size_t>(std::min(i + kHalfWindow, n - 1))];
+    const double span_s = after.time_s - before.time_s;
+    Eigen::Vector3d turn_B_s = Eigen::Vector3d::Zero();  // b3' = omega x b3
+    if (span_s > 0) turn_B_s = now.R_WB.transpose() * (after.b3_W() - before.b3_W()) / span_s;
+    now.omega_B_rad_s.x() = -turn_B_s.y();
+    now.omega_B_rad_s.y() = turn_B_s.x();
+  }
+}
+
 }  // namespace
 
 std::vector<stability::Instant> as_commanded(const Track& track, double mass_kg) {
-  constexpr std::ptrdiff_t kHalfWindow = 3;  // of the difference that gives the acceleration
   constexpr double kMostAcceleration_m_s2 = 5;
   std::vector<stability::Instant> wanted = track.instants;
   const auto n = static_cast<std::ptrdiff_t>(wanted.size());
@@ -150,6 +167,7 @@ std::vector<stability::Instant> as_commanded(const Track& track, double mass_kg)
     const Eigen::Matrix3d R = now.R_WB;
     now.R_WB = Eigen::Quaterniond::FromTwoVectors(R.col(2), force_N).toRotationMatrix() * R;
   }
+  set_commanded_rates(wanted);
   return wanted;
 }
 

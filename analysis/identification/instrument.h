@@ -12,8 +12,9 @@
 
 namespace swarmcert::identification {
 
-/// The track as set points ask for it: position, velocity, and the thrust and attitude that would follow them.
-/// Neighbours stay where they were seen. Precondition: as many targets as instants.
+/// The track as set points ask for it: position, velocity, and the thrust, the attitude, the roll rate and the pitch
+/// rate that would follow them. Heading and yaw rate stay as flown, because logs have no set point for them; neighbours
+/// stay where they were seen. Precondition: as many targets as instants.
 std::vector<stability::Instant> as_commanded(const residuals::Track& track, double mass_kg);
 
 /// One coefficient by both estimators.

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <random>
 
+#include "analysis/identification/instrument.h"
 #include "analysis/identification/scan/forms.h"
 #include "analysis/identification/scan/formulas.h"
 #include "analysis/identification/scan/proposal.h"
@@ -88,6 +90,38 @@ TEST(Scan, FindsAPullTowardsANeighbourThatPassesAllAround) {
   EXPECT_EQ(found.entries[0].frame, "neighbour");
   EXPECT_EQ(found.entries[0].axis, "toward");
   EXPECT_GT(found.entries[0].share, 0.5);
+}
+
+TEST(Scan, CommandedRatesAreThoseThatTheSetPointsAskFor) {
+  constexpr double kReach_m = 0.4, kOmega_rad_s = 2, kStep_s = 0.01, kSomeMass_kg = 0.03;
+  for (const double heading : {0.0, M_PI / 2}) {
+    residuals::Track track;
+    for (int i = 0; i < 400; ++i) {
+      stability::Instant now;
+      now.time_s = kStep_s * i;
+      now.R_WB = Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      now.omega_B_rad_s = {5, 5, 0.5};  // as flown: answers of the controller
+      track.instants.push_back(now);
+      const double phase = kOmega_rad_s * now.time_s;
+      track.targets.push_back({{kReach_m * std::sin(phase), 0, 1},
+                               {kReach_m * kOmega_rad_s * std::cos(phase), 0, 0},
+                               Eigen::Vector3d::Zero()});
+    }
+    const std::vector<stability::Instant> wanted = as_commanded(track, kSomeMass_kg);
+    double fastest = 0;
+    for (int i = 10; i < 390; ++i) {
+      // The thrust axis leans by atan(x'' / g) towards +x of the world.
+      const double phase = kOmega_rad_s * kStep_s * i;
+      const double lean = -kReach_m * std::pow(kOmega_rad_s, 2) * std::sin(phase) / stability::kGravity_m_s2;
+      const double slope = -kReach_m * std::pow(kOmega_rad_s, 3) * std::cos(phase) / stability::kGravity_m_s2;
+      const double rate = slope / (1 + lean * lean);
+      const Eigen::Vector3d expected =
+          heading == 0 ? Eigen::Vector3d(0, rate, 0.5) : Eigen::Vector3d(rate, 0, 0.5);
+      EXPECT_LT((wanted[static_cast<std::size_t>(i)].omega_B_rad_s - expected).norm(), 2e-3) << i;
+      fastest = std::max(fastest, std::abs(rate));
+    }
+    EXPECT_GT(fastest, 0.3);
+  }
 }
 
 TEST(Scan, FindsTheVariableOfEachForm) {

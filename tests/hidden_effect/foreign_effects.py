@@ -166,6 +166,10 @@ def slow_drain(a=0.04, at=15.0, width=2.0):
     return lambda s: (0, 0, -a / (1 + math.exp(-(s.t - at) / width)))
 
 
+def flapping(k=0.03):
+    return lambda s: tuple(s.to_world([k * s.w[1], 0, 0]))
+
+
 EFFECTS = {
     "thermal": dict(force=column(), variables={"xy"}, names={"wind_field"}, formula=expression(
         "force_z_N", "a_N * exp(-((x - 0.2)^2 + (y + 0.1)^2) / (2 * w_m^2))", a_N=0.03, w_m=0.25)),
@@ -209,5 +213,7 @@ EFFECTS = {
     "lane": dict(force=lane(), variables={"y", "xy"}),
     "suction": dict(force=suction(), variables={"neighbour"}, vehicles=2, formula=pull(
         "a_N * exp(-sqrt(dx^2 + dy^2 + dz^2) / reach_m) * {} / sqrt(dx^2 + dy^2 + dz^2)", a_N=0.03, reach_m=0.3)),
+    "flapping": dict(force=flapping(), variables={"rate_y"}, speed=1.6, formula=expression(
+        "force_b1_N", "a_N * wy", a_N=0.03)),
     "slow drain": dict(force=slow_drain(), variables={"time", "battery"}, names={"payload_step"}),
 }

@@ -153,8 +153,8 @@ class TrackSampler {
             track_.targets[i].p_W_m[static_cast<Eigen::Index>(axis)];
       }
     }
-    for (const V v : {V::kHeading, V::kTime, V::kBattery, V::kSetpointX, V::kSetpointY, V::kSetpointZ,
-                      V::kRateX, V::kRateY, V::kRateZ})
+    for (const V v :
+         {V::kHeading, V::kTime, V::kBattery, V::kSetpointX, V::kSetpointY, V::kSetpointZ, V::kRateZ})
       at(commanded, v) = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t v = 0; v < values.size(); ++v) {
       sum_.values[v] += values[v];
