@@ -102,6 +102,7 @@ class TrackSampler {
   TrackSampler(const residuals::Inputs& inputs, const Track& track, ScanQuantity quantity)
       : model_(inputs.model_for(track)),
         track_(track),
+        quantity_(quantity),
         residual_(quantity == ScanQuantity::kForce ? force_columns(model_, inputs, track)
                                                    : balance_columns(model_, inputs, track)),
         cut_(cut_into_blocks(track)),
@@ -156,6 +157,9 @@ class TrackSampler {
     for (const V v :
          {V::kHeading, V::kTime, V::kBattery, V::kSetpointX, V::kSetpointY, V::kSetpointZ, V::kRateZ})
       at(commanded, v) = std::numeric_limits<double>::quiet_NaN();
+    // The attitude controller answers every rate with a torque: what set points ask for is no witness of a torque.
+    if (quantity_ == ScanQuantity::kBalance)
+      at(commanded, V::kRateX) = at(commanded, V::kRateY) = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t v = 0; v < values.size(); ++v) {
       sum_.values[v] += values[v];
       sum_.commanded[v] += commanded[v];
@@ -219,6 +223,7 @@ class TrackSampler {
 
   const stability::Model model_;
   const Track& track_;
+  const ScanQuantity quantity_;
   const Eigen::MatrixXd residual_;
   const TrackBlocks cut_;
   const Eigen::Vector3d wind_m_s_;
