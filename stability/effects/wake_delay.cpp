@@ -1,6 +1,7 @@
 /// @file Downwash that takes time to arrive, and drifts with the wind meanwhile.
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "stability/effects/downwash.h"
 #include "stability/effects/effect_entry.h"
@@ -82,13 +83,19 @@ class WakeDelay : public Effect {
     for (const double delay_s : info().shape[kDelay].grid) {
       for (const auto& spread : spreads) thetas.push_back({delay_s, decay, spread[0], spread[1], norm, 0, 0});
     }
-    // Drifts of 0.16 m and 0.32 m to eight sides, of a wide wake: refinement moves them from there.
-    constexpr double kDiagonal = 0.7071067811865476;
-    const double sides[][2] = {{1, 0},  {kDiagonal, kDiagonal},   {0, 1},  {-kDiagonal, kDiagonal},
-                               {-1, 0}, {-kDiagonal, -kDiagonal}, {0, -1}, {kDiagonal, -kDiagonal}};
-    for (const double wind_m_s : {0.8, 1.6}) {
-      for (const auto& side : sides)
-        thetas.push_back({0.2, decay, 0.13, 0.03, norm, wind_m_s * side[0], wind_m_s * side[1]});
+    // A wide wake, carried 0.16, 0.32 and 0.48 m to all sides: refinement moves it from there. Further out there are
+    // more sides, so that one of them is always within the width of the wake.
+    constexpr double kDelay_s = 0.2, kTurn = 6.283185307179586;
+    const struct {
+      double wind_m_s;
+      int sides;
+    } drifts[] = {{0.8, 8}, {1.6, 8}, {2.4, 12}};
+    for (const auto& drift : drifts) {
+      for (int side = 0; side < drift.sides; ++side) {
+        const double bearing = kTurn * side / drift.sides;
+        thetas.push_back({kDelay_s, decay, 0.13, 0.03, norm, drift.wind_m_s * std::cos(bearing),
+                          drift.wind_m_s * std::sin(bearing)});
+      }
     }
     return thetas;
   }
