@@ -236,6 +236,16 @@ Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std:
   return result;
 }
 
+/// Thrust that saturates close to hovering throws the vehicle about, and what its set points ask for hardly reaches
+/// beyond the knee: no curve over the thrust is confirmed then. Where much is left, the effect itself is tried.
+bool may_saturate(const Explained& explained, const stability::Model& model,
+                  const std::vector<Candidate>& rivals) {
+  const auto is_it = [](const auto& one) { return one.name == "thrust_saturation"; };
+  return explained.settled.rest.ratio > kLoudRatio &&
+         std::none_of(model.effects.begin(), model.effects.end(), is_it) &&
+         std::none_of(rivals.begin(), rivals.end(), is_it);
+}
+
 /// A name stands only if it explains about as much as the best formula would in its place: where formulas win, the
 /// selection is done anew with them among the candidates, and they are what is left. Names that only formulas point to
 /// take part as well.
@@ -253,6 +263,7 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   const std::vector<Formula> formulas = rivals_of_names(passes, result, nominal ? &*nominal : nullptr);
   const stability::Model& model = *passes.inputs.model_of(passes.kind);
   std::vector<Candidate> rivals = named_forms(formulas, model, covered);
+  if (may_saturate(result, model, rivals)) rivals.push_back(candidate("thrust_saturation", model, covered));
   if (rivals.empty() && (formulas.empty() || result.settled.ranking.empty())) return result;
   for (const Formula& formula : formulas) rivals.push_back(candidate_of(formula, model));
   rivals.insert(rivals.end(), loads.begin(), loads.end());

@@ -23,7 +23,7 @@ class ThrustSaturation : public Effect {
                   1.3,
                   1,
                   5,
-                  {1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6}}}}) {}
+                  {1.02, 1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6}}}}) {}
   void columns(const Instant& now, const double* shape, Wrench* columns) const override {
     const double over_N = now.thrust_N - shape[0] * now.mass_kg * kGravity_m_s2;
     columns[0] = {-std::max(over_N, 0.0) * now.b3_W(), Eigen::Vector3d::Zero()};

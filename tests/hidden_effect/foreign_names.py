@@ -12,7 +12,8 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from foreign_campaign import KEYS, argument_parser, asked, model_with_lag  # noqa: E402
-from foreign_simulator import fly  # noqa: E402
+from foreign_effects import saturation  # noqa: E402
+from foreign_simulator import GRAVITY, MASS_KG, fly  # noqa: E402
 
 FLIGHTS = 3
 WIDER = 2.576 / 1.645  # from intervals of 90 % to 99 %: every value lies inside of 99 %, and of all so many inside of 90 %
@@ -62,6 +63,11 @@ NAMED = {
     "wake_delay": dict(truth=dict(force=late_wake(0.09, 0.25, 0.06, 0.06)), vehicles=2, values={"delay_s": 0.25}),
     "wake in wind": dict(effect="wake_delay", truth=dict(force=late_wake(0.09, 0.2, 0.06, 0.06, (0.9, -0.6))),
                          vehicles=2, values={"delay_s": 0.2, "wind_x_m_s": 0.9, "wind_y_m_s": -0.6}),
+    "wake in a strong wind": dict(effect="wake_delay", flights=6, vehicles=2,
+                                  truth=dict(force=late_wake(0.12, 0.2, 0.06, 0.06, (-2.4, 0.0))),
+                                  values={"delay_s": 0.2, "wind_x_m_s": -2.4}),
+    "saturation close to hovering": dict(effect="thrust_saturation", truth=dict(rotor=saturation(0.0855), speed=0.8),
+                                         values={"knee_weights": 4 * 0.0855 / (MASS_KG * GRAVITY), "loss": 0.9}),
     "tether": dict(truth=dict(force=tether(0.15, (0.1, -0.1, 0.0), 0.9)),
                    values={"stiffness_N_m": 0.15, "slack_m": 0.9}),
     "torque_bias": dict(truth=dict(torque=lambda s: (8e-4, 1.2e-3, 0.0)),
@@ -97,7 +103,7 @@ def diagnosed(options, name, case):
     os.makedirs(folder)
     flights = os.path.join(folder, "flights")
     truth = {key: case["truth"][key] for key in KEYS if key in case["truth"]}
-    for run in range(FLIGHTS):
+    for run in range(case.get("flights", FLIGHTS)):
         fly(truth, 5, flights, run, case.get("vehicles", 1))
     model = model_with_lag(options.model, folder)
     if case.get("is_added"):  # what `add` writes must lower the error of flights held out, and leave nothing to name

@@ -172,6 +172,14 @@ std::vector<Candidate> on_its_grid(const Formula& formula, Candidate candidate) 
   return {std::move(candidate)};
 }
 
+/// Also from where the formula's force over the thrust sets in, which may be close to hovering.
+void start_at_knee(const Formula& formula, double weight_N, Candidate& candidate) {
+  const auto from_N = number_of(formula, "from");
+  if (formula.variable != "thrust" || formula.form != "above" || !from_N) return;
+  const double lowest = candidate.info.shape[0].lower;
+  candidate.thetas.push_back({std::max(*from_N / weight_N, lowest)});
+}
+
 /// An effect with the variables that point to it.
 struct NamedForm {
   const char* effect;
@@ -220,6 +228,7 @@ std::vector<Candidate> named_forms(const std::vector<Formula>& formulas, const s
                                       [&](const auto& spec) { return spec.name == form.effect; });
       if (has_it || std::find(names.begin(), names.end(), formula.variable) == names.end()) continue;
       for (Candidate& next : form.make(formula, candidate(form.effect, model, coverage))) {
+        if (next.name == "thrust_saturation") start_at_knee(formula, model.weight_N(), next);
         const bool is_known =
             std::any_of(all.begin(), all.end(), [&](const Candidate& other) { return is_same(other, next); });
         if (!is_known) all.push_back(std::move(next));
