@@ -136,9 +136,13 @@ void scan_what_is_left(const Passes& passes, Explained& explained) {
   explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
 }
 
-bool is_answer_of_thrust(const Missing& missing) {
+bool is_of_library(const std::string& effect) {
   const std::vector<std::string> library = stability::effect_names();
-  if (std::find(library.begin(), library.end(), missing.effect) == library.end()) return false;
+  return std::find(library.begin(), library.end(), effect) != library.end();
+}
+
+bool is_answer_of_thrust(const Missing& missing) {
+  if (!is_of_library(missing.effect)) return false;
   const stability::EffectInfo& info = stability::effect_info(missing.effect);
   return info.remembers || is_scale(missing.effect) || is_of_load(missing.effect) ||
          missing.effect == "inflow";
@@ -176,17 +180,34 @@ bool is_doubtful(const Missing& missing, const Explained& explained, double weig
   return points_to(first.variable, missing.effect) && kOfSameVariable * taken < left;
 }
 
-void drop_doubtful_names(const Passes& passes, Explained& explained) {
-  const double weight_N = passes.inputs.model_of(passes.kind)->weight_N();
+/// Moves names to the suspects, and scans anew what is left.
+template <typename IsDropped>
+void drop_names(const Passes& passes, Explained& explained, const IsDropped& is_dropped) {
   std::vector<Missing>& ranking = explained.settled.ranking;
-  const auto doubtful = std::stable_partition(ranking.begin(), ranking.end(), [&](const Missing& missing) {
-    return !is_doubtful(missing, explained, weight_N);
-  });
+  const auto doubtful = std::stable_partition(ranking.begin(), ranking.end(),
+                                              [&](const Missing& missing) { return !is_dropped(missing); });
   if (doubtful == ranking.end()) return;
   for (auto it = doubtful; it != ranking.end(); ++it) explained.settled.suspected.push_back(it->effect);
   ranking.erase(doubtful, ranking.end());
   explained.settled.rest = remainder(passes, specs_of(ranking));
   scan_what_is_left(passes, explained);
+}
+
+void drop_doubtful_names(const Passes& passes, Explained& explained) {
+  const double weight_N = passes.inputs.model_of(passes.kind)->weight_N();
+  drop_names(passes, explained,
+             [&](const Missing& missing) { return is_doubtful(missing, explained, weight_N); });
+}
+
+/// Whether a lag or delay takes little away and may as well be none: its interval reaches down to where it ends.
+bool may_be_no_lag(const Missing& missing) {
+  constexpr double kLittle = 0.1;  // of the mean square
+  if (!is_of_library(missing.effect)) return false;
+  const stability::EffectInfo& info = stability::effect_info(missing.effect);
+  const double before = missing.finding.rmse_before_N;
+  if (!info.remembers || info.shape.empty() || taken_N2(missing) >= kLittle * before * before) return false;
+  const auto interval = missing.intervals.find(info.shape[0].name);
+  return interval != missing.intervals.end() && interval->second.first <= info.shape[0].lower;
 }
 
 /// A scale of the thrust that halves the error. Where thrust hardly varies, formulas of anything can say the same.
@@ -329,6 +350,7 @@ Explained explain(const Passes& passes, const Coverage& covered) {
   Explained explained = explain_by_formulas(passes, covered);
   drop_doubtful_names(passes, explained);
   correct_memories(passes, explained);
+  drop_names(passes, explained, may_be_no_lag);
   return explained;
 }
 

@@ -273,6 +273,20 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
   return result;
 }
 
+namespace {
+
+/// Thrust that answers gusts makes a lag look longer, and no filter removes all of it: thrust falls with the velocity
+/// that a gust gives. Where set points say less than least squares, the lag may be as short as they allow, however weak
+/// they are.
+void reach_down(Refined& lag, const InstrumentedValue& check) {
+  constexpr double kBeyondChance_z = 1;
+  if (check.difference_z >= -kBeyondChance_z) return;
+  double& lower = lag.shape_intervals[0].first;
+  lower = std::max(std::min(lower, lag.theta[0] * check.interval.first), lag.candidate.info.shape[0].lower);
+}
+
+}  // namespace
+
 void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
                    const std::vector<InstrumentedShape>& with_shapes, std::vector<Refined>& refined) {
   // By the bias to both sides, and to where the instrument's own interval ends.
@@ -289,6 +303,7 @@ void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
     const stability::EffectInfo& info = effect.candidate.info;
     if (info.remembers) {
       widen(effect.shape_intervals[0], checks[i][0], effect.theta[0], info.shape[0]);
+      reach_down(effect, checks[i][0]);
       continue;
     }
     for (std::size_t c = 0; c < checks[i].size(); ++c) {

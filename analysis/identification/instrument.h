@@ -50,7 +50,8 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
                                                       const std::vector<Refined>& refined);
 
 /// Widens the intervals of `refined` by the bias of each number, and so that they hold the instrument's where that is
-/// strong; what concerns a lag's gain falls on its time, since c (L_tau T - T) is about (L_(c tau) T - T). A positive
+/// strong; what concerns a lag's gain falls on its time, since c (L_tau T - T) is about (L_(c tau) T - T). A lag
+/// reaches down to what set points leave possible, weak or not, where they say less. A positive
 /// coefficient beside a free shape gets the upper end of an interval of its logarithm: f = a exp(-(z - z0) / b) is seen
 /// away from z0 only, so that an error of b multiplies a.
 /// @param checks, with_shapes of the same effects, see above; may be empty.

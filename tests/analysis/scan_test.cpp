@@ -124,6 +124,29 @@ TEST(Scan, CommandedRatesAreThoseThatTheSetPointsAskFor) {
   }
 }
 
+TEST(Instrument, LagsReachDownToWhatWeakSetPointsLeavePossible) {
+  constexpr double kLag_s = 0.12;
+  const Interval kNarrow = {0.1, 0.14};
+  Refined lag;
+  lag.candidate.info = stability::effect_info("motor_lag");
+  lag.coefficients = {1};
+  lag.theta = {kLag_s};
+  const auto interval_with = [&](const InstrumentedValue& check) {
+    std::vector<Refined> all = {lag};
+    all[0].shape_intervals = {kNarrow};
+    widen_by_bias({{check}}, {}, all);
+    return all[0].shape_intervals[0];
+  };
+  const InstrumentedValue less = {1, 0.4, {-0.2, 1}, -1.5}, much_less = {1, 0.5, {0.25, 0.75 + 0.6}, -2},
+                          alike = {1, 0.8, {-0.2, 1.8}, -0.4};
+  ASSERT_FALSE(less.is_strong());
+  ASSERT_FALSE(much_less.is_strong());
+  EXPECT_DOUBLE_EQ(interval_with(less).first, lag.candidate.info.shape[0].lower);
+  EXPECT_DOUBLE_EQ(interval_with(much_less).first, 0.25 * kLag_s);
+  EXPECT_EQ(interval_with(much_less).second, kNarrow.second);
+  EXPECT_EQ(interval_with(alike), kNarrow);
+}
+
 TEST(Scan, FindsTheVariableOfEachForm) {
   struct Case {
     std::string variable;

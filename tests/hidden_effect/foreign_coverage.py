@@ -22,7 +22,7 @@ TRUTHS = {"ratio": 0.95, "drag_N_s_m": 0.02, "tau_s": ROTOR_LAG_S}
 EFFECTS = "thrust_ratio,drag_linear,motor_lag"
 GUST_S = 1.0  # after which a gust has forgotten itself
 MOST_OF_QUIET_N = 0.005
-LEAST_HELD, LEAST_OF_ALL, MOST_OF_ALL = 0.75, 0.85, 0.98
+LEAST_HELD, LEAST_OF_ALL, MOST_OF_ALL = 0.8, 0.85, 0.98
 
 
 def gusty_drag(gust_N, seed):
@@ -60,7 +60,7 @@ def main():
     parser.add_argument("model")
     parser.add_argument("folder")
     parser.add_argument("--cases", type=int, default=12, help="flights for each gust")
-    parser.add_argument("--gusts", default="0,0.005,0.01,0.02")
+    parser.add_argument("--gusts", default="0,0.003,0.005,0.01,0.02")
     options = parser.parse_args()
     quiet, loud = collections.defaultdict(list), collections.defaultdict(list)
     for number, gust_N in enumerate(float(x) for x in options.gusts.split(",")):
