@@ -188,7 +188,8 @@ TEST(Report, DrawingsAreImagesInWhichBrowsersRunNothing) {
       read_text(report_with(std::vector<std::string>(kTexts, "plain")).write(folder / "r", false));
   EXPECT_EQ(skeleton(page).find("svg "), std::string::npos) << "a drawing is part of the page";
   int pictures = 0;
-  for (const char* start : {"<img src=\"data:image/svg+xml;base64,", " srcset=\"data:image/svg+xml;base64,"}) {
+  for (const char* start :
+       {"<img src=\"data:image/svg+xml;base64,", " srcset=\"data:image/svg+xml;base64,"}) {
     for (std::size_t at = page.find(start); at != std::string::npos; at = page.find(start, at + 1))
       ++pictures;
   }
