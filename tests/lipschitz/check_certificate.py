@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """A second checker of certificates, in another language and written from the mathematics: exact integers, standard
-library only. It shares no line with the C++ checker, reads the weight files itself, and must accept and reject the
+library only; trees of parts also in double with numpy, where it is installed. It shares no line with the C++ checker, reads the weight files itself, and must accept and reject the
 same certificates.
 
     check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C] [--activation OP]
