@@ -64,9 +64,19 @@ class Rejected(Exception):
     pass
 
 
+class BadInput(Exception):
+    """A weight file, network.toml or option that is wrong in itself or contradicts another one."""
+
+
 def require(condition, reason):
     if not condition:
         raise Rejected(reason)
+
+
+def require_input(condition, reason):
+    """In place of `assert`, which `python3 -O` drops: a checker must refuse however it is run."""
+    if not condition:
+        raise BadInput(reason)
 
 
 def f32(x):
@@ -235,9 +245,9 @@ def in_order(layers, listing, stated):
     "registration" or "none"."""
     if stated:
         by_name = {layer.name: layer for layer in layers}
-        assert sorted(stated) == sorted(by_name), "the order does not name every layer once"
+        require_input(sorted(stated) == sorted(by_name), "the order does not name every layer once")
         result = [by_name[name] for name in stated]
-        assert listing != "evaluation" or result == layers, "the file states another order"
+        require_input(listing != "evaluation" or result == layers, "the file states another order")
         return result
     if listing == "evaluation":
         return layers
@@ -247,11 +257,12 @@ def in_order(layers, listing, stated):
     if is_total and is_listed and all(a.outputs == b.inputs for a, b in zip(result, result[1:])):
         return result
     fitting = list(islice(orders_of(layers, False), 2))
-    assert fitting, "no order of the layers fits"
+    require_input(fitting, "no order of the layers fits")
     if len(fitting) == 1:
         return fitting[0]
     by_number = list(islice(orders_of(layers, True), 2))
-    assert len(by_number) == 1 and (listing == "none" or by_number[0] == layers), "the order of the layers is not stated"
+    require_input(len(by_number) == 1 and (listing == "none" or by_number[0] == layers),
+                  "the order of the layers is not stated")
     return by_number[0]
 
 
@@ -264,9 +275,12 @@ class Weights:
             if name.split(".")[-1] == "weight":
                 layer = name[:-7] if "." in name else ""
                 self.layers.append(Layer(layer, shape[0], shape[1], numbers, biases.get(layer, [0.0] * shape[0])))
-        assert self.layers and all(math.isfinite(x) for layer in self.layers for x in layer.weights + layer.biases)
+        require_input(self.layers, "the file holds no layer")
+        require_input(all(math.isfinite(x) for layer in self.layers for x in layer.weights + layer.biases),
+                      "a weight is not finite")
         self.layers = in_order(self.layers, listing, order)
-        assert all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:]))
+        require_input(all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:])),
+                      "a layer does not take what the one before gives")
         self.precision = "float32" if precision in ("float16", "bfloat16") else precision
         # None: the file does not state it. One that states the order of the layers states ReLU unless its reader says more.
         self.activation = "relu" if listing == "evaluation" and len(self.layers) > 1 else None
@@ -525,8 +539,9 @@ def read_c_source(data, key, order):
 def read_weights(path, key="", order=None, activation=None):
     """`activation` is what network.toml or the user states."""
     weights = read_file(path, key, order)
-    assert activation in (None, *STEEPEST), "no such activation"
-    assert activation in (None, weights.activation) or weights.activation is None, "the file states another activation"
+    require_input(activation in (None, *STEEPEST), f"there is no activation {activation}")
+    require_input(activation in (None, weights.activation) or weights.activation is None,
+                  f"the file states another activation, {weights.activation}")
     if len(weights.layers) > 1:
         weights.activation = weights.activation or activation
     return weights
@@ -569,7 +584,7 @@ class Network:
 
             def activation_of(entry):
                 stated = entry.get("activation", activation)
-                assert activation in (None, stated), f"{net} states another activation, {stated}"
+                require_input(activation in (None, stated), f"{net} states another activation, {stated}")
                 return stated
 
             self.parts = {f"{role}:{kind}": read_weights(Path(net).parent / entry["weights"], key, entry.get("order"),

@@ -351,7 +351,7 @@ def run():
         try:
             second.Network(smooth_net, activation="silu")
             raise SystemExit("an activation beside another one in network.toml is taken")
-        except AssertionError as refusal:
+        except second.BadInput as refusal:
             assert "states another activation" in str(refusal), refusal
         nets += [([smooth_net], ["--blocks=position", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"])]
         beside_net = str(beside(folder))
