@@ -276,9 +276,11 @@ Qed.
 Lemma stages_tame gs ks : Forall (fun k => bias_fits (snd k)) ks -> Forall2 has_bend gs (map fst ks) ->
   forallb is_zero gs = true -> Forall tame ks.
 Proof.
-  intros H. revert gs. induction H as [|k ks Hk H IH]; simpl; intros gs G Z; inversion G as [|[m e] ? gs' ? B G']; subst;
+  intros H. revert gs. induction H as [|k ks Hk H IH]; simpl; intros gs G Z; inversion G as [|[m e] ? gs' ? B G'];
+    subst;
     constructor; simpl in Z; apply andb_prop in Z; destruct Z as [Z Zs]; [|now apply (IH gs')].
-  apply Z.eqb_eq in Z. simpl in Z. subst m. split; auto. unfold has_bend in B. replace (real (0, e)%Z) with 0 in B; auto.
+  apply Z.eqb_eq in Z. simpl in Z. subst m. split; auto. unfold has_bend in B.
+  replace (real (0, e)%Z) with 0 in B; auto.
   unfold real. simpl. ring.
 Qed.
 Lemma stages_bend gs ms ks ts : Forall2 has_bend gs (map fst ks) -> Forall2 of_stage ms ks ->

@@ -47,7 +47,8 @@ Definition well_formed (ps : list part) (f : function) (moves : list bool) (scal
   && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
 Definition check_slope ps f moves scale u rho t factor : bool :=
   well_formed ps f moves scale && is_nonnegative u
-  && check_parts (flat_map bends_of (parts_of ps f)) ([], selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
+  && check_parts (flat_map bends_of (parts_of ps f)) ([],
+    selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
 
 (** Slopes by products of norms that were accepted before. *)
 Fixpoint find_norm (accepted : list claim) (p layer : nat) : option dyadic :=
@@ -89,7 +90,8 @@ Definition check_parts_with ps f moves scale u r (form : option proved_form) (co
   && match f, form with
      | Alone _, None => covers None
      | Set_of _ rho, Some q =>
-         (length (fst (outer (part_at ps (moved f)))) =? inputs_of (part_at ps rho))%nat && check_form (part_at ps rho) q
+         (length (fst (outer (part_at ps (moved f)))) =? inputs_of (part_at ps rho))%nat &&
+           check_form (part_at ps rho) q
          && covers (Some (lower_rows q))
      | _, _ => false
      end.
@@ -279,7 +281,8 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Norm_at_least p layer l, By_vector v => check_norm_below (matrix_at ps p layer) l v
   | Slope_at_most f moves scale u, By_inequality rho t r => check_slope ps f moves scale u rho t r
   | Slope_at_most f moves scale u, By_product => check_product ps accepted f moves scale u
-  | Slope_at_most f moves scale u, By_all_parts r form o radius ts => check_parts_of_all ps f moves scale u r form o radius ts
+  | Slope_at_most f moves scale u, By_all_parts r form o radius ts => check_parts_of_all ps f moves scale u r form o
+    radius ts
   | Slope_in_box f moves scale b u, By_parts r form o t => check_parts_of_box ps f moves scale b u r form o t
   | Slope_at_least f moves scale l, By_points x y others => check_points ps f moves scale l x y others
   | Law stacked kinds rho u, By_triangle => check_law ps accepted stacked kinds rho u

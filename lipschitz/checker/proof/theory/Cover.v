@@ -27,7 +27,8 @@ Lemma square_in_way scale x y s : length x = length y ->
   square_in scale (minus x (on_the_way s x y)) = s * s * square_in scale (minus x y) /\
   square_in scale (minus (on_the_way s x y) y) = (1 - s) * (1 - s) * square_in scale (minus x y).
 Proof.
-  unfold on_the_way, minus. revert scale y. induction x as [|a x IH]; intros scale [|b y]; simpl; try discriminate; intros H;
+  unfold on_the_way, minus. revert scale y.
+  induction x as [|a x IH]; intros scale [|b y]; simpl; try discriminate; intros H;
     [split; ring|].
   destruct (IH (tl scale) y ltac:(lia)) as [-> ->]. unfold Rdiv. split; ring.
 Qed.
@@ -57,15 +58,18 @@ Lemma lines_before_hold ls lines before k h x : Forall (fun l : layerD => length
     (reach (lines_before ls lines before k) x) /\
   length (snd (nth k ls no_layer)) = length (fst (nth k ls no_layer)).
 Proof.
-  intros F. revert lines before k h. induction F as [|[w c] ls Hc F IH]; intros [|l lines] before [|k] h; simpl; try tauto; try lia.
+  intros F. revert lines before k h. induction F as [|[w c] ls Hc F IH]; intros [|l lines] before [|k] h; simpl;
+    try tauto; try lia.
   - intros [H G] -> V _. auto.
   - intros [H G] -> V L. apply (IH lines ((w, c, l) :: before) k _ G); simpl; auto. lia.
 Qed.
-Lemma place_holds ls lines p h : Forall (fun l : layerD => length (snd l) = length (fst l)) ls -> lines_hold ls lines h ->
+Lemma place_holds ls lines p h : Forall (fun l : layerD => length (snd l) = length (fst l)) ls ->
+  lines_hold ls lines h ->
   place_is_open lines p = true -> let (d, j) := form_of_place ls lines p in
   sign_of p * value_at ls (in_layer p) (in_row p) h <= dotR (reals d) h + real j.
 Proof.
-  intros F H. unfold place_is_open, form_of_place, value_at. destruct (nth_error _ _) as [l|] eqn:E; [|discriminate]. intros _.
+  intros F H. unfold place_is_open, form_of_place, value_at. destruct (nth_error _ _) as [l|] eqn:E; [|discriminate].
+  intros _.
   assert (in_row p < length (nth (in_layer p) lines []))%nat as Lr by (apply nth_error_Some; congruence).
   assert (in_layer p < length lines)%nat as Ll.
   { destruct (lt_dec (in_layer p) (length lines)); auto. rewrite nth_overflow in Lr by lia. simpl in Lr. lia. }
@@ -91,7 +95,8 @@ Proof.
   intros F W H. unfold is_shown. pose proof (place_holds ls lines (first c) x F H) as P1.
   pose proof (place_holds ls lines (second c) x F H) as P2.
   destruct (form_of_place ls lines (first c)) as [f k]. destruct (form_of_place ls lines (second c)) as [g j].
-  intros S. do 5 both S. specialize (P1 S). specialize (P2 H4). apply real_nonnegative in H2, H3. apply real_positive in H1.
+  intros S. do 5 both S. specialize (P1 S). specialize (P2 H4). apply real_nonnegative in H2, H3.
+  apply real_positive in H1.
   rewrite real_add in H1. apply nonpositive in H0. rewrite !real_add, !real_mul in H0.
   pose proof (row_ends_within (plus add (scale mul (weight c) f) (scale mul (rest c) g)) b x W) as [_ E].
   rewrite (f_plus add Rplus real real_add), !(f_scale mul Rmult real real_mul), dot_plus_l, !dot_scale_l in E.
@@ -101,7 +106,8 @@ Qed.
 
 (** A tree of parts holds of usable points z that are looked at as z / size z, in a box. *)
 Section Cover.
-Context (o : hints) (ls : list layerD) (inequality : list (list line) -> list conflict -> list dyadic -> matrixD) (moves : list bool)
+Context (o : hints) (ls : list layerD) (inequality : list (list line) -> list conflict -> list dyadic ->
+  matrixD) (moves : list bool)
   (scale : list dyadic) (u : R) (f : list R -> list R) (n : nat) (usable : list R -> Prop) (size : list R -> R).
 Context (fits : Forall (fun l : layerD => length (snd l) = length (fst l)) ls) (values : forall x, length (f x) = n).
 Definition bounded_between x y := norm (minus (f x) (f y)) <= u * distance scale x y.
@@ -109,9 +115,11 @@ Definition looked_at x := scaleR (/ size x) x.
 Context (sizes : forall s x y, size (on_the_way s x y) = (1 - s) * size x + s * size y).
 Context (positive_size : forall x, usable x -> 0 < size x).
 Context (excluded_at : forall c x, usable x -> excluded ls c (looked_at x) -> excluded ls c x).
-Context (in_part : forall lines cs ts x y, forallb is_nonnegative ts = true -> nonnegative (realm (inequality lines cs ts)) ->
+Context (in_part : forall lines cs ts x y,
+  forallb is_nonnegative ts = true -> nonnegative (realm (inequality lines cs ts)) ->
   usable x -> usable y -> lines_hold ls lines (looked_at x) -> lines_hold ls lines (looked_at y) ->
-  agree moves x y -> same_signs ls x y -> Forall (fun c => excluded ls c x /\ excluded ls c y) cs -> bounded_between x y).
+  agree moves x y -> same_signs ls x y -> Forall (fun c => excluded ls c x /\ excluded ls c y) cs ->
+    bounded_between x y).
 Lemma between_halves x y s : 0 <= s <= 1 -> length x = length y ->
   bounded_between x (on_the_way s x y) -> bounded_between (on_the_way s x y) y -> bounded_between x y.
 Proof.
@@ -147,13 +155,15 @@ Proof.
     + intros x y s Hs A. apply between_halves; auto. destruct (agree_lengths _ _ _ A). congruence.
     + intros x y Dx Dy A Same. eapply in_part; eauto. apply Forall_forall. intros c Hc. apply filter_In in Hc.
       destruct Hc as [_ Hc]. split; apply excluded_at; auto; eapply shown_excluded; eauto.
-  - assert (forall z w, agree moves z w -> D z -> D w -> side k m z <= 0 -> side k m w <= 0 -> bounded_between z w) as Below.
+  - assert (forall z w, agree moves z w -> D z -> D w -> side k m z <= 0 -> side k m w <= 0 ->
+      bounded_between z w) as Below.
     { intros z w Azw Dz Dw Hz Hw. apply (IHl (fun v => D v /\ side k m v <= 0) _ _ H); auto.
       - intros v v' s Hs [G1 G2] [G3 G4]. split; auto. rewrite side_way. nra.
       - intros v [G1 _]. auto.
       - intros v [G1 G2]. apply within_cut; auto. now apply below_cut; auto.
       - intros v [G1 _]. apply known_of; auto. }
-    assert (forall z w, agree moves z w -> D z -> D w -> 0 <= side k m z -> 0 <= side k m w -> bounded_between z w) as Above.
+    assert (forall z w, agree moves z w -> D z -> D w -> 0 <= side k m z -> 0 <= side k m w ->
+      bounded_between z w) as Above.
     { intros z w Azw Dz Dw Hz Hw. apply (IHu (fun v => D v /\ 0 <= side k m v) _ _ H0); auto.
       - intros v v' s Hs [G1 G2] [G3 G4]. split; auto. rewrite side_way. nra.
       - intros v [G1 _]. auto.
@@ -178,7 +188,8 @@ Proof.
   intros Hu Hr Hq H. unfold norm. rewrite <- (sqrt_square u) by auto. rewrite <- sqrt_mult_alt by nra.
   apply sqrt_le_1_alt. eapply Rle_trans; [exact H|]. now apply Rmult_le_compat_r.
 Qed.
-(** What `covers` has to show: of points in a set, and functions G of the part's values whose increments these measure. *)
+(** What `covers` has to show: of points in a set,
+  and functions G of the part's values whose increments these measure. *)
 Lemma parts_sound ps f moves scale u r form covers (inside : list R -> Prop) : let p := part_at ps (moved f) in
   check_parts_with ps f moves scale u r form covers = true ->
   (forall q, covers q = true -> Forall (fun l : layerD => length (snd l) = length (fst l)) (hidden p) ->
@@ -208,15 +219,20 @@ Proof.
     (forall z w, square (minus (G z) (G w)) <= measured q (minus (g z) (g w))) ->
     norm (minus (G (clamped c x)) (G (clamped c y))) <= real u * distance scale x y) as T.
   { intros q T G n LG MG. pose proof (agree_clamped c _ _ _ A) as A'.
-    apply Rle_trans with (real u * distance scale (clamped c x) (clamped c y)); [apply (I q T Fh Fo Hs Hm Hu Hr G n); auto|].
-    apply Rmult_le_compat_l; auto. apply sqrt_le_1_alt, square_in_clamped. destruct (agree_lengths _ _ _ A). congruence. }
+    apply Rle_trans with (real u * distance scale (clamped c x) (clamped c y)); [apply (I q T Fh Fo Hs Hm Hu Hr G n);
+      auto|].
+    apply Rmult_le_compat_l; auto. apply sqrt_le_1_alt, square_in_clamped. destruct (agree_lengths _ _ _ A).
+    congruence. }
   assert (forall z, length (g z) = length (fst (outer p))) as Lg.
   { intros z. unfold g. rewrite network_end, length_affine; simpl; now rewrite ?map_length. }
   destruct f as [k|phi rho], form as [q|]; simpl in HC; try discriminate.
-  - simpl value_of. change (part_at ps k) with p. rewrite !V. fold c. apply (T None HC g _ Lg). intros z w. apply Rle_refl.
-  - apply andb_prop in HC. destruct HC as [HC HT]. apply andb_prop in HC. destruct HC as [HC HF]. apply Nat.eqb_eq in HC.
+  - simpl value_of. change (part_at ps k) with p. rewrite !V. fold c. apply (T None HC g _ Lg). intros z w.
+    apply Rle_refl.
+  - apply andb_prop in HC. destruct HC as [HC HT]. apply andb_prop in HC. destruct HC as [HC HF].
+    apply Nat.eqb_eq in HC.
     simpl value_of. change (part_at ps phi) with p. rewrite !V. fold c.
-    assert (fits_part (part_at ps rho) = true /\ relu_between (part_at ps rho) = true /\ clamp (part_at ps rho) = []) as (Fr & Rr & Cr).
+    assert (fits_part (part_at ps rho) = true /\ relu_between (part_at ps rho) = true /\ clamp (part_at ps rho) =
+      []) as (Fr & Rr & Cr).
     { simpl in H, HR, Hc. destruct (clamp (part_at ps rho)); [|rewrite ?andb_false_r in Hc; discriminate].
       rewrite !andb_true_r in *. apply andb_prop in H, HR. tauto. }
     unfold check_form in HF. apply andb_prop in HF. destruct HF as [HP HF]. apply shown_sound in HF.
@@ -231,7 +247,8 @@ Proof.
   apply (parts_sound ps f moves scale u r form _ (within (clamp_ends (clamp p) b)) H); auto using within_clamped.
   clear - p. cbv beta. fold p. intros q T Fh Fo Hs _ Hu Hr g G n LG MG x y A Ix Iy.
   assert (forall z, looked_at (fun _ => 1) z = z) as Id by (intros z; apply scale_one).
-  apply (tree_covers o (hidden p) (part_inequality (hidden p) (outer p) q moves scale r) moves scale (real u) G n (fun _ => True) (fun _ => 1))
+  apply (tree_covers o (hidden p) (part_inequality (hidden p) (outer p) q moves scale r) moves scale (real u) G n (fun
+    _ => True) (fun _ => 1))
     with (t := t) (D := within (clamp_ends (clamp p) b)) (b := clamp_ends (clamp p) b) (around := []); auto.
   - intros. ring.
   - intros. lra.

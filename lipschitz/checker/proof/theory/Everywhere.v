@@ -12,7 +12,8 @@ Lemma affine_multiple w c a h : Forall (fun a => real a = 0) c ->
 Proof.
   intros H. unfold affine, apply. rewrite !map_map. revert c H.
   induction w as [|r w IH]; intros [|b c] H; simpl; auto; try inversion H as [|? ? Hb Hc]; subst.
-  - f_equal; [rewrite Hb; ring|]. clear - Hc. induction Hc as [|d c Hd Hc IH]; simpl; auto. rewrite Hd. f_equal; [ring|auto].
+  - f_equal; [rewrite Hb; ring|]. clear - Hc. induction Hc as [|d c Hd Hc IH]; simpl; auto. rewrite Hd.
+    f_equal; [ring|auto].
   - rewrite dot_scale_r. f_equal. specialize (IH [] (Forall_nil _)). simpl in IH. now rewrite !plus_nil_r in IH.
   - rewrite dot_scale_r, Hb. f_equal; [ring|]. now apply IH.
 Qed.
@@ -22,13 +23,15 @@ Proof.
   - rewrite !relu_right; auto. now apply Rmult_le_pos.
   - rewrite !relu_left; [ring|lra|nra].
 Qed.
-Lemma values_multiple ls k a h : Forall no_bias ls -> 0 <= a -> layer_values ls k (scaleR a h) = scaleR a (layer_values ls k h).
+Lemma values_multiple ls k a h : Forall no_bias ls -> 0 <= a ->
+  layer_values ls k (scaleR a h) = scaleR a (layer_values ls k h).
 Proof.
   intros F H. revert k h. induction F as [|[w c] ls Hc F IH]; intros [|k] h; simpl; auto.
   - now apply affine_multiple.
   - rewrite affine_multiple, relu_multiple by auto. apply IH.
 Qed.
-Lemma signs_multiple ls lines a h : Forall no_bias ls -> 0 < a -> signs_hold ls lines (scaleR a h) -> signs_hold ls lines h.
+Lemma signs_multiple ls lines a h : Forall no_bias ls -> 0 < a -> signs_hold ls lines (scaleR a h) ->
+  signs_hold ls lines h.
 Proof.
   intros F H. revert lines h. induction F as [|[w c] ls Hc F IH]; intros [|l lines] h; simpl; try tauto.
   rewrite affine_multiple, relu_multiple by (auto; lra). intros [S G]. split; auto. clear - S H. revert S.
@@ -39,7 +42,8 @@ Proof.
 Qed.
 Lemma excluded_multiple ls c a x : Forall no_bias ls -> 0 < a -> excluded ls c (scaleR a x) -> excluded ls c x.
 Proof.
-  intros F H. unfold excluded, value_at. rewrite !values_multiple, !nth_scaled by (auto; lra). intros (H1 & H2 & H3 & H4).
+  intros F H. unfold excluded, value_at. rewrite !values_multiple, !nth_scaled by (auto; lra).
+  intros (H1 & H2 & H3 & H4).
   repeat split; auto. apply (Rmult_le_reg_l a); auto. lra.
 Qed.
 
@@ -53,10 +57,12 @@ Qed.
 Lemma affine_widened w c x : length c = length w -> Forall (fun r => length r = length x) w ->
   affine (realm (widened w c)) (reals (map (fun _ => zero) (widened w c))) (x ++ [1]) = affine (realm w) (reals c) x.
 Proof.
-  intros L F. unfold affine, apply. revert c L. induction F as [|r w Hr F IH]; intros [|a c] L; simpl in *; try discriminate; auto.
+  intros L F. unfold affine, apply. revert c L.
+  induction F as [|r w Hr F IH]; intros [|a c] L; simpl in *; try discriminate; auto.
   f_equal; [|apply IH; lia]. rewrite map_app, dot_app, real_zero by (now rewrite map_length). simpl. ring.
 Qed.
-Lemma is_chain_rows n w : forallb (fun r => length r =? n)%nat w = true -> Forall (fun r : list dyadic => length r = n) w.
+Lemma is_chain_rows n w : forallb (fun r => length r =? n)%nat w = true ->
+  Forall (fun r : list dyadic => length r = n) w.
 Proof. rewrite forallb_forall, <- Forall_forall. apply Forall_impl. intros r. apply Nat.eqb_eq. Qed.
 Lemma length_widened w c : length c = length w -> length (widened w c) = length w.
 Proof. revert c. induction w as [|r w IH]; intros [|a c] L; simpl in *; try discriminate; auto. Qed.
@@ -68,12 +74,14 @@ Proof.
   simpl in Hc, C. apply andb_prop in C. destruct C as [Cw C]. subst n. apply is_chain_rows in Cw.
   simpl homogeneous. rewrite map_app. simpl.
   pose proof (affine_app (widened w c) (match ls with [] => [] | _ => [unit_form (length x)] end)
-    (map (fun _ => zero) (widened w c)) (map (fun _ => zero) (match ls with [] => [] | _ => [unit_form (length x)] end)) (x ++ [1])
+    (map (fun _ => zero) (widened w c)) (map (fun _ => zero) (match ls with [] => [] | _ => [unit_form (length x)]
+      end)) (x ++ [1])
     (map_length _ _)) as E.
   rewrite affine_widened in E by auto. unfold relu_layers in *.
   rewrite E. destruct ls as [|l ls].
   - simpl. now rewrite app_nil_r.
-  - rewrite map_app. assert (affine (realm [unit_form (length x)]) (reals (map (fun _ => zero) [unit_form (length x)])) (x ++ [1]) = [1]) as U.
+  - rewrite map_app. assert (affine (realm [unit_form (length x)]) (reals (map (fun _ => zero) [unit_form (length
+      x)])) (x ++ [1]) = [1]) as U.
     { unfold affine. simpl. rewrite (dot_unit (length x) x 1 []), real_zero by auto. f_equal. ring. }
     rewrite U. assert (map relu [1] = [1]) as -> by (simpl; rewrite relu_right by lra; reflexivity).
     apply IH; try discriminate; auto. now rewrite map_length, length_affine, map_length; rewrite ?map_length.
@@ -89,7 +97,8 @@ Proof. revert n. induction ls as [|[w c] ls IH]; intros n; simpl; constructor; a
 (** A bound between points that lie on the same sides of planes holds between any two. *)
 Section Planes.
 Context (moves : list bool) (B : list R -> list R -> Prop) (D : list R -> Prop).
-Context (joins : forall x y s, 0 <= s <= 1 -> agree moves x y -> B x (on_the_way s x y) -> B (on_the_way s x y) y -> B x y).
+Context (joins : forall x y s, 0 <= s <= 1 -> agree moves x y -> B x (on_the_way s x y) -> B (on_the_way s x y) y ->
+  B x y).
 Context (convex : forall x y s, 0 <= s <= 1 -> D x -> D y -> D (on_the_way s x y)).
 Definition level (g : list R -> R) : Prop := forall x y s, g (on_the_way s x y) = (1 - s) * g x + s * g y.
 Lemma one_side_of_each gs : Forall level gs ->
@@ -117,7 +126,8 @@ Proof.
   f_equal. apply IH. lia.
 Qed.
 Lemma within_nth b x : length x = length b ->
-  (forall j, (j < length b)%nat -> real (fst (nth j b (zero, zero))) <= nth j x 0 <= real (snd (nth j b (zero, zero)))) -> within b x.
+  (forall j, (j < length b)%nat -> real (fst (nth j b (zero, zero))) <= nth j x 0 <= real (snd (nth j b (zero,
+    zero)))) -> within b x.
 Proof.
   revert x. induction b as [|[l h] b IH]; intros [|a x] L H; simpl in *; try discriminate; auto.
   split; [apply (H O); lia|]. apply IH; [lia|]. intros j Hj. apply (H (S j)). lia.
@@ -126,7 +136,8 @@ Lemma largest_of (q : nat -> R) n : exists k, (k <= n)%nat /\ forall j, (j <= n)
 Proof.
   induction n as [|n (k & L & H)]; [exists O; split; auto; intros j Hj; replace j with O by lia; lra|].
   destruct (Rle_dec (q k) (q (S n))) as [G|G].
-  - exists (S n). split; auto. intros j Hj. destruct (Nat.eq_dec j (S n)) as [->|]; [lra|]. specialize (H j ltac:(lia)). lra.
+  - exists (S n). split; auto. intros j Hj. destruct (Nat.eq_dec j (S n)) as [->|]; [lra|].
+    specialize (H j ltac:(lia)). lra.
   - exists k. split; [lia|]. intros j Hj. destruct (Nat.eq_dec j (S n)) as [->|]; [lra|]. apply H. lia.
 Qed.
 
@@ -145,10 +156,12 @@ Definition faces_out (k : nat) (s : R) (z : list R) : Prop :=
   (exists x, z = x ++ [1] /\ length x = n) /\
   forall j, (j <= n)%nat -> nth j z 0 * reach_of k <= s * nth k z 0 * reach_of j /\
                             - (nth j z 0 * reach_of k) <= s * nth k z 0 * reach_of j.
-Lemma faces_out_convex k s x y a : 0 <= a <= 1 -> faces_out k s x -> faces_out k s y -> faces_out k s (on_the_way a x y).
+Lemma faces_out_convex k s x y a : 0 <= a <= 1 -> faces_out k s x -> faces_out k s y ->
+  faces_out k s (on_the_way a x y).
 Proof.
   intros Ha [(v & -> & Lv) H] [(w & -> & Lw) G]. split.
-  - exists (on_the_way a v w). rewrite on_the_way_app by congruence. rewrite length_way by congruence. split; auto. f_equal. f_equal. ring.
+  - exists (on_the_way a v w). rewrite on_the_way_app by congruence. rewrite length_way by congruence. split; auto.
+    f_equal. f_equal. ring.
   - intros j Hj. rewrite !nth_on_the_way. specialize (H j Hj). specialize (G j Hj).
     set (p := nth j (v ++ [1]) 0) in *. set (q := nth j (w ++ [1]) 0) in *.
     set (p' := nth k (v ++ [1]) 0) in *. set (q' := nth k (w ++ [1]) 0) in *.
@@ -179,12 +192,14 @@ Proof.
   apply within_nth; unfold looked_at, face; fold n.
   - unfold scale. now rewrite !map_length, seq_length.
   - intros j Hj. rewrite map_length, seq_length in Hj. fold t.
-    set (f j := if (j =? k)%nat then (d, d) else if (j =? n)%nat then (zero, one) else (neg (nth j radius zero), nth j radius zero)).
+    set (f j := if (j =? k)%nat then (d, d) else if (j =? n)%nat then (zero, one) else (neg (nth j radius zero),
+      nth j radius zero)).
     rewrite (nth_indep (map f _) (zero, zero) (f O)) by (now rewrite map_length, seq_length).
     rewrite map_nth, seq_nth, Nat.add_0_l by lia. rewrite nth_scaled.
     assert (forall a b c, a * t <= b <= c * t -> a <= / t * b <= c) as Div.
     { intros a b c [G1 G2]. split; apply (Rmult_le_reg_l t); try lra; rewrite <- Rmult_assoc, Rinv_r by lra; lra. }
-    unfold f. destruct (Nat.eqb_spec j k) as [->|Nk]; [|destruct (Nat.eqb_spec j n) as [->|Nn]]; simpl fst; simpl snd; apply Div.
+    unfold f. destruct (Nat.eqb_spec j k) as [->|Nk]; [|destruct (Nat.eqb_spec j n) as [->|Nn]]; simpl fst; simpl snd;
+      apply Div.
     + rewrite Hd. destruct Hs; subst s; lra.
     + rewrite Hx, last_is_one, real_zero, real_one by auto. lra.
     + specialize (F j ltac:(lia)). assert (reach_of j = real (nth j radius zero)) as <-
@@ -195,7 +210,8 @@ Proof.
 Qed.
 
 Context (moves : list bool) (B : list R -> list R -> Prop).
-Context (joins : forall x y s, 0 <= s <= 1 -> agree moves x y -> B x (on_the_way s x y) -> B (on_the_way s x y) y -> B x y).
+Context (joins : forall x y s, 0 <= s <= 1 -> agree moves x y -> B x (on_the_way s x y) -> B (on_the_way s x y) y ->
+  B x y).
 Definition extended (z : list R) : Prop := exists x, z = x ++ [1] /\ length x = n.
 Lemma on_some_face : (forall k s, (k <= n)%nat -> (s = 1 \/ s = -1 /\ (k < n)%nat) ->
     forall x y, agree moves x y -> faces_out k s x -> faces_out k s y -> B x y) ->
@@ -203,7 +219,8 @@ Lemma on_some_face : (forall k s, (k <= n)%nat -> (s = 1 \/ s = -1 /\ (k < n)%na
 Proof.
   intros H.
   apply (one_side_of_each moves B extended joins) with (gs := flat_map (fun k => flat_map (fun j =>
-    [(fun z => nth k z 0 * reach_of j - nth j z 0 * reach_of k); (fun z => nth k z 0 * reach_of j + nth j z 0 * reach_of k)])
+    [(fun z => nth k z 0 * reach_of j - nth j z 0 * reach_of k);
+      (fun z => nth k z 0 * reach_of j + nth j z 0 * reach_of k)])
     (seq 0 (S n))) (seq 0 (S n))).
   - intros x y s _ (v & -> & Lv) (w & -> & Lw). exists (on_the_way s v w).
     rewrite on_the_way_app by congruence. rewrite length_way by congruence. split; auto. f_equal. f_equal. ring.
@@ -212,21 +229,26 @@ Proof.
   - intros x y A Ex Ey S. set (m j := (nth j x 0 + nth j y 0) / 2).
     destruct (largest_of (fun j => Rabs (m j) * / reach_of j) n) as (k & Hk & Largest).
     assert (forall j, (j <= n)%nat -> Rabs (m j) * reach_of k <= Rabs (m k) * reach_of j) as M.
-    { intros j Hj. specialize (Largest j Hj). simpl in Largest. pose proof (reach_positive j Hj). pose proof (reach_positive k Hk).
+    { intros j Hj. specialize (Largest j Hj). simpl in Largest. pose proof (reach_positive j Hj).
+      pose proof (reach_positive k Hk).
       apply (Rmult_le_compat_r (reach_of j * reach_of k)) in Largest; [|apply Rlt_le, Rmult_lt_0_compat; lra].
-      replace (Rabs (m j) * / reach_of j * (reach_of j * reach_of k)) with (Rabs (m j) * reach_of k) in Largest by (field; lra).
-      replace (Rabs (m k) * / reach_of k * (reach_of j * reach_of k)) with (Rabs (m k) * reach_of j) in Largest by (field; lra).
+      replace (Rabs (m j) * / reach_of j * (reach_of j * reach_of k)) with (Rabs (m j) * reach_of k) in Largest by
+        (field; lra).
+      replace (Rabs (m k) * / reach_of k * (reach_of j * reach_of k)) with (Rabs (m k) * reach_of j) in Largest by
+        (field; lra).
       exact Largest. }
     assert (forall j, (j <= n)%nat ->
       same_sign (nth k x 0 * reach_of j - nth j x 0 * reach_of k) (nth k y 0 * reach_of j - nth j y 0 * reach_of k) /\
-      same_sign (nth k x 0 * reach_of j + nth j x 0 * reach_of k) (nth k y 0 * reach_of j + nth j y 0 * reach_of k)) as G.
+      same_sign (nth k x 0 * reach_of j + nth j x 0 * reach_of k) (nth k y 0 * reach_of j + nth j y 0 * reach_of k))
+        as G.
     { intros j Hj. rewrite Forall_flat_map, Forall_forall in S. specialize (S k ltac:(apply in_seq; lia)).
       rewrite Forall_flat_map, Forall_forall in S. specialize (S j ltac:(apply in_seq; lia)).
       inversion S as [|? ? S1 S2]; subst. inversion S2; subst. tauto. }
     set (s := if Rle_dec 0 (m k) then 1 else -1).
     assert (Rabs (m k) = s * m k) as Sk.
     { unfold s. destruct (Rle_dec 0 (m k)); [rewrite Rabs_pos_eq|rewrite Rabs_left]; lra. }
-    assert (forall z, extended z -> (forall j, (j <= n)%nat -> 0 <= s * nth k z 0 * reach_of j - nth j z 0 * reach_of k /\
+    assert (forall z, extended z -> (forall j,
+      (j <= n)%nat -> 0 <= s * nth k z 0 * reach_of j - nth j z 0 * reach_of k /\
       0 <= s * nth k z 0 * reach_of j + nth j z 0 * reach_of k) -> faces_out k s z) as Out.
     { intros z Ez F. split; auto. intros j Hj. specialize (F j Hj). lra. }
     apply (H k s Hk).
@@ -236,21 +258,27 @@ Proof.
         destruct Ex as (v & -> & Lv), Ey as (w & -> & Lw). rewrite !last_is_one by auto. lra.
     + exact A.
     + apply Out; auto. intros j Hj. specialize (M j Hj). destruct (G j Hj) as [G1 G2]. rewrite Sk in M.
-      pose proof (Rle_abs (m j)). pose proof (Rle_abs (- m j)) as N. rewrite Rabs_Ropp in N. pose proof (reach_positive k Hk).
-      assert (m j * reach_of k <= s * m k * reach_of j) by nra. assert (- m j * reach_of k <= s * m k * reach_of j) by nra.
+      pose proof (Rle_abs (m j)). pose proof (Rle_abs (- m j)) as N. rewrite Rabs_Ropp in N.
+      pose proof (reach_positive k Hk).
+      assert (m j * reach_of k <= s * m k * reach_of j) by nra.
+      assert (- m j * reach_of k <= s * m k * reach_of j) by nra.
       unfold m in *. unfold s, same_sign in *. destruct (Rle_dec 0 _); split; lra.
     + apply Out; auto. intros j Hj. specialize (M j Hj). destruct (G j Hj) as [G1 G2]. rewrite Sk in M.
-      pose proof (Rle_abs (m j)). pose proof (Rle_abs (- m j)) as N. rewrite Rabs_Ropp in N. pose proof (reach_positive k Hk).
-      assert (m j * reach_of k <= s * m k * reach_of j) by nra. assert (- m j * reach_of k <= s * m k * reach_of j) by nra.
+      pose proof (Rle_abs (m j)). pose proof (Rle_abs (- m j)) as N. rewrite Rabs_Ropp in N.
+      pose proof (reach_positive k Hk).
+      assert (m j * reach_of k <= s * m k * reach_of j) by nra.
+      assert (- m j * reach_of k <= s * m k * reach_of j) by nra.
       unfold m in *. unfold s, same_sign in *. destruct (Rle_dec 0 _); split; lra.
 Qed.
 Lemma face_in_all k s : (k <= n)%nat -> (s = 1 \/ s = -1 /\ (k < n)%nat) ->
   exists d, In (face radius k d) (all_faces radius) /\ real d = s * reach_of k.
 Proof.
   intros Hk Hs. unfold all_faces. fold n. destruct (Nat.eq_dec k n) as [->|N].
-  - exists one. split; [now left|]. unfold reach_of. rewrite Nat.eqb_refl, real_one. destruct Hs as [->|[_ L]]; [ring|lia].
+  - exists one. split; [now left|]. unfold reach_of. rewrite Nat.eqb_refl, real_one.
+    destruct Hs as [->|[_ L]]; [ring|lia].
   - assert (reach_of k = real (nth k radius zero)) as -> by (unfold reach_of; destruct (Nat.eqb_spec k n); [lia|auto]).
-    destruct Hs as [->|[-> _]]; [exists (nth k radius zero)|exists (neg (nth k radius zero))]; (split; [|rewrite ?real_neg; ring]);
+    destruct Hs as [->|[-> _]]; [exists (nth k radius zero)|exists (neg (nth k radius zero))]; (split;
+      [|rewrite ?real_neg; ring]);
       right; apply in_flat_map; exists k; (split; [apply in_seq; lia|simpl; auto]).
 Qed.
 End Faces.
@@ -282,20 +310,24 @@ Proof.
   fold p. cbv beta. intros q T Fh Fo Hs Hm Hu Hru g G n LG MG x y A _ _.
   set (m := inputs_of p) in *. set (ls := homogeneous m (hidden p)) in *. set (moves' := moves ++ [false]).
   destruct (agree_lengths _ _ _ A) as [Lx Ly]. assert (length x = m /\ length y = m) as [Mx My] by (split; congruence).
-  set (F z := G (removelast z)). assert (forall v, F (v ++ [1]) = G v) as Fv by (intros v; unfold F; now rewrite removelast_last).
+  set (F z := G (removelast z)). assert (forall v, F (v ++ [1]) = G v) as Fv by (intros v; unfold F;
+    now rewrite removelast_last).
   assert (forall z, length (F z) = n) as LF by (intros z; apply LG).
   assert (distance scale (x ++ [1]) (y ++ [1]) = distance scale x y) as Dist
     by (unfold distance; rewrite square_in_extended; congruence).
   rewrite <- Dist, <- !Fv. change (bounded_between scale (real u) F (x ++ [1]) (y ++ [1])).
   assert (forall a b s, 0 <= s <= 1 -> agree moves' a b -> bounded_between scale (real u) F a (on_the_way s a b) ->
     bounded_between scale (real u) F (on_the_way s a b) b -> bounded_between scale (real u) F a b) as Joins.
-  { intros a b s Hs' A'. apply (between_halves scale (real u) F n LF); auto. destruct (agree_lengths _ _ _ A'). congruence. }
-  apply (on_some_face radius Hp moves' _ Joins); [|now apply agree_extended|exists x; split; congruence|exists y; split; congruence].
+  { intros a b s Hs' A'. apply (between_halves scale (real u) F n LF); auto. destruct (agree_lengths _ _ _ A').
+    congruence. }
+  apply (on_some_face radius Hp moves' _ Joins); [|now apply agree_extended|exists x; split; congruence|exists y;
+    split; congruence].
   intros k s Hk Hks. destruct (face_in_all radius k s Hk Hks) as (d & In_all & Hd).
   destruct (trees_of_all _ _ _ _ _ _ T In_all) as (t & Ht).
   assert (s = 1 \/ s = -1) as Hs1 by tauto.
   intros a b A' Da Db. apply (tree_covers o ls (part_inequality ls (outer p) q moves' scale r) moves' scale (real u) F n
-    (faces_out radius k s) (size_by radius k s)) with (t := t) (b := face radius k d) (around := []) (D := faces_out radius k s); auto.
+    (faces_out radius k s) (size_by radius k s)) with (t := t) (b := face radius k d) (around := []) (D := faces_out
+      radius k s); auto.
   - apply homogeneous_fits.
   - apply size_by_way.
   - intros z Hz. pose proof (size_at_least_1 radius Hp k s z Hk Hz). lra.
@@ -307,7 +339,8 @@ Proof.
     destruct Hz as [(v & -> & Lv) _], Hw' as [(v' & -> & Lv') _].
     apply square_root_bound with (r := real r); auto using square_in_nonneg. rewrite !Fv.
     eapply Rle_trans; [apply MG|]. unfold g.
-    rewrite <- (homogeneous_run m (hidden p) (outer p) v), <- (homogeneous_run m (hidden p) (outer p) v') by (auto; congruence).
+    rewrite <- (homogeneous_run m (hidden p) (outer p) v), <- (homogeneous_run m (hidden p) (outer p) v') by (auto;
+      congruence).
     eapply part_holds; eauto using homogeneous_fits.
   - intros. now apply faces_out_convex.
   - intros z Hz. now apply face_holds.

@@ -56,7 +56,8 @@ Proof.
 Qed.
 Lemma worth_inputs rho dx post : worth (input_pairs rho (length dx)) (dx ++ post) = real rho * square dx.
 Proof.
-  unfold input_pairs, square. assert (forall pre, worth (map (fun k => (unit_form k, scale mul (half rho) (unit_form k)))
+  unfold input_pairs, square. assert (forall pre, worth (map (fun k => (unit_form k,
+    scale mul (half rho) (unit_form k)))
     (seq (length pre) (length dx))) (pre ++ dx ++ post) = real rho * dotR dx dx) as H; [|exact (H [])].
   induction dx as [|a dx IH]; intros pre; simpl; [ring|].
   rewrite (f_scale mul Rmult real real_mul), dot_scale_l, dot_unit, real_half by auto.
@@ -109,7 +110,8 @@ Lemma excluded_product ls c x y : same_signs ls x y -> excluded ls c x -> exclud
   increment_at ls (first c) x y * increment_at ls (second c) x y = 0.
 Proof.
   intros S (Hw & Hr & Hs & Hx) (_ & _ & _ & Hy).
-  pose proof (S (in_layer (first c)) (in_row (first c))) as S1. pose proof (S (in_layer (second c)) (in_row (second c))) as S2.
+  pose proof (S (in_layer (first c)) (in_row (first c))) as S1.
+  pose proof (S (in_layer (second c)) (in_row (second c))) as S2.
   pose proof (increment_vanishes ls (first c) x y) as V1. pose proof (increment_vanishes ls (second c) x y) as V2.
   cbv zeta in V1, V2. unfold same_sign in S1, S2.
   set (a := value_at ls (in_layer (first c)) (in_row (first c)) x) in *.
@@ -144,26 +146,31 @@ Lemma relu_step_holds lines ts ys n y y' v pre post :
   let '(p, z, m) := relu_step lines ts ys n in
   worth p v <= 0 /\ applyR (realm z) v = dz /\ m = length (pre ++ open_ones lines dz).
 Proof.
-  unfold minus. intros H. revert ts ys n y' pre. induction H as [|l a lines y Hl H IH]; intros ts ys n y' pre H' Ht Hy Hp E.
+  unfold minus. intros H. revert ts ys n y' pre.
+  induction H as [|l a lines y Hl H IH]; intros ts ys n y' pre H' Ht Hy Hp E.
   - inversion H'. subst y'. simpl in *. rewrite app_nil_r. destruct ys; simpl in *; [|discriminate].
     repeat split; auto; lra.
-  - inversion H' as [|l' b lines' y'' Hb Hy']. subst l' lines' y' n. destruct ys as [|row ys]; simpl in Hy; [discriminate|].
+  - inversion H' as [|l' b lines' y'' Hb Hy']. subst l' lines' y' n.
+    destruct ys as [|row ys]; simpl in Hy; [discriminate|].
     inversion Hy as [[Hrow Hys]]. clear Hy.
     assert (Forall (fun t => is_nonnegative t = true) (tl ts)) as Ht' by (destruct ts; [constructor|now inversion Ht]).
     assert (0 <= real (hd zero ts)) as Hh.
     { destruct ts; [simpl; rewrite real_zero; lra|inversion Ht; subst; now apply real_nonnegative]. }
     cbn [relu_step]. destruct l as [| |low high s t]; cbn [is_open]; simpl in E, Hl, Hb.
     + specialize (IH (tl ts) ys (length pre) y'' pre Hy' Ht' Hys eq_refl E).
-      destruct (relu_step lines (tl ts) ys (length pre)) as [[p z] m]. destruct IH as (I1 & I2 & I3). repeat split; auto.
+      destruct (relu_step lines (tl ts) ys (length pre)) as [[p z] m]. destruct IH as (I1 & I2 & I3).
+      repeat split; auto.
       simpl. rewrite I2, Hrow, !relu_right by auto. reflexivity.
     + specialize (IH (tl ts) ys (length pre) y'' pre Hy' Ht' Hys eq_refl E).
-      destruct (relu_step lines (tl ts) ys (length pre)) as [[p z] m]. destruct IH as (I1 & I2 & I3). repeat split; auto.
+      destruct (relu_step lines (tl ts) ys (length pre)) as [[p z] m]. destruct IH as (I1 & I2 & I3).
+      repeat split; auto.
       simpl. rewrite I2, !relu_left by auto. f_equal. ring.
     + set (c := relu a + -1 * relu b) in *.
       specialize (IH (tl ts) ys (S (length pre)) y'' (pre ++ [c]) Hy' Ht' Hys).
       rewrite app_length, Nat.add_1_r, <- !app_assoc in IH. specialize (IH eq_refl E).
       destruct (relu_step lines (tl ts) ys (S (length pre))) as [[p z] m]. destruct IH as (I1 & I2 & I3).
-      pose proof (dot_unit (length pre) pre c (open_ones lines (plusR (map relu y) (scaleR (-1) (map relu y''))) ++ post) eq_refl) as U.
+      pose proof (dot_unit (length pre) pre c (open_ones lines (plusR (map relu y) (scaleR (-1) (map relu y''))) ++
+        post) eq_refl) as U.
       rewrite <- E in U. simpl. rewrite U. repeat split.
       * rewrite (f_plus add Rplus real real_add), !(f_scale mul Rmult real real_mul), dot_plus_l, !dot_scale_l, U, Hrow,
           real_neg, real_minus_one.
@@ -204,14 +211,16 @@ Proof.
     assert (dotR (reals (nth i zs [])) v = relu (nth i (affine (realm w) (reals c) h) 0)
       - relu (nth i (affine (realm w) (reals c) h') 0)) as Z
       by (rewrite <- nth_apply, Hz, nth_minus, !nth_relu; reflexivity).
-    destruct o; auto. rewrite (f_plus add Rplus real real_add), (f_scale mul Rmult real real_mul), dot_plus_l, dot_scale_l,
+    destruct o; auto. rewrite (f_plus add Rplus real real_add), (f_scale mul Rmult real real_mul), dot_plus_l,
+      dot_scale_l,
       real_minus_one, Z, <- nth_apply, Hy, nth_minus. ring.
   - intros (_ & _ & H). apply (IH _ _ _ _ H).
 Qed.
 Lemma conflicts_worth_nothing ls all v x y cs : rows_hold ls all v x y -> same_signs ls x y ->
   Forall (fun c => excluded ls c x /\ excluded ls c y) cs -> worth (conflict_pairs all cs) v = 0.
 Proof.
-  intros R S H. induction H as [|c cs [Hx Hy] H IH]; simpl; auto. rewrite IH, (f_scale mul Rmult real real_mul), dot_scale_l.
+  intros R S H. induction H as [|c cs [Hx Hy] H IH]; simpl; auto.
+  rewrite IH, (f_scale mul Rmult real real_mul), dot_scale_l.
   rewrite !(increment_form_holds ls all v x y) by auto. pose proof (excluded_product ls c x y S Hx Hy) as P.
   set (a := increment_at ls (first c) x y) in *. set (b := increment_at ls (second c) x y) in *.
   replace (2 * (real (neg (times_product c)) * a) * b + 0) with (2 * real (neg (times_product c)) * (a * b)) by ring.
@@ -227,7 +236,8 @@ Lemma chain_holds ls lines ts rows h h' pre (last : layerD) :
   signs_hold ls lines h -> signs_hold ls lines h' ->
   Forall (fun l : layerD => length (snd l) = length (fst l)) ls ->
   Forall (Forall (fun t => is_nonnegative t = true)) ts ->
-  (forall post w, applyR w (applyR (realm rows) (pre ++ post)) = applyR w (minus h h')) -> length (snd last) = length (fst last) ->
+  (forall post w, applyR w (applyR (realm rows) (pre ++
+    post)) = applyR w (minus h h')) -> length (snd last) = length (fst last) ->
   let '(p, z, all) := chain_pairs ls lines ts rows (length pre) in
   exists post, worth p (pre ++ post) <= 0 /\ rows_hold ls all (pre ++ post) h h' /\
     applyR (realm (times_rows (fst last) z)) (pre ++ post) =
@@ -235,13 +245,16 @@ Lemma chain_holds ls lines ts rows h h' pre (last : layerD) :
 Proof.
   intros H H' F T R Hl. revert lines ts rows h h' pre H H' T R.
   induction F as [|[w c] ls Hc F IH]; intros [|l lines] ts rows h h' pre H H' T R; simpl in H, H'; try tauto; simpl.
-  - exists []. simpl. split; [lra|]. split; [exact I|]. rewrite apply_times, R. symmetry. apply minus_affine. simpl. now rewrite !map_length.
+  - exists []. simpl. split; [lra|]. split; [exact I|]. rewrite apply_times, R. symmetry. apply minus_affine. simpl.
+    now rewrite !map_length.
   - destruct H as [H G], H' as [H' G']. simpl in Hc.
     set (y := affine (realm w) (reals c) h) in *. set (y' := affine (realm w) (reals c) h') in *.
     assert (forall post, applyR (realm (times_rows w rows)) (pre ++ post) = minus y y') as R'.
     { intros post. rewrite apply_times, R. symmetry. apply minus_affine. now rewrite !map_length. }
-    assert (Forall (fun t => is_nonnegative t = true) (hd [] ts)) as T1 by (destruct ts; simpl; [constructor|now inversion T]).
-    assert (Forall (Forall (fun t => is_nonnegative t = true)) (tl ts)) as T2 by (destruct ts; simpl; [constructor|now inversion T]).
+    assert (Forall (fun t => is_nonnegative t = true) (hd [] ts)) as T1 by (destruct ts; simpl;
+      [constructor|now inversion T]).
+    assert (Forall (Forall (fun t => is_nonnegative t = true)) (tl ts)) as T2 by (destruct ts; simpl;
+      [constructor|now inversion T]).
     set (dz := minus (map relu y) (map relu y')).
     assert (forall post, let '(p, z, m) := relu_step l (hd [] ts) (times_rows w rows) (length pre) in
       worth p (pre ++ open_ones l dz ++ post) <= 0 /\ applyR (realm z) (pre ++ open_ones l dz ++ post) = dz /\
@@ -261,7 +274,8 @@ Qed.
 
 Lemma shown_sound factor_of tries k p : shown_by factor_of tries k p = true -> nonnegative (realm p).
 Proof.
-  revert k. induction tries as [|tries IH]; intros k; simpl; [discriminate|]. destruct (factor_of k p) as [f|]; [|discriminate].
+  revert k. induction tries as [|tries IH]; intros k; simpl; [discriminate|].
+  destruct (factor_of k p) as [f|]; [|discriminate].
   destruct (shows_nonnegative p f) eqn:E; [intros _|apply IH]. eapply shows_nonnegative_sound; eauto.
 Qed.
 Lemma split_forall {P : dyadic -> Prop} t (ms : list matrixD) : Forall P t -> Forall (Forall P) (split t ms).
@@ -290,12 +304,14 @@ Proof.
   assert (forall post, applyR (realm (selector moves scale)) (dx ++ post) = minus x x') as D.
   { intros post. rewrite <- (selected moves scale x S Lx) at 1. rewrite <- (selected moves scale x' S Lx') at 1.
     rewrite (agree_staying _ _ _ A). unfold dx.
-    assert (forall rows, Forall (fun r => length r = count moves) rows -> applyR (realm rows) (dx ++ post) = applyR (realm rows) dx) as C.
+    assert (forall rows, Forall (fun r => length r = count moves) rows -> applyR (realm rows) (dx ++
+      post) = applyR (realm rows) dx) as C.
     { intros rows C. unfold apply. rewrite !map_map. apply map_ext_in. intros r Hr. rewrite Forall_forall in C.
       apply dot_app_short. rewrite map_length, (C r Hr), Ld. lia. }
     fold dx. rewrite C.
     - unfold dx at 1. rewrite apply_minus.
-      assert (forall u v w, length u = length w -> length v = length w -> minus (plusR u w) (plusR v w) = minus u v) as E.
+      assert (forall u v w, length u = length w -> length v = length w ->
+        minus (plusR u w) (plusR v w) = minus u v) as E.
       { clear. unfold minus. induction u as [|a u IH]; intros [|b v] [|c w]; simpl; try discriminate; intros; auto.
         rewrite IH by lia. f_equal. ring. }
       symmetry. apply E; unfold apply; rewrite !map_length, length_selector, length_staying; auto.
@@ -333,7 +349,8 @@ Qed.
 (** What is added to both does not matter. *)
 Lemma apply_shifted w u v s : applyR w (minus (plusR u s) (plusR v s)) = applyR w (minus u v).
 Proof.
-  unfold apply. apply map_ext. intros r. unfold minus. rewrite !(dot_comm r), !dot_plus_l, !dot_scale_l, !dot_plus_l. ring.
+  unfold apply. apply map_ext. intros r. unfold minus. rewrite !(dot_comm r), !dot_plus_l, !dot_scale_l, !dot_plus_l.
+  ring.
 Qed.
 Lemma form_holds p q ts u v s : relu_between p = true -> clamp p = [] -> fits_part p = true ->
   forallb is_nonnegative ts = true -> nonnegative (realm (form_inequality p q ts)) ->

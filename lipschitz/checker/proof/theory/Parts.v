@@ -1,4 +1,5 @@
-(** What the checker computes of proofs by parts of a box: which neurons a box decides, by linear relaxation of ReLU, the
+(** What the checker computes of proofs by parts of a box: which neurons a box decides, by linear relaxation of ReLU,
+  the
   inequality of one part, and the tree of parts that covers the box. *)
 From Coq Require Import List ZArith Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Blocks Lower Values.
@@ -19,7 +20,8 @@ Definition line_of (o : hints) (low high : dyadic) : line :=
   let s := slope_between o low high in
   Open low high s (larger (add high (neg (mul s high))) (neg (mul s low))).
 
-(** c relu y <= c' y + k, neuron by neuron. `below`: which open neurons are bounded from below by y, the others by 0; beyond
+(** c relu y <= c' y + k, neuron by neuron.
+  `below`: which open neurons are bounded from below by y, the others by 0; beyond
   its end, those whose interval reaches further above 0 than below. *)
 Fixpoint through_relu (c : list dyadic) (lines : list line) (below : list bool) : list dyadic * dyadic :=
   match c, lines with
@@ -39,7 +41,8 @@ Fixpoint combined (z : list dyadic) (m : matrixD) : list dyadic :=
   | a :: z', r :: m' => if (fst a =? 0)%Z then combined z' m' else plus add (scale mul a r) (combined z' m')
   | _, _ => []
   end.
-(** A form in the inputs that is at least c h + k, h being what the layers `before` it, the last one first, make of them. *)
+(** A form in the inputs that is at least c h + k, h being what the layers `before` it, the last one first,
+  make of them. *)
 Fixpoint form_above (before : list (layerD * list line)) (below : list (list bool)) (c : list dyadic) (k : dyadic) :
     list dyadic * dyadic :=
   match before with
@@ -123,10 +126,12 @@ Fixpoint form_pairs (s : dyadic) (q : matrixD) (ys all : matrixD) : list pair_of
   | _, _ => []
   end.
 
-(** Increments through a ReLU: those of y are linear forms `ys` in n variables so far; an open neuron's own increment is a
+(** Increments through a ReLU: those of y are linear forms `ys` in n variables so far;
+  an open neuron's own increment is a
   new variable z, for which z (y - z) >= 0, times 2 t. *)
 Definition is_open (l : line) : bool := match l with Open _ _ _ _ => true | _ => false end.
-Fixpoint relu_step (lines : list line) (ts : list dyadic) (ys : matrixD) (n : nat) : list pair_of_forms * matrixD * nat :=
+Fixpoint relu_step (lines : list line) (ts : list dyadic) (ys : matrixD) (n : nat) : list pair_of_forms * matrixD *
+  nat :=
   match lines, ys with
   | l :: lines', y :: ys' =>
       let '(p, z, m) := relu_step lines' (tl ts) ys' (if is_open l then S n else n) in
@@ -140,7 +145,8 @@ Fixpoint relu_step (lines : list line) (ts : list dyadic) (ys : matrixD) (n : na
   | _, _ => ([], [], n)
   end.
 Definition times_rows (w rows : matrixD) : matrixD := map (fun r => combined r rows) w.
-Fixpoint chain_pairs (ls : list layerD) (lines : list (list line)) (ts : list (list dyadic)) (rows : matrixD) (n : nat) :
+Fixpoint chain_pairs (ls : list layerD) (lines : list (list line)) (ts : list (list dyadic)) (rows : matrixD) (n :
+  nat) :
     list pair_of_forms * matrixD * list (matrixD * matrixD) :=
   match ls, lines with
   | (w, _) :: ls', l :: lines' =>
@@ -149,7 +155,8 @@ Fixpoint chain_pairs (ls : list layerD) (lines : list (list line)) (ts : list (l
       let '(q, last, all) := chain_pairs ls' lines' (tl ts) z m in (p ++ q, last, (y, z) :: all)
   | _, _ => ([], rows, [])
   end.
-(** Two neurons that are not both in these states anywhere in a part, because weight y_1 + rest y_2 <= 0 there, y negated where
+(** Two neurons that are not both in these states anywhere in a part, because weight y_1 + rest y_2 <= 0 there,
+  y negated where
   the state is off. Where neither changes its sign, u_1 u_2 = 0 for u = dz (on) or dy - dz (off): times any number. *)
 Record place := Place { in_layer : nat; in_row : nat; stays_on : bool }.
 Record conflict := Conflict { first : place; second : place; weight : dyadic; rest : dyadic; times_product : dyadic }.
@@ -165,7 +172,8 @@ Definition no_layer : layerD := ([], []).
 Definition form_of_place ls lines (p : place) : list dyadic * dyadic :=
   let (w, c) := nth (in_layer p) ls no_layer in
   let s := if stays_on p then one else (-1, 0)%Z in
-  form_above (lines_before ls lines [] (in_layer p)) [] (scale mul s (nth (in_row p) w [])) (mul s (nth (in_row p) c zero)).
+  form_above (lines_before ls lines [] (in_layer p)) [] (scale mul s (nth (in_row p) w [])) (mul s (nth (in_row p) c
+    zero)).
 Definition is_shown (ls : list layerD) (lines : list (list line)) (b : box) (c : conflict) : bool :=
   let (f, k) := form_of_place ls lines (first c) in
   let (g, j) := form_of_place ls lines (second c) in
@@ -226,18 +234,21 @@ Fixpoint cut (k : nat) (m : dyadic) (is_upper : bool) (b : box) : box :=
   | O, (l, h) :: b' => (if is_upper then (m, h) else (l, m)) :: b'
   | S k', i :: b' => i :: cut k' m is_upper b'
   end.
-Fixpoint check_tree (o : hints) (ls : list layerD) (inequality : list (list line) -> list conflict -> list dyadic -> matrixD) (b : box)
+Fixpoint check_tree (o : hints) (ls : list layerD) (inequality : list (list line) -> list conflict -> list dyadic ->
+  matrixD) (b : box)
     (around : list (list line)) (t : tree) : bool :=
   match t with
   | Leaf ds cs ts =>
       match bounds o b [] ls around ds with
-      | Some lines => forallb is_nonnegative ts && shown_by (factor_number o) most_factors O (inequality lines (filter (is_shown ls lines b) cs) ts)
+      | Some lines => forallb is_nonnegative ts &&
+        shown_by (factor_number o) most_factors O (inequality lines (filter (is_shown ls lines b) cs) ts)
       | None => false
       end
   | Halve ds k m lower upper =>
       match bounds o b [] ls around ds with
       | Some lines =>
-          check_tree o ls inequality (cut k m false b) lines lower && check_tree o ls inequality (cut k m true b) lines upper
+          check_tree o ls inequality (cut k m false b) lines lower &&
+            check_tree o ls inequality (cut k m true b) lines upper
       | None => false
       end
   end.

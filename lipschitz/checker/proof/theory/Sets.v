@@ -11,7 +11,8 @@ Definition set_stages (phi : list matrixD) (w : matrixD) (rho : list matrixD) (l
 Definition outputs (hidden : list matrixD) (n : nat) : nat := length (List.last hidden (repeat [] n)).
 (** One function after the other: `p`, then each of `ps`, nothing but an added vector between them. `gs`: of all hidden
   layers. *)
-Fixpoint check_parts (gs : list dyadic) (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic) (f : factor) :
+Fixpoint check_parts (gs : list dyadic) (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic) (f :
+  factor) :
   bool :=
   match ps with
   | [] => check gs (fst p) (snd p) upper r t f

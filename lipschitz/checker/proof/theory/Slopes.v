@@ -29,7 +29,8 @@ Proof.
   intros H d. set (n := inputs [] w). set (b := repeat 0 (length w)).
   assert (length b = length w) as Hb by apply repeat_length.
   assert (instance ([], w) ([], (realm w, b))) as I by (split; [constructor|split; auto]).
-  pose proof (check_sound [] [] w u rho t f H _ I (Forall2_nil _) (trim n d) (repeat 0 n) (length_trim n d) (repeat_length 0 n)) as B.
+  pose proof (check_sound [] [] w u rho t f H _ I (Forall2_nil _) (trim n d) (repeat 0 n) (length_trim n d)
+    (repeat_length 0 n)) as B.
   unfold run in B. simpl in B. rewrite minus_affine in B by (now rewrite map_length).
   rewrite <- (length_trim n d) in B at 2 4. rewrite minus_zeros in B.
   assert (is_nonnegative u = true /\ shapes n [] w = true) as [Hu Hs].

@@ -173,7 +173,8 @@ Proof.
 Qed.
 Lemma silu_slopes : slopes (act Silu) (1 - 72089 / 65536) (72089 / 65536).
 Proof.
-  apply (slopes_of_derivative _ _ _ _ silu_derivative). intros x. pose proof (silu_steepest x). pose proof (silu_least x).
+  apply (slopes_of_derivative _ _ _ _ silu_derivative). intros x. pose proof (silu_steepest x).
+  pose proof (silu_least x).
   pose proof (exp_pos (- x)). set (e := exp (- x)) in *. unfold Rsqr.
   assert (0 < (1 + e) * (1 + e)) by nra. split; [apply divided_below|apply divided]; auto; nra.
 Qed.
