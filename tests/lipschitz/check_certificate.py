@@ -138,6 +138,8 @@ def shifted(integer, by):
 # --- JSON ----------------------------------------------------------------------------------------------------------
 
 PLAIN_HEX_FLOATS = re.compile(r"(0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4} )*0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
+SIGNED_HEX_FLOAT = re.compile(r"-?0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
+CONFLICTING = re.compile("[0-9]{1,9}[+-]")
 HEX_FLOAT = re.compile(r"-?0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,6})")
 
 
@@ -1158,9 +1160,15 @@ def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
         return False
     if not all(isinstance(text, str) and PLAIN_HEX_FLOATS.fullmatch(text) for text in texts):
         return False
+    try:
+        conflicts = [conflicts_in_double(text) for text in listed(proof.get("conflicts", [""] * len(texts)))]
+    except (Rejected, ValueError):
+        return False
     rows = [list(map(float.fromhex, text.split(" "))) for text in texts]
     neurons = sum(len(layer.biases) for layer in layers)
-    if any(len(row) != neurons or min(row) < 0 or max(row) == math.inf for row in rows):
+    if any(len(row) != neurons or min(row) < 0 or max(row) == math.inf for row in rows) or len(conflicts) != len(rows):
+        return False
+    if not all(0 <= c[0] < c[2] < neurons and 0 <= c[4] <= 1 and math.isfinite(c[5]) for some in conflicts for c in some):
         return False
     near = [[float(x) for x in row] for row in gram]
     if not all(map(math.isfinite, (x for row in near for x in row))):
@@ -1171,7 +1179,22 @@ def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
         [([as_doubles(row) for row in layer.weights], as_doubles(layer.biases), layer.without_relu) for layer in layers],
         [(as_doubles(low), as_doubles(high)) for low, high in boxes], proof["tree"],
         (parts_in_double.np.array(near), parts_in_double.np.array(error)), moving, as_doubles(weight), rho,
-        parts_in_double.np.array(rows))
+        parts_in_double.np.array(rows), conflicts)
+
+
+def conflicts_in_double(text):
+    """As conflicts_in(), of a text that is written as certify writes it."""
+    words = text.split(" ") if text else []
+    if len(words) % 4:
+        raise ValueError("a conflict lacks words")
+    result = []
+    for first, second, weight, multiplier in zip(*[iter(words)] * 4):
+        if not (CONFLICTING.fullmatch(first) and CONFLICTING.fullmatch(second) and
+                SIGNED_HEX_FLOAT.fullmatch(weight) and SIGNED_HEX_FLOAT.fullmatch(multiplier)):
+            raise ValueError("written in another way")
+        result.append((int(first[:-1]), first[-1] == "+", int(second[:-1]), second[-1] == "+", float.fromhex(weight),
+                       float.fromhex(multiplier)))
+    return result
 
 
 def evaluate(weights, values, exponent):
@@ -1508,7 +1531,7 @@ class Checker:
             boxes = [self.box_of(names[0], where)]
         require(2.0 ** -400 <= rho <= 2.0 ** 400, f"{where}: rho is out of range")
         require(all(2.0 ** -200 <= w <= 2.0 ** 200 for w in weight), f"{where}: scale is out of range")
-        if not coupled and "conflicts" not in proof and proves_in_double(hidden, boxes, proof, gram, moving, weight, rho):
+        if not coupled and proves_in_double(hidden, boxes, proof, gram, moving, weight, rho):
             return
         multipliers = []
         for text in listed(proof["multipliers"]):

@@ -6,6 +6,7 @@ from the exact one by at most n u / (1 - n u) times the sum of their absolute va
 its end shows that a matrix of n rows, less gamma_(n+1) times its trace, is positive definite (Rump 2006, BIT 46).
 """
 import re
+from collections import namedtuple
 
 import numpy as np
 
@@ -72,7 +73,7 @@ class Bounds:
             self.add_terms(k)
             both = np.concatenate([layer.w, -layer.w])[None]
             constant = np.concatenate([layer.b, -layer.b])[None]
-            ends = self.largest(k, both, constant, slice(None), self.below)
+            ends = self.largest(*self.in_inputs(k, both, constant, np.s_[:], self.below), np.s_[:])
             lower, upper = -ends[:, layer.outputs:], ends[:, :layer.outputs]
             if around is not None:
                 lower, upper = np.maximum(lower, around[0][k]), np.minimum(upper, around[1][k])
@@ -104,9 +105,10 @@ class Bounds:
         self.below.append(np.where(is_open, (upper > -lower) * 1.0, np.where(is_off, 0.0, 1.0)))
         self.offset.append(np.where(is_open, offset, 0.0))
 
-    def largest(self, top, form, constant, which, below):
-        """Of forms in the inputs of layer `top`, [1 or parts, forms, inputs], over the boxes `which`: upper bounds. `below`:
-        slopes below ReLU, one row per box of `which`."""
+    def in_inputs(self, top, form, constant, which, below):
+        """Forms in the inputs of layer `top`, [1 or parts, forms, inputs], as forms in x that are no less over the boxes
+        `which`: (form, constant, sum of the absolute values of the constant's terms, what rounding may have cost, number of
+        terms). `below`: slopes below ReLU, one row per box of `which`."""
         absolute, error, terms = abs(constant), np.zeros((1, 1)), 4
         for j in range(top - 1, -1, -1):
             layer, is_positive = self.layers[j], form > 0
@@ -123,12 +125,15 @@ class Bounds:
             error = error + gamma(layer.outputs + 2) * 1.01 * np.matmul(size, self.terms[j][which][:, :, None])[..., 0]
             form = form @ layer.w
             terms += 3 * layer.outputs
+        return form, constant, absolute, error, terms
+
+    def largest(self, form, constant, absolute, error, terms, which):
+        """Upper bounds of such forms over the boxes."""
         low, high = self.low[which][:, :, None], self.high[which][:, :, None]
         value = constant + np.matmul(np.maximum(form, 0), high)[..., 0] + np.matmul(np.minimum(form, 0), low)[..., 0]
         absolute = absolute + np.matmul(abs(form), np.maximum(abs(low), abs(high)))[..., 0]
         terms += 2 * low.shape[1] + 16
-        result = value + (2 * terms * U * absolute + 1.01 * error + TINY)
-        result = np.nextafter(result, np.inf)
+        result = np.nextafter(value + (2 * terms * U * absolute + 1.01 * error + TINY), np.inf)
         return np.where(np.isfinite(result), result, np.inf)
 
     def decide(self, k, first, decisions):
@@ -145,8 +150,9 @@ class Bounds:
         if len(row) == 0:
             return
         sign = np.where(is_on, -1.0, 1.0)
-        ends = self.largest(k, (sign[:, None] * layer.w[neuron])[:, None], (sign * layer.b[neuron])[:, None], row,
-                            self.slopes_at(k, row, corner))[:, 0]
+        forms = self.in_inputs(k, (sign[:, None] * layer.w[neuron])[:, None], (sign * layer.b[neuron])[:, None], row,
+                               self.slopes_at(k, row, corner))
+        ends = self.largest(*forms, row)[:, 0]
         self.are_decided &= bool((ends <= 0).all())
         self.lower[k][row[is_on], neuron[is_on]] = -ends[is_on]
         self.upper[k][row[~is_on], neuron[~is_on]] = ends[~is_on]
@@ -166,6 +172,55 @@ class Bounds:
         return slopes
 
 
+    def side_of(self, row, neuron, is_on):
+        """Of neurons of the boxes `row`, counted over all layers: the form in x above y (on) or -y (off), as in_inputs(), and
+        whether the neuron is open."""
+        inputs = self.low.shape[1]
+        form, (constant, absolute, error) = np.zeros((len(row), 1, inputs)), np.zeros((3, len(row), 1))
+        is_open, most, first = np.zeros(len(row), dtype=bool), 0, 0
+        for k, layer in enumerate(self.layers):
+            mine = np.flatnonzero((neuron >= first) & (neuron < first + layer.outputs))
+            at, i = row[mine], neuron[mine] - first
+            sign = np.where(is_on[mine], 1.0, -1.0)
+            found = self.in_inputs(k, (sign[:, None] * layer.w[i])[:, None], (sign * layer.b[i])[:, None], at,
+                                   [slopes[at] for slopes in self.below])
+            form[mine], constant[mine], absolute[mine], error[mine] = found[:4]
+            is_open[mine] = layer.relu[i] & (self.lower[k][at, i] < 0) & (self.upper[k][at, i] > 0)
+            most, first = max(most, found[4]), first + layer.outputs
+        return form, constant, absolute, error, most, is_open
+
+    def shown(self, row, first, first_on, second, second_on, weight):
+        """Which conflicts hold: both neurons are open, and the weighted sum of y, negated where the state is off, is nowhere
+        positive. Any two nonnegative weights that are not both zero will do, so 1 - weight may be rounded."""
+        one, other, rest = self.side_of(row, first, first_on), self.side_of(row, second, second_on), 1 - weight
+        form, constant, absolute, error = (
+            a * weight[:, None, None] + b * rest[:, None, None] if a.ndim == 3 else a * weight[:, None] + b * rest[:, None]
+            for a, b in zip(one[:4], other[:4]))
+        size = abs(one[0]) * weight[:, None, None] + abs(other[0]) * rest[:, None, None]
+        reach = np.maximum(abs(self.low[row]), abs(self.high[row]))
+        error = error + 8 * U * (np.matmul(size, reach[:, :, None])[..., 0] + absolute)
+        ends = self.largest(form, constant, absolute, error, one[4] + other[4] + 8, row)[:, 0]
+        return one[5] & other[5] & (ends <= 0)
+
+
+class Conflicts:
+    """Columns first, is on, second, is on, weight, multiplier of those of all leaf numbers, one after the other."""
+
+    def __init__(self, by_leaf):
+        counts = np.array([len(some) for some in by_leaf])
+        self.counts, self.start = counts, np.concatenate([[0], np.cumsum(counts)[:-1]])
+        flat = np.array([one for some in by_leaf for one in some], dtype=float).reshape(-1, 6)
+        self.first, self.second = flat[:, 0].astype(np.int64), flat[:, 2].astype(np.int64)
+        self.first_on, self.second_on = flat[:, 1] == 1, flat[:, 3] == 1
+        self.weight, self.multiplier = flat[:, 4], flat[:, 5]
+
+    def of(self, leaves):
+        """(which of `leaves`, number) of each conflict of these."""
+        counts = self.counts[leaves]
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.repeat(np.arange(len(leaves)), counts), np.repeat(self.start[leaves], counts) + within
+
+
 class Inequality:
     """S of a batch of parts: |df|^2 <= rho |dx|^2 in the moving inputs and the increments of open neurons; rows of other
     neurons are those of the identity."""
@@ -176,7 +231,8 @@ class Inequality:
         self.inputs[moving, np.arange(len(moving))] = weight
         self.size = len(moving) + sum(layer.outputs for layer in layers)
 
-    def are_positive_definite(self, bounds, t):
+    def are_positive_definite(self, bounds, t, conflicts):
+        """`bounds`: of the parts; `conflicts`: (part, neuron, is on, neuron, is on, multiplier) of those that hold."""
         parts, n, p = len(t), self.size, self.moving
         s = np.zeros((parts, n, n))
         s[:, range(p), range(p)] = self.rho
@@ -192,11 +248,13 @@ class Inequality:
             s[:, first:last] -= part
             s[:, :, first:last] -= part.swapaxes(1, 2)
             s[:, own, own] += np.where(is_open, 2 * times, 1)
-            rows.append((abs(y), times, is_open, is_off))
+            rows.append((y, times, is_open, is_off))
             z = np.where((is_open | is_off)[:, :, None], 0, y)
             z[:, np.arange(layer.outputs), own] += is_open
             first = last
         s -= np.matmul(z.swapaxes(1, 2), np.matmul(self.gram, z))
+        if len(conflicts[0]):
+            self.subtract(conflicts, rows, s)
         diagonal = s[:, range(n), range(n)]
         if not (np.isfinite(s).all() and (diagonal > 0).all()):
             return False
@@ -204,30 +262,49 @@ class Inequality:
         if d.max() > 2.0 ** 300:  # what underflows would matter
             return False
         s *= d[:, :, None] * d[:, None]
-        shift = self.error(rows, abs(z), d) * 1.01 + 1.1 * gamma(n + 2) * s[:, range(n), range(n)].sum(1) + 16 * U
+        shift = self.error(rows, abs(z), d, conflicts) * 1.01 + 1.1 * gamma(n + 2) * s[:, range(n), range(n)].sum(1) + 16 * U
         s[:, range(n), range(n)] -= shift[:, None]
         try:
             return bool(np.isfinite(np.linalg.cholesky(s)).all())
         except np.linalg.LinAlgError:
             return False
 
-    def error(self, rows, z, d):
+    def subtract(self, conflicts, rows, s):
+        """Of neurons in conflict one has u = 0, u = dz (on) or dy - dz (off): their product times any number."""
+        part, first, first_on, second, second_on, multiplier = conflicts
+        for start in range(0, len(part), 512):
+            some = slice(start, start + 512)
+            p = self.factors(part[some], first[some], first_on[some], rows)
+            q = self.factors(part[some], second[some], second_on[some], rows) * multiplier[some, None]
+            both = p[:, :, None] * q[:, None]
+            np.subtract.at(s, part[some], both + both.swapaxes(1, 2))
+
+    def factors(self, part, neuron, is_on, rows):
+        result = np.zeros((len(part), self.size))
+        first = 0
+        for layer, (y, _, _, _) in zip(self.layers, rows):
+            mine = np.flatnonzero(~is_on & (neuron >= first) & (neuron < first + layer.outputs))
+            at = part[mine] if len(y) > 1 else np.zeros(len(mine), dtype=int)
+            result[mine] = y[at, neuron[mine] - first]
+            first += layer.outputs
+        result[np.arange(len(part)), self.moving + neuron] += np.where(is_on, 1.0, -1.0)
+        return result
+
+    def error(self, rows, z, d, conflicts):
         """At least the norm of D (S - true S) D. With R the error of increments as forms, only R d is followed: the sum of
         all entries of a matrix of no negative ones bounds its norm, and so does the largest sum of a row of a symmetric one."""
-        radius, squares = np.zeros((1, self.layers[0].inputs)), 0
-        before = np.zeros((1, self.layers[0].inputs, d.shape[1]))
-        before[0, :, :self.moving] = abs(self.inputs)
-        first = self.moving
+        radius, squares, first = np.zeros((1, self.layers[0].inputs)), 0, self.moving
+        here, radii, sizes = d[:, :first] @ abs(self.inputs).T, [], []  # here: |what enters the layer| d
         for layer, (y, times, is_open, is_off) in zip(self.layers, rows):
             last = first + layer.outputs
-            here = np.matmul(before, d[:, :, None])[..., 0]
             radius = (radius @ abs(layer.w).T + gamma(layer.inputs + 2) * (here @ abs(layer.w).T)) * 1.01
-            size = np.matmul(y, d[:, :, None])[..., 0]
+            size = np.matmul(abs(y), d[:, :, None])[..., 0]
             wrong = d[:, first:last] * times * (radius + 8 * U * (size + 2 * d[:, first:last]))
             squares = squares + (wrong ** 2).sum(1)
+            radii.append(radius)
+            sizes.append(size)
             radius = np.where(is_open | is_off, 0, radius)
-            before = np.where((is_open | is_off)[:, :, None], 0, y)
-            before[:, np.arange(layer.outputs), np.arange(first, last)] += is_open
+            here = np.where(is_open, d[:, first:last], np.where(is_off, 0, size))
             first = last
         n = len(self.gram)
         whole = abs(self.gram) + self.gram_error
@@ -235,66 +312,114 @@ class Inequality:
         along = np.matmul(z, d[:, :, None])[..., 0]
         out = (np.matmul((along @ loose)[:, None], z)[:, 0] * d).max(1)
         cross = ((along @ whole) * radius).sum(1) * 2 + ((radius @ whole) * radius).sum(1)
-        return 2 * np.sqrt(squares) * 1.01 + 1.01 * (out + cross) + 8 * U * self.rho * (d[:, :self.moving] ** 2).max(1)
+        total = 2 * np.sqrt(squares) * 1.01 + 1.01 * (out + cross) + 8 * U * self.rho * (d[:, :self.moving] ** 2).max(1)
+        if len(conflicts[0]):
+            self.add_error_of(conflicts, np.concatenate(radii, 1), np.concatenate(sizes, 1), d, total)
+        return total
+
+    def add_error_of(self, conflicts, radii, sizes, d, total):
+        part, first, first_on, second, second_on, multiplier = conflicts
+        wrong, size = ([np.where(is_on, 0, radii[part, neuron]) for neuron, is_on in ((first, first_on), (second, second_on))],
+                       [np.where(is_on, 0, sizes[part, neuron]) + d[part, self.moving + neuron]
+                        for neuron, is_on in ((first, first_on), (second, second_on))])
+        each = wrong[0] * size[1] + size[0] * wrong[1] + wrong[0] * wrong[1] + 16 * U * size[0] * size[1]
+        # Sums of several conflicts and of what stood there: each addition is off by U times all that is added.
+        counts = np.bincount(part, minlength=len(total))[part]
+        each += 2 * U * counts * size[0] * size[1]
+        np.add.at(total, part, 2.02 * abs(multiplier) * each)
+
+
+class Walk:
+    """The parts of a tree, level by level: boxes, and bounds of their neurons, which stay within those of the part above."""
+
+    def __init__(self, layers, boxes, tree, inequality, multipliers, conflicts):
+        self.layers, self.inequality, self.multipliers, self.conflicts = layers, inequality, multipliers, conflicts
+        self.parent, self.depth, self.leaf = np.array(tree.parent), np.array(tree.depth), np.array(tree.leaf)
+        self.coordinate, self.upper = np.array(tree.coordinate), np.array(tree.upper)
+        self.decisions = np.array(tree.decisions, dtype=np.int64).reshape(-1, 4)
+        self.low, self.high = (np.array([box[side] for box in boxes], dtype=float) for side in (0, 1))
+        widest = 2 * max(layer.outputs for layer in layers) ** 2
+        self.at_once = max(1, min(1024, MOST_AT_ONCE // max(inequality.size ** 2, widest)))
+
+    def names_what_exists(self):
+        splits = self.coordinate[self.depth > 0]
+        neurons = sum(layer.outputs for layer in self.layers)
+        return (self.leaf.max() < len(self.multipliers) and (len(splits) == 0 or splits.max() < self.layers[0].inputs)
+                and (len(self.decisions) == 0 or self.decisions[:, 1].max() < neurons))
+
+    def halve(self, nodes, position):
+        """The boxes of `nodes` from those of their parents, or False."""
+        self.low, self.high = self.low[position], self.high[position]
+        row, k, is_upper = np.arange(len(nodes)), self.coordinate[nodes], self.upper[nodes]
+        low, high = self.low[row, k], self.high[row, k]
+        middle = low + (high - low) / 2
+        self.low[row, k] = np.where(is_upper, middle, low)
+        self.high[row, k] = np.where(is_upper, high, middle)
+        return ((low <= middle) & (middle <= high)).all()
+
+    def holds(self):
+        before, around = None, None
+        for level in range(self.depth.max() + 1):
+            nodes = np.flatnonzero(self.depth == level)
+            position = self.coordinate[nodes] if level == 0 else np.searchsorted(before, self.parent[nodes])
+            if level == 0:
+                self.low, self.high = self.low[position], self.high[position]
+            elif not self.halve(nodes, position):
+                return False
+            if around is not None:
+                around = [[ends[position] for ends in side] for side in around]
+            around = self.bounds_of(nodes, around)
+            if around is None:
+                return False
+            before = nodes
+        return True
+
+    def bounds_of(self, nodes, around):
+        """Of all nodes of a level, if what is decided and what its leaves claim holds; else None."""
+        found = [[np.empty((len(nodes), layer.outputs)) for layer in self.layers] for _ in range(2)]
+        told = self.decisions[np.isin(self.decisions[:, 0], nodes)]
+        told_row = np.searchsorted(nodes, told[:, 0])
+        for start in range(0, len(nodes), self.at_once):
+            chunk = slice(start, min(start + self.at_once, len(nodes)))
+            mine = (told_row >= chunk.start) & (told_row < chunk.stop)
+            bounds = Bounds(self.layers, self.low[chunk], self.high[chunk],
+                            around and [[ends[chunk] for ends in side] for side in around],
+                            (told_row[mine] - chunk.start, told[mine, 1], told[mine, 2] == 1, told[mine, 3]))
+            if not bounds.are_decided or not self.leaves_hold(bounds, self.leaf[nodes[chunk]]):
+                return None
+            for side, ends in zip(found, (bounds.lower, bounds.upper)):
+                for k, of_layer in enumerate(ends):
+                    side[k][chunk] = of_layer
+        return found
+
+    def leaves_hold(self, bounds, leaf):
+        rows = np.flatnonzero(leaf >= 0)
+        if len(rows) == 0:
+            return True
+        c, (part, number) = self.conflicts, self.conflicts.of(leaf[rows])
+        if len(part):
+            is_shown = bounds.shown(rows[part], c.first[number], c.first_on[number], c.second[number], c.second_on[number],
+                                    c.weight[number])
+            part, number = part[is_shown], number[is_shown]
+        of_leaves = Leaves([ends[rows] for ends in bounds.lower], [ends[rows] for ends in bounds.upper])
+        return self.inequality.are_positive_definite(of_leaves, self.multipliers[leaf[rows]], (
+            part, c.first[number], c.first_on[number], c.second[number], c.second_on[number], c.multiplier[number]))
+
+
+Leaves = namedtuple("Leaves", "lower upper")
 
 
 @np.errstate(all="ignore")  # what is not finite is taken for unbounded
-def holds(layers, boxes, text, gram, moving, weight, rho, multipliers):
+def holds(layers, boxes, text, gram, moving, weight, rho, multipliers, conflicts):
     """Whether a tree of splits, leaves and decisions proves its parts.
 
     layers: (W, b, outputs without ReLU); boxes: (low, high); gram: (G, error of its entries); multipliers: one row per
-    number of a leaf. All numbers are doubles, and exact but for G."""
+    number of a leaf; conflicts: (neuron, is on, neuron, is on, weight, multiplier) for each such number. All numbers are
+    doubles, and exact but for G."""
     layers = [Layer(*layer) for layer in layers]
     try:
         tree = Tree(text, len(boxes))
     except ValueError:
         return False
-    parent, depth, leaf = np.array(tree.parent), np.array(tree.depth), np.array(tree.leaf)
-    coordinate, upper = np.array(tree.coordinate), np.array(tree.upper)
-    inputs = layers[0].inputs
-    if leaf.max() >= len(multipliers) or (depth.max() > 0 and coordinate[depth > 0].max() >= inputs):
-        return False
-    decisions = np.array(tree.decisions, dtype=np.int64).reshape(-1, 4)
-    neurons = sum(layer.outputs for layer in layers)
-    if len(decisions) and decisions[:, 1].max() >= neurons:
-        return False
-    inequality = Inequality(layers, *gram, moving, weight, rho)
-    at_once = max(1, min(1024, MOST_AT_ONCE // max(inequality.size ** 2, 2 * max(l.outputs for l in layers) ** 2)))
-    low, high = np.array([box[0] for box in boxes], dtype=float), np.array([box[1] for box in boxes], dtype=float)
-    before, around = None, None
-    for level in range(depth.max() + 1):
-        nodes = np.flatnonzero(depth == level)
-        if level == 0:
-            low, high = low[coordinate[nodes]], high[coordinate[nodes]]
-        else:
-            position = np.searchsorted(before, parent[nodes])
-            low, high = low[position], high[position]
-            row, k = np.arange(len(nodes)), coordinate[nodes]
-            middle = low[row, k] + (high[row, k] - low[row, k]) / 2
-            if not ((low[row, k] <= middle) & (middle <= high[row, k])).all():
-                return False
-            low[row, k] = np.where(upper[nodes], middle, low[row, k])
-            high[row, k] = np.where(upper[nodes], high[row, k], middle)
-        found = ([np.empty((len(nodes), l.outputs)) for l in layers], [np.empty((len(nodes), l.outputs)) for l in layers])
-        told = decisions[depth[decisions[:, 0]] == level]
-        told_row = np.searchsorted(nodes, told[:, 0])
-        for start in range(0, len(nodes), at_once):
-            chunk = slice(start, min(start + at_once, len(nodes)))
-            mine = (told_row >= chunk.start) & (told_row < chunk.stop)
-            parts = None
-            if level > 0:
-                parts = [[ends[position[chunk]] for ends in side] for side in around]
-            bounds = Bounds(layers, low[chunk], high[chunk], parts,
-                            (told_row[mine] - chunk.start, told[mine, 1], told[mine, 2] == 1, told[mine, 3]))
-            if not bounds.are_decided:
-                return False
-            for k in range(len(layers)):
-                found[0][k][chunk], found[1][k][chunk] = bounds.lower[k], bounds.upper[k]
-            is_leaf = leaf[nodes[chunk]] >= 0
-            if is_leaf.any():
-                bounds.lower = [ends[is_leaf] for ends in bounds.lower]
-                bounds.upper = [ends[is_leaf] for ends in bounds.upper]
-                if not inequality.are_positive_definite(bounds, multipliers[leaf[nodes[chunk]][is_leaf]]):
-                    return False
-        before, around = nodes, found
-    return True
+    walk = Walk(layers, boxes, tree, Inequality(layers, *gram, moving, weight, rho), multipliers, Conflicts(conflicts))
+    return walk.names_what_exists() and walk.holds()
