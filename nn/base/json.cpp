@@ -87,7 +87,7 @@ class HexFloatReader {
     return is_here;
   }
 
-  /// The hex digit that comes next; -1: there is none.
+  /// The value of the next character as a hex digit, or -1 if it is not one.
   int digit() const {
     const char c = at_ < text_.size() ? text_[at_] : '\0';
     if (c >= '0' && c <= '9') return c - '0';

@@ -37,6 +37,15 @@ std::vector<std::vector<double>> parse_form(const Json& entry) {
   return P;
 }
 
+void read_numbers(const Json& entry, LoopNumbers& loop) {
+  loop.mass_kg = hex_number(entry, "mass_kg");
+  loop.Kp = hex_number(entry, "Kp");
+  loop.Kd = hex_number(entry, "Kd");
+  loop.Ki = hex_number(entry, "Ki");
+  loop.lags_s = files::parse_hex_floats(entry["lags_s"]);
+  loop.delay_s = hex_number(entry, "delay_s");
+}
+
 LoopWitness parse_loop(const Json& entry) {
   files::require_keys(entry,
                       {"axis", "input", "mass_kg", "Kp", "Kd", "Ki", "lags_s", "delay_s", "delay_order",
@@ -45,12 +54,7 @@ LoopWitness parse_loop(const Json& entry) {
   check_axis(entry);
   LoopWitness loop;
   loop.input = entry["input"].get<std::string>();
-  loop.mass_kg = hex_number(entry, "mass_kg");
-  loop.Kp = hex_number(entry, "Kp");
-  loop.Kd = hex_number(entry, "Kd");
-  loop.Ki = hex_number(entry, "Ki");
-  loop.lags_s = files::parse_hex_floats(entry["lags_s"]);
-  loop.delay_s = hex_number(entry, "delay_s");
+  read_numbers(entry, loop);
   loop.delay_order = small_integer(entry, "delay_order");
   loop.time_exponent = small_integer(entry, "time_exponent");
   loop.step_exponent = small_integer(entry, "step_exponent");
@@ -67,12 +71,7 @@ SampledWitness parse_sampled(const Json& entry) {
                       "sampled loop");
   check_axis(entry);
   SampledWitness loop;
-  loop.mass_kg = hex_number(entry, "mass_kg");
-  loop.Kp = hex_number(entry, "Kp");
-  loop.Kd = hex_number(entry, "Kd");
-  loop.Ki = hex_number(entry, "Ki");
-  loop.lags_s = files::parse_hex_floats(entry["lags_s"]);
-  loop.delay_s = hex_number(entry, "delay_s");
+  read_numbers(entry, loop);
   loop.period_s = hex_number(entry, "period_s");
   loop.integrator_step_s = hex_number(entry, "integrator_step_s");
   loop.steps = small_integer(entry, "steps");

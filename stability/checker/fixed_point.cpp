@@ -1,6 +1,18 @@
 #include "stability/checker/fixed_point.h"
 
+#include <algorithm>
+
 namespace swarmcert::check {
+
+void check_numbers(const LoopNumbers& loop) {
+  constexpr std::size_t kMostLags = 4;
+  demand(
+      is_usual(loop.mass_kg) && is_usual(loop.Kp) && is_usual(loop.Kd) && (loop.Ki == 0 || is_usual(loop.Ki)),
+      "mass_kg, Kp, Kd or Ki is out of range");
+  demand(loop.lags_s.size() <= kMostLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), is_usual),
+         "lags_s are more than four, or out of range");
+  demand(loop.delay_s == 0 || is_usual(loop.delay_s), "delay_s is out of range");
+}
 
 std::optional<Rational> inverse_form(Square m, Row right) {
   Rational sum;

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "stability/checker/gain_bounds.h"
+
 namespace swarmcert::check {
 
 using Rational = mpq_class;
@@ -26,6 +28,9 @@ inline void demand(bool condition, const char* reason) {
 
 /// Numbers of a loop outside of this are refused: underflow and overflow are out of reach then.
 inline bool is_usual(double x) { return x >= 0x1p-40 && x <= 0x1p40; }
+
+/// @throws std::runtime_error naming the numbers that are out of range.
+void check_numbers(const LoopNumbers& loop);
 
 /// 2^exponent
 inline Rational two_to(long exponent) {

@@ -11,7 +11,6 @@ namespace swarmcert::check {
 namespace {
 
 constexpr long kMostSteps = 1 << 18;
-constexpr std::size_t kMostLags = 4;
 constexpr int kTerms = 24;
 
 Row times(const Row& row, const Square& m) {
@@ -34,15 +33,10 @@ void check_ranges(const LoopWitness& loop) {
   demand(loop.input == "force" || loop.input == "command" || loop.input == "velocity" ||
              loop.input == "position",
          "input is none of force, command, velocity, position");
-  demand(
-      is_usual(loop.mass_kg) && is_usual(loop.Kp) && is_usual(loop.Kd) && (loop.Ki == 0 || is_usual(loop.Ki)),
-      "mass_kg, Kp, Kd or Ki is out of range");
-  demand(loop.lags_s.size() <= kMostLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), is_usual),
-         "lags_s are more than four, or out of range");
-  demand(loop.delay_s == 0 ? loop.delay_order == 0
-                           : is_usual(loop.delay_s) && loop.delay_order >= 0 &&
-                                 static_cast<std::size_t>(loop.delay_order) <= loop.lags_s.size(),
-         "delay_s or delay_order is out of range");
+  check_numbers(loop);
+  demand(loop.delay_order >= 0 &&
+             static_cast<std::size_t>(loop.delay_order) <= (loop.delay_s == 0 ? 0 : loop.lags_s.size()),
+         "delay_order is out of range");
   demand(loop.time_exponent >= -64 && loop.time_exponent <= 64, "time_exponent is out of range");
   demand(loop.step_exponent >= 0 && loop.step_exponent <= 64, "step_exponent is out of range");
   demand(loop.steps >= 1 && loop.steps <= kMostSteps, "steps is out of range");

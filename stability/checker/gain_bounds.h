@@ -9,16 +9,20 @@
 
 namespace swarmcert::check {
 
-/// One axis, and what shows that its responses decay. All numbers count exactly as they stand.
-struct LoopWitness {
-  std::string input;  ///< force, command, velocity or position
+/// One axis. All numbers count exactly as they stand.
+struct LoopNumbers {
   double mass_kg = 0;
   double Kp = 0;  ///< 1/s^2
   double Kd = 0;  ///< 1/s
-  double Ki = 0;  ///< 1/s^3
+  double Ki = 0;  ///< 1/s^3, as the law states it
   std::vector<double> lags_s;
-  double delay_s = 0;   ///< of the command, before the lags
-  int delay_order = 0;  ///< of its expansion, at most the number of lags
+  double delay_s = 0;  ///< of the command, before the lags
+};
+
+/// A continuous loop with one input, and what shows that its response decays.
+struct LoopWitness : LoopNumbers {
+  std::string input;    ///< force, command, velocity or position
+  int delay_order = 0;  ///< of the delay's expansion, at most the number of lags
 
   int time_exponent = 0;  ///< time is counted in 2^-time_exponent s
   int step_exponent = 0;  ///< a cell is 2^-step_exponent such units long

@@ -4,241 +4,29 @@
 #include <array>
 #include <cmath>
 
-#include "stability/checker/fixed_point.h"
+#include "stability/checker/sampled_map.h"
 
 namespace swarmcert::check {
 namespace {
 
 constexpr long kMostPeriods = 1 << 18;
-constexpr std::size_t kMostSampledLags = 4;
-constexpr int kMostPast = 8;
-constexpr int kMostHalvings = 12;
-constexpr int kTaylorTerms = 24;
-constexpr long kMarginExponent = -60;  ///< of the contraction, for what M is not known exactly
 
-/// A number between two fixed-point numbers.
-struct Range {
-  Integer lo, hi;
-
-  Range() = default;
-  explicit Range(const Rational& x) : lo(floor_fixed(x)), hi(ceil_fixed(x)) {}
-  explicit Range(const Integer& fixed) : lo(fixed), hi(fixed) {}
-  void add(const Range& other) { lo += other.lo, hi += other.hi; }
-  void add_product(const Range& a, const Range& b) {
-    const std::array<Integer, 4> ends = {a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi};
-    lo += *std::min_element(ends.begin(), ends.end()) >> kBits;
-    hi += (*std::max_element(ends.begin(), ends.end()) >> kBits) + 1;
-  }
-  Integer middle() const { return (lo + hi) >> 1; }
-  Integer magnitude() const { return std::max<Integer>(abs(lo), abs(hi)); }
-};
-using RangeRow = std::vector<Range>;
-using Ranges = std::vector<RangeRow>;
-
-Ranges zeros(std::size_t rows, std::size_t columns) { return Ranges(rows, RangeRow(columns)); }
-
-Ranges product(const Ranges& a, const Ranges& b) {
-  Ranges result = zeros(a.size(), b.front().size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t k = 0; k < b.size(); ++k) {
-      if (a[i][k].lo == 0 && a[i][k].hi == 0) continue;
-      for (std::size_t j = 0; j < b.front().size(); ++j) result[i][j].add_product(a[i][k], b[k][j]);
-    }
-  }
-  return result;
-}
-
-/// exp(generator t): the Taylor sum of the 2^k-th part, whose rows sum to at most 1/2, squared k times.
-Ranges exponential(const Square& generator, const Rational& t) {
-  const std::size_t n = generator.size();
-  Rational largest;
-  for (const Row& row : generator) {
-    Rational sum;
-    for (const Rational& x : row) sum += abs(x);
-    largest = std::max<Rational>(largest, sum * t);
-  }
-  int halvings = 0;
-  while (largest * two_to(-halvings) > Rational(1, 2)) {
-    demand(++halvings <= kMostHalvings, "lags_s: one is too short against period_s");
-  }
-  Ranges scaled = zeros(n, n), term = zeros(n, n);
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j) scaled[i][j] = Range(generator[i][j] * t * two_to(-halvings));
-    term[i][i] = Range(Rational(1));
-  }
-  Ranges total = term;
-  Integer factorial = 1;
-  for (int k = 1; k <= kTaylorTerms; ++k) {
-    factorial *= k;
-    term = product(term, scaled);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j) {
-        Range quotient;  // by the factorial, so that no division adds up
-        mpz_fdiv_q(quotient.lo.get_mpz_t(), term[i][j].lo.get_mpz_t(), factorial.get_mpz_t());
-        mpz_cdiv_q(quotient.hi.get_mpz_t(), term[i][j].hi.get_mpz_t(), factorial.get_mpz_t());
-        total[i][j].add(quotient);
-      }
-    }
-  }
-  factorial *= kTaylorTerms + 1;
-  const Integer missed = ceil_fixed(two_to(-kTaylorTerms) / Rational(factorial));
-  for (RangeRow& row : total) {
-    for (Range& x : row) x.lo -= missed, x.hi += missed;
-  }
-  for (int k = 0; k < halvings; ++k) total = product(total, total);
-  return total;
-}
-
-/// Which state stands where, before the control of a period: e, e', lags' outputs, the integral, past commands (newest
-/// first). After it the new command stands before the past ones.
-struct Layout {
-  std::size_t plant = 0, command = 0, past = 0, newest = 0;
-  Rational shift_s;  ///< part of a period for which the older command still acts
-
-  explicit Layout(const SampledWitness& loop) {
-    const Rational periods = Rational(loop.delay_s) / Rational(loop.period_s);
-    const Integer whole = periods.get_num() / periods.get_den();
-    demand(whole < kMostPast, "delay_s is too long");
-    shift_s = Rational(loop.delay_s) - Rational(whole) * Rational(loop.period_s);
-    plant = 2 + loop.lags_s.size();
-    command = plant + (loop.Ki > 0 ? 1 : 0);
-    newest = whole.get_ui();
-    past = newest + (sgn(shift_s) > 0 ? 1 : 0);
-  }
-  std::size_t size() const { return command + past; }
-};
-
-void check_numbers(const SampledWitness& loop) {
-  demand(
-      is_usual(loop.mass_kg) && is_usual(loop.Kp) && is_usual(loop.Kd) && (loop.Ki == 0 || is_usual(loop.Ki)),
-      "mass_kg, Kp, Kd or Ki is out of range");
-  demand(
-      loop.lags_s.size() <= kMostSampledLags && std::all_of(loop.lags_s.begin(), loop.lags_s.end(), is_usual),
-      "lags_s are more than four, or out of range");
-  demand(loop.delay_s == 0 || is_usual(loop.delay_s), "delay_s is out of range");
+void check_sampling(const SampledWitness& loop) {
+  check_numbers(loop);
   demand(is_usual(loop.period_s) && is_usual(loop.integrator_step_s),
          "period_s or integrator_step_s is out of range");
 }
 
 void check_witness(const SampledWitness& loop) {
+  check_sampling(loop);
   demand(loop.steps >= 1 && loop.steps <= kMostPeriods, "steps is out of range");
   demand(loop.contraction >= 0x1p-10 && loop.contraction <= 1 - 0x1p-40, "contraction is out of range");
 }
 
-/// State before -> after control, [size + 1 x size].
-Square control_of(const SampledWitness& loop, const Layout& at) {
-  Square control(at.size() + 1, Row(at.size()));
-  for (std::size_t i = 0; i < at.command; ++i) control[i][i] = 1;
-  const Rational Ki = loop.Ki, step = loop.integrator_step_s;
-  control[at.command][0] = -(Rational(loop.Kp) + Ki * step);
-  control[at.command][1] = -Rational(loop.Kd);
-  if (loop.Ki > 0) control[at.plant][0] = step, control[at.command][at.plant] = -Ki;
-  for (std::size_t i = 0; i < at.past; ++i) control[at.command + 1 + i][at.command + i] = 1;
-  return control;
-}
-
-/// State after control -> before that of the next period, [size x size + 1].
-Ranges hold_of(const SampledWitness& loop, const Layout& at) {
-  Square generator(at.plant + 1, Row(at.plant + 1));
-  generator[0][1] = generator[1][2] = 1;
-  for (std::size_t i = 0; i < loop.lags_s.size(); ++i) {
-    const Rational rate = 1 / Rational(loop.lags_s[i]);
-    generator[2 + i][2 + i] = -rate, generator[2 + i][3 + i] = rate;
-  }
-  const Range one(Rational(1));
-  Ranges plant = zeros(at.plant, at.size() + 1);
-  for (std::size_t i = 0; i < at.plant; ++i) plant[i][i] = one;
-  const auto advance = [&](const Rational& duration_s, std::size_t command) {
-    Ranges step = exponential(generator, duration_s), of_command = zeros(at.plant, 1);
-    step.pop_back();
-    for (std::size_t i = 0; i < at.plant; ++i) of_command[i][0] = step[i].back(), step[i].pop_back();
-    plant = product(step, plant);
-    for (std::size_t i = 0; i < at.plant; ++i) plant[i][at.command + command].add(of_command[i][0]);
-  };
-  if (at.past > at.newest) advance(at.shift_s, at.newest + 1);
-  advance(Rational(loop.period_s) - at.shift_s, at.newest);
-  Ranges hold = std::move(plant);
-  hold.resize(at.size(), RangeRow(at.size() + 1));
-  if (loop.Ki > 0) hold[at.plant][at.plant] = one;
-  for (std::size_t i = 0; i < at.past; ++i) hold[at.command + i][at.command + i] = one;
-  return hold;
-}
-
-Ranges enclosed(const Square& exact) {
-  Ranges result;
-  for (const Row& row : exact) {
-    result.emplace_back();
-    for (const Rational& x : row) result.back().emplace_back(x);
-  }
-  return result;
-}
-
-/// The map from one period to the next, and the norm |r| = sqrt(r P r') of rows over its states.
-struct Map {
-  std::size_t n = 0;
-  Ranges M;
-  std::vector<Integer> middle;  ///< of M, row by row
-  Integer spread;               ///< M is within this of `middle`
-  Square P;
-  std::vector<Integer> scaled_P;    ///< over 2^kFormBits
-  Integer from_largest;             ///< |r| <= this times the largest |r_i|
-  std::vector<Integer> coordinate;  ///< |r_i| <= this times |r|
-  Rational gap;                     ///< 1 - contraction
-
-  Map(const SampledWitness& loop, const Layout& at, const Ranges& hold, const Square& control)
-      : n(at.size()),
-        M(product(hold, enclosed(control))),
-        P(exact_form(loop.P, n)),
-        gap(1 - Rational(loop.contraction)) {
-    for (const RangeRow& row : M) {
-      for (const Range& x : row) {
-        middle.push_back(x.middle());
-        spread = std::max<Integer>(spread, x.hi - x.lo + 1);
-      }
-    }
-    Rational sum;
-    for (const Row& row : P) {
-      for (const Rational& x : row) sum += abs(x), scaled_P.push_back(Integer(x * two_to(kFormBits)));
-    }
-    from_largest = fixed_root_up(sum);
-    Integer largest;
-    for (std::size_t i = 0; i < n; ++i) {
-      Row unit(n);
-      unit[i] = 1;
-      const std::optional<Rational> form = inverse_form(P, unit);
-      demand(form.has_value(), "P is not positive definite");
-      coordinate.push_back(fixed_root_up(*form));
-      largest = std::max(largest, coordinate.back());
-    }
-    check_contraction(Rational(loop.contraction) - two_to(kMarginExponent));
-    const Integer unknown = times_up(from_largest, times_up(static_cast<long>(n) * spread, largest));
-    demand(as_fraction(unknown) <= two_to(kMarginExponent), "P has an entry out of range");
-  }
-
- private:
-  void check_contraction(const Rational& factor) const {
-    Square half(n, Row(n)), falls(n, Row(n));
-    const auto m = [this](std::size_t i, std::size_t j) { return as_fraction(middle[i * n + j]); };
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j) {
-        for (std::size_t k = 0; k < n; ++k) half[i][j] += m(i, k) * P[k][j];
-      }
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j) {
-        falls[i][j] = factor * factor * P[i][j];
-        for (std::size_t k = 0; k < n; ++k) falls[i][j] -= half[i][k] * m(j, k);
-      }
-    }
-    demand(sgn(factor) > 0 && inverse_form(falls, Row(n)).has_value(),
-           "P does not show that the loop contracts as stated");
-  }
-};
-
 /// A row that goes back period by period.
 class Backwards {
  public:
-  Backwards(const Map& map, const Row& row) : map_(map), next_(map.n) {
+  Backwards(const PeriodMap& map, const Row& row) : map_(map), next_(map.n) {
     for (const Rational& x : row) state.push_back(floor_fixed(x));
     error = times_up(map_.from_largest, 1);
     measure();
@@ -274,7 +62,7 @@ class Backwards {
     size = root_up((form >> kFormBits) + 1) + error;
   }
 
-  const Map& map_;
+  const PeriodMap& map_;
   std::vector<Integer> next_;
 };
 
@@ -286,14 +74,14 @@ struct Column {
   Integer most;  ///< norm + off
 
   Column() = default;
-  Column(const Map& map, std::vector<Integer> middle, Integer unknown)
+  Column(const PeriodMap& map, std::vector<Integer> middle, Integer unknown)
       : at(std::move(middle)), off(std::move(unknown)) {
     Row exact;
     for (const Integer& x : at) exact.push_back(as_fraction(x));
     norm = fixed_root_up(*inverse_form(map.P, exact));
     most = norm + off;
   }
-  Column(const Map& map, const RangeRow& column) {
+  Column(const PeriodMap& map, const FixedRangeRow& column) {
     std::vector<Integer> middle;
     Integer unknown;
     for (std::size_t i = 0; i < map.n; ++i) {
@@ -312,7 +100,7 @@ struct Column {
 
 /// x = (I - M)^-1 b: r x is the sum of r b over this period and all before. What the residual of a computed x leaves is
 /// summed up by the contraction.
-Column summed(const Map& map, const RangeRow& b) {
+Column summed(const PeriodMap& map, const FixedRangeRow& b) {
   const std::size_t n = map.n;
   Square left(n, Row(n + 1));
   for (std::size_t i = 0; i < n; ++i) {
@@ -334,9 +122,9 @@ Column summed(const Map& map, const RangeRow& b) {
   for (std::size_t i = 0; i < n; ++i) x.push_back(floor_fixed(left[i][n] / left[i][i]));
   Integer wrong;
   for (std::size_t i = 0; i < n; ++i) {
-    Range residual = b[i];
-    for (std::size_t j = 0; j < n; ++j) residual.add_product(map.M[i][j], Range(x[j]));
-    residual.add(Range(Integer(-x[i])));
+    FixedRange residual = b[i];
+    for (std::size_t j = 0; j < n; ++j) residual.add_product(map.M[i][j], FixedRange(x[j]));
+    residual.add(FixedRange(Integer(-x[i])));
     wrong += times_up(residual.magnitude(), map.coordinate[i]);
   }
   return {map, std::move(x), ceil_fixed(as_fraction(wrong) / map.gap)};
@@ -346,7 +134,7 @@ Column summed(const Map& map, const RangeRow& b) {
 class Sums {
  public:
   /// @param own what the input of the output's own period adds; @param limit what a constant input leaves.
-  Sums(const Map& map, const Rational& period_s, const RangeRow& effect, const Rational& own,
+  Sums(const PeriodMap& map, const Rational& period_s, const FixedRangeRow& effect, const Rational& own,
        const Rational& limit)
       : period_(period_s),
         limit_(limit),
@@ -383,7 +171,7 @@ class Sums {
 /// The same for a force, which acts at all times: k(u) = r_2 + r_1 u on each period.
 class ForceSums {
  public:
-  ForceSums(const Map& map, const Rational& period_s, const Rational& limit)
+  ForceSums(const PeriodMap& map, const Rational& period_s, const Rational& limit)
       : period_(period_s),
         limit_(limit),
         limit_fixed_(floor_fixed(limit)),
@@ -426,9 +214,9 @@ class ForceSums {
 
  private:
   /// What a position and a speed at the end of a period come to.
-  static RangeRow column(const Map& map, const Rational& position, const Rational& speed) {
-    RangeRow result(map.n);
-    result[0] = Range(position), result[1] = Range(speed);
+  static FixedRangeRow column(const PeriodMap& map, const Rational& position, const Rational& speed) {
+    FixedRangeRow result(map.n);
+    result[0] = FixedRange(position), result[1] = FixedRange(speed);
     return result;
   }
   Rational period_, limit_;
@@ -442,8 +230,8 @@ constexpr std::size_t kForce = 0, kInputs = 4;  // force, command, velocity, pos
 using AllGains = std::array<GainBounds, kInputs>;
 
 /// Of one output, a row over the state before a control; `own`: what the inputs of that control add to it.
-AllGains gains_of(const SampledWitness& loop, const Map& map, const Row& output,
-                  const std::array<RangeRow, kInputs>& effects, const Row& own, const Row& limits) {
+AllGains gains_of(const SampledWitness& loop, const PeriodMap& map, const Row& output,
+                  const std::array<FixedRangeRow, kInputs>& effects, const Row& own, const Row& limits) {
   const Rational period = loop.period_s;
   ForceSums force(map, period, limits[kForce]);
   std::vector<Sums> others;
@@ -488,26 +276,25 @@ GainBounds per_newton(GainBounds gains, double mass_kg) {
 
 }  // namespace
 
-std::size_t order(const SampledWitness& loop) { return Layout(loop).size(); }
+std::size_t order(const SampledWitness& loop) { return SampledLayout(loop).size(); }
 
 std::vector<std::vector<double>> period_map(const SampledWitness& loop) {
-  check_numbers(loop);
-  const Layout at(loop);
+  check_sampling(loop);
+  const SampledLayout at(loop);
   std::vector<std::vector<double>> result;
-  for (const RangeRow& row : product(hold_of(loop, at), enclosed(control_of(loop, at)))) {
+  for (const FixedRangeRow& row : period_ranges(hold_of(loop, at), control_of(loop, at))) {
     result.emplace_back();
-    for (const Range& x : row) result.back().push_back(as_fraction(x.middle()).get_d());
+    for (const FixedRange& x : row) result.back().push_back(as_fraction(x.middle()).get_d());
   }
   return result;
 }
 
 SampledGainBounds sampled_upper_gains(const SampledWitness& loop) {
-  check_numbers(loop);
   check_witness(loop);
-  const Layout at(loop);
-  const Ranges hold = hold_of(loop, at);
+  const SampledLayout at(loop);
+  const FixedRanges hold = hold_of(loop, at);
   const Square control = control_of(loop, at);
-  const Map map(loop, at, hold, control);
+  const PeriodMap map(loop, period_ranges(hold, control));
 
   // What each input adds to the state after control.
   std::array<Row, kInputs> inputs;
@@ -517,12 +304,13 @@ SampledGainBounds sampled_upper_gains(const SampledWitness& loop) {
     inputs[2][i] = control[i][1] - (i == 1 ? 1 : 0);
     inputs[3][i] = control[i][0] - (i == 0 ? 1 : 0);
   }
-  std::array<RangeRow, kInputs> effects;
+  std::array<FixedRangeRow, kInputs> effects;
   Row nothing(kInputs), own(kInputs);
   for (std::size_t k = 1; k < kInputs; ++k) {
     effects[k].resize(at.size());
     for (std::size_t i = 0; i < at.size(); ++i) {
-      for (std::size_t j = 0; j <= at.size(); ++j) effects[k][i].add_product(hold[i][j], Range(inputs[k][j]));
+      for (std::size_t j = 0; j <= at.size(); ++j)
+        effects[k][i].add_product(hold[i][j], FixedRange(inputs[k][j]));
     }
     own[k] = inputs[k][at.command];
   }

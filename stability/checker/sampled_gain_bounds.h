@@ -7,14 +7,8 @@
 
 namespace swarmcert::check {
 
-/// One axis, and what shows that its responses decay. All numbers count exactly as they stand.
-struct SampledWitness {
-  double mass_kg = 0;
-  double Kp = 0;  ///< 1/s^2
-  double Kd = 0;  ///< 1/s
-  double Ki = 0;  ///< 1/s^3, as the firmware states it
-  std::vector<double> lags_s;
-  double delay_s = 0;  ///< of the command, before the lags
+/// A sampled loop, and what shows that its responses decay.
+struct SampledWitness : LoopNumbers {
   double period_s = 0;
   double integrator_step_s = 0;
 

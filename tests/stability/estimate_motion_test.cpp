@@ -77,6 +77,18 @@ std::vector<AxisLoop> moving_loops() {
       {kLight_kg, 10, 5, 10, {1 / 17.4}, 0}, {kLight_kg, 10, 5, 10, {}, 0}, {kLight_kg, 30, 9, 0, {0.03}, 0}};
 }
 
+Gains gains_of_pair() {
+  return parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n", "g.toml");
+}
+
+/// Two vehicles, each of which is pushed by the other's displacement.
+CoupledSwarm pair_of(double slope_N_m) {
+  CoupledSwarm swarm;
+  swarm.vehicles = 2;
+  swarm.couplings = {{0, 1, slope_N_m, 0, 0, 0, 0}, {1, 0, slope_N_m, 0, 0, 0, 0}};
+  return swarm;
+}
+
 TEST(EstimateMotion, IsReachedByTheWorstErrorOfItsSizeAndByNoneExceeded) {
   constexpr double kSize = 0.1;
   constexpr std::size_t kSteps = 8000;
@@ -130,13 +142,10 @@ TEST(EstimateMotion, ASlowErrorMovesAVehicleByItsRate) {
 }
 
 TEST(EstimateMotion, NoSimulatedSwarmLeavesTheBoundThatContainsTheErrorsOfItsEstimates) {
-  Gains gains =
-      parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n", "g.toml");
+  const Gains gains = gains_of_pair();
   const Plant plant = {0.034, 1, 0};
   constexpr double kSlope_N_m = 0.06, kSize = 0.1;
-  CoupledSwarm swarm;
-  swarm.vehicles = 2;
-  swarm.couplings = {{0, 1, kSlope_N_m, 0, 0, 0, 0}, {1, 0, kSlope_N_m, 0, 0, 0, 0}};
+  const CoupledSwarm swarm = pair_of(kSlope_N_m);
   OtherErrors errors;
   errors.velocity_error.amplitude = kSize;
   EXPECT_EQ(couple(swarm, gains, plant).small_gain.error_m[0], 0);
@@ -221,13 +230,10 @@ TEST(ForceMotion, ASlowForceMovesAVehicleByItsRateAndAnEdgeByItsSize) {
 }
 
 TEST(ForceMotion, NoSimulatedSwarmLeavesTheBoundThatContainsItsForces) {
-  Gains gains =
-      parse_gains("schema = \"swarmcert/gains/1\"\n[position]\nKp = 10\nKd = 5\nKi = 10\n", "g.toml");
+  const Gains gains = gains_of_pair();
   const Plant plant = {0.034, 1, 0};
   constexpr double kSlope_N_m = 0.06, kSize_N = 0.01;
-  CoupledSwarm swarm;
-  swarm.vehicles = 2;
-  swarm.couplings = {{0, 1, kSlope_N_m, 0, 0, 0, 0}, {1, 0, kSlope_N_m, 0, 0, 0, 0}};
+  const CoupledSwarm swarm = pair_of(kSlope_N_m);
   Disturbance force;
   force.amplitude_N = kSize_N;
   const CoupledVerdict verdict = couple(swarm, gains, plant, {}, force);

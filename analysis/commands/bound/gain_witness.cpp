@@ -88,17 +88,22 @@ double excess(const check::GainBounds& bounds, const stability::VerifiedNorms& k
   return most;
 }
 
+void set_numbers(const stability::AxisLoop& loop, check::LoopNumbers& numbers) {
+  numbers.mass_kg = loop.mass_kg;
+  numbers.Kp = loop.Kp, numbers.Kd = loop.Kd, numbers.Ki = loop.Ki;
+  numbers.delay_s = loop.delay_s;
+  std::copy_if(loop.lags_s.begin(), loop.lags_s.end(), std::back_inserter(numbers.lags_s),
+               [](double tau) { return tau > 0; });
+}
+
 std::optional<ProvedGains> search_witness(const stability::AxisLoop& loop, const std::string& input,
                                           int delay_order, const stability::VerifiedNorms& known,
                                           std::string& why) {
   ProvedGains found;
   check::LoopWitness& witness = found.witness;
   witness.input = input;
-  witness.delay_s = loop.delay_s, witness.delay_order = delay_order;
-  witness.mass_kg = loop.mass_kg, witness.Kp = loop.Kp, witness.Kd = loop.Kd, witness.Ki = loop.Ki;
-  for (const double tau : loop.lags_s) {
-    if (tau > 0) witness.lags_s.push_back(tau);
-  }
+  witness.delay_order = delay_order;
+  set_numbers(loop, witness);
   const Polynomial p = characteristic(loop, witness.lags_s, delay_order);
   double slowest = 1e300, fastest = 0;
   for (const std::complex<double>& pole : stability::poles(p)) {
@@ -161,22 +166,12 @@ double excess(const check::SampledGainBounds& bounds, const SampledEnclosures& k
                    excess(bounds.velocity, known.velocity), excess(bounds.position, known.position)});
 }
 
-check::SampledWitness numbers_of(const stability::SampledLoop& loop) {
-  check::SampledWitness witness;
-  witness.mass_kg = loop.plant.mass_kg;
-  witness.Kp = loop.plant.Kp, witness.Kd = loop.plant.Kd, witness.Ki = loop.plant.Ki;
-  std::copy_if(loop.plant.lags_s.begin(), loop.plant.lags_s.end(), std::back_inserter(witness.lags_s),
-               [](double tau) { return tau > 0; });
-  witness.delay_s = loop.plant.delay_s;
-  witness.period_s = loop.period_s;
-  witness.integrator_step_s = loop.integrator_step_s;
-  return witness;
-}
-
 std::optional<ProvedSampledGains> search_sampled(const stability::SampledLoop& loop,
                                                  const SampledEnclosures& known, std::string& why) {
-  ProvedSampledGains found{numbers_of(loop), {}};
+  ProvedSampledGains found;
   check::SampledWitness& witness = found.witness;
+  set_numbers(loop.plant, witness);
+  witness.period_s = loop.period_s, witness.integrator_step_s = loop.integrator_step_s;
   const std::vector<std::vector<double>> map = check::period_map(witness);
   const auto n = static_cast<Index>(map.size());
   MatrixXd M(n, n);

@@ -19,8 +19,7 @@ void refuse_unbounded(const CoupledVerdict& verdict) {
   if (!std::isfinite(verdict.of_force.error_m) || !std::isfinite(verdict.of_force.acceleration_m_s2)) {
     throw UsageError(
         "--swarm needs how large the force error beside the couplings is, or how fast it changes: add "
-        "--amplitude E "
-        "or --rate R");
+        "--amplitude E or --rate R");
   }
   for (std::size_t i = 0; i < verdict.small_gain.error_m.size(); ++i) {
     if (std::isfinite(verdict.small_gain.error_m[i]) && std::isfinite(verdict.small_gain.rate_N_s[i]))

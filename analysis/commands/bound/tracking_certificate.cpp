@@ -51,44 +51,43 @@ Json gains_of(const check::GainBounds& bounds) {
   return gains;
 }
 
+/// What entries of both kinds of loops have, the axis left empty.
+Json entry_of(const check::LoopNumbers& loop, const std::vector<std::vector<double>>& P, long steps) {
+  return {{"axis", ""},
+          {"mass_kg", files::hex_float(loop.mass_kg)},
+          {"Kp", files::hex_float(loop.Kp)},
+          {"Kd", files::hex_float(loop.Kd)},
+          {"Ki", files::hex_float(loop.Ki)},
+          {"lags_s", hex_array(loop.lags_s)},
+          {"delay_s", files::hex_float(loop.delay_s)},
+          {"steps", steps},
+          {"P", hex_rows(P)}};
+}
+
 Json loop_entry(const ProvedGains& found) {
   const check::LoopWitness& w = found.witness;
-  return {{"axis", ""},
-          {"input", w.input},
-          {"mass_kg", files::hex_float(w.mass_kg)},
-          {"Kp", files::hex_float(w.Kp)},
-          {"Kd", files::hex_float(w.Kd)},
-          {"Ki", files::hex_float(w.Ki)},
-          {"lags_s", hex_array(w.lags_s)},
-          {"delay_s", files::hex_float(w.delay_s)},
-          {"delay_order", w.delay_order},
-          {"time_exponent", w.time_exponent},
-          {"step_exponent", w.step_exponent},
-          {"steps", w.steps},
-          {"decay", files::hex_float(w.decay)},
-          {"P", hex_rows(w.P)},
-          {"gains", gains_of(found.bounds)}};
+  Json entry = entry_of(w, w.P, w.steps);
+  entry.update({{"input", w.input},
+                {"delay_order", w.delay_order},
+                {"time_exponent", w.time_exponent},
+                {"step_exponent", w.step_exponent},
+                {"decay", files::hex_float(w.decay)},
+                {"gains", gains_of(found.bounds)}});
+  return entry;
 }
 
 Json sampled_entry(const ProvedSampledGains& found) {
   const check::SampledWitness& w = found.witness;
-  return {{"axis", ""},
-          {"mass_kg", files::hex_float(w.mass_kg)},
-          {"Kp", files::hex_float(w.Kp)},
-          {"Kd", files::hex_float(w.Kd)},
-          {"Ki", files::hex_float(w.Ki)},
-          {"lags_s", hex_array(w.lags_s)},
-          {"delay_s", files::hex_float(w.delay_s)},
-          {"period_s", files::hex_float(w.period_s)},
-          {"integrator_step_s", files::hex_float(w.integrator_step_s)},
-          {"steps", w.steps},
-          {"contraction", files::hex_float(w.contraction)},
-          {"P", hex_rows(w.P)},
-          {"gains",
-           {{"force", gains_of(found.bounds.force)},
-            {"command", gains_of(found.bounds.command)},
-            {"velocity", gains_of(found.bounds.velocity)},
-            {"position", gains_of(found.bounds.position)}}}};
+  Json entry = entry_of(w, w.P, w.steps);
+  entry.update({{"period_s", files::hex_float(w.period_s)},
+                {"integrator_step_s", files::hex_float(w.integrator_step_s)},
+                {"contraction", files::hex_float(w.contraction)},
+                {"gains",
+                 {{"force", gains_of(found.bounds.force)},
+                  {"command", gains_of(found.bounds.command)},
+                  {"velocity", gains_of(found.bounds.velocity)},
+                  {"position", gains_of(found.bounds.position)}}}});
+  return entry;
 }
 
 stability::VerifiedNorms enclosures_of(const Json& gains) {

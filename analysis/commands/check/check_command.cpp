@@ -35,18 +35,19 @@ bool is_close(double stated, double derived) {
   return std::abs(stated - derived) <= 1e-12 * std::abs(derived);
 }
 
+bool fits(const files::Json& entry, const char* key, double derived) {
+  return is_close(files::parse_hex_float(entry[key].get<std::string>()), derived);
+}
+
 /// Whether an entry of an accepted certificate states the numbers of `loop`, up to their rounding.
 bool states(const files::Json& entry, const stability::AxisLoop& loop) {
-  const auto fits = [&entry](const char* key, double derived) {
-    return is_close(files::parse_hex_float(entry[key].get<std::string>()), derived);
-  };
   std::vector<double> stated = files::parse_hex_floats(entry["lags_s"]), derived;
   std::copy_if(loop.lags_s.begin(), loop.lags_s.end(), std::back_inserter(derived),
                [](double tau) { return tau > 0; });
   std::sort(stated.begin(), stated.end());
   std::sort(derived.begin(), derived.end());
-  return fits("delay_s", loop.delay_s) && fits("mass_kg", loop.mass_kg) && fits("Kp", loop.Kp) &&
-         fits("Kd", loop.Kd) && fits("Ki", loop.Ki) &&
+  return fits(entry, "delay_s", loop.delay_s) && fits(entry, "mass_kg", loop.mass_kg) &&
+         fits(entry, "Kp", loop.Kp) && fits(entry, "Kd", loop.Kd) && fits(entry, "Ki", loop.Ki) &&
          std::equal(stated.begin(), stated.end(), derived.begin(), derived.end(), is_close);
 }
 
@@ -57,11 +58,8 @@ int axis_of(const files::Json& entry) {
 
 /// The same for an entry of a sampled loop.
 bool states(const files::Json& entry, const stability::SampledLoop& loop) {
-  const auto fits = [&entry](const char* key, double derived) {
-    return is_close(files::parse_hex_float(entry[key].get<std::string>()), derived);
-  };
-  return states(entry, loop.plant) && fits("period_s", loop.period_s) &&
-         fits("integrator_step_s", loop.integrator_step_s);
+  return states(entry, loop.plant) && fits(entry, "period_s", loop.period_s) &&
+         fits(entry, "integrator_step_s", loop.integrator_step_s);
 }
 
 /// Rejects an accepted certificate whose loops are not those of the files.

@@ -43,8 +43,8 @@ struct HeldSlice {
   double largest_acceleration_m_s2 = 0;  ///< sup |e''| up to the slice's start
   double jerk_m_s3 = 0;                  ///< sup |p_d'''|
   double per_N = 0;                      ///< what |m x| <= 1 N in the slice adds to |e''| in it
-  double per_rising_N =
-      0;  ///< the same of |m x| <= (t - t_k)/T 1 N, where t_k is the last sample; at most per_N
+  /// The same of |m x| <= (t - t_k)/T 1 N, where t_k is the last sample; at most per_N
+  double per_rising_N = 0;
 };
 
 /// What is known of m x and e'' in a slice.

@@ -1,0 +1,71 @@
+/// @file The map from one period of a sampled loop to the next, enclosed in integers. Not for users.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "stability/checker/fixed_point.h"
+#include "stability/checker/sampled_gain_bounds.h"
+
+namespace swarmcert::check {
+
+/// A number between two fixed-point numbers.
+struct FixedRange {
+  Integer lo, hi;
+
+  FixedRange() = default;
+  explicit FixedRange(const Rational& x) : lo(floor_fixed(x)), hi(ceil_fixed(x)) {}
+  explicit FixedRange(const Integer& fixed) : lo(fixed), hi(fixed) {}
+  void add(const FixedRange& other) { lo += other.lo, hi += other.hi; }
+  void add_product(const FixedRange& a, const FixedRange& b) {
+    const std::array<Integer, 4> ends = {a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi};
+    lo += *std::min_element(ends.begin(), ends.end()) >> kBits;
+    hi += (*std::max_element(ends.begin(), ends.end()) >> kBits) + 1;
+  }
+  Integer middle() const { return (lo + hi) >> 1; }
+  Integer magnitude() const { return std::max<Integer>(abs(lo), abs(hi)); }
+};
+using FixedRangeRow = std::vector<FixedRange>;
+using FixedRanges = std::vector<FixedRangeRow>;
+
+/// Which state stands where, before the control of a period: e, e', lags' outputs, the integral, past commands (newest
+/// first). After it the new command stands before the past ones.
+struct SampledLayout {
+  std::size_t plant = 0, command = 0, past = 0, newest = 0;
+  Rational shift_s;  ///< part of a period for which the older command still acts
+
+  explicit SampledLayout(const SampledWitness& loop);
+  std::size_t size() const { return command + past; }
+};
+
+/// State before -> after control, [size + 1 x size].
+Square control_of(const SampledWitness& loop, const SampledLayout& at);
+/// State after control -> before that of the next period, [size x size + 1].
+/// @throws std::runtime_error where a lag is too short against the period.
+FixedRanges hold_of(const SampledWitness& loop, const SampledLayout& at);
+/// hold * control
+FixedRanges period_ranges(const FixedRanges& hold, const Square& control);
+
+/// The map M, and the norm |r| = sqrt(r P r') of rows over its states.
+struct PeriodMap {
+  std::size_t n = 0;
+  FixedRanges M;
+  std::vector<Integer> middle;  ///< of M, row by row
+  Integer spread;               ///< M is within this of `middle`
+  Square P;
+  std::vector<Integer> scaled_P;    ///< over 2^kFormBits
+  Integer from_largest;             ///< |r| <= this times the largest |r_i|
+  std::vector<Integer> coordinate;  ///< |r_i| <= this times |r|
+  Rational gap;                     ///< 1 - contraction
+
+  /// @throws std::runtime_error unless P shows that |r M| <= contraction |r| for every M in the ranges.
+  PeriodMap(const SampledWitness& loop, FixedRanges map);
+
+ private:
+  void enclose_middle();
+  void measure_norm();
+  void check_contraction(const Rational& factor) const;
+};
+
+}  // namespace swarmcert::check
