@@ -19,7 +19,7 @@
 namespace swarmcert::nn {
 
 /// The caller owns the arrays.
-/// Precondition: all phi have the same number of inputs; phi and ground have rho.inputs() outputs; lower <= upper.
+/// Precondition: fits_together(set) and lower <= upper.
 template <typename Scalar>
 struct DeepSet {
   const Mlp<Scalar>* ground;  ///< sees the vehicle's own state; nullptr: no such term
@@ -29,10 +29,23 @@ struct DeepSet {
   const Scalar* lower;  ///< [inputs()] each; nullptr: no clamp. The ground's input is not clamped.
   const Scalar* upper;
 
-  int inputs() const { return phi[0].inputs(); }
-  int hidden() const { return rho.inputs(); }
-  int outputs() const { return rho.outputs(); }
+  constexpr int inputs() const { return phi[0].inputs(); }
+  constexpr int hidden() const { return rho.inputs(); }
+  constexpr int outputs() const { return rho.outputs(); }
 };
+
+/// True if all phi have the same number of inputs, phi and ground have rho.inputs() outputs, and all are chains.
+template <typename Scalar>
+constexpr bool fits_together(const DeepSet<Scalar>& set) {
+  if (set.num_kinds < 1 || !is_chain(set.rho)) return false;
+  if (set.ground != nullptr && (!is_chain(*set.ground) || set.ground->outputs() != set.hidden()))
+    return false;
+  for (int kind = 0; kind < set.num_kinds; ++kind) {
+    const Mlp<Scalar>& phi = set.phi[kind];
+    if (!is_chain(phi) || phi.inputs() != set.inputs() || phi.outputs() != set.hidden()) return false;
+  }
+  return true;
+}
 
 /// One neighbour as the vehicle sees it.
 template <typename Scalar>

@@ -31,6 +31,13 @@ struct DenseLayer {
   Layout layout = Layout::kRows;
 };
 
+/// A layer in blocks whose sizes are checked when it is compiled: arrays of another size do not convert.
+template <int Outputs, int Inputs, typename Scalar>
+constexpr DenseLayer<Scalar> layer_in_blocks(const Scalar (&weights)[Outputs * Inputs],
+                                             const Scalar (&biases)[Outputs]) {
+  return {weights, biases, Outputs, Inputs, Layout::kBlocks};
+}
+
 /// Outputs of the block of Layout::kBlocks that begins at output `first`.
 constexpr int block_width(int outputs, int first) {
   const int left = outputs - first;

@@ -6,15 +6,25 @@
 namespace swarmcert::nn {
 
 /// f(x) = W_K relu(... relu(W_1 x + b_1) ...) + b_K: ReLU after every layer but the last.
-/// Precondition: num_layers >= 1 and layers[k].inputs == layers[k - 1].outputs.
+/// Precondition: is_chain(network).
 template <typename Scalar>
 struct Mlp {
   const DenseLayer<Scalar>* layers;
   int num_layers;
 
-  int inputs() const { return layers[0].inputs; }
-  int outputs() const { return layers[num_layers - 1].outputs; }
+  constexpr int inputs() const { return layers[0].inputs; }
+  constexpr int outputs() const { return layers[num_layers - 1].outputs; }
 };
+
+/// True if there is a layer and every further one takes what the one before it gives: for a static_assert beside
+/// weights that are known when they are compiled.
+template <typename Scalar>
+constexpr bool is_chain(const Mlp<Scalar>& network) {
+  for (int k = 1; k < network.num_layers; ++k) {
+    if (network.layers[k].inputs != network.layers[k - 1].outputs) return false;
+  }
+  return network.num_layers >= 1;
+}
 
 /// Elements that evaluate() needs in `scratch`: two buffers as wide as the widest hidden layer, for each of the
 /// `together` inputs that are evaluated at once.

@@ -80,10 +80,10 @@ std::string weights_source(const files::Weights& weights, const std::string& id)
         "extern \"C\" alignas(16) const {0}_layer {0} = {{{3}, {4}}};\n",
         name, layer.weights.size(), layer.biases.size(), braces(in_blocks(layer)),
         braces(narrow(layer.biases)));
-    layers += fmt::format("    {{{0}.weight, {0}.bias, {1}, {2}, Layout::kBlocks}},\n", name, layer.outputs,
+    layers += fmt::format("    layer_in_blocks<{1}, {2}>({0}.weight, {0}.bias),\n", name, layer.outputs,
                           layer.inputs);
   }
-  return text + fmt::format("static const DenseLayer<float> {}_layers[] = {{\n{}}};\n\n", id, layers);
+  return text + fmt::format("static constexpr DenseLayer<float> {}_layers[] = {{\n{}}};\n\n", id, layers);
 }
 
 std::string mlp(const std::string& id, const files::Weights& weights) {
@@ -123,20 +123,6 @@ std::uint32_t weights_hash(const files::Network& network) {
   if (ground != network.phi.end()) add(ground->second);
   for (const auto& [kind, weights] : network.rho) add(weights);
   return hash;
-}
-
-/// Floats that the exported evaluation needs as scratch, of whichever network needs most.
-int scratch_elements(const files::Network& network) {
-  int most = 1;
-  for (const auto& [part, weights] : files::parts(network)) {
-    std::vector<nn::DenseLayer<float>> layers;
-    for (const files::Layer& layer : weights->layers)
-      layers.push_back({nullptr, nullptr, layer.outputs, layer.inputs});
-    const nn::Mlp<float> mlp{layers.data(), static_cast<int>(layers.size())};
-    most = std::max(
-        most, scratch_size(mlp, nn::kMostTogether) + nn::kMostTogether * (mlp.inputs() + mlp.outputs()));
-  }
-  return most;
 }
 
 /// True if the inputs are relative position, then relative velocity, as flight code has them.
@@ -310,29 +296,46 @@ std::string source_text(const files::Network& network, const ExportOptions& opti
       kGeneratedMark, parameter_line(options), kExportedHeader);
   if (!network.sha256.empty()) text += fmt::format("// sha256 of network.toml: {}\n\n", network.sha256);
   for (const auto& [part, weights] : files::parts(network)) text += weights_source(*weights, ids.at(part));
-  std::string phi, rho;
+  std::string phi, sets;
   for (const std::string& kind : kinds)
     phi += mlp(ids.at(files::phi_name(kind)), network.phi.at(kind)) + ", ";
-  for (const auto& [kind, weights] : network.rho) rho += mlp(ids.at(files::rho_name(kind)), weights) + ", ";
-  text += fmt::format("static const Mlp<float> phi[] = {{{}}};\nstatic const Mlp<float> rho[] = {{{}}};\n",
-                      phi, rho);
+  text += fmt::format("static constexpr Mlp<float> phi[] = {{{}}};\n", phi);
   const bool has_ground = network.phi.count(files::kGroundKind) != 0;
   if (has_ground) {
     const std::string part = files::kGroundPhi;
-    text += fmt::format("static const Mlp<float> ground = {};\n",
+    text += fmt::format("static constexpr Mlp<float> ground = {};\n",
                         mlp(ids.at(part), network.phi.at(files::kGroundKind)));
   }
   if (network.clamp) {
-    text += array("static const float lower", narrow(network.clamp->lower)) +
-            array("static const float upper", narrow(network.clamp->upper));
+    text += array("static constexpr float lower", narrow(network.clamp->lower)) +
+            array("static constexpr float upper", narrow(network.clamp->upper));
   }
+  for (const auto& [kind, weights] : network.rho)
+    sets += fmt::format("    {{{}, phi, swarmcert_network::kNeighbourKinds, {}, {}}},\n",
+                        has_ground ? "&ground" : "nullptr", mlp(ids.at(files::rho_name(kind)), weights),
+                        network.clamp ? "lower, upper" : "nullptr, nullptr");
   text += fmt::format(
-      R"(static constexpr int kHidden = {hidden}, kScratch = {scratch};
+      R"(static constexpr DeepSet<float> sets[swarmcert_network::kOwnKinds] = {{
+{sets}}};
+
+// The evaluator trusts these sizes: what does not fit together does not compile.
+static constexpr bool all_fit_together() {{
+  for (const DeepSet<float>& set : sets) {{
+    if (!fits_together(set) || set.inputs() != swarmcert_network::kInputs || set.outputs() != 1) return false;
+  }}
+  return true;
+}}
+static_assert(all_fit_together(), "the layers of the exported networks do not fit together");
+
+static constexpr int largest_scratch() {{
+  int largest = 0;
+  for (const DeepSet<float>& set : sets) largest = scratch_size(set) > largest ? scratch_size(set) : largest;
+  return largest;
+}}
+static constexpr int kHidden = sets[0].hidden(), kScratch = largest_scratch();
 static constexpr std::uint32_t kWeightsHash = {hash:#010x}u;
 
-swarmcert::nn::DeepSet<float> swarmcert_network::deep_set(int own_kind) {{
-  return {{{ground}, phi, kNeighbourKinds, rho[own_kind], {clamp}}};
-}}
+swarmcert::nn::DeepSet<float> swarmcert_network::deep_set(int own_kind) {{ return sets[own_kind]; }}
 
 namespace {{
 
@@ -346,10 +349,7 @@ struct Golden {{
 }};
 
 )",
-      fmt::arg("hidden", network.rho.begin()->second.inputs()),
-      fmt::arg("scratch", scratch_elements(network)), fmt::arg("hash", weights_hash(network)),
-      fmt::arg("ground", has_ground ? "&ground" : "nullptr"),
-      fmt::arg("clamp", network.clamp ? "lower, upper" : "nullptr, nullptr"));
+      fmt::arg("sets", sets), fmt::arg("hash", weights_hash(network)));
   text +=
       golden_source(golden_vectors(network, options.golden_vectors, options.most_neighbours, options.seed));
   return text + kEvaluation;
@@ -373,6 +373,12 @@ std::vector<SourceFile> export_source(const files::Network& network, const Expor
   if (neighbour_kinds(network).empty()) {
     throw files::InputError(
         {network.path, "", "phi", "", "has only the ground", "add the phi of a neighbour's kind"});
+  }
+  const int outputs = network.rho.begin()->second.outputs();
+  if (outputs != 1) {
+    throw files::InputError({network.path, "", "outputs", std::to_string(outputs),
+                             "flight code feeds forward one number, the vertical force",
+                             "export a network whose rho has one output"});
   }
   std::vector<SourceFile> files = {{kExportedHeader, header_text(network, options)},
                                    {kExportedSource, source_text(network, options)}};

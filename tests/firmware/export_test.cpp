@@ -23,6 +23,43 @@ TEST_F(Firmware, ExportPassesItsOwnSelfTestWhateverTheCompilerMayContract) {
   }
 }
 
+TEST_F(Firmware, LayersThatDoNotFitTheirArraysOrEachOtherDoNotCompile) {
+  const std::string source = read_text(folder_ / "out/swarmcert_network.cpp");
+  const std::string compile = "g++ -std=c++17 -Iout -c out/changed.cpp -o changed.o";
+  write_text(folder_ / "out/changed.cpp", source);
+  ASSERT_EQ(run(compile).exit_code, 0);
+  const std::string hidden = "layer_in_blocks<11, 6>", last = "layer_in_blocks<5, 11>";
+  const auto compile_with = [&](const std::string& from, const std::string& to) {
+    std::string changed = source;
+    changed.replace(changed.find(from), from.size(), to);
+    write_text(folder_ / "out/changed.cpp", changed);
+    return run(compile);
+  };
+  EXPECT_NE(compile_with(hidden, "layer_in_blocks<10, 6>").exit_code, 0) << "the array has 11 rows";
+  const Outcome turned = compile_with(last, "layer_in_blocks<11, 5>");
+  EXPECT_NE(turned.exit_code, 0) << "as many weights, but other biases";
+  const auto call = [](const std::string& sizes, const std::string& layer) {
+    const std::string name = "swarmcert_phi_small_" + layer;
+    return sizes + "(" + name + ".weight, " + name + ".bias)";
+  };
+  const Outcome outcome = compile_with(call(last, "2"), call(hidden, "1"));
+  EXPECT_NE(outcome.output.find("do not fit together"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Firmware, ANetworkOfThreeForcesIsNotExportedAsAVerticalOne) {
+  for (const auto& [part, outputs, inputs] : {std::tuple("phi", 4, 6), {"rho", 3, 4}}) {
+    files::Weights weights;
+    files::Layer layer{"fc1", outputs, inputs, {}, {}};
+    for (int i = 0; i < outputs * inputs; ++i) layer.weights.push_back(0.5);
+    layer.biases.resize(static_cast<std::size_t>(outputs));
+    weights.layers.push_back(layer);
+    files::save_safetensors(weights, folder_ / (std::string(part) + "3.safetensors"), true);
+  }
+  const Outcome outcome = run("swarmcert export --phi phi3.safetensors --rho rho3.safetensors -o three");
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("one number, the vertical force"), std::string::npos) << outcome.output;
+}
+
 TEST_F(Firmware, SelfTestFailsForAChangedWeight) {
   std::string source = read_text(folder_ / "out/swarmcert_network.cpp");
   const std::size_t array = source.find("swarmcert_rho_small_2 = {");
