@@ -7,6 +7,7 @@ const std::vector<Experiment>& experiments() {
       {"curriculum", "section III-C: distances and labels from stage to stage", curriculum},
       {"data", "section V-B: test error over minutes of data", minutes_of_data},
       {"table", "tab:nnperf: largest z-error of networks and swarms; x- and y-errors", performance},
+      {"claims", "section V-C: under which wakes, batteries and heights its results appear", claims},
       {"intro", "fig:intro: two vehicles swap, without and with a network", figure_intro},
       {"swaps", "fig:swaps: height errors of three vehicles under four controllers", figure_swaps},
       {"heatmap", "fig:heatmap: predicted force over places", figure_heatmap},

@@ -269,7 +269,7 @@ void add_axis(Track track, const std::vector<Judged>& judged, Calibrations& cali
                   "like these, stays below its bound with probability {:g}; for the calibration at hand "
                   "between {:.3f} and {:.3f} (90 %).",
                   track_name(track), model.promise.flights, model.promise.groups, level,
-                  model.promise.coverage_90[0], model.promise.coverage_90[1]));
+                  model.promise.coverage_90.lower, model.promise.coverage_90.upper));
   finding.json["axes"].push_back(std::move(row));
 }
 

@@ -7,7 +7,7 @@
 
 #include "analysis/learning/trained_network.h"
 #include "nn/base/file_io.h"
-#include "nn/base/json.h"
+#include "nn/base/shard.h"
 
 namespace swarmcert::reproduction {
 namespace {
@@ -47,18 +47,12 @@ Learned read_back(const files::Json& file, const std::string& folder) {
   return learned;
 }
 
-}  // namespace
-
-Learned learn(const Setting& setting, const LearnOptions& options, const std::string& folder,
-              const std::string& key, const std::function<learning::LearningData()>& load) {
-  const std::string done = (fs::path(folder) / "learned.json").string();
-  const std::string whole_key = files::sha256(key + "|" + text_of(options));
-  if (fs::exists(done)) {
-    const files::Json file = files::read_json(done, kLearnSchema);
-    if (file.at("key") == whole_key) return read_back(file, folder);
-  }
+/// Trains and writes network and certificate into `folder`; what was measured. `checkpoints`: files that are not needed
+/// any more once that is kept.
+files::Json train(const Setting& setting, const LearnOptions& options, const std::string& folder,
+                  const std::string& hash, const learning::LearningData& data,
+                  std::vector<std::string>& checkpoints) {
   fs::create_directories(folder);
-  const learning::LearningData data = load();
   learning::RunOptions run;
   run.trainer.gamma = options.gamma;
   run.trainer.learning_rate = options.rate;
@@ -71,7 +65,7 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   const int per_epoch = (samples + options.batch - 1) / options.batch;
   run.epochs = options.steps > 0 ? std::max(1, (options.steps + per_epoch / 2) / per_epoch) : options.epochs;
   run.patience = run.epochs;
-  run.checkpoint = (fs::path(folder) / ("checkpoint-" + whole_key.substr(0, 12) + ".json")).string();
+  run.checkpoint = (fs::path(folder) / ("checkpoint-" + hash.substr(0, 12) + ".json")).string();
   const std::uint64_t first = options.seed + (options.teachers > 0 ? 1 : 0);
   run.resumes = fs::exists(learning::checkpoint_of(run, first));
   run.progress = [&](int epochs, int total, double select_gf) {
@@ -90,22 +84,32 @@ Learned learn(const Setting& setting, const LearnOptions& options, const std::st
   for (const learning::Score& score : taught.scores) scores.push_back({score.seed, score.select_rmse});
   for (const auto& [function, upper] : certified.set_bounds) bounds.push_back({function, upper});
   for (const learning::Epoch& epoch : trained.epochs) epochs.push_back({epoch.fit_rmse, epoch.select_rmse});
-  const files::Json file = {{"schema", kLearnSchema},
-                            {"key", whole_key},
-                            {"set_bounds", std::move(bounds)},
-                            {"bound", certified.largest()},
-                            {"keeps_gamma", certified.gamma == lipschitz::Verdict::kProved},
-                            {"test_gf", learning::rmse(data, trained.theta, Use::kTest, setting.jobs)},
-                            {"nothing_gf", learning::rmse_of_nothing(data, Use::kTest)},
-                            {"samples", samples},
-                            {"epochs", trained.epochs.size()},
-                            {"best_epoch", trained.best_epoch + 1},
-                            {"fit_and_select_gf", std::move(epochs)},
-                            {"kept_seed", trained.seed},
-                            {"scores", std::move(scores)}};
-  files::write_file(done, files::to_text(file), true);
-  for (const learning::Score& score : taught.scores) fs::remove(learning::checkpoint_of(run, score.seed));
-  return read_back(file, folder);
+  for (const learning::Score& score : taught.scores)
+    checkpoints.push_back(learning::checkpoint_of(run, score.seed));
+  return {{"set_bounds", std::move(bounds)},
+          {"bound", certified.largest()},
+          {"keeps_gamma", certified.gamma == lipschitz::Verdict::kProved},
+          {"test_gf", learning::rmse(data, trained.theta, Use::kTest, setting.jobs)},
+          {"nothing_gf", learning::rmse_of_nothing(data, Use::kTest)},
+          {"samples", samples},
+          {"epochs", trained.epochs.size()},
+          {"best_epoch", trained.best_epoch + 1},
+          {"fit_and_select_gf", std::move(epochs)},
+          {"kept_seed", trained.seed},
+          {"scores", std::move(scores)}};
+}
+
+}  // namespace
+
+Learned learn(const Setting& setting, const LearnOptions& options, const std::string& folder,
+              const std::string& key, const std::function<learning::LearningData()>& load) {
+  const std::string whole_key = key + "|" + text_of(options);
+  std::vector<std::string> checkpoints;
+  const files::Json learned = files::kept_unit(
+      (fs::path(folder) / "learned.json").string(), kLearnSchema, whole_key,
+      [&] { return train(setting, options, folder, files::sha256(whole_key), load(), checkpoints); });
+  for (const std::string& checkpoint : checkpoints) fs::remove(checkpoint);
+  return read_back(learned, folder);
 }
 
 }  // namespace swarmcert::reproduction

@@ -1,133 +1,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <map>
 
 #include "analysis/reproduction/experiments.h"
-#include "analysis/reproduction/stages.h"
-#include "analysis/residuals/statistics.h"
-#include "nn/base/file_io.h"
-#include "nn/base/parallel.h"
+#include "analysis/reproduction/table_flights.h"
 
 namespace swarmcert::reproduction {
 namespace {
 
-/// Swaps are flown that much above the published heights.
-constexpr double kHigher_m = 0.3;
-
 namespace fs = std::filesystem;
-
-constexpr int kLeast = 2, kMost = 5;
-constexpr std::array<int, 4> kControllers = {0, 2, 3, 4};  ///< "trained with"; 0: the baseline
-/// tab:nnperf, m; NaN: not flown.
-constexpr double kNot = std::numeric_limits<double>::quiet_NaN();
-constexpr double kPaper_m[4][4] = {{0.094, 0.139, 0.209, 0.314},
-                                   {0.027, 0.150, 0.294, kNot},
-                                   {0.026, 0.082, 0.140, 0.159},
-                                   {0.024, 0.061, 0.102, 0.150}};
-
-/// One flight of the table: six swaps.
-struct Cell {
-  int controller = 0, vehicles = 0, training_seed = 0;
-  std::uint64_t flight_seed = 0;
-  double max_m[3] = {0, 0, 0};                  ///< |x|, |y|, |z|; infinite: lost
-  double p50_m[2] = {0, 0}, p95_m[2] = {0, 0};  ///< of |x|, |y|
-  double saturated_share = 0;
-};
-
-void fill(const Flown& flown, Cell& cell) {
-  for (int axis = 0; axis < 3; ++axis) cell.max_m[axis] = largest_error_m(flown, axis);
-  cell.saturated_share = flown.saturated_share;
-  for (int axis = 0; axis < 2; ++axis) {
-    std::vector<double> errors;
-    for (const auto& moments : flown.vehicles) {
-      for (const Moment& now : moments)
-        errors.push_back(static_cast<double>(std::abs(now.p_m[axis] - now.p_d_m[axis])));
-    }
-    cell.p50_m[axis] = residuals::quantile(errors, 0.5);
-    cell.p95_m[axis] = residuals::quantile(errors, 0.95);
-  }
-}
-
-files::Json number(double value) { return std::isfinite(value) ? files::Json(value) : files::Json(); }
-
-constexpr const char* kPerformanceSchema = "swarmcert/table-unit/1";
-
-/// All flights of one truth and one training seed, into `file`, unless it holds them.
-void fly_unit(const Setting& setting, const Truth& truth, int training_seed, const std::string& file) {
-  Stages stages(setting, truth, training_seed);
-  std::array<std::optional<files::Network>, 4> networks;
-  std::string key = fmt::format("{} {} {} ", kHigher_m, setting.seed, scale_of(setting).flight_seeds) +
-                    stages.key(kNumStages - 1);
-  for (std::size_t c = 1; c < kControllers.size(); ++c) {
-    networks[c] = stages.learned(stage_of(kControllers[c])).network;
-    for (const auto& [kind, weights] : networks[c]->rho) key += weights.sha256;
-  }
-  key = files::sha256(key);
-  if (fs::exists(file) && files::read_json(file, kPerformanceSchema).at("key") == key) return;
-  std::vector<Cell> cells;
-  for (const int controller : kControllers) {
-    if (controller == 0 && training_seed > 0) continue;  // the baseline knows no training
-    for (int vehicles = kLeast; vehicles <= kMost; ++vehicles) {
-      for (int k = 0; k < scale_of(setting).flight_seeds; ++k) {
-        Cell cell;
-        cell.controller = controller;
-        cell.vehicles = vehicles;
-        cell.training_seed = training_seed;
-        cell.flight_seed = seed_of(setting.seed, "table", static_cast<std::uint64_t>(k));
-        cells.push_back(cell);
-      }
-    }
-  }
-  files::parallel_for(static_cast<int>(cells.size()), setting.jobs, [&](int i) {
-    Cell& cell = cells[static_cast<std::size_t>(i)];
-    const std::size_t c = cell.controller == 0 ? 0 : static_cast<std::size_t>(cell.controller - 1);
-    fill(fly(setting, truth, {"swap", cell.vehicles, 0, cell.flight_seed, kHigher_m},
-             networks[c] ? &*networks[c] : nullptr, false),
-         cell);
-  });
-  files::Json flights = files::Json::array();
-  for (const Cell& cell : cells) {
-    flights.push_back({{"trained_with", cell.controller},
-                       {"vehicles", cell.vehicles},
-                       {"training_seed", cell.training_seed},
-                       {"flight_seed", cell.flight_seed},
-                       {"max_x_m", number(cell.max_m[0])},
-                       {"max_y_m", number(cell.max_m[1])},
-                       {"max_z_m", number(cell.max_m[2])},
-                       {"p50_x_m", cell.p50_m[0]},
-                       {"p50_y_m", cell.p50_m[1]},
-                       {"p95_x_m", cell.p95_m[0]},
-                       {"p95_y_m", cell.p95_m[1]},
-                       {"saturated_share", cell.saturated_share}});
-  }
-  const files::Json unit = {{"schema", kPerformanceSchema}, {"key", key}, {"flights", std::move(flights)}};
-  files::write_file(file, files::to_text(unit), true);
-}
-
-/// Of one truth, over all its flights: per controller and number of vehicles.
-struct Spread {
-  double median_m = 0, least_m = INFINITY, most_m = 0;
-};
-
-Spread spread_of(const files::Json& flights, int controller, int vehicles, const char* field) {
-  std::vector<double> values;
-  for (const files::Json& flight : flights) {
-    if (flight.at("trained_with") != controller || flight.at("vehicles") != vehicles) continue;
-    values.push_back(flight.at(field).is_number() ? flight.at(field).get<double>() : INFINITY);
-  }
-  Spread spread;
-  for (const double value : values) {
-    spread.least_m = std::min(spread.least_m, value);
-    spread.most_m = std::max(spread.most_m, value);
-  }
-  spread.median_m = residuals::quantile(values, 0.5);
-  return spread;
-}
 
 std::string controller_name(int controller) {
   return controller == 0 ? "Baseline" : fmt::format("Trained w/ {} CF", controller);
@@ -135,12 +19,9 @@ std::string controller_name(int controller) {
 
 std::string metres(double value) { return std::isfinite(value) ? fmt::format("{:.3f}", value) : "lost"; }
 
-/// By controller, then by the number of vehicles from kLeast on.
-using Spreads = std::array<std::array<Spread, 4>, 4>;
-
 /// The largest height errors beside the paper's: a table, and column["max_z"].
 Spreads add_heights(const Truth& truth, const files::Json& flights, files::Json& column, Finding& finding) {
-  Spreads spreads;
+  const Spreads spreads = height_spreads(flights);
   Table table = {
       fmt::format("Maximum z-error [m], truth \"{}\": worst of all seeds (median) | paper", truth.name),
       {"controller", "2 CF swap", "3 CF swap", "4 CF swap", "5 CF swap"},
@@ -149,13 +30,12 @@ Spreads add_heights(const Truth& truth, const files::Json& flights, files::Json&
   for (std::size_t c = 0; c < 4; ++c) {
     std::vector<std::string> row = {controller_name(kControllers[c])};
     for (std::size_t v = 0; v < 4; ++v) {
-      Spread& spread = spreads[c][v];
-      spread = spread_of(flights, kControllers[c], kLeast + static_cast<int>(v), "max_z_m");
+      const Spread& spread = spreads[c][v];
       const double paper = kPaper_m[c][v];
       row.push_back(fmt::format("{} ({}) | {}", metres(spread.most_m), metres(spread.median_m),
                                 std::isnan(paper) ? "N.A." : fmt::format("{:.3f}", paper)));
       column["max_z"].push_back({{"trained_with", kControllers[c]},
-                                 {"vehicles", kLeast + static_cast<int>(v)},
+                                 {"vehicles", kLeastVehicles + static_cast<int>(v)},
                                  {"worst_m", number(spread.most_m)},
                                  {"median_m", number(spread.median_m)},
                                  {"least_m", number(spread.least_m)},
@@ -176,7 +56,7 @@ void add_sideways(const Truth& truth, const files::Json& flights, files::Json& c
   for (const char axis : {'x', 'y'}) {
     for (const int controller : kControllers) {
       std::vector<std::string> row = {fmt::format("{} {}", controller_name(controller), axis)};
-      for (int vehicles = kLeast; vehicles <= kMost; ++vehicles) {
+      for (int vehicles = kLeastVehicles; vehicles <= kMostVehicles; ++vehicles) {
         const auto of = [&](const char* what) {
           return spread_of(flights, controller, vehicles, fmt::format("{}_{}_m", what, axis).c_str());
         };
@@ -203,7 +83,7 @@ std::map<int, double> improvement_by_seed(const files::Json& flights, const Spre
   for (const files::Json& flight : flights) {
     const int controller = flight.at("trained_with").get<int>();
     if (controller < 3) continue;
-    const Spread& baseline = spreads[0][flight.at("vehicles").get<int>() - kLeast];
+    const Spread& baseline = spreads[0][flight.at("vehicles").get<int>() - kLeastVehicles];
     const double most_m = flight.at("max_z_m").is_number() ? flight.at("max_z_m").get<double>() : INFINITY;
     double& least = factor_of_seed.try_emplace(flight.at("training_seed").get<int>(), INFINITY).first->second;
     least = std::min(least, baseline.most_m / most_m);
@@ -271,9 +151,9 @@ Finding performance(const Setting& setting) {
                                                 setting.updraft ? "-updraft" : "", k, setting.seed))
               .string();
       if (!setting.shard.has(unit)) continue;
-      fly_unit(setting, truth, k, file);
-      const files::Json unit_file = files::read_json(file, kPerformanceSchema);
-      for (const files::Json& flight : unit_file.at("flights")) flights.push_back(flight);
+      Stages stages(setting, truth, k);
+      for (const files::Json& flight : table_flights(setting, stages, truth, k, kHigher_m, file))
+        flights.push_back(flight);
     }
     if (!setting.shard.is_whole()) continue;
     add_truth(truth, flights, finding);

@@ -17,15 +17,14 @@ void add_rows(const std::vector<Row>& rows, Finding& finding) {
                  {}};
   finding.json["physics_first"] = files::Json::array();
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const residuals::Interval of_row = interval_of(rows[k].second);
+    const Interval of_row = interval_of(rows[k].second);
     const double rms = rms_gf(rows[k].second);
-    files::Json row = {
-        {"model", rows[k].first}, {"rms_gf", rms}, {"interval_gf", {of_row.lower, of_row.upper}}};
+    files::Json row = {{"model", rows[k].first}, {"rms_gf", rms}, {"interval_gf", of_row}};
     std::vector<std::string> cells = {rows[k].first, gf(rms), gf(of_row), "", ""};
     if (k > 0) {
       const Estimate fall = change(rows[k - 1].second, rows[k].second);
       row["falls_by_gf"] = fall.value_gf;
-      row["falls_by_interval_gf"] = {fall.interval.lower, fall.interval.upper};
+      row["falls_by_interval_gf"] = fall.interval;
       cells[3] = gf(fall.value_gf);
       cells[4] = gf(fall.interval);
     }

@@ -100,7 +100,7 @@ Learned train_recorded(const Setting& setting, const Recorded& recorded, const L
 }
 
 std::string gf(double value) { return fmt::format("{:.2f}", value); }
-std::string gf(const residuals::Interval& interval) {
+std::string gf(const Interval& interval) {
   return fmt::format("{:.2f} .. {:.2f}", interval.lower, interval.upper);
 }
 

@@ -38,6 +38,6 @@ std::string recorded_key(const Setting& setting, const Recorded& recorded);
 void physics_first(const Setting& setting, Finding& finding);
 
 std::string gf(double value);
-std::string gf(const residuals::Interval& interval);
+std::string gf(const Interval& interval);
 
 }  // namespace swarmcert::reproduction

@@ -27,8 +27,7 @@ std::string composition_of(const std::vector<residuals::Track>& tracks, std::siz
 }
 
 /// 90 % interval of f over resampled blocks, given as indices.
-residuals::Interval bootstrap(std::size_t blocks,
-                              const std::function<double(const std::vector<std::size_t>&)>& f) {
+Interval bootstrap(std::size_t blocks, const std::function<double(const std::vector<std::size_t>&)>& f) {
   if (blocks < 2) return {};
   files::Random random(1);
   std::vector<std::size_t> drawn(blocks);
@@ -108,7 +107,7 @@ Estimate change(const std::vector<ResidualBlock>& before, const std::vector<Resi
           })};
 }
 
-residuals::Interval interval_of(const std::vector<ResidualBlock>& blocks) {
+Interval interval_of(const std::vector<ResidualBlock>& blocks) {
   return bootstrap(blocks.size(),
                    [&](const std::vector<std::size_t>& drawn) { return rms_of(blocks, drawn); });
 }

@@ -28,12 +28,12 @@ double rms_gf(const std::vector<ResidualBlock>& blocks);
 /// A number with its 90 % interval.
 struct Estimate {
   double value_gf = 0;
-  residuals::Interval interval;
+  Interval interval;
 };
 /// rms(before) - rms(after), resampling the same blocks of both.
 /// @throws std::invalid_argument if the blocks do not correspond.
 Estimate change(const std::vector<ResidualBlock>& before, const std::vector<ResidualBlock>& after);
-residuals::Interval interval_of(const std::vector<ResidualBlock>& blocks);
+Interval interval_of(const std::vector<ResidualBlock>& blocks);
 
 /// A sum of values over one block, and their number.
 struct BlockMean {

@@ -35,19 +35,20 @@ Scale scale_of(const Setting& setting) {
   return setting.full ? Scale{60, 12000, 3, 5, 12} : Scale{30, 800, 1, 2, 6};
 }
 
-std::vector<Truth> truths(const Setting& setting) {
-  Truth flights;
-  flights.name = "flights";
-  flights.model = stability::read_model(
+Truth with_norm_exponent(const Setting& setting, const std::string& name, double p) {
+  Truth truth;
+  truth.name = name;
+  truth.model = stability::read_model(
       (std::filesystem::path(setting.models) / "crazyflie-small-effects.toml").string());
-  effect(flights.model, "downwash").parameters["norm_exponent"] = 1.85;
-  if (setting.updraft) flights.model.effects.push_back(updraft());
+  effect(truth.model, "downwash").parameters["norm_exponent"] = p;
+  if (setting.updraft) truth.model.effects.push_back(updraft());
+  return truth;
+}
 
-  Truth calibrated = flights;
-  calibrated.name = "calibrated";
-  effect(calibrated.model, "downwash").parameters["norm_exponent"] = 1.15;
+std::vector<Truth> truths(const Setting& setting) {
+  Truth calibrated = with_norm_exponent(setting, "calibrated", 1.15);
   calibrated.knobs = {"downwash.norm_exponent = 1.15 (flights: 1.85): wakes add up almost in full"};
-  return {flights, calibrated};
+  return {with_norm_exponent(setting, "flights", 1.85), calibrated};
 }
 
 stability::Model nominal(const Truth& truth) {

@@ -51,6 +51,9 @@ struct Truth {
 /// Never mix their results.
 std::vector<Truth> truths(const Setting& setting);
 
+/// The truth "flights" with wakes that are composed by another p-norm: 1 adds them up, a large one keeps the strongest.
+Truth with_norm_exponent(const Setting& setting, const std::string& name, double p);
+
 /// What the labels are computed with: mass, thrust map and motor lag of the truth, and nothing of its forces.
 stability::Model nominal(const Truth& truth);
 

@@ -7,8 +7,8 @@
 #include <numeric>
 
 #include "nn/base/file_io.h"
-#include "nn/base/json.h"
 #include "nn/base/parallel.h"
+#include "nn/base/shard.h"
 
 namespace swarmcert::reproduction {
 namespace {
@@ -84,14 +84,13 @@ StageFlights Stages::flights(int stage) {
   const std::string folder = (fs::path(folder_) / fmt::format("stage{}", stage)).string();
   const std::string done = (fs::path(folder) / "flown.json").string();
   const std::string own_key = key(stage);
-  const auto read_back = [&](const files::Json& file) {
-    return StageFlights{folder, file.at("least_distance_m").get<double>(),
-                        file.at("percentile_distance_m").get<double>()};
-  };
-  if (fs::exists(done)) {
-    const files::Json file = files::read_json(done, kStagesSchema);
-    if (file.at("key") == own_key) return read_back(file);
-  }
+  const files::Json flown =
+      files::kept_unit(done, kStagesSchema, own_key, [&] { return fly_stage(stage, folder); });
+  return {folder, flown.at("least_distance_m").get<double>(),
+          flown.at("percentile_distance_m").get<double>()};
+}
+
+files::Json Stages::fly_stage(int stage, const std::string& folder) {
   const std::optional<files::Network> network = flown_network(stage);
   const double task_s = scale_of(setting_).task_s;
   const int vehicles = kStages[stage].vehicles;
@@ -122,12 +121,7 @@ StageFlights Stages::flights(int stage) {
   const auto mean = [](const std::vector<double>& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
   };
-  const files::Json file = {{"schema", kStagesSchema},
-                            {"key", own_key},
-                            {"least_distance_m", mean(least_m)},
-                            {"percentile_distance_m", mean(percentile_m)}};
-  files::write_file(done, files::to_text(file), true);
-  return read_back(file);
+  return {{"least_distance_m", mean(least_m)}, {"percentile_distance_m", mean(percentile_m)}};
 }
 
 residuals::Inputs Stages::inputs(const std::vector<int>& stages, const std::string& use) {

@@ -62,6 +62,9 @@ class Stages {
   LearnOptions learn_options() const;
 
  private:
+  /// Flies a stage into `folder`; what was seen of its flights.
+  files::Json fly_stage(int stage, const std::string& folder);
+
   const Setting& setting_;
   Truth truth_;
   std::string folder_;

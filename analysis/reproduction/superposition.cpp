@@ -60,7 +60,7 @@ void add_row(const std::string& who, const Blocks& blocks, const std::string& na
                                   {"f_ab_gf", together.value_gf},
                                   {"f_a_plus_f_b_gf", apart.value_gf},
                                   {"defect_gf", defect.value_gf},
-                                  {"interval_gf", {defect.interval.lower, defect.interval.upper}}});
+                                  {"interval_gf", defect.interval}});
 }
 
 /// Simulated flights of three: the truth and the network at the states that were flown.

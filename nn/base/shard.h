@@ -1,9 +1,12 @@
-/// @file Work that is cut into parts for several machines.
+/// @file Long work: cut into parts for several machines, and taken up again where it stopped.
 #pragma once
 
 #include <cstdlib>
+#include <functional>
 #include <optional>
 #include <string>
+
+#include "nn/base/json.h"
 
 namespace swarmcert::files {
 
@@ -28,5 +31,12 @@ inline std::optional<Shard> shard_of(const std::string& text) {
     return std::nullopt;
   return Shard{static_cast<int>(index % count), static_cast<int>(count)};
 }
+
+/// The result of one unit of work: what `file` holds, or else what `compute` returns, which is then written there.
+/// @param key text that changes with everything that the result depends on: a file with another one is replaced.
+/// @returns the members of the object that `compute` returned, after "schema" and "key".
+/// @throws InputError if there is a file that is not JSON of this schema.
+Json kept_unit(const std::string& file, const std::string& schema, const std::string& key,
+               const std::function<Json()>& compute);
 
 }  // namespace swarmcert::files

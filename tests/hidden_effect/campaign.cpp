@@ -22,8 +22,7 @@ namespace {
 constexpr const char* kSchema = "swarmcert/campaign-answer/1";
 
 files::Json json_of(const Answer& answer) {
-  return {{"schema", kSchema},
-          {"label", answer.label},
+  return {{"label", answer.label},
           {"named", answer.named},
           {"drops", answer.drops},
           {"first_right", answer.first_right},
@@ -132,18 +131,17 @@ std::optional<Answer> ask_once(const std::vector<Hidden>& hidden, Program progra
   name += fmt::format("-{}-{:g}s{}", seed, duration_s, knows_lag ? "-lag" : "");
   std::replace(name.begin(), name.end(), ' ', '_');
   const std::string path = std::string(kept) + "/" + name + ".json";
-  if (std::filesystem::exists(path)) return answer_of(files::read_json(path, kSchema));
-  if (const char* const text = std::getenv("SWARMCERT_CAMPAIGN_SHARD"); text != nullptr) {
+  const char* const text = std::getenv("SWARMCERT_CAMPAIGN_SHARD");
+  if (text != nullptr && !std::filesystem::exists(path)) {
     const std::optional<files::Shard> shard = files::shard_of(text);
     if (!shard) throw std::invalid_argument("SWARMCERT_CAMPAIGN_SHARD is not I/N: " + std::string(text));
     std::uint32_t number = 0;  // of the run, the same in every process
     for (const char letter : name) number = 31 * number + static_cast<unsigned char>(letter);
     if (!shard->has(number)) return std::nullopt;
   }
-  Answer answer = ask(hidden, program, duration_s, seed, folder, knows_lag);
-  std::filesystem::create_directories(kept);
-  files::write_file(path, json_of(answer).dump(1) + "\n", true);
-  return answer;
+  return answer_of(files::kept_unit(path, kSchema, name, [&] {
+    return json_of(ask(hidden, program, duration_s, seed, folder, knows_lag));
+  }));
 }
 
 std::pair<double, double> clopper_pearson(int hits, int runs) {

@@ -49,6 +49,19 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
     EXPECT_GT(column["improvement_trained_with_3_at_5"].get<double>(), 2) << column["truth"];
   }
 
+  reproduce("claims -o out");  // with the networks of the table
+  const Json claims = result("claims");
+  ASSERT_EQ(claims["conditions"].size(), 4u);
+  for (const Json& condition : claims["conditions"]) {
+    EXPECT_EQ(condition["flights"].size(), 16u * 2);
+    EXPECT_EQ(condition["two_harms_four"], condition["improvement_trained_with_2_at_4"].get<double>() < 1);
+    EXPECT_EQ(condition["saturates"], condition["saturated_share"].get<double>() > 0);
+  }
+  for (const int full : {0, 2}) {  // an emptier battery has less thrust
+    EXPECT_LT(claims["conditions"][full]["saturated_share"].get<double>(),
+              claims["conditions"][full + 1]["saturated_share"].get<double>());
+  }
+
   reproduce("curriculum -o out");
   const Json curriculum = result("curriculum");
   ASSERT_EQ(curriculum["stages"].size(), 4u);
