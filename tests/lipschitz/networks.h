@@ -22,6 +22,11 @@ inline files::Network plain(files::Weights weights) {
   return network;
 }
 
+/// The slope of one plain network; `weights` stays the caller's.
+inline lipschitz::SlopeFunction slope_of(const files::Weights& weights) {
+  return {{&weights, nullptr}, {}, nullptr};
+}
+
 /// NET with phi and rho of kind "default".
 inline files::Network deep_set(files::Weights phi, files::Weights rho) {
   files::Network network;

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "data.h"
+#include "lipschitz/networks.h"
 #include "lipschitz/spectral_norm.h"
 #include "nn/random_network.h"
 
@@ -15,14 +16,13 @@ namespace swarmcert::lipschitz {
 namespace {
 
 using tests::random_network;
+using tests::slope_of;
 
 files::Weights chain_of(std::vector<files::Layer> layers) {
   files::Weights weights;
   weights.layers = std::move(layers);
   return weights;
 }
-
-SlopeFunction slope_of(const files::Weights& weights) { return {{&weights, nullptr}, {}, nullptr}; }
 
 SlopeSearchOptions few_search_rounds() {
   SlopeSearchOptions options;

@@ -1,0 +1,70 @@
+#include "analysis/residuals/statistics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "nn/base/random.h"
+
+namespace swarmcert::residuals {
+namespace {
+
+TEST(ResidualStatistics, AreThoseOfANumberThatWasWorkedOutByHand) {
+  // x: 3, -3, 3, -3; y: 4 always; z: 0. The model explains half of x.
+  std::vector<Eigen::Vector3f> r, r0;
+  for (const float sign : {1.f, -1.f, 1.f, -1.f}) {
+    r.emplace_back(3 * sign, 4.f, 0.f);
+    r0.emplace_back(6 * sign, 4.f, 0.f);
+  }
+  const ErrorStatistics s = statistics(r, r0);
+  EXPECT_EQ(s.samples, 4u);
+  EXPECT_DOUBLE_EQ(s.rmse.x, 3);
+  EXPECT_DOUBLE_EQ(s.rmse.y, 4);
+  EXPECT_DOUBLE_EQ(s.rmse.total, 5);
+  EXPECT_DOUBLE_EQ(s.bias.x, 0);
+  EXPECT_DOUBLE_EQ(s.bias.total, 4);
+  EXPECT_DOUBLE_EQ(s.max.total, 5);
+  EXPECT_DOUBLE_EQ(s.variance_explained.x, 0.75);
+  EXPECT_DOUBLE_EQ(s.variance_explained.y, 0) << "does not vary";
+  EXPECT_EQ(statistics({}, {}).samples, 0u);
+}
+
+TEST(ResidualStatistics, AQuantileLeavesNoMoreThanItsShareAbove) {
+  std::vector<double> values;
+  for (int k = 1; k <= 20; ++k) values.push_back(k);
+  EXPECT_EQ(quantile(values, 0.95), 19);
+  EXPECT_EQ(quantile(values, 1), 20);
+  EXPECT_EQ(quantile(values, 0), 1);
+  EXPECT_EQ(quantile(values, 0.951), 20);
+  std::vector<double> none;
+  EXPECT_EQ(quantile(none, 0.5), 0);
+}
+
+TEST(ResidualStatistics, ResampledBlocksCoverTheRootMeanSquareAsOftenAsStated) {
+  files::Random random(12);
+  int held = 0;
+  constexpr int kRuns = 300;
+  for (int run = 0; run < kRuns; ++run) {
+    std::vector<BlockSum> blocks(60);
+    for (BlockSum& block : blocks) {
+      const double power = 1 + 0.5 * random.symmetric();  // its mean is 1: so is that of the squares
+      block = {Eigen::Vector3d::Constant(100 * power), 100};
+    }
+    const Interval x = bootstrap_rmse(blocks, static_cast<std::uint64_t>(run))[0];
+    EXPECT_LT(x.lower, x.upper);
+    held += x.lower <= 1 && 1 <= x.upper ? 1 : 0;
+  }
+  // Binomial with 0.9: within four standard deviations, and the bootstrap's own bias of a few percent.
+  EXPECT_GT(held, 0.9 * kRuns - 4 * std::sqrt(0.09 * kRuns));
+  EXPECT_LT(held, kRuns);
+}
+
+TEST(ResidualStatistics, OneBlockHasNoScatter) {
+  const auto intervals = bootstrap_rmse({{Eigen::Vector3d(4, 9, 36), 1}}, 1);
+  EXPECT_EQ(intervals[0].lower, 2);
+  EXPECT_EQ(intervals[0].upper, 2);
+  EXPECT_EQ(intervals[3].upper, 7);
+}
+
+}  // namespace
+}  // namespace swarmcert::residuals
