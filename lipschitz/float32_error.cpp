@@ -107,8 +107,8 @@ double largest_over_parts(const ReachNetwork& chain, const Box& box, int nodes, 
 Box inflated(const Box& box, const std::vector<double>& by) {
   Box result = box;
   for (std::size_t k = 0; k < by.size(); ++k) {
-    result.lower[k] = next_down(box.lower[k] - by[k]);
-    result.upper[k] = next_up(box.upper[k] + by[k]);
+    result.lower[k] = down(box.lower[k] - by[k]);
+    result.upper[k] = up(box.upper[k] + by[k]);
   }
   return result;
 }

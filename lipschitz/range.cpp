@@ -38,7 +38,7 @@ void add_interval(ReachLayer& layer, const Bounds& bounds) {
     const double rounding =
         0x1p-50 * (std::abs(layer.bias(i)) + std::abs(bounds.lower(i)) + std::abs(bounds.upper(i)));
     layer.bias(i) = middle;
-    layer.bias_radius(i) = next_up(half + rounding);
+    layer.bias_radius(i) = up(half + rounding);
   }
 }
 
@@ -265,7 +265,7 @@ std::vector<CertifiedRange> ranges_of(const Network& network, const std::map<std
     double jump_at_any_sum = 0, jump_between = 0, upper_before = 0, lower_before = 0;
     if (is_set)
       jump_at_any_sum =
-          next_up(ranger.jump_norm() * rho_bound.at(files::kind_of(files::networks_of(function)[1])));
+          up(ranger.jump_norm() * rho_bound.at(files::kind_of(files::networks_of(function)[1])));
     for (int n = is_set ? 0 : 1; n <= (is_set ? options.neighbours : 1); ++n) {
       const double upper = ranger.largest(output, 1, n, high);
       searched();
@@ -273,8 +273,7 @@ std::vector<CertifiedRange> ranges_of(const Network& network, const std::map<std
       searched();
       range.upper = std::max(range.upper, upper);
       range.lower = std::min(range.lower, lower);
-      if (n > 0)
-        jump_between = std::max({jump_between, next_up(upper - lower_before), next_up(upper_before - lower)});
+      if (n > 0) jump_between = std::max({jump_between, up(upper - lower_before), up(upper_before - lower)});
       upper_before = upper;
       lower_before = lower;
       if (is_set && n == 0) continue;

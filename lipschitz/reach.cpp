@@ -137,7 +137,7 @@ LinearForms Reach::substituted(std::size_t top, MatrixXd lambda,
         continue;
       }
       const double slope = u / (u - l);
-      const double offset = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
+      const double offset = std::max({0.0, up(u - down(slope * u)), up(-slope * l)});
       const double below = u > -l ? 1.0 : 0.0;
       const double magnitude = std::max(u, -l);
       for (Index r = 0; r < rows; ++r) {
@@ -170,7 +170,7 @@ VectorXd Reach::largest(const LinearForms& forms) const {
   const VectorXd absolute = forms.rows.cwiseAbs() * largest_input(box_) + forms.constants.cwiseAbs();
   const double relative = 4 * static_cast<double>(forms.rows.cols() + 8) * kUnit;
   VectorXd result = value + relative * absolute + VectorXd::Constant(value.size(), kUnderflow);
-  for (double& x : result) x = std::isnan(x) ? kInfinity : next_up(x);
+  for (double& x : result) x = std::isnan(x) ? kInfinity : up(x);
   return support_ ? VectorXd(result.cwiseMin(support_(forms))) : result;
 }
 

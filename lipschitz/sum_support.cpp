@@ -15,8 +15,8 @@ using Eigen::VectorXd;
 /// [a] + [b], rounded outwards.
 Bounds sum(const Bounds& a, const Bounds& b) {
   Bounds result{a.lower + b.lower, a.upper + b.upper};
-  for (double& x : result.lower) x = next_down(x);
-  for (double& x : result.upper) x = next_up(x);
+  for (double& x : result.lower) x = down(x);
+  for (double& x : result.upper) x = up(x);
   return result;
 }
 
@@ -38,7 +38,7 @@ VectorXd largest_over(const std::vector<std::shared_ptr<const Reach>>& parts, co
 double sum_rounded_up(double constant, int count, double term) {
   // One product and one addition, each off by at most half a unit of its result.
   const double total = constant + count * term;
-  return next_up(total + 0x1p-50 * (std::abs(total) + std::abs(constant) + std::abs(count * term)) + 1e-300);
+  return up(total + 0x1p-50 * (std::abs(total) + std::abs(constant) + std::abs(count * term)) + 1e-300);
 }
 
 Bounds SumSupport::bounds() const {

@@ -24,7 +24,7 @@ double rounded_up(const Dyadic& x) {
   exponent += x.exponent;
   if (exponent > 1024) return x.sign() > 0 ? kInfinity : std::numeric_limits<double>::lowest();
   double result = std::ldexp(mantissa, static_cast<int>(std::max(exponent, -1100L)));
-  while (std::isfinite(result) && !(Dyadic(result) >= x)) result = next_up(result);
+  while (std::isfinite(result) && !(Dyadic(result) >= x)) result = up(result);
   return result;
 }
 double rounded_down(const Dyadic& x) { return -rounded_up(-x); }
@@ -44,7 +44,7 @@ bool all_finite(const Row& values) {
 /// A double u >= 0 with u^2 >= square.
 double root_above(const Dyadic& square) {
   double result = std::sqrt(std::max(rounded_up(square), 0.0));
-  while (std::isfinite(result) && !(Dyadic(result) * result >= square)) result = next_up(result);
+  while (std::isfinite(result) && !(Dyadic(result) * result >= square)) result = up(result);
   return result;
 }
 

@@ -33,10 +33,10 @@ int main() {
     const identification::Finding& finding = one.finding;
     const double drop = 100 * (1 - finding.rmse_after_N / finding.rmse_before_N);
     fmt::print("{:<12} RMSE {:.4f} -> {:.4f} N, {:.0f} % less (90 %: {:.0f} .. {:.0f})\n", one.effect,
-               finding.rmse_before_N, finding.rmse_after_N, drop, 100 * finding.drop_interval.first,
-               100 * finding.drop_interval.second);
-    data += fmt::format("{} {:.1f} {:.1f} {:.1f}\n", one.effect, drop, 100 * finding.drop_interval.first,
-                        100 * finding.drop_interval.second);
+               finding.rmse_before_N, finding.rmse_after_N, drop, 100 * finding.drop_interval.lower,
+               100 * finding.drop_interval.upper);
+    data += fmt::format("{} {:.1f} {:.1f} {:.1f}\n", one.effect, drop, 100 * finding.drop_interval.lower,
+                        100 * finding.drop_interval.upper);
   }
 
   // %% [markdown]
@@ -46,7 +46,7 @@ int main() {
   for (const identification::Missing& one : missing) {
     for (const auto& [name, interval] : one.intervals) {
       fmt::print("{}.{} = {:.3g} (90 %: {:.3g} .. {:.3g})\n", one.effect, name, one.parameters.at(name),
-                 interval.first, interval.second);
+                 interval.lower, interval.upper);
     }
   }
   notebook::plot(

@@ -44,7 +44,7 @@ double not_negative(const TomlTable& table, const std::string& key, double other
   return value;
 }
 
-std::pair<double, double> interval(const TomlTable& table, const std::string& key) {
+Interval interval(const TomlTable& table, const std::string& key) {
   const std::vector<double> numbers = table.numbers(key);
   if (numbers.size() != 2 || numbers[0] > numbers[1]) {
     table.refuse(key, "", "must be [lower, upper]");
@@ -53,16 +53,16 @@ std::pair<double, double> interval(const TomlTable& table, const std::string& ke
 }
 
 /// The range of the battery that the file states, else that of one cell.
-std::pair<double, double> battery_range(const TomlTable& vehicle) {
+Interval battery_range(const TomlTable& vehicle) {
   constexpr double kHighest_V = 1000;
   if (!vehicle.has("battery_range_V")) return kOneCell_V;
-  const std::pair<double, double> range = interval(vehicle, "battery_range_V");
-  if (!(range.first > 0))
-    vehicle.refuse("battery_range_V", fmt::format("{:g}", range.first), "must be positive");
-  if (range.second > kHighest_V) {
-    vehicle.refuse("battery_range_V", fmt::format("{:g}", range.second),
+  const Interval range = interval(vehicle, "battery_range_V");
+  if (!(range.lower > 0))
+    vehicle.refuse("battery_range_V", fmt::format("{:g}", range.lower), "must be positive");
+  if (range.upper > kHighest_V) {
+    vehicle.refuse("battery_range_V", fmt::format("{:g}", range.upper),
                    fmt::format("is above {:g} V; millivolt were probably meant", kHighest_V),
-                   fmt::format("it is in V: {:g} mV are {:g}", range.second, range.second / 1000));
+                   fmt::format("it is in V: {:g} mV are {:g}", range.upper, range.upper / 1000));
   }
   return range;
 }

@@ -10,6 +10,7 @@
 
 #include "controller/battery.h"
 #include "controller/position_law.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::stability {
 
@@ -19,7 +20,7 @@ inline constexpr double kGramForce_N = controller::kNewtonPerGramForce;
 /// The battery voltage to which the thrust map and the effect `battery` refer.
 inline constexpr double kFullBattery_V = controller::kReferenceVoltage_V;
 /// Voltages of one lithium-polymer cell: empty under load, and full of the high-voltage kind with a reading's error.
-inline constexpr std::pair<double, double> kOneCell_V = {2.5, 4.5};
+inline constexpr Interval kOneCell_V = {2.5, 4.5};
 
 /// Force of one rotor, by the map that flies. Outside the calibrated range the polynomial may fall with p.
 struct ThrustMap : controller::ThrustMap<double> {
@@ -58,16 +59,16 @@ struct SensorModel {
 struct EffectExpression {
   std::map<std::string, std::string> formulas;  ///< "force_z_N" -> "a * T * exp(-z / b)"
   std::vector<std::string> linear;              ///< parameters in which the formulas are linear, e.g. {"a"}
-  std::map<std::string, std::pair<double, double>> bounds;  ///< of any parameter
+  std::map<std::string, Interval> bounds;       ///< of any parameter
   std::map<std::string, std::vector<double>> grid;  ///< values that identification tries, of the others
   bool per_neighbour = false;                       ///< evaluated for each neighbour and summed
 };
 
 /// Where an effect's numbers come from. Written by identification, kept by everyone.
 struct FitProvenance {
-  std::vector<std::string> flights;                           ///< that the fit used
-  std::map<std::string, std::pair<double, double>> interval;  ///< by parameter, 90 %
-  double select_rmse_before_N = 0, select_rmse_after_N = 0;   ///< on flights not used by the fit
+  std::vector<std::string> flights;                          ///< that the fit used
+  std::map<std::string, Interval> interval;                  ///< by parameter, 90 %
+  double select_rmse_before_N = 0, select_rmse_after_N = 0;  ///< on flights not used by the fit
   int test_looks = 0;  ///< how often the test flights had been scored when this was written
   std::string note;
 
@@ -111,7 +112,7 @@ struct Model {
   std::array<double, 3> inertia_kg_m2 = {0, 0, 0};  ///< diagonal, body axes x forward, y left, z up
   double arm_m = 0;                                 ///< from the centre to the rotors; their mean distance
   double torque_per_thrust_m = 0;                   ///< yaw torque of a rotor per newton of its thrust
-  std::pair<double, double> battery_range_V = kOneCell_V;  ///< voltages at which the vehicle can be
+  Interval battery_range_V = kOneCell_V;            ///< voltages at which the vehicle can be
   ThrustMap thrust{};
   /// Force of one rotor at command u in [0, 1], whatever the voltage: a + b u + c u^2, in newton. Where a file states
   /// it, `thrust` is the same polynomial in gram-force.

@@ -44,12 +44,12 @@ std::string joined(const Range& range, const Text& text) {
   return result;
 }
 
-std::string interval_table(const std::map<std::string, std::pair<double, double>>& intervals) {
+std::string interval_table(const std::map<std::string, Interval>& intervals) {
   return "{ " +
          joined(intervals,
                 [](const auto& item) {
-                  return key(item.first) + " = [" + number(item.second.first) + ", " +
-                         number(item.second.second) + "]";
+                  return key(item.first) + " = [" + number(item.second.lower) + ", " +
+                         number(item.second.upper) + "]";
                 }) +
          " }";
 }
@@ -144,8 +144,8 @@ std::string to_toml(const Model& model, const std::vector<std::string>& comments
   if (model.rotors.empty()) text += "arm_m = " + number(model.arm_m) + "\n";
   text += "torque_per_thrust_m = " + number(model.torque_per_thrust_m) + "\n";
   if (model.battery_range_V != kOneCell_V) {
-    text += "battery_range_V = [" + number(model.battery_range_V.first) + ", " +
-            number(model.battery_range_V.second) + "]\n";
+    text += "battery_range_V = [" + number(model.battery_range_V.lower) + ", " +
+            number(model.battery_range_V.upper) + "]\n";
   }
   text += rotors_text(model) + thrust_text(model);
   const SensorModel& sensor = model.sensor;

@@ -35,12 +35,12 @@ bool as_pid(const TrackingSetup& setup, Gains& gains) {
 
 /// The points of the box at which bounds are evaluated: its middle, then its corners, each once.
 std::vector<std::array<double, 4>> points_of(const UncertainPlant& box) {
-  const Range ranges[] = {box.mass_kg, box.thrust_scale, box.lag_s, box.delay_s};
+  const Interval ranges[] = {box.mass_kg, box.thrust_scale, box.lag_s, box.delay_s};
   std::vector<std::array<double, 4>> points(1);
-  for (std::size_t k = 0; k < 4; ++k) points[0][k] = (ranges[k].from + ranges[k].to) / 2;
+  for (std::size_t k = 0; k < 4; ++k) points[0][k] = (ranges[k].lower + ranges[k].upper) / 2;
   for (unsigned corner = 0; corner < 16; ++corner) {
     std::array<double, 4> point{};
-    for (std::size_t k = 0; k < 4; ++k) point[k] = (corner >> k) % 2 == 0 ? ranges[k].from : ranges[k].to;
+    for (std::size_t k = 0; k < 4; ++k) point[k] = (corner >> k) % 2 == 0 ? ranges[k].lower : ranges[k].upper;
     if (std::find(points.begin(), points.end(), point) == points.end()) points.push_back(point);
   }
   return points;
@@ -124,7 +124,7 @@ UncertainNorms norms_over(const Gains& pid, const AxisLoop& loop, const Uncertai
 double of_estimates(const Gains& pid, const AxisLoop& told, const UncertainPlant& box,
                     const DisturbanceSource& source, int axis, const UncertainNorms& command) {
   const double period_share = pid.rate_hz > 0 ? pid.integrator_step_s * pid.rate_hz : 1;
-  const double force_N = box.thrust_scale.to * told.mass_kg;
+  const double force_N = box.thrust_scale.upper * told.mass_kg;
   const double velocity = source.velocity_error[axis].largest();
   const double position = source.position_error[axis].largest();
   return force_N * (times(command.amplitude.upper, told.Kd * velocity + told.Kp * position) +
@@ -169,7 +169,7 @@ double enclosed(const TrackingSetup& setup, const Gains& pid, const UncertainPla
   const UncertainNorms without = norms_over(pid, no_integral, box, channel);
   const UncertainNorms command = of_command(no_integral, without);
   return times(without.amplitude.upper, d.amplitude_N) + times(without.edge.upper, bias_beside) +
-         times(command.amplitude.upper, box.thrust_scale.to * told.mass_kg * loop.Ki * limit_m_s) +
+         times(command.amplitude.upper, box.thrust_scale.upper * told.mass_kg * loop.Ki * limit_m_s) +
          estimates_m(no_integral, command);
 }
 

@@ -246,8 +246,8 @@ std::vector<Candidate> all_candidates(const stability::Model& model, const Cover
 
 std::vector<EffectSpec> specs_of(const Candidate& candidate, const std::vector<double>& coefficients,
                                  const std::vector<double>& theta,
-                                 const std::vector<std::pair<double, double>>& linear_intervals,
-                                 const std::vector<std::pair<double, double>>& shape_intervals) {
+                                 const std::vector<Interval>& linear_intervals,
+                                 const std::vector<Interval>& shape_intervals) {
   const std::vector<std::string> vehicles =
       candidate.vehicles.empty() ? std::vector<std::string>{""} : candidate.vehicles;
   const std::size_t each = coefficients.size() / vehicles.size();
@@ -264,7 +264,7 @@ std::vector<EffectSpec> specs_of(const Candidate& candidate, const std::vector<d
     for (std::size_t i = 0; i < theta.size(); ++i) {
       const std::string& name = candidate.info.shape[i].name;
       spec.parameters[name] = theta[i];
-      if (shape_intervals[i].first < shape_intervals[i].second) spec.fit.interval[name] = shape_intervals[i];
+      if (shape_intervals[i].lower < shape_intervals[i].upper) spec.fit.interval[name] = shape_intervals[i];
     }
     specs.push_back(std::move(spec));
   }

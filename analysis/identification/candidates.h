@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/residuals/inputs.h"
+#include "nn/base/interval.h"
 #include "stability/effects/effect.h"
 
 namespace swarmcert::identification {
@@ -96,8 +97,8 @@ inline constexpr char kVehicleOffset[] = "vehicle_offset";
 std::vector<stability::EffectSpec> specs_of(const Candidate& candidate,
                                             const std::vector<double>& coefficients,
                                             const std::vector<double>& theta,
-                                            const std::vector<std::pair<double, double>>& linear_intervals,
-                                            const std::vector<std::pair<double, double>>& shape_intervals);
+                                            const std::vector<Interval>& linear_intervals,
+                                            const std::vector<Interval>& shape_intervals);
 
 /// `model` with `specs`; an effect that the model has already is increased instead.
 stability::Model with_effects(const stability::Model& model, const std::vector<stability::EffectSpec>& specs);

@@ -299,8 +299,8 @@ void correct_clocks(const std::vector<ClockOffset>& offsets, residuals::Inputs& 
 std::string in_words(const ClockOffset& offset) {
   return fmt::format("the clock of {} is {:.3f} s {} that of the other log ({:+.3f} .. {:+.3f})",
                      std::filesystem::path(offset.path).filename().string(), std::abs(offset.offset_s),
-                     offset.offset_s > 0 ? "ahead of" : "behind", offset.interval.first,
-                     offset.interval.second);
+                     offset.offset_s > 0 ? "ahead of" : "behind", offset.interval.lower,
+                     offset.interval.upper);
 }
 
 }  // namespace swarmcert::identification

@@ -18,7 +18,7 @@ constexpr std::size_t kManyRecords = 400'000;
 bool is_unseen_lag(const Refined& refined, const InstrumentedValue& check, double loss) {
   constexpr double kLittle = 0.1, kBeyondChance_z = 2;
   return refined.candidate.info.remembers && loss < kLittle && check.difference_z < -kBeyondChance_z &&
-         check.interval.first <= 0;
+         check.interval.lower <= 0;
 }
 
 /// Index of the first effect that is only the controller's answer to something else; -1 if none.

@@ -28,7 +28,7 @@ ThrustScale thrust_scale(const Passes& passes, const Coverage& covered) {
   const double own = own_thrust_ratio(model);
   scale.value.least_squares += own;
   scale.value.instrument += own;
-  scale.value.interval = {scale.value.interval.first + own, scale.value.interval.second + own};
+  scale.value.interval = {scale.value.interval.lower + own, scale.value.interval.upper + own};
   return scale;
 }
 
@@ -39,7 +39,7 @@ void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
   constexpr double kSurely = 2;  // half widths of the 90 % interval
   const Interval& interval = scale.value.interval;
   const double excess = std::abs(scale.value.instrument - own_thrust_ratio(model));
-  if (!scale.is_known || excess <= kSurely * (interval.second - interval.first) / 2) return;
+  if (!scale.is_known || excess <= kSurely * (interval.upper - interval.lower) / 2) return;
   const auto names_scale = [](const Missing& missing) { return missing.effect == "thrust_ratio"; };
   if (std::any_of(ranking.begin(), ranking.end(), names_scale)) return;
   for (Missing& missing : ranking) {

@@ -207,7 +207,7 @@ bool may_be_no_lag(const Missing& missing) {
   const double before = missing.finding.rmse_before_N;
   if (!info.remembers || info.shape.empty() || taken_N2(missing) >= kLittle * before * before) return false;
   const auto interval = missing.intervals.find(info.shape[0].name);
-  return interval != missing.intervals.end() && interval->second.first <= info.shape[0].lower;
+  return interval != missing.intervals.end() && interval->second.lower <= info.shape[0].lower;
 }
 
 /// A scale of the thrust that halves the error. Where thrust hardly varies, formulas of anything can say the same.
@@ -237,7 +237,7 @@ bool vanishes_somewhere(const Nominal& nominal) {
       const double share = point.value / mean;
       if (share >= least) continue;
       least = share;
-      width = (point.interval.second - point.interval.first) / std::abs(mean);
+      width = (point.interval.upper - point.interval.lower) / std::abs(mean);
     }
     return std::abs(least) < kNothing && width < 2 * kNothing;
   });

@@ -35,8 +35,8 @@ Interval drop_interval(const std::vector<double>& before, const std::vector<doub
 
 void widen(std::vector<Interval>& spread, const Eigen::VectorXd& values) {
   for (std::size_t c = 0; c < spread.size(); ++c) {
-    spread[c].first = std::min(spread[c].first, values[static_cast<Eigen::Index>(c)]);
-    spread[c].second = std::max(spread[c].second, values[static_cast<Eigen::Index>(c)]);
+    spread[c].lower = std::min(spread[c].lower, values[static_cast<Eigen::Index>(c)]);
+    spread[c].upper = std::max(spread[c].upper, values[static_cast<Eigen::Index>(c)]);
   }
 }
 

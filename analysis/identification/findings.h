@@ -2,14 +2,12 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "analysis/identification/selection.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::identification {
-
-using Interval = std::pair<double, double>;
 
 /// A candidate that these data cannot tell from a selected effect.
 struct Rival {

@@ -172,7 +172,7 @@ std::vector<stability::Instant> as_commanded(const Track& track, double mass_kg)
 }
 
 bool InstrumentedValue::is_strong() const {
-  return interval.second - interval.first < std::abs(least_squares);
+  return interval.upper - interval.lower < std::abs(least_squares);
 }
 
 bool InstrumentedValue::contradicts() const {
@@ -226,7 +226,7 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
     thetas = {effect.theta};
     if (effect.candidate.info.remembers) continue;
     for (std::size_t i = 0; i < effect.theta.size(); ++i) {
-      const bool varies = effect.shape_intervals[i].first < effect.shape_intervals[i].second;
+      const bool varies = effect.shape_intervals[i].lower < effect.shape_intervals[i].upper;
       if (!varies || effect.theta[i] == 0) continue;
       free.push_back({e, i, thetas.size(), thetas.size() + 1, 2 * kToEachSide * std::abs(effect.theta[i])});
       for (const double sign : {-1.0, 1.0}) {
@@ -267,7 +267,7 @@ std::vector<InstrumentedShape> instrument_with_shapes(const Passes& passes,
     const double from = refined[shape.effect].theta[shape.index];
     value.least_squares += from;
     value.instrument += from;
-    value.interval = {value.interval.first + from, value.interval.second + from};
+    value.interval = {value.interval.lower + from, value.interval.upper + from};
     result[shape.effect].shapes[shape.index] = value;
   }
   return result;
@@ -281,8 +281,8 @@ namespace {
 void reach_down(Refined& lag, const InstrumentedValue& check) {
   constexpr double kBeyondChance_z = 1;
   if (check.difference_z >= -kBeyondChance_z) return;
-  double& lower = lag.shape_intervals[0].first;
-  lower = std::max(std::min(lower, lag.theta[0] * check.interval.first), lag.candidate.info.shape[0].lower);
+  double& lower = lag.shape_intervals[0].lower;
+  lower = std::max(std::min(lower, lag.theta[0] * check.interval.lower), lag.candidate.info.shape[0].lower);
 }
 
 }  // namespace
@@ -294,9 +294,8 @@ void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
                         const stability::Parameter& parameter) {
     if (!check.is_strong()) return;
     const double by = scale * check.bias();
-    interval.first = std::max(std::min(interval.first - by, scale * check.interval.first), parameter.lower);
-    interval.second =
-        std::min(std::max(interval.second + by, scale * check.interval.second), parameter.upper);
+    interval.lower = std::max(std::min(interval.lower - by, scale * check.interval.lower), parameter.lower);
+    interval.upper = std::min(std::max(interval.upper + by, scale * check.interval.upper), parameter.upper);
   };
   for (std::size_t i = 0; i < checks.size(); ++i) {
     Refined& effect = refined[i];
@@ -314,13 +313,13 @@ void widen_by_bias(const std::vector<std::vector<InstrumentedValue>>& checks,
     // An error of the shape multiplies the coefficient: what has a sign may be as many times too small as too large.
     const bool has_free_shape =
         std::any_of(effect.shape_intervals.begin(), effect.shape_intervals.end(),
-                    [](const Interval& interval) { return interval.first < interval.second; });
+                    [](const Interval& interval) { return interval.lower < interval.upper; });
     for (std::size_t c = 0; has_free_shape && c < effect.coefficients.size(); ++c) {
       const double value = effect.coefficients[c];
       Interval& interval = effect.linear_intervals[c];
       if (info.linear[c].lower >= 0 && value > 0) {
-        const double times = std::exp((interval.second - value) / value);
-        interval.second = std::min(value * times, info.linear[c].upper);
+        const double times = std::exp((interval.upper - value) / value);
+        interval.upper = std::min(value * times, info.linear[c].upper);
       }
     }
     for (std::size_t k = 0; !with_shapes.empty() && k < effect.theta.size(); ++k)

@@ -25,7 +25,7 @@ Missing missing_of(const Passes& passes, const Refined& refined, Finding finding
     const std::string& name = candidate.info.shape[i].name;
     missing.parameters[name] = refined.theta[i];
     const Interval& interval = refined.shape_intervals[i];
-    if (interval.first < interval.second) missing.intervals[name] = interval;
+    if (interval.lower < interval.upper) missing.intervals[name] = interval;
   }
   missing.specs = specs_of(candidate, refined.coefficients, refined.theta, refined.linear_intervals,
                            refined.shape_intervals);

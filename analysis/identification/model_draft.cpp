@@ -187,11 +187,11 @@ void set_battery_range(const std::vector<LogFit>& fits, ModelDraft& draft) {
     most_V = std::max(most_V, log.most_V);
   }
   auto& range = draft.model.battery_range_V;
-  if (!(most_V > 0) || (least_V >= range.first && most_V <= range.second)) return;
+  if (!(most_V > 0) || (least_V >= range.lower && most_V <= range.upper)) return;
   range = {0.8 * least_V, 1.1 * most_V};
   const std::string source = "log: what was flown, with room for a fifth less and a tenth more";
-  draft.parameters.push_back({"battery_range_V.least", range.first, false, 0, 0, source});
-  draft.parameters.push_back({"battery_range_V.most", range.second, false, 0, 0, source});
+  draft.parameters.push_back({"battery_range_V.least", range.lower, false, 0, 0, source});
+  draft.parameters.push_back({"battery_range_V.most", range.upper, false, 0, 0, source});
 }
 
 /// Why a log is damaged or implausible; empty where it is neither.

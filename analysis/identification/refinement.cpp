@@ -335,8 +335,8 @@ void widen_by_answers(const std::vector<Refined>& by_squares, std::vector<Refine
     for (std::size_t k = 0; k < whitened[i].theta.size(); ++k) {
       const double by = kKept * std::abs(by_squares[i].theta[k] - whitened[i].theta[k]);
       Interval& interval = whitened[i].shape_intervals[k];
-      interval = {std::max(interval.first - by, info.shape[k].lower),
-                  std::min(interval.second + by, info.shape[k].upper)};
+      interval = {std::max(interval.lower - by, info.shape[k].lower),
+                  std::min(interval.upper + by, info.shape[k].upper)};
     }
   }
 }
@@ -356,7 +356,7 @@ std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& n
         remembers(i) ? memories[i].shape_intervals : refined[i].shape_intervals;
     for (std::size_t k = 0; k < known.size(); ++k) {  // a shape that was held here is known as before
       Interval& interval = result[i].shape_intervals[k];
-      if (interval.first == interval.second) interval = known[k];
+      if (interval.lower == interval.upper) interval = known[k];
     }
   }
   return result;

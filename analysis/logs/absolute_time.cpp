@@ -41,7 +41,7 @@ double receiver_offset_s(const RawLog& log) {
   return offsets_s.empty() ? 0 : median(offsets_s);
 }
 
-std::pair<double, double> absolute_span_s(const RawLog& log) {
+Interval absolute_span_s(const RawLog& log) {
   double first_s = INFINITY, last_s = -INFINITY;
   for (const RawTopic& topic : log.topics) {
     for (const double time_s : topic.time_s) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "analysis/logs/raw_log.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::logs {
 
@@ -15,6 +16,6 @@ inline constexpr double kAbsoluteClock_s = 1e8;
 double receiver_offset_s(const RawLog& log);
 
 /// First and last time of a log, in seconds since 1970; {0, 0} where its clock is not absolute.
-std::pair<double, double> absolute_span_s(const RawLog& log);
+Interval absolute_span_s(const RawLog& log);
 
 }  // namespace swarmcert::logs

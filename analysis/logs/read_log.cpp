@@ -178,7 +178,7 @@ bool is_flight_table(const std::string& path) {
   }
 }
 
-std::pair<double, double> time_span_s(const std::string& path) {
+Interval time_span_s(const std::string& path) {
   constexpr std::streamoff kEnd_bytes = 16384;
   try {
     std::ifstream whole(path, std::ios::binary);
@@ -193,7 +193,7 @@ std::pair<double, double> time_span_s(const std::string& path) {
     read_csv(in, path, collector, log.health);
     collector.end();
     const std::vector<double>& times = log.topics.back().time_s;
-    return times.empty() ? std::pair(0.0, 0.0) : std::pair(times.front(), times.back());
+    return times.empty() ? Interval() : Interval(times.front(), times.back());
   } catch (const files::InputError&) {
     return {0, 0};
   }

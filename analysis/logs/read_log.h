@@ -7,6 +7,7 @@
 
 #include "analysis/logs/raw_log.h"
 #include "analysis/logs/signals.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::logs {
 
@@ -28,7 +29,7 @@ bool is_flight_table(const std::string& path);
 
 /// First and last time of a CSV on its own clock, in seconds, from its first lines and its end; {0, 0} where it has
 /// none.
-std::pair<double, double> time_span_s(const std::string& path);
+Interval time_span_s(const std::string& path);
 
 /// True for `[<prefix>_]cf<id>_<run>`, with or without ".csv".
 bool is_log_name(const std::string& name);

@@ -138,9 +138,9 @@ FoundLog named(const std::string& file, const LogRule& rule) {
 }
 
 /// Overlap of two spans of time over the shorter of them.
-double overlap(const std::pair<double, double>& a, const std::pair<double, double>& b) {
-  const double common = std::min(a.second, b.second) - std::max(a.first, b.first);
-  return common / std::min(a.second - a.first, b.second - b.first);
+double overlap(Interval a, Interval b) {
+  const double common = std::min(a.upper, b.upper) - std::max(a.lower, b.lower);
+  return common / std::min(a.upper - a.lower, b.upper - b.lower);
 }
 
 /// Logs of one folder that were recorded at the same time on a common clock are one flight.
@@ -150,13 +150,13 @@ void group_by_clock(std::vector<FoundLog>& logs) {
   for (const FoundLog& log : logs) ++in_folder[fs::path(log.path).parent_path()];
   struct Timed {
     std::size_t index;
-    std::pair<double, double> span_s;
+    Interval span_s;
   };
   std::vector<Timed> timed;
   for (std::size_t i = 0; i < logs.size(); ++i) {
     if (logs[i].why != "one file" || in_folder[fs::path(logs[i].path).parent_path()] < 2) continue;
-    const auto span_s = logs::time_span_s(logs[i].path);
-    if (!(span_s.first > kAbsolute_s) || !(span_s.second > span_s.first)) continue;
+    const Interval span_s = logs::time_span_s(logs[i].path);
+    if (!(span_s.lower > kAbsolute_s) || !(span_s.upper > span_s.lower)) continue;
     for (const Timed& other : timed) {
       FoundLog& first = logs[other.index];
       if (fs::path(first.path).parent_path() != fs::path(logs[i].path).parent_path()) continue;

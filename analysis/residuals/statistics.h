@@ -7,6 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "nn/base/interval.h"
+
 namespace swarmcert::residuals {
 
 /// One number per axis and for the vector.
@@ -26,15 +28,11 @@ struct ErrorStatistics {
 /// @param r, r0 in newton, of the same records.
 ErrorStatistics statistics(const std::vector<Eigen::Vector3f>& r, const std::vector<Eigen::Vector3f>& r0);
 
-/// 90 % interval of the root mean square by resampling blocks.
-struct Interval {
-  double lower = 0, upper = 0;
-};
 struct BlockSum {
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
   double count = 0;
 };
-/// @return for x, y, z and total; equal ends where there are fewer than two blocks.
+/// 90 % interval of the root mean square by resampling blocks, for x, y, z and total; equal ends where there are fewer than two blocks.
 std::array<Interval, 4> bootstrap_rmse(const std::vector<BlockSum>& blocks, std::uint64_t seed);
 
 /// Value below which a share `p` of `values` lies; 0 if empty. Reorders `values`.

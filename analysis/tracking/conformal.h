@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "nn/base/interval.h"
+
 namespace swarmcert::analysis {
 
 struct FlightScore {
@@ -26,7 +28,7 @@ struct ConformalThreshold {
   int flights = 0;
   /// What the probability is for the calibration at hand: 5 % and 95 % quantiles of Beta(k, groups + 1 - k), with
   /// k = ceil(level (groups + 1)) the rank of the threshold.
-  std::array<double, 2> coverage_90{};
+  Interval coverage_90;
 };
 
 /// Groups that a level needs at least: level / (1 - level), rounded up. With fewer no finite threshold holds.

@@ -18,7 +18,7 @@ namespace {
 using files::Json;
 
 /// 5 % and 95 % ends of the interval for `held` of `flights`.
-std::array<double, 2> clopper_pearson_90(int held, int flights) {
+Interval clopper_pearson_90(int held, int flights) {
   if (flights == 0) return {0, 1};
   return {held == 0 ? 0 : beta_quantile(held, flights - held + 1, 0.05),
           held == flights ? 1 : beta_quantile(held + 1, flights - held, 0.95)};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/residuals/flight_peaks.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::analysis {
 
@@ -25,7 +26,7 @@ struct KeptAlong {
   int flights = 0;  ///< with a set point along the axis
   int held = 0;     ///< of these, flights in which no vehicle exceeded the bound
   /// 90 % interval (Clopper and Pearson 1934) of the probability that a flight stays below; 0 to 1 without flights.
-  std::array<double, 2> interval_90{0, 1};
+  Interval interval_90{0, 1};
 
   double share() const { return flights == 0 ? 0 : static_cast<double>(held) / flights; }
 };

@@ -6,9 +6,7 @@
 
 namespace swarmcert::analysis {
 
-inline stability::Range about(double value, double share) {
-  return {value * (1 - share), value * (1 + share)};
-}
+inline Interval about(double value, double share) { return {value * (1 - share), value * (1 + share)}; }
 
 /// Mass within 5 %, thrust scale within 10 %, motor lag and delay within 20 % of what model and gains say.
 inline stability::UncertainPlant usual_uncertainty(const stability::Gains& gains,

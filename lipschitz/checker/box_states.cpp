@@ -108,7 +108,7 @@ double largest(const Forms& forms, int r, const Row& lower, const Row& upper) {
     absolute += std::abs(c) * std::max(std::abs(lower[j]), std::abs(upper[j]));
   }
   const double terms = forms.terms + 2.0 * static_cast<double>(lower.size()) + 16;
-  const double result = next_up(value + (2 * terms * kUnit * absolute + 1.01 * forms.error[row] + kTiny));
+  const double result = up(value + (2 * terms * kUnit * absolute + 1.01 * forms.error[row] + kTiny));
   return std::isnan(result) ? kInfinity : result;
 }
 
@@ -281,7 +281,7 @@ bool add_layers(NeuronBounds& bounds, const std::vector<HiddenLayer>& layers, co
       if (!layer.has_relu(i) || !(l < 0 && u > 0)) continue;
       const double slope = std::min(1.0, u / (u - l));
       bounds.slope[k][i] = slope;
-      bounds.offset[k][i] = std::max({0.0, next_up(u - next_down(slope * u)), next_up(-slope * l)});
+      bounds.offset[k][i] = std::max({0.0, up(u - down(slope * u)), up(-slope * l)});
     }
   }
   return all_hold;

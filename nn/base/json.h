@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "nn/base/interval.h"
+
 namespace swarmcert::files {
 
 using Json = nlohmann::ordered_json;
@@ -39,3 +41,10 @@ Json parse_json(const std::string& text, const std::string& path);
 std::string to_text(const Json& document);
 
 }  // namespace swarmcert::files
+
+namespace swarmcert {
+
+/// [lower, upper], found by nlohmann::json.
+inline void to_json(files::Json& json, const Interval& x) { json = files::Json::array({x.lower, x.upper}); }
+
+}  // namespace swarmcert

@@ -51,7 +51,7 @@ MatrixXd middle(const IntervalMatrix& m) {
   MatrixXd result(static_cast<Index>(m.size()), static_cast<Index>(m.columns()));
   for (std::size_t i = 0; i < m.size(); ++i) {
     for (std::size_t j = 0; j < m.columns(); ++j) {
-      result(static_cast<Index>(i), static_cast<Index>(j)) = (m(i, j).lo + m(i, j).hi) / 2;
+      result(static_cast<Index>(i), static_cast<Index>(j)) = (m(i, j).lower + m(i, j).upper) / 2;
     }
   }
   return result;
@@ -119,10 +119,10 @@ IntervalMatrix IntervalSampledModel::plant_at(Interval phase_s) const {
     result = next;
   };
   // Which comes first may be known only up to rounding: then the second stretch lasts from 0 to a rounding error.
-  const Interval first_s(std::min(phase_s.lo, shift_s_.lo), std::min(phase_s.hi, shift_s_.hi));
+  const Interval first_s(std::min(phase_s.lower, shift_s_.lower), std::min(phase_s.upper, shift_s_.upper));
   if (past_ > newest_) advance(first_s, newest_ + 1);
   const Interval rest_s = past_ > newest_ ? phase_s - first_s : phase_s;
-  advance({std::max(0.0, rest_s.lo), std::max(0.0, rest_s.hi)}, newest_);
+  advance({std::max(0.0, rest_s.lower), std::max(0.0, rest_s.upper)}, newest_);
   return result;
 }
 
@@ -142,7 +142,7 @@ std::optional<ContractingSampledSystem> contracting(const IntervalSampledModel& 
   const double gamma = 1 - 0.8 * (1 - radius);
   // States in units in which they are alike: w^k for the k-th derivative of e, w^2 = Kp.
   const auto command = static_cast<Index>(model.command_index());
-  const double w = std::sqrt(std::max(1e-6, (std::abs(model.control()(model.command_index(), 0).lo))));
+  const double w = std::sqrt(std::max(1e-6, (std::abs(model.control()(model.command_index(), 0).lower))));
   Eigen::VectorXd unit = Eigen::VectorXd::Constant(n, 1 / (w * w));
   unit[0] = 1;
   unit[1] = 1 / w;

@@ -69,7 +69,7 @@ struct Companion {
     }
     for (std::size_t k = 0; k < n; ++k) {
       matrix(n - 1, k) = -a[k];
-      approximate(size - 1, static_cast<Index>(k)) = -(a[k].lo + a[k].hi) / 2;
+      approximate(size - 1, static_cast<Index>(k)) = -(a[k].lower + a[k].upper) / 2;
     }
   }
 
@@ -129,7 +129,7 @@ std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
   double slowest = 1e300;
   double fastest = 0;
   Polynomial middle;
-  for (const Interval& x : denominator) middle.push_back(x.lo + (x.hi - x.lo) / 2);
+  for (const Interval& x : denominator) middle.push_back(x.lower + (x.upper - x.lower) / 2);
   for (const std::complex<double>& pole : poles(middle)) {
     slowest = std::min(slowest, -pole.real());
     fastest = std::max(fastest, std::abs(pole));

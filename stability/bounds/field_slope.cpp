@@ -17,7 +17,7 @@ constexpr int kMostBoxes = 6000;
 enum Slope { kTotal, kAcross, kAlong };
 
 /// 1/x of an interval of positive numbers that may be unbounded.
-Interval inverse(Interval x) { return {std::isinf(x.hi) ? 0 : down(1 / x.hi), up(1 / x.lo)}; }
+Interval inverse(Interval x) { return {std::isinf(x.upper) ? 0 : down(1 / x.upper), up(1 / x.lower)}; }
 
 Interval square(Interval x) { return abs(x) * abs(x); }
 
@@ -36,16 +36,16 @@ class Slopes {
 
   Interval operator()(Interval q, Interval z) const {
     // Beyond kFarSpreads, q^k exp(-q^2/2) with k <= 2 falls, so its values lie between 0 and that at the near end.
-    const bool is_far = std::isinf(q.hi);
-    const Interval nearest(q.lo);
+    const bool is_far = std::isinf(q.upper);
+    const Interval nearest(q.lower);
     const Interval exponent = square(is_far ? nearest : q) / Interval(2);
     Interval E = exp(-exponent);
     Interval qE = (is_far ? nearest : q) * E;
     Interval qqE = square(is_far ? nearest : q) * E;
-    if (is_far) E.lo = qE.lo = qqE.lo = 0;
+    if (is_far) E.lower = qE.lower = qqE.lower = 0;
     Interval along;
     Interval across;
-    if (z.hi <= kWakeNearest_m) {
+    if (z.upper <= kWakeNearest_m) {
       const Interval spread =
           Interval(field_.spread_m) + Interval(field_.spread_slope) * Interval(kWakeNearest_m);
       const Interval x =
@@ -58,12 +58,12 @@ class Slopes {
       across = at_nearest_ * fade * qE / spread;
     } else {
       const Interval closeness = inverse(z);
-      const Interval strength = {std::isinf(z.hi) ? (field_.decay > 0 ? 0 : 1) : power(z.hi).lo,
-                                 power(z.lo).hi};
-      const Interval spread = {down(field_.spread_m + down(field_.spread_slope * z.lo)),
-                               std::isinf(z.hi) && field_.spread_slope == 0
+      const Interval strength = {std::isinf(z.upper) ? (field_.decay > 0 ? 0 : 1) : power(z.upper).lower,
+                                 power(z.lower).upper};
+      const Interval spread = {down(field_.spread_m + down(field_.spread_slope * z.lower)),
+                               std::isinf(z.upper) && field_.spread_slope == 0
                                    ? up(field_.spread_m)
-                                   : up(field_.spread_m + up(field_.spread_slope * z.hi))};
+                                   : up(field_.spread_m + up(field_.spread_slope * z.upper))};
       const Interval narrowness = inverse(spread);
       along = strength *
               (Interval(field_.spread_slope) * narrowness * qqE - Interval(field_.decay) * closeness * E);
@@ -81,7 +81,7 @@ class Slopes {
     const auto at = [](double t) {
       return Interval(t) * Interval(t) * (Interval(3) - Interval(2) * Interval(t));
     };
-    return {at(std::max(x.lo, 0.0)).lo, at(std::min(x.hi, 1.0)).hi};
+    return {at(std::max(x.lower, 0.0)).lower, at(std::min(x.upper, 1.0)).upper};
   }
 
   const WakeField& field_;
@@ -94,11 +94,11 @@ Interval supremum(const WakeField& field, Slope which, double from_m, double to_
   std::priority_queue<Box> open;
   double reached = 0;
   const auto add = [&](Interval q, Interval z) {
-    open.push({q, z, slope(q, z).hi});
-    const double middle_q = std::isinf(q.hi) ? q.lo : q.lo + (q.hi - q.lo) / 2;
-    const double middle_z = std::isinf(z.hi) ? z.lo : z.lo + (z.hi - z.lo) / 2;
-    for (const double at : {z.lo, middle_z})
-      reached = std::max(reached, slope(Interval(middle_q), Interval(at)).lo);
+    open.push({q, z, slope(q, z).upper});
+    const double middle_q = std::isinf(q.upper) ? q.lower : q.lower + (q.upper - q.lower) / 2;
+    const double middle_z = std::isinf(z.upper) ? z.lower : z.lower + (z.upper - z.lower) / 2;
+    for (const double at : {z.lower, middle_z})
+      reached = std::max(reached, slope(Interval(middle_q), Interval(at)).lower);
   };
   for (const Interval q : {Interval(0, kFarSpreads), Interval(kFarSpreads, kInfinity)}) {
     if (from_m < kWakeNearest_m) add(q, {from_m, std::min(to_m, kWakeNearest_m)});
@@ -107,20 +107,21 @@ Interval supremum(const WakeField& field, Slope which, double from_m, double to_
   for (int i = 0; i < kMostBoxes && open.top().bound > reached * (1 + kGap); ++i) {
     const Box box = open.top();
     open.pop();
-    const bool halves_z = std::isinf(box.z.hi) || std::isinf(box.q.hi) ||
-                          (box.z.hi - box.z.lo) / box.z.lo > (box.q.hi - box.q.lo);
+    const bool halves_z = std::isinf(box.z.upper) || std::isinf(box.q.upper) ||
+                          (box.z.upper - box.z.lower) / box.z.lower > (box.q.upper - box.q.lower);
     if (halves_z) {
-      const double middle = std::isinf(box.z.hi) ? 2 * box.z.lo : box.z.lo + (box.z.hi - box.z.lo) / 2;
-      if (!(middle > box.z.lo && middle < box.z.hi)) {
+      const double middle =
+          std::isinf(box.z.upper) ? 2 * box.z.lower : box.z.lower + (box.z.upper - box.z.lower) / 2;
+      if (!(middle > box.z.lower && middle < box.z.upper)) {
         open.push(box);
         break;
       }
-      add(box.q, {box.z.lo, middle});
-      add(box.q, {middle, box.z.hi});
+      add(box.q, {box.z.lower, middle});
+      add(box.q, {middle, box.z.upper});
     } else {
-      const double middle = box.q.lo + (box.q.hi - box.q.lo) / 2;
-      add({box.q.lo, middle}, box.z);
-      add({middle, box.q.hi}, box.z);
+      const double middle = box.q.lower + (box.q.upper - box.q.lower) / 2;
+      add({box.q.lower, middle}, box.z);
+      add({middle, box.q.upper}, box.z);
     }
   }
   return {reached, open.top().bound};

@@ -1,7 +1,7 @@
 /// @file The largest slopes of the wake of one vehicle, enclosed. Not for users: see truth_bounds.h.
 #pragma once
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::stability {
 

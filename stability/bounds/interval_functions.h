@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "nn/base/doubles.h"
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::stability {
 
@@ -24,7 +24,7 @@ inline Interval exp_of(double x) {
   return total;
 }
 
-inline Interval exp(Interval x) { return {std::max(0.0, exp_of(x.lo).lo), exp_of(x.hi).hi}; }
+inline Interval exp(Interval x) { return {std::max(0.0, exp_of(x.lower).lower), exp_of(x.upper).upper}; }
 
 /// ln x of one positive double: what libm says, widened until exp() proves it.
 inline Interval log_of(double x) {
@@ -32,7 +32,7 @@ inline Interval log_of(double x) {
   double slack = 1e-15 * std::max(1.0, std::abs(guess));
   for (int i = 0; i < 60; ++i, slack *= 2) {
     const Interval result(guess - slack, guess + slack);
-    if (exp_of(result.lo).hi <= x && exp_of(result.hi).lo >= x) return result;
+    if (exp_of(result.lower).upper <= x && exp_of(result.upper).lower >= x) return result;
   }
   throw std::domain_error("log of " + std::to_string(x) + " could not be enclosed");
 }
@@ -40,7 +40,7 @@ inline Interval log_of(double x) {
 /// x^n for x > 0.
 inline Interval pow(Interval x, double n) {
   if (n == 0) return Interval(1);
-  return exp(Interval(n) * Interval(log_of(x.lo).lo, log_of(x.hi).hi));
+  return exp(Interval(n) * Interval(log_of(x.lower).lower, log_of(x.upper).upper));
 }
 
 }  // namespace swarmcert::stability

@@ -35,7 +35,7 @@ Interval dot(const IntervalVector& a, const std::vector<double>& b) {
 double norm_above(const IntervalVector& v) {
   Interval total;
   for (const Interval& x : v) total += Interval(x.mag()) * x.mag();
-  return sqrt(total).hi;
+  return sqrt(total).upper;
 }
 
 std::optional<IntervalMatrix> inverse(const MatrixXd& m) {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::stability {
 

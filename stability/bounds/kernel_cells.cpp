@@ -15,7 +15,7 @@ constexpr double kLargestStep_s = 1e-3;
 double norm_above(const std::vector<double>& w) {
   Interval total;
   for (const double x : w) total += Interval(x) * x;
-  return sqrt(total).hi;
+  return sqrt(total).upper;
 }
 
 /// exp(A step), up to `remainder` in the 2-norm.
@@ -41,7 +41,7 @@ Step exponential(const IntervalMatrix& A, double step_s, double size) {
   }
   // size^18/18! (1 + size/19 + ...) with size <= 1, and 18! > 6.4e15. The series is below 1.06: 1.1 covers what is
   // rounded.
-  step.remainder = 1.1 * nth_power(Interval(size * 1.000001), kTaylorTerms).hi / 6.4e15;
+  step.remainder = 1.1 * nth_power(Interval(size * 1.000001), kTaylorTerms).upper / 6.4e15;
   return step;
 }
 
@@ -52,8 +52,8 @@ struct EnclosedState {
 
   explicit EnclosedState(const std::vector<Interval>& b) : w(b.size()) {
     for (std::size_t i = 0; i < b.size(); ++i) {
-      w[i] = (b[i].lo + b[i].hi) / 2;
-      error = up(error + (b[i].hi - b[i].lo));
+      w[i] = (b[i].lower + b[i].upper) / 2;
+      error = up(error + (b[i].upper - b[i].lower));
     }
   }
 
@@ -71,11 +71,11 @@ struct EnclosedState {
     for (std::size_t i = 0; i < w.size(); ++i) {
       Interval total;
       for (std::size_t j = 0; j < w.size(); ++j) total += step.matrix(i, j) * w[j];
-      next[i] = total.lo + (total.hi - total.lo) / 2;
-      const double half = up(std::max(total.hi - next[i], next[i] - total.lo));
+      next[i] = total.lower + (total.upper - total.lower) / 2;
+      const double half = up(std::max(total.upper - next[i], next[i] - total.lower));
       missed += Interval(half) * half;
     }
-    error = up(up(error + sqrt(missed).hi) + up(step.remainder * norm_above(w)));
+    error = up(up(error + sqrt(missed).upper) + up(step.remainder * norm_above(w)));
     w = std::move(next);
   }
 };
@@ -88,7 +88,7 @@ double frobenius_above(const IntervalMatrix& A) {
       squares += Interval(entry) * entry;
     }
   }
-  return sqrt(squares).hi;
+  return sqrt(squares).upper;
 }
 
 }  // namespace
@@ -161,8 +161,8 @@ std::vector<double> convolved(const KernelCells& kernel, const std::vector<doubl
 }
 
 Interval answer(const KernelCells& kernel, std::size_t m, Interval w) {
-  const double centre = w.lo + (w.hi - w.lo) / 2;
-  const double radius = up(std::max(w.hi - centre, centre - w.lo));
+  const double centre = w.lower + (w.upper - w.lower) / 2;
+  const double radius = up(std::max(w.upper - centre, centre - w.lower));
   const double spread = up(kernel.integral[m] * up(radius));
   return kernel.net[m] * centre + Interval(-spread, spread);
 }
@@ -174,13 +174,13 @@ Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& 
   double size = 0;
   for (std::size_t m = 1; m <= n; ++m) {
     const Interval both = hull(w[n - m], m < n ? w[n - m - 1] : Interval(0));
-    const double c = both.lo + (both.hi - both.lo) / 2;
-    const double radius = std::max(both.hi - c, c - both.lo);
+    const double c = both.lower + (both.upper - both.lower) / 2;
+    const double radius = std::max(both.upper - c, c - both.lower);
     const Interval& net = kernel.net[m];
-    const double g = net.lo + (net.hi - net.lo) / 2;
+    const double g = net.lower + (net.upper - net.lower) / 2;
     centre += g * c;
     size += std::abs(g * c);
-    spread += kernel.integral[m] * radius + std::max(net.hi - g, g - net.lo) * std::abs(c);
+    spread += kernel.integral[m] * radius + std::max(net.upper - g, g - net.lower) * std::abs(c);
   }
   spread += 4e-16 * static_cast<double>(n + 8) * (size + spread) + 1e-300;
   return {down(centre - spread), up(centre + spread)};

@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "nn/base/interval.h"
 #include "stability/bounds/impulse_response.h"
-#include "stability/bounds/interval.h"
 
 namespace swarmcert::stability {
 

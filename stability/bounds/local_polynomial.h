@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::stability {
 
@@ -22,7 +22,7 @@ struct LocalPolynomial {
 
   /// What the polynomial may miss anywhere up to `s`.
   Interval slack(double s) const {
-    const double r = up(nth_power(Interval(s), kLocalTerms).hi * remainder);
+    const double r = up(nth_power(Interval(s), kLocalTerms).upper * remainder);
     const double total = up(r + error);
     return {-total, total};
   }
@@ -51,7 +51,7 @@ class AbsoluteIntegral {
  public:
   void add(const LocalPolynomial& f, const LocalPolynomial& F, double a, double b, int depth) {
     const Interval range = f.range(a, b);
-    const int sign = range.lo >= 0 ? 1 : range.hi <= 0 ? -1 : 0;
+    const int sign = range.lower >= 0 ? 1 : range.upper <= 0 ? -1 : 0;
     if (sign != 0) {
       if (sign != sign_) {
         close();
@@ -63,7 +63,7 @@ class AbsoluteIntegral {
     }
     const double most = up(up(b - a) * range.mag());
     // No stretch is short enough to tell the sign of what is smaller than its own error.
-    if (depth == 0 || most < 1e-19 || 8 * f.slack(b).hi > range.mag()) {
+    if (depth == 0 || most < 1e-19 || 8 * f.slack(b).upper > range.mag()) {
       close();
       total_ += Interval(0, most);
       return;
@@ -82,7 +82,7 @@ class AbsoluteIntegral {
   void close() {
     if (sign_ != 0) {
       const Interval part = sign_ > 0 ? end_ - start_ : start_ - end_;
-      total_ += Interval(std::max(0.0, part.lo), std::max(0.0, part.hi));
+      total_ += Interval(std::max(0.0, part.lower), std::max(0.0, part.upper));
     }
     sign_ = 0;
   }
@@ -91,26 +91,26 @@ class AbsoluteIntegral {
   int sign_ = 0;
 };
 
-/// Raises best.lo and best.hi to enclose the supremum of |f| over all stretches seen so far.
+/// Raises best.lower and best.upper to enclose the supremum of |f| over all stretches seen so far.
 inline void raise_supremum(const LocalPolynomial& f, const LocalPolynomial& slope, double a, double b,
                            int depth, double& lower, Interval& best) {
-  lower = std::max({lower, abs(f.at(a)).lo, abs(f.at(b)).lo});
-  best.lo = std::max(best.lo, lower);
+  lower = std::max({lower, abs(f.at(a)).lower, abs(f.at(b)).lower});
+  best.lower = std::max(best.lower, lower);
   const Interval turn = slope.range(a, b);
   double most;
-  if (turn.lo >= 0 || turn.hi <= 0) {
+  if (turn.lower >= 0 || turn.upper <= 0) {
     most = std::max(f.at(a).mag(), f.at(b).mag());  // monotonic
   } else {
     most = f.range(a, b).mag();
-    if (most <= best.hi) return;
-    if (depth > 0 && most > lower * (1 + 1e-15) && 8 * slope.slack(b).hi < turn.mag()) {
+    if (most <= best.upper) return;
+    if (depth > 0 && most > lower * (1 + 1e-15) && 8 * slope.slack(b).upper < turn.mag()) {
       const double middle = a + (b - a) / 2;
       raise_supremum(f, slope, a, middle, depth - 1, lower, best);
       raise_supremum(f, slope, middle, b, depth - 1, lower, best);
       return;
     }
   }
-  best.hi = std::max(best.hi, most);
+  best.upper = std::max(best.upper, most);
 }
 
 }  // namespace swarmcert::stability

@@ -18,7 +18,7 @@ GainNorms largest(const UncertainNorms& norms) {
 /// The interval of the ratio; mass, lags and delay as they are.
 UncertainPlant ratio_only(const AxisLoop& loop, double ratio_error) {
   return {{loop.mass_kg, loop.mass_kg},
-          {next_down(1 - ratio_error), next_up(1 + ratio_error)},
+          {down(1 - ratio_error), up(1 + ratio_error)},
           {0, 0},
           {loop.delay_s, loop.delay_s}};
 }

@@ -41,7 +41,7 @@ class Values {
 
 /// N^(1/p) from above: how much stronger N equal forces composed with the norm p are than one.
 double composed(int neighbours, double p) {
-  return neighbours <= 1 ? 1 : pow(Interval(neighbours), 1 / p).hi * (1 + 1e-15 * neighbours);
+  return neighbours <= 1 ? 1 : pow(Interval(neighbours), 1 / p).upper * (1 + 1e-15 * neighbours);
 }
 
 /// A field of position: its amplitude along z, its rate by slope and relative speed.
@@ -49,18 +49,18 @@ void field_bounds(const WakeField& field, double strength_N, double composition,
                   EffectBounds& result) {
   const FieldSlopes slopes = field_slopes(field, motion.least_gap_m, motion.largest_gap_m);
   const double factor = times_up(strength_N, composition);
-  result.amplitude_N[2] = times_up(factor, slopes.value.hi);
-  result.slope_across_N_m = times_up(strength_N, slopes.across.hi);
-  result.slope_along_N_m = times_up(strength_N, slopes.along.hi);
-  double rate = times_up(factor, times_up(slopes.total.hi, motion.relative_speed_m_s));
+  result.amplitude_N[2] = times_up(factor, slopes.value.upper);
+  result.slope_across_N_m = times_up(strength_N, slopes.across.upper);
+  result.slope_along_N_m = times_up(strength_N, slopes.along.upper);
+  double rate = times_up(factor, times_up(slopes.total.upper, motion.relative_speed_m_s));
   if (field.convection_s_m > 0) {
     // The wake's centre moves with the neighbour: r - k dz v_j changes by k |dz'| |v_j| + k dz |v_j'| more.
     const double drift = plus(times_up(motion.relative_speed_m_s, motion.speed_m_s),
                               times_up(motion.largest_gap_m, motion.acceleration_m_s2));
-    rate = plus(rate, times_up(times_up(factor, slopes.across.hi), times_up(field.convection_s_m, drift)));
+    rate = plus(rate, times_up(times_up(factor, slopes.across.upper), times_up(field.convection_s_m, drift)));
   }
   result.rate_N_s[2] = rate;
-  if (std::isinf(slopes.total.hi)) {
+  if (std::isinf(slopes.total.upper)) {
     result.unbounded =
         "the field jumps where vehicles are 0.05 m apart in height: state --gap from above that";
   } else if (std::isinf(rate)) {
@@ -68,7 +68,7 @@ void field_bounds(const WakeField& field, double strength_N, double composition,
                            ? "the wake is carried along: needs --speed, --own-speed, --own-accel and --gap"
                            : "needs the relative speed: --speed";
   } else {
-    result.reached_rate_N_s = strength_N * slopes.total.lo * motion.relative_speed_m_s;
+    result.reached_rate_N_s = strength_N * slopes.total.lower * motion.relative_speed_m_s;
   }
 }
 
@@ -91,7 +91,7 @@ void bound_wake(const std::string& name, const Values& value, const MotionSet& m
     field.spread_slope = value("spread_slope");
     field.fades = true;
     const Interval mass = Interval(motion.neighbour_mass_kg) / Interval(0.034);
-    const double strength_N = times_up(value("amplitude_N"), pow(mass, 0.5).hi);
+    const double strength_N = times_up(value("amplitude_N"), pow(mass, 0.5).upper);
     field_bounds(field, strength_N, composed(motion.neighbours, value("norm_exponent")),
                  seen_late(motion, value("delay_s")), result);
     result.reached_rate_N_s = 0;
@@ -108,9 +108,9 @@ void bound_wake(const std::string& name, const Values& value, const MotionSet& m
     field.convection_s_m = value("convection_s_m");
     composition = composed(motion.neighbours, value("norm_exponent"));
     const Interval mass = Interval(motion.neighbour_mass_kg) / Interval(0.034);
-    strength_N = times_up(strength_N, std::max(1.0, pow(mass, value("mass_exponent")).hi));
+    strength_N = times_up(strength_N, std::max(1.0, pow(mass, value("mass_exponent")).upper));
     if (motion.neighbour_mass_kg < 0.034)
-      strength_N = times_up(value("amplitude_N"), pow(mass, value("mass_exponent")).hi);
+      strength_N = times_up(value("amplitude_N"), pow(mass, value("mass_exponent")).upper);
   }
   field_bounds(field, strength_N, composition, motion, result);
 }
@@ -166,7 +166,7 @@ void bound_surface(const std::string& name, const Values& value, const MotionSet
   const double nearest_m = name == "ground"
                                ? down(std::max(m.least_height_m, 0.0) - value("height_reference_m"))
                                : std::max(0.0, down(value("height_m") - m.largest_height_m));
-  const double g = exp(-(Interval(nearest_m) / Interval(decay_m))).hi;
+  const double g = exp(-(Interval(nearest_m) / Interval(decay_m))).upper;
   const double strength = times_up(value("amplitude"), g);
   set_all(result.amplitude_N, times_up(strength, m.largest_thrust_N));
   set_all(result.rate_N_s,
@@ -204,7 +204,7 @@ void bound_thrust_factor(const std::string& name, const Values& value, const Mod
   if (name == "voltage_sag") {
     // g = -s ((T/W)^(3/2) - 1), and T |g'| <= s 3/2 (T/W)^(3/2) |T'|
     const Interval load = Interval(T) / Interval(down(model.mass_kg * kGravity_m_s2));
-    const double power = load.hi > 0 ? pow(load, 1.5).hi : 0;
+    const double power = load.upper > 0 ? pow(load, 1.5).upper : 0;
     const double most = std::max(1.0, up(power - 1)), s = value("sag");
     amplitude = times_up(s, times_up(most, T));
     change = times_up(s, times_up(rate, plus(most, up(1.5 * power))));

@@ -27,13 +27,14 @@ class Subdivision {
 
   UncertainNorms run(const UncertainEffort& effort) {
     using End = UncertainNorms::End;
-    const double at_least_thrust = plant_.thrust_scale.from * told_mass_kg_;
-    const double least = at_least_thrust / plant_.mass_kg.to;
-    const double between = at_least_thrust / plant_.mass_kg.from;
-    const double most = plant_.thrust_scale.to * told_mass_kg_ / plant_.mass_kg.from;
+    const double at_least_thrust = plant_.thrust_scale.lower * told_mass_kg_;
+    const double least = at_least_thrust / plant_.mass_kg.upper;
+    const double between = at_least_thrust / plant_.mass_kg.lower;
+    const double most = plant_.thrust_scale.upper * told_mass_kg_ / plant_.mass_kg.lower;
     const auto box = [&](PlantEdge edge, double from, double to) {
-      return PlantBox{
-          edge, {from, plant_.lag_s.from, plant_.delay_s.from}, {to, plant_.lag_s.to, plant_.delay_s.to}};
+      return PlantBox{edge,
+                      {from, plant_.lag_s.lower, plant_.delay_s.lower},
+                      {to, plant_.lag_s.upper, plant_.delay_s.upper}};
     };
     std::vector<PlantBox> edges;
     if (most > between || !(between > least)) edges.push_back(box(PlantEdge::kLeastMass, between, most));
@@ -76,8 +77,8 @@ class Subdivision {
 
   /// What gains per 1 kg are multiplied by.
   double weight(PlantEdge edge, double ratio) const {
-    return edge == PlantEdge::kLeastMass ? 1 / plant_.mass_kg.from
-                                         : ratio / (plant_.thrust_scale.from * told_mass_kg_);
+    return edge == PlantEdge::kLeastMass ? 1 / plant_.mass_kg.lower
+                                         : ratio / (plant_.thrust_scale.lower * told_mass_kg_);
   }
 
   /// The gains at a point, per unit of force; raises `lower`.
@@ -93,13 +94,13 @@ class Subdivision {
       values[k] = known->second.*kUncertainGains[k] * by;
       UncertainGain& gain = *gains_[k];
       if (!(values[k] > gain.lower)) continue;
-      const double thrust = p[0] * plant_.mass_kg.from / told_mass_kg_;
+      const double thrust = p[0] * plant_.mass_kg.lower / told_mass_kg_;
       gain.lower = values[k];
       gain.mass_kg = edge == PlantEdge::kLeastMass
-                         ? plant_.mass_kg.from
-                         : std::min(plant_.mass_kg.to, plant_.thrust_scale.from * told_mass_kg_ / p[0]);
-      gain.thrust_scale =
-          edge == PlantEdge::kLeastMass ? std::min(plant_.thrust_scale.to, thrust) : plant_.thrust_scale.from;
+                         ? plant_.mass_kg.lower
+                         : std::min(plant_.mass_kg.upper, plant_.thrust_scale.lower * told_mass_kg_ / p[0]);
+      gain.thrust_scale = edge == PlantEdge::kLeastMass ? std::min(plant_.thrust_scale.upper, thrust)
+                                                        : plant_.thrust_scale.lower;
       gain.lag_s = p[1];
       gain.delay_s = p[2];
     }

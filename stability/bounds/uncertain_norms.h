@@ -3,21 +3,18 @@
 
 #include <functional>
 
+#include "nn/base/interval.h"
 #include "stability/bounds/axis_loop.h"
 #include "stability/bounds/sampled_loop.h"
 
 namespace swarmcert::stability {
 
-struct Range {
-  double from = 0, to = 0;
-};
-
 /// What may vary about one axis, each within its range, independently and constant in time.
 struct UncertainPlant {
-  Range mass_kg;       ///< the true one; gains are forces for `commanded_mass_kg`
-  Range thrust_scale;  ///< force that acts per force commanded
-  Range lag_s;         ///< of the motors
-  Range delay_s;
+  Interval mass_kg;       ///< the true one; gains are forces for `commanded_mass_kg`
+  Interval thrust_scale;  ///< force that acts per force commanded
+  Interval lag_s;         ///< of the motors
+  Interval delay_s;
 };
 
 /// When to stop. Bounds hold whenever that is.

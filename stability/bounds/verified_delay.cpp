@@ -72,7 +72,7 @@ class DelayedSteps {
       double largest = 0;
       double scale = 1;
       for (std::size_t k = 0; k < order_; ++k, scale /= unit_) {
-        result.residual += abs(Interval(z[k]) * Interval(rising_[k][0]) - at[k]).hi * scale * kAbove;
+        result.residual += abs(Interval(z[k]) * Interval(rising_[k][0]) - at[k]).upper * scale * kAbove;
         const double most = most_of(z, k) * scale * kAbove;
         result.most[k] = std::max(result.most[k], most);
         result.integral[k] += most * length_ * kAbove;
@@ -114,7 +114,8 @@ class DelayedSteps {
   /// The Taylor polynomial from about `at`, driven by the piece one delay before.
   Piece next(const std::vector<Interval>& at, const Piece& driving) const {
     Piece z{};
-    for (std::size_t k = 0; k < order_; ++k) z[k] = (at[k].lo + (at[k].hi - at[k].lo) / 2) / rising_[k][0];
+    for (std::size_t k = 0; k < order_; ++k)
+      z[k] = (at[k].lower + (at[k].upper - at[k].lower) / 2) / rising_[k][0];
     for (std::size_t i = 0; i + order_ < kPieceTerms; ++i) {
       double right = 0;
       for (std::size_t k = 0; k < order_; ++k) right -= y_.denominator[k] * z[i + k] * rising_[k][i];
@@ -259,7 +260,7 @@ std::optional<VerifiedNorms> norms_by_steps(const TransferFunction& y, bool inte
     return total * unit.mag() * rho_of_y / (1 - rho) * kAbove * kAbove;
   };
   const auto widened = [](Interval x, double by) {
-    return Interval(std::max(0.0, down(x.lo - by)), up(x.hi + by));
+    return Interval(std::max(0.0, down(x.lower - by)), up(x.upper + by));
   };
   VerifiedNorms norms = pieces.norms();
   const std::size_t slope = integrates ? 1 : 0;
@@ -267,8 +268,8 @@ std::optional<VerifiedNorms> norms_by_steps(const TransferFunction& y, bool inte
   norms.edge = widened(norms.edge, integrates ? error(most, 0) : error(integral, 0));
   norms.amplitude = widened(norms.amplitude, error(integral, slope));
   norms.impulse = widened(norms.impulse, error(most, slope));
-  if (!std::isfinite(norms.amplitude.hi)) return std::nullopt;
-  norms.delay_gain = (norms.amplitude.hi - norms.amplitude.lo) / (2 * norms.amplitude.hi);
+  if (!std::isfinite(norms.amplitude.upper)) return std::nullopt;
+  norms.delay_gain = (norms.amplitude.upper - norms.amplitude.lower) / (2 * norms.amplitude.upper);
   return norms;
 }
 

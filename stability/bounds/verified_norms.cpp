@@ -22,7 +22,7 @@ class Enclosure {
     const std::size_t n = system.A.size();
     Interval largest;
     for (std::size_t i = 0; i < n; ++i) largest += dot_row(i);
-    length_ = 0.25 / sqrt(largest).hi;  // |A| <= its Frobenius norm
+    length_ = 0.25 / sqrt(largest).upper;  // |A| <= its Frobenius norm
     for (std::size_t r = 0; r < 4; ++r) {
       taylor_[r][0] = system.rows[r];
       for (std::size_t k = 1; k <= kLocalTerms; ++k) {
@@ -58,8 +58,8 @@ class Enclosure {
     std::vector<double> w(n);
     double error = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      w[i] = (system_.b[i].lo + system_.b[i].hi) / 2;
-      error = up(error + (system_.b[i].hi - system_.b[i].lo));
+      w[i] = (system_.b[i].lower + system_.b[i].upper) / 2;
+      error = up(error + (system_.b[i].upper - system_.b[i].lower));
     }
     const double first = length(w);
     VerifiedNorms norms;
@@ -86,9 +86,9 @@ class Enclosure {
     const double tail = up(size / system_.alpha);
     norms.rate = y == 2 ? rate.finish() + Interval(0, up(row_norm_[1] * tail)) : Interval(kInfinity);
     norms.amplitude = amplitude.finish() + Interval(0, up(row_norm_[y] * tail));
-    norms.edge = {std::max(norms.edge.lo, settled.mig()),
-                  std::max(norms.edge.hi, up(settled.mag() + up(row_norm_[y - 1] * size)))};
-    norms.impulse = {norms.impulse.lo, std::max(norms.impulse.hi, up(row_norm_[y] * size))};
+    norms.edge = {std::max(norms.edge.lower, settled.mig()),
+                  std::max(norms.edge.upper, up(settled.mag() + up(row_norm_[y - 1] * size)))};
+    norms.impulse = {norms.impulse.lower, std::max(norms.impulse.upper, up(row_norm_[y] * size))};
     return norms;
   }
 
@@ -102,7 +102,7 @@ class Enclosure {
   static double length(const std::vector<double>& w) {
     Interval total;
     for (const double x : w) total += Interval(x) * x;
-    return sqrt(total).hi;
+    return sqrt(total).upper;
   }
 
   void advance(std::vector<double>& w, double& error) const {
@@ -112,12 +112,12 @@ class Enclosure {
     for (std::size_t i = 0; i < n; ++i) {
       Interval total;
       for (std::size_t j = 0; j < n; ++j) total += step_[i * n + j] * w[j];
-      next[i] = total.lo + (total.hi - total.lo) / 2;
-      const double half = up(std::max(total.hi - next[i], next[i] - total.lo));
+      next[i] = total.lower + (total.upper - total.lower) / 2;
+      const double half = up(std::max(total.upper - next[i], next[i] - total.lower));
       missed += Interval(half) * half;
     }
     // The flow contracts, so the old error does not grow.
-    error = up(up(error + sqrt(missed).hi) + step_remainder_ * length(w));
+    error = up(up(error + sqrt(missed).upper) + step_remainder_ * length(w));
     w = std::move(next);
   }
 
@@ -155,7 +155,7 @@ double rest_of_delay(const TransferFunction& y, std::size_t order, const Interva
   }
   const Interval jump =
       numerator.size() + 1 == denominator.size() ? abs(numerator.back() / denominator.back()) : Interval(0);
-  return (weight * (jump + Enclosure(*system).run(2, Interval(0)).amplitude)).hi;
+  return (weight * (jump + Enclosure(*system).run(2, Interval(0)).amplitude)).upper;
 }
 
 /// The norms of the loop whose characteristic polynomial is `denominator`.
@@ -170,7 +170,7 @@ std::optional<VerifiedNorms> norms_over(const TransferFunction& y, const Interva
 VerifiedNorms times(VerifiedNorms norms, Interval factor) {
   for (const auto gain :
        {&VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse}) {
-    if (std::isfinite((norms.*gain).hi)) norms.*gain = norms.*gain * factor;
+    if (std::isfinite((norms.*gain).upper)) norms.*gain = norms.*gain * factor;
   }
   return norms;
 }
@@ -202,7 +202,7 @@ std::optional<VerifiedNorms> norms_of(const TransferFunction& y, bool integrates
   for (const auto gain :
        {&VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse}) {
     Interval& x = *norms.*gain;
-    if (std::isfinite(x.hi)) x = {(x * less).lo, (x * more).hi};
+    if (std::isfinite(x.upper)) x = {(x * less).lower, (x * more).upper};
   }
   norms->delay_gain = rest;
   return norms;

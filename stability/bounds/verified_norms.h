@@ -3,8 +3,8 @@
 
 #include <optional>
 
+#include "nn/base/interval.h"
 #include "stability/bounds/axis_loop.h"
-#include "stability/bounds/interval.h"
 
 namespace swarmcert::stability {
 

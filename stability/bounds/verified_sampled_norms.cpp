@@ -28,8 +28,8 @@ struct Linear {
   explicit Linear(const IntervalVector& c) {
     double radius = 0;
     for (const Interval& x : c) {
-      mid.push_back(x.lo + (x.hi - x.lo) / 2);
-      const double r = up(std::max(x.hi - mid.back(), mid.back() - x.lo));
+      mid.push_back(x.lower + (x.upper - x.lower) / 2);
+      const double r = up(std::max(x.upper - mid.back(), mid.back() - x.lower));
       radius = up(radius + r);
     }
     per_error = norm_above(c) * kOver;
@@ -76,7 +76,7 @@ class Runs {
   void add_unsure(Interval at, double most) {
     turn(at);
     total_ += Interval(0, most);
-    peak_.hi = std::max(peak_.hi, up(at.mag() + most));
+    peak_.upper = std::max(peak_.upper, up(at.mag() + most));
     sign_ = 0;
   }
   void finish(Interval at) { turn(at), sign_ = 0; }
@@ -87,10 +87,10 @@ class Runs {
   void turn(Interval at) {
     if (sign_ != 0) {
       const Interval part = sign_ > 0 ? at - start_ : start_ - at;
-      total_ += Interval(std::max(0.0, part.lo), std::max(0.0, part.hi));
+      total_ += Interval(std::max(0.0, part.lower), std::max(0.0, part.upper));
     }
     start_ = at;
-    peak_ = {std::max(peak_.lo, at.mig()), std::max(peak_.hi, at.mag())};
+    peak_ = {std::max(peak_.lower, at.mig()), std::max(peak_.upper, at.mag())};
   }
   Interval total_, peak_, start_;
   int sign_ = 0;
@@ -118,14 +118,14 @@ class SampledEnclosure {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) {
         const Interval a = system_.A(i, j);
-        const double mid = a.lo + (a.hi - a.lo) / 2;
+        const double mid = a.lower + (a.upper - a.lower) / 2;
         A_[j * n + i] = mid;
-        const double r = up(std::max(a.hi - mid, mid - a.lo));
+        const double r = up(std::max(a.upper - mid, mid - a.lower));
         radius += Interval(r) * r;
         size += Interval(a.mag()) * a.mag();
       }
     }
-    step_error_ = (sqrt(radius).hi + 2.3e-16 * static_cast<double>(n + 2) * sqrt(size).hi) * kOver;
+    step_error_ = (sqrt(radius).upper + 2.3e-16 * static_cast<double>(n + 2) * sqrt(size).upper) * kOver;
     gap_ = Interval(1) - Interval(system_.gamma);
     IntervalVector k0(n);
     IntervalVector k1(n);
@@ -162,11 +162,12 @@ class SampledEnclosure {
     std::vector<double> next(n);
     double error = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      row[i] = output.row[i].lo + (output.row[i].hi - output.row[i].lo) / 2;
-      error = up(error + up(output.row[i].hi - output.row[i].lo));
+      row[i] = output.row[i].lower + (output.row[i].upper - output.row[i].lower) / 2;
+      error = up(error + up(output.row[i].upper - output.row[i].lower));
     }
-    const double settled = (output.settled.lo + output.settled.hi) / 2;
-    const double settled_error = up(output.settled.hi - output.settled.lo) + 1e-15 * output.settled.mag();
+    const double settled = (output.settled.lower + output.settled.upper) / 2;
+    const double settled_error =
+        up(output.settled.upper - output.settled.lower) + 1e-15 * output.settled.mag();
     Runs of_S;
     Runs of_Q;
     VerifiedNorms norms = own_period(output);
@@ -177,8 +178,8 @@ class SampledEnclosure {
       set(cell, row, length, error, settled, settled_error);
       const double end = cell.k0 + cell.k1 * h_;
       const double most = std::max(std::abs(cell.k0), std::abs(end));
-      norms.impulse = {std::max(norms.impulse.lo, most - cell.k_error),
-                       std::max(norms.impulse.hi, up(most + cell.k_error))};
+      norms.impulse = {std::max(norms.impulse.lower, most - cell.k_error),
+                       std::max(norms.impulse.upper, up(most + cell.k_error))};
       const double least = cell.k0 * end > 0 ? std::min(std::abs(cell.k0), std::abs(end)) : 0;
       if (least > cell.k_error) {
         of_S.add(cell.k0 > 0 ? 1 : -1, [&] { return cell.S(0); });
@@ -195,12 +196,12 @@ class SampledEnclosure {
     // What is left: |row| falls by gamma per period.
     const double size = (length + error) * kOver;
     const double k_most = (k0_.per_error + k1_.per_error * h_) * size * kOver;
-    const double periods = up(1 / gap_.lo);
+    const double periods = up(1 / gap_.lower);
     const double S_change = h_ * k_most * periods * kOver;
     norms.amplitude += of_S.total() + Interval(0, S_change);
-    norms.edge = {std::max(norms.edge.lo, of_S.peak().lo),
-                  std::max({norms.edge.hi, of_S.peak().hi, up(cell.S(0).mag() + S_change)})};
-    norms.impulse.hi = std::max(norms.impulse.hi, k_most);
+    norms.edge = {std::max(norms.edge.lower, of_S.peak().lower),
+                  std::max({norms.edge.upper, of_S.peak().upper, up(cell.S(0).mag() + S_change)})};
+    norms.impulse.upper = std::max(norms.impulse.upper, k_most);
     if (integrates_) {
       of_Q.finish(cell.Q(0));
       const double S_most = (rest_.per_error * size + h_ * k_most) * kOver;
@@ -231,7 +232,7 @@ class SampledEnclosure {
     Eigen::VectorXd right(static_cast<Index>(n));
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) left(static_cast<Index>(i), static_cast<Index>(j)) -= A_[j * n + i];
-      right[static_cast<Index>(i)] = (c[i].lo + c[i].hi) / 2;
+      right[static_cast<Index>(i)] = (c[i].lower + c[i].upper) / 2;
     }
     const Eigen::VectorXd solved = left.fullPivLu().solve(right);
     IntervalVector residual = c;
@@ -240,7 +241,7 @@ class SampledEnclosure {
       for (std::size_t j = 0; j < n; ++j)
         residual[i] += system_.A(i, j) * Interval(solved[static_cast<Index>(j)]);
     }
-    const double wrong = (Interval(norm_above(residual)) / gap_).hi;
+    const double wrong = (Interval(norm_above(residual)) / gap_).upper;
     IntervalVector result(n);
     for (std::size_t i = 0; i < n; ++i) {
       result[i] = Interval(solved[static_cast<Index>(i)]) + Interval(-wrong, wrong);
@@ -273,8 +274,8 @@ class SampledEnclosure {
 
   void split_k(const Cell& cell, double a, double b, int depth, Runs& runs) const {
     const Interval range = hull(cell.k(a), cell.k(b));
-    if (range.lo > 0 || range.hi < 0) {
-      runs.add(range.lo > 0 ? 1 : -1, [&] { return cell.S(a); });
+    if (range.lower > 0 || range.upper < 0) {
+      runs.add(range.lower > 0 ? 1 : -1, [&] { return cell.S(a); });
       return;
     }
     if (depth == 0 || 8 * cell.k_error > range.mag()) {
@@ -289,8 +290,8 @@ class SampledEnclosure {
   void add_second(const Cell& cell, double k_most, Runs& runs) const {
     if (!is_force_) {
       const Interval at_end = cell.S(h_);
-      if (at_end.lo > 0 || at_end.hi < 0) {
-        runs.add(at_end.lo > 0 ? 1 : -1, [&] { return cell.Q(0); });
+      if (at_end.lower > 0 || at_end.upper < 0) {
+        runs.add(at_end.lower > 0 ? 1 : -1, [&] { return cell.Q(0); });
       } else {
         runs.add_unsure(cell.Q(0), up(h_ * at_end.mag()));
       }
@@ -306,8 +307,8 @@ class SampledEnclosure {
   void split_S(const Cell& cell, double a, double b, int depth, Runs& runs) const {
     const double middle = a + (b - a) / 2;
     const Interval range = cell.S(middle) + hull(cell.k(a), cell.k(b)) * (Interval(a, b) - Interval(middle));
-    if (range.lo > 0 || range.hi < 0) {
-      runs.add(range.lo > 0 ? 1 : -1, [&] { return cell.Q(a); });
+    if (range.lower > 0 || range.upper < 0) {
+      runs.add(range.lower > 0 ? 1 : -1, [&] { return cell.Q(a); });
       return;
     }
     if (depth == 0 || 8 * cell.S_error > range.mag()) {
@@ -369,7 +370,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
     if (i == 0) result.at_samples = result.all_times = here;
     for (const auto gain : kSampledGains) {
       Interval& all = result.all_times.*gain;
-      all = {std::max(all.lo, (here.*gain).lo), std::max(all.hi, (here.*gain).hi)};
+      all = {std::max(all.lower, (here.*gain).lower), std::max(all.upper, (here.*gain).upper)};
     }
   }
   // The largest gains to a command or a lag's output; with a force, `rate` to its sum with the force at that time.
@@ -378,7 +379,8 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
     IntervalVector after(model.size() + 1);
     after[i < model.lags() ? 2 + i : model.command_index()] = 1;
     const VerifiedNorms here = output(after, 0, Interval(0));
-    for (const auto gain : kSampledGains) (bend.*gain).hi = std::max((bend.*gain).hi, (here.*gain).hi);
+    for (const auto gain : kSampledGains)
+      (bend.*gain).upper = std::max((bend.*gain).upper, (here.*gain).upper);
   }
   if (is_force) {
     bend.amplitude = bend.amplitude + Interval(1);
@@ -389,8 +391,8 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
   const double step_s = up(loop.period_s / kVerifiedPhases * (1 + 1e-15));
   for (const auto gain : kSampledGains) {
     Interval& all = result.all_times.*gain;
-    if (std::isfinite(all.hi))
-      all.hi = (Interval(all.hi) + Interval(step_s) * step_s / Interval(8) * (bend.*gain).hi).hi;
+    if (std::isfinite(all.upper))
+      all.upper = (Interval(all.upper) + Interval(step_s) * step_s / Interval(8) * (bend.*gain).upper).upper;
   }
   return result;
 }
@@ -399,7 +401,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
 VerifiedSampledNorms over(VerifiedSampledNorms result, Interval divisor) {
   for (VerifiedNorms* const norms : {&result.at_samples, &result.all_times}) {
     for (const auto gain : kSampledGains) {
-      if (std::isfinite((norms->*gain).hi)) norms->*gain = norms->*gain / divisor;
+      if (std::isfinite((norms->*gain).upper)) norms->*gain = norms->*gain / divisor;
     }
   }
   return result;

@@ -86,7 +86,7 @@ struct Column {
     Integer unknown;
     for (std::size_t i = 0; i < map.n; ++i) {
       middle.push_back(column[i].middle());
-      unknown += times_up(column[i].hi - column[i].lo + 1, map.coordinate[i]);
+      unknown += times_up(column[i].upper - column[i].lower + 1, map.coordinate[i]);
     }
     *this = Column(map, std::move(middle), std::move(unknown));
   }

@@ -17,7 +17,7 @@ FixedRanges product(const FixedRanges& a, const FixedRanges& b) {
   FixedRanges result = zeros(a.size(), b.front().size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t k = 0; k < b.size(); ++k) {
-      if (a[i][k].lo == 0 && a[i][k].hi == 0) continue;
+      if (a[i][k].lower == 0 && a[i][k].upper == 0) continue;
       for (std::size_t j = 0; j < b.front().size(); ++j) result[i][j].add_product(a[i][k], b[k][j]);
     }
   }
@@ -50,8 +50,8 @@ FixedRanges exponential(const Square& generator, const Rational& t) {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) {
         FixedRange quotient;  // by the factorial, so that no division adds up
-        mpz_fdiv_q(quotient.lo.get_mpz_t(), term[i][j].lo.get_mpz_t(), factorial.get_mpz_t());
-        mpz_cdiv_q(quotient.hi.get_mpz_t(), term[i][j].hi.get_mpz_t(), factorial.get_mpz_t());
+        mpz_fdiv_q(quotient.lower.get_mpz_t(), term[i][j].lower.get_mpz_t(), factorial.get_mpz_t());
+        mpz_cdiv_q(quotient.upper.get_mpz_t(), term[i][j].upper.get_mpz_t(), factorial.get_mpz_t());
         total[i][j].add(quotient);
       }
     }
@@ -59,7 +59,7 @@ FixedRanges exponential(const Square& generator, const Rational& t) {
   factorial *= kTaylorTerms + 1;
   const Integer missed = ceil_fixed(two_to(-kTaylorTerms) / Rational(factorial));
   for (FixedRangeRow& row : total) {
-    for (FixedRange& x : row) x.lo -= missed, x.hi += missed;
+    for (FixedRange& x : row) x.lower -= missed, x.upper += missed;
   }
   for (int k = 0; k < halvings; ++k) total = product(total, total);
   return total;
@@ -143,7 +143,7 @@ void PeriodMap::enclose_middle() {
   for (const FixedRangeRow& row : M) {
     for (const FixedRange& x : row) {
       middle.push_back(x.middle());
-      spread = std::max<Integer>(spread, x.hi - x.lo + 1);
+      spread = std::max<Integer>(spread, x.upper - x.lower + 1);
     }
   }
 }

@@ -12,19 +12,20 @@ namespace swarmcert::check {
 
 /// A number between two fixed-point numbers.
 struct FixedRange {
-  Integer lo, hi;
+  Integer lower, upper;
 
   FixedRange() = default;
-  explicit FixedRange(const Rational& x) : lo(floor_fixed(x)), hi(ceil_fixed(x)) {}
-  explicit FixedRange(const Integer& fixed) : lo(fixed), hi(fixed) {}
-  void add(const FixedRange& other) { lo += other.lo, hi += other.hi; }
+  explicit FixedRange(const Rational& x) : lower(floor_fixed(x)), upper(ceil_fixed(x)) {}
+  explicit FixedRange(const Integer& fixed) : lower(fixed), upper(fixed) {}
+  void add(const FixedRange& other) { lower += other.lower, upper += other.upper; }
   void add_product(const FixedRange& a, const FixedRange& b) {
-    const std::array<Integer, 4> ends = {a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi};
-    lo += *std::min_element(ends.begin(), ends.end()) >> kBits;
-    hi += (*std::max_element(ends.begin(), ends.end()) >> kBits) + 1;
+    const std::array<Integer, 4> ends = {a.lower * b.lower, a.lower * b.upper, a.upper * b.lower,
+                                         a.upper * b.upper};
+    lower += *std::min_element(ends.begin(), ends.end()) >> kBits;
+    upper += (*std::max_element(ends.begin(), ends.end()) >> kBits) + 1;
   }
-  Integer middle() const { return (lo + hi) >> 1; }
-  Integer magnitude() const { return std::max<Integer>(abs(lo), abs(hi)); }
+  Integer middle() const { return (lower + upper) >> 1; }
+  Integer magnitude() const { return std::max<Integer>(abs(lower), abs(upper)); }
 };
 using FixedRangeRow = std::vector<FixedRange>;
 using FixedRanges = std::vector<FixedRangeRow>;

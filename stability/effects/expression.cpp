@@ -50,8 +50,8 @@ EffectInfo describe(const EffectSpec& spec) {
   const auto parameter = [&](const std::string& name, double value) {
     Parameter result = {name, "", value, -kInfinity, kInfinity};
     if (const auto bounds = spec.expression.bounds.find(name); bounds != spec.expression.bounds.end()) {
-      result.lower = bounds->second.first;
-      result.upper = bounds->second.second;
+      result.lower = bounds->second.lower;
+      result.upper = bounds->second.upper;
     }
     if (const auto grid = spec.expression.grid.find(name); grid != spec.expression.grid.end()) {
       result.grid = grid->second;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::stability {
 
@@ -14,8 +14,8 @@ struct RestToRestRange {
   Interval s, ds, dds, ddds;
 
   explicit RestToRestRange(Interval x) {
-    const double a = std::clamp(x.lo, 0.0, 1.0);
-    const double b = std::clamp(x.hi, 0.0, 1.0);
+    const double a = std::clamp(x.lower, 0.0, 1.0);
+    const double b = std::clamp(x.upper, 0.0, 1.0);
     s = hull(position(a), position(b));
     ds = hull(speed(a), speed(b));
     dds = hull(acceleration(a), acceleration(b));
@@ -23,9 +23,9 @@ struct RestToRestRange {
     if (a <= 0.5 && b >= 0.5) ds = hull(ds, speed(0.5)), ddds = hull(ddds, jerk(0.5));
     // dds is extreme at u = 1/5, ddds at u = 1/10: enclosures of x = (1 -+ sqrt(1 - 4 u))/2.
     for (const Interval at : {Interval(0.276393202, 0.276393203), Interval(0.723606797, 0.723606798)})
-      if (a <= at.hi && b >= at.lo) dds = hull(dds, acceleration(at));
+      if (a <= at.upper && b >= at.lower) dds = hull(dds, acceleration(at));
     for (const Interval at : {Interval(0.112701665, 0.112701666), Interval(0.887298334, 0.887298335)})
-      if (a <= at.hi && b >= at.lo) ddds = hull(ddds, jerk(at));
+      if (a <= at.upper && b >= at.lower) ddds = hull(ddds, jerk(at));
     const Interval rounding(-1e-13, 1e-13);
     s += rounding, ds += rounding, dds += rounding, ddds += rounding;
   }

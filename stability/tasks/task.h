@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::stability {
 

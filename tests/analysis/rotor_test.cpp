@@ -44,8 +44,8 @@ TEST(RotorBalance, NamesTheWeakRotorWithItsFactor) {
       EXPECT_EQ(balance.rotor, weak + 1);
       const RotorFactor& found = balance.factors[static_cast<std::size_t>(weak)];
       EXPECT_NEAR(found.value, factor, 1e-12);
-      EXPECT_LT(found.interval.first, factor);
-      EXPECT_GT(found.interval.second, factor);
+      EXPECT_LT(found.interval.lower, factor);
+      EXPECT_GT(found.interval.upper, factor);
       const std::string words = in_words(balance);
       EXPECT_NE(words.find("is weak, or carries a load near it"), std::string::npos) << words;
       EXPECT_EQ(words.find("cut"), std::string::npos) << "a load looks the same";
@@ -98,7 +98,7 @@ TEST(RotorFit, OfOneFlightIsAsUncertainAsTheBatterysPlace) {
   const RotorFactors one = rotor_factors({loads(kHealthy_N)}, {1}, model);
   const double lever_m = model.arm_m * std::sqrt(0.5);
   for (const RotorFactor& factor : one)
-    EXPECT_NEAR((factor.interval.second - factor.interval.first) / 2, factor.value * kBatteryPlay_m / lever_m,
+    EXPECT_NEAR((factor.interval.upper - factor.interval.lower) / 2, factor.value * kBatteryPlay_m / lever_m,
                 1e-12);
 }
 

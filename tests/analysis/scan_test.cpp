@@ -175,8 +175,8 @@ TEST(Scan, FindsTheVariableOfEachForm) {
     EXPECT_EQ(first.variable, cases[c].variable);
     EXPECT_EQ(first.axis, std::string(1, "xyz"[cases[c].axis]));
     EXPECT_GT(first.share, 0.5);
-    EXPECT_LE(first.share_interval.first, first.share);
-    EXPECT_GE(first.share_interval.second, first.share);
+    EXPECT_LE(first.share_interval.lower, first.share);
+    EXPECT_GE(first.share_interval.upper, first.share);
   }
 }
 

@@ -137,12 +137,12 @@ void coverage(const std::string& folder, int count, double gust_N, double gust_t
           if (value == c.values.end()) continue;
           Count& to = counts[name];
           ++to.runs;
-          to.below += interval.second < value->second;
-          to.above += interval.first > value->second;
+          to.below += interval.upper < value->second;
+          to.above += interval.lower > value->second;
           const double error = missing.parameters.at(name) - value->second;
           to.sum += error;
           to.squares += error * error;
-          to.half_widths += (interval.second - interval.first) / 2;
+          to.half_widths += (interval.upper - interval.lower) / 2;
         }
       }
     }

@@ -64,7 +64,7 @@ TEST(Conformal, CoversFurtherFlightsAsOftenAsItPromises) {
     covered += score(random) <= result.threshold ? 1 : 0;
     // P(score <= threshold) of the known distribution.
     const double coverage = 0.5 * std::erfc(-std::log(result.threshold) / 1.5 / std::sqrt(2.0));
-    inside += coverage >= result.coverage_90[0] && coverage <= result.coverage_90[1] ? 1 : 0;
+    inside += coverage >= result.coverage_90.lower && coverage <= result.coverage_90.upper ? 1 : 0;
   }
   // k/(n + 1) = 28/31 in the mean; standard deviation 0.005.
   EXPECT_NEAR(static_cast<double>(covered) / kRepeats, 28.0 / 31, 0.02);

@@ -46,10 +46,10 @@ TEST(KeptPromise, CountsFlightsAndLeavesThoseOutThatItWasMadeFrom) {
   EXPECT_EQ(kept.axes[2].held, 18);
   EXPECT_EQ(kept.worst_axis(), 2);
   // Clopper and Pearson for 18 of 20, by the incomplete beta function; all of 20: 0.05^(1/20).
-  EXPECT_NEAR(kept.axes[2].interval_90[0], 0.7174, 1e-4);
-  EXPECT_NEAR(kept.axes[2].interval_90[1], 0.9819, 1e-4);
-  EXPECT_NEAR(kept.axes[0].interval_90[0], std::pow(0.05, 0.05), 1e-9);
-  EXPECT_EQ(kept.axes[0].interval_90[1], 1);
+  EXPECT_NEAR(kept.axes[2].interval_90.lower, 0.7174, 1e-4);
+  EXPECT_NEAR(kept.axes[2].interval_90.upper, 0.9819, 1e-4);
+  EXPECT_NEAR(kept.axes[0].interval_90.lower, std::pow(0.05, 0.05), 1e-9);
+  EXPECT_EQ(kept.axes[0].interval_90.upper, 1);
   // One log of a flight is enough to leave all of it out.
   promise.made_from = {files::sha256("second"), files::sha256("flight0")};
   kept = kept_promise(promise, peaks);

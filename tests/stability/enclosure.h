@@ -3,20 +3,20 @@
 
 #include <gtest/gtest.h>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::tests {
 
 /// `interval` holds a number within `estimate_error` (relative) of `value`, has a width, and one below
 /// `relative_width`.
-inline testing::AssertionResult encloses(const stability::Interval& interval, double value,
-                                         double relative_width, double estimate_error = 0) {
-  if (!(interval.lo <= value * (1 + estimate_error) && value * (1 - estimate_error) <= interval.hi)) {
+inline testing::AssertionResult encloses(const Interval& interval, double value, double relative_width,
+                                         double estimate_error = 0) {
+  if (!(interval.lower <= value * (1 + estimate_error) && value * (1 - estimate_error) <= interval.upper)) {
     return testing::AssertionFailure()
-           << value << " is not in [" << interval.lo << ", " << interval.hi << "]";
+           << value << " is not in [" << interval.lower << ", " << interval.upper << "]";
   }
-  if (!(interval.hi > interval.lo)) return testing::AssertionFailure() << "no width at " << value;
-  const double width = (interval.hi - interval.lo) / value;
+  if (!(interval.upper > interval.lower)) return testing::AssertionFailure() << "no width at " << value;
+  const double width = (interval.upper - interval.lower) / value;
   if (!(width < relative_width)) return testing::AssertionFailure() << "width " << width;
   return testing::AssertionSuccess();
 }

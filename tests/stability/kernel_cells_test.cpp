@@ -24,15 +24,15 @@ TEST(KernelCells, SumUpToTheVerifiedNormsFromAbove) {
       const auto h1 = kernel_cells(impulse_transfer(loop, channel), 0.025, 2400);
       ASSERT_TRUE(norms && h && h1);
       const auto expect_above = [](double value, Interval exact) {
-        EXPECT_GE(value, exact.lo * (1 - 1e-4));  // 60 s of it
-        EXPECT_LE(value, exact.hi * (1 + 2e-4));
+        EXPECT_GE(value, exact.lower * (1 - 1e-4));  // 60 s of it
+        EXPECT_LE(value, exact.upper * (1 + 2e-4));
       };
       expect_above(h->total(), norms->rate);
       expect_above(h1->total(), norms->amplitude);
-      EXPECT_GE(h->peak, norms->edge.lo);
-      EXPECT_LE(h->peak, norms->edge.hi * (1 + 2e-4));
-      EXPECT_GE(h1->peak, norms->impulse.lo);
-      EXPECT_LE(h1->peak, norms->impulse.hi * (1 + 1e-3));
+      EXPECT_GE(h->peak, norms->edge.lower);
+      EXPECT_LE(h->peak, norms->edge.upper * (1 + 2e-4));
+      EXPECT_GE(h1->peak, norms->impulse.lower);
+      EXPECT_LE(h1->peak, norms->impulse.upper * (1 + 1e-3));
     }
   }
 }
@@ -53,9 +53,9 @@ TEST(KernelCells, EveryCellIsAtLeastTheFineSumOfItsResponse) {
         net += (values[at] + values[at + 1]) / 2 * 0.05 / parts;
       }
       const Interval& in_cell = cells->net[static_cast<std::size_t>(k)];
-      ASSERT_GE(net, in_cell.lo - 1e-5 * sum);
-      ASSERT_LE(net, in_cell.hi + 1e-5 * sum);
-      ASSERT_LE(in_cell.hi - in_cell.lo, 3e-5 * cells->total());
+      ASSERT_GE(net, in_cell.lower - 1e-5 * sum);
+      ASSERT_LE(net, in_cell.upper + 1e-5 * sum);
+      ASSERT_LE(in_cell.upper - in_cell.lower, 3e-5 * cells->total());
       ASSERT_GE(cells->integral[static_cast<std::size_t>(k)], sum * (1 - 1e-5));
       ASSERT_LE(cells->integral[static_cast<std::size_t>(k)], sum + 2e-5 * cells->total());
     }
@@ -121,11 +121,11 @@ Outside outside(const KernelCells& kernel, const std::vector<double>& y, double 
       const double y_at =
           (y[static_cast<std::size_t>(end - i)] + y[static_cast<std::size_t>(end - i - 1)]) / 2;
       const Interval& range = w[static_cast<std::size_t>(i / parts)];
-      reached[0] += y_at * (y_at >= 0 ? range.lo : range.hi) * step_s;
-      reached[1] += y_at * (y_at >= 0 ? range.hi : range.lo) * step_s;
+      reached[0] += y_at * (y_at >= 0 ? range.lower : range.upper) * step_s;
+      reached[1] += y_at * (y_at >= 0 ? range.upper : range.lower) * step_s;
     }
-    if (reached[0] < answered.lo || reached[1] > answered.hi) ++result.count;
-    result.widest = std::max(result.widest, (reached[1] - reached[0]) / (answered.hi - answered.lo));
+    if (reached[0] < answered.lower || reached[1] > answered.upper) ++result.count;
+    result.widest = std::max(result.widest, (reached[1] - reached[0]) / (answered.upper - answered.lower));
   }
   return result;
 }

@@ -34,7 +34,7 @@ TEST(Tasks, RangesHoldEverySetPointOfTheirTimeAndAreNarrow) {
   for (const char* const name : {"swap", "hover"}) {
     const auto task = make_task(name, {3, 0, 0});
     const auto in = [](Interval range, double x, double rounding) {
-      return range.lo - rounding <= x && x <= range.hi + rounding;
+      return range.lower - rounding <= x && x <= range.upper + rounding;
     };
     double widest_m = 0;
     for (int k = 0; k < 400; ++k) {
@@ -54,7 +54,7 @@ TEST(Tasks, RangesHoldEverySetPointOfTheirTimeAndAreNarrow) {
             ASSERT_TRUE(in(range->jerk_W_m_s3[axis], jerk, 1e-4)) << name << t;
           }
         }
-        if (k % 5 != 0) widest_m = std::max(widest_m, range->p_W_m[0].hi - range->p_W_m[0].lo);
+        if (k % 5 != 0) widest_m = std::max(widest_m, range->p_W_m[0].upper - range->p_W_m[0].lower);
       }
     }
     EXPECT_LT(widest_m, 0.02 * 0.6) << "at most the peak speed times the time";

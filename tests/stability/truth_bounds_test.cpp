@@ -283,19 +283,19 @@ TEST(IntervalFunctions, EncloseTheFunctionsOfLongDouble) {
   for (int i = 0; i < 20000; ++i) {
     const double x = (unit(random) - 0.5) * std::pow(10, 5 * unit(random) - 3);
     const Interval e = exp_of(x);
-    ASSERT_LE(e.lo, std::exp(static_cast<long double>(x))) << x;
-    ASSERT_GE(e.hi, std::exp(static_cast<long double>(x))) << x;
+    ASSERT_LE(e.lower, std::exp(static_cast<long double>(x))) << x;
+    ASSERT_GE(e.upper, std::exp(static_cast<long double>(x))) << x;
     if (std::abs(x) < 50) {
-      ASSERT_LT(e.hi - e.lo, 1e-12 * e.hi) << x;
+      ASSERT_LT(e.upper - e.lower, 1e-12 * e.upper) << x;
     }
     const double y = std::pow(10, 12 * unit(random) - 6);
     const Interval l = log_of(y);
-    ASSERT_LE(l.lo, std::log(static_cast<long double>(y)));
-    ASSERT_GE(l.hi, std::log(static_cast<long double>(y)));
+    ASSERT_LE(l.lower, std::log(static_cast<long double>(y)));
+    ASSERT_GE(l.upper, std::log(static_cast<long double>(y)));
     const double n = 4 * unit(random);
     const Interval p = pow(Interval(y), n);
-    ASSERT_LE(p.lo, std::pow(static_cast<long double>(y), static_cast<long double>(n)));
-    ASSERT_GE(p.hi, std::pow(static_cast<long double>(y), static_cast<long double>(n)));
+    ASSERT_LE(p.lower, std::pow(static_cast<long double>(y), static_cast<long double>(n)));
+    ASSERT_GE(p.upper, std::pow(static_cast<long double>(y), static_cast<long double>(n)));
   }
 }
 

@@ -43,10 +43,10 @@ class PlantsOf {
   }
 
  private:
-  double in(const Range& r) {
+  double in(const Interval& r) {
     const double share = unit_(random_);
-    if (unit_(random_) < 1.0 / 3) return share < 0.5 ? r.from : r.to;
-    return r.from + share * (r.to - r.from);
+    if (unit_(random_) < 1.0 / 3) return share < 0.5 ? r.lower : r.upper;
+    return r.lower + share * (r.upper - r.lower);
   }
   UncertainPlant box_;
   std::mt19937 random_{4};
@@ -97,12 +97,12 @@ TEST(UncertainNorms, NoContinuousLoopOfABoxExceedsItsSupremumAndItIsNear) {
                        {no_integral, kDefault, 0.02}};
   for (const Box& box : boxes) {
     for (const Channel channel : {Channel::kForce, Channel::kCommand}) {
-      SCOPED_TRACE(testing::Message() << box.told.Kp << " " << box.plant.lag_s.to);
+      SCOPED_TRACE(testing::Message() << box.told.Kp << " " << box.plant.lag_s.upper);
       const UncertainNorms norms = uncertain_norms(box.told, box.plant, channel, {box.gap, 2000});
       EXPECT_EQ(norms.end, End::kGap);
       expect_gap(norms, box.gap);
       PlantsOf plants(box.plant);
-      for (int i = 0; i < (box.plant.delay_s.to > 0 ? 20 : 150) && !HasFailure(); ++i) {
+      for (int i = 0; i < (box.plant.delay_s.upper > 0 ? 20 : 150) && !HasFailure(); ++i) {
         expect_below(continuous_norms(plants(box.told), channel), norms);
       }
       if (box.told.Ki > 0) {
@@ -152,7 +152,7 @@ TEST(UncertainNorms, SmallerIntervalsTendToTheCertainNorms) {
   const GainNorms continuous = continuous_norms(certain, Channel::kForce);
   const GainNorms sampled = sampled_norms({certain, 0.01, 0.01}, Channel::kForce, Instants::kSampling);
   for (const double share : {0.04, 0.004, 0.0004, 0.0}) {
-    const auto about = [share](double x) { return Range{x * (1 - share), x * (1 + share)}; };
+    const auto about = [share](double x) { return Interval{x * (1 - share), x * (1 + share)}; };
     const UncertainPlant box = {about(kMass_kg), about(1), about(0.0575), about(0.006)};
     // No refinement: what a single part gives.
     const double upper = uncertain_norms(kLoop, box, Channel::kForce, {0, 1}).amplitude.upper;

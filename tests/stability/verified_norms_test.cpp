@@ -62,7 +62,7 @@ TEST(VerifiedNorms, WithoutIntegralTheOtherGainsAreEnclosed) {
     const auto norms = verified_norms(loop, Channel::kForce);
     ASSERT_TRUE(norms.has_value());
     const GainNorms estimate = continuous_norms(loop, Channel::kForce);
-    EXPECT_TRUE(std::isinf(norms->rate.lo));
+    EXPECT_TRUE(std::isinf(norms->rate.lower));
     EXPECT_TRUE(encloses(norms->amplitude, estimate.amplitude, 1e-8));
     EXPECT_TRUE(encloses(norms->edge, estimate.edge, 1e-8));
     EXPECT_TRUE(encloses(norms->impulse, estimate.impulse, 1e-8));
@@ -85,7 +85,7 @@ TEST(VerifiedNorms, GainsOfErrorsOfTheEstimatesAreEnclosed) {
       EXPECT_TRUE(tests::encloses(norms->edge, exact.edge, 1e-5, 1e-7));
       EXPECT_TRUE(tests::encloses(norms->impulse, exact.impulse, 1e-5, 1e-7));
       if (std::isinf(exact.rate)) {
-        EXPECT_TRUE(std::isinf(norms->rate.hi));
+        EXPECT_TRUE(std::isinf(norms->rate.upper));
       } else {
         EXPECT_TRUE(tests::encloses(norms->rate, exact.rate, 1e-5, 1e-7));
       }
@@ -149,11 +149,11 @@ TEST(VerifiedNorms, AnUnstableLoopIsNotVerified) {
 
 TEST(Interval, EveryOperationIsWiderThanRounding) {
   const Interval third = Interval(1) / Interval(3);
-  EXPECT_LT(third.lo, third.hi);
+  EXPECT_LT(third.lower, third.upper);
   const Interval one = third * Interval(3);
-  EXPECT_LE(one.lo, 1);
-  EXPECT_GE(one.hi, 1);
-  EXPECT_LT((Interval(0.1) + Interval(0.2)).lo, (Interval(0.1) + Interval(0.2)).hi);
+  EXPECT_LE(one.lower, 1);
+  EXPECT_GE(one.upper, 1);
+  EXPECT_LT((Interval(0.1) + Interval(0.2)).lower, (Interval(0.1) + Interval(0.2)).upper);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ void expect_enclosures(const SampledLoop& loop, Input channel, double width, dou
   EXPECT_TRUE(encloses_estimate(norms->all_times.edge, all.edge, width_between));
   EXPECT_TRUE(encloses_estimate(norms->all_times.impulse, all.impulse, width_between));
   if (std::isinf(at.rate)) {
-    EXPECT_TRUE(std::isinf(norms->at_samples.rate.lo));
+    EXPECT_TRUE(std::isinf(norms->at_samples.rate.lower));
     return;
   }
   EXPECT_TRUE(encloses_estimate(norms->at_samples.rate, at.rate, width));

@@ -46,10 +46,10 @@ TEST(ErrorLoops, RotorsThatStartWithAnExcessOfThrustAreEnclosedSliceBySlice) {
   double largest_m = 0, widest_m = 0;
   for (std::size_t n = 0; n < kSlices; ++n) {
     for (int i = 0; i <= kSteps; ++i) {
-      ASSERT_GE(flown.x[0], start.position_m[n].lo - 1e-12) << n;
-      ASSERT_LE(flown.x[0], start.position_m[n].hi + 1e-12) << n;
-      ASSERT_GE(flown.x[1], start.velocity_m_s[n].lo - 1e-12) << n;
-      ASSERT_LE(flown.x[1], start.velocity_m_s[n].hi + 1e-12) << n;
+      ASSERT_GE(flown.x[0], start.position_m[n].lower - 1e-12) << n;
+      ASSERT_LE(flown.x[0], start.position_m[n].upper + 1e-12) << n;
+      ASSERT_GE(flown.x[1], start.velocity_m_s[n].lower - 1e-12) << n;
+      ASSERT_LE(flown.x[1], start.velocity_m_s[n].upper + 1e-12) << n;
       if (i < kSteps) flown.step(kSlice_s / kSteps);
       largest_m = std::max(largest_m, std::abs(flown.x[0]));
     }

@@ -41,12 +41,12 @@ Campaign fly_in_tube(int flights, const EstimateErrors& estimates) {
       const Deviation& slice = tube.slices[at][static_cast<std::size_t>(vehicle)];
       for (std::size_t k = 0; k < 3; ++k) {
         const Interval range = slice.position_m[k];
-        const double middle = (range.lo + range.hi) / 2;
+        const double middle = (range.lower + range.upper) / 2;
         ++campaign.looks;
-        if (!(e[k] >= range.lo && e[k] <= range.hi)) ++campaign.outside;
+        if (!(e[k] >= range.lower && e[k] <= range.upper)) ++campaign.outside;
         // What moves by less than a tenth of a millimetre shows rounding alone.
-        if (range.hi - range.lo > 1e-4)
-          campaign.nearest = std::max(campaign.nearest, std::abs(e[k] - middle) / (range.hi - middle));
+        if (range.upper - range.lower > 1e-4)
+          campaign.nearest = std::max(campaign.nearest, std::abs(e[k] - middle) / (range.upper - middle));
       }
       campaign.largest_share_z = std::max(campaign.largest_share_z, std::abs(e[2]) / radius_z_m);
     });

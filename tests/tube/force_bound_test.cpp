@@ -34,13 +34,14 @@ double largest_share(const Scene& scene, const files::Network& network, const st
     for (int i = 0; i < 60; ++i) {
       std::vector<double> seen, now;
       for (const Interval& x : states)
-        seen.push_back(i % 2 == 0 ? (random.below(2) == 0 ? x.lo : x.hi) : between(random, x.lo, x.hi));
+        seen.push_back(i % 2 == 0 ? (random.below(2) == 0 ? x.lower : x.upper)
+                                  : between(random, x.lower, x.upper));
       now = seen;
       const double age_s = between(random, 0, scene.network_age_s());
       for (int n = 0; n + 1 < scene.vehicles(); ++n) {
         for (int k = 0; k < 3; ++k) {
           const auto at = static_cast<std::size_t>(n * kPerNeighbour + k);
-          now[at] += age_s * between(random, states[at + 3].lo, states[at + 3].hi);
+          now[at] += age_s * between(random, states[at + 3].lower, states[at + 3].upper);
         }
       }
       const double learned = forces.learned(forces.at(seen, scene.vehicles() - 1));

@@ -108,7 +108,7 @@ TEST(LocalTube, MotorsLagAsTheTruthSaysWhateverTheGainsState) {
           const auto at = static_cast<std::size_t>(std::floor((t - 1e-9) / tube.slice_s));
           const Deviation& slice = tube.slices[at][static_cast<std::size_t>(vehicle)];
           for (std::size_t k = 0; k < 3; ++k)
-            if (e[k] < slice.position_m[k].lo || e[k] > slice.position_m[k].hi) ++count;
+            if (e[k] < slice.position_m[k].lower || e[k] > slice.position_m[k].upper) ++count;
         });
     return count;
   };
@@ -154,8 +154,8 @@ TEST(LocalTube, SliceBySliceTheShippedGainsAreProvedWhereOneRadiusHasAGainAboveO
       for (std::size_t i = 0; i < 2; ++i) {
         for (std::size_t k = 0; k < 3; ++k) {
           const Interval e = tube.slices[n][i].position_m[k];
-          ASSERT_LE(e.lo, e.hi);
-          ASSERT_GE(e.lo, tube.sliced.slices[n][i].position_m[k].lo);
+          ASSERT_LE(e.lower, e.upper);
+          ASSERT_GE(e.lower, tube.sliced.slices[n][i].position_m[k].lower);
           ASSERT_LE(e.mag(), tube.tube.radii.position_m[i][k]);
         }
       }

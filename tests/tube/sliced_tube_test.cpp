@@ -36,11 +36,11 @@ Seen fly(const stability::TrackingSetup& loop, const stability::Model& truth, co
   Seen seen;
   const auto check = [&seen](Interval range, double value) {
     ++seen.looks;
-    const double middle = (range.lo + range.hi) / 2;
-    const double share = std::abs(value - middle) / (range.hi - middle);
-    if (value < range.lo || value > range.hi) ++seen.outside;
+    const double middle = (range.lower + range.upper) / 2;
+    const double share = std::abs(value - middle) / (range.upper - middle);
+    if (value < range.lower || value > range.upper) ++seen.outside;
     // What moves by less than a tenth of a millimetre shows rounding alone.
-    if (range.hi - range.lo > 1e-4) seen.nearest = std::max(seen.nearest, share);
+    if (range.upper - range.lower > 1e-4) seen.nearest = std::max(seen.nearest, share);
   };
   for (int i = 0; i < flights; ++i) {
     flight.fly(random,
@@ -193,8 +193,8 @@ TEST(SlicedTube, FinerSlicesAreNeverWiderAndLaterSlicesChangeNothingBefore) {
     const SlicedTube first = sliced_tube(start, boxes(8), kTolerance_N);
     ASSERT_TRUE(first.proved);
     for (std::size_t n = 0; n + 1 < first.slices.size(); ++n) {
-      EXPECT_NEAR(first.slices[n][0].position_m[2].lo, tube.slices[n][0].position_m[2].lo, 1e-9) << n;
-      EXPECT_NEAR(first.slices[n][0].position_m[2].hi, tube.slices[n][0].position_m[2].hi, 1e-9) << n;
+      EXPECT_NEAR(first.slices[n][0].position_m[2].lower, tube.slices[n][0].position_m[2].lower, 1e-9) << n;
+      EXPECT_NEAR(first.slices[n][0].position_m[2].upper, tube.slices[n][0].position_m[2].upper, 1e-9) << n;
     }
   }
 }

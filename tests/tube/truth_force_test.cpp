@@ -72,8 +72,8 @@ void expect_enclosed(const stability::Model& model, int neighbours, std::uint64_
         Eigen::Vector3d p;
         for (int k = 0; k < 3; ++k) {
           const auto at = static_cast<std::size_t>(k);
-          p[k] = i < 2 ? (i == 0 ? set[j][at].lo : set[j][at].hi)
-                       : between(random, set[j][at].lo, set[j][at].hi);
+          p[k] = i < 2 ? (i == 0 ? set[j][at].lower : set[j][at].upper)
+                       : between(random, set[j][at].lower, set[j][at].upper);
           sloping += wake.gradient_N_m[j][at] * (Interval(p[k]) - middle[j][at]);
         }
         dp.push_back(p);
@@ -81,12 +81,12 @@ void expect_enclosed(const stability::Model& model, int neighbours, std::uint64_
       const double force = simulated(model, dp);
       strong += std::abs(force) > 0.01 ? 1 : 0;
       const double rounding = 1e-13 * (1 + std::abs(force));
-      ASSERT_GE(force, wake.value_N.lo - rounding) << box;
-      ASSERT_LE(force, wake.value_N.hi + rounding) << box;
+      ASSERT_GE(force, wake.value_N.lower - rounding) << box;
+      ASSERT_LE(force, wake.value_N.upper + rounding) << box;
       if (!wake.has_gradient) continue;
       ++sloped;
-      ASSERT_GE(force, sloping.lo - rounding) << box;
-      ASSERT_LE(force, sloping.hi + rounding) << box;
+      ASSERT_GE(force, sloping.lower - rounding) << box;
+      ASSERT_LE(force, sloping.upper + rounding) << box;
     }
   }
   EXPECT_GT(strong, 400) << "the boxes must meet the wake";
@@ -112,8 +112,8 @@ TEST(TruthForce, EnclosuresShrinkToThePoint) {
   const TruthForce truth(model_with("downwash", {}), 0.6);
   const Offset point = {Interval(0.03), Interval(-0.02), Interval(0.3)};
   const TruthForce::Wake wake = truth.wake({point});
-  EXPECT_LT(wake.value_N.hi - wake.value_N.lo, 1e-10);
-  EXPECT_LT(wake.gradient_N_m[0][2].hi - wake.gradient_N_m[0][2].lo, 1e-12);
+  EXPECT_LT(wake.value_N.upper - wake.value_N.lower, 1e-10);
+  EXPECT_LT(wake.gradient_N_m[0][2].upper - wake.gradient_N_m[0][2].lower, 1e-12);
 }
 
 TEST(TruthForce, TheRestCoversDragGroundAndConstantForces) {
@@ -131,15 +131,15 @@ TEST(TruthForce, TheRestCoversDragGroundAndConstantForces) {
     now.mass_kg = model.mass_kg;
     now.thrust_N = between(random, 0, 0.6);
     now.p_W_m = {0, 0, between(random, 0.05, 0.6)};
-    for (int k = 0; k < 3; ++k) now.v_W_m_s[k] = between(random, velocity[k].lo, velocity[k].hi);
+    for (int k = 0; k < 3; ++k) now.v_W_m_s[k] = between(random, velocity[k].lower, velocity[k].upper);
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
     for (const EffectSpec& spec : model.effects) {
       if (spec.name == "motor_lag" || spec.name == "downwash") continue;
       force += AppliedEffect(spec, {model.kind, {model.kind}, model.path}).wrench(now).force_W_N;
     }
     for (int k = 0; k < 3; ++k) {
-      ASSERT_GE(force[k], rest.force_N[k].lo - 1e-13);
-      ASSERT_LE(force[k], rest.force_N[k].hi + 1e-13);
+      ASSERT_GE(force[k], rest.force_N[k].lower - 1e-13);
+      ASSERT_LE(force[k], rest.force_N[k].upper + 1e-13);
     }
   }
 }

@@ -83,8 +83,8 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
         rows.push_back({effect.name, effect.vehicle, name, fmt::format("{:.6g}", beyond + value),
                         interval == effect.fit.interval.end()
                             ? "-"
-                            : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.first,
-                                          beyond + interval->second.second)});
+                            : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.lower,
+                                          beyond + interval->second.upper)});
       }
     }
     if (!rows.empty()) report.table({"effect", "vehicle", "parameter", "value", "90 %"}, rows);

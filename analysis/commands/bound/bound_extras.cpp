@@ -21,31 +21,32 @@ using files::Json;
 using namespace stability;  // NOLINT: every name below is of that library
 
 /// "0.032:0.037"
-Range range_of(const std::string& word, const std::string& text) {
+Interval range_of(const std::string& word, const std::string& text) {
   char* end = nullptr;
-  Range range;
-  range.from = std::strtod(text.c_str(), &end);
+  Interval range;
+  range.lower = std::strtod(text.c_str(), &end);
   const bool has_colon = end != text.c_str() && *end == ':';
   const char* second = has_colon ? end + 1 : end;
-  if (has_colon) range.to = std::strtod(second, &end);
-  if (!has_colon || end == second || *end != '\0' || !(range.from <= range.to) || !(range.from >= 0) ||
-      !std::isfinite(range.to)) {
+  if (has_colon) range.upper = std::strtod(second, &end);
+  if (!has_colon || end == second || *end != '\0' || !(range.lower <= range.upper) || !(range.lower >= 0) ||
+      !std::isfinite(range.upper)) {
     throw UsageError("--uncertain " + word + ": write NAME=FROM:TO, e.g. mass=0.032:0.037");
   }
   return range;
 }
 
 /// Refuses an interval in another unit: battery in mV, times in ms, the thrust's scale in percent.
-void check_range(const std::string& word, const std::string& name, const Range& range, const Model& model) {
+void check_range(const std::string& word, const std::string& name, const Interval& range,
+                 const Model& model) {
   constexpr double kLongest_s = 1, kLargestScale = 10;
   std::string problem;
   if (name == "battery") {
-    problem = battery_problem(model, range.from);
-    if (problem.empty()) problem = battery_problem(model, range.to);
-  } else if ((name == "lag" || name == "delay") && range.to > kLongest_s) {
-    problem = fmt::format("{:g} is longer than 1 s; {} is in seconds: 20 ms are 0.02", range.to, name);
-  } else if (name == "thrust" && range.to > kLargestScale) {
-    problem = fmt::format("{:g} times the modelled thrust; thrust is a factor: 90 % are 0.9", range.to);
+    problem = battery_problem(model, range.lower);
+    if (problem.empty()) problem = battery_problem(model, range.upper);
+  } else if ((name == "lag" || name == "delay") && range.upper > kLongest_s) {
+    problem = fmt::format("{:g} is longer than 1 s; {} is in seconds: 20 ms are 0.02", range.upper, name);
+  } else if (name == "thrust" && range.upper > kLargestScale) {
+    problem = fmt::format("{:g} times the modelled thrust; thrust is a factor: 90 % are 0.9", range.upper);
   }
   if (!problem.empty()) throw UsageError("--uncertain " + word + ": " + problem);
 }
@@ -57,31 +58,32 @@ UncertainPlant intervals_of(const Tracking& input, const std::vector<std::string
     if (word == "default") continue;
     const std::size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
-    const Range range = range_of(word, equals == std::string::npos ? "" : word.substr(equals + 1));
+    const Interval range = range_of(word, equals == std::string::npos ? "" : word.substr(equals + 1));
     check_range(word, name, range, input.model);
-    if (name == "mass" && range.from > 0) {
+    if (name == "mass" && range.lower > 0) {
       const double lifted_kg = input.plant.largest_thrust_N / kGravity_m_s2;
-      if (lifted_kg > 0 && range.from > lifted_kg) {
+      if (lifted_kg > 0 && range.lower > lifted_kg) {
         throw UsageError(
             fmt::format("--uncertain {}: the rotors lift {:.3g} kg; mass is in kg", word, lifted_kg));
       }
       plant.mass_kg = range;
-    } else if (name == "thrust" && range.from > 0) {
+    } else if (name == "thrust" && range.lower > 0) {
       plant.thrust_scale = range;
     } else if (name == "lag") {
       plant.lag_s = range;
     } else if (name == "delay") {
       plant.delay_s = range;
-    } else if (name == "battery" && range.from > 0) {
+    } else if (name == "battery" && range.lower > 0) {
       // Thrust at the PWM that hovers with a full battery, without compensation.
       const auto rotors = static_cast<double>(input.model.num_rotors());
       const double hover = input.model.thrust.pwm(input.model.weight_N() / rotors, kFullBattery_V);
       const auto ratio = [&](double v) {
         return input.model.thrust.force_N(hover, v) * rotors / input.model.weight_N();
       };
-      const double a = ratio(range.from);
-      const double b = ratio(range.to);
-      plant.thrust_scale = {plant.thrust_scale.from * std::min(a, b), plant.thrust_scale.to * std::max(a, b)};
+      const double a = ratio(range.lower);
+      const double b = ratio(range.upper);
+      plant.thrust_scale = {plant.thrust_scale.lower * std::min(a, b),
+                            plant.thrust_scale.upper * std::max(a, b)};
     } else {
       throw UsageError("--uncertain " + word +
                        ": names are mass, thrust, lag, delay, battery; mass and thrust positive");
@@ -246,7 +248,7 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
       gains.push_back(uncertain_row(axis, tasks[next].channel, tasks[next].loop, found[next]));
     }
   }
-  const auto range = [](const Range& r) { return Json{r.from, r.to}; };
+  const auto range = [](const Interval& r) { return Json{r.lower, r.upper}; };
   return {{"mass_kg", range(plant.mass_kg)},
           {"thrust_scale", range(plant.thrust_scale)},
           {"lag_s", range(plant.lag_s)},
@@ -283,7 +285,7 @@ void print_uncertain(const Json& uncertain) {
 
 namespace {
 
-Json enclosure_json(const Interval& x) { return {finite(x.lo), finite(x.hi)}; }
+Json enclosure_json(const Interval& x) { return {finite(x.lower), finite(x.upper)}; }
 
 Json verified_gains_json(const VerifiedNorms& norms) {
   return {{"rate", enclosure_json(norms.rate)},

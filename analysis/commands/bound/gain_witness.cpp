@@ -82,9 +82,10 @@ std::vector<std::vector<double>> in_fixed_point(const MatrixXd& P) {
 
 /// The largest ratio of a bound to the upper end of what is known.
 double excess(const check::GainBounds& bounds, const stability::VerifiedNorms& known) {
-  double most = std::max({bounds.amplitude.get_d() / known.amplitude.hi, bounds.edge.get_d() / known.edge.hi,
-                          bounds.impulse.get_d() / known.impulse.hi});
-  if (bounds.rate) most = std::max(most, bounds.rate->get_d() / known.rate.hi);
+  double most =
+      std::max({bounds.amplitude.get_d() / known.amplitude.upper, bounds.edge.get_d() / known.edge.upper,
+                bounds.impulse.get_d() / known.impulse.upper});
+  if (bounds.rate) most = std::max(most, bounds.rate->get_d() / known.rate.upper);
   return most;
 }
 

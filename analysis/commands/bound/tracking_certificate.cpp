@@ -96,8 +96,8 @@ stability::VerifiedNorms enclosures_of(const Json& gains) {
     const Json& x = gains.at(key).at(1);
     return x.is_null() ? std::numeric_limits<double>::infinity() : x.get<double>();
   };
-  known.rate.hi = upper("rate"), known.amplitude.hi = upper("amplitude");
-  known.edge.hi = upper("edge"), known.impulse.hi = upper("impulse");
+  known.rate.upper = upper("rate"), known.amplitude.upper = upper("amplitude");
+  known.edge.upper = upper("edge"), known.impulse.upper = upper("impulse");
   return known;
 }
 

@@ -172,10 +172,9 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
     for (std::size_t i = 0; i < tube.slices.front().size(); ++i) {
       Json axes = Json::array();
       for (std::size_t k = 0; k < 3; ++k) {
-        stability::Interval e = tube.slices[first][i].position_m[k];
-        for (std::size_t n = first + 1; n < last; ++n)
-          e = stability::hull(e, tube.slices[n][i].position_m[k]);
-        axes.push_back({e.lo, e.hi});
+        Interval e = tube.slices[first][i].position_m[k];
+        for (std::size_t n = first + 1; n < last; ++n) e = hull(e, tube.slices[n][i].position_m[k]);
+        axes.push_back({e.lower, e.upper});
         if (k == 2) largest.push_back(e.mag());
       }
       vehicles.push_back(std::move(axes));

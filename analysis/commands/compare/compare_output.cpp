@@ -39,8 +39,7 @@ files::Json json_of(const residuals::ErrorStatistics& s) {
 files::Json json_of(const residuals::GroupErrors& g) {
   files::Json json = json_of(g.statistics);
   const char* const kAxes[] = {"x", "y", "z", "total"};
-  for (std::size_t k = 0; k < 4; ++k)
-    json["rmse_interval_90"][kAxes[k]] = {g.rmse_interval[k].lower, g.rmse_interval[k].upper};
+  for (std::size_t k = 0; k < 4; ++k) json["rmse_interval_90"][kAxes[k]] = g.rmse_interval[k];
   json["nrmse"] = json_of(g.nrmse);
   json["low_band_to_floor"] = json_of(g.low_band_to_floor);
   json["noise_floor"] = json_of(g.noise_floor_N);

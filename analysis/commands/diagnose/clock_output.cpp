@@ -10,31 +10,28 @@ namespace {
 using identification::ClockOffset;
 
 files::Json ranking_entry_of(const ClockOffset& offset) {
-  return {
-      {"effect", "clock_offset"},
-      {"kind", offset.kind},
-      {"vehicle", offset.vehicle},
-      {"rmse_before", offset.rmse_before_N},
-      {"rmse_after", offset.rmse_after_N},
-      {"drop", 1 - offset.rmse_after_N / offset.rmse_before_N},
-      {"drop_ci", {nullptr, nullptr}},
-      {"parameters",
-       {{"offset_s",
-         {{"value", offset.offset_s}, {"interval_90", {offset.interval.first, offset.interval.second}}}}}},
-      {"per_vehicle", true},
-      {"model_form", files::Json::object()},
-      {"instrument", files::Json::object()},
-      {"class", "clock offset"},
-      {"confounded_with", files::Json::array()},
-      {"rivals", files::Json::array()},
-      {"separated_by", "passes in which each vehicle disturbs the other"},
-      {"paired_z", offset.z},
-      {"wald_z", nullptr},
-      {"records_in_support", offset.records},
-      {"blocks_in_support", offset.records},
-      {"flights_in_support", 1},
-      {"statement", identification::in_words(offset)},
-      {"sensor", true}};
+  return {{"effect", "clock_offset"},
+          {"kind", offset.kind},
+          {"vehicle", offset.vehicle},
+          {"rmse_before", offset.rmse_before_N},
+          {"rmse_after", offset.rmse_after_N},
+          {"drop", 1 - offset.rmse_after_N / offset.rmse_before_N},
+          {"drop_ci", {nullptr, nullptr}},
+          {"parameters", {{"offset_s", {{"value", offset.offset_s}, {"interval_90", offset.interval}}}}},
+          {"per_vehicle", true},
+          {"model_form", files::Json::object()},
+          {"instrument", files::Json::object()},
+          {"class", "clock offset"},
+          {"confounded_with", files::Json::array()},
+          {"rivals", files::Json::array()},
+          {"separated_by", "passes in which each vehicle disturbs the other"},
+          {"paired_z", offset.z},
+          {"wald_z", nullptr},
+          {"records_in_support", offset.records},
+          {"blocks_in_support", offset.records},
+          {"flights_in_support", 1},
+          {"statement", identification::in_words(offset)},
+          {"sensor", true}};
 }
 
 }  // namespace

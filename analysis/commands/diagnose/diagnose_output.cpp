@@ -24,7 +24,7 @@ constexpr const char* kDetectableMeaning =
 files::Json json_of(const identification::InstrumentedValue& value, double beyond) {
   return {{"least_squares", beyond + value.least_squares},
           {"instrument", beyond + value.instrument},
-          {"interval_90", {beyond + value.interval.first, beyond + value.interval.second}},
+          {"interval_90", {beyond + value.interval.lower, beyond + value.interval.upper}},
           {"difference_z", value.difference_z},
           {"verdict", !value.is_strong()    ? "too_weak"
                       : value.contradicts() ? "contradicts"
@@ -45,7 +45,7 @@ files::Json json_of(const Missing& missing) {
     const std::string& name = missing.coefficients[c];
     const double beyond = shown_beyond_file(missing.effect, name);
     if (c < finding.model_form.size())
-      model_form[name] = {beyond + finding.model_form[c].first, beyond + finding.model_form[c].second};
+      model_form[name] = {beyond + finding.model_form[c].lower, beyond + finding.model_form[c].upper};
     if (c < missing.instrument.size()) instrument[name] = json_of(missing.instrument[c], beyond);
   }
   files::Json rivals = files::Json::array();
@@ -56,7 +56,7 @@ files::Json json_of(const Missing& missing) {
                       {"rmse_before", finding.rmse_before_N},
                       {"rmse_after", finding.rmse_after_N},
                       {"drop", 1 - finding.rmse_after_N / finding.rmse_before_N},
-                      {"drop_ci", {finding.drop_interval.first, finding.drop_interval.second}},
+                      {"drop_ci", finding.drop_interval},
                       {"parameters", values_json(missing.effect, missing.parameters, missing.intervals)},
                       {"per_vehicle", !missing.specs.empty() && !missing.specs[0].vehicle.empty()},
                       {"model_form", std::move(model_form)},
@@ -78,8 +78,8 @@ void print(const Missing& missing, int flights) {
   const identification::Finding& finding = missing.finding;
   fmt::print("  {:<15} RMSE {:.5f} -> {:.5f} N ({:.1f} %, 90 %: {:.1f} .. {:.1f})\n", missing.effect,
              finding.rmse_before_N, finding.rmse_after_N,
-             100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.first,
-             100 * finding.drop_interval.second);
+             100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.lower,
+             100 * finding.drop_interval.upper);
   if (is_sensor_error(missing.effect)) fmt::print("    {}\n", sensor_words(missing.effect));
   print_values(missing.effect, "    ", missing.parameters, missing.intervals);
   for (std::size_t c = 0; c < missing.instrument.size(); ++c) {
@@ -87,7 +87,7 @@ void print(const Missing& missing, int flights) {
     if (!value.is_strong()) continue;
     const double beyond = shown_beyond_file(missing.effect, missing.coefficients[c]);
     fmt::print("    by instrument (set points) {} = {:.4g}, 90 % {:.4g} .. {:.4g}\n", missing.coefficients[c],
-               beyond + value.instrument, beyond + value.interval.first, beyond + value.interval.second);
+               beyond + value.instrument, beyond + value.interval.lower, beyond + value.interval.upper);
   }
   if (flights > 1 && finding.support.flights == 1) fmt::print("    seen in 1 flight of {}\n", flights);
   if (missing.equivalence_class != missing.effect)
@@ -111,7 +111,7 @@ files::Json json_of(const Diagnosis& diagnosis) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
     kind["thrust_scale"] = {{"least_squares", 1 + scale.least_squares},
                             {"instrument", 1 + scale.instrument},
-                            {"interval_90", {1 + scale.interval.first, 1 + scale.interval.second}},
+                            {"interval_90", {1 + scale.interval.lower, 1 + scale.interval.upper}},
                             {"difference_z", scale.difference_z}};
   }
   return kind;
@@ -154,8 +154,8 @@ void print_diagnosis(const Diagnosis& diagnosis) {
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
     fmt::print("  Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f})\n",
-               1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.first,
-               1 + scale.interval.second);
+               1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.lower,
+               1 + scale.interval.upper);
   }
   const identification::Remainder& rest = diagnosis.remainder;
   fmt::print("  Left: {:.5f} N; low frequencies {:.1f} times the noise floor{}", diagnosis.rmse_after_N,

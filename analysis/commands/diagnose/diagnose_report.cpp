@@ -35,8 +35,8 @@ std::string values_of(const Missing& missing) {
     const double beyond = shown_beyond_file(missing.effect, name);
     values.push_back(fmt::format("{} = {:.4g}", name, beyond + value));
     if (interval != missing.intervals.end())
-      values.back() += fmt::format(" ({:.4g} .. {:.4g})", beyond + interval->second.first,
-                                   beyond + interval->second.second);
+      values.back() += fmt::format(" ({:.4g} .. {:.4g})", beyond + interval->second.lower,
+                                   beyond + interval->second.upper);
   }
   return joined(values);
 }
@@ -54,12 +54,12 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
                     fmt::format("{:.4g} -> {:.4g}", unit.per_newton() * finding.rmse_before_N,
                                 unit.per_newton() * finding.rmse_after_N),
                     fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * drop(missing),
-                                100 * finding.drop_interval.first, 100 * finding.drop_interval.second),
+                                100 * finding.drop_interval.lower, 100 * finding.drop_interval.upper),
                     values_of(missing),
                     missing.equivalence_class == missing.effect ? "" : missing.equivalence_class,
                     joined(finding.confounded_with()), missing.excitation});
-    bars.push_back({missing.effect, 100 * drop(missing), 100 * finding.drop_interval.first,
-                    100 * finding.drop_interval.second});
+    bars.push_back({missing.effect, 100 * drop(missing), 100 * finding.drop_interval.lower,
+                    100 * finding.drop_interval.upper});
   }
   report.table({"effect", std::string("RMSE [") + unit.name + "]", "fall, 90 %", "values, 90 %",
                 "flights cannot tell apart", "these flights cannot tell it from", "what separates them"},
@@ -91,7 +91,7 @@ void add_left(Report& report, const Diagnosis& diagnosis, const residuals::Force
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
     report.paragraph(fmt::format(
         "Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f}).",
-        1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.first, 1 + scale.interval.second));
+        1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.lower, 1 + scale.interval.upper));
   }
   report.paragraph(
       "Smallest sizes that these flights show in 9 of 10 injections (open loop: the flight does not react):");

@@ -19,7 +19,7 @@ using identification::FlightNumbers;
 
 files::Json json_of(const FlightNumber& number) {
   if (!number.is_observable) return nullptr;
-  return {{"value", number.value}, {"interval_90", {number.interval.first, number.interval.second}}};
+  return {{"value", number.value}, {"interval_90", number.interval}};
 }
 
 void put(const FlightNumbers& numbers, files::Json& json) {
@@ -42,7 +42,7 @@ std::string cell(const FlightNumbers& numbers, const std::string& name) {
   const auto number = numbers.find(name);
   if (number == numbers.end() || !number->second.is_observable) return "-";
   const FlightNumber& n = number->second;
-  return fmt::format("{:.4g} ({:.4g} .. {:.4g}){}", n.value, n.interval.first, n.interval.second,
+  return fmt::format("{:.4g} ({:.4g} .. {:.4g}){}", n.value, n.interval.lower, n.interval.upper,
                      n.is_outlier ? " outlier" : "");
 }
 
@@ -68,7 +68,7 @@ void print_row(const std::string& name, const std::string& vehicle, const Flight
 std::string words(const Drift& drift) {
   return fmt::format("{} of {} {}: {:.3g} per flight (90 %: {:.3g} .. {:.3g}) over {} flights", drift.number,
                      drift.vehicle, drift.is_there ? "drifts" : "does not drift visibly", drift.per_flight,
-                     drift.interval.first, drift.interval.second, drift.flights);
+                     drift.interval.lower, drift.interval.upper, drift.flights);
 }
 
 /// `number` over the flights, one curve per vehicle; false where no flight shows it.
@@ -81,7 +81,7 @@ bool add_plot(Report& report, const Each& each, const std::string& number, const
     if (found == flight.numbers.end() || !found->second.is_observable) continue;
     const FlightNumber& n = found->second;
     curves[flight.vehicle] +=
-        fmt::format("{} {:.6g} {:.6g} {:.6g} {} {}\n", place, n.value, n.interval.first, n.interval.second,
+        fmt::format("{} {:.6g} {:.6g} {:.6g} {} {}\n", place, n.value, n.interval.lower, n.interval.upper,
                     plot_field(flight.flight), plot_field(flight.vehicle));
   }
   if (curves.empty()) return false;
@@ -122,7 +122,7 @@ void add_each(const std::vector<Each>& kinds, files::Json& result) {
                         {"vehicle", drift.vehicle},
                         {"kind", drift.kind},
                         {"per_flight", drift.per_flight},
-                        {"interval_90", {drift.interval.first, drift.interval.second}},
+                        {"interval_90", drift.interval},
                         {"flights", drift.flights},
                         {"drifts", drift.is_there}});
     }

@@ -43,9 +43,9 @@ std::string words_of(const ScanEntry& entry) {
 
 std::string verdict_of(const ScanEntry& entry) {
   if (!entry.is_checked) return "not_applicable";
-  const double width = entry.slope.interval.second - entry.slope.interval.first;
+  const double width = entry.slope.interval.upper - entry.slope.interval.lower;
   if (!(width < 1)) return "too_weak";
-  return entry.slope.interval.second < 1 ? "contradicts" : "agrees";
+  return entry.slope.interval.upper < 1 ? "contradicts" : "agrees";
 }
 
 files::Json curve_json(const ScanEntry& entry) {
@@ -53,7 +53,7 @@ files::Json curve_json(const ScanEntry& entry) {
   for (const CurvePoint& point : entry.curve) {
     points.push_back({{"at", point.at},
                       {is_torque(entry) ? "torque_Nm" : "force_N", point.value},
-                      {"interval_90", {point.interval.first, point.interval.second}}});
+                      {"interval_90", point.interval}});
   }
   return points;
 }
@@ -103,7 +103,7 @@ files::Json json_of(const ScanEntry& entry, const std::string& kind) {
                       {"axis", entry.axis},
                       {"kind", kind},
                       {"share", entry.share},
-                      {"share_ci", {entry.share_interval.first, entry.share_interval.second}},
+                      {"share_ci", entry.share_interval},
                       {"uncorrected_share", entry.uncorrected_share},
                       {"curve", curve_json(entry)},
                       {"expression", nullptr},
@@ -139,7 +139,7 @@ void add_curve(Report& report, const ScanEntry& entry, const std::string& name,
       data += fmt::format("{:.6g} {:.6g} {:.6g}\n", point.at[0], point.at[1], per_unit * point.value);
     } else {
       data += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", point.at[0], per_unit * point.value,
-                          per_unit * point.interval.first, per_unit * point.interval.second);
+                          per_unit * point.interval.lower, per_unit * point.interval.upper);
     }
   }
   const std::string unit =
@@ -187,8 +187,7 @@ void print_remainder(const Diagnosis& diagnosis) {
                                    ? fmt::format("{:.2e} -> {:.2e} N m", entry.rmse_before, entry.rmse_after)
                                    : fmt::format("{:.5f} -> {:.5f} N", entry.rmse_before, entry.rmse_after);
     fmt::print("    {:<34} {:.0f} % of it (90 %: {:.0f} .. {:.0f}), RMSE {}\n", place_of(entry),
-               100 * entry.share, 100 * entry.share_interval.first, 100 * entry.share_interval.second,
-               errors);
+               100 * entry.share, 100 * entry.share_interval.lower, 100 * entry.share_interval.upper, errors);
     if (formula != nullptr) {
       for (const auto& [target, text] : formula->effect.expression.formulas)
         fmt::print("      {} = {}\n", target, text);
@@ -211,7 +210,7 @@ void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t numbe
     std::replace(set_points.begin(), set_points.end(), '_', ' ');
     rows.push_back({place_of(entry),
                     fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * entry.share,
-                                100 * entry.share_interval.first, 100 * entry.share_interval.second),
+                                100 * entry.share_interval.lower, 100 * entry.share_interval.upper),
                     fmt::format("{:.4g} -> {:.4g} {}", per_unit * entry.rmse_before,
                                 per_unit * entry.rmse_after, unit_name),
                     set_points});

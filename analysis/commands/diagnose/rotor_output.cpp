@@ -18,8 +18,7 @@ files::Json factors_json(const RotorBalance& balance) {
   files::Json json = files::Json::object();
   for (std::size_t k = 0; k < balance.factors.size(); ++k) {
     const identification::RotorFactor& factor = balance.factors[k];
-    json["rotor_" + std::to_string(k + 1)] = {
-        {"value", factor.value}, {"interval_90", {factor.interval.first, factor.interval.second}}};
+    json["rotor_" + std::to_string(k + 1)] = {{"value", factor.value}, {"interval_90", factor.interval}};
   }
   return json;
 }

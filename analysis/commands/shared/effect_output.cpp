@@ -9,14 +9,14 @@ double shown_beyond_file(const std::string& effect, const std::string& parameter
 }
 
 files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
-                        const std::map<std::string, std::pair<double, double>>& intervals) {
+                        const std::map<std::string, Interval>& intervals) {
   files::Json json = files::Json::object();
   for (const auto& [name, value] : values) {
     const double beyond = shown_beyond_file(effect, name);
     files::Json& entry = json[name] = {{"value", beyond + value}};
     const auto interval = intervals.find(name);
     if (interval != intervals.end())
-      entry["interval_90"] = {beyond + interval->second.first, beyond + interval->second.second};
+      entry["interval_90"] = {beyond + interval->second.lower, beyond + interval->second.upper};
   }
   return json;
 }
@@ -43,14 +43,13 @@ files::Json effects_json(const std::vector<stability::EffectSpec>& effects) {
 
 void print_values(const std::string& effect, const std::string& prefix,
                   const std::map<std::string, double>& values,
-                  const std::map<std::string, std::pair<double, double>>& intervals) {
+                  const std::map<std::string, Interval>& intervals) {
   for (const auto& [name, value] : values) {
     const auto interval = intervals.find(name);
     const double beyond = shown_beyond_file(effect, name);
     fmt::print("{}{} = {:.4g}", prefix, name, beyond + value);
     if (interval != intervals.end())
-      fmt::print(", 90 % {:.4g} .. {:.4g}", beyond + interval->second.first,
-                 beyond + interval->second.second);
+      fmt::print(", 90 % {:.4g} .. {:.4g}", beyond + interval->second.lower, beyond + interval->second.upper);
     fmt::print("\n");
   }
 }

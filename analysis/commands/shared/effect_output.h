@@ -3,7 +3,6 @@
 
 #include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "nn/base/json.h"
@@ -17,7 +16,7 @@ double shown_beyond_file(const std::string& effect, const std::string& parameter
 
 /// {"tau_s": {"value": 0.06, "interval_90": [0.05, 0.07]}}; without the interval where there is none.
 files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
-                        const std::map<std::string, std::pair<double, double>>& intervals);
+                        const std::map<std::string, Interval>& intervals);
 
 /// Whether `effect` is an error of what the log says, and no force on the vehicle.
 bool is_sensor_error(const std::string& effect);
@@ -30,6 +29,6 @@ files::Json effects_json(const std::vector<stability::EffectSpec>& effects);
 /// A line per number, each after `prefix`: "tau_s = 0.06, 90 % 0.05 .. 0.07".
 void print_values(const std::string& effect, const std::string& prefix,
                   const std::map<std::string, double>& values,
-                  const std::map<std::string, std::pair<double, double>>& intervals);
+                  const std::map<std::string, Interval>& intervals);
 
 }  // namespace swarmcert::analysis

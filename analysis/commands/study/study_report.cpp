@@ -32,8 +32,8 @@ void add_findings(Report& report, const Study& study) {
       rows.push_back({effect.name, parameter, fmt::format("{:.4g}", beyond + value),
                       interval == effect.fit.interval.end()
                           ? "-"
-                          : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.first,
-                                        beyond + interval->second.second)});
+                          : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.lower,
+                                        beyond + interval->second.upper)});
     }
   }
   if (!rows.empty()) report.table({"effect", "parameter", "value", "90 % interval"}, rows);

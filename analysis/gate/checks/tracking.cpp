@@ -16,11 +16,9 @@
 namespace swarmcert::gate {
 namespace {
 
-using stability::Range;
-
 /// What is uncertain: an interval where stated, else so much about model and gains.
 struct Uncertainty {
-  std::optional<Range> mass_kg, thrust_scale, lag_s, delay_s;
+  std::optional<Interval> mass_kg, thrust_scale, lag_s, delay_s;
 };
 
 /// Where the bound must hold for the check to pass.
@@ -31,14 +29,14 @@ struct Guard {
   std::string quantile = "p95";
 };
 
-std::optional<Range> interval(const files::TomlTable& table, const char* key, bool is_positive) {
+std::optional<Interval> interval(const files::TomlTable& table, const char* key, bool is_positive) {
   if (!table.has(key)) return std::nullopt;
   const std::vector<double> ends = table.numbers(key);
   if (ends.size() != 2 || !(ends[0] <= ends[1]) || !(is_positive ? ends[0] > 0 : ends[0] >= 0))
     table.refuse(key, "",
                  is_positive ? "must be two positive numbers, from and to"
                              : "must be two numbers from 0 on, from and to");
-  return Range{ends[0], ends[1]};
+  return Interval{ends[0], ends[1]};
 }
 
 Uncertainty read_uncertainty(const files::TomlTable& table) {
@@ -133,7 +131,7 @@ void judge_promise(Evidence& evidence, const Limit& limit, Checks& checks) {
     check.witness = fmt::format(
         "axis {}: below {:.4g} m in {} of {} flights (90 % interval {:.3f} to {:.3f}), promised {:g}",
         stability::axis_name(axis), promise.bound_m[static_cast<std::size_t>(axis)], along.held,
-        along.flights, along.interval_90[0], along.interval_90[1], promise.level);
+        along.flights, along.interval_90.lower, along.interval_90.upper, promise.level);
   }
   checks.push_back(std::move(check));
 }

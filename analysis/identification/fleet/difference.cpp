@@ -155,11 +155,11 @@ bool is_beyond(const ScatterOfGroups& scatter, int own_groups, Missing& missing)
     const auto n = static_cast<double>(values->second.size());
     const boost::math::students_t student(n - 1);
     Interval& interval = missing.intervals[name];
-    const double fit = (interval.second - interval.first) / (2 * normal);
+    const double fit = (interval.upper - interval.lower) / (2 * normal);
     const double between = deviation(values->second) * std::sqrt(1.0 / std::max(1, own_groups) + 1 / n);
     const double error = std::hypot(fit, between), value = missing.parameters.at(name);
     const double half = error * boost::math::quantile(student, 0.95);
-    interval = {std::min(interval.first, value - half), std::max(interval.second, value + half)};
+    interval = {std::min(interval.lower, value - half), std::max(interval.upper, value + half)};
     beyond = beyond || std::abs(value) > error * boost::math::quantile(student, 0.975);
   }
   return beyond || !is_known;

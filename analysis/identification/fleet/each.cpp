@@ -41,13 +41,13 @@ void erase_fitted(std::vector<EffectSpec>& effects, bool keeps_lag) {
 
 double error_of(const FlightNumber& number) {
   static const double kNormal = boost::math::quantile(boost::math::normal(), 0.95);
-  return (number.interval.second - number.interval.first) / (2 * kNormal);
+  return (number.interval.upper - number.interval.lower) / (2 * kNormal);
 }
 
 /// A flight shows a number where its interval says more than the bounds of the effect do: the lag where its gain is
 /// that of a lag, and the others where the error is less than a tenth of the weight, or of a speed of 1 m/s.
 bool shows(const NumberSource& source, const Missing& fit, const Interval& interval, double weight_N) {
-  const double half = (interval.second - interval.first) / 2;
+  const double half = (interval.upper - interval.lower) / 2;
   if (!(half > 0) || !std::isfinite(half)) return false;
   if (std::string(source.effect) == "motor_lag") {
     const auto gain = fit.intervals.find("gain");
@@ -67,7 +67,7 @@ FlightNumbers flight_numbers(const std::vector<Missing>& fitted, double weight_N
       if (fit.effect != source.effect || interval == fit.intervals.end()) continue;
       number.is_observable = shows(source, fit, interval->second, weight_N);
       number.value = source.nominal + fit.parameters.at(source.parameter);
-      number.interval = {source.nominal + interval->second.first, source.nominal + interval->second.second};
+      number.interval = {source.nominal + interval->second.lower, source.nominal + interval->second.upper};
     }
   }
   return numbers;
@@ -101,7 +101,7 @@ void add_rotors(const Inputs& own, const std::string& kind, const std::string& v
     const RotorFactors factors = rotor_factors(loads);
     for (std::size_t k = 0; k < factors.size(); ++k) {
       const Interval interval = factors[k].interval;
-      const double half = (interval.second - interval.first) / 2;
+      const double half = (interval.upper - interval.lower) / 2;
       numbers["rotor_" + std::to_string(k + 1)] = {half > 0 && half < kMostHalfWidth, factors[k].value,
                                                    interval};
     }

@@ -83,7 +83,7 @@ RotorBalance rotor_balance(const std::vector<RotorLoads>& own, const std::vector
   for (Eigen::Index k = 0; k < kRotors; ++k) {
     if (k != first) second_N = std::max(second_N, balance.rise_N[k]);
   }
-  const bool stands_out = balance.factors[static_cast<std::size_t>(first)].interval.second < 1;
+  const bool stands_out = balance.factors[static_cast<std::size_t>(first)].interval.upper < 1;
   if (largest_N > balance.least_rise_N && second_N <= kMostOfSecond * largest_N && stands_out)
     balance.rotor = static_cast<int>(first) + 1;
   return balance;
@@ -121,8 +121,8 @@ std::string in_words(const RotorBalance& balance) {
   return fmt::format(
       "rotor {} ({}) is weak, or carries a load near it: {:.0f} % less thrust than in healthy flight (90 %: "
       "{:.0f} .. {:.0f} %)",
-      balance.rotor, kPlaces[k], 100 * (1 - factor.value), 100 * (1 - factor.interval.second),
-      100 * (1 - factor.interval.first));
+      balance.rotor, kPlaces[k], 100 * (1 - factor.value), 100 * (1 - factor.interval.upper),
+      100 * (1 - factor.interval.lower));
 }
 
 }  // namespace swarmcert::identification

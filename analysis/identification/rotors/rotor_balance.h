@@ -13,9 +13,9 @@
 #pragma once
 
 #include <array>
-#include <utility>
 
 #include "analysis/identification/rotors/rotor_loads.h"
+#include "nn/base/interval.h"
 
 namespace swarmcert::identification {
 
@@ -25,8 +25,8 @@ inline constexpr double kBatteryPlay_m = 1.5e-3;
 inline constexpr double kMostOfSecond = 0.5;
 
 struct RotorFactor {
-  double value = 1;                          ///< of the rotor's thrust before; 1: as before
-  std::pair<double, double> interval{1, 1};  ///< 90 %, with the scatter of the healthy flights
+  double value = 1;         ///< of the rotor's thrust before; 1: as before
+  Interval interval{1, 1};  ///< 90 %, with the scatter of the healthy flights
 };
 
 /// One vehicle, in one flight or in all of its flights.

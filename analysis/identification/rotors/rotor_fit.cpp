@@ -33,7 +33,7 @@ stability::EffectSpec spec_for(const stability::Model& model, const RotorFactors
     const double off = present == nullptr ? 0 : before[k].value;
     const RotorFactor& factor = factors[k];
     spec.parameters[coefficient_of(k)] = factor.value - off;
-    spec.fit.interval[coefficient_of(k)] = {factor.interval.first - off, factor.interval.second - off};
+    spec.fit.interval[coefficient_of(k)] = {factor.interval.lower - off, factor.interval.upper - off};
   }
   if (present != nullptr) {
     spec.parameters["model"] = 0;

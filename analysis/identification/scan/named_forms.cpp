@@ -111,9 +111,9 @@ struct FlownRange {
 std::optional<FlownRange> range_of_place(const Formula& formula) {
   for (const auto& [name, bounds] : formula.effect.expression.bounds) {
     const bool is_place = name == "centre_m" || name == "middle_m" || name == "at_m" || name == "from_m";
-    if (!is_place || !(bounds.first < bounds.second)) continue;
-    const double span_m = 0.5 * (bounds.second - bounds.first);
-    return FlownRange{bounds.first + 0.5 * span_m, bounds.second - 0.5 * span_m,
+    if (!is_place || !(bounds.lower < bounds.upper)) continue;
+    const double span_m = 0.5 * (bounds.upper - bounds.lower);
+    return FlownRange{bounds.lower + 0.5 * span_m, bounds.upper - 0.5 * span_m,
                       formula.effect.parameters.at(name)};
   }
   const auto from_m = number_of(formula, "from"), length_m = number_of(formula, "length");

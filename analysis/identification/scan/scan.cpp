@@ -204,9 +204,9 @@ InstrumentedValue slope_of(const Judged& judged, int column, const Columns& curv
 double counted_slope(const ScanEntry& entry, bool is_answer) {
   constexpr double kStrong = 0.5;  // half width of the interval
   const bool is_strong =
-      entry.is_checked && entry.slope.interval.second - entry.slope.interval.first < 2 * kStrong;
+      entry.is_checked && entry.slope.interval.upper - entry.slope.interval.lower < 2 * kStrong;
   if (is_answer) return is_strong ? std::clamp(entry.slope.instrument, 0.0, 1.0) : 0;
-  return is_strong ? std::clamp(entry.slope.interval.second, 0.0, 1.0) : 1;
+  return is_strong ? std::clamp(entry.slope.interval.upper, 0.0, 1.0) : 1;
 }
 
 void set_curve(const CurveFit& fit, const Curve& curve, int component, ScanEntry& entry) {
@@ -267,7 +267,7 @@ ScanEntry entry_of(const Judged& judged, const Abscissa& abscissa, int component
   const double counts = beta * (2 - beta);
   entry.share = counts * entry.uncorrected_share;
   const Interval interval = share_interval(judged, gains, total);
-  entry.share_interval = {counts * interval.first, counts * interval.second};
+  entry.share_interval = {counts * interval.lower, counts * interval.upper};
   set_curve(fit, curve, component, entry);
   return entry;
 }

@@ -4,12 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 #include "stability/bounds/sampled_loop.h"
 
 namespace swarmcert::analysis {
-
-using stability::up;
 
 namespace {
 
@@ -190,7 +188,7 @@ LagStart lag_start(const ErrorLoop& loop, double slice_s) {
   const auto values = [&](const KernelCells& kernel, const KernelCells& slope, Interval slope_scale = 1) {
     std::vector<Interval> of_cell;
     for (std::size_t n = 0; n < kernel.net.size(); ++n) {
-      const double away = (slope_scale * slope.integral[n]).hi;
+      const double away = (slope_scale * slope.integral[n]).upper;
       of_cell.push_back(tau_s * (kernel.net[n] / cell_s + Interval(-away, away)));
     }
     return of_cell;
@@ -213,8 +211,8 @@ EstimateAnswer estimate_answer(const ErrorLoop& loop, double velocity_m_s, doubl
   EstimateAnswer result;
   const Interval by_position = Interval(loop.Kp) + Interval(loop.Ki) * loop.period_s;
   result.force_N =
-      (Interval(loop.mass_kg) * (Interval(loop.Kd) * velocity_m_s + by_position * position_m)).hi;
-  const double integrated_N = (Interval(loop.mass_kg) * loop.Ki * position_m).hi;
+      (Interval(loop.mass_kg) * (Interval(loop.Kd) * velocity_m_s + by_position * position_m)).upper;
+  const double integrated_N = (Interval(loop.mass_kg) * loop.Ki * position_m).upper;
   const auto of = [slices](const std::optional<KernelCells>& kernel, double size) {
     return size > 0 ? convolved(*kernel, std::vector<double>(slices, size))
                     : std::vector<double>(slices, 0.0);
@@ -224,7 +222,7 @@ EstimateAnswer estimate_answer(const ErrorLoop& loop, double velocity_m_s, doubl
   if (loop.period_s == 0) return result;
   // Without a lag e'' follows a force at once, and then feeds back.
   result.acceleration_m_s2 = of(loop.has_lag ? loop.h3 : loop.direct_rest, result.force_N);
-  const double at_once_m_s2 = loop.has_lag ? 0 : (Interval(result.force_N) / loop.mass_kg).hi;
+  const double at_once_m_s2 = loop.has_lag ? 0 : (Interval(result.force_N) / loop.mass_kg).upper;
   const std::vector<double> integrated = of(loop.h2, integrated_N);
   for (std::size_t n = 0; n < slices; ++n)
     result.acceleration_m_s2[n] = up(up(result.acceleration_m_s2[n] + integrated[n]) + at_once_m_s2);

@@ -5,13 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 #include "stability/bounds/kernel_cells.h"
 #include "stability/bounds/tracking_setup.h"
 
 namespace swarmcert::analysis {
-
-using stability::Interval;
 
 /// One axis of the loop that flies, without delay: m D e = s (f_a - f_hat + m x) + s (L - 1)(f_a - m p_d''), with f_a
 /// the force that acts, f_hat what the controller believes, L the lags of its command. x is what the command, an

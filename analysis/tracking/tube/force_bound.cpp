@@ -9,8 +9,6 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 constexpr double kNoBound = std::numeric_limits<double>::infinity();
@@ -59,9 +57,9 @@ double slope_cost_N(const ForceConstants& c, double position_m, double velocity_
     return deviation == 0 ? 0 : up(constant * deviation);
   };
   const double apart = up(times(c.position, position_m) + times(c.velocity, velocity_m_s));
-  const double length = stability::sqrt(Interval(position_m) * Interval(position_m) +
-                                        Interval(velocity_m_s) * Interval(velocity_m_s))
-                            .hi;
+  const double length =
+      sqrt(Interval(position_m) * Interval(position_m) + Interval(velocity_m_s) * Interval(velocity_m_s))
+          .upper;
   return std::min(apart, times(c.together, length));
 }
 
@@ -86,9 +84,9 @@ std::vector<double> SlopeBound::sizes(const Radii& radii) const {
     const auto& p = radii.position_m[static_cast<std::size_t>(i)];
     const auto& v = radii.velocity_m_s[static_cast<std::size_t>(i)];
     if (constants.own > 0) {
-      const Interval own = stability::sqrt(Interval(p[2]) * p[2] + Interval(v[0]) * v[0] +
-                                           Interval(v[1]) * v[1] + Interval(v[2]) * v[2]);
-      size = up(size + up(constants.own * own.hi));
+      const Interval own =
+          sqrt(Interval(p[2]) * p[2] + Interval(v[0]) * v[0] + Interval(v[1]) * v[1] + Interval(v[2]) * v[2]);
+      size = up(size + up(constants.own * own.upper));
     }
     result.push_back(std::isnan(size) ? kNoBound : size);
   }

@@ -12,8 +12,6 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 constexpr double kNoConstant = std::numeric_limits<double>::infinity();
@@ -85,8 +83,8 @@ std::vector<ForceConstants> local_constants(const files::Network& network, const
     for (int n = 0; n + 1 < scene.vehicles(); ++n) {
       for (std::size_t k = 0; k < components.size(); ++k) {
         const Interval& x = states[static_cast<std::size_t>(n * kPerNeighbour + components[k])];
-        box.lower[k] = std::min(box.lower[k], x.lo);
-        box.upper[k] = std::max(box.upper[k], x.hi);
+        box.lower[k] = std::min(box.lower[k], x.lower);
+        box.upper[k] = std::max(box.upper[k], x.upper);
       }
     }
   }

@@ -6,8 +6,6 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 using Eigen::Index;
@@ -20,7 +18,7 @@ constexpr double kRounding = 1e-12;
 
 Box box_of(const std::vector<Interval>& states) {
   Box box;
-  for (const Interval& x : states) box.lower.push_back(x.lo), box.upper.push_back(x.hi);
+  for (const Interval& x : states) box.lower.push_back(x.lower), box.upper.push_back(x.upper);
   return box;
 }
 
@@ -78,7 +76,7 @@ ForceDifference::WakeForm ForceDifference::wake_form(const Box& box) const {
   VectorXd centre(static_cast<Index>(box.lower.size()));
   for (std::size_t k = 0; k < box.lower.size(); ++k) {
     states.emplace_back(box.lower[k], box.upper[k]);
-    centre(static_cast<Index>(k)) = states[k].lo + (states[k].hi - states[k].lo) / 2;
+    centre(static_cast<Index>(k)) = states[k].lower + (states[k].upper - states[k].lower) / 2;
   }
   const std::vector<Offset> reach = scene_->offsets(states, all_, true);
   const VectorXd zero = VectorXd::Zero(centre.size());
@@ -92,11 +90,11 @@ ForceDifference::WakeForm ForceDifference::wake_form(const Box& box) const {
       const Index at = static_cast<Index>(n) * kPerNeighbour + static_cast<Index>(k);
       const Interval g = form.wake.gradient_N_m[n][k];
       const Interval& x = reach[n][k];
-      const double slope = g.lo + (g.hi - g.lo) / 2;
-      const double radius = up(std::max(g.hi - slope, slope - g.lo));
-      const double away = up(std::max(x.hi - centre(at), centre(at) - x.lo));
-      const double aged = up(std::max(x.hi - box.upper[static_cast<std::size_t>(at)],
-                                      box.lower[static_cast<std::size_t>(at)] - x.lo));
+      const double slope = g.lower + (g.upper - g.lower) / 2;
+      const double radius = up(std::max(g.upper - slope, slope - g.lower));
+      const double away = up(std::max(x.upper - centre(at), centre(at) - x.lower));
+      const double aged = up(std::max(x.upper - box.upper[static_cast<std::size_t>(at)],
+                                      box.lower[static_cast<std::size_t>(at)] - x.lower));
       form.slope(at) = slope;
       form.bend(at) = radius;
       form.spread_N += radius * away + std::abs(slope) * aged;
@@ -121,13 +119,14 @@ ForceDifference::Form ForceDifference::difference(const Box& box, const WakeForm
                                                   double constant, double sign) const {
   const Interval rest_N = rest_.force_N[2];
   const Interval wake_N = truth.wake.value_N;
-  const double rest_least = sign > 0 ? -rest_N.lo : rest_N.hi;
-  Form flat{row, constant + (sign > 0 ? -wake_N.lo : wake_N.hi) + rest_least};
+  const double rest_least = sign > 0 ? -rest_N.lower : rest_N.upper;
+  Form flat{row, constant + (sign > 0 ? -wake_N.lower : wake_N.upper) + rest_least};
   flat.constant += kRounding * (std::abs(constant) + wake_N.mag() + rest_N.mag());
   if (!truth.wake.has_gradient) return flat;
   const double shift = truth.slope.dot(truth.centre);
   const double slack = truth.spread_N + kRounding * truth.size_N;
-  Form sloped{row - sign * truth.slope, constant + (sign > 0 ? -truth.at_centre_N.lo : truth.at_centre_N.hi) +
+  Form sloped{row - sign * truth.slope, constant +
+                                            (sign > 0 ? -truth.at_centre_N.lower : truth.at_centre_N.upper) +
                                             sign * shift + slack + rest_least};
   sloped.constant += kRounding * (std::abs(constant) + truth.size_N + rest_N.mag());
   return sloped.largest(box) < flat.largest(box) ? sloped : flat;
@@ -136,7 +135,7 @@ ForceDifference::Form ForceDifference::difference(const Box& box, const WakeForm
 /// |f_hat - f_a| where both forces act at x: an estimate.
 double ForceDifference::roughly(const VectorXd& x) const {
   const Interval f = scene_->truth().wake(offsets_at(x)).value_N + rest_.force_N[2];
-  return std::abs(scene_->learned().roughly(x) - (f.lo + f.hi) / 2);
+  return std::abs(scene_->learned().roughly(x) - (f.lower + f.upper) / 2);
 }
 
 ForceDifference::Part ForceDifference::part(const Box& box, const LearnedForce::Forms* around) const {

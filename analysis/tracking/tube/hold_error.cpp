@@ -22,7 +22,7 @@ AccelerationBound acceleration_bound(const ErrorLoop& loop, const LoopHistory& h
   const Interval by_size = whole * mass * history.planned_m_s2;
   const Interval by_jerk =
       mass * (Interval(loop.g2_total) * history.jerk_m_s3 + Interval(loop.g2->peak) * planned_at_start_m_s2);
-  return {per_N * history.force_N + history.of_estimates_m_s2 + std::min(by_size.hi, by_jerk.hi) +
+  return {per_N * history.force_N + history.of_estimates_m_s2 + std::min(by_size.upper, by_jerk.upper) +
               whole * history.truth_N + Interval(loop.lags_s) * loop.h3->peak * excess_N,
           per_N};
 }
@@ -49,15 +49,15 @@ double hold_error_N(const ErrorLoop& loop, const LoopHistory& history, double pl
            Interval(loop.Ki) * (history.position_m + T * history.velocity_m_s) / Interval(2));
   const Interval per_acceleration = T * loop.Kd + Interval(loop.Ki) * T * T * history.time_s / Interval(12);
   const Interval left = Interval(1) - per_acceleration * acceleration.per_N * loop.mass_kg;
-  if (!(left.lo > 0)) return std::numeric_limits<double>::infinity();
+  if (!(left.lower > 0)) return std::numeric_limits<double>::infinity();
   const Interval bound = Interval(loop.mass_kg) *
-                         (known + per_acceleration * acceleration.from_signals_m_s2) / Interval(left.lo);
-  return std::isnan(bound.hi) ? std::numeric_limits<double>::infinity() : bound.hi;
+                         (known + per_acceleration * acceleration.from_signals_m_s2) / Interval(left.lower);
+  return std::isnan(bound.upper) ? std::numeric_limits<double>::infinity() : bound.upper;
 }
 
 HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice) {
-  const Interval unknown = stability::whole_line();
-  const HeldAnswer nothing{unknown, unknown, unknown, unknown.hi};
+  const Interval unknown = whole_line();
+  const HeldAnswer nothing{unknown, unknown, unknown, unknown.upper};
   const Interval T(loop.period_s);
   const Interval mass(loop.mass_kg);
   const Interval per_N = mass * slice.per_N;
@@ -69,27 +69,26 @@ HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice) {
   const double ever_m_s2 = std::max(near_m_s2, slice.largest_acceleration_m_s2);
   // more <= per_rising_N (Kp |e'| + sup|p_d'''| + Kd (near + more)) + per_N (rest + trapezoidal (ever + more))
   const Interval left = Interval(1) - per_rising_N * loop.Kd - per_N * trapezoidal;
-  if (!(left.lo > 0)) return nothing;
+  if (!(left.lower > 0)) return nothing;
   const double more_m_s2 = ((per_rising_N * (Interval(loop.Kp) * slice.velocity_m_s.mag() + slice.jerk_m_s3 +
                                              Interval(loop.Kd) * near_m_s2) +
                              per_N * (rest + trapezoidal * ever_m_s2)) /
-                            Interval(left.lo))
-                               .hi;
+                            Interval(left.lower))
+                               .upper;
   HeldAnswer result;
   result.acceleration_m_s2 = slice.acceleration_m_s2 + Interval(-more_m_s2, more_m_s2);
-  const Interval slope =
-      Interval(loop.Kp) * slice.velocity_m_s +
-      Interval(loop.Kd) * stability::hull(result.acceleration_m_s2, slice.acceleration_before_m_s2) +
-      Interval(-slice.jerk_m_s3, slice.jerk_m_s3);
+  const Interval slope = Interval(loop.Kp) * slice.velocity_m_s +
+                         Interval(loop.Kd) * hull(result.acceleration_m_s2, slice.acceleration_before_m_s2) +
+                         Interval(-slice.jerk_m_s3, slice.jerk_m_s3);
   const double largest_m_s2 = std::max(slice.largest_acceleration_m_s2, result.acceleration_m_s2.mag());
-  const double away = (rest + trapezoidal * largest_m_s2).hi;
-  result.hold_N = mass * (Interval(0, T.hi) * slope + Interval(-away, away));
+  const double away = (rest + trapezoidal * largest_m_s2).upper;
+  result.hold_N = mass * (Interval(0, T.upper) * slope + Interval(-away, away));
   result.mean_N = result.hold_N;
   if (loop.has_whole_periods) {
     result.mean_N = mass * (T * slope / Interval(2) + Interval(-away, away));
-    result.sawtooth_N_s = (mass * T * T * slope.mag() / Interval(8)).hi;
+    result.sawtooth_N_s = (mass * T * T * slope.mag() / Interval(8)).upper;
   }
-  const bool is_known = std::isfinite(result.hold_N.lo) && std::isfinite(result.hold_N.hi);
+  const bool is_known = std::isfinite(result.hold_N.lower) && std::isfinite(result.hold_N.upper);
   return is_known ? result : nothing;
 }
 
@@ -97,7 +96,7 @@ double sum_excess_m_s(const ErrorLoop& loop, const LoopHistory& history, double 
   if (loop.period_s == 0) return 0;
   const Interval T(loop.period_s);
   return (T * history.position_m / Interval(2) + T * T * history.time_s * acceleration_m_s2 / Interval(12))
-      .hi;
+      .upper;
 }
 
 }  // namespace swarmcert::analysis

@@ -28,7 +28,7 @@ void inherit(LeastTube& better, const LeastTube& worse) {
 }
 
 void unite(TruthSizes& a, const TruthSizes& b) {
-  for (std::size_t k = 0; k < 3; ++k) a.force_N[k] = stability::hull(a.force_N[k], b.force_N[k]);
+  for (std::size_t k = 0; k < 3; ++k) a.force_N[k] = hull(a.force_N[k], b.force_N[k]);
   a.rest_width_N = std::max(a.rest_width_N, b.rest_width_N);
   for (std::size_t n = 0; n < a.gradient_N_m.size(); ++n)
     a.gradient_N_m[n] = std::max(a.gradient_N_m[n], b.gradient_N_m[n]);

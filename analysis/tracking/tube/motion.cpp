@@ -14,7 +14,9 @@ using stability::SetpointRange;
 /// same.
 constexpr double kGrid = 0x1p-24;
 
-Interval snapped(Interval x) { return {std::floor(x.lo / kGrid) * kGrid, std::ceil(x.hi / kGrid) * kGrid}; }
+Interval snapped(Interval x) {
+  return {std::floor(x.lower / kGrid) * kGrid, std::ceil(x.upper / kGrid) * kGrid};
+}
 
 }  // namespace
 
@@ -50,11 +52,11 @@ Motion sliced(const stability::Task& task, int vehicles, double memory_s, double
       std::vector<double> key = {static_cast<double>(i)};
       const auto add = [&](Interval x) {
         stretch.state.push_back(snapped(x));
-        key.push_back(stretch.state.back().lo);
-        key.push_back(stretch.state.back().hi);
+        key.push_back(stretch.state.back().lower);
+        key.push_back(stretch.state.back().upper);
       };
       const auto largest = [&](Interval x) {
-        key.push_back(snapped({0, x.mag()}).hi);
+        key.push_back(snapped({0, x.mag()}).upper);
         return key.back();
       };
       for (int j = 0; j < vehicles; ++j) {
@@ -64,17 +66,17 @@ Motion sliced(const stability::Task& task, int vehicles, double memory_s, double
         for (int a = 0; a < 3; ++a) add(other.v_W_m_s[a] - own.v_W_m_s[a]);
         Interval squares;
         for (int a = 0; a < 3; ++a) {
-          const Interval size = stability::abs(other.a_W_m_s2[a] - own.a_W_m_s2[a]);
+          const Interval size = abs(other.a_W_m_s2[a] - own.a_W_m_s2[a]);
           squares += size * size;
         }
-        stretch.relative_acceleration_m_s2.push_back(largest(stability::sqrt(squares)));
+        stretch.relative_acceleration_m_s2.push_back(largest(sqrt(squares)));
       }
       add(own.p_W_m[2]);
       for (int a = 0; a < 3; ++a) add(own.v_W_m_s[a]);
       for (int a = 0; a < 3; ++a) {
         stretch.acceleration_m_s2[a] = snapped(own.a_W_m_s2[a]);
-        key.push_back(stretch.acceleration_m_s2[a].lo);
-        key.push_back(stretch.acceleration_m_s2[a].hi);
+        key.push_back(stretch.acceleration_m_s2[a].lower);
+        key.push_back(stretch.acceleration_m_s2[a].upper);
         stretch.jerk_m_s3[a] = largest(own.jerk_W_m_s3[a]);
       }
       const auto [found, is_new] = known.emplace(std::move(key), static_cast<int>(motion.stretches.size()));

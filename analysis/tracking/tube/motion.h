@@ -3,12 +3,10 @@
 
 #include <vector>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 #include "stability/tasks/task.h"
 
 namespace swarmcert::analysis {
-
-using stability::Interval;
 
 /// What one vehicle should do during slices that ask for the same: everything encloses the set points of these slices
 /// and of `memory_s` before them.

@@ -7,13 +7,10 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 double length(double x, double y, double z) {
-  return stability::sqrt(Interval(x) * Interval(x) + Interval(y) * Interval(y) + Interval(z) * Interval(z))
-      .hi;
+  return sqrt(Interval(x) * Interval(x) + Interval(y) * Interval(y) + Interval(z) * Interval(z)).upper;
 }
 
 Interval widened(Interval x, double by) { return x + Interval(-by, by); }
@@ -129,7 +126,7 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
     const Stretch& stretch = motion_.stretches[static_cast<std::size_t>(first)];
     const Interval prediction_N =
         ForceDifference(*this, stretch, none).over(none) + truth_sizes(stretch, none).force_N[2];
-    excess_N_[static_cast<std::size_t>(i)] = stability::hull(0, -prediction_N);
+    excess_N_[static_cast<std::size_t>(i)] = hull(0, -prediction_N);
   }
 }
 
@@ -204,7 +201,7 @@ TruthSizes Scene::truth_sizes(const Stretch& stretch, const Deviations& deviatio
   sizes.force_N[0] = rest.force_N[0];
   sizes.force_N[1] = rest.force_N[1];
   sizes.force_N[2] = rest.force_N[2] + wake.value_N;
-  sizes.rest_width_N = up(rest.force_N[2].hi - rest.force_N[2].lo);
+  sizes.rest_width_N = up(rest.force_N[2].upper - rest.force_N[2].lower);
   for (const Offset& g : wake.gradient_N_m) {
     sizes.gradient_N_m.push_back(wake.has_gradient ? length(g[0].mag(), g[1].mag(), g[2].mag())
                                                    : std::numeric_limits<double>::infinity());

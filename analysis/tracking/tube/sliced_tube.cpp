@@ -9,8 +9,6 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 using stability::KernelCells;
@@ -20,11 +18,11 @@ constexpr int kMostTries = 12;
 constexpr double kWiderBy = 0.02, kWiderBy_m = 1e-6;
 
 Interval wider(Interval x) {
-  const double more = kWiderBy * (x.hi - x.lo) + kWiderBy_m;
-  return {x.lo - more, x.hi + more};
+  const double more = kWiderBy * (x.upper - x.lower) + kWiderBy_m;
+  return {x.lower - more, x.upper + more};
 }
 
-bool inside(Interval inner, Interval outer) { return inner.lo > outer.lo && inner.hi < outer.hi; }
+bool inside(Interval inner, Interval outer) { return inner.lower > outer.lower && inner.upper < outer.upper; }
 
 template <class Change>
 Deviations each(const Deviations& a, const Deviations& b, const Change& change) {
@@ -48,7 +46,7 @@ bool every_inside(const Deviations& inner, const Deviations& outer) {
 }
 
 Deviations hull_of(const Deviations& a, const Deviations& b) {
-  return each(a, b, [](Interval x, Interval y) { return stability::hull(x, y); });
+  return each(a, b, [](Interval x, Interval y) { return hull(x, y); });
 }
 
 /// Signals of one vehicle and axis, and what all but the present slice do to the error.
@@ -111,7 +109,7 @@ struct Axis {
                   std::size_t back) const {
     const std::size_t n = force.size();
     const auto with_last = [](Interval now, const std::vector<Interval>& past) {
-      return stability::hull(now, last(past));
+      return hull(now, last(past));
     };
     const Interval direct = Interval(1) / loop->mass_kg;
     HeldSlice slice;
@@ -132,11 +130,11 @@ struct Axis {
     } else {
       slice.acceleration_m_s2 =
           acceleration_m_s2 + direct * d - stability::answer(rest, 0, with_last(d, whole_force));
-      slice.per_N = slice.per_rising_N = (direct + rest.integral[0]).hi;
+      slice.per_N = slice.per_rising_N = (direct + rest.integral[0]).upper;
     }
     slice.acceleration_before_m_s2 = slice.acceleration_m_s2;
     for (std::size_t k = n - std::min(back, n); k < n; ++k) {
-      slice.acceleration_before_m_s2 = stability::hull(slice.acceleration_before_m_s2, acceleration[k]);
+      slice.acceleration_before_m_s2 = hull(slice.acceleration_before_m_s2, acceleration[k]);
     }
     for (const Interval& a : acceleration)
       slice.largest_acceleration_m_s2 = std::max(slice.largest_acceleration_m_s2, a.mag());
@@ -145,16 +143,16 @@ struct Axis {
 
   /// The errors of this slice if its signals are these. @param saw bounds the integral of the sawtooth in d, N s.
   void answer(Interval d, Interval w, double saw, Interval& position, Interval& velocity) const {
-    const Interval both_d = stability::hull(d, last(force));
+    const Interval both_d = hull(d, last(force));
     position = position_m + stability::answer(*loop->h1, 0, both_d);
     velocity = velocity_m_s + stability::answer(*loop->h2, 0, both_d);
     if (loop->has_whole_periods) {
-      const Interval both_saw = stability::hull(Interval(-saw, saw), last(sawtooth));
+      const Interval both_saw = hull(Interval(-saw, saw), last(sawtooth));
       position += stability::answer(*loop->slope1, 0, both_saw);
       velocity += stability::answer(*loop->slope2, 0, both_saw);
     }
     if (!loop->has_lag) return;
-    const Interval both_w = stability::hull(w, last(lagging));
+    const Interval both_w = hull(w, last(lagging));
     position += stability::answer(*loop->g1, 0, both_w);
     velocity += stability::answer(*loop->g2, 0, both_w);
   }

@@ -10,12 +10,9 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 using stability::exp;
-using stability::hull;
 using stability::pow;
 
 /// exp(-7^2/2), where the simulator's wakes end, rounded up.
@@ -23,15 +20,15 @@ constexpr double kCutOff = 2.3e-11;
 /// What is smaller counts as a number between zero and this: logarithms end somewhere.
 constexpr double kTiny = 1e-280;
 
-Interval square(Interval x) { return stability::abs(x) * stability::abs(x); }
+Interval square(Interval x) { return abs(x) * abs(x); }
 Interval cut(Interval x, double from, double to) {
-  return {std::clamp(x.lo, from, to), std::clamp(x.hi, from, to)};
+  return {std::clamp(x.lower, from, to), std::clamp(x.upper, from, to)};
 }
 
 /// x^p of an interval of numbers that are not negative.
 Interval power(Interval x, double p) {
-  return {x.lo > kTiny ? std::max(0.0, pow(Interval(x.lo), p).lo) : 0,
-          pow(Interval(std::max(x.hi, kTiny)), p).hi};
+  return {x.lower > kTiny ? std::max(0.0, pow(Interval(x.lower), p).lower) : 0,
+          pow(Interval(std::max(x.upper, kTiny)), p).upper};
 }
 
 double value_of(const stability::EffectSpec& spec, const char* name) {
@@ -55,8 +52,9 @@ struct Strength {
 Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double spread_slope) {
   Strength result;
   const Interval z = dp[2];
-  if (z.hi <= stability::kWakeTouching_m) return result;
-  const Interval h = {std::max(z.lo, stability::kWakeNearest_m), std::max(z.hi, stability::kWakeNearest_m)};
+  if (z.upper <= stability::kWakeTouching_m) return result;
+  const Interval h = {std::max(z.lower, stability::kWakeNearest_m),
+                      std::max(z.upper, stability::kWakeNearest_m)};
   const Interval s = Interval(spread_m) + Interval(spread_slope) * h;
   const Interval ss = square(s);
   const Interval rr = square(dp[0]) + square(dp[1]);
@@ -68,17 +66,17 @@ Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double
   const auto fade = [](double t) {
     return Interval(t) * Interval(t) * (Interval(3) - Interval(2) * Interval(t));
   };
-  const Interval u = cut({fade(x.lo).lo, fade(x.hi).hi}, 0, 1);
+  const Interval u = cut({fade(x.lower).lower, fade(x.upper).upper}, 0, 1);
   result.g = full * u;
-  result.g.lo = std::max(0.0, result.g.lo);
+  result.g.lower = std::max(0.0, result.g.lower);
   result.slope[0] = -(result.g * dp[0] / ss);
   result.slope[1] = -(result.g * dp[1] / ss);
   // Below 0.12 m only u changes, above only the rest; a set on both sides has either slope.
   const Interval rises = full * (Interval(6) * x * (Interval(1) - x) / range);
   const Interval falls = full * (Interval(spread_slope) * rr / (ss * s) - Interval(decay) / h);
-  result.slope[2] = z.lo >= stability::kWakeNearest_m   ? falls
-                    : z.hi <= stability::kWakeNearest_m ? rises
-                                                        : hull(rises, falls);
+  result.slope[2] = z.lower >= stability::kWakeNearest_m   ? falls
+                    : z.upper <= stability::kWakeNearest_m ? rises
+                                                           : hull(rises, falls);
   return result;
 }
 
@@ -129,15 +127,15 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
     Strength& one = each.back();
     one.g = one.g * field.mass_factor;
     for (Interval& slope : one.slope) slope = slope * field.mass_factor;
-    if (one.g.hi <= 0) continue;
+    if (one.g.upper <= 0) continue;
     total = ++count == 1 ? one.g : total + one.g;
   }
   if (count == 0) return;
   if (count > 1) {  // (sum g^p)^(1/p), which rises in each g
     Interval powers;
     for (const Strength& one : each)
-      if (one.g.hi > 0) powers += power(one.g, field.norm);
-    total = power({std::max(0.0, powers.lo), powers.hi}, 1 / field.norm);
+      if (one.g.upper > 0) powers += power(one.g, field.norm);
+    total = power({std::max(0.0, powers.lower), powers.upper}, 1 / field.norm);
     // 1/p is rounded: d ln(total) = d(1/p) ln(sum), and |ln| < 700.
     total = total * Interval(1 - 1e-12, 1 + 1e-12);
   }
@@ -147,18 +145,18 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
   sum.value_N += force;
   // A wake that ends changes the sum by at most its own strength there.
   const double cut_off =
-      up(field.amplitude_N * field.mass_factor.hi * kCutOff *
-         pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).hi *
+      up(field.amplitude_N * field.mass_factor.upper * kCutOff *
+         pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).upper *
          static_cast<double>(neighbours.size()) * 1.001);
   sum.cut_off_N = up(sum.cut_off_N + cut_off);
   sum.value_N += Interval(-cut_off, cut_off);
   for (std::size_t j = 0; j < each.size(); ++j) {
-    if (each[j].g.hi <= 0) continue;
+    if (each[j].g.upper <= 0) continue;
     // d total / d g_j = (g_j / total)^(p - 1), between 0 and 1.
     Interval share(1);
     if (count > 1) {
       share = {0, 1};
-      if (total.lo > kTiny && field.norm > 1) {
+      if (total.lower > kTiny && field.norm > 1) {
         share =
             cut(power(cut(each[j].g / total, 0, 1), field.norm - 1) * Interval(1 - 1e-12, 1 + 1e-12), 0, 1);
       } else if (field.norm == 1) {
@@ -173,28 +171,29 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
 void TruthForce::add(const Lift& field, const std::vector<Offset>& neighbours, Wake& sum) const {
   for (std::size_t j = 0; j < neighbours.size(); ++j) {
     const Interval z = -neighbours[j][2];
-    if (z.hi <= stability::kWakeTouching_m) continue;
-    const Interval h = {std::max(z.lo, stability::kWakeNearest_m), std::max(z.hi, stability::kWakeNearest_m)};
+    if (z.upper <= stability::kWakeTouching_m) continue;
+    const Interval h = {std::max(z.lower, stability::kWakeNearest_m),
+                        std::max(z.upper, stability::kWakeNearest_m)};
     const Interval ss = square(Interval(field.spread_m));
     const Interval rr = square(neighbours[j][0]) + square(neighbours[j][1]);
     Interval force = Interval(field.amplitude_N) *
                      pow(Interval(stability::kWakeReference_m) / h, field.decay) *
                      exp(-(rr / (Interval(2) * ss)));
-    const bool may_vanish = z.lo <= stability::kWakeTouching_m || field.for_some_only;
+    const bool may_vanish = z.lower <= stability::kWakeTouching_m || field.for_some_only;
     if (may_vanish) force = hull(force, Interval(0));
-    if (z.lo <= stability::kWakeTouching_m && field.amplitude_N > 0) sum.has_gradient = false;
+    if (z.lower <= stability::kWakeTouching_m && field.amplitude_N > 0) sum.has_gradient = false;
     sum.value_N += force;
-    const double cut_off =
-        up(field.amplitude_N * kCutOff *
-           pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).hi *
-           1.001);
+    const double cut_off = up(
+        field.amplitude_N * kCutOff *
+        pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).upper *
+        1.001);
     sum.cut_off_N = up(sum.cut_off_N + cut_off);
     sum.value_N += Interval(-cut_off, cut_off);
     Offset& gradient = sum.gradient_N_m[j];
     for (std::size_t k = 0; k < 2; ++k) gradient[k] += -(force * neighbours[j][k] / ss);
     // h is z beyond 0.12 m, and z = -dp_z: the force rises with dp_z.
     const Interval rise = force * Interval(field.decay) / h;
-    gradient[2] += z.lo >= stability::kWakeNearest_m ? rise : hull(rise, Interval(0));
+    gradient[2] += z.lower >= stability::kWakeNearest_m ? rise : hull(rise, Interval(0));
   }
 }
 
@@ -212,11 +211,11 @@ TruthForce::Rest TruthForce::rest(Interval height_m, const Interval velocity_m_s
   stability::MotionSet motion;
   Interval squares;
   for (int k = 0; k < 3; ++k) squares += square(velocity_m_s[k]);
-  motion.speed_m_s = stability::sqrt(squares).hi;
+  motion.speed_m_s = sqrt(squares).upper;
   motion.acceleration_m_s2 = acceleration_m_s2;
   motion.thrust_rate_N_s = thrust_rate_N_s;
-  motion.least_height_m = std::max(0.0, height_m.lo);
-  motion.largest_height_m = height_m.hi;
+  motion.least_height_m = std::max(0.0, height_m.lower);
+  motion.largest_height_m = height_m.upper;
   motion.largest_thrust_N = largest_thrust_N_;
   for (const stability::EffectSpec& effect : others_) {
     if (effect.name == "constant_force" && effect.vehicle.empty()) {
@@ -228,7 +227,7 @@ TruthForce::Rest TruthForce::rest(Interval height_m, const Interval velocity_m_s
       const Interval drag(value_of(effect, "drag_N_s_m"));
       for (int k = 0; k < 3; ++k) {
         result.force_N[k] += -(drag * velocity_m_s[k]);
-        result.rate_N_s[k] = up(result.rate_N_s[k] + up(drag.hi * acceleration_m_s2));
+        result.rate_N_s[k] = up(result.rate_N_s[k] + up(drag.upper * acceleration_m_s2));
       }
       continue;
     }

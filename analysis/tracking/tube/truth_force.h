@@ -5,12 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 #include "stability/model.h"
 
 namespace swarmcert::analysis {
 
-using stability::Interval;
 using Offset = std::array<Interval, 3>;  ///< of a neighbour from the vehicle, world axes, m
 
 /// Forces of one vehicle's declared effects, enclosed in real arithmetic.

@@ -8,8 +8,6 @@
 
 namespace swarmcert::analysis {
 
-using stability::up;
-
 namespace {
 
 constexpr double kNotKnown = std::numeric_limits<double>::infinity();
@@ -20,8 +18,8 @@ constexpr double kFade_m = 0.9;
 double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
 
 double length(Interval x, Interval y, Interval z) {
-  const auto square = [](Interval a) { return stability::abs(a) * stability::abs(a); };
-  return stability::sqrt(square(x) + square(y) + square(z)).hi;
+  const auto square = [](Interval a) { return abs(a) * abs(a); };
+  return sqrt(square(x) + square(y) + square(z)).upper;
 }
 
 double length(const double (&x)[3]) { return length(x[0], x[1], x[2]); }
@@ -214,7 +212,7 @@ ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std:
   return result;
 }
 
-Interval common(Interval a, Interval b) { return {std::max(a.lo, b.lo), std::min(a.hi, b.hi)}; }
+Interval common(Interval a, Interval b) { return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)}; }
 
 /// The errors of one vehicle slice by slice: what the sizes of all signals allow, within what is known already.
 void add_slices(const std::array<ErrorHistory, 3>& history, std::size_t vehicle,

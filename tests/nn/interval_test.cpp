@@ -1,5 +1,5 @@
 // Every operation on intervals contains what the operation gives for numbers of the intervals.
-#include "stability/bounds/interval.h"
+#include "nn/base/interval.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 
 #include "nn/base/random.h"
 
-namespace swarmcert::stability {
+namespace swarmcert {
 namespace {
 
-bool contains(Interval a, double x) { return a.lo <= x && x <= a.hi; }
+bool contains(Interval a, double x) { return a.lower <= x && x <= a.upper; }
 
 /// Of the kinds that occur: around zero, beside it, touching it, a single number.
 Interval random_interval(files::Random& random) {
@@ -33,8 +33,8 @@ TEST(Interval, DivisionByAnIntervalWithZeroGivesTheWholeLine) {
   for (const Interval divisor :
        {Interval(-1, 1), Interval(0, 1), Interval(-1, 0), Interval(0), Interval(-0.0)}) {
     const Interval quotient = Interval(1, 2) / divisor;
-    EXPECT_EQ(quotient.lo, -infinity);
-    EXPECT_EQ(quotient.hi, infinity);
+    EXPECT_EQ(quotient.lower, -infinity);
+    EXPECT_EQ(quotient.upper, infinity);
   }
   // What is computed with it stays an enclosure.
   const Interval product = Interval(1, 2) / Interval(-1, 1) * Interval(0, 1);
@@ -47,7 +47,7 @@ TEST(Interval, OperationsContainTheResultForNumbersOfTheIntervals) {
   for (int i = 0; i < 20000; ++i) {
     const Interval a = random_interval(random), b = random_interval(random);
     const auto pick = [&](Interval x) {
-      return std::clamp(x.lo + (x.hi - x.lo) * 0.5 * (1 + random.symmetric()), x.lo, x.hi);
+      return std::clamp(x.lower + (x.upper - x.lower) * 0.5 * (1 + random.symmetric()), x.lower, x.upper);
     };
     const double x = pick(a), y = pick(b);
     EXPECT_TRUE(contains(a + b, x + y) && contains(a - b, x - y) && contains(a * b, x * y));
@@ -77,17 +77,17 @@ TEST(Interval, NeighboursOfADoubleAreThoseOfNextafter) {
 }
 
 TEST(Interval, PowersAreMultipliedOut) {
-  EXPECT_EQ(nth_power(Interval(2), 0).lo, 1);
+  EXPECT_EQ(nth_power(Interval(2), 0).lower, 1);
   for (const double x : {0.1, 0.75, 1.0, 1.5}) {
     long double exact = 1;
     for (int n = 0; n <= 18; ++n, exact *= static_cast<long double>(x)) {
       const Interval power = nth_power(Interval(x), n);
-      EXPECT_LE(static_cast<long double>(power.lo), exact);
-      EXPECT_GE(static_cast<long double>(power.hi), exact);
-      EXPECT_LE(power.hi - power.lo, 1e-14 * power.hi);
+      EXPECT_LE(static_cast<long double>(power.lower), exact);
+      EXPECT_GE(static_cast<long double>(power.upper), exact);
+      EXPECT_LE(power.upper - power.lower, 1e-14 * power.upper);
     }
   }
 }
 
 }  // namespace
-}  // namespace swarmcert::stability
+}  // namespace swarmcert
