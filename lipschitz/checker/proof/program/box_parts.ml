@@ -1,5 +1,5 @@
-(* Proofs by parts of a box, or of boxes that hold a multiple of every (x, 1): the tree of a certificate as a proof of the theorems, with the numbers that only have to be good
-   guesses, in floating point. *)
+(* Proofs by parts of a box, or of boxes that hold a multiple of every (x, 1): the tree of a certificate
+   as a proof of the theorems, with the numbers that only have to be good guesses, in floating point. *)
 
 open Refusal
 open Json
@@ -27,7 +27,8 @@ let rounded_up (m, e) =
   let excess = Z.numbits m - 64 in
   if excess <= 0 then m, e else Z.add (Z.shift_right m excess) Z.one, Z.add e (Z.of_int excess)
 
-(* A guesser for one matrix after the other: the candidates of the one at hand, and how many were asked for before it. *)
+(* A guesser for one matrix after the other: the candidates of the one at hand, and how many were asked for before
+   it. *)
 type guesses = { mutable rest : Proved.factor Seq.t; mutable matrices : int; mutable is_shown : bool }
 (* Rows of the theorems' matrices end where only zeros follow. *)
 let padded matrix =
@@ -110,7 +111,8 @@ let conflicts_of where sizes json =
     let size = String.length word in
     let digits = if size > 0 then String.sub word 0 (size - 1) else "" in
     require (digits <> "" && size <= 10 && String.for_all (fun c -> c >= '0' && c <= '9') digits
-             && (word.[size - 1] = '+' || word.[size - 1] = '-')) "%s: a conflict's neuron is not a number with + or -" where;
+             && (word.[size - 1] = '+' || word.[size - 1] = '-'))
+      "%s: a conflict's neuron is not a number with + or -" where;
     int_of_string ("0u" ^ digits), word.[size - 1] = '+' in
   let rec read = function
     | [] -> []
@@ -159,7 +161,8 @@ let trees_of ~where ~(layers : Weights.layer list) ~passes ~multipliers ~boxes t
     | Some (Decided (neuron, is_on, corner)) ->
       (match place neuron 0 sizes with
        | None -> fails !at "a neuron is decided that nothing looks at"
-       | Some place when Array.length low > most_inputs_of_a_corner || passes place -> fails !at "a neuron is not decided by its slopes"
+       | Some place when Array.length low > most_inputs_of_a_corner || passes place ->
+          fails !at "a neuron is not decided by its slopes"
        | Some (layer, neuron) ->
          let point = Array.mapi (fun k l -> if (corner lsr k) land 1 = 1 then high.(k) else l) low in
          incr at;
@@ -201,8 +204,10 @@ let form_of net rho where json =
   require (List.length q = Functions.inputs net rho) "%s: q has another size" where;
   List.iteri (fun k row -> require (List.length row = k + 1) "%s: q is not a lower triangle" where) q;
   let t = Exact.hex_floats where (find where "t" json) in
-  let neurons = List.fold_left (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer weights)) weights.layers in
-  require (List.length t = neurons && List.for_all (fun x -> x >= 0.) t) "%s: needs one nonnegative t per hidden neuron" where;
+  let neurons =
+    List.fold_left (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer weights)) weights.layers in
+  require (List.length t = neurons && List.for_all (fun x -> x >= 0.) t)
+    "%s: needs one nonnegative t per hidden neuron" where;
   let form_factor = match find where "factor" json with
     | Null -> next_factor (new_guesses ())
     | factor ->
@@ -229,7 +234,8 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper 
   require (rho > 0. && Proved.at_most exact_rho (Proved.mul0 upper upper)) "%s: claims less than sqrt(rho)" where;
   let conflicts = if has_conflicts then list where (find where "conflicts" json) else [] in
   let lists = list where (find where "multipliers" json) in
-  require (not has_conflicts || List.length conflicts = List.length lists) "%s: there are conflicts for other multipliers" where;
+  require (not has_conflicts || List.length conflicts = List.length lists)
+    "%s: there are conflicts for other multipliers" where;
   let tree_text = text where (find where "tree" json) in
   if is_coupled then Beyond else begin
     let weights = Functions.weights net moved in
@@ -252,7 +258,8 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper 
       is_global && layer + 1 < List.length hidden && neuron = Weights.outputs (List.nth hidden layer) in
     let sizes = List.map Weights.outputs layers in
     let neurons = List.fold_left (+) 0 sizes in
-    let conflicts = if has_conflicts then List.map (conflicts_of where sizes) conflicts else List.map (fun _ -> []) lists in
+    let conflicts =
+      if has_conflicts then List.map (conflicts_of where sizes) conflicts else List.map (fun _ -> []) lists in
     let multipliers = Array.of_list (List.map2 (fun conflicts some ->
         let t = hex_words where some in
         require (List.length t = neurons && List.for_all (fun x -> x >= 0.) t)
@@ -272,6 +279,8 @@ let read (net : Network.t) certificate bound ~where ~names ~moves ~scale ~upper 
       let k = guesses.matrices in
       if k > 0 && not guesses.is_shown then
         Printf.sprintf "%s: word %d of the tree: its multipliers do not show the bound there" where leaves.(k - 1)
-      else Printf.sprintf "%s: the tree does not prove the bound after leaf %d: a neuron is not decided by its slopes" where k in
+      else
+        Printf.sprintf "%s: the tree does not prove the bound after leaf %d: a neuron is not decided by its slopes"
+          where k in
     Proof (domain, proof, reason)
   end

@@ -17,7 +17,8 @@ let rational text =
   let digits = Q.of_bigint (Z.of_string ("0" ^ whole ^ fraction)) and ten = Z.pow (Z.of_int 10) (abs power) in
   if power >= 0 then Q.mul digits (Q.of_bigint ten) else Q.div digits (Q.of_bigint ten)
 
-(* A decimal rounded once to float32. By way of double it would be rounded twice, which matters halfway between floats. *)
+(* A decimal rounded once to float32. By way of double it would be rounded twice, which matters halfway between
+   floats. *)
 let nearest_float32 text =
   let double = float_of_string text in
   let single = Exact.float32 double in

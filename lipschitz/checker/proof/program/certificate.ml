@@ -99,8 +99,8 @@ let check net json =
   check_weights net (member "network");
   check_boxes net (member "box");
   let state = { Claims.net; json; parts = Functions.parts net; accepted = []; log = []; norms = Hashtbl.create 8;
-                uppers = Hashtbl.create 64; in_box = Hashtbl.create 8; unwritten = 0; spectral_norms = 0; upper_bounds = 0; lower_bounds = 0;
-                values = 0; not_checked = [] } in
+                uppers = Hashtbl.create 64; in_box = Hashtbl.create 8; unwritten = 0; spectral_norms = 0;
+                upper_bounds = 0; lower_bounds = 0; values = 0; not_checked = [] } in
   List.iter (fun (part, (w : Weights.t)) ->
       List.iteri (fun k layer ->
           Claims.check_layer state (element "layers" state.spectral_norms (member "layers")) part k layer) w.layers)

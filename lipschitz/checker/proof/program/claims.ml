@@ -1,5 +1,5 @@
-(* Each statement of a certificate as a claim of the theorems with its proof. Only `prove` says that one holds: it asks the
-   extracted checker. Everything else here says which claim it is, and words the reason where it is refused. *)
+(* Each statement of a certificate as a claim of the theorems with its proof. Only `prove` says that one holds: it asks
+   the extracted checker. Everything else here says which claim it is, and words the reason where it is refused. *)
 
 open Refusal
 open Json
@@ -15,7 +15,8 @@ type t = {
   norms : (string, Proved.dyadic) Hashtbl.t;  (* product of the norms of a network *)
   uppers : (string * string * (string * int) list, Proved.dyadic * source) Hashtbl.t;
       (* by function, block, neighbours *)
-  in_box : (string * string, unit) Hashtbl.t;  (* functions and blocks whose bound, for any neighbours, is one in a box *)
+  in_box : (string * string, unit) Hashtbl.t;
+      (* functions and blocks whose bound, for any neighbours, is one in a box *)
   mutable unwritten : int;  (* claims that --coq does not write *)
   mutable spectral_norms : int;
   mutable upper_bounds : int;
@@ -60,8 +61,8 @@ let check_status where json =
   let status = text where (find where "status" json) in
   require (status = "finished" || status = "interrupted") "%s: unknown status" where
 
-(* Proofs of a claim by a matrix inequality: one, or where the certificate leaves out the factor, those to try. `neurons`:
-   hidden ones of the chain. *)
+(* Proofs of a claim by a matrix inequality: one, or where the certificate leaves out the factor, those to try.
+   `neurons`: hidden ones of the chain. *)
 let inequality state claim where ~neurons ~upper json =
   let here = where ^ ".proof" in
   require_keys here [ "rho"; "t"; "factor" ] json;
@@ -96,7 +97,8 @@ let check_layer state entry part k (layer : Weights.layer) =
   let p = Functions.index state.net part in
   prove state (Norm_at_least (p, k, lower)) (By_vector vector) (where ^ ": claims more than |W v| / |v|");
   let at_most = Proved.Norm_at_most (p, k, upper) in
-  prove_by state at_most (inequality state at_most where ~neurons:0 ~upper (find where "upper" proof)) (no_factor where);
+  prove_by state at_most (inequality state at_most where ~neurons:0 ~upper (find where "upper" proof))
+    (no_factor where);
   let product = Option.value ~default:Exact.one (Hashtbl.find_opt state.norms part) in
   Hashtbl.replace state.norms part (times product upper);
   state.spectral_norms <- state.spectral_norms + 1
@@ -163,7 +165,8 @@ let check_product state where names claim scale upper =
 let check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper =
   match Box_parts.read state.net state.json bound ~where ~names ~moves ~scale ~upper with
   | Beyond ->
-    not_checked state (Printf.sprintf "%s <= %s: %s" where (text where (find where "upper_hex" bound)) Box_parts.words_of_beyond);
+    let upper = text where (find where "upper_hex" bound) in
+    not_checked state (Printf.sprintf "%s <= %s: %s" where upper Box_parts.words_of_beyond);
     Not_checked
   | Proof (domain, proof, reason) ->
     let claim, source = match domain with
@@ -205,7 +208,8 @@ let check_bound state bound =
   let claim = Proved.Slope_at_most (func, moves, exact_scale, upper) in
   let source = match find where "upper_method" bound with
     | Text ("sdp" | "eclipse_fast") ->
-      let proofs = inequality state claim where ~neurons:(hidden_neurons state names) ~upper (find where "proof" bound) in
+      let neurons = hidden_neurons state names in
+      let proofs = inequality state claim where ~neurons ~upper (find where "proof" bound) in
       prove_by state claim proofs (no_factor where); Proved_here
     | Text "branch" -> check_parts state where bound names ~func ~moves ~scale ~exact_scale ~upper
     | Text "product" when find where "proof" bound = Null -> check_product state where names claim scale upper
@@ -247,7 +251,8 @@ let check_law state law =
     let f = Printf.sprintf "set:%s:%s" kind rho in
     let any, source = match Hashtbl.find_opt state.uppers (f, block, []) with
       | Some found -> found | None -> rejected "%s: rests on a bound of %s that is not there" where (shown f) in
-    require (domain = "box" || not (Hashtbl.mem state.in_box (f, block))) "%s: rests on a bound that holds on a box only" where;
+    require (domain = "box" || not (Hashtbl.mem state.in_box (f, block)))
+      "%s: rests on a bound that holds on a box only" where;
     match Hashtbl.find_opt state.uppers (f, block, neighbours) with
     | Some (fewer, source) when domain = "box" && neighbours <> [] && at_most fewer any -> f, count, fewer, source
     | _ -> f, count, any, source in
@@ -266,7 +271,8 @@ let check_law state law =
     | _ -> false in
   let is_written = List.for_all (fun (_, _, _, source) -> source = Proved_here) bounds in
   let everywhere = List.for_all (fun (_, _, _, source) -> source = Proved_here || source = By_parts) bounds in
-  if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds || not (everywhere || List.for_all has_box bounds) then
+  if List.exists (fun (_, _, _, source) -> source = Not_checked) bounds
+     || not (everywhere || List.for_all has_box bounds) then
     not_checked state (Printf.sprintf "%s: rests on a bound that is not checked" where)
   else begin
     let kind (f, n, _, _) = (Functions.index state.net (part f), Functions.moves state.net f block), Z.of_int n in
@@ -276,6 +282,7 @@ let check_law state law =
     let law = Proved.Law (stacked, List.map kind bounds, rho, upper) in
     if is_written then prove state law By_triangle reason
     else if everywhere then prove_unwritten state law By_triangle (fun () -> reason)
-    else prove_unwritten state (Law_in_box (stacked, List.map in_box bounds, rho, upper)) By_triangle (fun () -> reason);
+    else
+      prove_unwritten state (Law_in_box (stacked, List.map in_box bounds, rho, upper)) By_triangle (fun () -> reason);
     state.upper_bounds <- state.upper_bounds + 1
   end

@@ -18,10 +18,11 @@ let pair first second out (a, b) = Printf.bprintf out "(%a,%a)" first a second b
 
 let layer = pair matrix long_numbers
 let activation out a = Buffer.add_string out (match a with
-    | Proved.Relu -> "Relu" | Tanh -> "Tanh" | Sigmoid -> "Sigmoid" | Softplus -> "Softplus" | Elu -> "Elu" | Selu -> "Selu"
-    | Silu -> "Silu" | Gelu -> "Gelu")
+    | Proved.Relu -> "Relu" | Tanh -> "Tanh" | Sigmoid -> "Sigmoid" | Softplus -> "Softplus" | Elu -> "Elu"
+    | Selu -> "Selu" | Silu -> "Silu" | Gelu -> "Gelu")
 let part out { Proved.hidden; outer; clamp; between } =
-  Printf.bprintf out "Part %a %a %a %a" (list layer) hidden layer outer (list (pair number number)) clamp activation between
+  Printf.bprintf out "Part %a %a %a %a" (list layer) hidden layer outer (list (pair number number)) clamp
+    activation between
 let func out = function
   | Proved.Alone p -> Printf.bprintf out "(Alone %a)" natural p
   | Set_of (phi, rho) -> Printf.bprintf out "(Set_of %a %a)" natural phi natural rho
@@ -31,23 +32,30 @@ let term out { Proved.phi; inputs_in; fewest; most } =
 let claim out = function
   | Proved.Norm_at_most (p, k, u) -> Printf.bprintf out "Norm_at_most %a %a %a" natural p natural k number u
   | Norm_at_least (p, k, l) -> Printf.bprintf out "Norm_at_least %a %a %a" natural p natural k number l
-  | Slope_at_most (f, moves, scale, u) -> Printf.bprintf out "Slope_at_most %a %a %a %a" func f (list flag) moves numbers scale number u
-  | Slope_at_least (f, moves, scale, l) -> Printf.bprintf out "Slope_at_least %a %a %a %a" func f (list flag) moves numbers scale number l
+  | Slope_at_most (f, moves, scale, u) ->
+    Printf.bprintf out "Slope_at_most %a %a %a %a" func f (list flag) moves numbers scale number u
+  | Slope_at_least (f, moves, scale, l) ->
+    Printf.bprintf out "Slope_at_least %a %a %a %a" func f (list flag) moves numbers scale number l
   | Law (stacked, kinds, rho, u) ->
-    Printf.bprintf out "Law %a %a %a %a" flag stacked (list (pair (pair natural (list flag)) integer)) kinds natural rho number u
+    Printf.bprintf out "Law %a %a %a %a" flag stacked (list (pair (pair natural (list flag)) integer)) kinds natural rho
+      number u
   | Slope_in_box _ | Law_in_box _ -> assert false  (* not written: Claims.prove_unwritten *)
   | Within (p, b, v) -> Printf.bprintf out "Within %a %a %a" natural p box b box v
   | Sum_within (terms, rho, v) -> Printf.bprintf out "Sum_within %a %a %a" (list term) terms natural rho box v
-  | Jump_at_most (phi, b, rho, u) -> Printf.bprintf out "Jump_at_most %a %a %a %a" natural phi box b natural rho number u
-  | Float_error (p, b, r, e, u) -> Printf.bprintf out "Float_error %a %a %a %a %a" natural p box b numbers r numbers e number u
+  | Jump_at_most (phi, b, rho, u) ->
+    Printf.bprintf out "Jump_at_most %a %a %a %a" natural phi box b natural rho number u
+  | Float_error (p, b, r, e, u) ->
+    Printf.bprintf out "Float_error %a %a %a %a %a" natural p box b numbers r numbers e number u
   | Sum_float_error (terms, rho, u) ->
     Printf.bprintf out "Sum_float_error %a %a %a" (list (pair term numbers)) terms natural rho number u
 let proof out = function
   | Proved.By_inequality (rho, t, { unit0; scales; rows }) ->
-    Printf.bprintf out "By_inequality %a %a (Factor (%a) %a %a)" number rho long_numbers t integer unit0 (list integer) scales (list (list long)) rows
+    Printf.bprintf out "By_inequality %a %a (Factor (%a) %a %a)" number rho long_numbers t integer unit0
+      (list integer) scales (list (list long)) rows
   | By_vector v -> Printf.bprintf out "By_vector %a" numbers v
   | By_product -> Buffer.add_string out "By_product"
-  | By_points (x, y, others) -> Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
+  | By_points (x, y, others) ->
+    Printf.bprintf out "By_points %a %a %a" numbers x numbers y (list (pair natural numbers)) others
   | By_triangle -> Buffer.add_string out "By_triangle"
   | By_parts _ | By_all_parts _ -> assert false
   | By_layers bounds -> Printf.bprintf out "By_layers %a" (list box) bounds
@@ -64,9 +72,11 @@ let file parts claims =
      From Coq Require Import List ZArith.\nFrom Swarmcert Require Import Activations Checker Meaning Claims Sound.\n\
      Import ListNotations.\nOpen Scope Z_scope.\n\n";
   List.iteri (fun k p -> Printf.bprintf out "Definition network%d : part := %a.\n" k part p) parts;
-  Printf.bprintf out "Definition networks : list part := [%s].\n\n" (String.concat "; " (List.mapi (fun k _ -> Printf.sprintf "network%d" k) parts));
+  Printf.bprintf out "Definition networks : list part := [%s].\n\n"
+    (String.concat "; " (List.mapi (fun k _ -> Printf.sprintf "network%d" k) parts));
   List.iteri (fun k (c, p) ->
-      Printf.bprintf out "Definition claim%d : claim := %a.\nDefinition proof%d : proof := %a.\n" k claim c k proof p) claims;
+      Printf.bprintf out "Definition claim%d : claim := %a.\nDefinition proof%d : proof := %a.\n"
+        k claim c k proof p) claims;
   Printf.bprintf out "\nDefinition certificate : list (claim * proof) := [%s].\n"
     (String.concat "; " (List.mapi (fun k _ -> Printf.sprintf "(claim%d, proof%d)" k k) claims));
   Buffer.add_string out

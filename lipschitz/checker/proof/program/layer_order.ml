@@ -1,5 +1,5 @@
-(* In which order layers are evaluated: as the file or the user states, by the numbers in their names, or because no other
-   order fits their shapes. *)
+(* In which order layers are evaluated: as the file or the user states, by the numbers in their names, or because no
+   other order fits their shapes. *)
 
 open Refusal
 

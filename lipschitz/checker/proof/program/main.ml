@@ -10,13 +10,17 @@ let help =
   \  --phi FILE --rho FILE   phi and rho\n\
   \  --key KEY               key of the state dict inside a nested checkpoint\n\
   \  --order A,B,C           layers in the order of evaluation; with --phi and --rho phi=A,B and rho=A,B\n\
-  \  --activation OP         what lies between the layers, where neither the weight files nor network.toml say it; without it,\n\
+  \  --activation OP         what lies between the layers, where neither the weight files nor network.toml say \
+      it; without it,\n\
   \                          the certificate says it\n\
-  \  --coq                   write the certificate as a Coq file to standard output; coqc then accepts it in its kernel\n\
-  \  --many                  certificates of one NET, named on standard input, one in a line; writes the exit code and a\n\
+  \  --coq                   write the certificate as a Coq file to standard output; coqc then accepts it in \
+      its kernel\n\
+  \  --many                  certificates of one NET, named on standard input, one in a line; writes the exit \
+      code and a\n\
   \                          tab and the reason of each in a line\n\
   \  --version               the program's version\n\n\
-   Exit codes: 0 accepted; 1 rejected, with the reason; 2 usage; 3 a file cannot be read; 4 what was checked holds, but some\n\
+   Exit codes: 0 accepted; 1 rejected, with the reason; 2 usage; 3 a file cannot be read; 4 what was checked holds, \
+    but some\n\
    claims are beyond this checker and are listed as \"not checked\".\n"
 
 exception Usage of string
@@ -34,14 +38,16 @@ let rec options (args : Network.arguments) mode positional = function
   | "--rho" :: file :: rest -> options { args with rho = file } mode positional rest
   | "--key" :: key :: rest -> options { args with key } mode positional rest
   | "--activation" :: activation :: rest ->
-    if Activation.called activation = None then raise (Usage ("--activation: there is no activation " ^ shown activation));
+    if Activation.called activation = None then
+      raise (Usage ("--activation: there is no activation " ^ shown activation));
     options { args with activation } mode positional rest
   | "--order" :: word :: rest ->
     let part, names = match String.index_opt word '=' with
       | Some at -> String.sub word 0 at, String.sub word (at + 1) (String.length word - at - 1)
       | None -> "network", word in
     options { args with orders = (part, String.split_on_char ',' names) :: args.orders } mode positional rest
-  | word :: _ when String.length word > 1 && word.[0] = '-' -> raise (Usage ("unknown option, or one without its value: " ^ word))
+  | word :: _ when String.length word > 1 && word.[0] = '-' ->
+    raise (Usage ("unknown option, or one without its value: " ^ word))
   | word :: rest -> options args mode (word :: positional) rest
 
 let schema_of path = function
@@ -52,8 +58,8 @@ let schema_of path = function
 
 let report (state : Claims.t) =
   let values = if state.values > 0 then Printf.sprintf ", values of %d" state.values else "" in
-  let numbers = Printf.sprintf "%d spectral norms, %d upper bounds, %d lower bounds%s" state.spectral_norms state.upper_bounds
-      state.lower_bounds values in
+  let numbers = Printf.sprintf "%d spectral norms, %d upper bounds, %d lower bounds%s" state.spectral_norms
+      state.upper_bounds state.lower_bounds values in
   List.iter (fun what -> Printf.printf "not checked: %s\n" what) (List.rev state.not_checked);
   (match List.length state.not_checked with
    | 0 -> Printf.printf "accepted: every statement verified in exact arithmetic: %s\n" numbers
@@ -95,7 +101,8 @@ let single args mode certificate =
     print_string (Kernel.file state.parts (List.rev state.log));
     List.iter (fun what -> prerr_endline ("not checked: " ^ what)) (List.rev state.not_checked);
     if state.unwritten > 0 then
-      Printf.eprintf "not written: %d claims by parts of boxes, which hold but are not in the Coq file\n" state.unwritten;
+      Printf.eprintf "not written: %d claims by parts of boxes, which hold but are not in the Coq file\n"
+        state.unwritten;
     if state.not_checked = [] && state.unwritten = 0 then 0 else 4
   end
   else report state

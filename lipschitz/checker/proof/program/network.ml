@@ -124,7 +124,8 @@ let read_kinds path ~key role members =
       let weights = load file ~key ~order in
       let weights = match List.assoc_opt "activation" entry with
         | None -> weights
-        | json -> with_activation (path ^ ": " ^ where ^ ".activation") weights (text path (where ^ ".activation") json) in
+        | json ->
+          with_activation (path ^ ": " ^ where ^ ".activation") weights (text path (where ^ ".activation") json) in
       role ^ ":" ^ kind, weights) members
 
 let check_sizes path ~order ~clamp ~components phis rhos =

@@ -46,7 +46,8 @@ let attribute path message =
     | Protobuf.Fixed four :: _, _ when String.length four = 4 -> Some (Int32.float_of_bits (String.get_int32_le four 0))
     | _, Protobuf.Number n :: _ -> Some (Int64.to_float n)
     | _ -> None in
-  text path 1 fields, { number; word = text path 4 fields; tensor = (match texts path 5 fields with t :: _ -> Some (tensor path t) | [] -> None) }
+  let tensor = match texts path 5 fields with t :: _ -> Some (tensor path t) | [] -> None in
+  text path 1 fields, { number; word = text path 4 fields; tensor }
 
 let node path message =
   let fields = Protobuf.fields path message in
@@ -57,10 +58,14 @@ let node path message =
       attributes = List.map (attribute path) (texts path 5 fields) }
   | _ -> bad_input "%s: a node has not exactly one output" path
 
-type state = { mutable layers : affine list; mutable is_activated : bool; mutable activation : Proved.activation option }
+type state = {
+  mutable layers : affine list;
+  mutable is_activated : bool;
+  mutable activation : Proved.activation option;
+}
 
-(* Only with the parameters that the activations have here. Selu has float32 constants, with which it is 3e-9 steeper than
-   with the decimals of the statement: another function. *)
+(* Only with the parameters that the activations have here. Selu has float32 constants, with which it is 3e-9 steeper
+   than with the decimals of the statement: another function. *)
 let activation_of node =
   let is name expected = match List.assoc_opt name node.attributes with
     | None -> true | Some { number; _ } -> number = Some expected in
@@ -121,7 +126,8 @@ let follow path kept state current node =
      | _, [ _ ] when activation_of node <> None ->
        if state.layers = [] || state.is_activated then refuse "does not follow a linear layer";
        let activation = activation_of node in
-       if state.activation <> None && state.activation <> activation then refuse "is another activation than that before it";
+       if state.activation <> None && state.activation <> activation then
+         refuse "is another activation than that before it";
        state.activation <- activation;
        state.is_activated <- true
      | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Identity or an activation that is known");

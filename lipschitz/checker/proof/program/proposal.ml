@@ -1,4 +1,5 @@
-(* Factors that a certificate leaves out. Floating point proposes; whether one shows anything, the extracted checker decides. *)
+(* Factors that a certificate leaves out. Floating point proposes; whether one shows anything, the extracted checker
+   decides. *)
 
 let to_float (m, e) =
   let excess = max 0 (Z.numbits m - 64) in
@@ -48,7 +49,8 @@ let factors (p : Proved.dyadic list list) : Proved.factor Seq.t =
   let widest = Array.fold_left (fun most row ->
       Float.max most (2. *. Array.fold_left (fun sum x -> sum +. Float.abs x) 0. row)) 0. rows in
   let integers i row =
-    List.init i (fun _ -> Z.zero) @ List.map (fun x -> Z.of_float (Float.round (Float.ldexp x 60))) (Array.to_list row) in
+    List.init i (fun _ -> Z.zero)
+    @ List.map (fun x -> Z.of_float (Float.round (Float.ldexp x 60))) (Array.to_list row) in
   let rec from shift () =
     if not (shift < 1e-7) then Seq.Nil else
     match factorised rows first shift with

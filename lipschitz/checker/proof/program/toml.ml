@@ -113,7 +113,8 @@ let parse path text =
   let rec value depth =
     if depth > 16 then fail "is nested too deep";
     match peek () with
-    | '"' | '\'' when !at + 2 < size && String.sub text !at 3 = String.make 3 (peek ()) -> fail "a text on several lines is not read"
+    | '"' | '\'' when !at + 2 < size && String.sub text !at 3 = String.make 3 (peek ()) ->
+      fail "a text on several lines is not read"
     | '"' -> Leaf (Json.Text (basic ()))
     | '\'' -> Leaf (Json.Text (literal ()))
     | '[' -> incr at; Leaf (Json.Array (array depth))

@@ -1,4 +1,5 @@
-(* Ranges, jumps and float32 errors over a box, as claims of the theorems: of each network by its layers, then of their sum. *)
+(* Ranges, jumps and float32 errors over a box, as claims of the theorems: of each network by its layers, then of their
+   sum. *)
 
 open Refusal
 open Json
@@ -21,7 +22,8 @@ let stated where ~size ~with_error json =
 let layers where (weights : Weights.t) ~with_error json =
   let entries = list where json in
   require (List.length entries = List.length weights.layers) "%s: needs one entry per layer" where;
-  let all = List.map2 (fun layer entry -> stated where ~size:(Weights.outputs layer) ~with_error entry) weights.layers entries in
+  let of_layer layer entry = stated where ~size:(Weights.outputs layer) ~with_error entry in
+  let all = List.map2 of_layer weights.layers entries in
   match List.rev all with last :: hidden -> List.rev hidden, last | [] -> assert false
 
 let leaves where = where ^ ": the values leave the bounds"
@@ -54,7 +56,8 @@ let input (state : Claims.t) where name entry =
 
 let optional where entry key ~given =
   let decimal = find where key entry and hex = find where (key ^ "_hex") entry in
-  require ((decimal <> Null) = given && (hex <> Null) = given) "%s: %s where it has a meaning, and only there" where key;
+  require ((decimal <> Null) = given && (hex <> Null) = given)
+    "%s: %s where it has a meaning, and only there" where key;
   if given then Some (Exact.of_float (Exact.number (where ^ " " ^ key) decimal hex)) else None
 
 let keys = [ "function"; "neighbours"; "domain"; "input_error"; "networks"; "sum"; "lower"; "upper"; "jump"; "jump_hex";
@@ -117,14 +120,16 @@ let check (state : Claims.t) entry =
      let hidden, (last, last_error) = bounds f in
      prove_network state where p ~box ~errors ~with_error ~norm (hidden, (last, last_error));
      (* The range may be wider than what is stated of the last layer. *)
-     Claims.prove state (Within (p, box, range)) (By_layers (List.map fst hidden)) (where ^ ": the values leave the range");
+     Claims.prove state (Within (p, box, range)) (By_layers (List.map fst hidden))
+       (where ^ ": the values leave the range");
      require (Proved.contains range last) "%s: the values leave the range" where
    | rho :: _ ->
      let term name =
        let p = Functions.index state.net name in
        let box, errors = input state where name entry in
        let hidden, (last, last_error) = bounds name in
-       prove_network state (where ^ ": " ^ name) p ~box ~errors ~with_error ~norm:(sum_of last_error) (hidden, (last, last_error));
+       prove_network state (where ^ ": " ^ name) p ~box ~errors ~with_error ~norm:(sum_of last_error)
+         (hidden, (last, last_error));
        let fewest, most = if name = "phi:ground" then 1, 1 else 0, count in
        { Proved.phi = p; inputs_in = box; fewest = Z.of_int fewest; most = Z.of_int most }, errors, last in
      let terms = List.map term inputs in

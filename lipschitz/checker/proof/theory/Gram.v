@@ -1,4 +1,5 @@
-(** Inner products of rows of integers as they are computed: without the leading zeros that banded factors are full of. *)
+(** Inner products of rows of integers as they are computed: without the leading zeros that banded factors are full
+    of. *)
 From Coq Require Import List ZArith Lia.
 From Swarmcert Require Import Algebra.
 Import ListNotations.

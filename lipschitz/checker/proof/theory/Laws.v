@@ -108,8 +108,8 @@ Proof.
 Qed.
 Lemma counted ms (k : kind) : may_move k ms -> INR (length ms) <= IZR (snd k).
 Proof. intros [H _]. rewrite INR_IZR_INZ. now apply IZR_le. Qed.
-Lemma sum_of_steps (ps : list part) cs kinds movers r : 0 <= r -> not_negative cs kinds -> Forall2 may_move kinds movers ->
-  Forall (fun m => step_of m <= r) (concat movers) ->
+Lemma sum_of_steps (ps : list part) cs kinds movers r : 0 <= r -> not_negative cs kinds ->
+  Forall2 may_move kinds movers -> Forall (fun m => step_of m <= r) (concat movers) ->
   dotR (map bound (steps_of ps cs (combine kinds movers))) (map far (steps_of ps cs (combine kinds movers))) <=
   fold_right Rplus 0 (map (fun ck : dyadic * kind => IZR (snd (snd ck)) * real (fst ck)) (combine cs kinds)) * r.
 Proof.
@@ -179,16 +179,17 @@ Proof.
   - destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
     destruct (same_moves moves m) eqn:E; [|apply IH]. apply same_moves_eq in E. subst.
     assert (holds ps (Slope_in_box (Set_of q k) m [] b v)) as Hv by (intros r x y A L _ _; now apply Hc).
-    unfold less_of. destruct (find_slope_in rest q k m b) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst;
-      first [exact Hv | now apply IH].
+    unfold less_of. destruct (find_slope_in rest q k m b) as [w|]; [destruct (at_most w v)|];
+      intros G; inversion G; subst; first [exact Hv | now apply IH].
   - destruct (Nat.eqb_spec phi q), (Nat.eqb_spec rho k); cbn [andb]; try apply IH.
     destruct (same_moves moves m) eqn:E; cbn [andb]; [|apply IH]. apply same_moves_eq in E.
     destruct (same_box b d) eqn:F; [|apply IH]. apply same_box_eq in F. subst.
-    unfold less_of. destruct (find_slope_in rest q k m d) as [w|]; [destruct (at_most w v)|]; intros G; inversion G; subst;
-      first [exact Hc | now apply IH].
+    unfold less_of. destruct (find_slope_in rest q k m d) as [w|]; [destruct (at_most w v)|];
+      intros G; inversion G; subst; first [exact Hc | now apply IH].
 Qed.
 Lemma total_in_sound ps accepted squares kinds rho v : Forall (holds ps) accepted ->
-  total_in accepted squares kinds rho = Some v -> exists cs, not_negative cs (map fst kinds) /\ bounds_in ps rho cs kinds /\
+  total_in accepted squares kinds rho = Some v -> exists cs,
+  not_negative cs (map fst kinds) /\ bounds_in ps rho cs kinds /\
   real v = fold_right Rplus 0 (map
       (fun ck : dyadic * kind => IZR (snd (snd ck)) * (if squares then
       real (fst ck) * real (fst ck) else real (fst ck))) (combine cs (map fst kinds))).

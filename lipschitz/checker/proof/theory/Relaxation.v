@@ -1,7 +1,7 @@
 (** The lines that the checker finds for the neurons of a box hold all over it. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
-From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower Values Parts
-    Claims Slopes Witness Laws Ranges.
+From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
+    Values Parts Claims Slopes Witness Laws Ranges.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -65,7 +65,8 @@ Proof.
 Qed.
 
 (** ReLU below a line that is above it at both ends. *)
-Lemma relu_below_line l h s t y : l <= 0 -> 0 <= h -> h - s * h <= t -> - (s * l) <= t -> l <= y <= h -> relu y <= s * y + t.
+Lemma relu_below_line l h s t y : l <= 0 -> 0 <= h -> h - s * h <= t -> - (s * l) <= t ->
+  l <= y <= h -> relu y <= s * y + t.
 Proof.
   intros Hl Hh H1 H2 [H3 H4]. unfold relu, Rmax. destruct (Rle_dec 0 y).
   - destruct (Rle_dec s 1).
@@ -88,7 +89,8 @@ Qed.
 Lemma through_relu_above c lines below y : Forall2 line_holds lines y ->
   let (d, k) := through_relu c lines below in dotR (reals c) (map relu y) <= dotR (reals d) y + real k.
 Proof.
-  intros H. revert c below. induction H as [|l v lines y Hl H IH]; intros [|a c] below; simpl; rewrite ?real_zero; try lra.
+  intros H. revert c below. induction H as [|l v lines y Hl H IH]; intros [|a c] below; simpl;
+    rewrite ?real_zero; try lra.
   specialize (IH c (tl below)). destruct (through_relu c lines (tl below)) as [d k].
   destruct l as [| |low high s t]; simpl in Hl |- *.
   - rewrite relu_right by auto. lra.
@@ -140,8 +142,10 @@ Proof.
   intros V E K. unfold new_line.
   pose proof (most_above before [] row bias b x V W) as U. rewrite <- E in U.
   pose proof (most_above before [] (map neg row) (neg bias) b x V W) as L. rewrite dot_negated, real_neg in L.
-  pose proof (at_most_up o (most before [] row bias b)). pose proof (at_most_up o (most before [] (map neg row) (neg bias) b)).
-  set (high := up o (most before [] row bias b)) in *. set (low := up o (most before [] (map neg row) (neg bias) b)) in *.
+  pose proof (at_most_up o (most before [] row bias b)).
+  pose proof (at_most_up o (most before [] (map neg row) (neg bias) b)).
+  set (high := up o (most before [] row bias b)) in *.
+  set (low := up o (most before [] (map neg row) (neg bias) b)) in *.
   assert (real (neg low) <= y) by (rewrite real_neg; lra).
   destruct around as [|[| |l h s t] around]; auto; apply line_of_holds; [lra|]. destruct K as [[K1 K2] _].
   split; [now apply larger_least|]. destruct (at_most h high); lra.
@@ -185,7 +189,8 @@ Proof.
   rewrite map_length in Q. pose proof (nth_affine w c (reach before x) (neuron d) L ltac:(lia)) as Y.
   destruct (is_nonnegative _) eqn:K; [|discriminate]. apply nonpositive in K. intros G. inversion G. subst lines'.
   apply Forall2_replaced with (d := 0); auto. rewrite Y. destruct (is_on d); simpl.
-  - pose proof (most_above before (lower_slopes d) (map neg (nth (neuron d) w [])) (neg (nth (neuron d) c zero)) b x V W) as M.
+  - pose proof (most_above before (lower_slopes d) (map neg (nth (neuron d) w []))
+      (neg (nth (neuron d) c zero)) b x V W) as M.
     rewrite dot_negated, real_neg in M. lra.
   - pose proof (most_above before (lower_slopes d) (nth (neuron d) w []) (nth (neuron d) c zero) b x V W). lra.
 Qed.
@@ -199,14 +204,16 @@ Proof.
 Qed.
 Lemma bounds_hold_after before ls around ds lines : valid before x ->
   Forall (fun l : layerD => length (snd l) = length (fst l)) ls ->
-  known ls around (reach before x) -> bounds o b before ls around ds = Some lines -> lines_hold ls lines (reach before x).
+  known ls around (reach before x) -> bounds o b before ls around ds = Some lines ->
+  lines_hold ls lines (reach before x).
 Proof.
   revert before around ds lines. induction ls as [|[w c] ls IH]; intros before around ds lines V F K; simpl.
   - intros G. inversion G. exact I.
   - inversion F as [|? ? Hc F']; subst. simpl in Hc. destruct K as [K1 K2].
     destruct (decide_all _ _ _ _ _ _) as [l|] eqn:E; [|discriminate].
     destruct (bounds o b ((w, c, l) :: before) ls (tl around) (tl ds)) as [r|] eqn:G; [|discriminate].
-    intros S. inversion S. subst. pose proof (decide_all_holds _ _ _ _ _ _ V Hc (new_lines_hold _ _ _ _ V Hc K1) E) as D.
+    intros S. inversion S. subst.
+    pose proof (decide_all_holds _ _ _ _ _ _ V Hc (new_lines_hold _ _ _ _ V Hc K1) E) as D.
     split; auto. apply (IH ((w, c, l) :: before) _ _ _ (conj D V) F' K2 G).
 Qed.
 Lemma bounds_hold ls around ds lines : Forall (fun l : layerD => length (snd l) = length (fst l)) ls ->

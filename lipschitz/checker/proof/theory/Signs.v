@@ -1,4 +1,5 @@
-(** A bound between two points at which no neuron changes its sign holds between any two: a straight line is cut where one does. *)
+(** A bound between two points at which no neuron changes its sign holds between any two: a straight line is cut where
+    one does. *)
 From Coq Require Import List ZArith Reals Lra Lia Psatz Bool.
 From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
     Values Parts Claims Slopes Witness Laws Ranges Relaxation Increments.
@@ -47,8 +48,10 @@ Proof.
 Qed.
 Context (B : list R -> list R -> Prop) (D : list R -> Prop) (moves : list bool).
 Context (convex : forall x y s, 0 <= s <= 1 -> D x -> D y -> D (on_the_way s x y)).
-Context (agrees : forall x y s, agree moves x y -> agree moves x (on_the_way s x y) /\ agree moves (on_the_way s x y) y).
-Context (joins : forall x y s, 0 <= s <= 1 -> agree moves x y -> B x (on_the_way s x y) -> B (on_the_way s x y) y -> B x y).
+Context (agrees : forall x y s, agree moves x y ->
+  agree moves x (on_the_way s x y) /\ agree moves (on_the_way s x y) y).
+Context (joins : forall x y s, 0 <= s <= 1 -> agree moves x y ->
+  B x (on_the_way s x y) -> B (on_the_way s x y) y -> B x y).
 (** The neurons of the first k layers, and the first j of the next. *)
 Definition same_up_to (k j : nat) (x y : list R) : Prop :=
   (forall k' i, (k' < k)%nat -> same_sign (value_at ls k' i x) (value_at ls k' i y)) /\
@@ -86,7 +89,8 @@ Proof.
   2:{ intros x y Dx Dy A. apply (E O); auto. split; intros; lia. }
   assert (forall k j, enough k j -> enough k 0) as First by (intros k j; induction j; auto using one_neuron).
   assert (forall k, enough (S k) 0 -> enough k 0) as Layer.
-  { intros k Ek. apply (First k (length (fst (nth k ls ([], []))))). intros x y Dx Dy A [S1 S2]. apply Ek; auto. split; [|lia].
+  { intros k Ek. apply (First k (length (fst (nth k ls ([], []))))). intros x y Dx Dy A [S1 S2].
+    apply Ek; auto. split; [|lia].
     intros k' i L. destruct (Nat.eq_dec k' k) as [->|]; [|apply S1; lia].
     destruct (lt_dec i (length (fst (nth k ls ([], []))))) as [Li|Li]; [now apply S2|].
     unfold value_at. rewrite !nth_overflow by (rewrite length_values; lia). unfold same_sign. lra. }
@@ -94,6 +98,7 @@ Proof.
   { induction n as [|n IHn]; intros k G; [exact G|]. apply IHn, Layer, G. }
   intros k. apply (Down (length ls) k). intros x y Dx Dy A [S1 _]. apply H; auto. intros k' i.
   destruct (lt_dec k' (length ls)) as [L|L]; [apply S1; lia|].
-  unfold value_at. rewrite !nth_overflow; [unfold same_sign; lra| |]; rewrite length_values, nth_overflow by lia; simpl; lia.
+  unfold value_at. rewrite !nth_overflow; [unfold same_sign; lra| |];
+    rewrite length_values, nth_overflow by lia; simpl; lia.
 Qed.
 End Signs.
