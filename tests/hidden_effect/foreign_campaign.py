@@ -85,7 +85,8 @@ def held_out(options, folder, flights, model, effect):
     if added is None:
         return {}
     ladder = added["ladder"]
-    answer = {"formula": [effect["effect"] for effect in added["effects"]][1:], "before": ladder[0]["test_rmse"], "after": min(row["test_rmse"] for row in ladder if row["accepted"])}
+    answer = {"formula": [effect["effect"] for effect in added["effects"]][1:], "before": ladder[0]["test_rmse"],
+              "after": min(row["test_rmse"] for row in ladder if row["accepted"])}
     if "formula" in effect:
         truth = model_with_lag(options.model, folder, effect["formula"], "truth.toml")
         test = [f for f in sorted(os.listdir(flights)) if f.endswith(f"_{FLIGHTS - 1:02d}")]

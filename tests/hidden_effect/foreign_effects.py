@@ -197,7 +197,8 @@ EFFECTS = {
         "force_z_N", "a_N * 0.0015 / ((x - 0.3)^2 + (y - 0.2)^2 + s_m^2)", a_N=-1, s_m=0.2)),
     "ripple": dict(force=ripple(), variables={"y"}, formula=expression(
         "force_y_N", "a_N * sin(9 * y)", a_N=0.015)),
-    "tilted board": dict(force=board(), variables={"body_constant"}, names={"constant_force", "imu_tilt"}, yaw_reach=3.0),
+    "tilted board": dict(force=board(), variables={"body_constant"}, names={"constant_force", "imu_tilt"},
+                         yaw_reach=3.0),
     "leak": dict(force=leak(), variables={"time", "battery"}),
     "hose": dict(force=hose(), variables={"z"}, formula=expression(
         "force_z_N", "a_N * max(0, z - 0.6)", a_N=-0.035)),

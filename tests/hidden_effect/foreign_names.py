@@ -1,7 +1,9 @@
-"""Effects of the registry, flown by the foreign simulator: `diagnose` names them first, with values inside their intervals.
+"""Effects of the registry, flown by the foreign simulator: `diagnose` names them first, with values inside their
+intervals.
 
 Usage: foreign_names.py TOOL MODEL FOLDER [--effects NAME,...]
-Prints a line per case; exits 1 where a name is not first, a value is outside, or a flight without the effect has the name.
+Prints a line per case; exits 1 where a name is not first, a value is outside, or a flight without the effect has the
+name.
 """
 
 import json
@@ -16,7 +18,8 @@ from foreign_effects import saturation  # noqa: E402
 from foreign_simulator import GRAVITY, MASS_KG, fly  # noqa: E402
 
 FLIGHTS = 3
-WIDER = 2.576 / 1.645  # from intervals of 90 % to 99 %: every value lies inside of 99 %, and of all so many inside of 90 %
+# from intervals of 90 % to 99 %: every value lies inside of 99 %, and of all so many inside of 90 %
+WIDER = 2.576 / 1.645
 LEAST_HELD = 0.8
 
 
@@ -52,12 +55,14 @@ def tether(k, anchor, slack):
     return force
 
 
-# truth: as foreign_simulator.fly() takes it; effect: its name in the registry, if it is not the case's; values: parameters that flights show; rivals: what must or must not be one.
+# truth: as foreign_simulator.fly() takes it; effect: its name in the registry, if it is not the case's; values:
+# parameters that flights show; rivals: what must or must not be one.
 NAMED = {
     "com_offset": dict(truth=dict(torque=com_offset(0.004, -0.002)), values={"offset_x_m": 0.004, "offset_y_m": -0.002},
                        not_rivals=["torque_bias"], is_added=True),
     "imu_tilt": dict(truth=dict(force=tilted(0.03, -0.04), yaw_reach=3.0),
-                     values={"tilt_x_rad": 0.03, "tilt_y_rad": -0.04}, not_rivals=["constant_force"], is_added=True, of_sensor=True),
+                     values={"tilt_x_rad": 0.03, "tilt_y_rad": -0.04}, not_rivals=["constant_force"], is_added=True,
+                     of_sensor=True),
     "accelerometer_scale": dict(truth=dict(accelerometer_scale=1.08), values={"scale": 1.08},
                                 not_rivals=["thrust_ratio", "constant_force"], is_added=True, of_sensor=True),
     "wake_delay": dict(truth=dict(force=late_wake(0.09, 0.25, 0.06, 0.06)), vehicles=2, values={"delay_s": 0.25}),

@@ -1,9 +1,9 @@
-"""A load on a string, flown by the foreign simulator: `diagnose` names it first, `add pendulum` writes it; a load that is
-fixed, and no load, are never one.
+"""A load on a string, flown by the foreign simulator: `diagnose` names it first, `add pendulum` writes it; a load that
+is fixed, and no load, are never one.
 
 Usage: foreign_pendulum.py TOOL MODEL FOLDER [--effects LENGTH,...]
-Prints a line per case; exits 1 where a name is another one, a number is outside, or the error of flights held out is more
-than 1.2 times that of the true load.
+Prints a line per case; exits 1 where a name is another one, a number is outside, or the error of flights held out is
+more than 1.2 times that of the true load.
 """
 
 import json
@@ -28,8 +28,8 @@ def dot(a, b):
 
 
 def hanging(mass_kg, length_m, damping_1_s):
-    """The full pendulum: a mass point on a taut string of fixed length with friction against its swing, at any angle. The
-    tension follows from the string's length and from the masses at both of its ends."""
+    """The full pendulum: a mass point on a taut string of fixed length with friction against its swing, at any angle.
+    The tension follows from the string's length and from the masses at both of its ends."""
     def force(s):
         r, dr = s.memory.setdefault("load", ([0.0, 0.0, -length_m], [0.0, 0.0, 0.0]))
         n = [x / length_m for x in r]
@@ -103,7 +103,8 @@ def faults_of_add(options, folder, flights, model, load):
     of_truth = of_truth["overall"]["rmse"]["total"]
     if after > 1.2 * of_truth or not after < 0.5 * before:
         return [f"add pendulum: the error goes from {before} to {after} N; that of the true load is {of_truth} N"]
-    rest = asked(options.tool, ["diagnose", os.path.join(folder, "new.toml"), flights], os.path.join(folder, "rest.json"))
+    rest = asked(options.tool, ["diagnose", os.path.join(folder, "new.toml"), flights],
+                 os.path.join(folder, "rest.json"))
     return [f"beside the load that add fitted: {entry['effect']}" for entry in rest["ranking"]]
 
 
@@ -113,7 +114,8 @@ def main():
 
     def report(name, faults, ranking):
         print(("! " if faults else "  ") + json.dumps(
-            {"case": name, "faults": faults, "named": [{e["effect"]: {n: p["value"] for n, p in e["parameters"].items()}}
+            {"case": name, "faults": faults,
+             "named": [{e["effect"]: {n: p["value"] for n, p in e["parameters"].items()}}
                                                        for e in ranking]}), flush=True)
         return bool(faults)
 
@@ -123,8 +125,10 @@ def main():
         faults = faults_of(load, ranking, held) + faults_of_add(options, folder, flights, model, load)
         failed += report(name, faults, ranking)
     calm = dict(force=hanging(**LOADS[1]), speed=0.7)
-    for name, truth, right in (("never_swings", calm, ["thrust_ratio"]), ("fixed_light", dict(force=fixed(0.003), speed=SPEED), ["thrust_ratio"]),
-                               ("fixed_heavy", dict(force=fixed(0.010), speed=SPEED), ["thrust_ratio"]), ("nothing", dict(speed=SPEED), [])):
+    for name, truth, right in (("never_swings", calm, ["thrust_ratio"]),
+                               ("fixed_light", dict(force=fixed(0.003), speed=SPEED), ["thrust_ratio"]),
+                               ("fixed_heavy", dict(force=fixed(0.010), speed=SPEED), ["thrust_ratio"]),
+                               ("nothing", dict(speed=SPEED), [])):
         ranking = flown(options, name, truth, 14)[3]
         named = [entry["effect"] for entry in ranking]
         failed += report(name, [] if named == right else [f"named {named}"], ranking)

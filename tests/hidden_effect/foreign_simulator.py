@@ -21,7 +21,8 @@ LOG_EVERY = 5
 ROTOR_LAG_S = 0.05
 
 # Load-cell map of one rotor in gram-force: p = PWM / 65536, v = V / 4.2.
-C00, C10, C01, C20, C11 = 11.093358483549203, -39.08104165843915, -9.525647087583181, 20.573302305476638, 38.42885066644033
+C00, C10, C01 = 11.093358483549203, -39.08104165843915, -9.525647087583181
+C20, C11 = 20.573302305476638, 38.42885066644033
 
 
 def rotor_N(duty, battery_V):
@@ -237,7 +238,8 @@ class Vehicle:
                   ARM_M * (lifts[1] + lifts[2] - lifts[0] - lifts[3]) + twist[1],
                   TORQUE_PER_THRUST_M * (lifts[1] + lifts[3] - lifts[0] - lifts[2]) + twist[2]]
         w = s.w
-        gyro = [w[1] * INERTIA[2] * w[2] - w[2] * INERTIA[1] * w[1], w[2] * INERTIA[0] * w[0] - w[0] * INERTIA[2] * w[2],
+        gyro = [w[1] * INERTIA[2] * w[2] - w[2] * INERTIA[1] * w[1],
+                w[2] * INERTIA[0] * w[0] - w[0] * INERTIA[2] * w[2],
                 w[0] * INERTIA[1] * w[1] - w[1] * INERTIA[0] * w[0]]
         for i in range(3):
             w[i] += STEP_S * (torque[i] - gyro[i]) / INERTIA[i]
@@ -258,8 +260,8 @@ def wrapped(angle):
 
 
 def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
-    """Flies and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the body, both in SI
-    units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale; clocks_s, by how
+    """Flies and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the body, both in
+    SI units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale; clocks_s, by how
     much each log's clock is ahead, and from_s, when the logs begin. Returns how far each log's clock is ahead in truth,
     s."""
     rng = random.Random(seed * 1000 + run)

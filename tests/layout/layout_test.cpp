@@ -109,21 +109,22 @@ std::string layer_of(const std::string& folder) {
   return found;
 }
 
-bool is_source(const fs::path& path) {
-  return path.extension() == ".h" || path.extension() == ".cpp" || path.extension() == ".inc";
-}
-
-/// Paths of the product's sources, relative to the source tree, in order.
-std::vector<std::string> product_sources() {
+/// Paths of the files in these folders with one of these endings, relative to the source tree, in order.
+std::vector<std::string> files_in(const std::vector<std::string>& folders,
+                                  const std::set<std::string>& endings) {
   std::vector<std::string> found;
-  for (const char* top : {"nn", "controller", "lipschitz", "stability", "analysis"}) {
+  for (const std::string& top : folders) {
     for (const auto& entry : fs::recursive_directory_iterator(fs::path(SWARMCERT_SOURCE_DIR) / top)) {
-      if (entry.is_regular_file() && is_source(entry.path()))
+      if (entry.is_regular_file() && endings.count(entry.path().extension().string()) > 0)
         found.push_back(fs::relative(entry.path(), SWARMCERT_SOURCE_DIR).generic_string());
     }
   }
   std::sort(found.begin(), found.end());
   return found;
+}
+
+std::vector<std::string> product_sources() {
+  return files_in({"nn", "controller", "lipschitz", "stability", "analysis"}, {".h", ".cpp", ".inc"});
 }
 
 /// What `source` includes with quotation marks, by path from the source tree.
@@ -241,14 +242,20 @@ TEST(Layout, EveryFolderOfSourcesHasAReadmeOfAtMostAPage) {
 }
 
 TEST(Layout, LinesOfSourcesHaveAtMost120Columns) {
-  std::size_t lines = 0;
-  for (const std::string& source : product_sources()) {
+  std::vector<std::string> sources =
+      files_in({"nn", "controller", "lipschitz", "stability", "analysis", "tests"},
+               {".h", ".cpp", ".inc", ".py", ".pyi", ".ml", ".mli", ".v"});
+  for (const std::string& guide : files_in({"notebooks_cpp"}, {".py"})) sources.push_back(guide);
+  std::map<std::string, std::size_t> lines;
+  for (const std::string& source : sources) {
     std::ifstream in(fs::path(SWARMCERT_SOURCE_DIR) / source);
+    std::size_t& count = lines[fs::path(source).extension().string()];
     std::string line;
-    for (int number = 1; std::getline(in, line); ++number, ++lines)
+    for (int number = 1; std::getline(in, line); ++number, ++count)
       EXPECT_LE(line.size(), 120U) << source << ":" << number;
   }
-  EXPECT_GT(lines, 50'000U);
+  EXPECT_GT(lines[".cpp"], 50'000U);
+  for (const char* ending : {".py", ".ml", ".v"}) EXPECT_GT(lines[ending], 1'000U) << ending;
 }
 
 }  // namespace

@@ -50,8 +50,8 @@ TEST(BentBound, OfOneNeuronPerLayerIsTheProductOfWeightsAndLargestSlopes) {
   }
 }
 
-/// s(x) - s(x), seen as two neurons that know nothing of each other: the slopes d_1 - d_2 reach c - (1 - c). With slopes
-/// in [0, 1] it would be 1.
+/// s(x) - s(x), seen as two neurons that know nothing of each other: the slopes d_1 - d_2 reach c - (1 - c). With
+/// slopes in [0, 1] it would be 1.
 TEST(BentBound, OfADifferenceCountsTheNegativeSlopes) {
   const Weights difference = tests::weights({layer(2, 1, {1, 1}), layer(1, 2, {1, -1})});
   for (const Activation activation : kBent) {

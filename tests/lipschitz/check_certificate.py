@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A second checker of certificates, in another language and written from the mathematics: exact integers, standard
-library only; trees of parts also in double with numpy, where it is installed. It shares no line with the C++ checker, reads the weight files itself, and must accept and reject the
-same certificates.
+library only; trees of parts also in double with numpy, where it is installed. It shares no line with the C++ checker,
+reads the weight files itself, and must accept and reject the same certificates.
 
     check_certificate.py CERTIFICATE NET | --phi F --rho F  [--key KEY] [--order A,B,C | PART=A,B,C] [--activation OP]
 
@@ -33,28 +33,30 @@ except ImportError:  # without numpy
 
 STATEMENT = (
     "The functions are the operations listed under chain, in that order, with the weights stored in the files named by "
-    "sha256, rounded to float32 where `as` says so: linear is W x + b; of each number t, relu is the positive part, tanh "
-    "and sigmoid, 1 / (1 + e^-t), are the functions of these names, softplus is ln(1 + e^t), elu is max(0, t) + "
+    "sha256, rounded to float32 where `as` says so: linear is W x + b; of each number t, relu is the positive part, "
+    "tanh and sigmoid, 1 / (1 + e^-t), are the functions of these names, softplus is ln(1 + e^t), elu is max(0, t) + "
     "min(0, e^t - 1), selu is 1.0507009873554805 max(0, t) + 1.0507009873554805 * 1.6732632423543772 min(0, e^t - 1), "
-    "silu is t / (1 + e^-t), gelu is t/2 (1 + erf(t / sqrt 2)); clamp is the input clamp of network.toml. Where samples are named, they were reproduced up to largest_deviation when this was written; "
-    "checking does not repeat that. Every bound holds in exact arithmetic: |f(x) - f(y)| <= upper |x - y| for all x and y "
-    "that differ in the block only, and |f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x "
-    "and y in the box. So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, "
-    "|x - y|^2 is the sum of ((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x to y, whatever the "
-    "number and the places of the others; where neighbours are listed, with at most so many of each kind, the moving one "
-    "included, all in the box, and the ground's input where there is one. Laws hold for the neighbours listed and the ground's input where there is "
-    "one, in the box where their domain is box: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, |df| <= upper max |dx_j|; own_state, |df| <= upper "
-    "|dx| where the vehicle's own state moves by dx. "
-    "Values hold for inputs in the box, or in the input clamp where their domain is clamp, with up to as many "
-    "neighbours of the kind as listed and the ground's input where there is one: lower <= f <= upper, and |df| <= jump "
-    "where one more neighbour comes or goes, whatever the others are, in exact arithmetic; and |g - f| <= float32_error "
-    "for each g that float32 arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of "
-    "products in any order, fused or not, each operation rounded to nearest.")
+    "silu is t / (1 + e^-t), gelu is t/2 (1 + erf(t / sqrt 2)); clamp is the input clamp of network.toml. Where "
+    "samples are named, they were reproduced up to largest_deviation when this was written; checking does not repeat "
+    "that. Every bound holds in exact arithmetic: |f(x) - f(y)| <= upper |x - y| for all x and y that differ in the "
+    "block only, and |f(x) - f(y)| >= lower |x - y| at the witness; where the domain is box, for x and y in the box. "
+    "So |df| <= the sum of upper |dx_block| over blocks that make up the input. With a scale, |x - y|^2 is the sum of "
+    "((x_k - y_k) / scale_k)^2. In a set function one neighbour moves from x to y, whatever the number and the places "
+    "of the others; where neighbours are listed, with at most so many of each kind, the moving one included, all in "
+    "the box, and the ground's input where there is one. Laws hold for the neighbours listed and the ground's input "
+    "where there is one, in the box where their domain is box: all_stacked, |df| <= upper sqrt(sum |dx_j|^2); all_max, "
+    "|df| <= upper max |dx_j|; own_state, |df| <= upper |dx| where the vehicle's own state moves by dx. Values hold "
+    "for inputs in the box, or in the input clamp where their domain is clamp, with up to as many neighbours of the "
+    "kind as listed and the ground's input where there is one: lower <= f <= upper, and |df| <= jump where one more "
+    "neighbour comes or goes, whatever the others are, in exact arithmetic; and |g - f| <= float32_error for each g "
+    "that float32 arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of products "
+    "in any order, fused or not, each operation rounded to nearest.")
 
 
 # What lies between layers, by the name that a chain gives it: its slopes are in [0, steepest] where it is monotone,
 # else in [1 - steepest, steepest], because s(t) - t / 2 is even.
-MONOTONE = {"relu": Fraction(1), "tanh": Fraction(1), "sigmoid": Fraction(1, 4), "softplus": Fraction(1), "elu": Fraction(1),
+MONOTONE = {"relu": Fraction(1), "tanh": Fraction(1), "sigmoid": Fraction(1, 4), "softplus": Fraction(1),
+            "elu": Fraction(1),
             # at least 1.0507009873554805 * 1.6732632423543772
             "selu": Fraction(0x1c212cc640f031, 2 ** 52)}
 STEEPEST = {**MONOTONE, "silu": 1 + Fraction(0x1999, 2 ** 16), "gelu": 1 + Fraction(0x211, 2 ** 12)}
@@ -84,7 +86,8 @@ def f32(x):
 
 
 def f32_of(decimal):
-    """A decimal rounded once. By way of double it would be rounded twice, which matters in the middle between floats."""
+    """A decimal rounded once. By way of double it would be rounded twice, which matters in the middle between
+    floats."""
     double = float(decimal)
     near = f32(double)
     if near == double or math.isinf(near) or abs(double) < 2.0 ** -200:
@@ -137,7 +140,8 @@ def shifted(integer, by):
 
 # --- JSON ----------------------------------------------------------------------------------------------------------
 
-PLAIN_HEX_FLOATS = re.compile(r"(0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4} )*0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
+PLAIN_HEX_FLOATS = re.compile(r"(0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4} )*"
+                              r"0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
 SIGNED_HEX_FLOAT = re.compile(r"-?0x[0-9a-f](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}")
 CONFLICTING = re.compile("[0-9]{1,9}[+-]")
 HEX_FLOAT = re.compile(r"-?0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,6})")
@@ -284,7 +288,8 @@ class Weights:
         require_input(all(a.outputs == b.inputs for a, b in zip(self.layers, self.layers[1:])),
                       "a layer does not take what the one before gives")
         self.precision = "float32" if precision in ("float16", "bfloat16") else precision
-        # None: the file does not state it. One that states the order of the layers states ReLU unless its reader says more.
+        # None: the file does not state it. One that states the order of the layers states ReLU unless its reader says
+        # more.
         self.activation = "relu" if listing == "evaluation" and len(self.layers) > 1 else None
         self.sha256 = hashlib.sha256(data).hexdigest()
 
@@ -509,7 +514,8 @@ def read_onnx(data, order):
         raise ValueError("this checker reads ONNX models with one activation")
     if is_open:  # what ends in an activation is followed by the identity
         size = [shape[0] for name, shape, _ in tensors if name.endswith(".weight")][-1]
-        tensors.append((f"{layer_name('')}.weight", [size, size], [float(i == j) for i in range(size) for j in range(size)]))
+        tensors.append((f"{layer_name('')}.weight", [size, size],
+                        [float(i == j) for i in range(size) for j in range(size)]))
     result = Weights(tensors, precision, data, "evaluation", order)
     if len(result.layers) > 1:
         (result.activation,) = activations
@@ -652,8 +658,9 @@ def unit_of(network, function, block):
 # --- the mathematics -----------------------------------------------------------------------------------------------
 
 def stages(network, function, block, scale):
-    """The matrices between the activations, from the block's inputs in units of their scale to the output. An activation
-    of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it. Others stay as they are."""
+    """The matrices between the activations, from the block's inputs in units of their scale to the output. An
+    activation of slopes in [0, b] is b times one of slopes in [0, 1]: b goes to the matrix behind it. Others stay as
+    they are."""
     names = networks_of(function)
     require(all(name in network.parts for name in names), f"there is no {function}")
     inputs = network.parts[names[0]].layers[0].inputs
@@ -677,7 +684,8 @@ def stages(network, function, block, scale):
 
 def lmi(chain, rho, t):
     """The matrix P(rho, t) over the hidden increments dz whose positive semidefiniteness gives |df|^2 <= rho |dx|^2:
-    from rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i dz_i (dy_i - dz_i) >= 0, minimised over dx and multiplied by rho."""
+    from rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i dz_i (dy_i - dz_i) >= 0, minimised over dx and multiplied by
+    rho."""
     (rho_integer,), rho_exponent = dyadics([rho])
     if len(chain) == 1:
         m = chain[0]
@@ -722,8 +730,8 @@ def bends(network, function):
 
 
 def bent_lmi(chain, gs, rho, t):
-    """The matrix over (dx, dz) of rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i (dz_i (dy_i - dz_i) + g_i dy_i^2) >= 0: each
-    square (row m_i of a stage times what enters) gives - 2 t_i g_i m_i' m_i."""
+    """The matrix over (dx, dz) of rho |dx|^2 - |M_K dz_{K-1}|^2 - 2 sum_i t_i (dz_i (dy_i - dz_i) + g_i dy_i^2) >= 0:
+    each square (row m_i of a stage times what enters) gives - 2 t_i g_i m_i' m_i."""
     (integer,), exponent = dyadics([rho])
     inputs = range(len(chain[0].rows[0]))
     p = quadratic_lmi(chain, Matrix([[integer * (i == j) for j in inputs] for i in inputs], exponent), t)
@@ -732,7 +740,8 @@ def bent_lmi(chain, gs, rho, t):
         width = len(m.rows[0])
         if g:
             weights, exponent = dyadics([-2 * g * Fraction(t[neuron + i]) for i in range(len(m.rows))])
-            square = m.transposed() @ Matrix([[w * x for x in row] for w, row in zip(weights, m.rows)], m.exponent + exponent)
+            square = m.transposed() @ Matrix([[w * x for x in row] for w, row in zip(weights, m.rows)],
+                                             m.exponent + exponent)
             common = min(square.exponent, p.exponent)
             p = Matrix([[shifted(x, p.exponent - common) for x in row] for row in p.rows], common)
             for i in range(width):
@@ -809,8 +818,8 @@ def scaled_double(integer, exponent):
 
 
 def factorised(rows, first, shift):
-    """R with R R' = the matrix with these lower rows - shift I, in floating point; rows with an empty diagonal stay empty.
-    None if that breaks down."""
+    """R with R R' = the matrix with these lower rows - shift I, in floating point; rows with an empty diagonal stay
+    empty. None if that breaks down."""
     result = []
     for i, row in enumerate(rows):
         if row[-1] == 0:
@@ -923,7 +932,8 @@ def above(layers, bounds, layer, neuron, sign, slopes=None):
     form[neuron] = Fraction(sign)
     for j in range(layer, -1, -1):
         constant += layers[j].constant(form)
-        form = [sum(c * row[x] for c, row in zip(form, layers[j].weights) if c) for x in range(len(layers[j].weights[0]))]
+        form = [sum(c * row[x] for c, row in zip(form, layers[j].weights) if c)
+                for x in range(len(layers[j].weights[0]))]
         if j == 0:
             break
         for c, (l, u) in enumerate(bounds[j - 1]):
@@ -946,8 +956,8 @@ def largest(form, constant, low, high):
 def neuron_bounds(layers, low, high, around, first=(), decisions=()):
     """Bounds on every neuron over a box by linear relaxation of ReLU, layer by layer; those that `around` decides keep
     its bounds. Exact but for bounds and slopes, which are rounded so that they still hold. `first`: those of the first
-    layers, which are taken as they are. `decisions`: (neuron, is on, corner), of neurons that the lower slopes tight at a
-    corner decide; those of other layers are not looked at. None where one of them does not hold."""
+    layers, which are taken as they are. `decisions`: (neuron, is on, corner), of neurons that the lower slopes tight at
+    a corner decide; those of other layers are not looked at. None where one of them does not hold."""
     bounds = list(first)
     before = sum(len(layer.biases) for layer in layers[:len(bounds)])
     for k in range(len(bounds), len(layers)):
@@ -1041,7 +1051,8 @@ def part_holds(layers, gram, moving, weight, bounds, form, t, conflicts):
             neuron += 1
         z = y
     for first, first_on, second, second_on, multiplier in conflicts:
-        p, q = ([(0 if is_on else x) + (1 if is_on else -1) * int(j == forms[at][1]) for j, x in enumerate(forms[at][0])]
+        p, q = ([(0 if is_on else x) + (1 if is_on else -1) * int(j == forms[at][1])
+                 for j, x in enumerate(forms[at][0])]
                 for at, is_on in ((first, first_on), (second, second_on)))
         for i in range(n):
             for j in range(n):
@@ -1070,8 +1081,8 @@ def scaled_identity(rho, size):
 
 
 class Part:
-    """A box, bounds on its neurons and, once a form holds in it, those of the whole set function and the form's Gram matrix.
-    `around`: bounds on the neurons of the box that was halved. `decisions`: that nothing has looked at yet."""
+    """A box, bounds on its neurons and, once a form holds in it, those of the whole set function and the form's Gram
+    matrix. `around`: bounds on the neurons of the box that was halved. `decisions`: that nothing has looked at yet."""
 
     def __init__(self, low, high, around, through_rho=None, gram=None):
         self.low, self.high, self.around, self.through_rho, self.gram = low, high, around, through_rho, gram
@@ -1086,8 +1097,8 @@ class Part:
 
 
 class Forms:
-    """|drho|^2 <= dv' Q dv where rho's neurons are as a part decides them: (Q, t) each. `behind`: phi's last layer, then
-    rho's hidden layers."""
+    """|drho|^2 <= dv' Q dv where rho's neurons are as a part decides them: (Q, t) each. `behind`: phi's last layer,
+    then rho's hidden layers."""
 
     def __init__(self, forms, hidden, behind, gram):
         self.forms, self.layers, self.first, self.gram = forms, hidden + behind, len(hidden) + 1, gram
@@ -1107,11 +1118,13 @@ class Forms:
             return False
         q, t = self.forms[index]
         one = [Fraction(1)] * len(q)
-        if not part_holds(self.layers[self.first:], self.gram, list(range(len(q))), one, part.through_rho[self.first:], q, t, []):
+        if not part_holds(self.layers[self.first:], self.gram, list(range(len(q))), one, part.through_rho[self.first:],
+                          q, t, []):
             return False
         last = self.layers[self.first - 1].weights
         half = [[sum(a * row[j] for a, row in zip(q_row, last)) for j in range(len(last[0]))] for q_row in q]
-        part.gram = [[sum(row[i] * h[j] for row, h in zip(last, half)) for j in range(len(last[0]))] for i in range(len(last[0]))]
+        part.gram = [[sum(row[i] * h[j] for row, h in zip(last, half)) for j in range(len(last[0]))]
+                     for i in range(len(last[0]))]
         return True
 
 
@@ -1129,7 +1142,8 @@ def tree_fails(layers, boxes, text, proves, forms=None):
             return f"before {word}: a neuron is not decided by its slopes"
         index = int(word[1:] or 0)
         if word[0] in "qr":
-            if forms is None or not (forms.use(index, open_parts[-1]) if word[0] == "q" else forms.look(open_parts[-1])):
+            if forms is None or not (forms.use(index, open_parts[-1]) if word[0] == "q"
+                                     else forms.look(open_parts[-1])):
                 return f"{word} does not hold in its part"
             continue
         part = open_parts.pop()
@@ -1153,8 +1167,8 @@ def tree_fails(layers, boxes, text, proves, forms=None):
 
 
 def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
-    """Whether floating point with bounded errors accepts the tree, which takes seconds where fractions take hours. Needs
-    numpy; where it is absent, or in doubt, fractions decide."""
+    """Whether floating point with bounded errors accepts the tree, which takes seconds where fractions take hours.
+    Needs numpy; where it is absent, or in doubt, fractions decide."""
     texts = proof["multipliers"]
     if parts_in_double is None or not isinstance(proof["tree"], str) or not isinstance(texts, list) or not texts:
         return False
@@ -1168,7 +1182,8 @@ def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
     neurons = sum(len(layer.biases) for layer in layers)
     if any(len(row) != neurons or min(row) < 0 or max(row) == math.inf for row in rows) or len(conflicts) != len(rows):
         return False
-    if not all(0 <= c[0] < c[2] < neurons and 0 <= c[4] <= 1 and math.isfinite(c[5]) for some in conflicts for c in some):
+    if not all(0 <= c[0] < c[2] < neurons and 0 <= c[4] <= 1 and math.isfinite(c[5]) for some in conflicts
+               for c in some):
         return False
     near = [[float(x) for x in row] for row in gram]
     if not all(map(math.isfinite, (x for row in near for x in row))):
@@ -1176,7 +1191,8 @@ def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
     error = [[float(abs(x - Fraction(y))) * (1 + 2.0 ** -50) for x, y in zip(*pair)] for pair in zip(gram, near)]
     as_doubles = lambda row: [float(x) for x in row]
     return parts_in_double.holds(
-        [([as_doubles(row) for row in layer.weights], as_doubles(layer.biases), layer.without_relu) for layer in layers],
+        [([as_doubles(row) for row in layer.weights], as_doubles(layer.biases), layer.without_relu)
+         for layer in layers],
         [(as_doubles(low), as_doubles(high)) for low, high in boxes], proof["tree"],
         (parts_in_double.np.array(near), parts_in_double.np.array(error)), moving, as_doubles(weight), rho,
         parts_in_double.np.array(rows), conflicts)
@@ -1216,7 +1232,7 @@ def add(a, b):
     return [shifted(x, a[1] - exponent) + shifted(y, b[1] - exponent) for x, y in zip(a[0], b[0])], exponent
 
 
-# --- values over boxes -------------------------------------------------------------------------------------------------
+# --- values over boxes ---------------------------------------------------------------------------------------------
 
 class Bounded:
     """lower <= x <= upper, entry by entry, and |computed - x| <= error where a float32 evaluation is spoken of."""
@@ -1249,7 +1265,8 @@ def layer_bounds(layer, inputs):
 
 
 def rounding_error(n, size, before):
-    """Of a float32 sum of n summands whose absolute values sum up to `size`, in any order; None if it might overflow."""
+    """Of a float32 sum of n summands whose absolute values sum up to `size`, in any order; None if it might
+    overflow."""
     nu = n * power(-24)
     if n > 1 << 23 or size + n * power(-149) > power(126):
         return None
@@ -1344,7 +1361,8 @@ class Checker:
             return
         require(isinstance(boxes, dict) and boxes, "box is neither null nor an object with boxes")
         for part, box in boxes.items():
-            require(part in self.network.parts and not part.startswith("rho:"), f"box.{part} is of no network with a box")
+            require(part in self.network.parts and not part.startswith("rho:"),
+                    f"box.{part} is of no network with a box")
             require_keys(box, ["lower", "upper"], f"box.{part}")
             low, high = hex_floats(box["lower"]), hex_floats(box["upper"])
             require(len(low) == len(high) == self.network.parts[part].layers[0].inputs, f"box.{part} has another size")
@@ -1370,7 +1388,8 @@ class Checker:
         require(rho > 0 and all(x >= 0 for x in t), f"{where}: rho is not positive, or a t negative")
         require(len(t) == sum(len(m.rows) for m in chain[:-1]), f"{where}: needs one t per hidden neuron")
         require(Fraction(upper) ** 2 >= Fraction(rho), f"{where}: claims less than sqrt(rho)")
-        require(shows_or_finds(bent_lmi(chain, gs, rho, t) if any(gs) else lmi(chain, rho, t), parse_factor(factor, where)),
+        require(shows_or_finds(bent_lmi(chain, gs, rho, t) if any(gs) else lmi(chain, rho, t),
+                               parse_factor(factor, where)),
                 f"{where}: the factor does not show that the matrix inequality holds")
 
     def check_bound(self, bound):
@@ -1388,7 +1407,8 @@ class Checker:
         require(bound["norm"] == ("weighted_l2" if scale else "l2"), f"{where}: another norm")
         require(bound["unit"] == unit_of(self.network, function, block), f"{where}: another unit")
         require(bound["law"] == ("one_neighbour" if len(names) == 2 else "none"), f"{where}: another law")
-        require(not scale or len(scale) == self.network.parts[names[0]].layers[0].inputs, f"{where}: scale has another size")
+        require(not scale or len(scale) == self.network.parts[names[0]].layers[0].inputs,
+                f"{where}: scale has another size")
         neighbours = self.neighbours_of(bound, where)
         upper = number(bound["upper"], bound["upper_hex"], where)
         require(bound["status"] in ("finished", "interrupted"), f"{where}: unknown status")
@@ -1440,7 +1460,8 @@ class Checker:
         """The part's box, or what the input clamp makes of it. `limited`: of a size that proofs by parts can bear."""
         require(part in self.c["box"] and part in self.network.parts, f"{where}: no box for {part}")
         low, high = (hex_floats(self.c["box"][part][side]) for side in ("lower", "upper"))
-        require(len(low) == len(high) == self.network.parts[part].layers[0].inputs, f"{where}: the box has another size")
+        require(len(low) == len(high) == self.network.parts[part].layers[0].inputs,
+                f"{where}: the box has another size")
         if self.network.clamp and part != "phi:ground":
             clamp = list(zip(*self.network.clamp))
             low, high = ([min(max(x, a), b) for x, (a, b) in zip(side, clamp)] for side in (low, high))
@@ -1472,8 +1493,9 @@ class Checker:
             require(len(low) == len(high) == rows, f"{here}: the range is of something else")
             require(isinstance(others[part]["tree"], str), f"{here}: the tree is not text")
             layers = self.term_layers(part, names[1])
-            reason = tree_fails(layers, [self.box_of(part, here)], others[part]["tree"], lambda at, index: index == 0 and all(
-                a <= l and u <= b for a, (l, u), b in zip(low, at.bounds[-1], high)))
+            reason = tree_fails(layers, [self.box_of(part, here)], others[part]["tree"],
+                                lambda at, index: index == 0 and all(
+                                    a <= l and u <= b for a, (l, u), b in zip(low, at.bounds[-1], high)))
             require(not reason, f"{here}: {reason}")
             for i in range(rows):
                 least[i] += low[i] if kind == "ground" else count * min(low[i], 0)
@@ -1483,8 +1505,8 @@ class Checker:
     def check_local(self, bound, upper, scale, where):
         proof = bound["proof"]
         coupled, everywhere = "others" in proof, bound["domain"] == "global"
-        require_keys(proof, ["rho", "tree", "multipliers"] + (["others", "forms"] if coupled else ["form"]) + ["radius"] * everywhere
-                     + ["conflicts"] * ("conflicts" in proof), where)
+        require_keys(proof, ["rho", "tree", "multipliers"] + (["others", "forms"] if coupled else ["form"])
+                     + ["radius"] * everywhere + ["conflicts"] * ("conflicts" in proof), where)
         names = networks_of(bound["function"])
         require(all(name in self.network.parts for name in names), f"{where}: no such function")
         require(not names[0].startswith("rho:"), f"{where}: rho has no box")
@@ -1502,8 +1524,9 @@ class Checker:
             last = Matrix.of(behind_rho[-1].weights, behind_rho[-1].inputs)
             gram = last.transposed() @ last
             inputs = len(behind[0].biases)
-            forms = Forms([self.form_of_part(form, inputs, behind[1:], where) for form in listed(proof["forms"])], hidden,
-                          behind, [[gram.fraction(i, j) for j in range(len(gram.rows))] for i in range(len(gram.rows))])
+            forms = Forms([self.form_of_part(form, inputs, behind[1:], where) for form in listed(proof["forms"])],
+                          hidden, behind,
+                          [[gram.fraction(i, j) for j in range(len(gram.rows))] for i in range(len(gram.rows))])
             gram = None
         else:
             require(len(layers) > 1, f"{where}: no hidden layer")
@@ -1545,7 +1568,8 @@ class Checker:
         require(isinstance(proof["tree"], str), f"{where}: the tree is not text")
         square = scaled_identity(rho, len(moving))
         reason = tree_fails(hidden, boxes, proof["tree"],
-                            lambda part, index: index < len(multipliers) and (part.gram or gram) is not None and part_holds(
+                            lambda part, index: index < len(multipliers) and (
+                                part.gram or gram) is not None and part_holds(
                                 hidden, part.gram or gram, moving, weight, part.bounds, square, multipliers[index],
                                 shown(hidden, part.low, part.high, part.bounds, conflicts[index])), forms)
         require(not reason, f"{where}: {reason}")
@@ -1560,7 +1584,8 @@ class Checker:
         q, t = values
         require(len(q) == size * (size + 1) // 2 and len(t) == sum(len(layer.biases) for layer in rho_layers),
                 f"{where}: a form is of another size")
-        require(min(t) >= 0 and max(map(abs, q + t)) <= 2 ** 400, f"{where}: a form is out of range, or a t of it negative")
+        require(min(t) >= 0 and max(map(abs, q + t)) <= 2 ** 400,
+                f"{where}: a form is out of range, or a t of it negative")
         return [[q[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(size)] for i in range(size)], t
 
     def checked_form(self, form, name, where):
@@ -1658,20 +1683,23 @@ class Checker:
 
     def check_values(self, entry):
         """Range, jump and float32 error over a box, layer by layer."""
-        require_keys(entry, ["function", "neighbours", "domain", "input_error", "networks", "sum", "lower", "upper", "jump",
-                             "jump_hex", "float32_error", "float32_error_hex"], "values")
+        require_keys(entry, ["function", "neighbours", "domain", "input_error", "networks", "sum", "lower", "upper",
+                             "jump", "jump_hex", "float32_error", "float32_error_hex"], "values")
         require(isinstance(entry["function"], str), "values: function is not text")
         where, names = f"values of {entry['function']}", networks_of(entry["function"])
         is_set, is_float32 = len(names) == 2, entry["input_error"] is not None
-        require(names[0] != "phi:ground" if is_set else names == ["network"], f"{where}: only of the network, or of a sum")
+        require(names[0] != "phi:ground" if is_set else names == ["network"],
+                f"{where}: only of the network, or of a sum")
         count = entry["neighbours"]
         require(type(count) is int, f"{where}: neighbours is not an integer")
         require(1 <= count <= 1000000 if is_set else count == 0, f"{where}: impossible number of neighbours")
         inputs = names[:1] + ["phi:ground"] * (is_set and "phi:ground" in self.network.parts)
         used = inputs + names[1:]
         require(all(name in self.network.parts for name in used), f"{where}: no such function")
-        require(all(self.network.parts[name].activation in (None, "relu") for name in used), f"{where}: values are for ReLU only")
-        require(isinstance(entry["networks"], dict) and set(entry["networks"]) == set(used), f"{where}: networks lists others")
+        require(all(self.network.parts[name].activation in (None, "relu") for name in used),
+                f"{where}: values are for ReLU only")
+        require(isinstance(entry["networks"], dict) and set(entry["networks"]) == set(used),
+                f"{where}: networks lists others")
         if is_float32:
             require(isinstance(entry["input_error"], dict) and set(entry["input_error"]) == set(inputs),
                     f"{where}: input_error is not of the function's inputs")
@@ -1688,13 +1716,16 @@ class Checker:
             result = self.follow_layers(names[1], entry, result, where)
         lower, upper = ([Fraction(x) for x in hex_floats(entry[key])] for key in ("lower", "upper"))
         require(len(lower) == len(upper) == len(result.lower) and all(
-            a <= l and u <= b for a, l, u, b in zip(lower, result.lower, result.upper, upper)), f"{where}: the values leave the range")
-        require((entry["jump"] is not None) == (entry["jump_hex"] is not None) == is_set, f"{where}: a jump of set functions only")
+            a <= l and u <= b for a, l, u, b in zip(lower, result.lower, result.upper, upper)),
+            f"{where}: the values leave the range")
+        require((entry["jump"] is not None) == (entry["jump_hex"] is not None) == is_set,
+                f"{where}: a jump of set functions only")
         if is_set:
             jump = Fraction(number(entry["jump"], entry["jump_hex"], where))
             key = (names[1], "all", frozenset())
             require(key in self.proved, f"{where}: no bound of {names[1]}")
-            require(jump ** 2 >= self.proved[key] ** 2 * sum(x * x for x in terms[0][0].sizes()), f"{where}: claims less than the jump")
+            require(jump ** 2 >= self.proved[key] ** 2 * sum(x * x for x in terms[0][0].sizes()),
+                    f"{where}: claims less than the jump")
         require((entry["float32_error"] is not None) == (entry["float32_error_hex"] is not None) == is_float32,
                 f"{where}: a float32 error where there are input errors, and only there")
         if is_float32:
@@ -1707,18 +1738,21 @@ class Checker:
             require(isinstance(self.c["box"], dict), f"{where}: there is no box")
             lower, upper = self.box_of(name, where, limited=False)
         else:
-            require(entry["domain"] == "clamp" and self.network.clamp and name != "phi:ground", f"{where}: no such domain")
+            require(entry["domain"] == "clamp" and self.network.clamp and name != "phi:ground",
+                    f"{where}: no such domain")
             lower, upper = ([Fraction(x) for x in side] for side in self.network.clamp)
         error = None
         if entry["input_error"] is not None:
             error = [Fraction(x) for x in hex_floats(entry["input_error"][name])]
-            require(len(error) == len(lower) and min(error) >= 0, f"{where}: needs one input error per input, none negative")
+            require(len(error) == len(lower) and min(error) >= 0,
+                    f"{where}: needs one input error per input, none negative")
         return Bounded(lower, upper, error)
 
     def stated(self, stated, size, found, is_float32, where):
         """What is stated of a vector, which must enclose what was found."""
         require_keys(stated, ["lower", "upper", "error"], where)
-        require((stated["error"] is not None) == is_float32, f"{where}: an error where there are input errors, and only there")
+        require((stated["error"] is not None) == is_float32,
+                f"{where}: an error where there are input errors, and only there")
         values = []
         for key in ["lower", "upper"] + ["error"] * is_float32:
             require(isinstance(stated[key], str), f"{where}: {key} is not text")
@@ -1728,7 +1762,8 @@ class Checker:
         require(all(a <= b for a, b in zip(values[0], lower)) and all(a <= b for a, b in zip(upper, values[1])),
                 f"{where}: the values leave the bounds")
         if is_float32:
-            require(error is not None and all(a <= b for a, b in zip(error, values[2])), f"{where}: claims less than the float32 error")
+            require(error is not None and all(a <= b for a, b in zip(error, values[2])),
+                    f"{where}: claims less than the float32 error")
         return Bounded(values[0], values[1], values[2] if is_float32 else None)
 
     def follow_layers(self, name, entry, inputs, where):
@@ -1737,8 +1772,10 @@ class Checker:
                 f"{where}: {name} needs one entry per layer")
         for k, (layer, stated) in enumerate(zip(layers, entry["networks"][name])):
             if k > 0:
-                inputs = Bounded([max(x, Fraction(0)) for x in inputs.lower], [max(x, Fraction(0)) for x in inputs.upper], inputs.error)
-            inputs = self.stated(stated, layer.outputs, layer_bounds(layer, inputs), inputs.error is not None, f"{where}: {name}")
+                inputs = Bounded([max(x, Fraction(0)) for x in inputs.lower],
+                                 [max(x, Fraction(0)) for x in inputs.upper], inputs.error)
+            inputs = self.stated(stated, layer.outputs, layer_bounds(layer, inputs), inputs.error is not None,
+                                 f"{where}: {name}")
         return inputs
 
 

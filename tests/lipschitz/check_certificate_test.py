@@ -49,7 +49,8 @@ def onnx(nodes, sizes, generator):
         graph += field(1, b"".join(field(1, name) for name in inputs) + field(2, output) + field(4, kind))
     for k, shape in enumerate(zip(sizes, sizes[1:])):
         numbers = pack(f"<{shape[0] * shape[1]}f", *(generator.uniform(-1, 1) for _ in range(shape[0] * shape[1])))
-        graph += field(5, b"".join(field(1, size) for size in shape) + field(2, 1) + field(8, f"w{k + 1}") + field(9, numbers))
+        graph += field(5, b"".join(field(1, size) for size in shape) + field(2, 1) + field(8, f"w{k + 1}")
+                       + field(9, numbers))
     graph += field(11, field(1, "x")) + field(12, field(1, "y"))
     return field(1, 8) + field(2, "test") + field(7, graph)
 
@@ -59,7 +60,8 @@ def smooth_models(folder, generator):
     layer = lambda k, x, y: ("MatMul", [x, f"w{k}"], y)
     models = {
         "tanh": ([layer(1, "x", "a"), ("Tanh", ["a"], "b"), layer(2, "b", "c"), ("Tanh", ["c"], "y")], [3, 5, 2]),
-        "silu": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "s"), ("Mul", ["a", "s"], "b"), layer(2, "b", "y")], [3, 5, 2]),
+        "silu": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "s"), ("Mul", ["a", "s"], "b"), layer(2, "b", "y")],
+                 [3, 5, 2]),
         "sigmoid": ([layer(1, "x", "a"), ("Sigmoid", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
         "elu": ([layer(1, "x", "a"), ("Celu", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2]),
         "swish": ([layer(1, "x", "a"), ("Swish", ["a"], "b"), layer(2, "b", "y")], [3, 5, 2])}
@@ -97,7 +99,8 @@ def smooth(folder):
     """A network.toml with the parts of heterogeneous(), each with another activation between its layers."""
     net, text = folder / "smooth.toml", (folder / "network.toml").read_text()
     for part, activation in (("small", "tanh"), ("large", "sigmoid"), ("ground", "softplus"), ("rho", "selu")):
-        text = text.replace(f'weights = "{part}.safetensors"', f'weights = "{part}.safetensors"\nactivation = "{activation}"')
+        text = text.replace(f'weights = "{part}.safetensors"',
+                            f'weights = "{part}.safetensors"\nactivation = "{activation}"')
     net.write_text(text)
     return net
 
@@ -105,7 +108,8 @@ def smooth(folder):
 def beside(folder):
     """The network.toml of heterogeneous(), with another activation in the ground only."""
     net = folder / "beside.toml"
-    net.write_text((folder / "network.toml").read_text().replace('"ground.safetensors"', '"ground.safetensors"\nactivation = "tanh"'))
+    net.write_text((folder / "network.toml").read_text().replace('"ground.safetensors"',
+                                                                 '"ground.safetensors"\nactivation = "tanh"'))
     return net
 
 
@@ -140,7 +144,8 @@ def is_tree(value):
 
 
 def with_other_decisions(tree, generator):
-    """Of the neurons that a tree says are decided, one the other way, by another corner, or another one; or all left out."""
+    """Of the neurons that a tree says are decided, one the other way, by another corner, or another one; or all left
+    out."""
     words = tree.split()
     decided = [i for i, word in enumerate(words) if word[0] == "d"]
     if not decided:
@@ -158,16 +163,18 @@ def mutated(value, generator):
         number = second.hex_float(value)
         return generator.choice([(number * (1 - 2 ** -20)).hex(), (-number).hex(), (0.0).hex(), "0x1p5000", "1.5", ""])
     if isinstance(value, str) and value[:2] in ("s0", "s1", "s2", "s3", "s4", "s5", "q0") or is_tree(value):
-        return generator.choice(with_other_decisions(value, generator) + [value.replace("q", "q9"), " ".join(w for w in value.split() if w[0] != "q") + " q0",
-                                 value + " t0", value[:-3], value.replace("s", "t"), value.replace("t", "s"), "s9 t0 t0",
-                                 " ".join(value.split()[1:]), ""])
+        return generator.choice(with_other_decisions(value, generator)
+                                + [value.replace("q", "q9"), " ".join(w for w in value.split() if w[0] != "q") + " q0",
+                                 value + " t0", value[:-3], value.replace("s", "t"), value.replace("t", "s"),
+                                 "s9 t0 t0", " ".join(value.split()[1:]), ""])
     if isinstance(value, str) and " 0x" in value:  # multipliers, or a row of a form
         words = value.split()
         at = generator.randrange(len(words))
         if words[at][-1] in "+-":  # a neuron of a conflict
             words[at] = generator.choice(["x", words[at][:-1], "99999+", words[at][:-1] + "+-"[words[at][-1] == "+"]])
             return " ".join(words)
-        words[at] = generator.choice([(second.hex_float(words[at]) * generator.choice([0.5, 1.001])).hex(), "-0x1p0", "x"])
+        words[at] = generator.choice([(second.hex_float(words[at]) * generator.choice([0.5, 1.001])).hex(),
+                                      "-0x1p0", "x"])
         return " ".join(words)
     if isinstance(value, str) and len(value) > 200:  # a row of a factor
         return generator.choice([value + "7", value + " 1", value[:-2], "x" + value])
@@ -305,7 +312,8 @@ def check_activations(certificate, net, folder):
     for i, bound in enumerate(certificate["bounds"]):
         changed = copy()
         names = second.networks_of(bound["function"])
-        others = [{"network": "phi:ground", "x": point("phi:ground")}] if len(names) == 2 and names[0] != "phi:ground" else []
+        others = ([{"network": "phi:ground", "x": point("phi:ground")}]
+                  if len(names) == 2 and names[0] != "phi:ground" else [])
         changed["bounds"][i].update(lower=0.0, lower_hex="0x0p+0", lower_witness={
             "x": point(names[0]), "y": ["0x1p+0"] + point(names[0])[1:], "others": others})
         assert both(changed) == (bound["lower"] is not None), f"{bound['function']}: a lower bound"
@@ -336,17 +344,20 @@ def run():
         square = folder / "square.safetensors"
         square.write_bytes(safetensors([3, 3, 3, 2], generator, ["first", "after", "last"]))
         order = ["--order", "first,after,last"]
-        (folder / "square.json").write_text(recorded(second.Network(**arguments([str(square), *order])).parts["network"],
-                                                     generator))
+        network = second.Network(**arguments([str(square), *order])).parts["network"]
+        (folder / "square.json").write_text(recorded(network, generator))
         nets = [([str(square), *order], ["--samples", str(folder / "square.json")]),
                 ([hetero], ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2", "--domain",
                             str(folder / "box.toml")]),
-                ([hetero], ["--neighbours", "2", "--domain", str(folder / "part.toml"), "--method", "branch", "--cuts", "20"]),
+                ([hetero], ["--neighbours", "2", "--domain", str(folder / "part.toml"), "--method", "branch",
+                            "--cuts", "20"]),
                 ([str(tiny)], ["--method", "branch", "--cuts", "20"]),
                 ([hetero], ["--as", "float32", "--neighbours", "2", "--method", "product"]),
                 ([str(demo / "network.toml")], ["--blocks=position"]),
-                ([str(demo / "network.toml")], ["--as", "float32", "--neighbours", "2", "--domain", str(folder / "box.toml")]),
-                (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")], ["--blocks=velocity"])]
+                ([str(demo / "network.toml")],
+                 ["--as", "float32", "--neighbours", "2", "--domain", str(folder / "box.toml")]),
+                (["--phi", str(demo / "phi.safetensors"), "--rho", str(demo / "rho.safetensors")],
+                 ["--blocks=velocity"])]
         smooth_net = str(smooth(folder))
         try:
             second.Network(smooth_net, activation="silu")
@@ -382,12 +393,14 @@ def run():
                 # Where the slack of a proof allows it, another factor or multiplier proves the same; a law that holds
                 # for two neighbours holds for one.
                 # Another pair of points may be as steep.
-                # Wider bounds of values hold as well, and so do those for fewer neighbours or smaller errors of the inputs.
+                # Wider bounds of values hold as well, and so do those for fewer neighbours or smaller errors of the
+                # inputs.
                 wider = ("networks", "sum", "lower", "upper", "neighbours", "input_error")
                 # Another corner may decide a neuron as well, and the part may hold without.
-                harmless = mutation == certificate or is_longer or decided_otherwise(certificate, mutation, where) or where[0] in ("tool", "box") or \
-                    any(key in where for key in ("factor", "t", "q", "multipliers", "conflicts", "least", "most", "radius", "law",
-                                             "neighbours", "samples")) or \
+                harmless = mutation == certificate or is_longer or decided_otherwise(certificate, mutation, where) or \
+                    where[0] in ("tool", "box") or \
+                    any(key in where for key in ("factor", "t", "q", "multipliers", "conflicts", "least", "most",
+                                                 "radius", "law", "neighbours", "samples")) or \
                     ("lower_witness" in where and ("x" in where or "y" in where)) or \
                     (where[0] == "values" and len(where) > 2 and where[2] in wider)
                 assert harmless or not accepted, f"{where} was changed and both accept"

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Two attacks on certifiers that prove bounds for real arithmetic while float32 flies. Biases far larger than the inputs make
-the float32 evaluation a step function: its slope between neighbouring floats, and its values at the border of the range, leave
-the bounds of the exact function. Both must be so here, and both must stay within the float32 error that certify states.
+"""Two attacks on certifiers that prove bounds for real arithmetic while float32 flies. Biases far larger than the
+inputs make the float32 evaluation a step function: its slope between neighbouring floats, and its values at the border
+of the range, leave the bounds of the exact function. Both must be so here, and both must stay within the float32 error
+that certify states.
 
     float32_attacks_test.py SWARMCERT
 """
@@ -29,9 +30,11 @@ def after(x):
 def safetensors(layers):
     header, data = {}, b""
     for k, (weights, biases) in enumerate(layers):
-        for part, shape, numbers in (("weight", [len(weights), len(weights[0])], sum(weights, [])), ("bias", [len(biases)], biases)):
+        for part, shape, numbers in (("weight", [len(weights), len(weights[0])], sum(weights, [])),
+                                     ("bias", [len(biases)], biases)):
             raw = struct.pack(f"<{len(numbers)}f", *numbers)
-            header[f"fc{k + 1}.{part}"] = {"dtype": "F32", "shape": shape, "data_offsets": [len(data), len(data) + len(raw)]}
+            header[f"fc{k + 1}.{part}"] = {"dtype": "F32", "shape": shape,
+                                           "data_offsets": [len(data), len(data) + len(raw)]}
             data += raw
     text = json.dumps(header).encode()
     return struct.pack("<Q", len(text)) + text + data
@@ -63,7 +66,8 @@ def in_float32(layers, x, bias_first):
 
 
 def largest_step(layers, low, high, bias_first, generator):
-    """(step, x, next float): bisection to neighbouring floats between which the values differ most, from many places."""
+    """(step, x, next float): bisection to neighbouring floats between which the values differ most, from many
+    places."""
     value = lambda x: Fraction(in_float32(layers, x, bias_first))
     best = (Fraction(0), low, after(low))
     for _ in range(40):
@@ -102,8 +106,8 @@ def certify(folder, layers, low, high):
     (folder / "net.safetensors").write_bytes(safetensors(layers))
     (folder / "box.toml").write_text(f'schema = "swarmcert/box/1"\nlower = [{low!r}]\nupper = [{high!r}]\n')
     out = folder / "result.json"
-    done = subprocess.run([SWARMCERT, "certify", folder / "net.safetensors", "--domain", folder / "box.toml", "--nodes", "1", "-q",
-                           "--json", out, "--force"], capture_output=True, text=True)
+    done = subprocess.run([SWARMCERT, "certify", folder / "net.safetensors", "--domain", folder / "box.toml",
+                           "--nodes", "1", "-q", "--json", out, "--force"], capture_output=True, text=True)
     assert done.returncode == 0, done
     result = json.loads(out.read_text())
     (bound,), (error,), (span,) = result["bounds"], result["float32_error"], result["range"]
@@ -112,8 +116,9 @@ def certify(folder, layers, low, high):
 
 def slopes_through_biases(folder, generator):
     steeper = 0
-    for name, bias, layers in [(f"x + {2 ** k} - {2 ** k}", 2.0 ** k, through_biases(2.0 ** k)) for k in (6, 10, 16, 20)] + \
-            [(f"6 and 5 neurons, biases {2 ** k}", 2.0 ** k, random_network(2.0 ** k, generator)) for k in (8, 12, 16)]:
+    cases = [(f"x + {2 ** k} - {2 ** k}", 2.0 ** k, through_biases(2.0 ** k)) for k in (6, 10, 16, 20)] + \
+        [(f"6 and 5 neurons, biases {2 ** k}", 2.0 ** k, random_network(2.0 ** k, generator)) for k in (8, 12, 16)]
+    for name, bias, layers in cases:
         upper, error, _, _ = certify(folder, layers, 0.25, 1.0)
         for bias_first in True, False:
             step, a, b = largest_step(layers, 0.25, 1.0, bias_first, generator)
@@ -125,8 +130,8 @@ def slopes_through_biases(folder, generator):
             for x in [a, b] + [f32(generator.uniform(0.25, 1)) for _ in range(60)]:
                 off = abs(Fraction(in_float32(layers, x, bias_first)) - exact(layers, x))
                 assert off <= error, f"{name} at {x}: off by {float(off)}, error {float(error)}"
-            print(f"{name:32} slope at most {float(upper):.4g}; a step of {float(step):.4g} between neighbouring floats, "
-                  f"slope {float(step / gap):.4g}; stated error {float(error):.4g}")
+            print(f"{name:32} slope at most {float(upper):.4g}; a step of {float(step):.4g} between "
+                  f"neighbouring floats, slope {float(step / gap):.4g}; stated error {float(error):.4g}")
     assert steeper == 14
 
 
@@ -141,7 +146,8 @@ def values_outside_of_the_range(folder):
         value = Fraction(in_float32(layers, high, True))
         assert upper < value <= upper + error, f"{float(value)} against {float(upper)} + {float(error)}"
         outside += 1
-        print(f"2^{k}: proved at most {float(upper):.9g}, float32 gives {float(value):.9g}, stated error {float(error):.3g}")
+        print(f"2^{k}: proved at most {float(upper):.9g}, float32 gives {float(value):.9g}, "
+              f"stated error {float(error):.3g}")
     assert outside == 3
 
 

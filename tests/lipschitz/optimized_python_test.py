@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Input that is wrong in itself, or contradicts another one, is refused by the Python checker with exit code 3, also under
-`python3 -O`, which drops every assert; the C++ checker refuses the same input with the same code.
+"""Input that is wrong in itself, or contradicts another one, is refused by the Python checker with exit code 3, also
+under `python3 -O`, which drops every assert; the C++ checker refuses the same input with the same code.
 
     optimized_python_test.py SWARMCERT SOURCE_DIR
 """
@@ -93,7 +93,8 @@ def refuses_contradictory_input(folder):
 
 
 def no_checker_rests_on_assert():
-    sources = [path for folder in ("lipschitz", "stability") for path in sorted((common.SOURCE / "tests" / folder).glob("*.py"))
+    sources = [path for folder in ("lipschitz", "stability")
+               for path in sorted((common.SOURCE / "tests" / folder).glob("*.py"))
                if not path.stem.endswith("_test")]
     assert {"check_certificate", "check_tracking"} <= {path.stem for path in sources}
     for path in sources:

@@ -1,9 +1,10 @@
-"""Proofs by parts for check_certificate.py in double precision, many parts at once, with numpy. What `holds` accepts holds in
-exact arithmetic, as every rounding error is bounded; what it does not accept has to be decided in fractions.
+"""Proofs by parts for check_certificate.py in double precision, many parts at once, with numpy. What `holds` accepts
+holds in exact arithmetic, as every rounding error is bounded; what it does not accept has to be decided in fractions.
 
-Error bounds are those of sums and products in any order (Higham 2002, sections 3.1 and 4.2): a sum of n products differs
-from the exact one by at most n u / (1 - n u) times the sum of their absolute values. A Cholesky factorization that runs to
-its end shows that a matrix of n rows, less gamma_(n+1) times its trace, is positive definite (Rump 2006, BIT 46).
+Error bounds are those of sums and products in any order (Higham 2002, sections 3.1 and 4.2): a sum of n products
+differs from the exact one by at most n u / (1 - n u) times the sum of their absolute values. A Cholesky factorization
+that runs to its end shows that a matrix of n rows, less gamma_(n+1) times its trace, is positive definite (Rump 2006,
+BIT 46).
 """
 import re
 from collections import namedtuple
@@ -106,9 +107,9 @@ class Bounds:
         self.offset.append(np.where(is_open, offset, 0.0))
 
     def in_inputs(self, top, form, constant, which, below):
-        """Forms in the inputs of layer `top`, [1 or parts, forms, inputs], as forms in x that are no less over the boxes
-        `which`: (form, constant, sum of the absolute values of the constant's terms, what rounding may have cost, number of
-        terms). `below`: slopes below ReLU, one row per box of `which`."""
+        """Forms in the inputs of layer `top`, [1 or parts, forms, inputs], as forms in x that are no less over the
+        boxes `which`: (form, constant, sum of the absolute values of the constant's terms, what rounding may have cost,
+        number of terms). `below`: slopes below ReLU, one row per box of `which`."""
         absolute, error, terms = abs(constant), np.zeros((1, 1)), 4
         for j in range(top - 1, -1, -1):
             layer, is_positive = self.layers[j], form > 0
@@ -173,8 +174,8 @@ class Bounds:
 
 
     def side_of(self, row, neuron, is_on):
-        """Of neurons of the boxes `row`, counted over all layers: the form in x above y (on) or -y (off), as in_inputs(), and
-        whether the neuron is open."""
+        """Of neurons of the boxes `row`, counted over all layers: the form in x above y (on) or -y (off), as
+        in_inputs(), and whether the neuron is open."""
         inputs = self.low.shape[1]
         form, (constant, absolute, error) = np.zeros((len(row), 1, inputs)), np.zeros((3, len(row), 1))
         is_open, most, first = np.zeros(len(row), dtype=bool), 0, 0
@@ -190,11 +191,12 @@ class Bounds:
         return form, constant, absolute, error, most, is_open
 
     def shown(self, row, first, first_on, second, second_on, weight):
-        """Which conflicts hold: both neurons are open, and the weighted sum of y, negated where the state is off, is nowhere
-        positive. Any two nonnegative weights that are not both zero will do, so 1 - weight may be rounded."""
+        """Which conflicts hold: both neurons are open, and the weighted sum of y, negated where the state is off, is
+        nowhere positive. Any two nonnegative weights that are not both zero will do, so 1 - weight may be rounded."""
         one, other, rest = self.side_of(row, first, first_on), self.side_of(row, second, second_on), 1 - weight
         form, constant, absolute, error = (
-            a * weight[:, None, None] + b * rest[:, None, None] if a.ndim == 3 else a * weight[:, None] + b * rest[:, None]
+            a * weight[:, None, None] + b * rest[:, None, None] if a.ndim == 3
+            else a * weight[:, None] + b * rest[:, None]
             for a, b in zip(one[:4], other[:4]))
         size = abs(one[0]) * weight[:, None, None] + abs(other[0]) * rest[:, None, None]
         reach = np.maximum(abs(self.low[row]), abs(self.high[row]))
@@ -222,8 +224,8 @@ class Conflicts:
 
 
 class Inequality:
-    """S of a batch of parts: |df|^2 <= rho |dx|^2 in the moving inputs and the increments of open neurons; rows of other
-    neurons are those of the identity."""
+    """S of a batch of parts: |df|^2 <= rho |dx|^2 in the moving inputs and the increments of open neurons; rows of
+    other neurons are those of the identity."""
 
     def __init__(self, layers, gram, gram_error, moving, weight, rho):
         self.layers, self.gram, self.gram_error, self.rho, self.moving = layers, gram, gram_error, rho, len(moving)
@@ -262,7 +264,8 @@ class Inequality:
         if d.max() > 2.0 ** 300:  # what underflows would matter
             return False
         s *= d[:, :, None] * d[:, None]
-        shift = self.error(rows, abs(z), d, conflicts) * 1.01 + 1.1 * gamma(n + 2) * s[:, range(n), range(n)].sum(1) + 16 * U
+        shift = self.error(rows, abs(z), d, conflicts) * 1.01
+        shift = shift + 1.1 * gamma(n + 2) * s[:, range(n), range(n)].sum(1) + 16 * U
         s[:, range(n), range(n)] -= shift[:, None]
         try:
             return bool(np.isfinite(np.linalg.cholesky(s)).all())
@@ -291,8 +294,9 @@ class Inequality:
         return result
 
     def error(self, rows, z, d, conflicts):
-        """At least the norm of D (S - true S) D. With R the error of increments as forms, only R d is followed: the sum of
-        all entries of a matrix of no negative ones bounds its norm, and so does the largest sum of a row of a symmetric one."""
+        """At least the norm of D (S - true S) D. With R the error of increments as forms, only R d is followed: the sum
+        of all entries of a matrix of no negative ones bounds its norm, and so does the largest sum of a row of a
+        symmetric one."""
         radius, squares, first = np.zeros((1, self.layers[0].inputs)), 0, self.moving
         here, radii, sizes = d[:, :first] @ abs(self.inputs).T, [], []  # here: |what enters the layer| d
         for layer, (y, times, is_open, is_off) in zip(self.layers, rows):
@@ -319,7 +323,8 @@ class Inequality:
 
     def add_error_of(self, conflicts, radii, sizes, d, total):
         part, first, first_on, second, second_on, multiplier = conflicts
-        wrong, size = ([np.where(is_on, 0, radii[part, neuron]) for neuron, is_on in ((first, first_on), (second, second_on))],
+        wrong, size = ([np.where(is_on, 0, radii[part, neuron])
+                        for neuron, is_on in ((first, first_on), (second, second_on))],
                        [np.where(is_on, 0, sizes[part, neuron]) + d[part, self.moving + neuron]
                         for neuron, is_on in ((first, first_on), (second, second_on))])
         each = wrong[0] * size[1] + size[0] * wrong[1] + wrong[0] * wrong[1] + 16 * U * size[0] * size[1]
@@ -330,7 +335,8 @@ class Inequality:
 
 
 class Walk:
-    """The parts of a tree, level by level: boxes, and bounds of their neurons, which stay within those of the part above."""
+    """The parts of a tree, level by level: boxes, and bounds of their neurons, which stay within those of the part
+    above."""
 
     def __init__(self, layers, boxes, tree, inequality, multipliers, conflicts):
         self.layers, self.inequality, self.multipliers, self.conflicts = layers, inequality, multipliers, conflicts
@@ -398,8 +404,8 @@ class Walk:
             return True
         c, (part, number) = self.conflicts, self.conflicts.of(leaf[rows])
         if len(part):
-            is_shown = bounds.shown(rows[part], c.first[number], c.first_on[number], c.second[number], c.second_on[number],
-                                    c.weight[number])
+            is_shown = bounds.shown(rows[part], c.first[number], c.first_on[number], c.second[number],
+                                    c.second_on[number], c.weight[number])
             part, number = part[is_shown], number[is_shown]
         of_leaves = Leaves([ends[rows] for ends in bounds.lower], [ends[rows] for ends in bounds.upper])
         return self.inequality.are_positive_definite(of_leaves, self.multipliers[leaf[rows]], (
@@ -414,8 +420,8 @@ def holds(layers, boxes, text, gram, moving, weight, rho, multipliers, conflicts
     """Whether a tree of splits, leaves and decisions proves its parts.
 
     layers: (W, b, outputs without ReLU); boxes: (low, high); gram: (G, error of its entries); multipliers: one row per
-    number of a leaf; conflicts: (neuron, is on, neuron, is on, weight, multiplier) for each such number. All numbers are
-    doubles, and exact but for G."""
+    number of a leaf; conflicts: (neuron, is on, neuron, is on, weight, multiplier) for each such number. All numbers
+    are doubles, and exact but for G."""
     layers = [Layer(*layer) for layer in layers]
     try:
         tree = Tree(text, len(boxes))

@@ -32,7 +32,8 @@ def safetensors(sizes, generator):
 
 def certified(folder, name, net, *options):
     path = folder / f"{name}.json"
-    done = subprocess.run([SWARMCERT, "certify", *map(str, net), "--method", "branch", *map(str, options), "-q", "-o", path],
+    done = subprocess.run([SWARMCERT, "certify", *map(str, net), "--method", "branch", *map(str, options), "-q",
+                           "-o", path],
                           capture_output=True, text=True)
     assert done.returncode == 0, done
     return json.loads(path.read_text())
@@ -72,9 +73,10 @@ def holds_in_fractions(layers, boxes, text, gram, moving, weight, rho, multiplie
     fractions = [([Fraction(x) for x in low], [Fraction(x) for x in high]) for low, high in boxes]
     square = checker.scaled_identity(rho, len(moving))
     exact = [[(*c[:4], Fraction(c[4]), Fraction(c[5])) for c in some] for some in conflicts]
-    proves = lambda part, index: checker.part_holds(hidden, g, moving, [Fraction(x) for x in weight], part.bounds, square,
-                                                    [Fraction(x) for x in multipliers[index].tolist()],
-                                                    checker.shown(hidden, part.low, part.high, part.bounds, exact[index]))
+    proves = lambda part, index: checker.part_holds(hidden, g, moving, [Fraction(x) for x in weight], part.bounds,
+                                                    square, [Fraction(x) for x in multipliers[index].tolist()],
+                                                    checker.shown(
+                                                        hidden, part.low, part.high, part.bounds, exact[index]))
     return checker.tree_fails(hidden, fractions, text, proves) == ""
 
 
@@ -106,11 +108,13 @@ def refuses_what_lacks_a_part(arguments):
     splits = [k for k, word in enumerate(words) if word[0] == "s"]
     decisions = [k for k, word in enumerate(words) if word[0] == "d"]
     changed = [words[:leaves[-1]], words + ["t0"], words[:leaves[0]] + ["t999999"] + words[leaves[0] + 1:],
-               *(words[:k] + ["s9"] + words[k + 1:] for k in splits[:1]), ["d9999+0"] + words, words + ["d0+0"], ["r"] + words]
+               *(words[:k] + ["s9"] + words[k + 1:] for k in splits[:1]), ["d9999+0"] + words, words + ["d0+0"],
+               ["r"] + words]
     for k in decisions[:5]:  # the other state than the one that is shown
         changed.append(words[:k] + [words[k].translate(str.maketrans("+-", "-+"))] + words[k + 1:])
     for some in changed:
-        assert not parts_in_double.holds(layers, boxes, " ".join(some), gram, moving, weight, rho, multipliers, conflicts), some[:3]
+        assert not parts_in_double.holds(layers, boxes, " ".join(some), gram, moving, weight, rho, multipliers,
+                                         conflicts), some[:3]
     assert not parts_in_double.holds(layers, boxes, text, gram, moving, weight, rho, 0 * multipliers, conflicts)
     return len(decisions)
 
@@ -119,8 +123,10 @@ def bounds_contain_the_neurons(generator):
     """Exact values of all neurons at points of random boxes, of networks with small and large numbers."""
     checked = 0
     for size in (1.0, 1e-12, 1e8):
-        weights = [[[generator.gauss(0, size) for _ in range(n)] for _ in range(m)] for n, m in ((3, 6), (6, 5), (5, 4))]
-        layers = [parts_in_double.Layer(w, [generator.gauss(0, size) for _ in w], k == 1) for k, w in enumerate(weights)]
+        weights = [[[generator.gauss(0, size) for _ in range(n)] for _ in range(m)]
+                   for n, m in ((3, 6), (6, 5), (5, 4))]
+        layers = [parts_in_double.Layer(w, [generator.gauss(0, size) for _ in w], k == 1)
+                  for k, w in enumerate(weights)]
         middle = [[generator.uniform(-1, 1) for _ in range(3)] for _ in range(8)]
         half = [[10 ** generator.uniform(-9, 0) for _ in range(3)] for _ in range(8)]
         low = parts_in_double.np.array([[m - h for m, h in zip(*row)] for row in zip(middle, half)])
@@ -132,9 +138,11 @@ def bounds_contain_the_neurons(generator):
                 x = [Fraction(generator.choice((l, h)) if corner < 8 else generator.uniform(l, h))
                      for l, h in zip(low[row].tolist(), high[row].tolist())]
                 for k, layer in enumerate(layers):
-                    y = [sum(Fraction(w) * v for w, v in zip(ws, x)) + Fraction(b) for ws, b in zip(layer.w.tolist(), layer.b.tolist())]
+                    y = [sum(Fraction(w) * v for w, v in zip(ws, x)) + Fraction(b)
+                         for ws, b in zip(layer.w.tolist(), layer.b.tolist())]
                     for i, value in enumerate(y):
-                        assert Fraction(float(bounds.lower[k][row, i])) <= value <= Fraction(float(bounds.upper[k][row, i]))
+                        least, most = (Fraction(float(ends[k][row, i])) for ends in (bounds.lower, bounds.upper))
+                        assert least <= value <= most
                         checked += 1
                     x = [max(v, Fraction(0)) if relu else v for v, relu in zip(y, layer.relu)]
     assert checked > 3000, checked
@@ -147,7 +155,8 @@ def main():
         for file, sizes in (("cube", [3, 8, 8, 2]), ("tiny", [2, 5, 4, 1]), ("phi", [3, 8, 6, 2]), ("rho", [2, 6, 1])):
             (folder / f"{file}.safetensors").write_bytes(safetensors(sizes, generator))
         (folder / "cube.toml").write_text('schema = "swarmcert/box/1"\nlower = [-1, -1, -1]\nupper = [1, 1, 1]\n')
-        (folder / "part.toml").write_text('schema = "swarmcert/box/1"\nlower = [-0.1, -0.8, 0.1]\nupper = [1.2, 0.4, 1.5]\n')
+        (folder / "part.toml").write_text(
+            'schema = "swarmcert/box/1"\nlower = [-0.1, -0.8, 0.1]\nupper = [1.2, 0.4, 1.5]\n')
         cube, tiny = [folder / "cube.safetensors"], [folder / "tiny.safetensors"]
         pair = ["--phi", folder / "phi.safetensors", "--rho", folder / "rho.safetensors"]
         decisions = cuts = 0
@@ -155,7 +164,8 @@ def main():
                                    ("set", pair, ["--domain", folder / "part.toml"])):
             certificate = certified(folder, kind, net, "--nodes", "60", *options)
             bound = next(b for b in certificate["bounds"] if b["upper_method"] == "branch")
-            witnessed = bound["lower"] if len(net) == 1 else 0  # of a set function rho is that of phi in front of a form
+            # of a set function rho is that of phi in front of a form
+            witnessed = bound["lower"] if len(net) == 1 else 0
             arguments = calls_of(certificate, net)[0]
             least = accepts_no_less_than_fractions(arguments, witnessed)
             cuts += sum(map(len, arguments[8]))

@@ -34,15 +34,16 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         common.heterogeneous(folder, generator)
-        certificate, net = folder / "certificate.json", ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
-        subprocess.run([SWARMCERT, "certify", *net, "--neighbours", "2", "--nodes", "1", "--method", "sdp", "--as", "float32", "--domain",
-                        folder / "box.toml", "-q", "-o", certificate], check=True,
+        certificate = folder / "certificate.json"
+        net = ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
+        subprocess.run([SWARMCERT, "certify", *net, "--neighbours", "2", "--nodes", "1", "--method", "sdp",
+                        "--as", "float32", "--domain", folder / "box.toml", "-q", "-o", certificate], check=True,
                        capture_output=True)
         text = subprocess.run([CHECKER, "--coq", certificate, *net], check=True, capture_output=True, text=True).stdout
         done = kernel(folder / "Sound.v", text)
         accepted(done)
-        for kind in "Norm_at_most", "Norm_at_least", "Slope_at_most", "Slope_at_least", "Law", "Within", "Sum_within", "Jump_at_most", \
-                "Float_error", "Sum_float_error":
+        for kind in "Norm_at_most", "Norm_at_least", "Slope_at_most", "Slope_at_least", "Law", "Within", "Sum_within", \
+                "Jump_at_most", "Float_error", "Sum_float_error":
             assert f": claim := {kind}" in text, kind
         # The last number of a claim is its bound.
         claims = re.findall(r"claim := ((?:Slope_at_most|Norm_at_most) .*)\((\d+),(-?\d+)\)\.", text)

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Three checkers on the same certificates: the proved one, the one of the tool, and the second one in Python. Whatever
-certify writes without a box is accepted by all, with nothing left unchecked; mutations of every field are decided alike;
-malformed files are refused by each.
+certify writes without a box is accepted by all, with nothing left unchecked; mutations of every field are decided
+alike; malformed files are refused by each.
 
-    proved_checker_test.py SWARMCERT SOURCE_DIR MUTATIONS CHECKER CHECK_MANY    MUTATIONS: 0, one for every kind of field
+    proved_checker_test.py SWARMCERT SOURCE_DIR MUTATIONS CHECKER CHECK_MANY
+    MUTATIONS: 0, one for every kind of field
 """
 import json
 import math
@@ -16,7 +17,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
-SOURCE, MUTATIONS, CHECKER, MANY = Path(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]).resolve(), Path(sys.argv[5]).resolve()
+SOURCE, MUTATIONS = Path(sys.argv[2]), int(sys.argv[3])
+CHECKER, MANY = (Path(word).resolve() for word in sys.argv[4:6])
 sys.path.insert(0, str(SOURCE / "tests/lipschitz"))
 import check_certificate as second  # noqa: E402
 import check_certificate_test as common  # noqa: E402
@@ -42,8 +44,8 @@ class Server:
     """A checker that decides many certificates of one NET in one process."""
 
     def __init__(self, command):
-        self.process = subprocess.Popen(list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                                        errors="replace")
+        self.process = subprocess.Popen(list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                        text=True, errors="replace")
 
     def __enter__(self):
         return self
@@ -92,15 +94,18 @@ def kinds(folder, generator):
     float32 = ["--as", "float32"]
     pair = ["--phi", folder / "small.safetensors", "--rho", folder / "rho.safetensors"]
     parts = ["--method", "branch", "--cuts", "20"]
-    slow = [("kinds by parts for a number of neighbours", hetero, ["--neighbours", "2", "--domain", folder / "part.toml", *parts], 0.01)]
+    slow = [("kinds by parts for a number of neighbours", hetero,
+             ["--neighbours", "2", "--domain", folder / "part.toml", *parts], 0.01)]
     return [
         ("plain", [tiny], [], 0.16),
         ("one layer", [line], ["--blocks"], 0.2),
         ("factors left out", [deep], [], 0.01),
         ("order and samples", ordered, ["--samples", samples], 0.2),
-        ("kinds, blocks, laws, scale", hetero, ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"], 0.05),
+        ("kinds, blocks, laws, scale", hetero,
+         ["--blocks", "--neighbours", "large=2,small=1", "--scale", "1,1,1,2,2,2"], 0.05),
         ("float32 and products", hetero, ["--as", "float32", "--neighbours", "2", "--method", "product"], 0.1),
-        ("kinds and values on a box", hetero, [*float32, "--neighbours", "small=3", "--domain", folder / "box.toml", "--method", "sdp"], 0.05),
+        ("kinds and values on a box", hetero, [*float32, "--neighbours", "small=3", "--domain", folder / "box.toml",
+                                               "--method", "sdp"], 0.05),
         ("pair", pair, ["--blocks=velocity"], 0.1),
         ("values of a network", [tiny], [*float32, "--domain", folder / "plane.toml"], 0.1),
         ("values on a clamp", [clamped], [*float32, "--range", "--neighbours", "2", "--input-step", "0.001"], 0.05),
@@ -109,7 +114,8 @@ def kinds(folder, generator):
         ("tanh", [tiny], ["--activation", "tanh"], 0.05),
         ("silu", [tiny], ["--activation", "silu", "--blocks"], 0.05),
         ("gelu, factors left out", [deep], ["--activation", "gelu"], 0.01),
-        ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"], 0.03),
+        ("activations of parts", [common.smooth(folder)], ["--blocks=position", "--neighbours", "large=2,small=1"],
+         0.03),
         ("cover by parts", [tiny], parts, 0.03),
         ("pair and cover by parts", pair, parts, 0.02),
     ] + slow * (MUTATIONS > 0)
@@ -141,7 +147,8 @@ def mutate(name, net, certificate, folder, generator, count):
     for path in paths:
         by_pattern.setdefault(pattern(path), []).append(path)
     chosen = [generator.choice(some) for some in by_pattern.values()]
-    chosen += [generator.choice(by_pattern[p]) for p in generator.choices(list(by_pattern), k=max(0, count - len(chosen)))]
+    chosen += [generator.choice(by_pattern[p])
+               for p in generator.choices(list(by_pattern), k=max(0, count - len(chosen)))]
     network = second.Network(**arguments(net))
     stated = {part: weights.activation for part, weights in network.parts.items()}
     words = list(map(str, net))
@@ -156,17 +163,20 @@ def mutate(name, net, certificate, folder, generator, count):
             three.ask(path)
             if "as" in mutation.get("network", {}) and mutation["network"]["as"] != certificate["network"]["as"]:
                 network = second.Network(**arguments(net))  # the second checker rounds it in place
-            for part, weights in network.parts.items():  # the second checker takes what no file states from a certificate
+            # the second checker takes what no file states from a certificate
+            for part, weights in network.parts.items():
                 weights.activation = stated[part]
             reason = second.check(mutation, network) if mutation.get("schema") == certificate["schema"] else "schema"
             (code, words_of_one), (code_of_three, words_of_three) = one.answer(), three.answer()
             assert code in (0, 1, 3) and code_of_three in (0, 1, 3, 4), (words_of_one, words_of_three)
             assert decided_alike(code_of_three, code == 0, not reason, by_parts), (
-                f"{name}, {place}: first {code} {words_of_one}, second {reason!r}, proved {code_of_three} {words_of_three}")
+                f"{name}, {place}: first {code} {words_of_one}, second {reason!r}, "
+                f"proved {code_of_three} {words_of_three}")
             table["accepted" if code == 0 else "rejected" if code_of_three != 4 else "beyond"] += 1
     assert table["rejected"] + table["beyond"] > 0.5 * len(chosen), table
-    print(f"{name:28} {len(by_pattern):4} kinds of fields {len(chosen):7} mutations: {table['rejected']:7} rejected by all, "
-          f"{table['accepted']:6} accepted by all, {table['beyond']:6} beyond the proved one")
+    print(f"{name:28} {len(by_pattern):4} kinds of fields {len(chosen):7} mutations: "
+          f"{table['rejected']:7} rejected by all, {table['accepted']:6} accepted by all, "
+          f"{table['beyond']:6} beyond the proved one")
     return len(chosen)
 
 
@@ -193,20 +203,22 @@ def a_smaller_bound(certificate, net, folder):
     path = folder / "smaller_bound.json"
     path.write_text(json.dumps(changed))
     one, three = first(path, net), proved(path, net)
-    assert one.returncode == three.returncode == 1 and "of the tree" in one.stdout and three.stdout == one.stdout, f"{one} {three}"
+    assert one.returncode == three.returncode == 1 and "of the tree" in one.stdout, f"{one} {three}"
+    assert three.stdout == one.stdout, f"{one} {three}"
     assert "does not prove its part" in second.check(changed, second.Network(**arguments(net)))
 
 
 def laws_in_a_box(folder, pair):
-    """A law that rests on bounds in a box for any number of neighbours: accepted by all; one that claims less, or holds outside of
-    the box, is refused by all."""
+    """A law that rests on bounds in a box for any number of neighbours: accepted by all; one that claims less, or holds
+    outside of the box, is refused by all."""
     path = folder / "laws.json"
-    run([common.SWARMCERT, "certify", *pair, "--neighbours", "2", "--domain", folder / "part.toml", "--method", "branch",
-         "--nodes", "1", "-q", "-o", path])
+    run([common.SWARMCERT, "certify", *pair, "--neighbours", "2", "--domain", folder / "part.toml",
+         "--method", "branch", "--nodes", "1", "-q", "-o", path])
     certificate = second.parse(path.read_text())
     certificate["bounds"] = [b for b in certificate["bounds"] if "neighbours" not in b]
     assert len(certificate["laws"]) == 3
-    for factor, domain, said in (2, "box", "accepted"), (0.9, "box", "less than the law gives"), (2, "global", "box only"):
+    for factor, domain, said in (
+            (2, "box", "accepted"), (0.9, "box", "less than the law gives"), (2, "global", "box only")):
         changed = json.loads(json.dumps(certificate))
         for law in changed["laws"]:
             upper = factor * law["upper"]
@@ -223,8 +235,8 @@ def laws_in_a_box(folder, pair):
 def short_scale(certificate, net, folder):
     """Of a product of norms as well, whose proof does not look at single inputs."""
     bound = next(b for b in certificate["bounds"] if b["scale"])
-    bound.update(scale=bound["scale"][:-1], upper_method="product", proof=None, lower=None, lower_hex=None, lower_witness=None,
-                 upper=2.0 ** 90, upper_hex="0x1p+90")
+    bound.update(scale=bound["scale"][:-1], upper_method="product", proof=None, lower=None, lower_hex=None,
+                 lower_witness=None, upper=2.0 ** 90, upper_hex="0x1p+90")
     certificate["content_sha256"] = second.content_sha256(certificate)
     path = folder / "short_scale.json"
     path.write_text(json.dumps(certificate))
@@ -310,20 +322,26 @@ def malformed(certificate, net, folder):
         b["proof"]["factor"]["rows"][0] = "9" * 100000
     scale = certificate["bounds"][bound]["proof"]["factor"]["scale"]
     cases = {
-        "empty": b"", "no JSON": b"{", "an array": b"[]", "NaN": with_number("NaN"), "Infinity": with_number("-Infinity"),
+        "empty": b"", "no JSON": b"{", "an array": b"[]", "NaN": with_number("NaN"),
+        "Infinity": with_number("-Infinity"),
         "exponent of nine digits": with_number("1e999999999"), "number of 10^5 digits": with_number("9" * 100000),
         "fraction of 10^5 digits": with_number("0." + "3" * 100000),
-        "nested 10^5 deep": b"[" * 100000 + b"]" * 100000, "nested 65 deep": b'{"schema":' + b"[" * 65 + b"]" * 65 + b"}",
-        "byte order mark": b"\xef\xbb\xbf" + text.encode(), "two documents": text + text, "not UTF-8": text.encode() + b"\xff",
+        "nested 10^5 deep": b"[" * 100000 + b"]" * 100000,
+        "nested 65 deep": b'{"schema":' + b"[" * 65 + b"]" * 65 + b"}",
+        "byte order mark": b"\xef\xbb\xbf" + text.encode(), "two documents": text + text,
+        "not UTF-8": text.encode() + b"\xff",
         "key twice": text[:-1] + ', "tool": "x"}', "half a surrogate": text.replace('"tool": "', '"tool": "\\ud800', 1),
         "control character": text.replace('"tool": "', '"tool": "\x01', 1), "comment": "// x\n" + text,
         "trailing comma": text[:-1] + ",}", "leading zero": with_number("01"), "plus sign": with_number("+1"),
-        "ragged factor": with_bound(ragged), "a row less": with_bound(one_row_less), "long integer": with_bound(long_word),
-        "huge unit": with_bound(set_("unit_exponent", 10 ** 18)), "huge scale": with_bound(set_("scale", [10 ** 9] * len(scale))),
-        "scale is text": with_bound(set_("scale", "1")), "factor is text": with_bound(lambda b: b["proof"].update(factor="null")),
+        "ragged factor": with_bound(ragged), "a row less": with_bound(one_row_less),
+        "long integer": with_bound(long_word),
+        "huge unit": with_bound(set_("unit_exponent", 10 ** 18)),
+        "huge scale": with_bound(set_("scale", [10 ** 9] * len(scale))),
+        "scale is text": with_bound(set_("scale", "1")),
+        "factor is text": with_bound(lambda b: b["proof"].update(factor="null")),
         "hex exponent": hex_upper("0x1p999999999"), "long hex": hex_upper("0x" + "1" * 100000 + "p0"),
-        "hex nan": hex_upper("nan"), "hex inf": hex_upper("inf"), "hex blank": hex_upper(" 0x1p0"), "hex plus": hex_upper("+0x1p0"),
-        "more bits than a double": hex_upper("0x1.000000000000001p3"),
+        "hex nan": hex_upper("nan"), "hex inf": hex_upper("inf"), "hex blank": hex_upper(" 0x1p0"),
+        "hex plus": hex_upper("+0x1p0"), "more bits than a double": hex_upper("0x1.000000000000001p3"),
         "scale of another size": with_bound(lambda b: b.update(scale=["0x1p+0"], norm="weighted_l2")),
     }
     longest = {}
@@ -377,7 +395,8 @@ def main():
         total = 0
         for index, (name, net, options, share) in enumerate(everything):
             path = folder / f"certificate{index}.json"
-            run([common.SWARMCERT, "certify", *net, *options, "--nodes", "20" if "parts" in name else "1", "-q", "-o", path])
+            run([common.SWARMCERT, "certify", *net, *options, "--nodes", "20" if "parts" in name else "1", "-q",
+                 "-o", path])
             certificate = second.parse(path.read_text())
             one, three = first(path, net), proved(path, net)
             assert one.returncode == 0, one

@@ -11,7 +11,8 @@ from collections import OrderedDict
 def layers(sizes, generator):
     """(name, rows, biases) in float32."""
     number = lambda: struct.unpack("<f", struct.pack("<f", generator.uniform(-1, 1)))[0]
-    found = [(f"fc{k + 1}", [[number() for _ in range(inputs)] for _ in range(outputs)], [number() for _ in range(outputs)])
+    found = [(f"fc{k + 1}", [[number() for _ in range(inputs)] for _ in range(outputs)],
+              [number() for _ in range(outputs)])
              for k, (inputs, outputs) in enumerate(zip(sizes, sizes[1:]))]
     found[0][1][0][0] = JUST_ABOVE_ONE
     return found
@@ -40,7 +41,8 @@ class Tensor:
         self.storage, self.shape, self.strides = storage, shape, strides
 
     def __reduce__(self):
-        return sys.modules["torch._utils"]._rebuild_tensor_v2, (self.storage, 0, self.shape, self.strides, False, OrderedDict())
+        arguments = self.storage, 0, self.shape, self.strides, False, OrderedDict()
+        return sys.modules["torch._utils"]._rebuild_tensor_v2, arguments
 
 
 class Pickler(pickle.Pickler):
@@ -68,7 +70,8 @@ def state_dict(network):
     for k, (name, rows, biases) in enumerate(network):
         shape = (len(rows), len(rows[0]))
         strides = (1, shape[0]) if k == 0 else (shape[1], 1)
-        storages.append(Storage(str(2 * k), [rows[i][j] for j in range(shape[1]) for i in range(shape[0])] if k == 0 else flat(rows)))
+        storages.append(Storage(str(2 * k), [rows[i][j] for j in range(shape[1]) for i in range(shape[0])] if k == 0
+                                else flat(rows)))
         state[f"{name}.weight"] = Tensor(storages[-1], shape, strides)
         storages.append(Storage(str(2 * k + 1), biases))
         state[f"{name}.bias"] = Tensor(storages[-1], (len(biases),), (1,))
@@ -120,7 +123,8 @@ def onnx(network, activation="Relu", first=None, attributes=b""):
         weights = [f"{name}.weight", f"{name}.bias"]
         as_stored = flat(rows) if k % 2 == 0 else flat(zip(*rows))
         dims = (len(rows), len(rows[0])) if k % 2 == 0 else (len(rows[0]), len(rows))
-        graph += field(5, b"".join(field(1, d) for d in dims) + field(2, 1) + field(8, weights[0]) + field(9, raw(as_stored)))
+        graph += field(5, b"".join(field(1, d) for d in dims) + field(2, 1) + field(8, weights[0])
+                       + field(9, raw(as_stored)))
         graph += field(5, field(1, len(biases)) + field(2, 1) + field(8, weights[1]) + field(9, raw(biases)))
         if k % 2 == 0:
             node = b"".join(field(1, i) for i in [current] + weights) + field(2, f"y{k}") + field(4, "Gemm")
@@ -134,7 +138,8 @@ def onnx(network, activation="Relu", first=None, attributes=b""):
             graph += field(1, field(1, current) + field(1, f"s{k}") + field(2, f"h{k}") + field(4, "Mul"))
             current = f"h{k}"
         elif k + 1 < len(network):
-            graph += field(1, field(1, current) + field(2, f"h{k}") + field(4, first if first and k == 0 else activation) + attributes)
+            graph += field(1, field(1, current) + field(2, f"h{k}")
+                           + field(4, first if first and k == 0 else activation) + attributes)
             current = f"h{k}"
     graph += field(11, field(1, "x")) + field(12, field(1, current))
     return field(1, 7) + field(2, "test") + field(7, graph)
@@ -143,12 +148,13 @@ def onnx(network, activation="Relu", first=None, attributes=b""):
 # --- C source ------------------------------------------------------------------------------------------------------
 
 def c_source(network):
-    """Matrices as [inputs][outputs]. A literal with f is rounded once, from the decimal: one stands just above the middle
-    between two floats, on which it would fall as a double."""
+    """Matrices as [inputs][outputs]. A literal with f is rounded once, from the decimal: one stands just above the
+    middle between two floats, on which it would fall as a double."""
     declared, values = "", ""
     for name, rows, biases in network:
         declared += f"  float {name}_weight[{len(rows[0])}][{len(rows)}];\n  float {name}_bias[{len(rows)}];\n"
         literal = lambda x: "1.0000000596046447754f" if x == JUST_ABOVE_ONE else f"{x!r}f"
         columns = ",".join("{" + ",".join(map(literal, column)) + "}" for column in zip(*rows))
         values += f"  .{name}_weight = {{{columns}}},\n  .{name}_bias = {{{','.join(f'{x!r}' for x in biases)}}},\n"
-    return f"/* weights */\n#include <x.h>\nstruct net {{\n{declared}}};\nstatic const struct net weights_it = {{\n{values}}};\n".encode()
+    return (f"/* weights */\n#include <x.h>\nstruct net {{\n{declared}}};\n"
+            f"static const struct net weights_it = {{\n{values}}};\n").encode()

@@ -22,7 +22,8 @@ CHECK = r"""
   for (const table of document.querySelectorAll('table')) {
     const box = table.closest('.scroll');
     if (!box) fault('wide table', 'it has no box of its own: ' + table.outerHTML);
-    else if (box.getBoundingClientRect().right > innerWidth + 1) fault('wide table', 'its box is wider than the screen');
+    else if (box.getBoundingClientRect().right > innerWidth + 1)
+      fault('wide table', 'its box is wider than the screen');
     else if (box.scrollWidth > box.clientWidth + 1 && !/auto|scroll/.test(getComputedStyle(box).overflowX))
       fault('wide table', 'its last columns are hidden: ' + table.outerHTML);
   }
@@ -53,7 +54,8 @@ CHECK = r"""
     if (box.width < 0.8 * figure.clientWidth || box.height < 80) fault('missing plot', `${box.width} x ${box.height}`);
     if (!svg.getAttribute('aria-label')) fault('no caption', svg.outerHTML);
     const area = r => r.width * r.height;
-    const shapes = [...svg.querySelectorAll('path,polygon,polyline,image,use,circle,rect')].filter(e => !e.closest('defs'));
+    const shapes = [...svg.querySelectorAll('path,polygon,polyline,image,use,circle,rect')]
+      .filter(e => !e.closest('defs'));
     const isData = e => e.closest('[id*="gnuplot_plot_"]');
     // gnuplot draws a curve's sample in the key as part of the curve: what counts lies within the frame.
     const frame = shapes.filter(e => !isData(e)).map(e => e.getBoundingClientRect()).reduce(
@@ -126,7 +128,8 @@ CHECK = r"""
   }
   // What a screen reader needs: a name for every control, and one top heading.
   for (const control of document.querySelectorAll('button,select,input,[role="img"],[role="region"]')) {
-    if (shown(control) && !(control.getAttribute('aria-label') || control.textContent.trim())) fault('no name', control.outerHTML);
+    if (shown(control) && !(control.getAttribute('aria-label') || control.textContent.trim()))
+      fault('no name', control.outerHTML);
   }
   if (document.querySelectorAll('h1').length !== 1) fault('no name', 'not one top heading');
   try {
@@ -135,7 +138,8 @@ CHECK = r"""
   } catch (error) { fault('no result', error); }
   const command = document.getElementById('command');
   if (!command || !command.textContent.startsWith('swarmcert ')) fault('no command', '');
-  if (!document.querySelector('button[data-copies="command"]:not([hidden])')) fault('no command', 'no button to copy it');
+  if (!document.querySelector('button[data-copies="command"]:not([hidden])'))
+    fault('no command', 'no button to copy it');
   for (const [picture, svg] of copies) {
     svg.remove();
     picture.style.display = '';
@@ -272,8 +276,9 @@ class Browser:
 
     def faults(self, page, widths=(390, 768, 1280), schemes=("light", "dark"), pictures=None):
         """[kind, width, what] of all that is wrong with a report: console, policy (of content), network, overflow, wide
-        table, missing plot, empty plot, no caption, raw unit, cut text, overlapping text, small text, contrast, no name, no result, no command, injection. The page is loaded at every
-        width, and pictured there as <pictures>-<width>.png; colour schemes and print are looked at on the widest."""
+        table, missing plot, empty plot, no caption, raw unit, cut text, overlapping text, small text, contrast, no
+        name, no result, no command, injection. The page is loaded at every width, and pictured there as
+        <pictures>-<width>.png; colour schemes and print are looked at on the widest."""
         found = []
         for width in widths:
             self._call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)

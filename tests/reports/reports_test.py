@@ -1,8 +1,10 @@
 """Every command's report, in a browser: reports_test.py TOOL SOURCE_FOLDER SCREENSHOTS [AXE]
 
-SCREENSHOTS is a folder for pictures of the top of every page at three widths. AXE is axe.min.js of the npm package axe-core; without it only names of controls and headings are checked.
+SCREENSHOTS is a folder for pictures of the top of every page at three widths. AXE is axe.min.js of the npm package
+axe-core; without it only names of controls and headings are checked.
 
-Ends with 77 (skipped) where there is no Chromium. First a good report is damaged in every way that the browser must see.
+Ends with 77 (skipped) where there is no Chromium. First a good report is damaged in every way that the browser must
+see.
 """
 
 import base64
@@ -19,7 +21,8 @@ import tempfile
 import browser
 
 # A folder, a subfolder and a prefix of logs, as a hostile uploader would name them. `touch` would leave a file behind.
-HOSTILE = ["a'b\"c`touch pwned`$(touch pwned)<", "script><script>window.pwned=1<", "script><img src=x onerror=alert(1)>"]
+HOSTILE = ["a'b\"c`touch pwned`$(touch pwned)<", "script><script>window.pwned=1<",
+           "script><img src=x onerror=alert(1)>"]
 HOSTILE_KIND = "k'\\\"`touch pwned`$(touch pwned)</script><script>window.pwned=1</script><!--]]>\\n"
 
 
@@ -58,7 +61,8 @@ def network_with_hostile_kinds(r):
 def hostile_policy(r):
     """A release that passes one check and fails one, whose files have hostile names."""
     demo, flights = r.source / "nn/networks/demo", pathlib.Path(*HOSTILE)
-    model, gains = r.source / "stability/models/crazyflie-small.toml", r.source / "controller/gains/crazyflie-small.toml"
+    model = r.source / "stability/models/crazyflie-small.toml"
+    gains = r.source / "controller/gains/crazyflie-small.toml"
     named = r.folder / "gains'`touch pwned`<img src=x onerror=alert(3)>.toml"
     named.write_text(gains.read_text())
     return r.write("policy.toml", f"""schema = "swarmcert/policy/1"
@@ -93,7 +97,8 @@ def thrust_table(r):
 def make(r):
     """A report of every command that has one."""
     demo = r.source / "nn/networks/demo"
-    model, gains = r.source / "stability/models/crazyflie-small.toml", r.source / "controller/gains/crazyflie-small.toml"
+    model = r.source / "stability/models/crazyflie-small.toml"
+    gains = r.source / "controller/gains/crazyflie-small.toml"
     composite = r.source / "controller/gains/composite.toml"
     r.report("certify", "certify", demo / "network.toml", "--domain", demo / "box.toml", "--map", "dp_x_m,dp_z_m",
              "--cells", 2, "--nodes", 1, "--cell-nodes", 2)

@@ -8,9 +8,11 @@ namespace swarmcert::tests {
 namespace {
 
 constexpr const char* kHead =
-    R"({"schema": "swarmcert/check/1", "tool": "swarmcert 1", "command_line": ["swarmcert"], "inputs": [], "seed": null,)";
+    R"({"schema": "swarmcert/check/1", "tool": "swarmcert 1", "command_line": ["swarmcert"], )"
+    R"("inputs": [], "seed": null,)";
 constexpr const char* kBody =
-    R"("accepted": true, "reason": "r", "chain": "c", "spectral_norms": 1, "upper_bounds": 1, "lower_bounds": 1, "values": 0)";
+    R"("accepted": true, "reason": "r", "chain": "c", "spectral_norms": 1, "upper_bounds": 1, )"
+    R"("lower_bounds": 1, "values": 0)";
 
 TEST(SchemaCheck, AcceptsAResult) {
   EXPECT_EQ(schema_faults(std::string(kHead) + kBody + "}"), std::vector<std::string>());

@@ -134,7 +134,8 @@ def command_lines():
     sizes = ["--phi", "4", "--rho", "4", "--features", "2", "--epochs", "1"]
     yield ["train", model, "flights", *sizes, "-o", "trained"], any_verdict
     force = ["--rate", "0.3", "--amplitude", "0.1"]
-    yield ["bound", "--gains", composite, "--model", model, *force, "--tube", "--verified", "-o", "gains-cert.json"], any_verdict
+    yield ["bound", "--gains", composite, "--model", model, *force, "--tube", "--verified",
+           "-o", "gains-cert.json"], any_verdict
     yield ["check", "gains-cert.json"], (0,)
     yield ["spacing", "--gains", gains, "--model", truth, "--max-error", "0.1"], any_verdict
     yield ["sweep", "grid.toml", "-o", "sweep"], (0,)
@@ -271,8 +272,8 @@ def test_the_writers_write_no_field_that_the_schemas_do_not_know():
             fields[field] = path.name
     expect(len(fields) > 150, f"only {len(fields)} fields found in the source")
     # Values, and names in maps such as the parameters of effects.
-    no_fields = {"auto", "Kpos_P", "Kpos_D", "Kpos_I", "force_z", "gf", "mN", "pwm", "voltage", "offset_x_m", "offset_y_m",
-                 "torque_x_Nm", "torque_y_Nm", "offset_s"}
+    no_fields = {"auto", "Kpos_P", "Kpos_D", "Kpos_I", "force_z", "gf", "mN", "pwm", "voltage", "offset_x_m",
+                 "offset_y_m", "torque_x_Nm", "torque_y_Nm", "offset_s"}
     unknown = {field: file for field, file in fields.items() if field not in known | no_fields}
     expect(not unknown, f"no schema knows {unknown}")
 
@@ -405,7 +406,8 @@ SARIF = {
 
 
 def test_sarif_has_the_published_structure(folder):
-    """SARIF 2.1.0 (OASIS), section 3: the properties that are used here, their types, and which of them are required."""
+    """SARIF 2.1.0 (OASIS), section 3: the properties that are used here, their types, and which of them are
+    required."""
     counts = []
     for name in ("pass.sarif", "fail.sarif"):
         document = json.loads((folder / name).read_text())

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""A second checker of certificates of tracking gains, in another language and written from the mathematics: integers and
-fractions, standard library only. It shares no line with the C++ checker and must accept and reject the same certificates.
+"""A second checker of certificates of tracking gains, in another language and written from the mathematics: integers
+and fractions, standard library only. It shares no line with the C++ checker and must accept and reject the same
+certificates.
 
     check_tracking.py CERTIFICATE [--gains FILE] [--model FILE]
 
@@ -11,8 +12,8 @@ With x the vector of y and its derivatives, in the certificate's unit of time, x
 A'P + PA + 2 decay P < 0, so that sqrt(x'Px) falls at least like e^(-decay t). The step response, less its limit, is a
 linear form of x, too. Four numbers follow: the integrals and the largest values of both.
 
-A sampled loop goes from period to period by a matrix M, in intervals of integers over 2^128; P with M P M' < contraction^2 P
-bounds the rows that give e some periods later. The same four numbers are sums over the periods.
+A sampled loop goes from period to period by a matrix M, in intervals of integers over 2^128; P with M P M' <
+contraction^2 P bounds the rows that give e some periods later. The same four numbers are sums over the periods.
 """
 import hashlib
 import json
@@ -26,18 +27,19 @@ from pathlib import Path
 
 STATEMENT = (
     "For each loop listed, with its numbers taken exactly as they stand: along one axis m e'' = u + f, e, e', the "
-    "integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int (e + p)) + c behind a delay of "
-    "delay_s and first-order lags of the time constants listed, in continuous time and without limits. The input w is f (force), c "
-    "(command), v (velocity, an error of that estimate) or p (position); the others are zero. Then at all times, in exact "
-    "arithmetic, |e| <= rate sup |w'| where w starts at zero, |e| <= amplitude sup |w|, |e| <= edge times the total "
-    "variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is null, none is stated. For each "
-    "sampled loop the same, but every period_s the law reads e + p and e' + v, adds integrator_step_s (e + p) to I, which "
-    "starts at zero, and holds the command -m (Kp (e + p) + Kd (e' + v) + Ki I) + c until the next one, behind the delay and "
-    "the lags; f is a function of time, and c, v and p are one number per period, whose rate is the difference to the one "
-    "before over period_s, the one before the first being zero, and whose integral of |w| is the sum of |w| period_s. Lengths "
-    "are in m, forces in N, masses in kg, times in s. gains_sha256 and model_sha256 name the files from which the loops "
-    "were derived; where both are given, checking compares the hashes and derives the loops anew, up to a relative 1e-12 "
-    "for rounding. What is listed under left_out, and every bound made from these gains, is not certified here.")
+    "integral of e and the lags start at zero, and u is -m (Kp (e + p) + Kd (e' + v) + Ki int (e + p)) + c behind a "
+    "delay of delay_s and first-order lags of the time constants listed, in continuous time and without limits. The "
+    "input w is f (force), c (command), v (velocity, an error of that estimate) or p (position); the others are zero. "
+    "Then at all times, in exact arithmetic, |e| <= rate sup |w'| where w starts at zero, |e| <= amplitude sup |w|, "
+    "|e| <= edge times the total variation of w, its first jump included, and |e| <= impulse int |w| dt. Where rate is "
+    "null, none is stated. For each sampled loop the same, but every period_s the law reads e + p and e' + v, adds "
+    "integrator_step_s (e + p) to I, which starts at zero, and holds the command -m (Kp (e + p) + Kd (e' + v) + Ki I) "
+    "+ c until the next one, behind the delay and the lags; f is a function of time, and c, v and p are one number per "
+    "period, whose rate is the difference to the one before over period_s, the one before the first being zero, and "
+    "whose integral of |w| is the sum of |w| period_s. Lengths are in m, forces in N, masses in kg, times in s. "
+    "gains_sha256 and model_sha256 name the files from which the loops were derived; where both are given, checking "
+    "compares the hashes and derives the loops anew, up to a relative 1e-12 for rounding. What is listed under "
+    "left_out, and every bound made from these gains, is not certified here.")
 
 BITS = 128  # of a fixed-point number after the point
 DEEPEST = 64
@@ -217,7 +219,8 @@ class Derived:
                     for key in ("Kp", "Kd", "Ki")]
         both = self.matrix("Lambda"), self.matrix("K")
         for m in both:
-            require(all(m[axis][j] == 0 and m[j][axis] == 0 for j in range(3) if j != axis), "the files couple the axes")
+            require(all(m[axis][j] == 0 and m[j][axis] == 0 for j in range(3) if j != axis),
+                    "the files couple the axes")
         l, a = both[0][axis][axis], both[1][axis][axis] / self.mass
         return [2 * a * l + l * l, a + 2 * l, a * l * l]
 
@@ -227,7 +230,8 @@ class Derived:
         if "period_s" in entry:
             rate = self.position.get("rate_hz", 0)
             require(rate > 0, "the loop of the files is not sampled")
-            keys, sampling = keys + ["period_s", "integrator_step_s"], [1 / rate, self.position.get("integrator_step_s", 1 / rate)]
+            keys = keys + ["period_s", "integrator_step_s"]
+            sampling = [1 / rate, self.position.get("integrator_step_s", 1 / rate)]
         stated = [exact(entry[key]) for key in keys] + sorted(map(exact, entry["lags_s"]))
         lags = sorted(x for x in (self.motor, self.attitude if axis < 2 else 0) if x > 0)
         derived = [self.mass] + [self.ratio * x for x in self.gains(axis)] + [self.delay] + sampling + lags
@@ -401,7 +405,8 @@ def interval_sum(terms):
 
 
 def matrix_product(a, b):
-    return [[interval_sum(interval_product(x, y[j]) for x, y in zip(row, b) if x != (0, 0)) for j in range(len(b[0]))] for row in a]
+    return [[interval_sum(interval_product(x, y[j]) for x, y in zip(row, b) if x != (0, 0)) for j in range(len(b[0]))]
+            for row in a]
 
 
 def matrix_exponential(generator, t):
@@ -509,7 +514,8 @@ class Sampled:
         m = [[Fraction(x, 2 ** BITS) for x in row] for row in self.middle]
         factor = self.factor - two_to(-60)
         half = [times(row, self.P) for row in m]
-        falls = [[factor ** 2 * self.P[i][j] - sum(x * y for x, y in zip(half[i], m[j])) for j in range(n)] for i in range(n)]
+        falls = [[factor ** 2 * self.P[i][j] - sum(x * y for x, y in zip(half[i], m[j])) for j in range(n)]
+                 for i in range(n)]
         require(inverse_form(falls, [Fraction(0)] * n) is not None, "P does not show that the loop contracts as stated")
         unknown = product_above(self.widest, product_above(n * self.spread, max(self.reach)))
         require(unknown <= 1 << (BITS - 60), "P has an entry out of range")
@@ -531,7 +537,8 @@ class Sampled:
         x = [fixed_below(v) for v in solve(left, [Fraction(low + high >> 1, 2 ** BITS) for low, high in effect])]
         wrong = 0
         for i in range(n):
-            low, high = interval_sum([effect[i], (-x[i], -x[i])] + [interval_product(a, (v, v)) for a, v in zip(self.M[i], x)])
+            low, high = interval_sum([effect[i], (-x[i], -x[i])]
+                                     + [interval_product(a, (v, v)) for a, v in zip(self.M[i], x)])
             wrong += product_above(max(abs(low), abs(high)), self.reach[i])
         return self.finished(x, fixed_above(Fraction(wrong, 2 ** BITS) / (1 - self.factor)))
 
@@ -591,7 +598,8 @@ class Sampled:
             "rate": None if limits[0] else Fraction(halves, fixed) * T / 2 + bent * Fraction(bends, fixed) +
             (T * lefts_most[0] + bent * bend_most) * tail,
             "amplitude": T / 2 * Fraction(ends, fixed) + T * force_most * tail,
-            "edge": max(Fraction(force_highest, fixed * bow.denominator), abs(limits[0]) + (lefts_most[0] + T * T / 8 * bend_most) * size),
+            "edge": max(Fraction(force_highest, fixed * bow.denominator),
+                        abs(limits[0]) + (lefts_most[0] + T * T / 8 * bend_most) * size),
             "impulse": max(Fraction(force_peak, fixed), force_most * size)}]
         for k in range(3):
             gains.append({
@@ -663,7 +671,8 @@ def check_gain(claims, name, proved):
 
 
 def check(c, hashes, derived):
-    require_keys(c, "schema tool statement gains_sha256 model_sha256 loops sampled_loops left_out content_sha256", "certificate")
+    require_keys(c, "schema tool statement gains_sha256 model_sha256 loops sampled_loops left_out content_sha256",
+                 "certificate")
     require(c["statement"] == STATEMENT, "another statement")
     require(c["content_sha256"] == content_sha256(c), "content_sha256 does not match")
     for key in ("tool", "gains_sha256", "model_sha256"):

@@ -25,7 +25,8 @@ def certificate(folder, position, lag="", model=MODEL):
     gains = folder / "gains.toml"
     gains.write_text(f'schema = "swarmcert/gains/1"\n[position]\n{position}\n{lag}')
     path = folder / "cert.json"
-    subprocess.run([SWARMCERT, "bound", "--gains", gains, "--model", model, "--verified", "-o", path, "--force", "--quiet"],
+    subprocess.run([SWARMCERT, "bound", "--gains", gains, "--model", model, "--verified", "-o", path, "--force",
+                    "--quiet"],
                    check=True, capture_output=True)
     return json.loads(path.read_text())
 
@@ -122,7 +123,8 @@ def least_gains(loop):
 
 def least_sampled_gains(loop, source):
     """Of the sampled loop from below: sums over the sampling times of the response to a step of one input, which begins
-    at a sampling time. Held commands pass the lags by Runge and Kutta in short steps; a delay is a whole number of them."""
+    at a sampling time. Held commands pass the lags by Runge and Kutta in short steps; a delay is a whole number of
+    them."""
     m, kp, kd, ki, period, increment, delay = (float.fromhex(loop[k]) for k in (
         "mass_kg", "Kp", "Kd", "Ki", "period_s", "integrator_step_s", "delay_s"))
     lags = [float.fromhex(x) for x in loop["lags_s"]]
@@ -202,12 +204,14 @@ def gains_computed_once():
 
 
 def agree_on_sampled_mutations(folder, document):
-    """Every field of a sampled loop with a past command; of P, a form as of the other loops, the diagonal and a corner."""
+    """Every field of a sampled loop with a past command; of P, a form as of the other loops, the diagonal and a
+    corner."""
     seen = accepted = 0
     loop = document["sampled_loops"][0]
     witness = ("axis", "steps", "contraction", "P", "gains")  # they change nothing of what is true
     truth = {source: least_sampled_gains(loop, source) for source in loop["gains"]}
-    assert [exit_codes(folder, forged({**document, "loops": [], "sampled_loops": some})) for some in ([loop], [])] == [[0, 0], [1, 1]]
+    assert [exit_codes(folder, forged({**document, "loops": [], "sampled_loops": some}))
+            for some in ([loop], [])] == [[0, 0], [1, 1]]
     for path in places(loop):
         if path[:1] == ("P",) and len(path) == 3 and path[1] != path[2] and path != ("P", 0, 1):
             continue
@@ -226,7 +230,8 @@ def agree_on_sampled_mutations(folder, document):
 
 
 def hold_from_below(loop, rate_slack, truth=None):
-    """No certified gain is below what stepping finds; the integral over sampling times is a sum, wrong by `rate_slack`."""
+    """No certified gain is below what stepping finds; the integral over sampling times is a sum, wrong by
+    `rate_slack`."""
     compared = 0
     for source, claims in loop["gains"].items():
         for name, least in (truth[source] if truth else least_sampled_gains(loop, source)).items():
@@ -253,7 +258,8 @@ def refuse_hostile_files(folder, document):
     good = forged(document)
     deep = "[" * 100000 + "]" * 100000
     for text in ("", "{", deep, good.replace('"left_out": [', '"left_out": [' + deep + ", ", 1), good + "x",
-                 good.replace('"time_exponent": ', '"time_exponent": 1' + "0" * 100000, 1), good.replace("null", "NaN", 1),
+                 good.replace('"time_exponent": ', '"time_exponent": 1' + "0" * 100000, 1),
+                 good.replace("null", "NaN", 1),
                  good.replace('"steps": ', '"steps": 1e', 1), b"\xff" + good.encode(), b"\xef\xbb\xbf" + good.encode(),
                  good.replace('"steps"', '"axis"', 1)):
         codes = exit_codes(folder, text)
@@ -278,7 +284,8 @@ def hold_for_random_loops(folder):
                 claimed = loop["gains"][name]
                 if claimed is None:
                     continue
-                assert least * (1 - 1e-4) <= claimed <= 1.06 * least, (kp, kd, ki, lag, loop["input"], name, least, claimed)
+                assert least * (1 - 1e-4) <= claimed <= 1.06 * least, (kp, kd, ki, lag, loop["input"], name, least,
+                                                                       claimed)
                 compared += 1
                 delayed += loop["delay_s"] != "0x0p+0"
     assert compared > 60 and delayed > 8, (compared, delayed)
@@ -292,7 +299,9 @@ def hold_for_random_sampled_loops(folder):
         kp, kd, rate = generator.uniform(6, 20), generator.uniform(5, 8), (50, 100, 200, 100)[run]
         ki = 0.3 * kp * kd if run % 2 else 0
         lag = f"[lag]\nmotor_s = {generator.uniform(0.01, 0.04)}\ndelay_s = {delay_periods / rate}\n"
-        document = certificate(folder, f"Kp = {kp}\nKd = {kd}\nKi = {ki}\nrate_hz = {rate}\nintegrator_step_s = {0.8 / rate}", lag)
+        document = certificate(folder,
+                               f"Kp = {kp}\nKd = {kd}\nKi = {ki}\nrate_hz = {rate}\nintegrator_step_s = {0.8 / rate}",
+                               lag)
         own = ["--gains", str(folder / "gains.toml"), "--model", str(MODEL)]
         assert exit_codes(folder, forged(document), *own) == [0, 0]
         assert [loop["axis"] for loop in document["sampled_loops"]] == ["x", "y", "z"], document["left_out"]
@@ -321,7 +330,8 @@ def main():
                 loop[number] = (float.fromhex(loop[number]) * (1 + 1e-9)).hex()
                 for name in ("rate", "amplitude", "edge", "impulse"):
                     if loop["gains"][name] is not None:
-                        loop["gains"].update({name: loop["gains"][name] * 1.1, name + "_hex": (loop["gains"][name] * 1.1).hex()})
+                        loop["gains"].update({name: loop["gains"][name] * 1.1,
+                                              name + "_hex": (loop["gains"][name] * 1.1).hex()})
             assert exit_codes(folder, forged(other)) == [0, 0]
             assert exit_codes(folder, forged(other), *own) == [1, 1]
         late = certificate(folder, "Kp = 12\nKd = 7\nKi = 20", "[lag]\nmotor_s = 0.03\ndelay_s = 0.004\n")
@@ -347,7 +357,8 @@ def main():
         changed = copy.deepcopy(document)
         changed["tool"] = "another"
         assert exit_codes(folder, json.dumps(changed)) == [1, 1]  # the hash of the content is of the other one
-        sampled = certificate(folder, "Kp = 12\nKd = 7\nKi = 20\nrate_hz = 50", "[lag]\nmotor_s = 0.03\ndelay_s = 0.005\n")
+        sampled = certificate(folder, "Kp = 12\nKd = 7\nKi = 20\nrate_hz = 50",
+                              "[lag]\nmotor_s = 0.03\ndelay_s = 0.005\n")
         assert exit_codes(folder, forged(sampled), *own) == [0, 0]
         for number in ("period_s", "integrator_step_s"):
             other = copy.deepcopy(sampled)

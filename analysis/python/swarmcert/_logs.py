@@ -51,8 +51,8 @@ class Log(Mapping[str, np.ndarray]):
     time_s [n]; position_m, velocity_m_s, specific_force_m_s2 (what an accelerometer feels, +9.81 upwards at rest),
     target_position_m, target_velocity_m_s [n, 3], in the world with z up; attitude [n, 4]: unit quaternion x, y, z, w
     that turns body into world; rates_rad_s, torque_command_N_m [n, 3], in the body; duty [n, 4]: PWM/65536;
-    battery_V [n]; thrust_N or thrust_over_hover [n] where the thrust does not come from the duties; motor_force_N [n, 4];
-    thrust_command_N [n]. What the log does not have is not there.
+    battery_V [n]; thrust_N or thrust_over_hover [n] where the thrust does not come from the duties; motor_force_N [n,
+    4]; thrust_command_N [n]. What the log does not have is not there.
 
     Attributes:
         path, format:   of the file

@@ -93,7 +93,8 @@ def collision_avoidance():
     """As VNN-COMP's ACAS-Xu files: Flatten, Sub, then MatMul, Add and Relu."""
     widths = [5, 6, 6, 5]
     constants = {"mean": normal(1, 5)}
-    nodes = [helper.make_node("Flatten", ["input"], ["flat"], axis=1), helper.make_node("Sub", ["flat", "mean"], ["h0"])]
+    nodes = [helper.make_node("Flatten", ["input"], ["flat"], axis=1),
+             helper.make_node("Sub", ["flat", "mean"], ["h0"])]
     for k in range(3):
         constants[f"W{k}"] = normal(widths[k], widths[k + 1])
         constants[f"b{k}"] = normal(widths[k + 1])
