@@ -144,6 +144,16 @@ TEST_F(CertifiedChain, ASmoothActivationIsCertifiedCheckedAndHeldAgainstSamples)
   expect("certify " + net + " --activation relu --samples tanh.csv", 3, {"--activation"});
 }
 
+TEST_F(CertifiedChain, InspectShowsTheActivationAfterEveryLayerButTheLast) {
+  write_square("turn", "steep");
+  expect("inspect net.pth --order head,steep,turn,tail --json out.json", 0, {"1 -> 2, relu", "2 -> 2, relu"});
+  const Json layers =
+      Json::parse(read_text(folder_ / "out.json"))["files"][0]["networks"]["network"]["layers"];
+  ASSERT_EQ(layers.size(), 4u);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(layers[k]["activation"], "relu");
+  EXPECT_TRUE(layers[3]["activation"].is_null());
+}
+
 TEST_F(CertifiedChain, WhatIsForReluRefusesASmoothActivation) {
   write_square("turn", "steep");
   write_text(folder_ / "box.toml", "schema = \"swarmcert/box/1\"\nlower = [-1]\nupper = [1]\n");

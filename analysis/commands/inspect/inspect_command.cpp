@@ -35,10 +35,20 @@ struct InspectOptions {
   double t1_s = std::numeric_limits<double>::infinity();
 };
 
+/// What follows layer `k`: the activation, after the last one nothing.
+std::string activation_after(const files::Weights& weights, std::size_t k) {
+  return k + 1 < weights.layers.size() ? files::function_of(weights.activation).op : "";
+}
+
 files::Json describe(const files::Weights& weights) {
   files::Json layers = files::Json::array();
-  for (const files::Layer& layer : weights.layers) {
-    layers.push_back({{"name", layer.name}, {"inputs", layer.inputs}, {"outputs", layer.outputs}});
+  for (std::size_t k = 0; k < weights.layers.size(); ++k) {
+    const files::Layer& layer = weights.layers[k];
+    const std::string activation = activation_after(weights, k);
+    layers.push_back({{"name", layer.name},
+                      {"inputs", layer.inputs},
+                      {"outputs", layer.outputs},
+                      {"activation", activation.empty() ? files::Json() : files::Json(activation)}});
   }
   return {{"file", weights.path},
           {"sha256", weights.sha256},
@@ -99,8 +109,11 @@ files::Json inspect_network(const std::string& path, files::NetworkArguments arg
     if (!print) continue;
     fmt::print("{}: {} {}, sha256 {}\n", weights->path, name, files::name(weights->precision),
                weights->sha256);
-    for (const files::Layer& layer : weights->layers) {
-      fmt::print("  {:<10} {} -> {}\n", layer.name, layer.inputs, layer.outputs);
+    for (std::size_t k = 0; k < weights->layers.size(); ++k) {
+      const files::Layer& layer = weights->layers[k];
+      const std::string activation = activation_after(*weights, k);
+      fmt::print("  {:<10} {} -> {}{}{}\n", layer.name, layer.inputs, layer.outputs,
+                 activation.empty() ? "" : ", ", activation);
     }
     for (const std::string& note : weights->notes) fmt::print("  {}\n", note);
   }
