@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <string>
 
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/table_flights.h"
@@ -65,14 +66,21 @@ Claims judged(const files::Json& flights) {
   return claims;
 }
 
+/// The place of the first condition with the same truth, whose networks they share: one shard trains them.
+int first_of_truth(const Condition& condition) {
+  const auto is_same = [&](const Condition& other) { return std::string(other.truth) == condition.truth; };
+  return static_cast<int>(std::find_if(kConditions.begin(), kConditions.end(), is_same) -
+                          kConditions.begin());
+}
+
 /// The flights of one condition with all training seeds, of which this shard computes its own.
-files::Json flights_under(const Setting& setting, const Condition& condition, int& unit) {
+files::Json flights_under(const Setting& setting, const Condition& condition) {
   const Truth trained = with_norm_exponent(setting, condition.truth, condition.norm_exponent);
   Truth flown = trained;
   flown.battery_V = condition.battery_V;
   files::Json flights = files::Json::array();
   for (int k = 0; k < scale_of(setting).training_seeds; ++k) {
-    if (!setting.shard.has(unit++)) continue;
+    if (!setting.shard.has(first_of_truth(condition) * scale_of(setting).training_seeds + k)) continue;
     const std::string name =
         fmt::format("{}{}-{}/claims-{:g}V-{:g}m-{}.json", condition.truth, setting.updraft ? "-updraft" : "",
                     k, condition.battery_V, condition.higher_m, setting.seed);
@@ -118,9 +126,8 @@ Finding claims(const Setting& setting) {
       "Results of section V-C under conditions that the paper leaves open (medians over seeds)",
       {"p of wakes", "battery [V]", "higher [m]", "baseline 5 / 2", "2 at 4", "saturated", "falls"},
       {}};
-  int unit = 0;
   for (std::size_t k = 0; k < (setting.full ? kConditions.size() : kSmallConditions); ++k) {
-    const files::Json flights = flights_under(setting, kConditions[k], unit);
+    const files::Json flights = flights_under(setting, kConditions[k]);
     if (setting.shard.is_whole()) add(kConditions[k], flights, table, finding);
   }
   table.rows.push_back({"paper", "", "", fmt::format("{:.2f}", kPaper_m[0][3] / kPaper_m[0][0]),
