@@ -99,10 +99,22 @@ double KernelCells::total() const {
   return sum;
 }
 
+Interval KernelCells::whole_net(std::size_t k) const {
+  Interval result = net[k];
+  for (const std::vector<double>& mode : modes) result += Interval(-std::abs(mode[k]), std::abs(mode[k]));
+  return result;
+}
+
 std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count) {
   if (y.delay_s > 0) return std::nullopt;
-  const std::optional<ContractingSystem> system =
-      contracting({y.numerator, sum(y.denominator, y.feedback), {}, 0});
+  const Polynomial denominator = sum(y.denominator, y.feedback);
+  return kernel_cells(IntervalVector(y.numerator.begin(), y.numerator.end()),
+                      IntervalVector(denominator.begin(), denominator.end()), cell_s, count);
+}
+
+std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const IntervalVector& denominator,
+                                        double cell_s, int count) {
+  const std::optional<ContractingSystem> system = contracting(numerator, denominator);
   if (!system) return std::nullopt;
   const double norm_A = frobenius_above(system->A);
   const int parts = static_cast<int>(std::ceil(cell_s / std::min(kLargestStep_s, 0.5 / norm_A)));
@@ -112,17 +124,19 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
 
   const double row_norm = norm_above(system->rows[1]);
   EnclosedState state(system->b);
+  const double steepest = up(norm_above(system->rows[2]) * state.largest_norm());  // sup |y'|
   KernelCells cells;
   Interval last = state.value(system->rows[1], row_norm);
   for (int k = 0; k < count; ++k) {
     double integral = 0;
+    double largest = 0;
     Interval net;
     for (int p = 0; p < parts; ++p) {
       // The state's norm falls, so what it is at the step's start bounds y'' in all of the step.
       const double bend = up(up(bend_norm * state.largest_norm()) * up(step_s * step_s));
       state.advance(step);
       const Interval now = state.value(system->rows[1], row_norm);
-      cells.peak = std::max(cells.peak, up(std::max(last.mag(), now.mag()) + bend / 8));
+      largest = std::max(largest, up(std::max(last.mag(), now.mag()) + bend / 8));
       integral = up(integral + up(step_s * up(up(last.mag() + now.mag()) / 2 + bend / 12)));
       const double bent = up(bend / 12);
       net += Interval(step_s) * ((last + now) * Interval(0.5) + Interval(-bent, bent));
@@ -130,6 +144,8 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
     }
     cells.integral.push_back(integral);
     cells.net.push_back(net);
+    cells.largest.push_back(largest);
+    cells.peak = std::max(cells.peak, largest);
   }
   // Cell borders k cell_s and sums of step_s differ by a few units in the last place of the time; |y| is at most
   // `peak`.
@@ -138,6 +154,7 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
     const double more = 1e-13 * cells.integral[k] + cells.peak * shift_s;
     cells.integral[k] = up(cells.integral[k] + up(more));
     cells.net[k] += Interval(-more, more) * Interval(1 + 1e-12);
+    cells.largest[k] = up(cells.largest[k] + up(steepest * shift_s * (1 + 1e-12)));
   }
   if (!std::isfinite(cells.peak)) return std::nullopt;
   return cells;
@@ -164,7 +181,7 @@ Interval answer(const KernelCells& kernel, std::size_t m, Interval w) {
   const double centre = w.lower + (w.upper - w.lower) / 2;
   const double radius = up(std::max(w.upper - centre, centre - w.lower));
   const double spread = up(kernel.integral[m] * up(radius));
-  return kernel.net[m] * centre + Interval(-spread, spread);
+  return kernel.whole_net(m) * centre + Interval(-spread, spread);
 }
 
 Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& w, std::size_t n) {
@@ -172,6 +189,7 @@ Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& 
   double centre = 0;
   double spread = 0;
   double size = 0;
+  std::vector<double> by_mode(kernel.modes.size(), 0.0);
   for (std::size_t m = 1; m <= n; ++m) {
     const Interval both = hull(w[n - m], m < n ? w[n - m - 1] : Interval(0));
     const double c = both.lower + (both.upper - both.lower) / 2;
@@ -180,8 +198,13 @@ Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& 
     const double g = net.lower + (net.upper - net.lower) / 2;
     centre += g * c;
     size += std::abs(g * c);
+    for (std::size_t i = 0; i < by_mode.size(); ++i) {
+      by_mode[i] += kernel.modes[i][m] * c;
+      size += std::abs(kernel.modes[i][m] * c);
+    }
     spread += kernel.integral[m] * radius + std::max(net.upper - g, g - net.lower) * std::abs(c);
   }
+  for (const double x : by_mode) spread += std::abs(x);
   spread += 4e-16 * static_cast<double>(n + 8) * (size + spread) + 1e-300;
   return {down(centre - spread), up(centre + spread)};
 }

@@ -6,15 +6,21 @@
 
 #include "nn/base/interval.h"
 #include "stability/bounds/impulse_response.h"
+#include "stability/bounds/interval_matrix.h"
 
 namespace swarmcert::stability {
 
-/// Upper bounds, in real arithmetic, for y(t) = L^-1[Y] at t > 0.
+/// Upper bounds, in real arithmetic, for y(t) = L^-1[Y] at t > 0; or for every y of a family, see lag_range_cells.h.
 struct KernelCells {
   std::vector<double> integral;  ///< at least int |y| over [k cell_s, (k + 1) cell_s]
-  std::vector<Interval> net;     ///< contains int y over the same cell
-  double peak = 0;               ///< at least sup |y| over all of them
-  double total() const;          ///< at least int |y| over all of them
+  std::vector<Interval>
+      net;  ///< contains int y over the same cell, less x_1 modes[0][k] + x_2 modes[1][k] + ..
+  /// Of a family: each y has its own x_1, x_2, .. in [-1, 1], the same for all its cells.
+  std::vector<std::vector<double>> modes;
+  std::vector<double> largest;              ///< at least sup |y| over the same cell
+  double peak = 0;                          ///< at least sup |y| over all of them
+  double total() const;                     ///< at least int |y| over all of them
+  Interval whole_net(std::size_t k) const;  ///< contains int y over cell k, whichever y it is
 };
 
 /// Steps of a millisecond or less in coordinates in which the system contracts (contracting_system.h), so that errors
@@ -22,6 +28,9 @@ struct KernelCells {
 /// @param y without a delay, strictly proper.
 /// @returns nothing where stability could not be verified.
 std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count);
+/// The same of the transfer functions with these coefficients, in ascending powers.
+std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const IntervalVector& denominator,
+                                        double cell_s, int count);
 
 /// sup |e| for e = y * w from rest, up to the end of each cell, where |w| <= sizes[k] in cell k, time in the same
 /// cells:
@@ -32,11 +41,12 @@ std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s
 std::vector<double> convolved(const KernelCells& kernel, const std::vector<double>& sizes);
 
 /// Contains int y(u) w(u) du over cell m for every w with values in `w`: with c + [-r, r] = w it is
-///   c net[m] + [-r, r] integral[m].
+///   c (net[m] + sum of x_i modes[i][m]) + [-r, r] integral[m].
 Interval answer(const KernelCells& kernel, std::size_t m, Interval w);
 
 /// Contains what cells 1, 2, ... of the kernel add to (y * w)(t) for t in cell n, where w is 0 before the start and in
-/// w[k] in cell k < n: for u in cell m, t - u lies in cell n - m or n - m - 1. All of (y * w)(t) is this and answer()
+/// w[k] in cell k < n: for u in cell m, t - u lies in cell n - m or n - m - 1. Each mode is summed up over the cells
+/// before its x_i is taken to be any. All of (y * w)(t) is this and answer()
 /// of cell 0 to the hull of w[n] and w[n - 1].
 Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& w, std::size_t n);
 

@@ -109,6 +109,34 @@ TEST(TubeCommand, ProvesTheGainsThatFlewAndThreeVehicles) {
   }
 }
 
+TEST(TubeCommand, AnIntervalOfLagsWidensTheTubeAndContainsTheTruthsLag) {
+  const ScratchFolder folder;
+  const std::string command = bound("crazyflie-small.toml") + kNetwork + kTruth +
+                              " --tube --task swap --duration 4.5 --quiet --json a.json";
+  double radius_z_m[2];
+  for (const bool is_interval : {false, true}) {
+    ASSERT_EQ(
+        run_shell(command + (is_interval ? " --lag-interval 0.052 0.063" : ""), folder.path()).exit_code, 0);
+    const Json tube = files::parse_json(read_text(folder / "a.json"), "a.json")["local_tube"];
+    EXPECT_EQ(tube["verdict"], "proved");
+    EXPECT_EQ(tube["loop"], "sampled");
+    EXPECT_NEAR(tube["motor_lag_s"][0].get<double>(), is_interval ? 0.052 : 1 / 17.4, 1e-12);
+    EXPECT_NEAR(tube["motor_lag_s"][1].get<double>(), is_interval ? 0.063 : 1 / 17.4, 1e-12);
+    radius_z_m[is_interval ? 1 : 0] = tube["radius_xyz_m"][2].get<double>();
+  }
+  EXPECT_GT(radius_z_m[1], 1.01 * radius_z_m[0]);
+  EXPECT_LT(radius_z_m[1], 1.3 * radius_z_m[0]);
+  const auto refused = [&](const std::string& interval, const std::string& why) {
+    const auto run = run_shell(command + " --lag-interval " + interval, folder.path());
+    EXPECT_EQ(run.exit_code, 2) << interval;
+    EXPECT_NE(run.output.find(why), std::string::npos) << run.output;
+  };
+  refused("0.06 0.07", "tau_s = 0.05747");
+  refused("0 0.06", "above 0");
+  refused("52 63", "in seconds");
+  refused("0.063 0.052", "the least and the largest");
+}
+
 TEST(TubeCommand, ErrorsOfTheEstimatesAreInTheTubeAndInWhatItSays) {
   const ScratchFolder folder;
   const std::string command = bound("composite.toml") + kNetwork + kTruth +

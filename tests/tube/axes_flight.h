@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <optional>
 
 #include "analysis/tracking/tube/error_loops.h"
 #include "stability/bounds/axis_loop.h"
@@ -17,7 +18,8 @@ namespace swarmcert::tests {
 
 /// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts
 /// is random; predictions reach the controller late. Errors of the estimates switch between plus and minus their bounds
-/// at random rates, each on its own, or stand still. Behind one lag, rotors start anywhere between the weight and what
+/// at random rates, each on its own, or stand still. The motors of each vehicle have a
+/// random lag in each flight where an interval is given. Behind one lag, rotors start anywhere between the weight and what
 /// the first prediction asks for.
 class AxesFlight {
  public:
@@ -26,23 +28,28 @@ class AxesFlight {
 
   AxesFlight(const stability::TrackingSetup& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles,
-             bool is_sampled = false, const analysis::EstimateErrors& estimates = {})
+             bool is_sampled = false, const analysis::EstimateErrors& estimates = {},
+             const std::optional<Interval>& motor_lag_s = {})
       : estimates_(estimates),
+        motor_lag_s_(motor_lag_s),
         gains_(tracking.gains),
         task_(task),
         vehicles_(vehicles),
         is_sampled_(is_sampled),
         forces_(network, truth) {
+    Loops loops;
     for (int k = 0; k < 3; ++k) {
-      loops_[k] = *axis_loop(gains_, tracking.plant, k);
+      loops[k] = *axis_loop(gains_, tracking.plant, k);
       if (const auto sampled = sampled_axis_loop(gains_, tracking.plant, k))
-        loops_[k].Ki = stability::effective_Ki(*sampled);
+        loops[k].Ki = stability::effective_Ki(*sampled);
     }
+    loops_.assign(static_cast<std::size_t>(vehicles), loops);
   }
 
   void fly(files::Random& random, const Look& look) {
     std::vector<Vehicle> now(static_cast<std::size_t>(vehicles_));
     draw_switching(random);
+    draw_lags(random);
     const double period_s = gains_.network_rate_hz > 0 ? 1 / gains_.network_rate_hz : 0;
     std::vector<double> next_s, predicted, acting;
     for (int i = 0; i < vehicles_; ++i) {
@@ -53,7 +60,7 @@ class AxesFlight {
     for (int i = 0; i < vehicles_; ++i) {
       const auto at = static_cast<std::size_t>(i);
       const double excess_N = -between(random, 0, 1) * predicted[at];
-      if (has_one_lag(loops_[2])) now[at][2][3] = excess_N;
+      if (has_one_lag(loops_[at][2])) now[at][2][3] = excess_N;
     }
     const int every = is_sampled_ ? static_cast<int>(std::lround(1 / (gains_.rate_hz * kStep_s))) : 0;
     std::vector<std::array<double, 3>> sums(now.size()), held(now.size());
@@ -77,7 +84,7 @@ class AxesFlight {
           Axis sampled = estimated(now[at][k], i, k, t);
           sums[at][k] += every * kStep_s * sampled[0];
           sampled[2] = sums[at][k];
-          held[at][k] = command(sampled, k, task_.at(i, t).a_W_m_s2, learned);
+          held[at][k] = command(sampled, at, k, task_.at(i, t).a_W_m_s2, learned);
         }
       }
       const auto rate = [&](const std::vector<Vehicle>& x, double time_s) {
@@ -110,6 +117,7 @@ class AxesFlight {
   /// Per axis: e, e', int e, and what the lags let through so far.
   using Axis = std::array<double, 6>;
   using Vehicle = std::array<Axis, 3>;
+  using Loops = std::array<stability::AxisLoop, 3>;
 
   static std::vector<Vehicle> moved(std::vector<Vehicle> x, const std::vector<Vehicle>& by, double step) {
     for (std::size_t i = 0; i < x.size(); ++i)
@@ -124,10 +132,20 @@ class AxesFlight {
     return count == 1;
   }
 
-  double command(const Axis& a, std::size_t k, const Eigen::Vector3d& planned, double learned) const {
-    const stability::AxisLoop& loop = loops_[k];
+  double command(const Axis& a, std::size_t vehicle, std::size_t k, const Eigen::Vector3d& planned,
+                 double learned) const {
+    const stability::AxisLoop& loop = loops_[vehicle][k];
     return loop.mass_kg * (planned[static_cast<int>(k)] - loop.Kp * a[0] - loop.Kd * a[1] - loop.Ki * a[2]) -
            (k == 2 ? learned : 0);
+  }
+
+  /// A lag of the motors for each vehicle, which gains_ must state to be one at all.
+  void draw_lags(files::Random& random) {
+    for (Loops& loops : loops_) {
+      if (!motor_lag_s_) return;
+      const double lag_s = between(random, motor_lag_s_->lower, motor_lag_s_->upper);
+      for (stability::AxisLoop& loop : loops) loop.lags_s.front() = lag_s;
+    }
   }
 
   void draw_switching(files::Random& random) {
@@ -163,11 +181,13 @@ class AxesFlight {
     const Eigen::Vector3d planned = task_.at(vehicle, time_s).a_W_m_s2;
     for (int k = 0; k < 3; ++k) {
       const auto at = static_cast<std::size_t>(k);
-      const stability::AxisLoop& loop = loops_[at];
+      const stability::AxisLoop& loop = loops_[static_cast<std::size_t>(vehicle)][at];
       const Axis& a = x[at];
       Axis& d = result[at];
       const Axis told = estimated(a, vehicle, at, time_s);
-      double applied = held != nullptr ? (*held)[at] : command(told, at, planned, learned);
+      double applied = held != nullptr
+                           ? (*held)[at]
+                           : command(told, static_cast<std::size_t>(vehicle), at, planned, learned);
       std::size_t c = 3;
       for (const double tau_s : loop.lags_s) {
         if (tau_s <= 0) continue;
@@ -210,13 +230,14 @@ class AxesFlight {
   };
 
   analysis::EstimateErrors estimates_;
+  std::optional<Interval> motor_lag_s_;
   std::vector<std::array<Switching, 6>> switching_;  ///< per vehicle and quantity
   const stability::Gains& gains_;
   const stability::Task& task_;
   int vehicles_;
   bool is_sampled_;
   Forces forces_;
-  std::array<stability::AxisLoop, 3> loops_;
+  std::vector<Loops> loops_;  ///< per vehicle
 };
 
 }  // namespace swarmcert::tests

@@ -18,21 +18,23 @@ struct Campaign {
   double nearest = 0;          ///< to the edge of a slice: 1 at the edge
 };
 
-/// Flies the swap of two vehicles with random errors of the estimates, starts of the rotors and times of prediction in
-/// the sampled loop of the gains that flew.
-Campaign fly_in_tube(int flights, const EstimateErrors& estimates) {
+/// Flies the swap of two vehicles with random errors of the estimates, starts of the rotors, times of prediction and
+/// lags of each vehicle's motors in the sampled loop of the gains that flew.
+Campaign fly_in_tube(int flights, const EstimateErrors& estimates,
+                     const std::optional<Interval>& motor_lag_s) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
   LocalTubeOptions options;
   options.estimates = estimates;
+  options.motor_lag_s = motor_lag_s;
   options.nodes = 1;
   const LocalTube tube = local_tube(loop, truth, network, *task, 2, options);
   Campaign campaign;
   EXPECT_TRUE(tube.proved && tube.is_sampled) << tube.why;
   if (!tube.proved) return campaign;
-  tests::AxesFlight flight(loop, truth, network, *task, 2, true, estimates);
+  tests::AxesFlight flight(loop, truth, network, *task, 2, true, estimates, motor_lag_s);
   files::Random random(2026);
   const double radius_z_m = tube.tube.radius_m(2);
   for (int i = 0; i < flights; ++i) {
@@ -56,9 +58,13 @@ Campaign fly_in_tube(int flights, const EstimateErrors& estimates) {
 
 constexpr EstimateErrors kWrong{{0.003, 0.003, 0.003}, {0.0005, 0.0005, 0.0005}};
 
+/// Ten per cent about the authors' identification.
+const Interval kLags_s(0.9 * 0.0575, 1.1 * 0.0575);
+
 /// @param nearest, share_z what the flights have to reach of a slice's half-width, and |e_z| of its radius.
-void stay_inside(int flights, double nearest, double share_z) {
-  const Campaign campaign = fly_in_tube(flights, kWrong);
+void stay_inside(int flights, double nearest, double share_z,
+                 const std::optional<Interval>& motor_lag_s = {}) {
+  const Campaign campaign = fly_in_tube(flights, kWrong, motor_lag_s);
   EXPECT_EQ(campaign.looks, flights * 4500L * 2 * 3);
   EXPECT_EQ(campaign.outside, 0);
   EXPECT_GT(campaign.nearest, nearest);
@@ -67,7 +73,11 @@ void stay_inside(int flights, double nearest, double share_z) {
 
 TEST(FlightsInTube, NoneOfTwentyLeavesItAndSomeReachAFifthOfIt) { stay_inside(20, 0.6, 0.2); }
 
-TEST(FlightsInTube, NoneOfTenThousandLeavesIt_slow) { stay_inside(10000, 0.7, 0.25); }
+TEST(FlightsInTube, NoneOfTwoHundredWithRandomLagsOfTheirMotorsLeavesIt) {
+  stay_inside(200, 0.6, 0.2, kLags_s);
+}
+
+TEST(FlightsInTube, NoneOfTenThousandWithRandomLagsLeavesIt_slow) { stay_inside(10000, 0.7, 0.25, kLags_s); }
 
 }  // namespace
 }  // namespace swarmcert::analysis

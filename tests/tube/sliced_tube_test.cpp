@@ -28,10 +28,10 @@ struct Seen {
 
 Seen fly(const stability::TrackingSetup& loop, const stability::Model& truth, const stability::Task& task,
          const SlicedTube& tube, double slice_s, int flights, bool is_sampled = false,
-         const EstimateErrors& estimates = {}) {
+         const EstimateErrors& estimates = {}, const std::optional<Interval>& motor_lag_s = {}) {
   const int vehicles = static_cast<int>(tube.slices.front().size());
   const files::Network network = tests::demo_network();
-  tests::AxesFlight flight(loop, truth, network, task, vehicles, is_sampled, estimates);
+  tests::AxesFlight flight(loop, truth, network, task, vehicles, is_sampled, estimates, motor_lag_s);
   files::Random random(11);
   Seen seen;
   const auto check = [&seen](Interval range, double value) {
@@ -125,6 +125,36 @@ TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOn
       EXPECT_GE(radius_m[1][k], radius_m[0][k]) << k;
       EXPECT_LE(radius_m[1][k], most * radius_m[0][k]) << k;
     }
+  }
+}
+
+TEST(SlicedTube, OfAnIntervalOfLagsHoldsFlightsOfAnyLagInItAndIsLittleWider) {
+  const files::Network network = tests::demo_network();
+  const stability::Model truth = tests::truth_model();
+  const auto task = stability::make_task("swap", {2, 4.5, 0});
+  for (const bool is_sampled : {false, true}) {
+    SCOPED_TRACE(is_sampled ? "sampled" : "continuous");
+    const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+    const double lag_s = loop.gains.motor_lag_s;
+    const Interval within(0.9 * lag_s, 1.1 * lag_s);
+    const auto tube_of = [&](const Interval& lags_s) {
+      const Scene scene(loop, truth, network, *task, 2, network_age_s(loop.gains, is_sampled), kSlice_s,
+                        is_sampled, {}, lags_s);
+      return sliced_tube(scene, boxes(8), kTolerance_N);
+    };
+    const SlicedTube one = tube_of(lag_s), all = tube_of(within);
+    ASSERT_TRUE(one.proved) << one.why;
+    ASSERT_TRUE(all.proved) << all.why;
+    for (int k = 0; k < 3; ++k) {
+      const double ratio = all.radii().largest_position_m(k) / one.radii().largest_position_m(k);
+      EXPECT_GT(ratio, 1.02) << k;
+      EXPECT_LT(ratio, 1.3) << k;
+    }
+    const double slice_s = task->duration_s() / static_cast<double>(all.slices.size());
+    const Seen seen = fly(loop, truth, *task, all, slice_s, 10, is_sampled, {}, within);
+    EXPECT_EQ(seen.outside, 0) << "of " << seen.looks;
+    EXPECT_GT(seen.nearest, 0.8) << "a tube that no flight comes near to would hide a fault";
+    EXPECT_GT(fly(loop, truth, *task, all, slice_s, 1, is_sampled, {}, 1.5 * lag_s).outside, 0);
   }
 }
 

@@ -17,6 +17,8 @@ using files::Json;
 
 /// Points of the curves in the JSON result.
 constexpr int kCurvePoints = 200;
+/// Far beyond the lag of any motor: a number in milliseconds is none in seconds.
+constexpr double kLongestLag_s = 1;
 
 Json radii_json(const LeastTube& tube) {
   if (!tube.proved) return Json();
@@ -83,7 +85,38 @@ void declare_tube(CLI::App& app, TubeArguments& arguments) {
                  "Duration of --task, s, at most 60 (default: the task's own)")
       ->check(CLI::Range(0.1, 60.0))
       ->needs(task);
+  app.add_option(
+         "--lag-interval", arguments.motor_lag_s,
+         "LOW HIGH: the motors of each vehicle that flies --task have a constant lag between these, s "
+         "(default: the one of --truth, else of [lag])")
+      ->expected(2)
+      ->needs(task);
 }
+
+namespace {
+
+/// --lag-interval, which a truth with a lag lies in.
+std::optional<Interval> lag_interval(const TubeArguments& arguments, const stability::Model& truth,
+                                     const Tracking& tracking) {
+  if (arguments.motor_lag_s.empty()) return std::nullopt;
+  const Interval lag_s(arguments.motor_lag_s[0], arguments.motor_lag_s[1]);
+  const std::string given = fmt::format("--lag-interval {:g} {:g}: ", lag_s.lower, lag_s.upper);
+  if (!(lag_s.lower > 0 && lag_s.lower <= lag_s.upper && lag_s.upper <= kLongestLag_s)) {
+    throw UsageError(given +
+                     fmt::format("write the least and the largest lag in seconds, above 0 and at most {:g}",
+                                 kLongestLag_s));
+  }
+  const double of_truth_s = TruthForce(truth, tracking.plant.largest_thrust_N).motor_lag_s();
+  if (of_truth_s > 0 && !(of_truth_s >= lag_s.lower && of_truth_s <= lag_s.upper)) {
+    throw UsageError(given +
+                     fmt::format("the effect motor_lag of --truth has tau_s = {:.4g}, outside: take an "
+                                 "interval that contains it, or another truth",
+                                 of_truth_s));
+  }
+  return lag_s;
+}
+
+}  // namespace
 
 LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
                           const Tracking& tracking, const stability::DisturbanceSource& estimates,
@@ -128,6 +161,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
           "--position-error P");
     }
   }
+  options.motor_lag_s = lag_interval(arguments, truth, tracking);
   options.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
   };
@@ -140,7 +174,8 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
                {"duration_s", tube.duration_s},
                {"loop", tube.is_sampled ? "sampled" : "continuous"},
                {"velocity_error_m_s", tube.estimates.velocity_m_s},
-               {"position_error_m", tube.estimates.position_m}};
+               {"position_error_m", tube.estimates.position_m},
+               {"motor_lag_s", {tube.motor_lag_s.lower, tube.motor_lag_s.upper}}};
   LeastTube shown = tube.tube;
   shown.proved = tube.proved;
   shown.why = tube.why;

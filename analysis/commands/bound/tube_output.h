@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "analysis/commands/bound/disturbance_input.h"
 #include "analysis/commands/shared/tracking_input.h"
@@ -14,10 +15,11 @@ class Report;
 struct TubeArguments {
   std::string task;  ///< empty: no tube around a task
   int vehicles = 2;
-  double duration_s = 0;  ///< 0: the task's own
+  double duration_s = 0;            ///< 0: the task's own
+  std::vector<double> motor_lag_s;  ///< from, to; empty: as the truth or the gains say
 };
 
-/// Declares --task, --vehicles, --duration.
+/// Declares --task, --vehicles, --duration, --lag-interval.
 void declare_tube(CLI::App& app, TubeArguments& arguments);
 
 /// Reads the network and the truth that `disturbance` names and looks for the tube, with progress.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "nn/base/interval.h"
+#include "stability/bounds/lag_range_cells.h"
 #include "stability/bounds/sampled_loop.h"
 
 namespace swarmcert::analysis {
@@ -12,9 +13,8 @@ namespace swarmcert::analysis {
 namespace {
 
 using stability::AxisLoop;
+using stability::IntervalVector;
 using stability::KernelCells;
-using stability::Polynomial;
-using stability::times_s_to;
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
@@ -35,12 +35,13 @@ std::optional<KernelCells> slope_of(const std::optional<KernelCells>& kernel,
     result.integral[n] = up(up(result.integral[n] * scale) + up(more * kernel->peak));
     result.net[n] = {-result.integral[n], result.integral[n]};
   }
+  result.modes.clear();
   result.peak = up(result.peak * scale);
   return result;
 }
 
-/// @param one_lag_s its time constant where the loop has one lag, which makes h'''' = -direct_rest/tau; else 0.
-void add_slopes(double slice_s, double one_lag_s, const std::optional<KernelCells>& h4, ErrorLoop& loop) {
+/// @param h4 missing where the loop has one lag, which makes it -direct_rest/tau.
+void add_slopes(double slice_s, const std::optional<KernelCells>& h4, ErrorLoop& loop) {
   const double periods = std::round(slice_s / loop.period_s);
   if (!(periods >= 1) || !(std::abs(slice_s - periods * loop.period_s) <= kPeriodTolerance * slice_s)) return;
   // What is left of a cell of P periods T is at most 1e-12 P T long, and t - t_k - T/2 there at most T/2.
@@ -48,64 +49,109 @@ void add_slopes(double slice_s, double one_lag_s, const std::optional<KernelCell
   loop.slope1 = slope_of(loop.h1, loop.h2, 1, more);
   loop.slope2 = slope_of(loop.h2, loop.has_lag ? loop.h3 : loop.direct_rest, 1, more);
   if (loop.has_lag) {
-    loop.slope3 = one_lag_s > 0 ? slope_of(loop.h3, loop.direct_rest, up(1 / one_lag_s), more)
-                                : slope_of(loop.h3, h4, 1, more);
+    loop.slope3 = h4 ? slope_of(loop.h3, h4, 1, more)
+                     : slope_of(loop.h3, loop.direct_rest, up(1 / loop.lags_s.lower), more);
   }
   loop.has_whole_periods = loop.slope1 && loop.slope2 && (loop.slope3 || !loop.has_lag);
 }
 
+/// p with every coefficient times `factor`, times s^power.
+IntervalVector times(Interval factor, const IntervalVector& p, int power = 0) {
+  IntervalVector result(static_cast<std::size_t>(power));
+  for (const Interval& c : p) result.push_back(factor * c);
+  return result;
+}
+
+IntervalVector sum(IntervalVector a, const IntervalVector& b) {
+  a.resize(std::max(a.size(), b.size()));
+  for (std::size_t i = 0; i < b.size(); ++i) a[i] += b[i];
+  return a;
+}
+
+/// Kernels of the loop whose motors' lag tau lies in an interval. With A the other lag, L = A + tau s A and
+///   D = d + tau d',   d = s^(2 + i) A + P,   d' = s^(3 + i) A,   i = 1 where Ki > 0, else 0; P as s^i allows.
+class LoopKernels {
+ public:
+  LoopKernels(const AxisLoop& loop, Interval motor_lag_s, double slice_s, int slices)
+      : integrates_(loop.Ki > 0 ? 1 : 0),
+        motor_lag_s_(motor_lag_s),
+        inverse_mass_(Interval(1) / loop.mass_kg),
+        other_lag_{Interval(1)},
+        feedback_(integrates_ == 1 ? IntervalVector{loop.Ki, loop.Kp, loop.Kd}
+                                   : IntervalVector{loop.Kp, loop.Kd}),
+        Kd_(loop.Kd) {
+    if (motor_lag_s.upper > 0) motor_ = {1};
+    for (const double tau_s : loop.lags_s) other_lag_ = sum(other_lag_, times(tau_s, other_lag_, 1));
+    cells_.emplace(sum(times(1, other_lag_, 2 + integrates_), feedback_), by_motor(1, 3 + integrates_),
+                   motor_lag_s, slice_s, slices);
+  }
+
+  /// L^-1[s^power/(m D)] with D of this class: h' has the power i.
+  std::optional<KernelCells> h(int power) const { return cells_->cells(times(inverse_mass_, {1}, power)); }
+  /// L^-1[s^power (L - 1)/(s m D)]: g has the power i.
+  std::optional<KernelCells> g(int power) const {
+    const IntervalVector other(other_lag_.begin() + 1, other_lag_.end());  // (A - 1)/s
+    const IntervalVector fixed = other.empty() ? IntervalVector() : times(inverse_mass_, other, power);
+    return cells_->cells(fixed, by_motor(inverse_mass_, power));
+  }
+  std::optional<KernelCells> direct_rest(bool has_lag) const {
+    IntervalVector numerator = times(inverse_mass_, feedback_);
+    if (has_lag) numerator = sum(numerator, times(inverse_mass_, {1}, 2 + integrates_));
+    return cells_->cells(numerator);
+  }
+  std::optional<KernelCells> demand() const {
+    return cells_->cells(sum(times(1, other_lag_, 2), {0, Kd_}), by_motor(1, 3));
+  }
+
+ private:
+  /// factor s^power A; empty without motors that lag.
+  IntervalVector by_motor(Interval factor, int power) const {
+    return motor_.empty() ? IntervalVector() : times(factor, other_lag_, power);
+  }
+
+  int integrates_;
+  Interval motor_lag_s_, inverse_mass_;
+  IntervalVector other_lag_, feedback_, motor_;
+  Interval Kd_;
+  std::optional<stability::LagRangeCells> cells_;
+};
+
+/// @param loop its lags are those of the attitude.
 /// @param period_s of a sampled loop; 0: continuous.
-ErrorLoop error_loop(const AxisLoop& loop, double period_s, double slice_s, int slices) {
+ErrorLoop error_loop(const AxisLoop& loop, Interval motor_lag_s, double period_s, double slice_s,
+                     int slices) {
   ErrorLoop result;
   result.mass_kg = loop.mass_kg;
   result.period_s = period_s;
   result.Kp = loop.Kp;
   result.Kd = loop.Kd;
   result.Ki = loop.Ki;
-  Polynomial lag = {1};
-  for (const double tau : loop.lags_s) {
-    if (tau <= 0) continue;
-    lag = stability::product(lag, {1, tau});
-    result.lags_s = up(result.lags_s + tau);
-  }
+  result.lags_s = motor_lag_s;
+  for (const double tau_s : loop.lags_s) result.lags_s += tau_s;
+  result.has_lag = result.lags_s.upper > 0;
   const int integrates = loop.Ki > 0 ? 1 : 0;
-  const Polynomial feedback =
-      integrates == 1 ? Polynomial{loop.Ki, loop.Kp, loop.Kd} : Polynomial{loop.Kp, loop.Kd};
-  const Polynomial open = times_s_to(2 + integrates, lag);
-  const auto cells = [&](const Polynomial& numerator) {
-    return stability::kernel_cells({numerator, open, feedback, 0}, slice_s, slices);
-  };
-  const Polynomial unit = {1 / loop.mass_kg};
-  if (integrates == 1) result.h = cells(unit);
-  result.h1 = cells(times_s_to(integrates, unit));
-  result.h2 = cells(times_s_to(integrates + 1, unit));
-  result.has_lag = lag.size() > 1;
+  const LoopKernels kernels(loop, motor_lag_s, slice_s, slices);
+  if (integrates == 1) result.h = kernels.h(0);
+  result.h1 = kernels.h(integrates);
+  result.h2 = kernels.h(integrates + 1);
   if (period_s > 0) {
-    Polynomial numerator = stability::scaled(feedback, 1 / loop.mass_kg);
-    if (result.has_lag) numerator = stability::sum(numerator, times_s_to(2 + integrates, unit));
-    result.direct_rest = cells(numerator);
+    result.direct_rest = kernels.direct_rest(result.has_lag);
     if (result.direct_rest) result.direct_rest_total = result.direct_rest->total();
   }
-  if (integrates == 1) {
-    Polynomial numerator = times_s_to(2, lag);
-    numerator[1] += loop.Kd;
-    result.demand = cells(numerator);
-  }
+  if (integrates == 1) result.demand = kernels.demand();
   if (!result.has_lag) {
-    if (period_s > 0) add_slopes(slice_s, 0, std::nullopt, result);
+    if (period_s > 0) add_slopes(slice_s, std::nullopt, result);
     return result;
   }
-  const Polynomial rest = stability::scaled(Polynomial(lag.begin() + 1, lag.end()), 1 / loop.mass_kg);
-  result.g = cells(times_s_to(integrates, rest));
-  result.g1 = cells(times_s_to(integrates + 1, rest));
-  result.g2 = cells(times_s_to(integrates + 2, rest));
-  result.h3 = cells(times_s_to(integrates + 2, unit));
+  result.g = kernels.g(integrates);
+  result.g1 = kernels.g(integrates + 1);
+  result.g2 = kernels.g(integrates + 2);
+  result.h3 = kernels.h(integrates + 2);
   if (period_s == 0) return result;
   if (result.h3) result.h3_total = result.h3->total();
   if (result.g2) result.g2_total = result.g2->total();
-  const bool has_one_lag = lag.size() == 2;
-  add_slopes(slice_s, has_one_lag ? lag[1] : 0,
-             has_one_lag ? std::nullopt : cells(times_s_to(integrates + 3, unit)), result);
+  const bool has_one_lag = loop.lags_s.empty() || motor_lag_s.upper == 0;
+  add_slopes(slice_s, has_one_lag ? std::nullopt : kernels.h(integrates + 3), result);
   return result;
 }
 
@@ -122,9 +168,12 @@ std::vector<double> least(const std::optional<KernelCells>& by_size,
 
 }  // namespace
 
-ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices,
-                       bool is_sampled) {
+ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices, bool is_sampled,
+                       const std::optional<Interval>& motor_lag_s) {
   ErrorLoops loops;
+  const Interval motors_s = motor_lag_s ? *motor_lag_s : Interval(tracking.gains.motor_lag_s);
+  stability::Gains without_motors = tracking.gains;
+  without_motors.motor_lag_s = 0;
   if (tracking.gains.delay_s > 0) {
     loops.refusal = "the loop has a delay, whose kernel has no enclosure: set [lag] delay_s = 0";
     return loops;
@@ -136,7 +185,7 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
   }
   std::optional<AxisLoop> last;
   for (int axis = 0; axis < 3; ++axis) {
-    std::optional<AxisLoop> loop = axis_loop(tracking.gains, tracking.plant, axis);
+    std::optional<AxisLoop> loop = axis_loop(without_motors, tracking.plant, axis);
     if (!loop) {
       loops.refusal = "Lambda or K couples the axes";
       return loops;
@@ -146,8 +195,9 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
       loop->Ki = stability::effective_Ki(*sampled);
       if (is_sampled) period_s = up(sampled->period_s);
     }
-    loops.axis[axis] =
-        last && same_loop(*loop, *last) ? loops.axis[axis - 1] : error_loop(*loop, period_s, slice_s, slices);
+    loops.axis[axis] = last && same_loop(*loop, *last)
+                           ? loops.axis[axis - 1]
+                           : error_loop(*loop, motors_s, period_s, slice_s, slices);
     const ErrorLoop& made = loops.axis[axis];
     if (!made.h1 || !made.h2 || (made.has_lag && (!made.g1 || !made.g2 || !made.h3)) ||
         (made.period_s > 0 && !made.direct_rest)) {
@@ -182,14 +232,14 @@ double ErrorHistory::largest_velocity_m_s() const {
 LagStart lag_start(const ErrorLoop& loop, double slice_s) {
   LagStart result;
   if (!loop.has_lag) return result;
-  const Interval tau_s(loop.lags_s * (1 - 1e-15), loop.lags_s),
-      cell_s = Interval(slice_s) * Interval(1 - 1e-12, 1 + 1e-12);
+  const Interval tau_s = loop.lags_s;
+  const Interval cell_s = Interval(slice_s) * Interval(1 - 1e-12, 1 + 1e-12);
   // A kernel leaves its mean over a cell by at most the integral of its slope's absolute value there.
   const auto values = [&](const KernelCells& kernel, const KernelCells& slope, Interval slope_scale = 1) {
     std::vector<Interval> of_cell;
     for (std::size_t n = 0; n < kernel.net.size(); ++n) {
       const double away = (slope_scale * slope.integral[n]).upper;
-      of_cell.push_back(tau_s * (kernel.net[n] / cell_s + Interval(-away, away)));
+      of_cell.push_back(tau_s * (kernel.whole_net(n) / cell_s + Interval(-away, away)));
     }
     return of_cell;
   };

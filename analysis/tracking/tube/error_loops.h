@@ -16,7 +16,8 @@ namespace swarmcert::analysis {
 /// acceleration that a sampled loop holds over its period, differs from the continuous law's (hold_error.h); in a
 /// continuous loop it is 0. So e = h' * (f_a - f_hat + m x) + g' * w with
 ///   h = L^-1[1/(m D)] (command channel),   g = L^-1[(L - 1)/(m D)],   w = f_a - m p_d''.
-/// Each entry bounds its kernel in real arithmetic. h and g, which do not decay where Ki = 0, may be missing.
+/// Each entry bounds its kernel in real arithmetic, for every constant lag of the motors in an interval where one is
+/// given. h and g, which do not decay where Ki = 0, may be missing.
 struct ErrorLoop {
   std::optional<stability::KernelCells> h, h1, h2;  ///< h, h', h''
   std::optional<stability::KernelCells> h3;         ///< h'''; missing where there is no lag
@@ -38,7 +39,7 @@ struct ErrorLoop {
   bool has_lag = false;
   double mass_kg = 0;
   double Kp = 0, Kd = 0, Ki = 0;
-  double lags_s = 0;    ///< sum of the time constants
+  Interval lags_s;      ///< sum of the time constants
   double period_s = 0;  ///< of a sampled loop; 0: continuous
 };
 
@@ -51,8 +52,9 @@ struct ErrorLoops {
 /// The loops of all axes, their kernels over `slices` slices, with the integral gain as the firmware's step makes it
 /// act.
 /// @param is_sampled the command is held over a period of the gains' rate; else the law is continuous.
+/// @param motor_lag_s positive: the loops of all lags in it; else the one that the gains state.
 ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices,
-                       bool is_sampled = false);
+                       bool is_sampled = false, const std::optional<Interval>& motor_lag_s = {});
 
 /// Bounds of |e| and |e'| at the times of each slice.
 struct ErrorHistory {

@@ -23,7 +23,7 @@ AccelerationBound acceleration_bound(const ErrorLoop& loop, const LoopHistory& h
   const Interval by_jerk =
       mass * (Interval(loop.g2_total) * history.jerk_m_s3 + Interval(loop.g2->peak) * planned_at_start_m_s2);
   return {per_N * history.force_N + history.of_estimates_m_s2 + std::min(by_size.upper, by_jerk.upper) +
-              whole * history.truth_N + Interval(loop.lags_s) * loop.h3->peak * excess_N,
+              whole * history.truth_N + loop.lags_s * loop.h3->peak * excess_N,
           per_N};
 }
 

@@ -88,10 +88,11 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
                        const LocalTubeOptions& options, bool is_sampled) {
   LocalTube result;
   const Scene scene(tracking, truth, network, task, vehicles, network_age_s(tracking.gains, is_sampled),
-                    kSlice_s, is_sampled, options.estimates);
+                    kSlice_s, is_sampled, options.estimates, options.motor_lag_s);
   result.why = scene.refusal();
   result.is_sampled = is_sampled;
   result.estimates = options.estimates;
+  result.motor_lag_s = scene.motor_lag_s();
   result.duration_s = task.duration_s();
   result.slice_s = scene.motion().slice_s;
   if (!result.why.empty()) return result;

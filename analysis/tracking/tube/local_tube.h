@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,8 @@ namespace swarmcert::analysis {
 struct LocalTubeOptions {
   EnclosureOptions enclosure;  ///< its progress is set here
   EstimateErrors estimates;
+  /// Where the constant lag of each vehicle's motors lies, s, positive; missing: as the truth says, or as stated.
+  std::optional<Interval> motor_lag_s;
   int nodes = 100;  ///< boxes of branch and bound per local constant
   /// Steps done, of how many; what is being done. From any thread.
   std::function<void(int done, int total, const std::string& what)> progress;
@@ -45,6 +48,7 @@ struct LocalTube {
   bool proved = false;
   bool is_sampled = false;   ///< of the loop that holds its command over a period; else of a continuous one
   EstimateErrors estimates;  ///< for which it holds
+  Interval motor_lag_s;      ///< likewise
   std::string why;           ///< where not proved
   LeastTube tube;            ///< the smallest that follows from all of the following together
   LeastTube
@@ -65,7 +69,8 @@ struct LocalTube {
 ///
 /// Beside it least_tube() from constants of the network alone: product of spectral norms, global and local Lipschitz
 /// bounds.
-/// @param stated gains and model of every vehicle; the motors lag as the truth says, or as stated where it does not.
+/// @param stated gains and model of every vehicle; the motors lag as options say, else as the truth
+///   says, else as stated.
 /// @param truth what the force really is; @param vehicles 2 to 10.
 /// @param task one whose trajectories have enclosures (Task::over()).
 /// @return an upper bound in real arithmetic of the loop of error_loops.h under `assumptions`: of the sampled loop

@@ -98,17 +98,20 @@ double network_age_s(const stability::Gains& gains, bool is_sampled) {
 
 Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
-             double longest_slice_s, bool is_sampled, const EstimateErrors& estimates)
+             double longest_slice_s, bool is_sampled, const EstimateErrors& estimates,
+             const std::optional<Interval>& motor_lag_s)
     : tracking_(tracking),
       network_age_s_(network_age_s),
+      motor_lag_s_(motor_lag_s ? *motor_lag_s : Interval(tracking.gains.motor_lag_s)),
       learned_(network, tracking.model.kind, vehicles - 1),
       truth_(truth, tracking.plant.largest_thrust_N),
       motion_(sliced(task, vehicles, network_age_s,
                      is_sampled && tracking.gains.rate_hz > 0
                          ? whole_periods_s(task.duration_s(), 1 / tracking.gains.rate_hz, longest_slice_s)
                          : longest_slice_s)),
-      loops_(motion_.slices > 0 ? error_loops(tracking, motion_.slice_s, motion_.slices, is_sampled)
-                                : ErrorLoops{}),
+      loops_(motion_.slices > 0
+                 ? error_loops(tracking, motion_.slice_s, motion_.slices, is_sampled, motor_lag_s)
+                 : ErrorLoops{}),
       estimates_(estimates),
       excess_N_(static_cast<std::size_t>(vehicles), Interval(0)) {
   if (!refusal().empty()) return;
@@ -186,7 +189,7 @@ TruthForce::Rest Scene::rest(const Stretch& stretch, const Deviations& deviation
   const Interval* const own = &states[states.size() - kOwnState];
   const Interval velocity[3] = {own[1], own[2], own[3]};
   // The thrust's vector behind a first-order lag: |T'| <= |command - T| / tau.
-  const double tau_s = tracking_.gains.motor_lag_s;
+  const double tau_s = motor_lag_s_.lower;
   const double thrust_rate_N_s =
       tau_s > 0 ? up(2 * tracking_.plant.largest_thrust_N / tau_s) : std::numeric_limits<double>::infinity();
   return truth_.rest(widened(own[0], up(network_age_s_ * own[3].mag())), velocity, acceleration_m_s2,

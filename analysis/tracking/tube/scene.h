@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,11 +54,13 @@ class Scene {
  public:
   /// @param network_age_s how old the states are, at most, that a prediction rests on when it acts.
   /// @param is_sampled see error_loops().
+  /// @param motor_lag_s see error_loops().
   /// @param estimates what is wrong with what every vehicle knows of itself and is told by others.
   /// @throws files::InputError as LearnedForce.
   Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
         const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
-        double longest_slice_s = kSlice_s, bool is_sampled = false, const EstimateErrors& estimates = {});
+        double longest_slice_s = kSlice_s, bool is_sampled = false, const EstimateErrors& estimates = {},
+        const std::optional<Interval>& motor_lag_s = {});
 
   const stability::TrackingSetup& tracking() const { return tracking_; }
   const LearnedForce& learned() const { return learned_; }
@@ -65,6 +68,8 @@ class Scene {
   const Motion& motion() const { return motion_; }
   const ErrorLoops& loops() const { return loops_; }
   double network_age_s() const { return network_age_s_; }
+  Interval motor_lag_s() const { return motor_lag_s_; }
+  bool has_lag_interval() const { return motor_lag_s_.lower < motor_lag_s_.upper; }
   const EstimateErrors& estimates() const { return estimates_; }
   /// What these do to each axis of every vehicle.
   const EstimateAnswer& estimate_answer(std::size_t axis) const { return estimate_answers_[axis]; }
@@ -121,6 +126,7 @@ class Scene {
 
   const stability::TrackingSetup& tracking_;
   double network_age_s_;
+  Interval motor_lag_s_;
   LearnedForce learned_;
   TruthForce truth_;
   Motion motion_;

@@ -90,7 +90,8 @@ AxisLoads axis_loads(const Scene& scene, const LocalTube& tube, int vehicle, std
 double lag_error_N(const ErrorLoop& loop, const AxisLoads& acting, double mass_kg) {
   if (!loop.has_lag) return 0;
   const bool starts_at_rest = acting.planned_m_s2.front() < 1e-6;
-  const double by_jerk = starts_at_rest ? up(up(loop.lags_s * largest(acting.jerk_m_s3)) + 1e-6) : kNotKnown;
+  const double by_jerk =
+      starts_at_rest ? up(up(loop.lags_s.upper * largest(acting.jerk_m_s3)) + 1e-6) : kNotKnown;
   return up(2 * largest(acting.truth_N) + up(mass_kg * std::min(2 * largest(acting.planned_m_s2), by_jerk)));
 }
 
@@ -124,7 +125,7 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
     // Rotors that start with an excess add exp(-t/tau) of it to the force.
     const double excess_N = axis == 2 ? scene.excess_at_start_N(vehicle).mag() : 0;
     if (loop.h && loop.has_lag)
-      integral_m_s = up(integral_m_s + times(up(excess_N * loop.lags_s), loop.h->peak));
+      integral_m_s = up(integral_m_s + times(up(excess_N * loop.lags_s.upper), loop.h->peak));
     // A held command differs from the continuous law's by x.
     const double feedback =
         up(up(acting.hold_N / mass_kg) +
@@ -293,7 +294,11 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
         gains.rate_hz > 0 ? "sampling and the tilt of the thrust are left out"
                           : "the gains state no rate; the tilt of the thrust is left out");
   }
-  if (scene.truth().motor_lag_s() > 0) {
+  if (scene.has_lag_interval()) {
+    add("each vehicle's motors lag by a constant within an interval", "assumed",
+        fmt::format("{:.4g} to {:.4g} s, whatever [lag] and the truth state", scene.motor_lag_s().lower,
+                    scene.motor_lag_s().upper));
+  } else if (scene.truth().motor_lag_s() > 0) {
     add("motors lag as the truth says", "assumed",
         fmt::format("{:.3g} s, whatever [lag] states", gains.motor_lag_s));
   }
