@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <stdexcept>
 
 #include "lipschitz/certify_bounds.h"
+#include "lipschitz/rounding.h"
 #include "lipschitz/stop.h"
 #include "lipschitz/work_progress.h"
 #include "nn/base/parallel.h"
@@ -218,23 +218,13 @@ Certification certify(const Network& network, const CertifyOptions& options) {
 
 UpperBound law_bound(LawKind law, const std::vector<std::pair<UpperBound, int>>& terms) {
   check::Dyadic sum, sum_of_squares;
-  int unit = -1000;  // of squares, in powers of four: those of tiny and huge bounds leave the range of double
   for (const auto& [bound, count] : terms) {
     if (!std::isfinite(bound.value())) return bound;
-    if (bound.value() > 0) unit = std::max(unit, std::ilogb(bound.value()));
     const check::Dyadic n = static_cast<double>(count), k = bound.value();
     sum += n * k;
     sum_of_squares += n * k * k;
   }
-  const bool stacked = law == LawKind::kAllStacked;
-  const check::Dyadic of_order_one = {sum_of_squares.mantissa, sum_of_squares.exponent - 2 * unit};
-  double result = stacked ? std::ldexp(std::sqrt(to_double(of_order_one)), unit) : to_double(sum);
-  const auto is_enough = [&](double x) {
-    return stacked ? check::Dyadic(x) * x >= sum_of_squares : check::Dyadic(x) >= sum;
-  };
-  while (std::isfinite(result) && !is_enough(result))
-    result = std::nextafter(result, std::numeric_limits<double>::infinity());
-  return UpperBound(result);
+  return UpperBound(law == LawKind::kAllStacked ? sqrt_up(sum_of_squares) : rounded_up(sum));
 }
 
 }  // namespace swarmcert::lipschitz

@@ -4,12 +4,12 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/live_chain.h"
+#include "lipschitz/rounding.h"
 #include "lipschitz/sdp_bound.h"
 #include "nn/base/random.h"
 #include "nn/weights/functions.h"
@@ -113,10 +113,7 @@ std::optional<UpperBound> combettes_pesquet(const std::vector<check::Matrix>& st
   }
   check::Dyadic exact = c.back();
   exact.exponent -= static_cast<long>(stages.size()) - 1;
-  double bound = to_double(exact);
-  while (!(check::Dyadic(bound) >= exact))
-    bound = std::nextafter(bound, std::numeric_limits<double>::infinity());
-  return UpperBound(bound);
+  return UpperBound(rounded_up(exact));
 }
 
 PatternFloor pattern_floor(const std::vector<check::Matrix>& stages, int starts, std::uint64_t seed,

@@ -1,21 +1,13 @@
 #include "lipschitz/lmi_proof.h"
 
 #include <cmath>
-#include <limits>
+
+#include "lipschitz/rounding.h"
 
 namespace swarmcert::lipschitz {
 
-using check::Dyadic;
 using check::Factor;
 using check::Matrix;
-
-double sqrt_up(double rho) {
-  const auto is_enough = [rho](double x) { return Dyadic(x) * Dyadic(x) >= Dyadic(rho); };
-  double root = std::sqrt(rho);
-  while (!is_enough(root)) root = std::nextafter(root, std::numeric_limits<double>::infinity());
-  while (root > 0 && is_enough(std::nextafter(root, 0.0))) root = std::nextafter(root, 0.0);
-  return root;
-}
 
 namespace {
 

@@ -33,7 +33,4 @@ std::optional<UpperProof> prove(const check::BentChain& chain, double rho, const
 
 using check::to_double;
 
-/// The smallest double whose square is at least rho >= 0, in exact arithmetic.
-double sqrt_up(double rho);
-
 }  // namespace swarmcert::lipschitz

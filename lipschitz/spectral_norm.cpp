@@ -10,6 +10,7 @@
 
 #include "lipschitz/checker/lipschitz_lmi.h"
 #include "lipschitz/checker/witness.h"
+#include "lipschitz/rounding.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/functions.h"
 
@@ -107,10 +108,7 @@ void require_moderate(const files::Network& network) {
 UpperBound product_up(const std::vector<UpperBound>& factors) {
   check::Dyadic exact(1.0);
   for (const UpperBound factor : factors) exact = exact * check::Dyadic(factor.value());
-  double rounded = to_double(exact);
-  while (!(check::Dyadic(rounded) >= exact))
-    rounded = std::nextafter(rounded, std::numeric_limits<double>::infinity());
-  return UpperBound(rounded);
+  return UpperBound(rounded_up(exact));
 }
 
 }  // namespace swarmcert::lipschitz

@@ -6,7 +6,7 @@
 #include "lipschitz/checker/values.h"
 #include "lipschitz/float32_error.h"
 #include "lipschitz/range.h"
-#include "nn/base/doubles.h"
+#include "lipschitz/rounding.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
@@ -15,19 +15,6 @@ namespace {
 using check::Bounded;
 using check::Dyadic;
 using Row = std::vector<double>;
-
-/// The smallest double that is at least x; infinite beyond the doubles.
-double rounded_up(const Dyadic& x) {
-  if (x.sign() == 0) return 0;
-  long exponent = 0;
-  const double mantissa = mpz_get_d_2exp(&exponent, x.mantissa.get_mpz_t());  // truncates
-  exponent += x.exponent;
-  if (exponent > 1024) return x.sign() > 0 ? kInfinity : std::numeric_limits<double>::lowest();
-  double result = std::ldexp(mantissa, static_cast<int>(std::max(exponent, -1100L)));
-  while (std::isfinite(result) && !(Dyadic(result) >= x)) result = up(result);
-  return result;
-}
-double rounded_down(const Dyadic& x) { return -rounded_up(-x); }
 
 Row each(const std::vector<Dyadic>& values, double (*rounded)(const Dyadic&)) {
   Row result;
@@ -39,13 +26,6 @@ std::vector<Dyadic> exact_numbers(const Row& values) { return {values.begin(), v
 
 bool all_finite(const Row& values) {
   return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
-}
-
-/// A double u >= 0 with u^2 >= square.
-double root_above(const Dyadic& square) {
-  double result = std::sqrt(std::max(rounded_up(square), 0.0));
-  while (std::isfinite(result) && !(Dyadic(result) * result >= square)) result = up(result);
-  return result;
 }
 
 /// Follows the values of one function through its layers, as the checker will.
@@ -79,14 +59,14 @@ class Values {
     if (names.size() == 2) {
       const auto size = static_cast<std::size_t>(parts_.at(names[1])->inputs());
       const double slope = rho_bound.at(files::kind_of(names[1]));
-      found.jump = root_above(Dyadic(slope) * slope * check::largest_square(terms.front().values));
+      found.jump = sqrt_up(Dyadic(slope) * slope * check::largest_square(terms.front().values));
       found.sum = rounded(check::sum_intervals(terms, size),
                           options_.float32 ? check::sum_error(terms, size) : std::nullopt, values);
       if (!found.sum || !std::isfinite(*found.jump) || !through_layers(names[1], values, found))
         return std::nullopt;
     }
     if (!options_.float32) return found;
-    found.float32_error = root_above(check::square(values.error));
+    found.float32_error = sqrt_up(check::square(values.error));
     return std::isfinite(*found.float32_error) ? std::optional(found) : std::nullopt;
   }
 

@@ -7,6 +7,7 @@
 #include "lipschitz/checker/projective_cover.h"
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/lmi_proof.h"
+#include "lipschitz/rounding.h"
 #include "nn/weights/functions.h"
 
 namespace swarmcert::lipschitz {
