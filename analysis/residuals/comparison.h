@@ -32,20 +32,11 @@ struct Moment {
 };
 
 /// One vehicle in one flight.
-struct TrackErrors {
-  std::string flight, scenario, vehicle, kind, path;
-  std::string composition;  ///< see Comparison::compositions
-  bool position_only = false;
-  Eigen::Vector3d judged = Eigen::Vector3d::Ones();  ///< Track::judged
-  logs::ThrustSource thrust_source = logs::ThrustSource::kNone;
-  logs::ForceSource force_source = logs::ForceSource::kNone;
+struct TrackErrors : TrackHead {
+  std::string composition;                                               ///< see Comparison::compositions
   std::array<std::size_t, static_cast<std::size_t>(Cut::kCount)> cut{};  ///< records by what became of them
-  double clock_offset_s = 0;
-  int clock_onsets = 0;  ///< 0: the offset is not estimated, unless the clock is the reference
-  bool has_reference_clock = false, has_absolute_clock = false;
   double used_s = 0;                  ///< between used records that follow each other
   std::vector<std::string> findings;  ///< what was wrong with the log
-  std::vector<logs::Doubt> doubts;    ///< numbers that no flight has
   bool is_sound = true;               ///< nothing in the log is damaged; gaps in time are no damage
   GroupErrors errors;
   TrajectoryErrors trajectory;

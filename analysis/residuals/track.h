@@ -53,23 +53,27 @@ struct CutRules {
   bool has_published_signals() const { return published || published_signals; }
 };
 
-struct Track {
+/// What a log is, and how it is used.
+struct TrackHead {
   std::string flight, scenario, vehicle, kind, path;
   bool position_only = false;
-  bool has_rates = false;
-  bool has_height = true;  ///< the log has a position: contact with the ground can be seen
   logs::ThrustSource thrust_source = logs::ThrustSource::kDuty;
   logs::ForceSource force_source = logs::ForceSource::kAccelerometer;
-  double window_s = 0;  ///< of the derivative where force_source is no accelerometer
-  logs::TorqueUse torque_use = logs::TorqueUse::kDynamic;
   /// 1 for the axes of W along which the log lets a force be judged, 0 for the others, whose residual is zero.
   Eigen::Vector3d judged = Eigen::Vector3d::Ones();
-  logs::LogHealth health;
   std::vector<logs::Doubt> doubts;   ///< those that refuse a force have made the track position only
   double clock_offset_s = 0;         ///< of this log's clock against the first vehicle's
   int clock_onsets = 0;              ///< how many common starts of a trajectory gave it; 0: not estimated
   bool has_reference_clock = false;  ///< the first log of its flight
   bool has_absolute_clock = false;   ///< the offset is the difference of two absolute clocks
+};
+
+struct Track : TrackHead {
+  bool has_rates = false;
+  bool has_height = true;  ///< the log has a position: contact with the ground can be seen
+  double window_s = 0;     ///< of the derivative where force_source is no accelerometer
+  logs::TorqueUse torque_use = logs::TorqueUse::kDynamic;
+  logs::LogHealth health;
   std::vector<stability::Instant> instants;  ///< thrust_N and mass_kg are set by apply_model()
   std::vector<stability::Neighbour> neighbours;
   std::vector<std::array<double, 4>> duty;

@@ -89,27 +89,6 @@ const stability::Gains* gains_of(const GainsOfKinds& gains, const std::string& k
   return nullptr;
 }
 
-TrackErrors head_of(const Track& track) {
-  TrackErrors errors;
-  errors.flight = track.flight;
-  errors.scenario = track.scenario;
-  errors.vehicle = track.vehicle;
-  errors.kind = track.kind;
-  errors.path = track.path;
-  errors.position_only = track.position_only;
-  errors.judged = track.judged;
-  errors.thrust_source = track.thrust_source;
-  errors.force_source = track.force_source;
-  errors.clock_offset_s = track.clock_offset_s;
-  errors.clock_onsets = track.clock_onsets;
-  errors.has_reference_clock = track.has_reference_clock;
-  errors.has_absolute_clock = track.has_absolute_clock;
-  errors.findings = logs::findings(track.health);
-  errors.doubts = track.doubts;
-  errors.is_sound = logs::is_sound(track.health);
-  return errors;
-}
-
 /// Sorts the residuals `r`, and `r0` without effects, into points, blocks, the map of neighbours and the series.
 void add_records(const Track& track, const std::vector<Eigen::Vector3d>& r,
                  const std::vector<Eigen::Vector3d>& r0, TrackPart& result) {
@@ -201,7 +180,9 @@ GroupErrors errors_of(const std::vector<const Part*>& parts) {
 TrackPart track_part(const Inputs& inputs, const GainsOfKinds& gains, Track& track) {
   TrackPart result;
   TrackErrors& errors = result.errors;
-  errors = head_of(track);
+  static_cast<TrackHead&>(errors) = track;
+  errors.findings = logs::findings(track.health);
+  errors.is_sound = logs::is_sound(track.health);
   if (track.position_only) {
     errors.trajectory.refused = errors.torque.refused = "position only";
     return result;
