@@ -8,6 +8,7 @@
 
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/table_flights.h"
+#include "nn/base/json_number.h"
 
 namespace swarmcert::reproduction {
 namespace {
@@ -102,19 +103,20 @@ void add(const Condition& condition, const files::Json& flights, Table& table, F
                         fmt::format("{:.2f} {}", claims.two_at_four, answer(claims.harms())),
                         fmt::format("{:.1f} % {}", 100 * claims.saturated_share, answer(claims.saturates())),
                         fmt::format("{} of {}", claims.falling, claims.columns)});
-  finding.json["conditions"].push_back({{"truth", condition.truth},
-                                        {"norm_exponent", condition.norm_exponent},
-                                        {"battery_V", condition.battery_V},
-                                        {"higher_m", condition.higher_m},
-                                        {"baseline_growth", number(claims.growth)},
-                                        {"improvement_trained_with_2_at_4", number(claims.two_at_four)},
-                                        {"saturated_share", claims.saturated_share},
-                                        {"columns_where_errors_fall", claims.falling},
-                                        {"columns", claims.columns},
-                                        {"two_harms_four", claims.harms()},
-                                        {"saturates", claims.saturates()},
-                                        {"more_is_best", claims.always_falls()},
-                                        {"flights", flights}});
+  finding.json["conditions"].push_back(
+      {{"truth", condition.truth},
+       {"norm_exponent", condition.norm_exponent},
+       {"battery_V", condition.battery_V},
+       {"higher_m", condition.higher_m},
+       {"baseline_growth", files::finite(claims.growth)},
+       {"improvement_trained_with_2_at_4", files::finite(claims.two_at_four)},
+       {"saturated_share", claims.saturated_share},
+       {"columns_where_errors_fall", claims.falling},
+       {"columns", claims.columns},
+       {"two_harms_four", claims.harms()},
+       {"saturates", claims.saturates()},
+       {"more_is_best", claims.always_falls()},
+       {"flights", flights}});
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "analysis/reproduction/experiments.h"
 #include "analysis/reproduction/table_flights.h"
+#include "nn/base/json_number.h"
 
 namespace swarmcert::reproduction {
 namespace {
@@ -36,10 +37,10 @@ Spreads add_heights(const Truth& truth, const files::Json& flights, files::Json&
                                 std::isnan(paper) ? "N.A." : fmt::format("{:.3f}", paper)));
       column["max_z"].push_back({{"trained_with", kControllers[c]},
                                  {"vehicles", kLeastVehicles + static_cast<int>(v)},
-                                 {"worst_m", number(spread.most_m)},
-                                 {"median_m", number(spread.median_m)},
-                                 {"least_m", number(spread.least_m)},
-                                 {"paper_m", number(paper)}});
+                                 {"worst_m", files::finite(spread.most_m)},
+                                 {"median_m", files::finite(spread.median_m)},
+                                 {"least_m", files::finite(spread.least_m)},
+                                 {"paper_m", files::finite(paper)}});
     }
     table.rows.push_back(std::move(row));
   }
@@ -67,7 +68,7 @@ void add_sideways(const Truth& truth, const files::Json& flights, files::Json& c
                                 {"axis", std::string(1, axis)},
                                 {"p50_m", p50},
                                 {"p95_m", p95},
-                                {"max_m", number(most)}});
+                                {"max_m", files::finite(most)}});
       }
       sideways.rows.push_back(std::move(row));
     }
@@ -105,15 +106,15 @@ void add_improvement(const Truth& truth, const files::Json& flights, const Sprea
   std::vector<std::string> factors;
   column["least_improvement_by_training_seed"] = files::Json::array();
   for (const auto& [seed, factor] : improvement_by_seed(flights, spreads)) {
-    column["least_improvement_by_training_seed"].push_back(number(factor));
+    column["least_improvement_by_training_seed"].push_back(files::finite(factor));
     factors.push_back(fmt::format("{:.2f}", factor));
   }
   const double two_at_four = spreads[0][2].most_m / spreads[1][2].most_m;
   const double three_at_five = spreads[0][3].most_m / spreads[2][3].most_m;
   column["baseline_farthest_from_paper"] = farthest;
-  column["least_improvement_trained_with_3_or_4"] = number(least_factor);
-  column["improvement_trained_with_2_at_4"] = number(two_at_four);
-  column["improvement_trained_with_3_at_5"] = number(three_at_five);
+  column["least_improvement_trained_with_3_or_4"] = files::finite(least_factor);
+  column["improvement_trained_with_2_at_4"] = files::finite(two_at_four);
+  column["improvement_trained_with_3_at_5"] = files::finite(three_at_five);
   finding.notes.push_back(fmt::format(
       "Truth \"{}\": baseline within {:.0f} % of the paper; networks trained with three or four divide the "
       "worst error by at least {:.2f} (training seeds: {}; paper: 1.5 to 3.9); trained with two, at four "

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "analysis/residuals/statistics.h"
+#include "nn/base/json_number.h"
 #include "nn/base/parallel.h"
 #include "nn/base/shard.h"
 
@@ -66,9 +67,9 @@ files::Json to_json(const std::vector<Cell>& cells) {
                        {"vehicles", cell.vehicles},
                        {"training_seed", cell.training_seed},
                        {"flight_seed", cell.flight_seed},
-                       {"max_x_m", number(cell.max_m[0])},
-                       {"max_y_m", number(cell.max_m[1])},
-                       {"max_z_m", number(cell.max_m[2])},
+                       {"max_x_m", files::finite(cell.max_m[0])},
+                       {"max_y_m", files::finite(cell.max_m[1])},
+                       {"max_z_m", files::finite(cell.max_m[2])},
                        {"p50_x_m", cell.p50_m[0]},
                        {"p50_y_m", cell.p50_m[1]},
                        {"p95_x_m", cell.p95_m[0]},
@@ -92,8 +93,6 @@ files::Json flown_cells(const Setting& setting, const Truth& flown, const Networ
 }
 
 }  // namespace
-
-files::Json number(double value) { return std::isfinite(value) ? files::Json(value) : files::Json(); }
 
 files::Json table_flights(const Setting& setting, Stages& stages, const Truth& flown, int training_seed,
                           double higher_m, const std::string& file) {

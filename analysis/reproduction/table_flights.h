@@ -22,9 +22,6 @@ inline constexpr double kPaper_m[4][4] = {{0.094, 0.139, 0.209, 0.314},
                                           {0.026, 0.082, 0.140, 0.159},
                                           {0.024, 0.061, 0.102, 0.150}};
 
-/// A number for JSON: null unless it is finite.
-files::Json number(double value);
-
 /// All flights of one training seed, as objects of result.json; read from `file` if it holds them.
 /// @param stages trained the networks, on flights of their own truth.
 /// @param flown  the truth that flies; its battery may be another one.

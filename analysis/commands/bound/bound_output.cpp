@@ -15,13 +15,6 @@ namespace {
 using files::Json;
 using namespace stability;  // NOLINT: every name below is of that library
 
-Json norms_json(const GainNorms& norms) {
-  return {{"rate", finite(norms.rate)},
-          {"amplitude", finite(norms.amplitude)},
-          {"edge", finite(norms.edge)},
-          {"impulse", finite(norms.impulse)}};
-}
-
 Json theorem_json(const TrackingReport& report) {
   const Theorem& theorem = report.theorem;
   Json json = {{"applies", theorem.applies},
@@ -146,8 +139,6 @@ std::optional<double> vector_error_m(const DisturbanceSource& source, const Trac
   return report.vector->upper * source.rate_norm_N_s;
 }
 
-std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : "-"; }
-
 void print_theorem(const DisturbanceSource& source, const TrackingReport& report) {
   const Theorem& theorem = report.theorem;
   fmt::print("Theorem (limsup |e| <= d_m / (lmin(Lambda)^2 lmin(K)), continuous loop): {}\n",
@@ -269,7 +260,14 @@ void print_bounds(const DisturbanceSource& source, const TrackingReport& report)
 
 }  // namespace
 
-files::Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+Json norms_json(const GainNorms& norms) {
+  return {{"rate", finite(norms.rate)},
+          {"amplitude", finite(norms.amplitude)},
+          {"edge", finite(norms.edge)},
+          {"impulse", finite(norms.impulse)}};
+}
+
+std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : "-"; }
 
 void add_tracking_json(Json& result, const Tracking& input, const DisturbanceSource& source,
                        const TrackingReport& report) {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "analysis/cli/command_line.h"
+#include "analysis/commands/bound/bound_output.h"
 #include "analysis/commands/bound/tube_output.h"
 #include "analysis/report/report.h"
 
@@ -17,8 +18,6 @@ using namespace stability;  // NOLINT: every name below is of that library
 
 constexpr int kSamples = 4001;
 constexpr int kShown = 400;
-
-std::string text(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : "-"; }
 
 /// Seconds until the slowest pole has fallen to e^-10, at most two minutes.
 double horizon_s(const TransferFunction& h) {
@@ -120,8 +119,8 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
   report.heading("Worst error per unit of force error");
   std::vector<std::vector<std::string>> rows;
   for (const ExactGains& row : tracking.exact) {
-    rows.push_back({axis_name(row.axis), name(row.channel), name(row.loop), text(row.norms.rate),
-                    text(row.norms.amplitude), text(row.norms.edge), text(row.norms.impulse)});
+    rows.push_back({axis_name(row.axis), name(row.channel), name(row.loop), cell(row.norms.rate),
+                    cell(row.norms.amplitude), cell(row.norms.edge), cell(row.norms.impulse)});
   }
   report.table(
       {"axis", "channel", "loop", "rate, m per N/s", "amplitude, m/N", "edge, m/N", "impulse, m per N s"},
@@ -139,9 +138,9 @@ std::string write_bound_report(const Tracking& input, const LoadedDisturbance& d
     report.heading("Bounds on the error, m");
     rows.clear();
     for (const AxisBounds& row : tracking.bounds) {
-      rows.push_back({axis_name(row.axis), name(row.channel), name(row.loop), text(row.bounds.by_rate),
-                      text(row.bounds.by_amplitude), text(row.bounds.by_edges), text(row.bounds.by_impulse),
-                      text(row.bounds.by_both), row.clamp.never_acts ? "no" : "may", text(row.least())});
+      rows.push_back({axis_name(row.axis), name(row.channel), name(row.loop), cell(row.bounds.by_rate),
+                      cell(row.bounds.by_amplitude), cell(row.bounds.by_edges), cell(row.bounds.by_impulse),
+                      cell(row.bounds.by_both), row.clamp.never_acts ? "no" : "may", cell(row.least())});
     }
     report.table(
         {"axis", "channel", "loop", "rate", "amplitude", "edge", "impulse", "both", "clamp acts", "least"},

@@ -13,6 +13,7 @@
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/residuals/force_unit.h"
+#include "nn/base/json_number.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -22,8 +23,7 @@ using residuals::Comparison;
 
 files::Json json_of(const Eigen::Vector3d& v) {
   // JSON has no NaN: null where a spectrum could not be had.
-  const auto number = [](double x) { return std::isfinite(x) ? files::Json(x) : files::Json(nullptr); };
-  return {{"x", number(v[0])}, {"y", number(v[1])}, {"z", number(v[2])}};
+  return {{"x", files::finite(v[0])}, {"y", files::finite(v[1])}, {"z", files::finite(v[2])}};
 }
 
 files::Json json_of(const residuals::ErrorStatistics& s) {

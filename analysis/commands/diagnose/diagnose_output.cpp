@@ -8,6 +8,7 @@
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/identification/verdict.h"
+#include "nn/base/json_number.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -118,12 +119,9 @@ files::Json json_of(const Diagnosis& diagnosis) {
 }
 
 files::Json json_of(const identification::Detectable& entry, const std::string& kind) {
-  return {{"effect", entry.effect},
-          {"kind", kind},
-          {"parameter", entry.parameter},
-          {"size", std::isfinite(entry.size) ? files::Json(entry.size) : files::Json(nullptr)},
-          {"shape", entry.shape},
-          {"excitation", entry.excitation}};
+  return {{"effect", entry.effect},       {"kind", kind},
+          {"parameter", entry.parameter}, {"size", files::finite(entry.size)},
+          {"shape", entry.shape},         {"excitation", entry.excitation}};
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "analysis/commands/shared/plausibility_output.h"
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/read_log.h"
+#include "nn/base/json_number.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -16,7 +17,7 @@ const char* name(logs::SignalInfo::Source source) {
   return kWords[static_cast<int>(source)];
 }
 
-files::Json finite(double value) { return std::isfinite(value) ? files::Json(value) : files::Json(nullptr); }
+using files::finite;
 
 files::Json force_axes(const logs::Log& log) {
   files::Json axes = files::Json::array();

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "analysis/cli/command.h"
+#include "nn/base/json_number.h"
 
 namespace swarmcert::analysis {
 
@@ -13,13 +14,11 @@ using learning::Use;
 
 namespace {
 
-files::Json number_or_null(double x) { return std::isfinite(x) ? files::Json(x) : files::Json(); }
-
 void add_selection(const Outcome& outcome, double SI, files::Json& json) {
   json["kept"] = outcome.kept();
   json["output_scales"] = outcome.scales;
-  json["select_rmse"] = number_or_null(outcome.select.network * SI);
-  json["select_rmse_of_nothing"] = number_or_null(outcome.select.nothing * SI);
+  json["select_rmse"] = files::finite(outcome.select.network * SI);
+  json["select_rmse_of_nothing"] = files::finite(outcome.select.nothing * SI);
   json["select"] = files::Json::array();
   for (const auto& [composition, scores] : outcome.select_compositions) {
     json["select"].push_back({{"vehicles", composition},
@@ -63,13 +62,13 @@ files::Json train_json(const TrainOptions& options, const std::vector<std::strin
   const double SI = target.SI_per_unit;
   json["quantity"] = target.quantity;
   json["split"] = data.split_by_blocks ? "blocks" : "flights";
-  json["test_rmse"] = number_or_null(outcome.all.network * SI);
-  json["test_rmse_" + std::string(target.unit)] = number_or_null(outcome.all.network);
-  json["test_rmse_of_nothing"] = number_or_null(outcome.all.nothing * SI);
+  json["test_rmse"] = files::finite(outcome.all.network * SI);
+  json["test_rmse_" + std::string(target.unit)] = files::finite(outcome.all.network);
+  json["test_rmse_of_nothing"] = files::finite(outcome.all.nothing * SI);
   for (std::size_t c = 0; c < outcome.components.size(); ++c) {
     const std::string axis(1, "xyz"[c]);
-    json["test_rmse_axes"][axis] = number_or_null(outcome.components[c].network * SI);
-    json["test_rmse_of_nothing_axes"][axis] = number_or_null(outcome.components[c].nothing * SI);
+    json["test_rmse_axes"][axis] = files::finite(outcome.components[c].network * SI);
+    json["test_rmse_of_nothing_axes"][axis] = files::finite(outcome.components[c].nothing * SI);
   }
   json["test"] = files::Json::array();
   for (const auto& [composition, scores] : outcome.compositions) {

@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <memory>
@@ -31,13 +31,6 @@ struct TuneOptions {
 
 /// Part of the further lag that the shipped gains bear and that tuned ones must still bear, where nothing else is said.
 constexpr double kKeptLag = 0.5;
-
-files::Json norms_json(const stability::GainNorms& norms) {
-  return {{"rate", finite(norms.rate)},
-          {"amplitude", finite(norms.amplitude)},
-          {"edge", finite(norms.edge)},
-          {"impulse", finite(norms.impulse)}};
-}
 
 files::Json point_json(const TunedPoint& p, const stability::GainNorms& sampled) {
   files::Json json = {{"Kp", p.Kp},
@@ -102,9 +95,7 @@ std::vector<TunedQuantity> quantities(const std::string& axis, const TuneResult&
 }
 
 std::string constraint_names(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 void print_result(const TuneOptions& options, const TuneResult& found) {
