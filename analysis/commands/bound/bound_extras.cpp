@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/commands/bound/bound_output.h"
+#include "analysis/tracking/tube/error_loops.h"
 #include "analysis/tracking/usual_uncertainty.h"
 #include "nn/base/input_error.h"
 #include "nn/base/parallel.h"
@@ -108,10 +109,6 @@ AxisLoop fixed_part(const Tracking& input, int axis) {
   if (axis < 2 && input.gains.attitude_lag_s > 0) loop.lags_s.push_back(input.gains.attitude_lag_s);
   loop.delay_s = 0;
   return loop;
-}
-
-bool is_same(const AxisLoop& a, const AxisLoop& b) {
-  return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
 }
 
 std::string number_text(const Json& x) {
@@ -225,7 +222,7 @@ Json uncertain_json(const Tracking& input, const std::vector<std::string>& words
   const std::size_t rows_per_axis = input.gains.rate_hz > 0 ? 4 : 2;
   const auto repeats = [&](int axis) {
     return axis > 0 && axis_loop(input.gains, input.plant, axis - 1) &&
-           is_same(fixed_part(input, axis), fixed_part(input, axis - 1));
+           same_gains_and_lags(fixed_part(input, axis), fixed_part(input, axis - 1));
   };
   std::vector<UncertainTask> tasks;
   for (int axis = 0; axis < 3; ++axis) {
@@ -332,7 +329,7 @@ Json verified_json(const Tracking& input) {
     const std::optional<AxisLoop> loop = axis_loop(input.gains, input.plant, axis);
     if (!loop) continue;
     const std::optional<SampledLoop> sampled = sampled_axis_loop(input.gains, input.plant, axis);
-    if (axis > 0 && last && is_same(*loop, *last)) {
+    if (axis > 0 && last && same_gains_and_lags(*loop, *last)) {
       for (Json* const repeated : {&rows, &of_estimates}) repeat_rows(*repeated, sampled ? 4 : 2, axis);
       continue;
     }

@@ -18,10 +18,6 @@ using stability::KernelCells;
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-bool same_loop(const AxisLoop& a, const AxisLoop& b) {
-  return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
-}
-
 /// A slice is a whole number of periods up to this, relatively.
 constexpr double kPeriodTolerance = 1e-12;
 
@@ -168,6 +164,10 @@ std::vector<double> least(const std::optional<KernelCells>& by_size,
 
 }  // namespace
 
+bool same_gains_and_lags(const AxisLoop& a, const AxisLoop& b) {
+  return a.Kp == b.Kp && a.Kd == b.Kd && a.Ki == b.Ki && a.lags_s == b.lags_s;
+}
+
 ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s, int slices, bool is_sampled,
                        const std::optional<Interval>& motor_lag_s) {
   ErrorLoops loops;
@@ -195,7 +195,7 @@ ErrorLoops error_loops(const stability::TrackingSetup& tracking, double slice_s,
       loop->Ki = stability::effective_Ki(*sampled);
       if (is_sampled) period_s = up(sampled->period_s);
     }
-    loops.axis[axis] = last && same_loop(*loop, *last)
+    loops.axis[axis] = last && same_gains_and_lags(*loop, *last)
                            ? loops.axis[axis - 1]
                            : error_loop(*loop, motors_s, period_s, slice_s, slices);
     const ErrorLoop& made = loops.axis[axis];

@@ -49,6 +49,9 @@ struct ErrorLoops {
   bool is_sampled() const { return axis[0].period_s > 0; }
 };
 
+/// Whether both differ in nothing but mass and delay.
+bool same_gains_and_lags(const stability::AxisLoop& a, const stability::AxisLoop& b);
+
 /// The loops of all axes, their kernels over `slices` slices, with the integral gain as the firmware's step makes it
 /// act.
 /// @param is_sampled the command is held over a period of the gains' rate; else the law is continuous.

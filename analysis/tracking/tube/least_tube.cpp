@@ -119,13 +119,9 @@ class Trial {
   std::vector<std::array<ErrorHistory, 3>> others_;
 };
 
-double farthest_of(const Radii& radii) {
-  return std::max({radii.largest_position_m(0), radii.largest_position_m(1), radii.largest_position_m(2)});
-}
-
 }  // namespace
 
-double LeastTube::radius_m() const { return std::max({radius_m(0), radius_m(1), radius_m(2)}); }
+double LeastTube::radius_m() const { return radii.largest_position_m(); }
 
 LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m, double wanted_m) {
   LeastTube result;
@@ -142,12 +138,12 @@ LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m, d
   // Without any deviation: below every tube.
   const Radii start = Trial(scene, bound, none, std::move(truth)).allowed(none);
   Radii largest = start.scaled(1.4, 1e-4);
-  if (farthest_of(largest) > wanted_m) {
+  if (largest.largest_position_m() > wanted_m) {
     result.why = fmt::format(
         "the force error at the set points alone moves vehicles by {:.3g} m; tubes wider than {:.3g} m were "
         "not "
         "tried",
-        farthest_of(start), wanted_m);
+        start.largest_position_m(), wanted_m);
     return result;
   }
   for (int i = 0; i < kMostTrials; ++i) {
@@ -178,7 +174,7 @@ LeastTube least_tube(const Scene& scene, ForceBound& bound, double farthest_m, d
         "of one metre adds {:.3g} m to its own bound",
         radius_m, at_edge.largest_position_m(2), result.loop_gain);
     const Radii wider = larger(largest, reached).scaled(1.25, 0);
-    if (!(farthest_of(wider) <= std::min(farthest_m, wanted_m))) break;
+    if (!(wider.largest_position_m() <= std::min(farthest_m, wanted_m))) break;
     largest = wider;
   }
   if (result.proved) result.why.clear();

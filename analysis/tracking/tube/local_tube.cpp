@@ -59,10 +59,6 @@ LeastTube narrowed(const LeastTube& tube, const SlicedTube& sliced, const Motion
   return result;
 }
 
-double largest_position_m(const Radii& radii) {
-  return std::max({radii.largest_position_m(0), radii.largest_position_m(1), radii.largest_position_m(2)});
-}
-
 class Steps {
  public:
   Steps(const LocalTubeOptions& options, int total) : options_(options), total_(total) {}
@@ -120,7 +116,7 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
     finer.boxes *= kSlicedParts;
     result.sliced = sliced_tube(scene, finer, tolerance_N);
     // What is much wider than a tube that is proved already adds nothing to it.
-    const double wanted_m = result.sliced.proved ? kWidest * largest_position_m(result.sliced.radii())
+    const double wanted_m = result.sliced.proved ? kWidest * result.sliced.radii().largest_position_m()
                                                  : std::numeric_limits<double>::infinity();
     show(2, "tube of one radius");
     Enclosure enclosure(scene, with_progress);

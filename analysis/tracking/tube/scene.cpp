@@ -71,6 +71,10 @@ double Radii::largest_position_m(int axis) const {
   return largest;
 }
 
+double Radii::largest_position_m() const {
+  return std::max({largest_position_m(0), largest_position_m(1), largest_position_m(2)});
+}
+
 Radii smaller(const Radii& a, const Radii& b) {
   return each_of(a, b, [](double x, double y) { return std::min(x, y); });
 }

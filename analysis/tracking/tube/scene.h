@@ -25,6 +25,7 @@ struct Radii {
   bool below(const Radii& other) const;
   Radii scaled(double factor, double more) const;  ///< factor x + more
   double largest_position_m(int axis) const;
+  double largest_position_m() const;  ///< over all axes
 };
 
 Radii smaller(const Radii& a, const Radii& b);  ///< entry by entry
