@@ -78,13 +78,10 @@ std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const
     std::vector<std::vector<std::string>> rows;
     for (const stability::EffectSpec& effect : ladder.effects) {
       for (const auto& [name, value] : effect.parameters) {
-        const auto interval = effect.fit.interval.find(name);
-        const double beyond = shown_beyond_file(effect.name, name);
-        rows.push_back({effect.name, effect.vehicle, name, fmt::format("{:.6g}", beyond + value),
-                        interval == effect.fit.interval.end()
-                            ? "-"
-                            : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.lower,
-                                          beyond + interval->second.upper)});
+        const std::string interval = interval_words(effect.name, name, effect.fit.interval);
+        rows.push_back({effect.name, effect.vehicle, name,
+                        fmt::format("{:.6g}", shown_beyond_file(effect.name, name) + value),
+                        interval.empty() ? "-" : interval});
       }
     }
     if (!rows.empty()) report.table({"effect", "vehicle", "parameter", "value", "90 %"}, rows);

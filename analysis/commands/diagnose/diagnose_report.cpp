@@ -1,6 +1,6 @@
 #include "analysis/commands/diagnose/diagnose_report.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,20 +23,15 @@ double drop(const Missing& missing) {
 }
 
 std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
+  return fmt::format("{}", fmt::join(words, ", "));
 }
 
 std::string values_of(const Missing& missing) {
   std::vector<std::string> values;
   for (const auto& [name, value] : missing.parameters) {
-    const auto interval = missing.intervals.find(name);
-    const double beyond = shown_beyond_file(missing.effect, name);
-    values.push_back(fmt::format("{} = {:.4g}", name, beyond + value));
-    if (interval != missing.intervals.end())
-      values.back() += fmt::format(" ({:.4g} .. {:.4g})", beyond + interval->second.lower,
-                                   beyond + interval->second.upper);
+    const std::string interval = interval_words(missing.effect, name, missing.intervals);
+    values.push_back(fmt::format("{} = {:.4g}", name, shown_beyond_file(missing.effect, name) + value));
+    if (!interval.empty()) values.back() += " (" + interval + ")";
   }
   return joined(values);
 }

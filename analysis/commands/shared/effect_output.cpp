@@ -8,6 +8,14 @@ double shown_beyond_file(const std::string& effect, const std::string& parameter
   return effect == "thrust_ratio" && parameter == "ratio" ? 1 : 0;
 }
 
+std::string interval_words(const std::string& effect, const std::string& parameter,
+                           const std::map<std::string, Interval>& intervals) {
+  const auto interval = intervals.find(parameter);
+  if (interval == intervals.end()) return "";
+  const double beyond = shown_beyond_file(effect, parameter);
+  return fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.lower, beyond + interval->second.upper);
+}
+
 files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
                         const std::map<std::string, Interval>& intervals) {
   files::Json json = files::Json::object();
@@ -45,12 +53,9 @@ void print_values(const std::string& effect, const std::string& prefix,
                   const std::map<std::string, double>& values,
                   const std::map<std::string, Interval>& intervals) {
   for (const auto& [name, value] : values) {
-    const auto interval = intervals.find(name);
-    const double beyond = shown_beyond_file(effect, name);
-    fmt::print("{}{} = {:.4g}", prefix, name, beyond + value);
-    if (interval != intervals.end())
-      fmt::print(", 90 % {:.4g} .. {:.4g}", beyond + interval->second.lower, beyond + interval->second.upper);
-    fmt::print("\n");
+    const std::string interval = interval_words(effect, name, intervals);
+    fmt::print("{}{} = {:.4g}{}\n", prefix, name, shown_beyond_file(effect, name) + value,
+               interval.empty() ? "" : ", 90 % " + interval);
   }
 }
 

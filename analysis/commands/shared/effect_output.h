@@ -14,6 +14,10 @@ namespace swarmcert::analysis {
 /// as a factor (1 is nominal) and model files as the excess over 1; else 0.
 double shown_beyond_file(const std::string& effect, const std::string& parameter);
 
+/// "0.05 .. 0.07" as results show it; empty where there is no interval.
+std::string interval_words(const std::string& effect, const std::string& parameter,
+                           const std::map<std::string, Interval>& intervals);
+
 /// {"tau_s": {"value": 0.06, "interval_90": [0.05, 0.07]}}; without the interval where there is none.
 files::Json values_json(const std::string& effect, const std::map<std::string, double>& values,
                         const std::map<std::string, Interval>& intervals);

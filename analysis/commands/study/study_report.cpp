@@ -27,13 +27,10 @@ void add_findings(Report& report, const Study& study) {
   std::vector<std::vector<std::string>> rows;
   for (const stability::EffectSpec& effect : study.ladder.model.effects) {
     for (const auto& [parameter, value] : effect.parameters) {
-      const auto interval = effect.fit.interval.find(parameter);
-      const double beyond = shown_beyond_file(effect.name, parameter);
-      rows.push_back({effect.name, parameter, fmt::format("{:.4g}", beyond + value),
-                      interval == effect.fit.interval.end()
-                          ? "-"
-                          : fmt::format("{:.4g} .. {:.4g}", beyond + interval->second.lower,
-                                        beyond + interval->second.upper)});
+      const std::string interval = interval_words(effect.name, parameter, effect.fit.interval);
+      rows.push_back({effect.name, parameter,
+                      fmt::format("{:.4g}", shown_beyond_file(effect.name, parameter) + value),
+                      interval.empty() ? "-" : interval});
     }
   }
   if (!rows.empty()) report.table({"effect", "parameter", "value", "90 % interval"}, rows);
