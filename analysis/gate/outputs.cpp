@@ -1,6 +1,6 @@
 #include "analysis/gate/outputs.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,12 +19,6 @@ std::string summary(const GateResult& result) {
                                  result.count(Verdict::kPass), result.count(Verdict::kFail),
                                  result.count(Verdict::kInconclusive));
   if (!result.not_run.empty()) text += fmt::format("; {} not asked for", result.not_run.size());
-  return text;
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text;
 }
 
@@ -71,7 +65,7 @@ std::string to_table(const GateResult& result) {
                         printable(check.reason));
     if (!check.witness.empty()) text += fmt::format("  {}\n", printable(check.witness));
   }
-  if (!result.not_run.empty()) text += fmt::format("\nnot asked for: {}\n", joined(result.not_run));
+  if (!result.not_run.empty()) text += fmt::format("\nnot asked for: {}\n", fmt::join(result.not_run, ", "));
   return text + fmt::format("\n{}\nverdict: {}\n", summary(result), name(result.verdict()));
 }
 
@@ -210,7 +204,8 @@ std::string to_markdown(const GateResult& result) {
                     check.witness.empty() ? "" : ". " + markdown(check.witness));
   }
   if (!failures.empty()) text += "\n" + failures;
-  if (!result.not_run.empty()) text += "\nNot asked for: " + markdown(joined(result.not_run)) + "\n";
+  if (!result.not_run.empty())
+    text += "\nNot asked for: " + markdown(fmt::format("{}", fmt::join(result.not_run, ", "))) + "\n";
   return text;
 }
 

@@ -103,25 +103,17 @@ stability::EffectSpec spec_of(const AccelerometerBalance& balance) {
 
 std::vector<AccelerometerBalance> accelerometer_balances(const residuals::Inputs& inputs,
                                                          const std::string& kind, int jobs) {
-  const auto vehicles = blocks_by_vehicle<MotionBlock>(
-      inputs, kind, jobs, [&](const Track& track) -> std::optional<std::vector<MotionBlock>> {
+  return balances_by_vehicle<AccelerometerBalance, MotionBlock>(
+      inputs, kind, jobs, kFewestMotionBlocks,
+      [&](const Track& track) -> std::optional<std::vector<MotionBlock>> {
         if (track.force_source != logs::ForceSource::kAccelerometer || !(track.judged.z() > 0))
           return std::nullopt;
         const double scale = modelled_accelerometer_scale(inputs.model_for(track), track.vehicle);
         return motion_blocks(track, scale);
+      },
+      [&](const std::vector<MotionBlock>& blocks, AccelerometerBalance& balance) {
+        fit_scale(blocks, inputs.model_of(kind)->mass_kg, balance);
       });
-  std::vector<AccelerometerBalance> all;
-  for (const auto& [name, vehicle] : vehicles) {
-    if (vehicle.blocks.size() < kFewestMotionBlocks) continue;
-    AccelerometerBalance balance;
-    balance.kind = kind;
-    balance.vehicle = name;
-    balance.flights = vehicle.flights;
-    balance.blocks = vehicle.blocks.size();
-    fit_scale(vehicle.blocks, inputs.model_of(kind)->mass_kg, balance);
-    all.push_back(std::move(balance));
-  }
-  return all;
 }
 
 std::string in_words(const AccelerometerBalance& balance) {

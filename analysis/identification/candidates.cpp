@@ -1,6 +1,6 @@
 #include "analysis/identification/candidates.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -112,10 +112,8 @@ Coverage coverage(const residuals::Inputs& inputs, const std::string& kind, cons
         if (!doubt.refuses_force) part.covered.problems.push_back(track.path + ": " + doubt.words);
       }
       if (!logs::is_sound(track.health)) {
-        std::string text;
-        for (const std::string& finding : logs::findings(track.health))
-          text += (text.empty() ? "" : "; ") + finding;
-        part.covered.problems.push_back(track.path + ": " + text);
+        part.covered.problems.push_back(
+            fmt::format("{}: {}", track.path, fmt::join(logs::findings(track.health), "; ")));
       }
       if (track.position_only || track.kind != kind) continue;
       double lowest_m = INFINITY, highest_m = -INFINITY;

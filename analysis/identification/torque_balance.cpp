@@ -75,24 +75,16 @@ void fit_torques(const std::vector<TorqueBlock>& blocks, const stability::Model&
 
 std::vector<TorqueBalance> torque_balances(const residuals::Inputs& inputs, const std::string& kind,
                                            int jobs) {
-  const auto vehicles = blocks_by_vehicle<TorqueBlock>(
-      inputs, kind, jobs, [&](const residuals::Track& track) -> std::optional<std::vector<TorqueBlock>> {
+  return balances_by_vehicle<TorqueBalance, TorqueBlock>(
+      inputs, kind, jobs, kFewestTorqueBlocks,
+      [&](const residuals::Track& track) -> std::optional<std::vector<TorqueBlock>> {
         auto blocks = residuals::torque_blocks(inputs.model_for(track), inputs.kinds, track, kTorqueBlock_s);
         if (blocks.empty()) return std::nullopt;
         return blocks;
+      },
+      [&](const std::vector<TorqueBlock>& blocks, TorqueBalance& balance) {
+        fit_torques(blocks, *inputs.model_of(kind), balance);
       });
-  std::vector<TorqueBalance> all;
-  for (const auto& [name, vehicle] : vehicles) {
-    if (vehicle.blocks.size() < kFewestTorqueBlocks) continue;
-    TorqueBalance balance;
-    balance.kind = kind;
-    balance.vehicle = name;
-    balance.flights = vehicle.flights;
-    balance.blocks = vehicle.blocks.size();
-    fit_torques(vehicle.blocks, *inputs.model_of(kind), balance);
-    all.push_back(std::move(balance));
-  }
-  return all;
 }
 
 stability::EffectSpec spec_of(const TorqueBalance& balance, const std::string& effect) {

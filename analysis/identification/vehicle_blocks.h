@@ -39,4 +39,23 @@ std::map<std::string, VehicleBlocks<Block>> blocks_by_vehicle(const residuals::I
   return vehicles;
 }
 
+/// One balance per vehicle of this kind that has at least `fewest` blocks.
+/// @param fit (blocks, balance): fills in what the blocks say.
+template <typename Balance, typename Block, typename BlocksOf, typename Fit>
+std::vector<Balance> balances_by_vehicle(const residuals::Inputs& inputs, const std::string& kind, int jobs,
+                                         std::size_t fewest, const BlocksOf& blocks_of, const Fit& fit) {
+  std::vector<Balance> all;
+  for (const auto& [name, vehicle] : blocks_by_vehicle<Block>(inputs, kind, jobs, blocks_of)) {
+    if (vehicle.blocks.size() < fewest) continue;
+    Balance balance;
+    balance.kind = kind;
+    balance.vehicle = name;
+    balance.flights = vehicle.flights;
+    balance.blocks = vehicle.blocks.size();
+    fit(vehicle.blocks, balance);
+    all.push_back(std::move(balance));
+  }
+  return all;
+}
+
 }  // namespace swarmcert::identification

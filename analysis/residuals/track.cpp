@@ -1,5 +1,7 @@
 #include "analysis/residuals/track.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -211,12 +213,6 @@ void cut_phases(Track& track, const CutRules& rules) {
   }
 }
 
-std::string words_of(const std::vector<std::string>& findings) {
-  std::string words;
-  for (const std::string& finding : findings) words += (words.empty() ? "" : "; ") + finding;
-  return words;
-}
-
 struct LoadedLog {
   std::shared_ptr<const logs::Log> log;
   std::size_t track;
@@ -316,8 +312,8 @@ std::vector<Track> load_flight(const FlightFiles& flight, const Fleet& fleet,
     }
     if (rules.fits && !rules.keep && !track.position_only && !logs::is_sound(log.health)) {
       track.position_only = true;
-      problems.push_back(path + ": " + words_of(logs::findings(log.health)) +
-                         "; damaged, left out of the fit (--keep takes it)");
+      problems.push_back(fmt::format("{}: {}; damaged, left out of the fit (--keep takes it)", path,
+                                     fmt::join(logs::findings(log.health), "; ")));
     }
     track.has_rates = log.signals.rates;
     track.has_height = log.signals.position;

@@ -1,6 +1,6 @@
 #include "analysis/commands/compare/log_output.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -90,11 +90,7 @@ void print_cuts(const Comparison& comparison) {
 
 void print_doubts(const Comparison& comparison) {
   for (const TrackErrors& track : comparison.tracks) {
-    if (!track.is_sound) {
-      std::string text;
-      for (const std::string& finding : track.findings) text += (text.empty() ? "" : "; ") + finding;
-      fmt::print("damaged: {}: {}\n", track.path, text);
-    }
+    if (!track.is_sound) fmt::print("damaged: {}: {}\n", track.path, fmt::join(track.findings, "; "));
     for (const logs::Doubt& doubt : track.doubts) {
       if (!doubt.refuses_force) fmt::print("implausible: {}: {}\n", track.path, doubt.words);
     }

@@ -1,6 +1,6 @@
 #include "analysis/commands/gate/gate_report.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <limits>
@@ -53,8 +53,7 @@ std::string write_gate_report(const gate::GateResult& result, const files::Json&
   Report report("May this release ship?");
   report.made_by(command_to_copy());
   report.result(json);
-  std::string not_run;
-  for (const std::string& name : result.not_run) not_run += (not_run.empty() ? "" : ", ") + name;
+  const std::string not_run = fmt::format("{}", fmt::join(result.not_run, ", "));
   report.paragraph(fmt::format("Verdict: {}. {} checks passed, {} failed, {} inconclusive.{}",
                                gate::name(result.verdict()), result.count(gate::Verdict::kPass),
                                result.count(gate::Verdict::kFail), result.count(gate::Verdict::kInconclusive),

@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include "analysis/gate/checks/checks.h"
 #include "analysis/gate/checks/disturbance.h"
@@ -28,9 +28,7 @@ Run read_theorem(const files::TomlTable& table, Policy& policy) {
       check.witness = fmt::format("lambda_min(Lambda) {:.6g} 1/s, lambda_min(K) {:.6g} kg/s",
                                   report.theorem.min_Lambda, report.theorem.min_K);
     } else {
-      std::string why;
-      for (const std::string& one : report.theorem.why_not) why += (why.empty() ? "" : "; ") + one;
-      fail(check, why);
+      fail(check, fmt::format("{}", fmt::join(report.theorem.why_not, "; ")));
     }
     checks.push_back(check);
     if (!ball) return;
