@@ -16,7 +16,7 @@ from foreign_effects import EFFECTS  # noqa: E402
 from foreign_simulator import ROTOR_LAG_S, fly  # noqa: E402
 
 FLIGHTS = 4
-KEYS = ("force", "torque", "rotor", "discharge_V_s", "accelerometer_scale", "yaw_reach", "speed")
+KEYS = ("force", "torque", "rotor", "discharge_V_s", "accelerometer_scale", "yaw_reach", "speed", "apart_m")
 
 
 def model_with_lag(path, folder, extra="", name="model.toml"):

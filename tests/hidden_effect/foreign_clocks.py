@@ -1,12 +1,15 @@
-"""Two vehicles disturb each other; the logs' clocks differ, and no start of a set point tells by how much.
+"""Vehicles disturb one another; the logs' clocks differ, and no start of a set point tells by how much.
 
-Usage: foreign_clocks.py TOOL MODEL FOLDER [--seeds FROM:TO]
+Usage: foreign_clocks.py TOOL MODEL FOLDER [--seeds FROM:TO] [--fleets]
 Exits 1 where an offset is not found within its interval (widened by half, as the test is of few cases), or one is
 claimed where there is none or only a wake that arrives late, or a lag of the thrust is named, which no flight has.
+--fleets: three and four vehicles with random clocks, instead of two. --add: also whether `add` and `study` read three
+logs with their clocks corrected: a fitted wake then leaves as little as where clocks agree.
 """
 
 import json
 import os
+import random
 import shutil
 import sys
 
@@ -23,32 +26,95 @@ LAGS = {"delay", "motor_lag", "sensor_delay"}
 LEAST_OFFSET_S = 0.06  # below it the interval may hold zero
 
 
-def case(options, seed, ahead_s, delay_s, from_s=4.0):
-    folder = os.path.join(options.folder, f"{seed}_{ahead_s}_{delay_s}")
+def right_offset(entry, ahead_s):
+    """Whether the interval holds the offset against the clock that the entry names."""
+    offset_s = ahead_s[entry["vehicle"]] - ahead_s[entry["against"]]
+    return is_inside(entry["parameters"]["offset_s"], offset_s, 1.5)
+
+
+def missed(found, ahead_s):
+    """Vehicles whose clock differs from that in the middle, beyond what an interval may hold, and is not found."""
+    middle = found[0]["against"] if found else sorted(ahead_s, key=ahead_s.get)[(len(ahead_s) - 1) // 2]
+    named = [entry["vehicle"] for entry in found]
+    return [v for v in ahead_s if v not in named and abs(ahead_s[v] - ahead_s[middle]) >= LEAST_OFFSET_S]
+
+
+def case(options, seed, clocks_s, delay_s, from_s=4.0):
+    folder = os.path.join(options.folder, f"{seed}_{len(clocks_s)}_{delay_s}")
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
     flights = os.path.join(folder, "flights")
-    truth = dict(force=late_wake(0.09, delay_s, 0.06, 0.06), clocks_s=(0.0, ahead_s), from_s=from_s)
-    first_s, second_s = fly(truth, seed, flights, vehicles=2, duration_s=45.0)
+    truth = dict(force=late_wake(0.09, delay_s, 0.06, 0.06), clocks_s=clocks_s, from_s=from_s)
+    offsets_s = fly(truth, seed, flights, vehicles=len(clocks_s), duration_s=45.0)
+    ahead_s = {f"cf{k + 1}": offset_s for k, offset_s in enumerate(offsets_s)}
     result = asked(options.tool, ["diagnose", model_with_lag(options.model, folder), flights],
                    os.path.join(folder, "result.json"))
-    offset_s = second_s - first_s
-    found = [entry["parameters"]["offset_s"] for entry in result["ranking"] if entry["effect"] == "clock_offset"]
+    found = [entry for entry in result["ranking"] if entry["effect"] == "clock_offset"]
     lags = [entry["effect"] for entry in result["ranking"] if entry["effect"] in LAGS]
-    inside = all(is_inside(one, offset_s, 1.5) for one in found)
-    right = not lags and inside and len(found) <= 1 and (found or abs(offset_s) < LEAST_OFFSET_S)
-    print(json.dumps({"seed": seed, "offset_s": offset_s, "delay_s": delay_s, "found": found,
-                      "lags": lags, "right": bool(right)}))
+    inside = all(right_offset(entry, ahead_s) for entry in found)
+    lost = missed(found, ahead_s)
+    right = not lags and inside and not lost
+    print(json.dumps({"seed": seed, "ahead_s": ahead_s, "delay_s": delay_s, "found": [e["statement"] for e in found],
+                      "inside": inside, "missed": lost, "lags": lags, "right": right}), flush=True)
+    return right
+
+
+def random_clocks(seed, vehicles, largest_s=0.2):
+    """The differences lie within what is searched."""
+    rng = random.Random(seed)
+    return tuple(rng.uniform(-largest_s / 2, largest_s / 2) for _ in range(vehicles))
+
+
+def fleets(options, seed):
+    cases = []
+    for vehicles in (3, 4):
+        clocks_s = random_clocks(100 * seed + vehicles, vehicles)
+        cases += [(clocks_s, 0.0), (clocks_s, 0.15), ((0.0,) * vehicles, 0.0), ((0.0,) * vehicles, 0.2)]
+    return [case(options, 100 * seed + 10 + k, *one) for k, one in enumerate(cases)]
+
+
+def added(options, name, seed, clocks_s):
+    """What `add` finds of the clocks, and what the fitted wake leaves; offsets that `study` finds."""
+    folder = os.path.join(options.folder, name)
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    flights, model = os.path.join(folder, "flights"), model_with_lag(options.model, folder)
+    fly(dict(force=late_wake(0.09, 0.0, 0.06, 0.06), clocks_s=clocks_s, from_s=4.0), seed, flights,
+        vehicles=len(clocks_s), duration_s=45.0)
+    result = asked(options.tool, ["add", "downwash", "--model", model, flights, "-o", os.path.join(folder, "new.toml")],
+                   os.path.join(folder, "add.json"))
+    study = asked(options.tool, ["study", model, flights, "-o", os.path.join(folder, "study")],
+                  os.path.join(folder, "study.json"))
+    of_study = [entry["statement"] for entry in study["ranking"] if entry["effect"] == "clock_offset"]
+    return [entry["statement"] for entry in result["clock_offsets"]], of_study, result["ladder"][-1]["fit_rmse"]
+
+
+def adds_with_clocks_corrected(options, seed):
+    alike = added(options, "alike", seed, (0.0, 0.0, 0.0))
+    apart = added(options, "apart", seed, (0.0, 0.12, -0.05))
+    right = not alike[0] and len(apart[0]) > 0 and apart[0] == apart[1] and apart[2] < 1.1 * alike[2]
+    print(json.dumps({"seed": seed, "alike": alike, "apart": apart, "right": right}), flush=True)
     return right
 
 
 def main():
     parser = argument_parser()
     parser.add_argument("--seeds", default="1:2")
+    parser.add_argument("--fleets", action="store_true")
+    parser.add_argument("--add", action="store_true")
     options = parser.parse_args()
     first, last = (int(seed) for seed in options.seeds.split(":"))
-    right = [case(options, 100 * seed + k, *one) for seed in range(first, last) for k, one in enumerate(CASES)]
-    right += [case(options, seed, 0.0, 0.2, from_s) for seed, from_s in MID_AIR]
+    right = []
+    for seed in range(first, last):
+        if options.add:
+            right.append(adds_with_clocks_corrected(options, 100 * seed + 30))
+        elif options.fleets:
+            right += fleets(options, seed)
+        else:
+            right += [case(options, 100 * seed + k, (0.0, ahead_s), delay_s)
+                      for k, (ahead_s, delay_s) in enumerate(CASES)]
+    if not options.fleets and not options.add:
+        right += [case(options, seed, (0.0, 0.0), 0.2, from_s) for seed, from_s in MID_AIR]
     if not options.keep:
         shutil.rmtree(options.folder, ignore_errors=True)
     print(f"{sum(map(bool, right))} of {len(right)} right")

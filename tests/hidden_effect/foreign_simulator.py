@@ -262,8 +262,8 @@ def wrapped(angle):
 def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
     """Flies and writes folder/cf<1 ...>_<run>. `truth`: force(state) in the world, torque(state) in the body, both in
     SI units; rotor(state, index, thrust_N), what a rotor gives; discharge_V_s; accelerometer_scale; clocks_s, by how
-    much each log's clock is ahead, and from_s, when the logs begin. Returns how far each log's clock is ahead in truth,
-    s."""
+    much each log's clock is ahead; from_s, when the logs begin; apart_m, how far the others' paths are to the side.
+    Returns how far each log's clock is ahead in truth, s."""
     rng = random.Random(seed * 1000 + run)
     scale = truth.get("speed", 1.0)
     fleet = []
@@ -273,7 +273,7 @@ def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
         if k > 0:  # dances around the first, below and above it
             path = Path(rng, (0.0, 0.0, 0.9), (0.8, 0.8, 0.55), 0.28 * scale, 1.0)
             path.waves[0], path.waves[1] = first.waves[0], first.waves[1]
-            path = Around(path, Wave(rng, 0.1, 0.4), Wave(rng, 0.1, 0.4))
+            path = Around(path, Wave(rng, 0.1, 0.4), Wave(rng, 0.1, 0.4), truth.get("apart_m", 0.0))
         fleet.append(Vehicle(random.Random(seed * 77 + run * 13 + k), path))
     for k, vehicle in enumerate(fleet):
         vehicle.sensors.ahead_s = truth.get("clocks_s", (0.0,) * vehicles)[k]
@@ -295,13 +295,14 @@ def fly(truth, seed, folder, run=0, vehicles=1, duration_s=30.0):
 
 
 class Around:
-    """A path with two more waves to the sides."""
+    """A path with two more waves to the sides, about a centre that is apart in x."""
 
-    def __init__(self, path, x, y):
-        self.path, self.more = path, (x, y)
+    def __init__(self, path, x, y, apart_m):
+        self.path, self.more, self.apart_m = path, (x, y), apart_m
 
     def at(self, t):
         p, v, a, yaw = self.path.at(t)
+        p[0] += self.apart_m
         since = max(t - 1, 0.0)
         s, ds, dds = (since * since / 2, since, 1.0 if since > 0 else 0.0) if since < 1 else (since - 0.5, 1.0, 0.0)
         for axis, wave in enumerate(self.more):

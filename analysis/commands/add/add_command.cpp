@@ -11,6 +11,7 @@
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/add/add_report.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/diagnose/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/output_folder.h"
@@ -140,7 +141,9 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, options.output);
   refuse_missing_folder(options.output);
   if (options.flights.models.size() != 1) throw UsageError("add takes one --model");
-  const residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  const std::vector<identification::ClockOffset> clocks =
+      identification::find_and_correct_clocks(inputs, common.jobs);
   identification::LadderOptions what;
   what.automatic = options.effects == "auto";
   if (!what.automatic) {
@@ -161,6 +164,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   }
   files::Json result = result_head("add", inputs.files());
   add_ladder(ladder, inputs, result);
+  add_clocks(clocks, common.prints_text(), result);
   result["written"] = ladder.any_accepted;
   result["problems"] = ladder.problems;
   if (!ladder.too_poor.empty()) result["reason"] = ladder.too_poor;

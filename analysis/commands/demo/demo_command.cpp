@@ -124,7 +124,7 @@ std::string study_flights(const fs::path& folder, const CommonOptions& common, c
   const std::string sentence = headline(study, unit);
   say("   " + sentence);
   result["study"] = {{"headline", sentence}, {"verdict", answer["verdict"]}};
-  return write_study_folder(study, nullptr, unit, answer, output);
+  return write_study_folder(study, {}, nullptr, unit, answer, output);
 }
 
 int run_demo(const DemoOptions& options, const CommonOptions& common) {

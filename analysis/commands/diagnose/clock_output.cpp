@@ -13,6 +13,7 @@ files::Json ranking_entry_of(const ClockOffset& offset) {
   return {{"effect", "clock_offset"},
           {"kind", offset.kind},
           {"vehicle", offset.vehicle},
+          {"against", offset.against_vehicle},
           {"rmse_before", offset.rmse_before_N},
           {"rmse_after", offset.rmse_after_N},
           {"drop", 1 - offset.rmse_after_N / offset.rmse_before_N},
@@ -34,13 +35,35 @@ files::Json ranking_entry_of(const ClockOffset& offset) {
           {"sensor", true}};
 }
 
+void print_all(const std::vector<ClockOffset>& offsets) {
+  for (const ClockOffset& offset : offsets) fmt::print("  {}\n", sentence(offset));
+}
+
 }  // namespace
 
-bool judge_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Json& result) {
+std::string sentence(const ClockOffset& offset) {
+  std::string words = identification::in_words(offset) + "; all else was judged with it corrected";
+  words[0] = 'T';
+  return words + ".";
+}
+
+void add_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Json& result) {
+  result["clock_offsets"] = files::Json::array();
   for (const ClockOffset& offset : offsets) {
-    result["ranking"].push_back(ranking_entry_of(offset));
-    if (prints) fmt::print("  {}; all else was judged with it corrected\n", identification::in_words(offset));
+    result["clock_offsets"].push_back({{"flight", offset.flight},
+                                       {"log", offset.path},
+                                       {"vehicle", offset.vehicle},
+                                       {"against", offset.against_vehicle},
+                                       {"offset_s", offset.offset_s},
+                                       {"interval_90", offset.interval},
+                                       {"statement", identification::in_words(offset)}});
   }
+  if (prints) print_all(offsets);
+}
+
+bool judge_clocks(const std::vector<ClockOffset>& offsets, bool prints, files::Json& result) {
+  for (const ClockOffset& offset : offsets) result["ranking"].push_back(ranking_entry_of(offset));
+  if (prints) print_all(offsets);
   if (offsets.empty()) return false;
   if (result["verdict"] != identification::name(identification::Verdict::kInconclusive)) {
     result["verdict"] = identification::name(identification::Verdict::kMissingEffect);

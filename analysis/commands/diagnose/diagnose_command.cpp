@@ -91,13 +91,13 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   residuals::Inputs inputs = read_flights(options.flights, false, false, true);
-  const std::vector<identification::ClockOffset> clocks = identification::clock_offsets(inputs, common.jobs);
-  identification::correct_clocks(clocks, inputs);
+  const std::vector<identification::ClockOffset> clocks = identification::find_and_correct_clocks(inputs, common.jobs);
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
     others = read_others(options.flights, options.against, inputs);
+    identification::find_and_correct_clocks(*others, common.jobs);
     other_files = add_files_of(*others, files);
   }
   files::Json result = result_head("diagnose", files);

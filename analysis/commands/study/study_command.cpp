@@ -7,6 +7,7 @@
 #include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
+#include "analysis/commands/diagnose/clock_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/study/study_output.h"
 #include "analysis/commands/study/study_report.h"
@@ -68,14 +69,17 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   FlightOptions words = options.flights;
   words.words.insert(words.words.end(), options.select.begin(), options.select.end());
   words.words.insert(words.words.end(), options.test.begin(), options.test.end());
-  const residuals::Inputs inputs = read_flights(words, false, false, true);
+  residuals::Inputs inputs = read_flights(words, false, false, true);
   if (inputs.models.size() != 1)
     throw UsageError("study takes one MODEL; study each kind of vehicle by itself");
+  const std::vector<identification::ClockOffset> clocks =
+      identification::find_and_correct_clocks(inputs, common.jobs);
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
     others = read_others(words, options.against, inputs);
+    identification::find_and_correct_clocks(*others, common.jobs);
     other_files = add_files_of(*others, files);
   }
   Progress progress(common.quiet);
@@ -84,16 +88,18 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
       [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
   files::Json result = result_head("study", files);
   add_study(study, inputs, result);
+  judge_clocks(clocks, false, result);
   std::optional<Changes> changes;
   if (others) {
     changes = changes_against(*others, study, inputs, common.jobs);
     add_changes(*changes, other_files, result);
   }
   const std::string page =
-      write_study_folder(study, changes ? &*changes : nullptr, unit, result, options.output);
+      write_study_folder(study, clocks, changes ? &*changes : nullptr, unit, result, options.output);
   write_result(common, result);
   if (common.prints_text()) {
     print_study(study, unit);
+    for (const identification::ClockOffset& clock : clocks) fmt::print("{}\n", sentence(clock));
     if (changes) print_changes(*changes);
     fmt::print("Page: {}\n", page);
   }

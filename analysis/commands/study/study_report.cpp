@@ -9,6 +9,7 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_report.h"
+#include "analysis/commands/diagnose/clock_output.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/remainder_output.h"
@@ -100,12 +101,16 @@ void add_changes(Report& report, const Changes& changes, const residuals::ForceU
   }
 }
 
-std::string write_page(const Study& study, const Changes* changes, const residuals::ForceUnit& unit,
-                       const files::Json& result, const std::string& folder) {
+using ClockOffsets = std::vector<identification::ClockOffset>;
+
+std::string write_page(const Study& study, const ClockOffsets& clocks, const Changes* changes,
+                       const residuals::ForceUnit& unit, const files::Json& result,
+                       const std::string& folder) {
   Report report("What does the model lack?");
   report.made_by(command_to_copy());
   report.result(result);
   report.paragraph(headline(study, unit));
+  for (const identification::ClockOffset& clock : clocks) report.paragraph(sentence(clock));
   report.heading("Where the model failed");
   add_before_and_after(report, study.before.all, study.after.all, study.pictures.room, unit);
   add_moments(report, study, unit);
@@ -130,8 +135,9 @@ std::string write_page(const Study& study, const Changes* changes, const residua
 
 }  // namespace
 
-std::string write_study_folder(const Study& study, const Changes* changes, const residuals::ForceUnit& unit,
-                               const files::Json& result, const std::string& folder) {
+std::string write_study_folder(const Study& study, const ClockOffsets& clocks, const Changes* changes,
+                               const residuals::ForceUnit& unit, const files::Json& result,
+                               const std::string& folder) {
   const std::filesystem::path path(folder);
   std::filesystem::create_directories(path);
   if (study.ladder.any_accepted) {
@@ -140,7 +146,7 @@ std::string write_study_folder(const Study& study, const Changes* changes, const
         stability::to_toml(study.ladder.model, {"Effects fitted to flights by swarmcert study."}), true);
   }
   files::write_file((path / "study.json").string(), files::to_text(result), true);
-  return write_page(study, changes, unit, result, folder);
+  return write_page(study, clocks, changes, unit, result, folder);
 }
 
 }  // namespace swarmcert::analysis

@@ -1,0 +1,68 @@
+/// @file The vertical force on one vehicle beside the places of the others, for shifts of the others' clocks.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "analysis/identification/scan/curve_fit.h"
+#include "analysis/residuals/track.h"
+
+namespace swarmcert::identification {
+
+inline constexpr double kClockSample_s = 0.05;  ///< over which forces are averaged
+inline constexpr double kClockStep_s = 0.02;    ///< of shifts
+inline constexpr int kClockSteps = 20;          ///< most steps between two clocks, to each side
+inline constexpr int kWakeSteps = 15;           ///< most steps that a wake takes to arrive
+inline constexpr int kClockTenths = 10;         ///< parts of a flight that are left out in turn
+
+/// Maps from a neighbour's place to the vertical force, one per kind of neighbour, fitted to the sum over all
+/// neighbours, each read at the vehicle's time plus a shift.
+class Interplay {
+ public:
+  static constexpr int kAbsent = std::numeric_limits<int>::min();
+  /// What the maps explain of total(): of the whole flight, then without one tenth each, N^2.
+  using Explained = std::array<double, kClockTenths + 1>;
+
+  /// @param r force_residual() of `own`, in W. @param others vehicles on the clock of `own`, save for what is sought
+  Interplay(const residuals::Track& own, const std::vector<Eigen::Vector3d>& r,
+            const std::vector<const residuals::Track*>& others);
+
+  int size() const { return static_cast<int>(force_N_.size()); }
+  bool is_rich() const;
+  /// Sum of squares about the mean, N^2.
+  double total() const;
+  /// @param shifts of each of the others, in steps from -kClockSteps - kWakeSteps to kClockSteps, or kAbsent. What was
+  ///     asked once is remembered.
+  const Explained& explained(const std::vector<int>& shifts);
+
+ private:
+  struct Path {
+    std::vector<double> time_s;
+    std::vector<Eigen::Vector3d> p_m;
+    int map = 0;                                 ///< which map its kind has
+    std::map<int, std::vector<SparseRow>> rows;  ///< by shift, as they are asked for
+  };
+  /// Sums of a least-squares fit over a tenth of the flight.
+  struct Sums {
+    Eigen::MatrixXd gram;
+    Eigen::VectorXd b, columns;
+    double sum = 0, count = 0;
+  };
+
+  void read(const residuals::Track& own, const std::vector<Eigen::Vector3d>& r);
+  void keep_what_every_shift_knows();
+  const std::vector<SparseRow>& rows_at(Path& path, int shift) const;
+  std::vector<Sums> sums_at(const std::vector<int>& shifts);
+  Explained fitted_to(const std::vector<Sums>& tenths) const;
+
+  std::vector<double> time_s_, force_N_;
+  std::vector<Eigen::Vector3d> own_m_;
+  std::vector<Path> others_;
+  int maps_ = 0;
+  std::map<std::vector<int>, Explained> known_;
+};
+
+}  // namespace swarmcert::identification
