@@ -71,8 +71,6 @@ void stay_inside(int flights, double nearest, double share_z,
   EXPECT_GT(campaign.largest_share_z, share_z);
 }
 
-TEST(FlightsInTube, NoneOfTwentyLeavesItAndSomeReachAFifthOfIt) { stay_inside(20, 0.6, 0.2); }
-
 TEST(FlightsInTube, NoneOfTwoHundredWithRandomLagsOfTheirMotorsLeavesIt) {
   stay_inside(200, 0.6, 0.2, kLags_s);
 }

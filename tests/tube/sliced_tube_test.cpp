@@ -106,7 +106,7 @@ TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOn
   const auto task = stability::make_task("swap", {2, 4.5, 0});
   // At 500 Hz and at 100 Hz, where predictions also rest on states twice as old.
   for (const auto& [gains, most] :
-       {std::pair("firmware-defaults", 1.08), std::pair("crazyflie-small", 1.5)}) {
+       {std::pair("firmware-defaults", 1.08), std::pair("crazyflie-small", 1.35)}) {
     SCOPED_TRACE(gains);
     const stability::TrackingSetup loop = tests::loop_of(gains);
     double radius_m[2][3];

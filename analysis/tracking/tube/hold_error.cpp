@@ -70,16 +70,16 @@ HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice) {
   // more <= per_rising_N (Kp |e'| + sup|p_d'''| + Kd (near + more)) + per_N (rest + trapezoidal (ever + more))
   const Interval left = Interval(1) - per_rising_N * loop.Kd - per_N * trapezoidal;
   if (!(left.lower > 0)) return nothing;
-  const double more_m_s2 = ((per_rising_N * (Interval(loop.Kp) * slice.velocity_m_s.mag() + slice.jerk_m_s3 +
-                                             Interval(loop.Kd) * near_m_s2) +
+  const double more_m_s2 = ((per_rising_N * (Interval(loop.Kp) * slice.velocity_m_s.mag() +
+                                             slice.jerk_m_s3.mag() + Interval(loop.Kd) * near_m_s2) +
                              per_N * (rest + trapezoidal * ever_m_s2)) /
                             Interval(left.lower))
                                .upper;
   HeldAnswer result;
   result.acceleration_m_s2 = slice.acceleration_m_s2 + Interval(-more_m_s2, more_m_s2);
   const Interval slope = Interval(loop.Kp) * slice.velocity_m_s +
-                         Interval(loop.Kd) * hull(result.acceleration_m_s2, slice.acceleration_before_m_s2) +
-                         Interval(-slice.jerk_m_s3, slice.jerk_m_s3);
+                         Interval(loop.Kd) * hull(result.acceleration_m_s2, slice.acceleration_before_m_s2) -
+                         slice.jerk_m_s3;
   const double largest_m_s2 = std::max(slice.largest_acceleration_m_s2, result.acceleration_m_s2.mag());
   const double away = (rest + trapezoidal * largest_m_s2).upper;
   result.hold_N = mass * (Interval(0, T.upper) * slope + Interval(-away, away));

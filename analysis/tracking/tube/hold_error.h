@@ -41,7 +41,7 @@ struct HeldSlice {
   Interval acceleration_before_m_s2;     ///< e'' over the period before
   LoopHistory history;                   ///< up to the end of the slice
   double largest_acceleration_m_s2 = 0;  ///< sup |e''| up to the slice's start
-  double jerk_m_s3 = 0;                  ///< sup |p_d'''|
+  Interval jerk_m_s3;                    ///< p_d'''
   double per_N = 0;                      ///< what |m x| <= 1 N in the slice adds to |e''| in it
   /// The same of |m x| <= (t - t_k)/T 1 N, where t_k is the last sample; at most per_N
   double per_rising_N = 0;
@@ -59,8 +59,8 @@ struct HeldAnswer {
 /// The same bound slice by slice and with its sign: as c(t) - c(t_k) = int_{t_k}^t (Kp e' + Kd e'') + the integral's
 /// part,
 ///   x(t) lies in (t - t_k) Y + [-1, 1] Ki (T/2 sup|e| + (T^2/2) sup|e'| + |R|),
-///   Y = Kp E' + Kd E'' + [-1, 1] sup|p_d'''|,
-/// E' and E'' intervals of e' and e'' over the slice and a period before it. What x adds to E'' in its own slice is
+///   Y = Kp E' + Kd E'' - J,
+/// E', E'' and J intervals of e', e'' and p_d''' over the slice and a period before it. What x adds to E'' in its own slice is
 /// solved for as above. All are infinite where nothing is known.
 HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice);
 

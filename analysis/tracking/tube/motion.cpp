@@ -28,7 +28,7 @@ double whole_periods_s(double duration_s, double period_s, double longest_s) {
   return longest_s;
 }
 
-Motion sliced(const stability::Task& task, int vehicles, double memory_s, double longest_s) {
+Motion sliced(const stability::Task& task, int vehicles, double memory_s, double longest_s, double held_s) {
   Motion motion;
   motion.vehicles = vehicles;
   motion.slices = static_cast<int>(std::ceil(task.duration_s() / longest_s - 1e-9));
@@ -36,15 +36,18 @@ Motion sliced(const stability::Task& task, int vehicles, double memory_s, double
   motion.stretch_of.resize(static_cast<std::size_t>(vehicles));
   std::map<std::vector<double>, int> known;
   for (int k = 0; k < motion.slices; ++k) {
-    std::vector<SetpointRange> ranges;
+    std::vector<SetpointRange> ranges, now, held;
     // A little more than the slice: k slice_s is rounded.
     const double margin_s = 1e-12 * (k + 2);
-    const double from_s = std::max(0.0, k * motion.slice_s - memory_s - margin_s);
-    for (int i = 0; i < vehicles; ++i) {
-      const std::optional<SetpointRange> range = task.over(i, from_s, (k + 1) * motion.slice_s + margin_s);
-      if (!range) return {};
-      ranges.push_back(*range);
-    }
+    const auto add_ranges = [&](double before_s, std::vector<SetpointRange>& to) {
+      const double from_s = std::max(0.0, k * motion.slice_s - before_s - margin_s);
+      for (int i = 0; i < vehicles; ++i) {
+        const std::optional<SetpointRange> range = task.over(i, from_s, (k + 1) * motion.slice_s + margin_s);
+        if (range) to.push_back(*range);
+      }
+      return to.size() == static_cast<std::size_t>(vehicles);
+    };
+    if (!add_ranges(memory_s, ranges) || !add_ranges(0, now) || !add_ranges(held_s, held)) return {};
     for (int i = 0; i < vehicles; ++i) {
       const SetpointRange& own = ranges[static_cast<std::size_t>(i)];
       Stretch stretch;
@@ -74,10 +77,16 @@ Motion sliced(const stability::Task& task, int vehicles, double memory_s, double
       add(own.p_W_m[2]);
       for (int a = 0; a < 3; ++a) add(own.v_W_m_s[a]);
       for (int a = 0; a < 3; ++a) {
-        stretch.acceleration_m_s2[a] = snapped(own.a_W_m_s2[a]);
-        key.push_back(stretch.acceleration_m_s2[a].lower);
-        key.push_back(stretch.acceleration_m_s2[a].upper);
-        stretch.jerk_m_s3[a] = largest(own.jerk_W_m_s3[a]);
+        const auto kept = [&key](Interval x) {
+          const Interval outer = snapped(x);
+          key.push_back(outer.lower);
+          key.push_back(outer.upper);
+          return outer;
+        };
+        const auto at = static_cast<std::size_t>(i);
+        stretch.acceleration_m_s2[a] = kept(own.a_W_m_s2[a]);
+        stretch.acceleration_now_m_s2[a] = kept(now[at].a_W_m_s2[a]);
+        stretch.jerk_m_s3[a] = kept(held[at].jerk_W_m_s3[a]);
       }
       const auto [found, is_new] = known.emplace(std::move(key), static_cast<int>(motion.stretches.size()));
       if (is_new) motion.stretches.push_back(std::move(stretch));

@@ -112,7 +112,8 @@ Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& t
       motion_(sliced(task, vehicles, network_age_s,
                      is_sampled && tracking.gains.rate_hz > 0
                          ? whole_periods_s(task.duration_s(), 1 / tracking.gains.rate_hz, longest_slice_s)
-                         : longest_slice_s)),
+                         : longest_slice_s,
+                     is_sampled && tracking.gains.rate_hz > 0 ? up(1 / tracking.gains.rate_hz) : 0)),
       loops_(motion_.slices > 0
                  ? error_loops(tracking, motion_.slice_s, motion_.slices, is_sampled, motor_lag_s)
                  : ErrorLoops{}),
@@ -230,7 +231,7 @@ std::array<ErrorHistory, 3> Scene::other_errors(int vehicle, const std::vector<T
     for (const int s : motion_.stretch_of[static_cast<std::size_t>(vehicle)]) {
       const auto at = static_cast<std::size_t>(s);
       feed_forward.size.push_back(up(mass_kg * motion_.stretches[at].acceleration_m_s2[axis].mag()));
-      feed_forward.rate.push_back(up(mass_kg * motion_.stretches[at].jerk_m_s3[axis]));
+      feed_forward.rate.push_back(up(mass_kg * motion_.stretches[at].jerk_m_s3[axis].mag()));
       force.size.push_back(truth[at].force_N[axis].mag());
     }
     feed_forward.at_start = feed_forward.size.front();
@@ -262,7 +263,7 @@ LoopHistory Scene::in_slice(const Stretch& stretch, int slice, std::size_t axis,
   history.truth_N = truth.force_N[axis].mag();
   history.force_N = axis == 2 ? force_N : history.truth_N;
   history.planned_m_s2 = stretch.acceleration_m_s2[axis].mag();
-  history.jerk_m_s3 = stretch.jerk_m_s3[axis];
+  history.jerk_m_s3 = stretch.jerk_m_s3[axis].mag();
   history.time_s = (slice + 1) * motion_.slice_s * (1 + 1e-12);
   const std::vector<double>& of_estimates_m_s2 = estimate_answers_[axis].acceleration_m_s2;
   if (!of_estimates_m_s2.empty())

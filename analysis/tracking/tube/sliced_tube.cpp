@@ -105,7 +105,7 @@ struct Axis {
 
   /// m x and e'' of this slice if its signals without m x are d and w, e' is `velocity` since a period ago.
   /// @param back slices before this one in which a command that acts in this one may have been made.
-  HeldAnswer held(Interval d, Interval w, Interval velocity, double jerk_m_s3, const LoopHistory& history,
+  HeldAnswer held(Interval d, Interval w, Interval velocity, Interval jerk_m_s3, const LoopHistory& history,
                   std::size_t back) const {
     const std::size_t n = force.size();
     const auto with_last = [](Interval now, const std::vector<Interval>& past) {
@@ -172,6 +172,12 @@ class Sweep {
       axes_.back()[2].start = &scene.lag_start_z();
       axes_.back()[2].excess_N = scene.excess_at_start_N(i);
     }
+    // Where slices are whole periods, only their borders are rounded.
+    const ErrorLoop& loop = scene.loops().axis[0];
+    if (loop.period_s > 0)
+      held_ = loop.has_whole_periods
+                  ? 1
+                  : static_cast<int>(std::ceil(loop.period_s / scene.motion().slice_s * (1 + 1e-9)));
     remembered_ = static_cast<int>(std::ceil(scene.network_age_s() / scene.motion().slice_s + 1e-9));
   }
 
@@ -200,11 +206,16 @@ class Sweep {
             fmt::format("at {:.3g} s errors could exceed {:g} m", n * scene_.motion().slice_s, farthest_m);
         return false;
       }
-      Deviations seen = tried;
-      for (int back = 1; back <= std::min(remembered_, n); ++back)
-        seen = hull_of(seen, tube.slices[static_cast<std::size_t>(n - back)]);
-      files::parallel_for(scene_.vehicles(), options_.jobs,
-                          [&](int v) { signals[static_cast<std::size_t>(v)] = signals_of(v, n, seen); });
+      const auto with_past = [&](int slices) {
+        Deviations result = tried;
+        for (int back = 1; back <= std::min(slices, n); ++back)
+          result = hull_of(result, tube.slices[static_cast<std::size_t>(n - back)]);
+        return result;
+      };
+      const Deviations seen = with_past(remembered_), recent = with_past(held_);
+      files::parallel_for(scene_.vehicles(), options_.jobs, [&](int v) {
+        signals[static_cast<std::size_t>(v)] = signals_of(v, n, seen, recent);
+      });
       if (options_.cancelled != nullptr && *options_.cancelled) return false;
     }
     tube.why = fmt::format("no tube was found that holds at {:.3g} s", n * scene_.motion().slice_s);
@@ -221,7 +232,9 @@ class Sweep {
   };
   using Signals = std::vector<Signal>;
 
-  Signal signals_of(int vehicle, int slice, const Deviations& seen) const {
+  /// @param seen what a prediction that acts in the slice may rest on.
+  /// @param recent what a command that acts in it may rest on.
+  Signal signals_of(int vehicle, int slice, const Deviations& seen, const Deviations& recent) const {
     const Motion& motion = scene_.motion();
     const int s = motion.stretch_of[static_cast<std::size_t>(vehicle)][static_cast<std::size_t>(slice)];
     const Stretch& stretch = motion.stretches[static_cast<std::size_t>(s)];
@@ -233,14 +246,14 @@ class Sweep {
     const Interval mass_kg(scene_.tracking().plant.mass_kg);
     const auto i = static_cast<std::size_t>(vehicle);
     for (std::size_t k = 0; k < 3; ++k) {
-      signal.lagging_N[k] = signal.truth.force_N[k] - mass_kg * stretch.acceleration_m_s2[k];
+      signal.lagging_N[k] = signal.truth.force_N[k] - mass_kg * stretch.acceleration_now_m_s2[k];
       signal.met[k] = axes_[i][k].met;
       signal.met[k].add(scene_.in_slice(stretch, slice, k, signal.difference_N.mag(), signal.truth,
                                         seen[i].position_m[k].mag(), seen[i].velocity_m_s[k].mag()));
       if (scene_.loops().is_sampled()) {
         signal.held[k] =
-            axes_[i][k].held(known_force(signal, k), signal.lagging_N[k], seen[i].velocity_m_s[k],
-                             stretch.jerk_m_s3[k], signal.met[k], static_cast<std::size_t>(remembered_));
+            axes_[i][k].held(known_force(signal, k), signal.lagging_N[k], recent[i].velocity_m_s[k],
+                             stretch.jerk_m_s3[k], signal.met[k], static_cast<std::size_t>(held_));
       }
     }
     return signal;
@@ -288,6 +301,7 @@ class Sweep {
   const Scene& scene_;
   const EnclosureOptions& options_;
   double tolerance_N_;
+  int held_ = 0;  ///< slices before the present one in which a command that acts in it may have been made
   int remembered_ = 0;  ///< slices before the present one whose states the network may still act upon
   std::vector<std::array<Axis, 3>> axes_;
   Signals last_;

@@ -70,7 +70,7 @@ AxisLoads axis_loads(const Scene& scene, const LocalTube& tube, int vehicle, std
                                   tube.tube.truth[at], tube.tube.radii.position_m[i][axis],
                                   tube.tube.radii.velocity_m_s[i][axis]));
     result.planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis].mag());
-    result.jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis]);
+    result.jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis].mag());
     result.lagged_N.push_back(up(result.truth_N.back() + up(mass_kg * result.planned_m_s2.back())));
   }
   const std::vector<double> hold_by_slice_N =
