@@ -13,9 +13,9 @@ Finding curriculum(const Setting& setting);
 Finding minutes_of_data(const Setting& setting);
 /// tab:nnperf, with the errors along x and y.
 Finding performance(const Setting& setting);
-/// Three results of section V-C that tab:nnperf alone does not give: that a network trained with two vehicles harms four,
-/// that thrust saturates in swaps of three and more, and that errors fall with the vehicles in training. Flown under
-/// compositions of wakes, batteries and heights that the paper leaves open: which of them show which result.
+/// Three results of section V-C that tab:nnperf alone does not give: that a network trained with two vehicles harms
+/// four, that thrust saturates in swaps of three and more, and that errors fall with the vehicles in training. Flown
+/// under compositions of wakes, batteries and heights that the paper leaves open: which of them show which result.
 Finding claims(const Setting& setting);
 Finding figure_intro(const Setting& setting);
 Finding figure_swaps(const Setting& setting);

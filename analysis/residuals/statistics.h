@@ -32,7 +32,8 @@ struct BlockSum {
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
   double count = 0;
 };
-/// 90 % interval of the root mean square by resampling blocks, for x, y, z and total; equal ends where there are fewer than two blocks.
+/// 90 % interval of the root mean square by resampling blocks, for x, y, z and total; equal ends where there are fewer
+/// than two blocks.
 std::array<Interval, 4> bootstrap_rmse(const std::vector<BlockSum>& blocks, std::uint64_t seed);
 
 /// Value below which a share `p` of `values` lies; 0 if empty. Reorders `values`.
