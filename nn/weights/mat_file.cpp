@@ -2,6 +2,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 #include <optional>
@@ -256,13 +257,23 @@ class MatReader {
 
 }  // namespace
 
+bool looks_like_hdf5(const std::string& bytes) {
+  constexpr std::string_view kSignature("\x89HDF\r\n\x1a\n", 8);
+  for (std::size_t at = 0; at < bytes.size(); at = std::max<std::size_t>(512, 2 * at))
+    if (bytes.compare(at, kSignature.size(), kSignature) == 0) return true;
+  return false;
+}
+
 bool looks_like_mat(const std::string& bytes) {
   return bytes.size() >= kHeader_bytes && bytes.compare(0, 7, "MATLAB ") == 0 &&
          (bytes.compare(126, 2, "IM") == 0 || bytes.compare(126, 2, "MI") == 0);
 }
 
 Weights parse_mat(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
-  if (bytes.compare(0, 10, "MATLAB 7.3") == 0 || bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
+  if (bytes.compare(0, 10, "MATLAB 7.3") == 0 || looks_like_hdf5(bytes))
+    throw InputError({path, "offset 0", "", "", "is a MAT file of version 7.3 (HDF5), which is not read",
+                      std::string("load it there and ") + kSaveAgain});
+  if (bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
     throw InputError({path, "offset 124", "", "", "is a MAT file of another version than 5", kSaveAgain});
   if (bytes.compare(126, 2, "IM") != 0)
     throw InputError({path, "offset 126", "", "", "the numbers are not little-endian", kSaveAgain});

@@ -7,6 +7,11 @@
 
 namespace swarmcert::files {
 
+/// True if `bytes` have HDF5's signature where the format allows it: at offset 0, 512, 1024, 2048, ... MATLAB's -v7.3
+/// files are such files, and Keras's .h5. None is read: HDF5 is a file system with its own filters and links, and its
+/// library no safe reader of files from strangers; every program that writes it also writes a simple format.
+bool looks_like_hdf5(const std::string& bytes);
+
 /// True if `bytes` begin as a MAT file of version 5 or later does.
 bool looks_like_mat(const std::string& bytes);
 

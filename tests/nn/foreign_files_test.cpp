@@ -149,11 +149,28 @@ TEST(Nnet, DamagedLinesAreRefusedByNumber) {
 TEST(MatFile, OtherVersionsAreRefusedWithTheCallThatMendsThem) {
   const std::string good = read_file(foreign("scipy_weights.mat"));
   std::string newer = good;
-  newer.replace(0, 10, "MATLAB 7.3");
+  newer[125] = '\3';
   EXPECT_TRUE(is_refused(newer, {"another version than 5", "-v7"}));
   std::string big_endian = good;
   big_endian.replace(126, 2, "MI");
   EXPECT_TRUE(is_refused(big_endian, {"not little-endian"}));
+}
+
+// "MATLAB MAT-File Versions": -v7.3 puts 512 bytes of text and version 0x0200 before an HDF5 file.
+TEST(MatFile, Hdf5IsRefusedWithTheCallThatMendsIt) {
+  const std::string hdf5 = std::string("\x89HDF\r\n\x1a\n", 8) + std::string(100, '\0');
+  std::string head = "MATLAB 7.3 MAT-file, Platform: GLNXA64";
+  head.resize(124, ' ');
+  head += std::string("\0\2IM", 4);
+  head.resize(512, '\0');
+  const std::vector<std::string> by_matlab{"version 7.3 (HDF5)", "load it there", "-v7'"};
+  EXPECT_TRUE(is_refused(head + hdf5, by_matlab));
+  std::string renamed = head;  // by MATLAB's own users: only the signature tells it then
+  renamed.replace(0, 38, "MATLAB 5.0 MAT-file, by somebody else ");
+  EXPECT_TRUE(is_refused(renamed + hdf5, by_matlab));
+  EXPECT_TRUE(is_refused(hdf5, {"HDF5", "ONNX", "numpy.savez"}));
+  EXPECT_TRUE(is_refused(std::string(1024, '#') + hdf5, {"HDF5", "numpy.savez"}));
+  EXPECT_TRUE(is_refused(std::string(700, '#') + hdf5, {"is neither"}));  // no offset of HDF5
 }
 
 TEST(MatFile, ABombOfZerosIsRefused) {
