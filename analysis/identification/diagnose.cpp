@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
 #include <optional>
 #include <set>
 
@@ -60,7 +61,8 @@ bool is_explained_by_curve(const Scan& scan, double rmse_N) {
 
 /// What halves the error is named even where set points do not confirm it: at least as one of a class, with the rivals
 /// that halve it as well. Only scales of the thrust and a constant force are so plain without knowing more.
-void name_what_halves(const Passes& passes, Diagnosis& result) {
+/// @param all gives the numbers of what `passes` names
+void name_what_halves(const Passes& all, const Passes& passes, Diagnosis& result) {
   constexpr double kQuarter = 0.25;  // of the mean square
   if (result.suspected.empty() && result.contradicted.empty() && result.scan.entries.empty()) return;
   const residuals::Inputs left = inputs_with(passes, specs_of(result.ranking));
@@ -82,8 +84,8 @@ void name_what_halves(const Passes& passes, Diagnosis& result) {
     least = std::min(least, square);
   }
   if (names.empty() || is_explained_by_curve(result.scan, std::sqrt(least))) return;
-  std::vector<Missing> found =
-      fit_effects(left, passes.kind, {names[0]}, flights, passes.jobs, [](int, int) {});
+  std::vector<Missing> found = fit_effects(inputs_with(all, specs_of(result.ranking)), passes.kind,
+                                           {names[0]}, flights, passes.jobs, [](int, int) {});
   for (std::size_t i = 1; i < names.size(); ++i) {
     std::vector<Rival>& rivals = found[0].finding.rivals;
     const bool is_known = std::any_of(rivals.begin(), rivals.end(),
@@ -139,6 +141,17 @@ Candidate candidate_to_fit(const Passes& passes, const std::string& name, const 
   return result;
 }
 
+/// `inputs` for vehicles of `kind` alone, with their tracks kept between the passes: whole, or excerpts of about
+/// `most` of their blocks.
+residuals::Inputs kept_tracks(const residuals::Inputs& inputs, const std::string& kind, std::size_t blocks,
+                              std::size_t most) {
+  residuals::Inputs result = inputs;
+  result.models = {*inputs.model_of(kind)};
+  const double share = blocks > most ? static_cast<double>(most) / static_cast<double>(blocks) : 1;
+  result.tracks = std::make_shared<residuals::TrackStore>(share);
+  return result;
+}
+
 }  // namespace
 
 std::vector<int> every_flight(const residuals::Inputs& inputs) {
@@ -148,7 +161,7 @@ std::vector<int> every_flight(const residuals::Inputs& inputs) {
 }
 
 Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, const std::vector<int>& which,
-                   int jobs, const residuals::Progress& progress) {
+                   int jobs, const residuals::Progress& progress, std::size_t most_searched) {
   Diagnosis result;
   result.kind = kind;
   const Coverage covered = coverage(inputs, kind, which, jobs);
@@ -158,12 +171,16 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   result.too_poor = covered.too_poor();
   result.problems = covered.problems;
   if (!result.too_poor.empty()) return result;
-  const Passes passes = {inputs, kind, which, covered.records, jobs, progress};
-  Explained explained = explain(passes, covered);
+  const residuals::Inputs searched = kept_tracks(inputs, kind, covered.blocks, most_searched);
+  const bool is_excerpt = covered.blocks > most_searched;
+  const Coverage seen = is_excerpt ? coverage(searched, kind, which, jobs) : covered;
+  result.searched_blocks = seen.blocks;
+  const Passes all = {is_excerpt ? inputs : searched, kind, which, covered.records, jobs, progress};
+  const Passes passes = {searched, kind, which, seen.records, jobs, progress};
+  Explained explained = explain(passes, seen);
   Settled& settled = explained.settled;
   const Selected& selected = settled.selected;
   const Selection selection(selected.grams);
-  result.ranking = std::move(settled.ranking);
   result.contradicted = selected.contradicted;
   result.suspected = std::move(settled.suspected);
   result.rmse_before_N = std::sqrt(selection.mean_square({}));
@@ -178,12 +195,19 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
                                            return is_formula(entry.effect) || needs_scan(entry.effect);
                                          }),
                           result.detectable.end());
-  result.thrust_scale = thrust_scale(passes, covered);
+  if (is_excerpt) {
+    if (const auto squares = fit_to_all(all, passes, explained)) {
+      result.rmse_before_N = std::sqrt(squares->first);
+      result.rmse_after_N = std::sqrt(squares->second);
+    }
+  }
+  result.ranking = std::move(settled.ranking);
+  result.thrust_scale = thrust_scale(all, covered);
   name_hidden_scale(*inputs.model_of(kind), result.thrust_scale, result.ranking);
   result.remainder = std::move(settled.rest);
   result.scan = std::move(explained.scan);
   result.formulas = std::move(explained.formulas);
-  name_what_halves(passes, result);
+  name_what_halves(all, passes, result);
   scan_balance(passes, result);
   return result;
 }

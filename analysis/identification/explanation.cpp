@@ -329,20 +329,37 @@ Explained explain_by_formulas(const Passes& passes, const Coverage& covered) {
   return result;
 }
 
+/// Of the names, in their order.
+std::vector<Refined> refined_of(const Settled& settled) {
+  std::vector<Refined> result;
+  for (const Missing& missing : settled.ranking) {
+    const std::vector<Refined>& all = settled.selected.refined;
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Refined& effect) {
+      return effect.candidate.name == missing.effect;
+    });
+    if (found == all.end()) return {};
+    result.push_back(*found);
+  }
+  return result;
+}
+
+/// Checks `refined` against the set points, widens its intervals, and gives `ranking` its numbers.
+void set_numbers(const Passes& passes, std::vector<Refined>& refined, const Grams& grams,
+                 std::vector<Missing>& ranking) {
+  const std::vector<std::vector<InstrumentedValue>> checks = instrument(passes, candidates_of(refined));
+  widen_by_bias(checks, instrument_with_shapes(passes, refined), refined);
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    ranking[i] = with_numbers(passes, refined[i], ranking[i], grams);
+    if (!checks.empty()) ranking[i].instrument = checks[i];
+  }
+}
+
 /// Lags and delays as the innovations of the residual show them, with the other numbers fitted and checked beside them
 /// as fit_effects() does. What is left is scanned anew where a time moved.
 void correct_memories(const Passes& passes, Explained& explained) {
   constexpr double kMoved = 0.1;
   std::vector<Missing>& ranking = explained.settled.ranking;
-  std::vector<Refined> refined;
-  for (const Missing& missing : ranking) {
-    const std::vector<Refined>& all = explained.settled.selected.refined;
-    const auto found = std::find_if(all.begin(), all.end(), [&](const Refined& effect) {
-      return effect.candidate.name == missing.effect;
-    });
-    if (found == all.end()) return;
-    refined.push_back(*found);
-  }
+  const std::vector<Refined> refined = refined_of(explained.settled);
   std::vector<Refined> corrected = with_innovations(passes, refined);
   bool is_other = false, has_moved = false;
   for (std::size_t i = 0; i < corrected.size(); ++i) {
@@ -352,11 +369,11 @@ void correct_memories(const Passes& passes, Explained& explained) {
     has_moved = has_moved || moved > kMoved * refined[i].theta[0];
   }
   if (!is_other) return;  // no lag, or white noise: the numbers and their intervals stand
-  const std::vector<std::vector<InstrumentedValue>> checks = instrument(passes, candidates_of(corrected));
-  widen_by_bias(checks, instrument_with_shapes(passes, corrected), corrected);
-  for (std::size_t i = 0; i < corrected.size(); ++i) {
-    ranking[i] = with_numbers(passes, corrected[i], ranking[i], explained.settled.selected.grams);
-    if (!checks.empty()) ranking[i].instrument = checks[i];
+  set_numbers(passes, corrected, explained.settled.selected.grams, ranking);
+  for (const Refined& effect : corrected) {
+    for (Refined& known : explained.settled.selected.refined) {
+      if (known.candidate.name == effect.candidate.name) known = effect;
+    }
   }
   if (!has_moved) return;
   explained.settled.rest = remainder(passes, specs_of(ranking));
@@ -372,6 +389,33 @@ Explained explain(const Passes& passes, const Coverage& covered) {
   drop_names(passes, explained,
              [&](const Missing& missing) { return may_be_no_lag(missing, explained.settled.rest); });
   return explained;
+}
+
+std::optional<std::pair<double, double>> fit_to_all(const Passes& all, const Passes& seen,
+                                                    Explained& explained) {
+  std::vector<Missing>& ranking = explained.settled.ranking;
+  std::vector<Refined> refined = refit(all, seen, refined_of(explained.settled));
+  if (refined.size() < ranking.size()) return std::nullopt;
+  std::vector<Candidate> candidates;
+  Members members;
+  for (const Refined& effect : refined) {
+    members.push_back({static_cast<int>(candidates.size()), 0});
+    candidates.push_back(effect.candidate);
+  }
+  const Grams grams =
+      block_grams(all.inputs, all.kind, std::move(candidates), all.flights, all.jobs, all.progress);
+  const Selection selection(grams);
+  const std::vector<Finding> found = findings(selection, members);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    Finding& finding = ranking[i].finding;
+    Finding next = found[i];
+    next.member = finding.member;
+    next.rivals = std::move(finding.rivals);
+    next.model_form = std::move(finding.model_form);
+    finding = std::move(next);
+  }
+  if (!refined.empty()) set_numbers(all, refined, grams, ranking);
+  return std::make_pair(selection.mean_square({}), selection.mean_square(members));
 }
 
 }  // namespace swarmcert::identification

@@ -362,6 +362,29 @@ std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& n
   return result;
 }
 
+/// `refined` with the shapes that were free once more so.
+std::vector<Refined> freed(std::vector<Refined> refined) {
+  for (Refined& effect : refined) {
+    for (std::size_t k = 0; k < effect.theta.size(); ++k) {
+      if (!(effect.shape_intervals[k].first < effect.shape_intervals[k].second)) continue;
+      effect.candidate.thetas.push_back(effect.theta);
+      effect.candidate.thetas.back()[k] += 1;
+    }
+  }
+  return refined;
+}
+
+std::vector<Refined> fitted_from(const Passes& passes, const std::vector<Refined>& refined) {
+  Refinement refinement(passes);
+  for (const Refined& effect : refined) refinement.add(effect.candidate, effect.theta, Moves::kAll);
+  return refinement.run();
+}
+
+bool has_memory(const std::vector<Refined>& refined) {
+  return std::any_of(refined.begin(), refined.end(),
+                     [](const Refined& effect) { return effect.candidate.info.remembers; });
+}
+
 }  // namespace
 
 std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members) {
@@ -377,9 +400,7 @@ std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Memb
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined) {
   constexpr int kMostRounds = 4;  // a wrong lag hides part of the gusts, and with it of their correlation
   constexpr double kSettledNoise = 0.05;
-  const bool has_memory = std::any_of(refined.begin(), refined.end(),
-                                      [](const Refined& effect) { return effect.candidate.info.remembers; });
-  if (!has_memory || passes.records > kTooManyToRefine) return refined;
+  if (!has_memory(refined) || passes.records > kTooManyToRefine) return refined;
   const std::vector<Refined> by_squares = refined;
   Noise before;
   for (int round = 0; round < kMostRounds; ++round) {
@@ -393,6 +414,22 @@ std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined>
   }
   widen_by_answers(by_squares, refined);
   return refined;
+}
+
+std::vector<Refined> refit(const Passes& all, const Passes& seen, const std::vector<Refined>& found) {
+  const std::vector<Refined> refined = freed(found);
+  if (refined.empty()) return {};
+  const Noise noise = has_memory(refined) ? noise_beside(seen, refined) : Noise();
+  if (!(noise.forget_s > 0)) return fitted_from(all, refined);
+  std::vector<Refined> whitened = with_whitened_memories(all, noise, refined);
+  // What whitening moves is known well enough from the excerpt.
+  std::vector<Refined> by_squares = fitted_from(seen, refined);
+  for (std::size_t i = 0; i < whitened.size(); ++i) {
+    for (std::size_t k = 0; k < whitened[i].theta.size(); ++k)
+      by_squares[i].theta[k] += whitened[i].theta[k] - refined[i].theta[k];
+  }
+  widen_by_answers(by_squares, whitened);
+  return whitened;
 }
 
 }  // namespace swarmcert::identification

@@ -34,4 +34,8 @@ std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Memb
 /// everything else fitted anew beside them; as it is where none is refined, or what is left is white.
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined);
 
+/// `found`, as `seen`, an excerpt of the flights of `all`, gave it, fitted to all of them from there: lags and delays
+/// to the innovations again, with intervals that allow for as much of what whitening removes as with_innovations().
+std::vector<Refined> refit(const Passes& all, const Passes& seen, const std::vector<Refined>& found);
+
 }  // namespace swarmcert::identification

@@ -204,12 +204,21 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
   for (auto& [vehicle, use] : uses) {
     if (model_of(use.kind) == nullptr) use.position_only = true;
   }
-  std::vector<Track> tracks =
-      load_flight(found.flights[index], uses, fallback_kind, kinds, map, rules, *cache, problems);
-  for (Track& track : tracks) {
+  const FlightFiles& flight = found.flights[index];
+  const auto load_all = [&](std::vector<std::string>& told) {
+    return load_flight(flight, uses, fallback_kind, kinds, map, rules, *cache, told);
+  };
+  std::vector<Track> loaded =
+      tracks == nullptr ? load_all(problems) : tracks->tracks(flight, load_all, problems);
+  for (Track& track : loaded) {
     if (track.position_only) continue;
     if (has_only_log_models && log_models.count(track.path) == 0) {
       problems.push_back(track.path + ": no model: none is named, and flights.toml gives this log none");
+      track.position_only = true;
+      continue;
+    }
+    const bool has_own = log_models.count(track.path) != 0 || vehicle_models.count(track.vehicle) != 0;
+    if (!has_own && model_of(track.kind) == nullptr) {
       track.position_only = true;
       continue;
     }
@@ -226,7 +235,7 @@ std::vector<Track> Inputs::load(std::size_t index, std::vector<std::string>& pro
     if (rules.per_mass) continue;
     for (logs::Doubt& doubt : doubts_of(model, track)) track.doubts.push_back(std::move(doubt));
   }
-  return tracks;
+  return loaded;
 }
 
 std::vector<std::string> Inputs::files() const {

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "analysis/logs/signals.h"
 #include "analysis/residuals/log_cache.h"
 #include "analysis/residuals/track.h"
+#include "analysis/residuals/track_store.h"
 #include "stability/gains.h"
 #include "stability/model.h"
 
@@ -58,6 +60,9 @@ struct Inputs {
   std::string fallback_kind;
   std::vector<std::string> named_files;
   std::shared_ptr<LogCache> cache;  ///< shared by copies
+  /// Where load() takes tracks from; null: from the logs. Copies that share it may differ in models of the same kinds
+  /// and in the choice of flights, in nothing else.
+  std::shared_ptr<TrackStore> tracks;
 };
 
 /// @throws files::InputError as the readers of these files do, and where two models have one kind.

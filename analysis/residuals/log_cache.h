@@ -15,7 +15,8 @@ namespace swarmcert::residuals {
 /// Safe to use from several threads. What was not asked for the longest goes first when the memory is full.
 class LogCache {
  public:
-  static constexpr std::size_t kMost_bytes = std::size_t{512} << 20;
+  /// Six hours at 100 Hz.
+  static constexpr std::size_t kMost_bytes = std::size_t{900} << 20;
 
   /// @param hover_multiples  logs are changed by logs::use_hover_multiples().
   explicit LogCache(bool hover_multiples, std::size_t most_bytes = kMost_bytes)

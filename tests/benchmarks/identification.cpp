@@ -1,9 +1,11 @@
 /// How long diagnose takes, and whether its 90 % intervals hold 90 %. In one process, on flights of the tests' own
 /// simulator (hidden_effect/other_simulator.h).
-///   benchmark_identification speed [count]
+///   benchmark_identification speed [count] [gust_N]
+///   benchmark_identification recorded MODEL FLIGHTS...
 ///   benchmark_identification coverage [count] [gust_N] [gust_time_s] [parameter]
-/// speed: one flight of 40 s, then `count` flights of two vehicles (default 240: 1.9 million records). Goals: 1 s of
-/// the processor; 60 s on two cores and 2 GiB.
+/// speed: one flight of 40 s, then `count` flights of two vehicles (default 240: 1.9 million records), in gusts if
+/// asked for. Goals: 1 s of the processor; 60 s on two cores and 2 GiB.
+/// recorded: the same for logs. Both print the ratio to a search of all blocks instead of kMostSearched of them.
 /// coverage: for each effect, `count` flights (default 100) under a gust (default 0.006 N rms and 0.5 s) that no column
 /// explains; with the name of a parameter, only the cases that have it.
 #include <fmt/core.h>
@@ -13,6 +15,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -42,13 +45,6 @@ double peak_MiB() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-residuals::Inputs inputs_of(const std::string& model, const std::string& flights) {
-  residuals::InputArguments arguments;
-  arguments.models = {model};
-  arguments.flights = {flights};
-  return residuals::read_inputs(arguments);
-}
-
 const auto kSilent = [](int, int) {};
 
 tests::Truth drag_lag_ground() {
@@ -61,28 +57,59 @@ tests::Truth drag_lag_ground() {
   return truth;
 }
 
-void time_diagnosis(const std::string& name, const std::string& folder) {
-  const residuals::Inputs inputs =
-      inputs_of(tests::source_path("stability/models/crazyflie-small.toml"), folder);
+struct Timed {
+  double processor_s = 0, wall_s = 0;
+};
+
+Timed time_diagnosis(const residuals::InputArguments& arguments, const std::string& name,
+                     std::size_t most_searched) {
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
   const double before_s = processor_s();
   const auto begin = std::chrono::steady_clock::now();
-  const auto diagnosis =
-      identification::diagnose(inputs, "small", identification::every_flight(inputs), 2, kSilent);
+  const auto diagnosis = identification::diagnose(
+      inputs, inputs.models.at(0).kind, identification::every_flight(inputs), 2, kSilent, most_searched);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  std::string named;
-  for (const identification::Missing& missing : diagnosis.ranking) named += " " + missing.effect;
+  const double used_s = processor_s() - before_s;
   fmt::print(
-      "{}: {} records, {} blocks: {:.2f} s of the processor, {:.2f} s on the clock, peak {:.0f} MiB;{}\n",
-      name, diagnosis.records, diagnosis.blocks, processor_s() - before_s, wall_s, peak_MiB(), named);
+      "{}: {} records, {} of {} blocks searched: {:.2f} s of the processor, {:.2f} s on the clock, peak "
+      "{:.0f} MiB; RMSE {:.5f} -> {:.5f} N\n",
+      name, diagnosis.records, diagnosis.searched_blocks, diagnosis.blocks, used_s, wall_s, peak_MiB(),
+      diagnosis.rmse_before_N, diagnosis.rmse_after_N);
+  for (const identification::Missing& missing : diagnosis.ranking) {
+    fmt::print("  {}", missing.effect);
+    for (const auto& [parameter, interval] : missing.intervals)
+      fmt::print("; {} {:.5f} ({:.5f} .. {:.5f})", parameter, missing.parameters.at(parameter),
+                 interval.first, interval.second);
+    fmt::print("\n");
+  }
+  return {used_s, wall_s};
 }
 
-void speed(const std::string& folder, int count) {
-  tests::fly(drag_lag_ground(), {tests::Program::kRich, 1, 40, 1}, folder + "/one");
-  time_diagnosis("one flight of 40 s", folder + "/one");
+/// With and without an excerpt. The peak of the second counts the first as well.
+void compare_searches(const residuals::InputArguments& arguments, const std::string& name) {
+  const Timed excerpt = time_diagnosis(arguments, name, identification::kMostSearched);
+  std::fflush(stdout);
+  const Timed whole = time_diagnosis(arguments, name + ", all searched", SIZE_MAX);
+  fmt::print("  ratio: {:.2f} of the processor, {:.2f} on the clock\n",
+             whole.processor_s / excerpt.processor_s, whole.wall_s / excerpt.wall_s);
+}
+
+residuals::InputArguments small_flights(const std::string& folder) {
+  residuals::InputArguments arguments;
+  arguments.models = {tests::source_path("stability/models/crazyflie-small.toml")};
+  arguments.flights = {folder};
+  return arguments;
+}
+
+void speed(const std::string& folder, int count, double gust_N) {
+  tests::Truth truth = drag_lag_ground();
+  truth.gust_N = gust_N;
+  tests::fly(truth, {tests::Program::kRich, 1, 40, 1}, folder + "/one");
+  time_diagnosis(small_flights(folder + "/one"), "one flight of 40 s", identification::kMostSearched);
   for (int i = 0; i < count; ++i)
-    tests::fly(drag_lag_ground(), {tests::Program::kRich, 2, 40, static_cast<std::uint64_t>(i)},
+    tests::fly(truth, {tests::Program::kRich, 2, 40, static_cast<std::uint64_t>(i)},
                fmt::format("{}/many/flight{:03}", folder, i));
-  time_diagnosis("many flights", folder + "/many");
+  compare_searches(small_flights(folder + "/many"), "many flights");
 }
 
 /// Effects that are fitted together, with a truth that has their form.
@@ -128,8 +155,7 @@ void coverage(const std::string& folder, int count, double gust_N, double gust_t
       const std::string flight = folder + "/flight";
       std::filesystem::remove_all(flight);
       tests::fly(truth, {tests::Program::kRich, c.vehicles, 40, static_cast<std::uint64_t>(100 + i)}, flight);
-      const residuals::Inputs inputs =
-          inputs_of(tests::source_path("stability/models/crazyflie-small.toml"), flight);
+      const residuals::Inputs inputs = residuals::read_inputs(small_flights(flight));
       for (const identification::Missing& missing :
            identification::fit_effects(inputs, "small", c.effects, {0}, 2, kSilent)) {
         for (const auto& [name, interval] : missing.intervals) {
@@ -161,6 +187,13 @@ void coverage(const std::string& folder, int count, double gust_N, double gust_t
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "speed";
+  if (what == "recorded" && argc > 3) {
+    residuals::InputArguments arguments;
+    arguments.models = {argv[2]};
+    arguments.flights.assign(argv + 3, argv + argc);
+    compare_searches(arguments, "recorded flights");
+    return 0;
+  }
   const int count = argc > 2 ? std::atoi(argv[2]) : what == "coverage" ? 100 : 240;
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / fmt::format("swarmcert-identification-{}", getpid());
@@ -169,7 +202,7 @@ int main(int argc, char** argv) {
     coverage(folder.string(), count, argc > 3 ? std::atof(argv[3]) : 0.006,
              argc > 4 ? std::atof(argv[4]) : 0.5, argc > 5 ? argv[5] : "");
   else
-    speed(folder.string(), count);
+    speed(folder.string(), count, argc > 3 ? std::atof(argv[3]) : 0);
   std::filesystem::remove_all(folder);
   return 0;
 }

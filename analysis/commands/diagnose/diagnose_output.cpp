@@ -102,6 +102,7 @@ files::Json json_of(const Diagnosis& diagnosis) {
   files::Json kind = {{"kind", diagnosis.kind},
                       {"records", diagnosis.records},
                       {"blocks", diagnosis.blocks},
+                      {"searched_blocks", diagnosis.searched_blocks},
                       {"flights", diagnosis.flights},
                       {"rmse_before", diagnosis.rmse_before_N},
                       {"rmse_after", diagnosis.rmse_after_N},
@@ -130,6 +131,10 @@ void print_diagnosis(const Diagnosis& diagnosis) {
   fmt::print(
       "{} {}: {} records, {} blocks of 2 s.\n", diagnosis.vehicle.empty() ? "Vehicles of kind" : "Vehicle",
       diagnosis.vehicle.empty() ? diagnosis.kind : diagnosis.vehicle, diagnosis.records, diagnosis.blocks);
+  if (diagnosis.searched_blocks < diagnosis.blocks && diagnosis.too_poor.empty())
+    fmt::print(
+        "  Names were looked for in {} of the blocks, out of every flight; their numbers are of all.\n",
+        diagnosis.searched_blocks);
   if (!diagnosis.too_poor.empty()) {
     fmt::print("  No answer: {}.\n", diagnosis.too_poor);
     return;
