@@ -32,21 +32,6 @@ std::set<std::string> out_of_bounds(const Selected& selected) {
   return names;
 }
 
-/// Names that stand for thrust under load and that set points do not confirm. Thrust answers a disturbance late and in
-/// part, so that what takes away all but a tenth of what stands out of the noise is no answer and needs no witness.
-std::set<std::string> doubtful_loads(const Passes& passes, const Selected& selected) {
-  constexpr double kAnswered = 0.1;
-  std::set<std::string> loads = unconfirmed_loads(selected);
-  if (loads.empty()) return loads;
-  std::vector<Missing> with = ranking_of(passes, selected), without = with;
-  without.erase(std::remove_if(without.begin(), without.end(),
-                               [&](const Missing& missing) { return loads.count(missing.effect) == 1; }),
-                without.end());
-  const Remainder after = remainder(passes, specs_of(with)), before = remainder(passes, specs_of(without));
-  if (!after.flag && after.excess_N2 < kAnswered * before.excess_N2) loads.clear();
-  return loads;
-}
-
 /// @param rivals that compete with the names that are always candidates
 /// @param start effects where selection begins
 Settled settle(const Passes& passes, const Coverage& covered, const std::vector<Candidate>& rivals,
@@ -60,7 +45,7 @@ Settled settle(const Passes& passes, const Coverage& covered, const std::vector<
     result.selected =
         doubts_slope ? without_slope(passes, candidates, {}) : select(passes, candidates, start);
     std::set<std::string> doubtful = out_of_bounds(result.selected);
-    doubtful.merge(doubtful_loads(passes, result.selected));
+    doubtful.merge(unconfirmed_loads(result.selected));
     if (!doubtful.empty() && round + 1 < kMostRounds) {
       result.suspected.insert(result.suspected.end(), doubtful.begin(), doubtful.end());
       erase(candidates, doubtful);
@@ -214,15 +199,13 @@ void drop_doubtful_names(const Passes& passes, Explained& explained) {
              [&](const Missing& missing) { return is_doubtful(missing, explained, weight_N); });
 }
 
-/// Whether a lag or delay takes little away and may as well be none: its interval reaches down to where it ends, or
-/// what is left, which thrust answers, dominates.
-bool may_be_no_lag(const Missing& missing, const Remainder& rest) {
+/// Whether a lag or delay takes little away and may as well be none: its interval reaches down to where it ends.
+bool may_be_no_lag(const Missing& missing) {
   constexpr double kLittle = 0.1;  // of the mean square
   if (!is_of_library(missing.effect)) return false;
   const stability::EffectInfo& info = stability::effect_info(missing.effect);
   const double before = missing.finding.rmse_before_N;
   if (!info.remembers || info.shape.empty() || taken_N2(missing) >= kLittle * before * before) return false;
-  if (rest.ratio > kLoudRatio) return true;
   const auto interval = missing.intervals.find(info.shape[0].name);
   return interval != missing.intervals.end() && interval->second.lower <= info.shape[0].lower;
 }
@@ -274,14 +257,12 @@ Settled settle_with_formulas(const Passes& passes, const Coverage& covered, std:
   return result;
 }
 
-/// What set points ask for hardly reaches beyond the knee of a thrust that saturates, which throws the vehicle about: no
-/// curve over the thrust is confirmed then. Where what is left varies with the thrust, the effect itself is tried.
+/// Thrust that saturates close to hovering throws the vehicle about, and what its set points ask for hardly reaches
+/// beyond the knee: no curve over the thrust is confirmed then. Where much is left, the effect itself is tried.
 bool may_saturate(const Explained& explained, const stability::Model& model,
                   const std::vector<Candidate>& rivals) {
   const auto is_it = [](const auto& one) { return one.name == "thrust_saturation"; };
-  const std::vector<std::string>& over = explained.settled.rest.depends_on;
-  const std::string thrust = residuals::variable_name(residuals::kThrustToWeight);
-  return std::find(over.begin(), over.end(), thrust) != over.end() &&
+  return explained.settled.rest.ratio > kLoudRatio &&
          std::none_of(model.effects.begin(), model.effects.end(), is_it) &&
          std::none_of(rivals.begin(), rivals.end(), is_it);
 }
@@ -386,8 +367,7 @@ Explained explain(const Passes& passes, const Coverage& covered) {
   Explained explained = explain_by_formulas(passes, covered);
   drop_doubtful_names(passes, explained);
   correct_memories(passes, explained);
-  drop_names(passes, explained,
-             [&](const Missing& missing) { return may_be_no_lag(missing, explained.settled.rest); });
+  drop_names(passes, explained, may_be_no_lag);
   return explained;
 }
 

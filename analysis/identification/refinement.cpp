@@ -366,7 +366,7 @@ std::vector<Refined> with_whitened_memories(const Passes& passes, const Noise& n
 std::vector<Refined> freed(std::vector<Refined> refined) {
   for (Refined& effect : refined) {
     for (std::size_t k = 0; k < effect.theta.size(); ++k) {
-      if (!(effect.shape_intervals[k].first < effect.shape_intervals[k].second)) continue;
+      if (!(effect.shape_intervals[k].lower < effect.shape_intervals[k].upper)) continue;
       effect.candidate.thetas.push_back(effect.theta);
       effect.candidate.thetas.back()[k] += 1;
     }

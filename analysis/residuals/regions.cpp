@@ -18,7 +18,7 @@ struct Variable {
 const std::vector<double> kLateral_m = {0, 0.05, 0.1, 0.2, 0.4};
 const std::vector<double> kVertical_m = {0.05, 0.2, 0.3, 0.4, 0.6, 1.0};
 
-enum Index { kHeight, kSpeed, kThrust = kThrustToWeight, kBattery, kTime, kTilt, kBelow, kAbove };
+enum Index { kHeight, kSpeed, kThrust, kBattery, kTime, kTilt, kBelow, kAbove };
 
 const std::vector<Variable>& variables() {
   static const std::vector<Variable> all = {

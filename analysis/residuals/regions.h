@@ -10,7 +10,6 @@
 namespace swarmcert::residuals {
 
 inline constexpr int kNumVariables = 8;
-inline constexpr int kThrustToWeight = 2;
 /// "height", "speed", ...: the variables whose ranges make regions.
 const char* variable_name(int variable);
 

@@ -79,7 +79,7 @@ Timed time_diagnosis(const residuals::InputArguments& arguments, const std::stri
     fmt::print("  {}", missing.effect);
     for (const auto& [parameter, interval] : missing.intervals)
       fmt::print("; {} {:.5f} ({:.5f} .. {:.5f})", parameter, missing.parameters.at(parameter),
-                 interval.first, interval.second);
+                 interval.lower, interval.upper);
     fmt::print("\n");
   }
   return {used_s, wall_s};

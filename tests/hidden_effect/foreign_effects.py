@@ -191,8 +191,6 @@ EFFECTS = {
                        names={"thrust_saturation"}, speed=1.4),
     "drag of the body's front": dict(force=body_drag(), variables={"vx"}, names={"drag_linear", "drag_rotor"}),
     "late wake": dict(force=late_wake(), variables={"neighbour"}, names={"downwash", "wake_delay"}, vehicles=2),
-    "rare wake": dict(force=late_wake(0.08, 0.0, 0.05), variables={"neighbour"}, names={"downwash", "wake_delay"},
-                      vehicles=2, apart_m=0.33),
     "carpet": dict(force=carpet(), variables={"x"}, formula=expression(
         "force_z_N", "a_N * (x > 0.1)", a_N=0.02)),
     "magnet": dict(force=magnet(), variables={"xy"}, formula=expression(
