@@ -8,11 +8,12 @@
 
 namespace swarmcert::stability {
 
-/// Cells that hold for y_tau(t) = L^-1[Y_tau], Y_tau = (n + tau n')/(d + tau d'), for every constant tau of an interval.
+/// Cells that hold for y_tau(t) = L^-1[Y_tau], Y_tau = (n + tau n')/(d + tau d'), for every constant tau of an
+/// interval.
 ///
 /// Between two lags that are neighbours in a grid, linear interpolation of y_tau in tau misses it by at most
-/// (distance^2/8) sup |d^2 y_tau/d tau^2|. With D = d + tau d' and R = d/D, which is strictly proper, tau d'/D is 1 - R,
-/// so that
+/// (distance^2/8) sup |d^2 y_tau/d tau^2|. With D = d + tau d' and R = d/D, which is strictly proper, tau d'/D is
+/// 1 - R, so that
 ///   d^2 Y/d tau^2 = (2/tau^2) (1 - R) ((1 - R) Y - tau n'/D).
 /// Y, R and n'/D themselves are bounded between a lag tau_j and the next, tau = (1 + theta) tau_j, cell by cell from
 ///   (1 + theta) y_tau = y_j + theta tau_j L^-1[n'/D_j] + theta r_j * y_tau.

@@ -128,6 +128,22 @@ TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOn
   }
 }
 
+TEST(SlicedTube, OverTheDefaultSwapTheSampledTubeIsAtMostOneAndAHalfTimesTheContinuousOne_slow) {
+  const files::Network network = tests::demo_network();
+  const auto task = stability::make_task("swap", {2, 0, 0});
+  const stability::TrackingSetup loop = tests::loop_of("crazyflie-small");
+  Radii radii[2];
+  for (const bool is_sampled : {false, true}) {
+    const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, is_sampled),
+                      kSlice_s, is_sampled);
+    const SlicedTube tube = sliced_tube(scene, boxes(32), kTolerance_N);
+    ASSERT_TRUE(tube.proved) << tube.why;
+    radii[is_sampled ? 1 : 0] = tube.radii();
+  }
+  for (int k = 0; k < 3; ++k)
+    EXPECT_LE(radii[1].largest_position_m(k), 1.5 * radii[0].largest_position_m(k)) << k;
+}
+
 TEST(SlicedTube, OfAnIntervalOfLagsHoldsFlightsOfAnyLagInItAndIsLittleWider) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();

@@ -60,8 +60,8 @@ struct HeldAnswer {
 /// part,
 ///   x(t) lies in (t - t_k) Y + [-1, 1] Ki (T/2 sup|e| + (T^2/2) sup|e'| + |R|),
 ///   Y = Kp E' + Kd E'' - J,
-/// E', E'' and J intervals of e', e'' and p_d''' over the slice and a period before it. What x adds to E'' in its own slice is
-/// solved for as above. All are infinite where nothing is known.
+/// E', E'' and J intervals of e', e'' and p_d''' over the slice and a period before it. What x adds to E'' in its
+/// own slice is solved for as above. All are infinite where nothing is known.
 HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice);
 
 /// At least what the firmware's sum T sum e(t_j) exceeds the largest |int e| by, m s; 0 where the loop is continuous.
