@@ -112,7 +112,7 @@ TEST(TubeCommand, ProvesTheGainsThatFlewAndThreeVehicles) {
 TEST(TubeCommand, AnIntervalOfLagsWidensTheTubeAndContainsTheTruthsLag) {
   const ScratchFolder folder;
   const std::string command = bound("crazyflie-small.toml") + kNetwork + kTruth +
-                              " --tube --task swap --duration 4.5 --quiet --json a.json";
+                              " --tube --task swap --duration 4.5 --quiet --force --json a.json";
   double radius_z_m[2];
   for (const bool is_interval : {false, true}) {
     ASSERT_EQ(
