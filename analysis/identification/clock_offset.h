@@ -22,17 +22,16 @@ struct ClockOffset {
   double correction_s = 0;               ///< offset_s and what is known of the clock already
   Interval interval;                     ///< 90 %, from the jackknife over tenths of the flight
   double delay_s = 0;                    ///< tau, on the grid of the search
-  double rmse_before_N = 0,
-         rmse_after_N =
-             0;     ///< of all vertical forces, with the two clocks alike and as they are; maps of their own
+  /// Of all vertical forces, with the two clocks alike and as they are; maps of their own.
+  double rmse_before_N = 0, rmse_after_N = 0;
   int records = 0;  ///< means over kClockSample_s
   double z = 0;     ///< offset over its standard deviation
 };
 
-/// Of flights of two and more vehicles some of whose clocks nothing else relates: no absolute times, no common starts of
-/// their set points. All clocks of a flight are estimated together, and compared with the one that most logs share, else
-/// with that in the middle. Empty where the vehicles hardly disturb each other, one of them feels no other one or none
-/// feels it, or the offset is within three standard deviations of zero.
+/// Of flights of two and more vehicles some of whose clocks nothing else relates: no absolute times, no common starts
+/// of their set points. All clocks of a flight are estimated together, and compared with the one that most logs share,
+/// else with that in the middle. Empty where the vehicles hardly disturb each other, one of them feels no other one or
+/// none feels it, or the offset is within three standard deviations of zero.
 std::vector<ClockOffset> clock_offsets(const residuals::Inputs& inputs, int jobs);
 
 /// Lets the logs of `inputs` be read with these offsets.
