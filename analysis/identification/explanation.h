@@ -39,8 +39,8 @@ struct Explained {
 /// of the weight only if it takes more than what is left above the noise.
 Explained explain(const Passes& passes, const Coverage& covered);
 
-/// Numbers, intervals and errors of the names of `explained`, which the flights of `seen` gave, from all flights: `seen`
-/// is an excerpt of those of `all`. What rivals say stays.
+/// Numbers, intervals and errors of the names of `explained`, which the flights of `seen` gave, from all flights:
+/// `seen` is an excerpt of those of `all`. What rivals say stays.
 /// @return the cross-validated mean square over all flights without the names, and with them; N^2. Nothing, and nothing
 /// is changed, where a name has no fit of its own.
 std::optional<std::pair<double, double>> fit_to_all(const Passes& all, const Passes& seen,

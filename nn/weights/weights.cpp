@@ -30,7 +30,7 @@ namespace {
     what = "is a Git LFS pointer, not the file itself";
     mend = "fetch it: git lfs pull";
   } else if (looks_like_hdf5(bytes)) {
-    what = "is an HDF5 file (.h5, .hdf5, .keras), which is not read";
+    what = "is an HDF5 file (.h5, .hdf5), which is not read";
     mend = "export the model to ONNX, or write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez";
   }
   throw InputError({path, "offset 0", "", "", what, mend});

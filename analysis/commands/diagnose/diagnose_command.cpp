@@ -91,7 +91,8 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
   residuals::Inputs inputs = read_flights(options.flights, false, false, true);
-  const std::vector<identification::ClockOffset> clocks = identification::find_and_correct_clocks(inputs, common.jobs);
+  const std::vector<identification::ClockOffset> clocks =
+      identification::find_and_correct_clocks(inputs, common.jobs);
   const residuals::ForceUnit unit = page_unit(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
