@@ -19,7 +19,8 @@ namespace swarmcert::tests {
 /// Runge-Kutta in steps of a millisecond, of which a period of the loop must be a multiple. When each vehicle predicts
 /// is random; predictions reach the controller late. Errors of the estimates switch between plus and minus their bounds
 /// at random rates, each on its own, or stand still. Where an interval is given, the motors of each vehicle have a
-/// random lag in each flight. Behind one lag, rotors start anywhere between the weight and what the first prediction asks for.
+/// random lag in each flight. Behind one lag, rotors start anywhere between the weight and what the first prediction
+/// asks for.
 class AxesFlight {
  public:
   /// Called with the time, the vehicle, e and e'.
