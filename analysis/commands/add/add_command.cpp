@@ -11,7 +11,7 @@
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/add/add_report.h"
 #include "analysis/commands/commands.h"
-#include "analysis/commands/diagnose/clock_output.h"
+#include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/shared/output_folder.h"

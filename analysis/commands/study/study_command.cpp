@@ -7,7 +7,7 @@
 #include "analysis/cli/host.h"
 #include "analysis/cli/progress.h"
 #include "analysis/commands/commands.h"
-#include "analysis/commands/diagnose/clock_output.h"
+#include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/commands/study/study_output.h"
 #include "analysis/commands/study/study_report.h"

@@ -9,10 +9,10 @@
 
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_report.h"
-#include "analysis/commands/diagnose/clock_output.h"
 #include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/diagnose_report.h"
 #include "analysis/commands/diagnose/remainder_output.h"
+#include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"

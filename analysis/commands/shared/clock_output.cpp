@@ -1,4 +1,4 @@
-#include "analysis/commands/diagnose/clock_output.h"
+#include "analysis/commands/shared/clock_output.h"
 
 #include <fmt/core.h>
 
