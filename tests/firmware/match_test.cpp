@@ -218,7 +218,8 @@ TEST_F(Match, AProgramForCortexMIsRunAndAChangedScaleSignOrEvaluatorInItIsFound)
       {kHeader, {"kNewtonPerUnit = 0x1.41743ep-7f", "kNewtonPerUnit = 0x1.417440p-7f"}},
       {kSource, {"*force_N = rounded", "*force_N = -rounded"}},
       {kSource,
-       {"static const float lower[6] = {\n    -0x1p+0f", "static const float lower[6] = {\n    -0x1p+1f"}},
+       {"static constexpr float lower[6] = {\n    -0x1p+0f",
+        "static constexpr float lower[6] = {\n    -0x1p+1f"}},
       {"out/nn/dense_layer.h",
        {"const Scalar zero = unknown;", "const Scalar zero = unknown + Scalar(0x1p-20);"}}};
   for (const auto& [file, change] : changes) {
