@@ -13,9 +13,9 @@ namespace swarmcert::stability {
 /// Upper bounds, in real arithmetic, for y(t) = L^-1[Y] at t > 0; or for every y of a family, see lag_range_cells.h.
 struct KernelCells {
   std::vector<double> integral;  ///< at least int |y| over [k cell_s, (k + 1) cell_s]
-  std::vector<Interval>
-      net;  ///< contains int y over the same cell, less x_1 modes[0][k] + x_2 modes[1][k] + ..
-  /// Of a family: each y has its own x_1, x_2, .. in [-1, 1], the same for all its cells.
+  /// Contains int y over the same cell, less the sum of x_m modes[m][k].
+  std::vector<Interval> net;
+  /// Of a family: each y has x_m in [-1, 1] of its own, the same for all its cells.
   std::vector<std::vector<double>> modes;
   std::vector<double> largest;              ///< at least sup |y| over the same cell
   double peak = 0;                          ///< at least sup |y| over all of them
