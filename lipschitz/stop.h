@@ -6,7 +6,8 @@
 #include <chrono>
 #include <mutex>
 #include <optional>
-#include <thread>
+
+#include "nn/base/parallel.h"
 
 namespace swarmcert::lipschitz {
 
@@ -52,11 +53,9 @@ class Stop {
 /// part of what is left, so that what quick tasks do not need goes to those behind them.
 class TimeShares {
  public:
-  /// @param jobs threads; 0: as many as the machine has.
+  /// @param jobs see files::thread_count().
   TimeShares(Stop whole, int tasks, int jobs)
-      : whole_(whole),
-        left_(tasks),
-        threads_(jobs > 0 ? jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {}
+      : whole_(whole), left_(tasks), threads_(files::thread_count(jobs)) {}
 
   /// The stop of the task that begins now.
   Stop next() {

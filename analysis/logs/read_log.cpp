@@ -116,7 +116,7 @@ Log read_log(const std::string& path, const SignalMap& map) {
   // What a columns.toml says counts: its columns keep the names that the log itself gives.
   const std::vector<std::string> named = map.empty() ? name_variables(raw) : std::vector<std::string>{};
   try {
-    Log log = interpret(raw, map);
+    Log log = interpret(std::move(raw), map);
     log.interpretation.insert(log.interpretation.begin(), named.begin(), named.end());
     return log;
   } catch (const files::InputError& error) {

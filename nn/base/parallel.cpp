@@ -8,8 +8,12 @@
 
 namespace swarmcert::files {
 
+int thread_count(int jobs) {
+  return jobs > 0 ? jobs : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
 void parallel_for(int count, int jobs, const std::function<void(int)>& work) {
-  if (jobs <= 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  jobs = thread_count(jobs);
   std::atomic<int> next{0};
   std::atomic<bool> failed{false};
   std::vector<std::exception_ptr> errors(static_cast<std::size_t>(std::max(count, 0)));

@@ -5,9 +5,12 @@
 
 namespace swarmcert::files {
 
+/// `jobs`, or as many threads as the machine has where it is 0 or less.
+int thread_count(int jobs);
+
 /// Calls work(0) .. work(count - 1), each once, on up to `jobs` threads; returns when all have ended. Results must
 /// not depend on which thread runs a piece or when.
-/// @param jobs threads; 0: as many as the machine has.
+/// @param jobs see thread_count().
 /// @throws what a piece threw, of the lowest such index, after all running pieces ended; pieces not yet begun are
 ///   then left out.
 void parallel_for(int count, int jobs, const std::function<void(int)>& work);

@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
+#include <exception>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -19,6 +21,7 @@
 #include "analysis/residuals/flight_set.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/base/parallel.h"
 #include "nn/base/toml.h"
 #include "nn/weights/functions.h"
 #include "stability/model.h"
@@ -162,34 +165,83 @@ struct Seen {
   std::vector<InspectedLog> logs;  ///< empty without --report
 };
 
-files::Json inspect_log(const std::string& path, const InspectOptions& options, const CommonOptions& common,
-                        bool in_table, Seen& seen) {
-  const auto start = std::chrono::steady_clock::now();
-  const logs::Log log = options.columns.empty() ? logs::read_log(path)
-                                                : logs::read_log(path, logs::read_columns(options.columns));
-  if (!options.csv.empty()) {
-    std::ostringstream text;
-    logs::write_csv(log, options.t0_s, options.t1_s, text);
-    files::write_file(options.csv, text.str(), common.force);
+/// A file that was taken for a log: read, or why it cannot be.
+struct LogRead {
+  bool is_log = false;
+  logs::Log log;
+  files::Json json;  ///< what `inspect` says of it
+  LogOutcome outcome;
+  std::exception_ptr error;
+};
+
+LogRead log_read(const std::string& path, const InspectOptions& options) {
+  LogRead read;
+  try {
+    const auto start = std::chrono::steady_clock::now();
+    read.is_log = logs::looks_like_log(path);
+    if (!read.is_log) return read;
+    read.log = options.columns.empty() ? logs::read_log(path)
+                                       : logs::read_log(path, logs::read_columns(options.columns));
+    read.json = {{"file", path}};
+    read.json.update(describe_log(read.log));
+    read.outcome = outcome_of(path, read.log, read.json);
+    read.outcome.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  } catch (const files::InputError&) {
+    read.error = std::current_exception();
   }
-  files::Json json = {{"file", path}};
-  json.update(describe_log(log));
-  seen.outcomes.push_back(outcome_of(path, log, json));
-  seen.outcomes.back().run_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (!options.report.empty()) seen.logs.push_back({path, json, logs::findings(log.health), curve_of(log)});
-  if (common.prints_text()) {
-    if (in_table)
-      print_log_row(path, json);
-    else
-      print_log(log);
-  }
-  return json;
+  return read;
 }
 
-files::Json inspect(const std::string& path, const InspectOptions& options, const CommonOptions& common,
-                    bool in_table, Seen& seen) {
-  if (logs::looks_like_log(path)) return inspect_log(path, options, common, in_table, seen);
+/// The logs among `paths` in their order; as many are read at once, and held, as there are threads.
+class LogsInOrder {
+ public:
+  LogsInOrder(const std::vector<std::string>& paths, const InspectOptions& options, int jobs)
+      : paths_(paths), options_(options), jobs_(jobs) {}
+
+  /// Of paths[index], each asked for once and in order.
+  LogRead next(std::size_t index) {
+    if (index >= first_ + ahead_.size()) {
+      first_ = index;
+      ahead_.clear();
+      ahead_.resize(std::min(paths_.size() - index, static_cast<std::size_t>(files::thread_count(jobs_))));
+      files::parallel_for(static_cast<int>(ahead_.size()), jobs_, [&](int i) {
+        const auto at = static_cast<std::size_t>(i);
+        ahead_[at] = log_read(paths_[index + at], options_);
+      });
+    }
+    return std::move(ahead_[index - first_]);
+  }
+
+ private:
+  const std::vector<std::string>& paths_;
+  const InspectOptions& options_;
+  const int jobs_;
+  std::size_t first_ = 0;
+  std::vector<LogRead> ahead_;
+};
+
+files::Json show_log(LogRead read, const InspectOptions& options, const CommonOptions& common, bool in_table,
+                     Seen& seen) {
+  const std::string path = read.outcome.path;
+  if (!options.csv.empty()) {
+    std::ostringstream text;
+    logs::write_csv(read.log, options.t0_s, options.t1_s, text);
+    files::write_file(options.csv, text.str(), common.force);
+  }
+  seen.outcomes.push_back(std::move(read.outcome));
+  if (!options.report.empty())
+    seen.logs.push_back({path, read.json, logs::findings(read.log.health), curve_of(read.log)});
+  if (common.prints_text()) {
+    if (in_table)
+      print_log_row(path, read.json);
+    else
+      print_log(read.log);
+  }
+  return std::move(read.json);
+}
+
+files::Json inspect_other(const std::string& path, const InspectOptions& options,
+                          const CommonOptions& common) {
   if (is_model(path)) return inspect_model(path, common.prints_text());
   if (is_json(path)) return inspect_certificate(path, common.prints_text());
   try {
@@ -267,9 +319,14 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
   const bool in_table = paths.size() > options.files.size();
   std::vector<std::string> readable;
   Seen seen;
-  for (const std::string& path : paths) {
+  LogsInOrder logs(paths, options, common.jobs);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const std::string& path = paths[i];
     try {
-      found.push_back(inspect(path, options, common, in_table, seen));
+      LogRead log = logs.next(i);
+      if (log.error) std::rethrow_exception(log.error);
+      found.push_back(log.is_log ? show_log(std::move(log), options, common, in_table, seen)
+                                 : inspect_other(path, options, common));
     } catch (const files::InputError& error) {
       seen.outcomes.push_back({path, false, {}, false, 0, 0, "unreadable: " + error.fault().what});
       note(std::string("swarmcert: ") + error.what());
