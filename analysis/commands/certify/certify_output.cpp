@@ -213,8 +213,12 @@ void print_bounds(const files::Network& network, const CertifyOutput& output) {
       fmt::print("    the semidefinite program gave no bound that could be proved: {}\n",
                  name(bound.sdp.stop));
     }
-    if (const auto estimate = slope_estimate_of(output, i))
-      fmt::print("    steepest slope of sampled pairs, in double: {:.6g} (estimate)\n", estimate->value());
+    if (const auto estimate = slope_estimate_of(output, i)) {
+      fmt::print("    steepest slope of sampled pairs, in double: {:.6g} (estimate)", estimate->value());
+      if (estimate->value() > 0)
+        fmt::print("; upper / estimate: {:.3f}", bound.upper.value() / estimate->value());
+      fmt::print("\n");
+    }
     const std::string interruption = interruption_words(bound);
     if (!interruption.empty()) fmt::print("    {}\n", interruption);
     const std::string outlook = branch_outlook_words(bound);
