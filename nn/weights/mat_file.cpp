@@ -272,7 +272,7 @@ bool looks_like_mat(const std::string& bytes) {
 Weights parse_mat(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
   if (bytes.compare(0, 10, "MATLAB 7.3") == 0 || looks_like_hdf5(bytes))
     throw InputError({path, "offset 0", "", "", "is a MAT file of version 7.3 (HDF5), which is not read",
-                      std::string("load it there and ") + kSaveAgain});
+                      "load it in MATLAB, then save('net.mat', 'weights', '-v7')"});
   if (bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
     throw InputError({path, "offset 124", "", "", "is a MAT file of another version than 5", kSaveAgain});
   if (bytes.compare(126, 2, "IM") != 0)

@@ -144,6 +144,20 @@ TEST_F(CertifiedChain, ASmoothActivationIsCertifiedCheckedAndHeldAgainstSamples)
   expect("certify " + net + " --activation relu --samples tanh.csv", 3, {"--activation"});
 }
 
+TEST_F(CertifiedChain, TheTextShowsHowFarTheBoundOfASmoothNetworkIsFromTheSlopeFound) {
+  write_square("turn", "steep");
+  const Outcome outcome =
+      run("certify net.pth --order head,steep,turn,tail --activation softplus --json out.json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const Json bound = Json::parse(read_text(folder_ / "out.json"))["bounds"][0];
+  const std::string words = "(estimate); upper / estimate: ";
+  const std::size_t at = outcome.output.find(words);
+  ASSERT_NE(at, std::string::npos) << outcome.output;
+  const double ratio = bound["upper"].get<double>() / bound["slope_estimate"].get<double>();
+  EXPECT_GT(ratio, 1 - 1e-6);                                                     // differences cancel digits
+  EXPECT_NEAR(std::stod(outcome.output.substr(at + words.size())), ratio, 6e-4);  // three digits are shown
+}
+
 TEST_F(CertifiedChain, InspectShowsTheActivationAfterEveryLayerButTheLast) {
   write_square("turn", "steep");
   expect("inspect net.pth --order head,steep,turn,tail --json out.json", 0, {"1 -> 2, relu", "2 -> 2, relu"});

@@ -163,7 +163,7 @@ TEST(MatFile, Hdf5IsRefusedWithTheCallThatMendsIt) {
   head.resize(124, ' ');
   head += std::string("\0\2IM", 4);
   head.resize(512, '\0');
-  const std::vector<std::string> by_matlab{"version 7.3 (HDF5)", "load it there", "-v7'"};
+  const std::vector<std::string> by_matlab{"version 7.3 (HDF5)", "load it in MATLAB", "-v7'"};
   EXPECT_TRUE(is_refused(head + hdf5, by_matlab));
   std::string renamed = head;  // by MATLAB's own users: only the signature tells it then
   renamed.replace(0, 38, "MATLAB 5.0 MAT-file, by somebody else ");
