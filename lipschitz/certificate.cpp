@@ -238,7 +238,7 @@ Json certificate(const files::Network& network, const Certification& certificati
   Json result = {
       {"schema", check::kCertificateSchema},
       {"tool", "swarmcert " SWARMCERT_VERSION},
-      {"statement", check::kStatement},
+      {"statement", check::statement_for(network)},
       {"network",
        {{"description_sha256", network.sha256}, {"as", std::move(as)}, {"weights", std::move(weights)}}},
       {"box", std::move(box)},

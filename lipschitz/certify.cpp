@@ -174,6 +174,7 @@ void multiply_norms(const std::map<std::string, const Weights*>& parts,
     }
     add_steepest_slopes(*parts.at(name), norms);
     const files::ActivationFunction& function = files::function_of(parts.at(name)->activation);
+    bound.has_slopes = bound.has_slopes && !function.sorts();
     bound.is_monotone = bound.is_monotone && function.is_monotone();
   }
   bound.is_relu = has_witness(parts, bound.function);

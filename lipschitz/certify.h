@@ -53,6 +53,7 @@ struct CertifiedLayer {
 
 struct CertifiedBound : Claim {
   bool is_relu = true;      ///< otherwise there are no witness and no branch and bound
+  bool has_slopes = true;   ///< number by number; otherwise a layer is sorted, and the product is the bound
   bool is_monotone = true;  ///< otherwise the layer-wise bound is that of the product
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;

@@ -24,7 +24,7 @@ std::string called(const CertifiedBound& bound) {
 }
 
 bool has_program(const CertifyOptions& options, const CertifiedBound& bound) {
-  return options.method != UpperMethod::kProduct && bound.neighbours.empty();
+  return options.method != UpperMethod::kProduct && bound.neighbours.empty() && bound.has_slopes;
 }
 
 bool is_branched(const CertifyOptions& options, const CertifiedBound& bound) {

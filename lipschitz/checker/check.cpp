@@ -42,7 +42,7 @@ CheckResult CertificateChecker::run() {
                        "content_sha256"},
                       "certificate");
   require(certificate_["schema"] == kCertificateSchema, "schema is not " + std::string(kCertificateSchema));
-  require(certificate_["statement"] == kStatement, "statement is not the one that is checked");
+  require(certificate_["statement"] == statement_for(network_), "statement is not the one that is checked");
   require(certificate_["content_sha256"] == files::content_sha256(certificate_),
           "content_sha256 does not match: the certificate was changed after it was written");
   require(certificate_["tool"].is_string(), "tool is not text");
@@ -216,11 +216,13 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
     require(parts_.count(name) == 1, where + ": there is no network " + name);
     const files::ActivationFunction& function = files::function_of(parts_.at(name)->activation);
     if (function.activation == files::Activation::kRelu) continue;
-    const std::string with = std::string(" of a network with ") + function.words;
+    const std::string with = " of a network with " + function.words;
     require(bound["domain"] == "global" && bound["upper_method"] != "branch",
             where + ": a bound on a box" + with);
     require(bound["lower"].is_null() && bound["lower_hex"].is_null() && bound["lower_witness"].is_null(),
             where + ": a lower bound" + with);
+    require(!function.sorts() || bound["upper_method"] == "product",
+            where + ": a bound from slopes of single numbers" + with);
   }
 }
 
@@ -284,13 +286,21 @@ void CertificateChecker::check_law(const Json& law) {
   ++upper_bounds_;
 }
 
+std::string statement_for(const files::Network& network) {
+  const auto parts = files::parts(network);
+  const bool sorts = std::any_of(parts.begin(), parts.end(), [](const auto& part) {
+    return part.second->layers.size() > 1 && files::function_of(part.second->activation).sorts();
+  });
+  return std::string(kStatement) + (sorts ? kSortingStatement : "");
+}
+
 files::Network with_stated_activations(const files::Json& certificate, files::Network network) {
   const auto adopt = [&certificate](const std::string& part, files::Weights& weights) {
     if (weights.states_activation() || weights.layers.size() == 1) return;
     try {
       for (const files::Json& step : certificate.at("network").at("weights").at(part).at("chain")) {
         const auto activation = files::activation_called(step.at("op").get<std::string>());
-        if (!activation) continue;
+        if (!activation || !weights.has_groups_of(*activation)) continue;
         weights.activation = *activation;
         return;
       }

@@ -27,10 +27,12 @@ struct Unit {
 };
 
 Unit unit_of(const files::ActivationFunction& function) {
+  if (function.sorts())
+    throw std::domain_error(function.words + " acts on whole layers: it has no slopes of single numbers");
   if (function.is_monotone()) return {function.greatest_slope, {}};
   const Dyadic c = function.greatest_slope;
   if (function.least_slope != 1 - function.greatest_slope)
-    throw std::logic_error(std::string(function.op) + ": slopes that do not add up to 1");
+    throw std::logic_error(function.op + ": slopes that do not add up to 1");
   return {1.0, c * (c + -Dyadic(1.0))};
 }
 

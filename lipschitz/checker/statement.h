@@ -1,6 +1,10 @@
 /// @file What a certificate of this schema states, in words: certify writes it, the checker insists on it.
 #pragma once
 
+#include <string>
+
+#include "nn/weights/network.h"
+
 namespace swarmcert::check {
 
 inline constexpr const char* kCertificateSchema = "swarmcert/certificate/1";
@@ -27,5 +31,14 @@ inline constexpr const char* kStatement =
     "whatever the others are, in exact arithmetic; and |g - f| <= float32_error for each g that float32 "
     "arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of products in "
     "any order, fused or not, each operation rounded to nearest.";
+
+/// What is added for networks with a layer that is sorted.
+inline constexpr const char* kSortingStatement =
+    " Of the numbers t_1, t_2, ... of a layer, groupsort:k sorts each k side by side, the smallest first; "
+    "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
+    "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).";
+
+/// The statement of a certificate for NET.
+std::string statement_for(const files::Network& network);
 
 }  // namespace swarmcert::check

@@ -1,5 +1,6 @@
 #include "nn/weights/activation.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -87,6 +88,13 @@ bool is_activation(const std::string& name) {
   return activation_called(name).has_value() || terms_of(name).has_value();
 }
 
+bool Weights::has_groups_of(Activation other) const {
+  const int group = function_of(other).group;
+  return std::all_of(layers.begin(), layers.end(), [&](const Layer& layer) {
+    return &layer == &layers.back() || layer.outputs % group == 0;
+  });
+}
+
 Weights with_activation(Weights weights, const std::string& activation) {
   const std::optional<Activation> as_is = activation_called(activation);
   const std::optional<ActivationTerms> terms = terms_of(activation);
@@ -96,11 +104,16 @@ Weights with_activation(Weights weights, const std::string& activation) {
     if (as_is == weights.activation) return weights;
     throw InputError({weights.path, "", "--activation", activation,
                       (weights.activation_is_given ? "network.toml states " : "the file itself states ") +
-                          std::string(function_of(weights.activation).words) + " between its layers",
+                          function_of(weights.activation).words + " between its layers",
                       "leave --activation out"});
   }
   weights.activation_is_given = true;
   if (as_is) {
+    if (!weights.has_groups_of(*as_is))
+      throw InputError(
+          {weights.path, "", "--activation", activation,
+           "a hidden layer has no multiple of " + std::to_string(function_of(*as_is).group) + " outputs",
+           "state the size of the groups that the network was trained with"});
     weights.activation = *as_is;
     return weights;
   }

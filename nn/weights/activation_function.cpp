@@ -1,9 +1,9 @@
 #include "nn/weights/activation_function.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
+#include <vector>
 
 namespace swarmcert::files {
 namespace {
@@ -26,39 +26,85 @@ double selu(double t) { return t > 0 ? kSeluScale * t : kSeluScale * (kSeluAlpha
 double silu(double t) { return t * sigmoid(t); }
 double gelu(double t) { return t / 2 * std::erfc(-t * kHalfRoot); }
 
-constexpr std::array<ActivationFunction, 8> kFunctions = {{
-    {Activation::kRelu, "relu", "ReLU", 0, 1, relu},
-    {Activation::kTanh, "tanh", "tanh", 0, 1, tanh},
-    {Activation::kSigmoid, "sigmoid", "sigmoid", 0, 0.25, sigmoid},
-    {Activation::kSoftplus, "softplus", "softplus", 0, 1, softplus},
-    {Activation::kElu, "elu", "ELU", 0, 1, elu},
-    {Activation::kSelu, "selu", "SELU", 0, kSeluSlope, selu},
-    {Activation::kSilu, "silu", "SiLU", 1 - kSiluSlope, kSiluSlope, silu},
-    {Activation::kGelu, "gelu", "GELU", 1 - kGeluSlope, kGeluSlope, gelu},
-}};
+double (*const kSorts)(double) = nullptr;
+
+std::vector<ActivationFunction> all_functions() {
+  std::vector<ActivationFunction> all = {
+      {Activation::kRelu, "relu", "ReLU", 0, 1, relu},
+      {Activation::kTanh, "tanh", "tanh", 0, 1, tanh},
+      {Activation::kSigmoid, "sigmoid", "sigmoid", 0, 0.25, sigmoid},
+      {Activation::kSoftplus, "softplus", "softplus", 0, 1, softplus},
+      {Activation::kElu, "elu", "ELU", 0, 1, elu},
+      {Activation::kSelu, "selu", "SELU", 0, kSeluSlope, selu},
+      {Activation::kSilu, "silu", "SiLU", 1 - kSiluSlope, kSiluSlope, silu},
+      {Activation::kGelu, "gelu", "GELU", 1 - kGeluSlope, kGeluSlope, gelu},
+      {Activation::kMaxMinHalves, "maxmin:halves", "MaxMin of halves", 0, 1, kSorts, 2},
+      {Activation::kMaxMinPairs, "maxmin:pairs", "MaxMin of pairs", 0, 1, kSorts, 2},
+  };
+  for (int size = 2; size <= kLargestGroup; ++size) {
+    const std::string number = std::to_string(size);
+    all.push_back({group_sort(size), "groupsort:" + number, "GroupSort of " + number, 0, 1, kSorts, size});
+  }
+  return all;
+}
+
+const std::vector<ActivationFunction>& functions() {
+  static const std::vector<ActivationFunction> all = all_functions();
+  return all;
+}
 
 }  // namespace
+
+Activation group_sort(int size) {
+  if (size < 2 || size > kLargestGroup)
+    throw std::invalid_argument("group_sort: groups hold 2 to " + std::to_string(kLargestGroup) + " numbers");
+  return static_cast<Activation>(static_cast<int>(Activation::kGroupSort) + size);
+}
 
 double ActivationFunction::steepest() const { return std::max(-least_slope, greatest_slope); }
 
 const ActivationFunction& function_of(Activation activation) {
-  for (const ActivationFunction& function : kFunctions)
+  for (const ActivationFunction& function : functions())
     if (function.activation == activation) return function;
   throw std::logic_error("function_of: no such activation");
 }
 
+std::vector<double> activated(Activation activation, std::vector<double> layer) {
+  const ActivationFunction& function = function_of(activation);
+  if (!function.sorts()) {
+    for (double& t : layer) t = function.value(t);
+    return layer;
+  }
+  const auto group = static_cast<std::size_t>(function.group);
+  if (layer.size() % group != 0) throw std::invalid_argument("activated: no whole number of groups");
+  if (activation != Activation::kMaxMinHalves && activation != Activation::kMaxMinPairs) {
+    for (auto first = layer.begin(); first != layer.end(); first += function.group)
+      std::sort(first, first + function.group);
+    return layer;
+  }
+  const std::size_t half = layer.size() / 2;
+  std::vector<double> result(layer.size());
+  for (std::size_t i = 0; i < half; ++i) {
+    const bool is_halves = activation == Activation::kMaxMinHalves;
+    const double a = layer[is_halves ? i : 2 * i], b = layer[is_halves ? i + half : 2 * i + 1];
+    result[i] = std::max(a, b);
+    result[i + half] = std::min(a, b);
+  }
+  return result;
+}
+
 std::optional<Activation> activation_called(const std::string& op) {
-  for (const ActivationFunction& function : kFunctions)
+  for (const ActivationFunction& function : functions())
     if (function.op == op) return function.activation;
   return std::nullopt;
 }
 
 std::string smooth_activations() {
   std::string names;
-  for (const ActivationFunction& function : kFunctions)
-    if (function.activation != Activation::kRelu)
-      names += (names.empty() ? "" : ", ") + std::string(function.op);
-  return names;
+  for (const ActivationFunction& function : functions())
+    if (function.activation != Activation::kRelu && function.activation < Activation::kGroupSort)
+      names += (names.empty() ? "" : ", ") + function.op;
+  return names + ", groupsort:SIZE";
 }
 
 }  // namespace swarmcert::files

@@ -69,9 +69,10 @@ std::vector<Scalar> Evaluator<Scalar>::smooth_value(const std::vector<Scalar>& i
   for (const nn::DenseLayer<Scalar>& layer : layers_) {
     std::vector<Scalar> y(static_cast<std::size_t>(layer.outputs));
     nn::apply<1>(layer, x.data(), y.data(), nn::Activation::kNone);
-    const bool is_last = &layer == &layers_.back();
-    for (Scalar& t : y)
-      if (!is_last) t = static_cast<Scalar>(function_of(activation_).value(static_cast<double>(t)));
+    if (&layer != &layers_.back()) {
+      const std::vector<double> after = activated(activation_, {y.begin(), y.end()});
+      for (std::size_t i = 0; i < y.size(); ++i) y[i] = static_cast<Scalar>(after[i]);
+    }
     x = std::move(y);
   }
   return x;

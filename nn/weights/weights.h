@@ -58,6 +58,8 @@ struct Weights {
   int inputs() const { return layers.front().inputs; }
   int outputs() const { return layers.back().outputs; }
   bool is_relu() const { return activation == Activation::kRelu; }
+  /// Whether every hidden layer has a whole number of groups of `other`, which 1 divides unless it sorts.
+  bool has_groups_of(Activation other) const;
   /// Whether the file itself, network.toml or the user states the activation.
   bool states_activation() const { return order_source == OrderSource::kFile || activation_is_given; }
 };

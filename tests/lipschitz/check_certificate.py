@@ -51,6 +51,11 @@ STATEMENT = (
     "neighbour comes or goes, whatever the others are, in exact arithmetic; and |g - f| <= float32_error for each g "
     "that float32 arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of products "
     "in any order, fused or not, each operation rounded to nearest.")
+# Added for networks with a layer that is sorted.
+SORTING_STATEMENT = (
+    " Of the numbers t_1, t_2, ... of a layer, groupsort:k sorts each k side by side, the smallest first; "
+    "maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); "
+    "maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i)).")
 
 
 # What lies between layers, by the name that a chain gives it: its slopes are in [0, steepest] where it is monotone,
@@ -59,7 +64,10 @@ MONOTONE = {"relu": Fraction(1), "tanh": Fraction(1), "sigmoid": Fraction(1, 4),
             "elu": Fraction(1),
             # at least 1.0507009873554805 * 1.6732632423543772
             "selu": Fraction(0x1c212cc640f031, 2 ** 52)}
-STEEPEST = {**MONOTONE, "silu": 1 + Fraction(0x1999, 2 ** 16), "gelu": 1 + Fraction(0x211, 2 ** 12)}
+# These act on whole layers and are 1-Lipschitz; the width of a layer is a multiple of the number.
+SORTING = {"maxmin:halves": 2, "maxmin:pairs": 2, **{f"groupsort:{k}": k for k in range(2, 65)}}
+STEEPEST = {**MONOTONE, "silu": 1 + Fraction(0x1999, 2 ** 16), "gelu": 1 + Fraction(0x211, 2 ** 12),
+            **dict.fromkeys(SORTING, Fraction(1))}
 
 
 class Rejected(Exception):
@@ -292,6 +300,9 @@ class Weights:
         # more.
         self.activation = "relu" if listing == "evaluation" and len(self.layers) > 1 else None
         self.sha256 = hashlib.sha256(data).hexdigest()
+
+    def has_groups_of(self, activation):
+        return all(layer.outputs % SORTING.get(activation, 1) == 0 for layer in self.layers[:-1])
 
     def round_to_float32(self):
         self.layers = [layer.rounded() for layer in self.layers]
@@ -552,6 +563,7 @@ def read_weights(path, key="", order=None, activation=None):
                   f"the file states another activation, {weights.activation}")
     if len(weights.layers) > 1:
         weights.activation = weights.activation or activation
+        require_input(weights.has_groups_of(weights.activation), "a hidden layer is no multiple of the group's size")
     return weights
 
 
@@ -1298,7 +1310,9 @@ class Checker:
         require_keys(self.c, ["schema", "tool", "statement", "network", "box", "layers", "bounds", "laws",
                               "values", "content_sha256"], "certificate")
         require(self.c["schema"] == "swarmcert/certificate/1", "another schema")
-        require(self.c["statement"] == STATEMENT, "another statement")
+        sorting = any(step["op"] in SORTING for weights in self.c["network"]["weights"].values()
+                      for step in weights["chain"])
+        require(self.c["statement"] == STATEMENT + SORTING_STATEMENT * sorting, "another statement")
         require(self.c["content_sha256"] == content_sha256(self.c), "content_sha256 does not match")
         require(isinstance(self.c["tool"], str), "tool is not text")
         self.check_network(self.c["network"])
@@ -1331,6 +1345,7 @@ class Checker:
             if weights.activation is None and len(weights.layers) > 1:  # the file does not state it: the chain does
                 ops = [step["op"] for step in entry["chain"] if step["op"] not in ("clamp", "linear")]
                 require(ops and ops[0] in STEEPEST, f"{where}: unknown activation")
+                require(weights.has_groups_of(ops[0]), f"{where}: no whole number of groups")
                 weights.activation = ops[0]
             self.check_chain(entry["chain"], name, where)
             self.check_samples(entry["samples"], where)
@@ -1418,6 +1433,8 @@ class Checker:
             require(not boxed and bound["upper_method"] != "branch", f"{where}: a bound on a box is for ReLU only")
             require(bound["lower"] is None and bound["lower_hex"] is None and bound["lower_witness"] is None,
                     f"{where}: a lower bound is for ReLU only")
+            require(activations.isdisjoint(SORTING) or bound["upper_method"] == "product",
+                    f"{where}: a bound from slopes of single numbers")
         if bound["upper_method"] in ("sdp", "eclipse_fast"):
             self.check_upper(stages(self.network, function, block, scale), bound["proof"], upper, where,
                              bends(self.network, function))

@@ -583,6 +583,11 @@ let lmi zero0 add1 mul1 minus_one two_rho minus_rho t first0 later last0 =
       (gram zero0 add1 mul1 (scale_rows mul1 t first0)))
     (band zero0 add1 mul1 two_rho minus_rho t later last0)
 
+type sorting =
+| Groups of int
+| Halves
+| Pairs
+
 type activation =
 | Relu
 | Tanh
@@ -592,6 +597,7 @@ type activation =
 | Selu
 | Silu
 | Gelu
+| Sorted of sorting
 
 (** val weighted_gram :
     'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
@@ -998,6 +1004,12 @@ let steepest = function
 let is_rising = function
 | Silu -> false
 | Gelu -> false
+| _ -> true
+
+(** val is_entrywise : activation -> bool **)
+
+let is_entrywise = function
+| Sorted _ -> false
 | _ -> true
 
 (** val is_relu : activation -> bool **)
@@ -2000,6 +2012,11 @@ let bends_of p =
 let relu_between p =
   is_relu p.between
 
+(** val entrywise_between : part -> bool **)
+
+let entrywise_between p =
+  is_entrywise p.between
+
 (** val parts_of : part list -> function0 -> part list **)
 
 let parts_of ps = function
@@ -2024,7 +2041,10 @@ let well_formed ps f moves scale0 =
     dyadic list -> factor -> bool **)
 
 let check_slope ps f moves scale0 u rho t factor0 =
-  (&&) ((&&) (well_formed ps f moves scale0) (is_nonnegative u))
+  (&&)
+    ((&&)
+      ((&&) (well_formed ps f moves scale0)
+        (forallb entrywise_between (parts_of ps f))) (is_nonnegative u))
     (check_parts (flat_map bends_of (parts_of ps f)) ([],
       (selector moves scale0)) (map matrices (parts_of ps f)) u rho t factor0)
 

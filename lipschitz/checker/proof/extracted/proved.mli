@@ -143,6 +143,11 @@ val lmi :
   'a1 list -> 'a1 list list -> ('a1 list * 'a1 list list) list -> 'a1 list
   list -> 'a1 list list
 
+type sorting =
+| Groups of int
+| Halves
+| Pairs
+
 type activation =
 | Relu
 | Tanh
@@ -152,6 +157,7 @@ type activation =
 | Selu
 | Silu
 | Gelu
+| Sorted of sorting
 
 val weighted_gram :
   'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
@@ -284,6 +290,8 @@ type claim =
 val steepest : activation -> dyadic
 
 val is_rising : activation -> bool
+
+val is_entrywise : activation -> bool
 
 val is_relu : activation -> bool
 
@@ -536,6 +544,8 @@ val matrices : part -> stack
 val bends_of : part -> dyadic list
 
 val relu_between : part -> bool
+
+val entrywise_between : part -> bool
 
 val parts_of : part list -> function0 -> part list
 

@@ -28,7 +28,8 @@ let with_stated_activations (net : Network.t) json =
     | Some (Array steps) -> List.find_map activation_of steps
     | _ -> None in
   let adopted (part, (w : Weights.t)) =
-    part, if w.activation = None then { w with activation = stated part } else w in
+    let activation = Option.bind (stated part) (fun a -> if Weights.has_groups_of a w.layers then Some a else None) in
+    part, if w.activation = None then { w with activation } else w in
   { net with parts = List.map adopted net.parts }
 
 let is_hash = function
@@ -90,12 +91,13 @@ let check net json =
   require_keys "certificate"
     [ "schema"; "tool"; "statement"; "network"; "box"; "layers"; "bounds"; "laws"; "values"; "content_sha256" ] json;
   let member key = find "certificate" key json in
-  require (member "statement" = Text Statement.text) "statement is not the one that is checked";
+  let net = with_stated_activations net json in
+  let sorts (_, w) = Activation.sorts (Functions.activation w) in
+  require (member "statement" = Text (Statement.text (List.exists sorts net.parts))) "statement is not the one that is checked";
   let rest = List.filter (fun (key, _) -> key <> "content_sha256") (members "certificate" json) in
   require (member "content_sha256" = Text (Sha256.to_hex (Sha256.string (encode (Object rest)))))
     "content_sha256 does not match: the certificate was changed after it was written";
   (match member "tool" with Text _ -> () | _ -> rejected "tool is not text");
-  let net = with_stated_activations net json in
   check_weights net (member "network");
   check_boxes net (member "box");
   let state = { Claims.net; json; parts = Functions.parts net; accepted = []; log = []; norms = Hashtbl.create 8;

@@ -184,7 +184,9 @@ let check_activations state where bound names =
         let by method_ = find where "upper_method" bound = Text method_ in
         require (find where "domain" bound = Text "global" && not (by "branch")) "%s: a bound on a box%s" where of_;
         require (List.for_all (fun key -> find where key bound = Null) [ "lower"; "lower_hex"; "lower_witness" ])
-          "%s: a lower bound%s" where of_
+          "%s: a lower bound%s" where of_;
+        require (not (Activation.sorts activation) || find where "upper_method" bound = Text "product")
+          "%s: a bound from slopes of single numbers%s" where of_
       end) names
 
 let check_bound state bound =

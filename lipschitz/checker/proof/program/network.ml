@@ -106,6 +106,8 @@ let with_activation field (weights : Weights.t) name =
   | None, _ -> bad_input "%s: there is no activation %s" field (shown name)
   | Some stated, Some other when stated <> other && List.length weights.layers > 1 ->
     bad_input "%s: %s: %s is stated already" weights.path field (Activation.name other)
+  | Some stated, _ when not (Weights.has_groups_of stated weights.layers) ->
+    bad_input "%s: %s: a hidden layer is no multiple of the group's size" weights.path field
   | activation, _ -> { weights with activation }
 
 let read_kinds path ~key role members =

@@ -2,7 +2,7 @@
 
 let schema = "swarmcert/certificate/1"
 
-let text =
+let common =
   "The functions are the operations listed under chain, in that order, with the weights stored in the files named \
    by sha256, rounded to float32 where `as` says so: linear is W x + b; of each number t, relu is the positive \
    part, tanh and sigmoid, 1 / (1 + e^-t), are the functions of these names, softplus is ln(1 + e^t), elu is \
@@ -24,3 +24,11 @@ let text =
    |g - f| <= float32_error for each g that float32 arithmetic may give, whose inputs after the clamp are \
    off by at most input_error: sums of products in any order, fused or not, each operation rounded to \
    nearest."
+
+(* What is added for networks with a layer that is sorted. *)
+let sorting =
+  " Of the numbers t_1, t_2, ... of a layer, groupsort:k sorts each k side by side, the smallest first; \
+   maxmin:halves, of 2 h numbers, is max(t_i, t_(i+h)) for i = 1 .. h and then min(t_i, t_(i+h)); \
+   maxmin:pairs is max(t_(2i-1), t_(2i)) for i = 1 .. h and then min(t_(2i-1), t_(2i))."
+
+let text sorts = if sorts then common ^ sorting else common

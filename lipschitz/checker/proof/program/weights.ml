@@ -14,6 +14,9 @@ type t = {
 let outputs layer = Array.length layer.weights
 let inputs layer = Array.length layer.weights.(0)
 let first_layer w = List.hd w.layers
+let rec has_groups_of activation = function
+  | layer :: (_ :: _ as rest) -> outputs layer mod Activation.group activation = 0 && has_groups_of activation rest
+  | _ -> true
 let last_layer w = List.nth w.layers (List.length w.layers - 1)
 
 (* Every number rounded to the nearest float32. *)

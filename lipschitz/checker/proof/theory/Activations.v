@@ -1,9 +1,32 @@
 (** The functions between the layers of a network, and what it means that their slopes are bounded. *)
 From Coq Require Import List Reals Lra Lia.
+Import ListNotations.
 From Swarmcert Require Import Exponential.
 Open Scope R_scope.
 
-Inductive activation := Relu | Tanh | Sigmoid | Softplus | Elu | Selu | Silu | Gelu.
+(** Sorting acts on the whole layer: in groups of k numbers side by side, or as the larger and the smaller of two, of one
+    number in each half of the layer or of neighbours; the larger ones come first. *)
+Inductive sorting := Groups (k : nat) | Halves | Pairs.
+Inductive activation := Relu | Tanh | Sigmoid | Softplus | Elu | Selu | Silu | Gelu | Sorted (s : sorting).
+
+(** By compare and swap: `a` into a list that is in ascending order. *)
+Fixpoint inserted (a : R) (l : list R) : list R :=
+  match l with [] => [a] | b :: l' => Rmin a b :: inserted (Rmax a b) l' end.
+Definition ascending (l : list R) : list R := fold_right inserted [] l.
+(** n groups; a last one may be shorter. *)
+Fixpoint sorted_groups (n k : nat) (l : list R) : list R :=
+  match n with O => [] | S n' => ascending (firstn k l) ++ sorted_groups n' k (skipn k l) end.
+Definition both (f : R -> R -> R) (u v : list R) : list R := map (fun p => f (fst p) (snd p)) (combine u v).
+Definition of_halves (f : R -> R -> R) (l : list R) : list R :=
+  let h := Nat.div2 (length l) in both f (firstn h l) (skipn h l).
+Fixpoint of_pairs (f : R -> R -> R) (l : list R) : list R :=
+  match l with a :: b :: l' => f a b :: of_pairs f l' | _ => [] end.
+Definition sort_layer (s : sorting) (l : list R) : list R :=
+  match s with
+  | Groups k => sorted_groups (length l) k l
+  | Halves => of_halves Rmax l ++ of_halves Rmin l
+  | Pairs => of_pairs Rmax l ++ of_pairs Rmin l
+  end.
 
 Definition relu (x : R) : R := Rmax 0 x.
 Definition sigmoid (x : R) : R := / (1 + exp (- x)).
@@ -58,6 +81,7 @@ Definition act (a : activation) (x : R) : R :=
   | Selu => selu_scale * relu x + selu_scale * selu_alpha * falling x
   | Silu => x / (1 + exp (- x))
   | Gelu => x / 2 * (1 + erf (x / sqrt 2))
+  | Sorted _ => x  (* by number it does nothing; see `value` of Meaning.v *)
   end.
 
 (** Every slope of f lies in [a, b]. *)

@@ -38,6 +38,7 @@ Definition matrices (p : part) : stack :=
 (** Of each hidden layer. *)
 Definition bends_of (p : part) : list dyadic := map (fun _ => bend_of (between p)) (hidden p).
 Definition relu_between (p : part) : bool := is_relu (between p).
+Definition entrywise_between (p : part) : bool := is_entrywise (between p).
 Definition parts_of (ps : list part) (f : function) : list part :=
   match f with Alone p => [part_at ps p] | Set_of phi rho => [part_at ps phi; part_at ps rho] end.
 (** Every network's biases fit; rho has no clamp; `moves` and a scale that is stated have one entry per input. *)
@@ -46,7 +47,7 @@ Definition well_formed (ps : list part) (f : function) (moves : list bool) (scal
   && (length moves =? inputs_of (part_at ps (moved f)))%nat
   && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
 Definition check_slope ps f moves scale u rho t factor : bool :=
-  well_formed ps f moves scale && is_nonnegative u
+  well_formed ps f moves scale && forallb entrywise_between (parts_of ps f) && is_nonnegative u
   && check_parts (flat_map bends_of (parts_of ps f)) ([],
     selector moves scale) (map matrices (parts_of ps f)) u rho t factor.
 

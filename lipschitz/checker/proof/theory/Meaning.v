@@ -22,8 +22,18 @@ Fixpoint clamped (c : list (dyadic * dyadic)) (x : list R) : list R :=
   | (low, high) :: c', a :: x' => Rmin (Rmax a (real low)) (real high) :: clamped c' x'
   | _, _ => x
   end.
-Definition value (p : part) (x : list R) : list R :=
-  network (map (fun l => (act (between p), real_layer l)) (hidden p)) (real_layer (outer p)) (clamped (clamp p) x).
+(** What is between layers by number, or sorts. *)
+Fixpoint sorting_network (s : sorting) (hidden : list layer) (last : layer) (x : list R) : list R :=
+  match hidden with
+  | [] => affine (fst last) (snd last) x
+  | l :: hidden' => sorting_network s hidden' last (sort_layer s (affine (fst l) (snd l) x))
+  end.
+Definition unclamped (p : part) : list R -> list R :=
+  match between p with
+  | Sorted s => sorting_network s (map real_layer (hidden p)) (real_layer (outer p))
+  | a => network (map (fun l => (act a, real_layer l)) (hidden p)) (real_layer (outer p))
+  end.
+Definition value (p : part) (x : list R) : list R := unclamped p (clamped (clamp p) x).
 Definition vector_sum (us : list (list R)) : list R := fold_right plusR [] us.
 
 (** "network", "phi:..." or "rho:...", and "set:...", whose value is rho(phi(x) + rest). *)

@@ -103,7 +103,7 @@ Proof.
   unfold check_error. intros H. do 3 both H. apply relu_part in H. split; auto. intros x v Hx (h & C & F).
   apply real_nonnegative in H1. apply at_most_real in H0.
   assert (close e (value (part_at ps p) x) v) as K.
-  { unfold value. rewrite H. eapply roundings_close; eauto. now apply within_clamped. }
+  { unfold value, unclamped. rewrite H. eapply roundings_close; eauto. now apply within_clamped. }
   split; auto. apply sqrt_below; auto. rewrite real_square, real_mul in H0. pose proof (close_square _ _ _ K). lra.
 Qed.
 Lemma find_error_sound ps accepted p b r e u : Forall (holds ps) accepted ->

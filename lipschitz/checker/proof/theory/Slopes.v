@@ -1,7 +1,7 @@
 (** Accepted norms and slopes hold: by a matrix inequality, by a vector, by a product of norms. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool.
-From Swarmcert Require Import Algebra Activations Form Network Checker Meaning Steepness Sets Distance Blocks Lower
-    Values Claims.
+From Swarmcert Require Import Algebra Activations Form Network Sorting Checker Meaning Steepness Sets Distance Blocks
+    Lower Values Claims.
 Import ListNotations.
 Open Scope R_scope.
 
@@ -83,13 +83,13 @@ Proof.
   intros H. destruct hidden as [|[m c] later]; [reflexivity|]. unfold run. simpl.
   now rewrite scaled_later, scale_divided.
 Qed.
-Lemma value_network p x : value p x =
-  network (map (fun l => (act (between p), l)) (map real_layer (hidden p))) (real_layer (outer p))
-    (clamped (clamp p) x).
-Proof. unfold value. now rewrite map_map. Qed.
-Lemma value_run p x : value p x = run (stack_of p) (clamped (clamp p) x).
+Lemma unclamped_network p x : entrywise_between p = true -> unclamped p x =
+  network (map (fun l => (act (between p), l)) (map real_layer (hidden p))) (real_layer (outer p)) x.
+Proof. unfold entrywise_between, unclamped. rewrite map_map. now destruct (between p). Qed.
+Lemma value_run p x : entrywise_between p = true -> value p x = run (stack_of p) (clamped (clamp p) x).
 Proof.
-  destruct (function_bent (between p)) as [P _]. unfold stack_of. rewrite scaled_run by lra. apply value_network.
+  intros H. destruct (function_bent (between p)) as [P _]. unfold stack_of. rewrite scaled_run by lra.
+  now apply unclamped_network.
 Qed.
 Lemma bends_hold p : Forall2 has_bend (bends_of p) (functions (stack_of p)).
 Proof.
@@ -120,8 +120,14 @@ Proof.
 Qed.
 Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
 Proof.
-  intros H. unfold value. rewrite network_end, length_affine; simpl; rewrite ?map_length; auto.
-  apply (fits_layer p); auto. apply in_or_app. right. now left.
+  intros H. assert (length (snd (outer p)) = length (fst (outer p))) as L
+    by (apply (fits_layer p); auto; apply in_or_app; right; now left).
+  unfold value. destruct (entrywise_between p) eqn:E.
+  - rewrite unclamped_network, network_end, length_affine by (simpl; rewrite ?map_length; auto). simpl.
+    now rewrite map_length.
+  - unfold entrywise_between, unclamped in *. destruct (between p); try discriminate.
+    generalize (clamped (clamp p) x). induction (hidden p) as [|l ls IH]; intros y; simpl; auto.
+    rewrite length_affine by (simpl; now rewrite !map_length). simpl. now rewrite map_length.
 Qed.
 Lemma distance_nonneg scale x y : 0 <= distance scale x y. Proof. apply sqrt_pos. Qed.
 
@@ -143,22 +149,22 @@ Qed.
 Lemma slope_sound ps f moves scale u rho t factor :
   check_slope ps f moves scale u rho t factor = true -> holds ps (Slope_at_most f moves scale u).
 Proof.
-  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 2 both H. do 4 both H.
-  rename H0 into HP, H1 into Hu, H2 into Hl, H3 into Hs, H4 into Hm, H5 into Hc.
+  unfold check_slope, well_formed. intros H rest x y Ha Hx. do 3 both H. do 4 both H.
+  rename H0 into HP, H1 into Hu, H2 into He, H3 into Hl, H4 into Hs, H5 into Hm, H6 into Hc.
   apply real_nonnegative in Hu. set (S := selector moves scale) in *.
   assert (forall base, length base = length moves -> instance ([], S) ([], (realm S, base))) as I.
   { intros base Hb. split; [constructor|]. split; auto. simpl. unfold S. now rewrite length_selector. }
   assert (inputs [] S = count moves) as Hi by apply selector_columns.
   pose proof (check_parts_sound _ _ _ _ _ _ _ HP) as C. clear HP. cbn [fst snd] in C.
   destruct f as [p|phi k]; cbn [parts_of map forallb tl moved value_of flat_map] in *.
-  - both H. apply instance_matrices in H. rewrite !value_run.
+  - both H. apply instance_matrices in H. both He. rewrite !value_run by auto.
     apply (moved_bound moves scale); auto. intros v w base Hv Hw Hb.
     pose proof (C _ [([], stack_of (part_at ps p))] (I base Hb)
       (Forall2_cons (matrices (part_at ps p)) ([], stack_of (part_at ps p)) H (Forall2_nil _))
       (Forall2_app (bends_hold _) (Forall2_nil _)) v w) as B.
     simpl in B. rewrite !plus_nil_r in B. apply B; congruence.
-  - both H. both H0. apply instance_matrices in H, H0.
-    both Hc. rewrite !value_run. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
+  - both H. both H0. apply instance_matrices in H, H0. apply andb_prop in He. destruct He as [He He']. both He'.
+    both Hc. rewrite !value_run by auto. destruct (clamp (part_at ps k)) eqn:E; [|discriminate]. simpl clamped.
     apply (moved_bound moves scale _ _
         (fun z => run (stack_of (part_at ps k)) (plusR (run (stack_of (part_at ps phi)) z) rest))); auto.
     intros v w base Hv Hw Hb.
@@ -228,9 +234,23 @@ Proof.
     unfold norm. rewrite <- (sqrt_square c) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
     apply sqrt_le_1_alt. now apply slopes_contract.
 Qed.
-(** Of a part without its clamp. *)
-Definition unclamped (p : part) : list R -> list R :=
-  network (map (fun l => (act (between p), real_layer l)) (hidden p)) (real_layer (outer p)).
+Lemma sorting_bound s hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
+  (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
+  let g := sorting_network s (map real_layer hs) (real_layer l) in
+  norm (minus (g x) (g y)) <= with_slopes_R 1 hs (product_R us) * norm (minus x y).
+Proof.
+  revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
+  - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
+  - inversion H as [|? u ? us' Hu Hus]; subst. pose proof (affine_bound k u x y Hu (L _ (or_introl eq_refl))) as B.
+    unfold real_layer in B. simpl in B. set (p := affine _ _ x) in *. set (q := affine _ _ y) in *.
+    assert (length p = length q) as E.
+    { unfold p, q. rewrite !length_affine; auto; rewrite !map_length; apply L; auto. }
+    eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite with_slopes_times.
+    set (w := with_slopes_R 1 hs (product_R us')).
+    assert (0 <= w) as W by (apply with_slopes_nonneg; [lra|]; eapply product_nonneg; eauto).
+    replace (1 * (u * w) * norm (minus x y)) with (w * (u * norm (minus x y))) by ring.
+    apply Rmult_le_compat_l; auto. eapply Rle_trans; [|exact B]. apply norm_le. now apply sorting_contracts.
+Qed.
 Lemma part_bound ps accepted p v : Forall (holds ps) accepted -> fits_part (part_at ps p) = true ->
   norm_of ps accepted p = Some v -> 0 <= real v /\ forall x y,
   norm (minus (unclamped (part_at ps p) x) (unclamped (part_at ps p) y)) <= real v * norm (minus x y).
@@ -239,7 +259,10 @@ Proof.
   inversion Hv. destruct (all_slopes (between (part_at ps p))) as [C S].
   destruct (norms_sound ps accepted p w HA _ [] eq_refl Hw) as (us & B & E). rewrite real_with_slopes, E. split.
   - apply with_slopes_nonneg; auto. eapply product_nonneg; eauto.
-  - intros x y. apply network_bound; auto. intros k. now apply fits_layer.
+  - intros x y. destruct (entrywise_between (part_at ps p)) eqn:W.
+    + rewrite !unclamped_network, map_map by auto. apply network_bound; auto. intros k. now apply fits_layer.
+    + unfold entrywise_between, unclamped in *. destruct (between (part_at ps p)); try discriminate.
+      simpl steepest. rewrite real_one. apply sorting_bound; auto. intros k. now apply fits_layer.
 Qed.
 Lemma square_in_largest m scale d : (scale = [] \/ length d = length scale) -> positive_scale scale = true ->
   real (hd one scale) <= m -> Forall (fun s => real s <= m) scale -> square d <= m * m * square_in scale d.
@@ -288,14 +311,13 @@ Proof.
     - eapply Rle_trans; [exact E|]. now apply Rmult_le_compat_l.
     - rewrite <- Rmult_assoc, (Rmult_comm (real k)). apply Rmult_le_compat_r; auto. }
   destruct f as [p|phi r]; cbn [parts_of forallb tl value_of product_of] in *.
-  - both H. destruct (part_bound _ _ _ _ HA H Hk) as [K B]. unfold value. fold (unclamped (part_at ps p)).
+  - both H. destruct (part_bound _ _ _ _ HA H Hk) as [K B]. unfold value.
     eapply G; [apply norm_nonneg | auto | apply B | apply D].
   - both H. both H3. both Hc.
     destruct (norm_of ps accepted phi) as [a|] eqn:Ea; [|discriminate].
     destruct (norm_of ps accepted r) as [b|] eqn:Eb; [|discriminate]. inversion Hk. subst k.
     destruct (part_bound _ _ _ _ HA H Ea) as [Ka Ba]. destruct (part_bound _ _ _ _ HA H3 Eb) as [Kb Bb].
     unfold value at 1 3. destruct (clamp (part_at ps r)) eqn:E; [|discriminate]. simpl clamped.
-    fold (unclamped (part_at ps r)).
     apply (G (norm (minus (clamped (clamp (part_at ps phi)) x) (clamped (clamp (part_at ps phi)) y))));
       [apply norm_nonneg | rewrite real_mul; nra | | apply D].
     rewrite real_mul, (Rmult_comm (real a)), Rmult_assoc. eapply Rle_trans; [apply Bb|]. apply Rmult_le_compat_l; auto.

@@ -6,7 +6,7 @@ Open Scope R_scope.
 (** No slope is larger in absolute value. *)
 Definition steepest (a : activation) : dyadic :=
   match a with
-  | Relu | Tanh | Softplus | Elu => one
+  | Relu | Tanh | Softplus | Elu | Sorted _ => one
   | Sigmoid => (1, -2)%Z
   | Selu => (7917775536320561, -52)%Z
   | Silu => (72089, -16)%Z
@@ -14,6 +14,8 @@ Definition steepest (a : activation) : dyadic :=
   end.
 (** No slope is negative. *)
 Definition is_rising (a : activation) : bool := match a with Silu | Gelu => false | _ => true end.
+(** Whether it acts number by number. *)
+Definition is_entrywise (a : activation) : bool := match a with Sorted _ => false | _ => true end.
 Definition is_relu (a : activation) : bool := match a with Relu => true | _ => false end.
 
 Lemma slopes_of_derivative (f d : R -> R) a b : (forall x, derivable_pt_lim f x (d x)) ->
@@ -196,6 +198,7 @@ Proof.
   - exact elu_slopes.
   - auto.
   - exact selu_slopes.
+  - intros x y L. simpl. lra.
 Qed.
 Theorem all_slopes a : 0 <= real (steepest a) /\ slopes (act a) (- real (steepest a)) (real (steepest a)).
 Proof.
