@@ -57,9 +57,11 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   rho->needs(phi)->excludes(file);
   app.add_option("--key", arguments.key, "Key of the state dict inside a nested checkpoint, e.g. model");
   app.add_option("--activation", arguments.activation,
-                 "Between the layers, which a state dict does not tell (default: relu). Smooth ones can be "
-                 "certified and checked: " +
-                     files::activations());
+                 "Between the layers, which a state dict does not tell (default: relu). Others than ReLU "
+                 "can be certified and checked: " +
+                     files::activations() +
+                     ". maxmin:halves compares number i with number i of the layer's second half, "
+                     "maxmin:pairs neighbours; the larger ones come first; groupsort sorts upwards");
   declare_order(app, arguments);
 }
 
@@ -72,7 +74,11 @@ files::Network load_net(const files::NetworkArguments& arguments) {
 files::Network load_any_net(const files::NetworkArguments& arguments) {
   if (!arguments.activation.empty() && !files::is_activation(arguments.activation))
     throw UsageError("--activation " + arguments.activation +
-                     ": is none of those whose slopes are known: " + files::activations());
+                     ": is none of those whose slopes are known: " + files::activations() +
+                     (arguments.activation == "maxmin"
+                          ? "; maxmin:halves compares number i with number i of the layer's second half, "
+                            "maxmin:pairs neighbours; the larger ones come first in both"
+                          : ""));
   if (host() != nullptr && host()->network) {
     return arguments.activation.empty() ? *host()->network
                                         : files::with_activation(*host()->network, arguments.activation);

@@ -225,6 +225,46 @@ def products_count_the_activations(folder, generator):
         refused(certificate, net, "claims less than the product of the norms")
 
 
+def sorting_layers_have_products_only(folder, generator):
+    """MaxMin and GroupSort: certificates as written, and changed ones, are decided alike by the three checkers."""
+    net = folder / "sorting.safetensors"
+    net.write_bytes(safetensors(layers([3, 4, 8, 2], generator)))
+    relu, decided, accepted = certify(net, "--method", "sdp"), 0, 0
+    def smaller(certificate):
+        with_upper(certificate["bounds"][0], math.nextafter(certificate["bounds"][0]["upper"], 0))
+    def of_relu(certificate):
+        certificate["bounds"] = copy.deepcopy(relu["bounds"])
+        certificate["bounds"][0].update(lower=None, lower_hex=None, lower_witness=None)
+    def with_other(key, value):
+        return lambda certificate: certificate["bounds"][0].update({key: value})
+    changes = [lambda certificate: None, smaller, of_relu, with_other("upper_method", "sdp"),
+               with_other("upper_method", "branch"), with_other("lower", 0.5), with_other("domain", "box"),
+               lambda certificate: certificate.update(statement=relu["statement"])]
+    ops = ["groupsort:2", "groupsort:4", "maxmin:halves", "maxmin:pairs"]
+    changes += [lambda certificate, op=op: certificate.update(with_activations_again(certificate, op))
+                for op in ops + ["relu", "tanh", "groupsort:1", "groupsort:3", "groupsort:02", "groupsort:65", "maxmin"]]
+    for op in ops:
+        certificate = certify(net, "--activation", op)
+        assert certificate["bounds"][0]["upper_method"] == "product"
+        for number, change in enumerate(changes):
+            changed = copy.deepcopy(certificate)
+            change(changed)
+            done = check(changed, net)
+            checked = net.parent / "checked.json"
+            others = [run(SWARMCERT, "check", checked, net).returncode,
+                      run(sys.executable, SOURCE / "tests/lipschitz/check_certificate.py", checked, net).returncode]
+            assert [done.returncode] * 2 == others, f"{op}, change {number}: {done}, {others}"
+            decided += 1
+            accepted += done.returncode == 0
+            assert done.returncode in (0, 1) and "not checked" not in done.stdout.replace("0 not checked", ""), done
+    # Any of the four is accepted for any other: the file does not say which it is, and the bound is that of each.
+    assert (decided, accepted) == (len(ops) * len(changes), len(ops) * (1 + len(ops))), (decided, accepted)
+    for op in "groupsort:3", "maxmin", "groupsort:65":
+        assert check(certificate, net, "--activation", op).returncode in (2, 3)
+    done = check(certificate, net, "--coq")
+    assert "(Sorted Pairs)" in done.stdout, done
+
+
 PARTS = {"phi:small": [6, 3, 2], "phi:large": [6, 2, 3, 2], "phi:ground": [4, 3, 2], "rho:small": [2, 3, 1]}
 
 
@@ -354,7 +394,8 @@ def main():
                 accepted_at_the_bound_that_the_proof_shows(folder, op, generator)
         for claim in (the_inequality_is_that_of_the_activation,
                       functions_that_are_not_monotone_have_an_inequality_of_their_own, refuses_what_only_relu_has,
-                      products_count_the_activations, each_part_has_its_own_activation,
+                      products_count_the_activations, sorting_layers_have_products_only,
+                      each_part_has_its_own_activation,
                       terms_that_stand_still_must_be_relu, onnx_files_state_their_activation):
             claim(folder, generator)
             print(claim.__name__.replace("_", " "))

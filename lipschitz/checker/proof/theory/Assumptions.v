@@ -1,12 +1,14 @@
 (** The theorems, and what they rest on; compared with assumptions.txt. *)
 From Coq Require Import List Reals.
-From Swarmcert Require Import Activations Form Network Checker Meaning Steepness Sets Claims Sound.
+From Swarmcert Require Import Activations Form Network Sorting Checker Meaning Steepness Sets Claims Sound.
 Open Scope R_scope.
 Set Printing Width 120.
 Check rising_slopes.
 Print Assumptions rising_slopes.
 Check all_slopes.
 Print Assumptions all_slopes.
+Check sorting_contracts.
+Print Assumptions sorting_contracts.
 Check check_sound.
 Print Assumptions check_sound.
 Check check_parts_sound.

@@ -1,0 +1,160 @@
+/// Bounds and certificates of networks with MaxMin or GroupSort between their layers.
+#include <algorithm>
+#include <cmath>
+
+#include "lipschitz/certify.h"
+#include "lipschitz/checker/check.h"
+#include "lipschitz/checker/stages.h"
+#include "lipschitz/networks.h"
+#include "lipschitz/slope_estimate.h"
+#include "nn/base/content_hash.h"
+#include "nn/base/input_error.h"
+#include "nn/weights/activation.h"
+
+namespace swarmcert {
+namespace {
+
+using files::Activation;
+using files::Json;
+using files::Network;
+
+const Activation kSorting[] = {Activation::kMaxMinHalves, Activation::kMaxMinPairs, files::group_sort(2),
+                               files::group_sort(4), files::group_sort(8)};
+
+files::Weights sorting(files::Weights weights, Activation activation) {
+  weights.activation = activation;
+  return weights;
+}
+
+lipschitz::CertifyOptions quick() {
+  lipschitz::CertifyOptions options;
+  options.lower.rounds = 1;
+  options.jobs = 1;
+  return options;
+}
+
+double distance(const std::vector<double>& x, const std::vector<double>& y) {
+  double sum = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - y[i]) * (x[i] - y[i]);
+  return std::sqrt(sum);
+}
+
+TEST(Sorting, ActivationsAreThoseOfTheirDefinitions) {
+  const std::vector<double> t = {3, -1, 4, 1, -5, 9, 2, -6};
+  const auto expect = [&t](Activation activation, const std::vector<double>& expected) {
+    EXPECT_EQ(files::activated(activation, t), expected) << files::function_of(activation).op;
+  };
+  expect(Activation::kMaxMinHalves, {3, 9, 4, 1, -5, -1, 2, -6});
+  expect(Activation::kMaxMinPairs, {3, 4, 9, 2, -1, 1, -5, -6});
+  expect(files::group_sort(2), {-1, 3, 1, 4, -5, 9, -6, 2});
+  expect(files::group_sort(4), {-1, 1, 3, 4, -6, -5, 2, 9});
+  expect(files::group_sort(8), {-6, -5, -1, 1, 2, 3, 4, 9});
+  EXPECT_THROW(files::activated(files::group_sort(3), t), std::invalid_argument);
+  EXPECT_THROW(files::group_sort(1), std::invalid_argument);
+  EXPECT_THROW(files::group_sort(files::kLargestGroup + 1), std::invalid_argument);
+}
+
+TEST(Sorting, BoundsAreTheProductAndAboveEverySampledSlope) {
+  std::mt19937 generator(5);
+  int slopes = 0;
+  for (const Activation activation : kSorting) {
+    const Network network =
+        tests::plain(sorting(tests::random_network({3, 8, 16, 8, 2}, generator), activation));
+    const auto found = certify(network, quick());
+    ASSERT_EQ(found.bounds.size(), 1U);
+    const lipschitz::CertifiedBound& bound = found.bounds.front();
+    EXPECT_EQ(bound.method, lipschitz::UpperMethod::kProduct);
+    EXPECT_EQ(bound.upper.value(), bound.product.value());
+    const files::Evaluator<double> f(*network.plain);
+    for (int s = 0; s < 20000; ++s, ++slopes) {
+      const double radius = std::exp2(-static_cast<double>(generator() % 12));
+      std::vector<double> x(3), y(3);
+      for (std::size_t i = 0; i < 3; ++i) {
+        x[i] = 3 * static_cast<double>(tests::random_number(generator));
+        y[i] = x[i] + radius * static_cast<double>(tests::random_number(generator));
+      }
+      ASSERT_LE(distance(f(x), f(y)), bound.upper.value() * distance(x, y) * (1 + 1e-9));
+    }
+    const double steepest = lipschitz::slope_estimate(network, bound, {}).value();  // climbs
+    EXPECT_GT(steepest, 0.1 * bound.upper.value());
+    EXPECT_LE(steepest, bound.upper.value() * (1 + 1e-9)) << files::function_of(activation).op;
+  }
+  EXPECT_EQ(slopes, 100000);
+}
+
+TEST(Sorting, TheProductIsAttainedByOrthogonalLayersAndBelowTheBoundThatReluGives) {
+  const double c = 0.6, s = 0.8;
+  const std::vector<double> turned = {c, -s, s, c};
+  const files::Weights weights = tests::weights(
+      {tests::layer(2, 2, turned), tests::layer(2, 2, turned), tests::layer(2, 2, {c, s, -s, c})});
+  const Network network = tests::plain(sorting(weights, files::group_sort(2)));
+  const auto found = certify(network, quick());
+  EXPECT_NEAR(found.bounds.front().upper.value(), 1, 1e-9);
+  EXPECT_NEAR(lipschitz::slope_estimate(network, found.bounds.front(), {}).value(), 1, 1e-6);
+  // max(a, b) = b + relu(a - b), min(a, b) = a - relu(a - b), where x = relu(x) - relu(-x).
+  std::vector<double> into;
+  for (const auto& [a, b] : {std::pair{1, -1}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}})
+    for (std::size_t j = 0; j < 2; ++j) into.push_back(a * turned[j] + b * turned[2 + j]);
+  const files::Weights relu =
+      tests::weights({tests::layer(5, 2, into), tests::layer(2, 5, {-1, 1, -1, 0, 0, 1, 0, 0, 1, -1})});
+  EXPECT_GT(certify(tests::plain(relu), quick()).bounds.front().upper.value(), 1.2);
+}
+
+/// A certificate of a network with `activation`, whose file does not state it.
+Json certificate_of(const Network& network) {
+  return lipschitz::certificate(network, certify(network, quick()));
+}
+
+bool accepted(Json certificate, const Network& network) {
+  certificate["content_sha256"] = files::content_sha256(certificate);
+  return check::check(certificate, check::with_stated_activations(certificate, network)).accepted;
+}
+
+TEST(Sorting, CheckerAcceptsTheProductAndNothingBetter) {
+  std::mt19937 generator(6);
+  const files::Weights weights = tests::random_network({3, 4, 8, 2}, generator);
+  const Network relu = tests::plain(weights);
+  const auto slopes = certificate_of(relu)["bounds"];
+  ASSERT_EQ(slopes.at(0)["upper_method"], "sdp");
+  int refused = 0;
+  for (const Activation activation : {Activation::kMaxMinHalves, files::group_sort(4)}) {
+    const Network network = tests::plain(sorting(weights, activation));
+    const Json certificate = certificate_of(network);
+    EXPECT_TRUE(accepted(certificate, network));
+    const auto refuses = [&](const auto& change) {
+      Json changed = certificate;
+      change(changed);
+      EXPECT_FALSE(accepted(changed, network)) << changed["bounds"].dump();
+      ++refused;
+    };
+    refuses([&](Json& changed) { changed["bounds"] = slopes; });
+    refuses([&](Json& changed) {
+      changed["bounds"] = slopes;
+      for (const char* const key : {"lower", "lower_hex", "lower_witness"})
+        changed["bounds"][0][key] = nullptr;
+    });
+    refuses([&](Json& changed) { changed["bounds"][0]["upper_method"] = "sdp"; });
+    refuses([&](Json& changed) { changed["statement"] = certificate_of(relu)["statement"]; });
+    refuses([&](Json& changed) {
+      for (Json& step : changed["network"]["weights"]["network"]["chain"])
+        if (step["op"] != "linear") step["op"] = "relu";
+    });
+    EXPECT_THROW(check::stages(network, "network"), std::domain_error);
+  }
+  EXPECT_EQ(refused, 10);
+}
+
+TEST(Sorting, WidthsMustBeMultiplesOfTheGroup) {
+  std::mt19937 generator(7);
+  files::Weights weights = tests::random_network({3, 6, 4, 2}, generator);
+  weights.order_source = files::OrderSource::kNames;
+  weights.activation_is_given = false;
+  EXPECT_NO_THROW(files::with_activation(weights, "groupsort:2"));
+  EXPECT_THROW(files::with_activation(weights, "groupsort:4"), files::InputError);
+  EXPECT_FALSE(files::is_activation("maxmin"));
+  EXPECT_FALSE(files::is_activation("groupsort"));
+  EXPECT_FALSE(files::is_activation("groupsort:02"));
+}
+
+}  // namespace
+}  // namespace swarmcert
