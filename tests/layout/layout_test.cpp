@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <regex>
 #include <set>
 #include <string>
 #include <vector>
@@ -224,21 +225,24 @@ TEST(Layout, InstalledHeadersAreForUsersAndIncludeOnlySuch) {
   }
 }
 
-TEST(Layout, EveryFolderOfSourcesHasAReadmeOfAtMostAPage) {
+TEST(Layout, EveryFolderOfSourcesHasAReadmeOfAtMostAPageThatNamesEachFile) {
   std::set<std::string> folders;
-  for (const std::string& source : product_sources())
-    folders.insert(fs::path(source).parent_path().generic_string());
-  for (const std::string& folder : folders) {
-    if (folder.rfind("analysis/commands/", 0) == 0 || folder == "controller/crazyflie/src" ||
-        folder == "analysis/gate/checks")
-      continue;  // the README of the folder above explains them
-    const fs::path readme = fs::path(SWARMCERT_SOURCE_DIR) / folder / "README.md";
-    std::ifstream in(readme);
-    ASSERT_TRUE(in) << readme << " is missing";
-    const auto lines = std::count(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>(), '\n');
-    EXPECT_LT(lines, 80) << readme << " is longer than a page";
+  std::size_t files = 0;
+  for (const std::string& source : product_sources()) {
+    const fs::path folder = fs::path(SWARMCERT_SOURCE_DIR) / fs::path(source).parent_path();
+    std::ifstream in(folder / "README.md");
+    ASSERT_TRUE(in) << folder << " has no README.md";
+    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    if (folders.insert(folder.generic_string()).second)
+      EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 80)
+          << folder << ": README.md is longer than a page";
+    const std::string stem = fs::path(source).stem().string();
+    EXPECT_TRUE(std::regex_search(text, std::regex("\\b" + stem + "\\b")))
+        << folder << ": README.md does not say what " << stem << " is for";
+    ++files;
   }
-  EXPECT_GT(folders.size(), 30U);
+  EXPECT_GT(folders.size(), 50U);
+  EXPECT_GT(files, 900U);
 }
 
 TEST(Layout, LinesOfSourcesHaveAtMost120Columns) {
