@@ -13,7 +13,8 @@ namespace {
 constexpr char kOperators[] =
     "is none of the operators that can be read: Gemm, MatMul, Conv, BatchNormalization, AveragePool, "
     "MaxPool, Add, Sub, Mul, Div, Relu, LeakyRelu, PRelu, Clip, HardSigmoid, Abs, Max, Min, Tanh, Sigmoid, "
-    "Softplus, Elu, Gelu, Flatten, Reshape, Transpose, Concat and the like";
+    "Softplus, Elu, Gelu, TopK, Split with Max and Min for MaxMin, Flatten, Reshape, Transpose, Concat and "
+    "the like";
 constexpr char kSmooth[] =
     "leave it out of the exported model where it is the last node; a network with it between its layers "
     "cannot be read: train with ReLU, LeakyReLU, Hardtanh, tanh, sigmoid, softplus, ELU, SELU, SiLU or GELU";
@@ -25,6 +26,10 @@ bool is_unread_activation(const std::string& type) {
 
 std::size_t inputs_that_count(const OnnxNode& node) {
   return node.type == "BatchNormalization" || node.type == "Dropout" ? 1 : node.inputs.size();
+}
+
+bool is_part_of_sorting(const std::string& type) {
+  return type == "Split" || type == "ReduceMax" || type == "ReduceMin" || type == "Sort";
 }
 
 }  // namespace
@@ -43,6 +48,7 @@ Weights OnnxGraph::run() {
   if (!count || *count > kMostRows) refuse(0, in_quotes(model_.input.name), "has more than 2^20 entries");
   chain_ = ReluChain(static_cast<int>(*count));
   values_[model_.input.name] = {identity_map(static_cast<int>(*count)), shape, ""};
+  join_sorting();
   join_smooth_activations();
   count_uses();
   for (const Node& node : model_.nodes) follow(node);
@@ -221,6 +227,8 @@ OnnxValue OnnxGraph::computed(const Node& node) {
                                                 "Squeeze",  "Unsqueeze", "Transpose", "Concat",  "Pad"};
   static const std::set<std::string> kActivation = {
       "Relu", "LeakyRelu", "PRelu", "Clip", "Abs", "Max", "Min", "HardSigmoid", "MaxPool", "GlobalMaxPool"};
+  if (joined_.count(node.outputs[0]) == 1) return sorted_by_concat(node);
+  if (node.type == "TopK") return sorted_by_top(node);
   if (kAffine.count(node.type) == 1) return computed_affine(node);
   if (kLayout.count(node.type) == 1) return computed_layout(node);
   static const std::set<std::string> kSmoothRead = {"Tanh", "Sigmoid", "Softplus", "Elu",
@@ -232,7 +240,9 @@ OnnxValue OnnxGraph::computed(const Node& node) {
     notes_.insert("the last " + node.type + " is left out: everything is said of the logits");
     return value(node, 0);
   }
-  throw OperatorRefusal{kOperators, is_unread_activation(node.type) ? kSmooth : kReexportOnnx};
+  throw OperatorRefusal{kOperators, is_unread_activation(node.type) ? kSmooth
+                                    : is_part_of_sorting(node.type) ? kReadSorting
+                                                                    : kReexportOnnx};
 }
 
 OnnxValue OnnxGraph::applied(const Node& node, const AffineMap& map, const OnnxShape& shape,

@@ -13,6 +13,13 @@
 
 namespace swarmcert::files {
 
+inline constexpr char kReadSorting[] =
+    "MaxMin is read as Split in two halves, Max and Min of them, Concat; or as ReduceMax and ReduceMin of "
+    "pairs "
+    "along the last axis, Concat; GroupSort as TopK of the whole last axis; or save the state dict, and "
+    "certify "
+    "it with --activation maxmin:halves, maxmin:pairs or groupsort:SIZE";
+
 class OnnxGraph {
  public:
   OnnxGraph(OnnxModel model, const std::string& path);
@@ -61,6 +68,12 @@ class OnnxGraph {
   OnnxNode* only_user(const std::string& name);
   bool holds(const std::string& name, double wanted, double error) const;
   void join_smooth_activations();
+  std::vector<OnnxNode*> users_of(const std::string& name);
+  OnnxNode* joined_by_concat(const std::vector<OnnxNode*>& pair);
+  void join_sorting();
+  OnnxValue sorted(const Node& node, const OnnxValue& x, Activation activation);
+  OnnxValue sorted_by_concat(const Node& node);
+  OnnxValue sorted_by_top(const Node& node);
   std::vector<AffineMap*> needed_after(const Node& node);
   void require_activation(const Node& node, Activation activation);
   std::string layer_name(const std::string& weight);
@@ -74,6 +87,8 @@ class OnnxGraph {
   std::set<std::string> names_;
   int layers_ = 0;
   std::set<std::string> notes_;
+  /// Of a Concat that stands for MaxMin, by its output: the Split, or ReduceMax and ReduceMin, before it.
+  std::map<std::string, std::vector<OnnxNode>> joined_;
   Activation activation_ = Activation::kRelu;
   std::string activated_by_;  ///< the first node with an activation; empty: none yet
 };

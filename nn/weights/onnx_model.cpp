@@ -152,8 +152,9 @@ class OnnxModelReader {
       if (field.number == 7 && !text(field).empty() && text(field) != "ai.onnx")
         refuse(field.offset, in_quotes(text(field)), "the node is of an operator set that cannot be read");
     }
-    // Dropout and BatchNormalization may name further outputs, which nothing uses in inference.
-    const bool may_have_more = node.type == "Dropout" || node.type == "BatchNormalization";
+    // Dropout and BatchNormalization may name further outputs, which nothing uses in inference; TopK's are indices.
+    const bool may_have_more = node.type == "Dropout" || node.type == "BatchNormalization" ||
+                               node.type == "TopK" || node.type == "Split";
     if (node.outputs.empty() || (node.outputs.size() > 1 && !may_have_more))
       refuse(node.offset, node.label(), "has not exactly one output");
     return node;

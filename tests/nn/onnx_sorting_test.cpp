@@ -1,0 +1,107 @@
+/// MaxMin and GroupSort in ONNX models: the groups of nodes that PyTorch exports, and what is refused.
+#include <gtest/gtest.h>
+
+#include "nn/weights/weights.h"
+#include "onnx_writer.h"
+#include "refusal.h"
+
+namespace swarmcert::files {
+namespace {
+
+using namespace tests;
+
+constexpr std::uint64_t kMinusOne = ~std::uint64_t{0};
+
+/// Gemm 2-4, `nodes` from "h" to "a", Gemm 4-1 with weights 1, 10, 100, 1000.
+std::string sorting_model(const std::vector<std::string>& nodes) {
+  OnnxModel model;
+  model.nodes = {onnx_node("Gemm", {"x", "w", "b"}, {"h"})};
+  model.nodes.insert(model.nodes.end(), nodes.begin(), nodes.end());
+  model.nodes.push_back(onnx_node("Gemm", {"a", "v"}, {"y"}));
+  const auto integers = [](const std::string& name, const std::vector<std::int64_t>& values) {
+    return onnx_tensor(name, {values.size()}, 7, onnx_text(9, raw_numbers(values)));
+  };
+  model.tensors = {onnx_raw("w", {2, 4}, {1, -2, 0.5F, 3, 2, 1, -1, 4}),
+                   onnx_raw("b", {4}, {0.25F, -1, 2, 0.5F}),
+                   onnx_raw("v", {4, 1}, {1, 10, 100, 1000}),
+                   integers("pairs", {1, 2, 2}),
+                   integers("flat", {1, 4}),
+                   integers("halves", {2, 2}),
+                   integers("unequal", {1, 3}),
+                   integers("two", {2}),
+                   integers("four", {4}),
+                   integers("one", {1})};
+  model.shape = {1, 2};
+  return model.bytes();
+}
+
+Weights sorting_weights(const std::vector<std::string>& nodes) {
+  return parse_weights(sorting_model(nodes), "net.onnx");
+}
+
+std::vector<std::string> halves_nodes(const std::string& sizes = "halves", std::uint64_t axis = 1) {
+  return {onnx_node("Split", {"h", sizes}, {"p", "q"}, {onnx_integer("axis", 1)}),
+          onnx_node("Max", {"p", "q"}, {"c"}), onnx_node("Min", {"p", "q"}, {"d"}),
+          onnx_node("Concat", {"c", "d"}, {"a"}, {onnx_integer("axis", axis)})};
+}
+
+std::vector<std::string> pairs_nodes(std::uint64_t keepdims = 0) {
+  const std::vector<std::string> attributes = {onnx_integers("axes", {kMinusOne}),
+                                               onnx_integer("keepdims", keepdims)};
+  return {onnx_node("Reshape", {"h", "pairs"}, {"r"}), onnx_node("ReduceMax", {"r"}, {"c"}, attributes),
+          onnx_node("ReduceMin", {"r"}, {"d"}, attributes),
+          onnx_node("Concat", {"c", "d"}, {"a"}, {onnx_integer("axis", 1)})};
+}
+
+std::vector<std::string> sort_nodes(std::uint64_t largest, const std::string& count = "two") {
+  return {onnx_node("Reshape", {"h", "pairs"}, {"r"}),
+          onnx_node("TopK", {"r", count}, {"s", "indices"}, {onnx_integer("largest", largest)}),
+          onnx_node("Reshape", {"s", "flat"}, {"a"})};
+}
+
+TEST(OnnxSorting, EveryGroupOfNodesIsItsFunction) {
+  // With x = (0.75, -0.5): h = (0, -3, 2.875, 0.75).
+  const std::vector<double> x = {0.75, -0.5};
+  const auto expect = [&x](const std::vector<std::string>& nodes, Activation activation, double y) {
+    const Weights weights = sorting_weights(nodes);
+    EXPECT_EQ(weights.activation, activation) << function_of(weights.activation).op;
+    ASSERT_EQ(weights.layers.size(), 2u);
+    EXPECT_TRUE(weights.states_activation());
+    EXPECT_EQ(weights.layers[0].weight_rounding + weights.layers[1].weight_rounding, 0);
+    EXPECT_EQ(Evaluator<double>(weights)(x)[0], y);
+  };
+  expect(halves_nodes(), Activation::kMaxMinHalves, 2.875 + 7.5 + 0 - 3000);
+  expect(halves_nodes("", kMinusOne), Activation::kMaxMinHalves, 2.875 + 7.5 + 0 - 3000);
+  expect(pairs_nodes(), Activation::kMaxMinPairs, 0 + 28.75 - 300 + 750);
+  expect(sort_nodes(0), group_sort(2), -3 + 0 + 75 + 2875);
+  expect(sort_nodes(1), group_sort(2), 0 - 30 + 287.5 + 750);  // the largest first
+  expect({onnx_node("TopK", {"h", "four"}, {"a", "i"}, {onnx_integer("largest", 0)})}, group_sort(4),
+         -3 + 0 + 75 + 2875);
+}
+
+TEST(OnnxSorting, OtherGroupsOfNodesAreRefusedByName) {
+  const auto refused = [](const std::vector<std::string>& nodes, const std::vector<std::string>& pieces) {
+    return refuses([&] { sorting_weights(nodes); }, pieces);
+  };
+  EXPECT_TRUE(refused(halves_nodes("unequal"), {"Concat", "no halves", "--activation maxmin:halves"}));
+  EXPECT_TRUE(refused(halves_nodes("halves", 0), {"Concat", "does not join the halves"}));
+  std::vector<std::string> other = halves_nodes();
+  other[3] = onnx_node("Concat", {"d", "c"}, {"a"}, {onnx_integer("axis", 1)});
+  EXPECT_TRUE(refused(other, {"Split", "none of the operators", "--activation maxmin:halves"}));
+  EXPECT_TRUE(refused(pairs_nodes(1), {"Concat", "joins other maxima", "GroupSort as TopK"}));
+  EXPECT_TRUE(refused(sort_nodes(0, "one"), {"TopK", "does not sort the whole last axis"}));
+  std::vector<std::string> indices = sort_nodes(0);
+  indices[2] = onnx_node("Reshape", {"indices", "flat"}, {"a"});
+  EXPECT_TRUE(refused(indices, {"Reshape", "\"indices\""}));
+  std::vector<std::string> mixed = sort_nodes(0);
+  mixed[2] = onnx_node("Reshape", {"s", "flat"}, {"t"});
+  mixed.push_back(onnx_node("Relu", {"t"}, {"a"}));
+  EXPECT_TRUE(refused(mixed, {"Relu", "is another activation than TopK"}));
+  std::vector<std::string> skip = sort_nodes(0);
+  skip[2] = onnx_node("Reshape", {"s", "flat"}, {"t"});
+  skip.push_back(onnx_node("Add", {"t", "h"}, {"a"}));
+  EXPECT_TRUE(refused(skip, {"TopK", "skip connection"}));
+}
+
+}  // namespace
+}  // namespace swarmcert::files
