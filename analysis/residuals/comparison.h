@@ -9,6 +9,7 @@
 
 #include "analysis/residuals/inputs.h"
 #include "analysis/residuals/learning_error.h"
+#include "analysis/residuals/place_residual.h"
 #include "analysis/residuals/regions.h"
 #include "analysis/residuals/statistics.h"
 #include "analysis/residuals/torque_residual.h"
@@ -53,8 +54,9 @@ struct RegionErrors {
 
 /// Vertical residual over the place of the neighbour that is laterally nearest among those within 1 m in height.
 struct NeighbourMap {
-  static constexpr int kLateral = 12, kHeights = 20;
-  static constexpr double kLateralStep_m = 0.05, kHeightStep_m = 0.1, kLowest_m = -1;
+  static constexpr int kLateral = PlaceGrid::kLateral, kHeights = PlaceGrid::kHeights;
+  static constexpr double kLateralStep_m = PlaceGrid::kLateralStep_m,
+                          kHeightStep_m = PlaceGrid::kHeightStep_m, kLowest_m = PlaceGrid::kLowest_m;
   struct Cell {
     std::size_t records = 0;
     double sum_N = 0, squares_N2 = 0;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/residuals/inputs.h"
+#include "analysis/residuals/place_residual.h"
 #include "analysis/residuals/velocity_error.h"
 
 namespace swarmcert::residuals {
@@ -23,6 +24,7 @@ struct FlightError {
   std::string path;        ///< of the log
   ErrorOfFlight force;     ///< in newton
   ErrorOfFlight velocity;  ///< velocity_error(), in m/s; no windows where the log does not measure it
+  std::vector<PlaceResidual> places;  ///< range of the force residual by place of the neighbour
 };
 
 /// One per vehicle whose force is judged and whose log holds a window at least, in the order of flights. The logs are

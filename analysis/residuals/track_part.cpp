@@ -6,6 +6,7 @@
 
 #include "analysis/logs/read_log.h"
 #include "analysis/residuals/force_residual.h"
+#include "analysis/residuals/place_residual.h"
 
 namespace swarmcert::residuals {
 namespace {
@@ -13,18 +14,8 @@ namespace {
 constexpr double kBlock_s = 2;
 
 void add_to_map(const stability::Instant& now, double residual_z_N, NeighbourMap& map) {
-  int row = -1, column = NeighbourMap::kLateral;
-  double nearest_m = INFINITY;
-  for (int j = 0; j < now.num_neighbours; ++j) {
-    const Eigen::Vector3d& dp = now.neighbours[j].dp_W_m;
-    const double lateral_m = dp.head<2>().norm();
-    const double height = std::floor((dp.z() - NeighbourMap::kLowest_m) / NeighbourMap::kHeightStep_m);
-    if (!(lateral_m < nearest_m) || !(height >= 0) || height >= NeighbourMap::kHeights) continue;
-    nearest_m = lateral_m;
-    row = static_cast<int>(height);
-    column = static_cast<int>(std::min(lateral_m / NeighbourMap::kLateralStep_m, 1e6));
-  }
-  if (row < 0 || column >= NeighbourMap::kLateral) return;
+  const auto [row, column] = place_of(now);
+  if (row < 0) return;
   NeighbourMap::Cell& cell = map.cells[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
   ++cell.records;
   cell.sum_N += residual_z_N;

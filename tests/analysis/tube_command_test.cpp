@@ -1,10 +1,12 @@
 // bound --tube --task as a user runs it.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <sstream>
 
 #include "analysis/run.h"
 #include "nn/base/json.h"
+#include "nn/base/random.h"
 
 namespace swarmcert::tests {
 namespace {
@@ -135,6 +137,93 @@ TEST(TubeCommand, AnIntervalOfLagsWidensTheTubeAndContainsTheTruthsLag) {
   refused("0 0.06", "above 0");
   refused("52 63", "in seconds");
   refused("0.063 0.052", "the least and the largest");
+}
+
+/// Flies the swap `count` times, with a drag and a constant force of each flight's own, in `folder`/`name`.
+/// @returns the largest error of each flight, x, y, z.
+std::vector<std::array<double, 3>> fly_swaps(const ScratchFolder& folder, const std::string& name, int first,
+                                             int count) {
+  files::Random random(static_cast<std::uint64_t>(first));
+  const std::string model = read_text(kSources + "/stability/models/crazyflie-small-effects.toml");
+  std::vector<std::array<double, 3>> largest;
+  for (int i = first; i < first + count; ++i) {
+    std::string text = model;
+    const std::string drag = "drag_N_s_m = 0.013";
+    text.replace(text.find(drag), drag.size(),
+                 "drag_N_s_m = " + std::to_string(0.013 + 0.004 * random.symmetric()));
+    text +=
+        "\n[[effect]]\nname = \"constant_force\"\nparameters = { force_x_N = 0, force_y_N = 0, force_z_N = " +
+        std::to_string(0.001 * random.bell()) + " }\n";
+    write_text(folder / "flown.toml", text);
+    const std::string run = std::to_string(i);
+    const auto flown =
+        run_shell("swarmcert simulate swap --vehicles 2 --duration 3 --model flown.toml --gains " + kSources +
+                      "/controller/gains/composite.toml" + kNetwork + " --quiet --seed " + run + " --run " +
+                      run + " --json f.json --force -o " + name + "/" + run,
+                  folder.path());
+    EXPECT_EQ(flown.exit_code, 0) << flown.output;
+    std::array<double, 3> most{};
+    const Json result = files::parse_json(read_text(folder / "f.json"), "f.json");
+    for (const Json& vehicle : result["vehicles"]) {
+      const char* const axes[] = {"x", "y", "z"};
+      for (std::size_t k = 0; k < 3; ++k) most[k] = std::max(most[k], vehicle["max"][axes[k]].get<double>());
+    }
+    largest.push_back(most);
+  }
+  return largest;
+}
+
+TEST(TubeCommand, ATruthThatFlightsMeasuredKeepsFurtherFlightsInItsTube) {
+  const ScratchFolder folder;
+  fly_swaps(folder, "calibrate", 1, 21);
+  ASSERT_EQ(
+      run_shell("swarmcert compare " + kTruth.substr(9) + " calibrate --quiet --json c.json", folder.path())
+          .exit_code,
+      0);
+  const std::string command = bound("composite.toml") + kNetwork + kTruth +
+                              " --tube --task swap --duration 3 --quiet --force --json out.json";
+  const Outcome outcome = run_shell(command + " --from c.json --coverage 0.9", folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const Json tube = files::parse_json(read_text(folder / "out.json"), "out.json")["local_tube"];
+  EXPECT_EQ(tube["verdict"], "proved");
+  const Json& measured = tube["measured"];
+  EXPECT_EQ(measured["flights"], 14);
+  EXPECT_EQ(measured["shape_flights"], 7);
+  EXPECT_LT(measured["interval"][0].get<double>(), 0.9);
+  EXPECT_GT(measured["interval"][1].get<double>(), 0.9);
+  EXPECT_GT(measured["cells_in_tube"].get<int>(), measured["cells_in_tube_without_flights"].get<int>());
+  EXPECT_NE(outcome.output.find("take the hull of all cells"), std::string::npos);
+  int inside = 0;
+  double largest_m = 0;
+  for (const std::array<double, 3>& most : fly_swaps(folder, "further", 1001, 30)) {
+    bool is_inside = true;
+    for (std::size_t k = 0; k < 3; ++k)
+      is_inside = is_inside && most[k] <= tube["radius_xyz_m"][k].get<double>();
+    inside += is_inside ? 1 : 0;
+    largest_m = std::max(largest_m, most[2]);
+  }
+  EXPECT_GE(inside, 27);
+  // Noise of the accelerometer is in the ranges as if it were a force: 0.12 m/s^2 of noise widen the tube to several
+  // times that of the truth alone.
+  EXPECT_LT(tube["radius_xyz_m"][2].get<double>(), 8 * largest_m);
+}
+
+TEST(TubeCommand, AMeasuredTruthIsThatOfTheModelThatWasCompared) {
+  const ScratchFolder folder;
+  fly_swaps(folder, "calibrate", 1, 2);
+  const std::string compare = "swarmcert compare --quiet --force --json c.json calibrate ";
+  ASSERT_EQ(run_shell(compare + kSources + "/stability/models/crazyflie-small.toml", folder.path()).exit_code,
+            0);
+  const std::string command = bound("composite.toml") + kNetwork +
+                              " --tube --task swap --duration 2 --quiet --from c.json --coverage 0.9";
+  const Outcome other = run_shell(command + kTruth, folder.path());
+  EXPECT_EQ(other.exit_code, 3);
+  EXPECT_NE(other.output.find("residuals are those of another model"), std::string::npos) << other.output;
+  EXPECT_EQ(run_shell(command, folder.path()).exit_code, 2) << "no --truth";
+  const Outcome few =
+      run_shell(command + " --truth " + kSources + "/stability/models/crazyflie-small.toml", folder.path());
+  EXPECT_EQ(few.exit_code, 3);
+  EXPECT_NE(few.output.find("needs at least 14"), std::string::npos) << few.output;
 }
 
 TEST(TubeCommand, ErrorsOfTheEstimatesAreInTheTubeAndInWhatItSays) {

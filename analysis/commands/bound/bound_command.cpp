@@ -108,6 +108,7 @@ LoadedDisturbance checked_disturbance(const BoundOptions& options, const Trackin
   const bool has_task = !options.task.task.empty();
   if (has_task && !options.tube) throw UsageError("--task requires --tube");
   DisturbanceArguments told = options.disturbance;
+  if (has_task && options.coverage > 0) told.from.clear();  // measured beside --truth, not a class of its own
   // The tube makes its own bounds of how vehicles move; without --speed there are no others.
   if (has_task && told.speed < 0) told.network = {}, told.truth.clear(), told.certificate.clear();
   LoadedDisturbance disturbance = load_disturbance(told, input);
@@ -141,9 +142,10 @@ files::Json uncertain_result(const BoundOptions& options, const Tracking& input,
 /// What the options ask for beside the bounds, each a field of the result.
 void add_extras(const BoundOptions& options, const CommonOptions& common, const Tracking& input,
                 const stability::DisturbanceSource& source, const stability::TrackingReport& report,
-                const std::optional<LocalTube>& local, files::Json& result) {
+                const std::optional<LocalTube>& local, const std::optional<MeasuredTruth>& measured,
+                files::Json& result) {
   if (options.is_uncertain) result["uncertain"] = uncertain_result(options, input, common);
-  if (options.coverage > 0) {
+  if (options.coverage > 0 && !measured) {
     // Beside the file's classes stands only what was given on the command line.
     DisturbanceArguments others = options.disturbance;
     others.from.clear();
@@ -154,7 +156,7 @@ void add_extras(const BoundOptions& options, const CommonOptions& common, const 
     result["attitude"] = attitude_json(input, options.attitude);
   if (options.verified) result["verified"] = verified_json(input);
   if (options.tube) result["tube"] = tube_json(input, source, 101);
-  if (local) result["local_tube"] = local_tube_json(options.task, *local);
+  if (local) result["local_tube"] = local_tube_json(options.task, *local, measured ? &*measured : nullptr);
   if (!options.swarm.empty()) result["swarm"] = swarm_json(input, options.swarm, source);
 }
 
@@ -184,9 +186,16 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   if (!options.swarm.empty()) inputs.push_back(options.swarm);
   const LoadedDisturbance disturbance = checked_disturbance(options, input, inputs);
   const stability::DisturbanceSource& source = disturbance.source;
+  std::optional<MeasuredTruth> measured;
   std::optional<LocalTube> local;
-  if (!options.task.task.empty())
-    local = load_local_tube(options.task, options.disturbance, input, source, common, inputs);
+  if (!options.task.task.empty()) {
+    if (options.coverage > 0) {
+      measured = load_measured_truth(options.disturbance, input.model.kind, options.coverage);
+      inputs.push_back(options.disturbance.from);
+    }
+    local = load_local_tube(options.task, options.disturbance, input, source, measured ? &*measured : nullptr,
+                            common, inputs);
+  }
   stability::TrackingReport report = tracking_bounds(input.gains, input.plant, source, options.initial);
   const FloatErrors float32 = float_errors(input, report);
   for (stability::AxisBounds& row : report.bounds) row.float32_m = float32.tracking_error_m[row.axis];
@@ -195,7 +204,7 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
   add_tracking_json(result, input, source, report);
   result["float32"] = float_errors_json(float32);
   if (disturbance.truth) result["truth"] = truth_json(*disturbance.truth);
-  add_extras(options, common, input, source, report, local, result);
+  add_extras(options, common, input, source, report, local, measured, result);
   std::optional<files::Json> certificate;
   if (!options.certificate.empty()) {
     certificate = tracking_certificate(input, options.tracking, result["verified"]);
@@ -249,9 +258,11 @@ CLI::Option* declare_extras(CLI::App& app, BoundOptions& options) {
       "--attitude-gains", options.attitude,
       "KR,Kw,KI of the attitude law, N m, N m s, N m/s: gains and limit-cycle margins of the cascade "
       "(default: [attitude] of gains.toml, where it has them)");
-  app.add_option("--coverage", options.coverage,
-                 "Bound that a further flight like those of --from keeps with this probability "
-                 "(split-conformal prediction over flights)")
+  app.add_option(
+         "--coverage", options.coverage,
+         "Bound that a further flight like those of --from keeps with this probability "
+         "(split-conformal prediction over flights); with --tube --task the tube, in which --truth is the "
+         "model that compare was run with")
       ->check(CLI::Range(0.5, 0.999))
       ->needs("--from");
   app.add_flag("--verified", options.verified, "Rigorous enclosures of the gains (intervals)");

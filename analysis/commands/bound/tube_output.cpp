@@ -8,6 +8,8 @@
 #include "analysis/cli/progress.h"
 #include "analysis/commands/bound/bound_output.h"
 #include "analysis/report/report.h"
+#include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
 #include "nn/base/suggest.h"
 
 namespace swarmcert::analysis {
@@ -118,9 +120,28 @@ std::optional<Interval> lag_interval(const TubeArguments& arguments, const stabi
 
 }  // namespace
 
+MeasuredTruth load_measured_truth(const DisturbanceArguments& disturbance, const std::string& kind,
+                                  double level) {
+  if (disturbance.truth.empty())
+    throw UsageError("--tube --task with --from: add --truth MODEL, the model that compare was run with");
+  const std::string sha256 = files::sha256(files::read_file(disturbance.truth));
+  const Json compared = files::read_json(disturbance.from, "swarmcert/compare/1");
+  bool is_same = false;
+  for (const Json& input : compared.value("inputs", Json::array()))
+    is_same = is_same || (input.is_object() && input.value("sha256", "") == sha256);
+  if (!is_same) {
+    throw files::InputError(
+        {disturbance.from, "", "inputs", files::in_quotes(disturbance.truth),
+         "is not among the files that compare read: its residuals are those of another model",
+         "give --truth the model of compare, or compare with this one"});
+  }
+  return read_measured_truth(disturbance.from, kind, level);
+}
+
 LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
                           const Tracking& tracking, const stability::DisturbanceSource& estimates,
-                          const CommonOptions& common, std::vector<std::string>& inputs) {
+                          const MeasuredTruth* measured, const CommonOptions& common,
+                          std::vector<std::string>& inputs) {
   const std::vector<std::string> tasks = stability::task_names();
   if (std::find(tasks.begin(), tasks.end(), arguments.task) == tasks.end()) {
     throw UsageError("unknown task " + arguments.task + ": " + files::did_you_mean(arguments.task, tasks));
@@ -161,6 +182,7 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
           "--position-error P");
     }
   }
+  if (measured != nullptr) options.residual = &measured->envelope;
   options.motor_lag_s = lag_interval(arguments, truth, tracking);
   options.progress = [&progress](int done, int total, const std::string& what) {
     progress.show(done, total, what);
@@ -168,7 +190,53 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
   return local_tube(tracking, truth, network, *task, arguments.vehicles, options);
 }
 
-Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
+namespace {
+
+Json measured_json(const MeasuredTruth& measured, const LocalTube& tube) {
+  const ConformalThreshold& promise = measured.promise;
+  int with_flights = 0;
+  for (const ResidualEnvelope::Cell& cell : measured.envelope.cells) with_flights += cell.flights > 0 ? 1 : 0;
+  double widest_N[3] = {0, 0, 0};
+  for (const ResidualEnvelope::Cell& cell : measured.envelope.cells)
+    for (int k = 0; k < 3; ++k)
+      widest_N[k] = std::max(widest_N[k], cell.force_N[static_cast<std::size_t>(k)].mag());
+  return {
+      {"level", promise.level},
+      {"flights", promise.flights},
+      {"shape_flights", measured.shape_flights},
+      {"interval", {promise.coverage_90.lower, promise.coverage_90.upper}},
+      {"factor", finite(promise.threshold)},
+      {"largest_residual_N", {finite(widest_N[0]), finite(widest_N[1]), finite(widest_N[2])}},
+      {"mean_s", measured.mean_s},
+      {"cells_with_flights", with_flights},
+      {"cells_in_tube", tube.residual_cells},
+      {"cells_in_tube_without_flights", tube.residual_cells_without_flights},
+      {"elsewhere", "the hull of all cells with flights"},
+      {"like_them",
+       "a flight whose residual is one more draw of what these flights' were drawn from: same vehicles, task "
+       "and model"},
+      {"rests_on", "forces are seen as their mean over mean_s; neighbours as they were logged"}};
+}
+
+void print_measured(const Json& measured) {
+  fmt::print(
+      "  a further flight like the {} that were compared keeps it with probability {:g} ({:.3f} to {:.3f} "
+      "for "
+      "these flights, 90 %)\n",
+      measured["flights"].get<int>() + measured["shape_flights"].get<int>(), measured["level"].get<double>(),
+      measured["interval"][0].get<double>(), measured["interval"][1].get<double>());
+  fmt::print(
+      "  residual by the place of the neighbour: shape of {} flights, {:.3g} times as wide for {} others\n",
+      measured["shape_flights"].get<int>(), measured["factor"].get<double>(), measured["flights"].get<int>());
+  fmt::print("  {} of the {} cells that the tube reaches have no such flight and take {}\n",
+             measured["cells_in_tube_without_flights"].get<int>(), measured["cells_in_tube"].get<int>(),
+             measured["elsewhere"].get<std::string>());
+  fmt::print("  like them: {}\n", measured["like_them"].get<std::string>());
+}
+
+}  // namespace
+
+Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube, const MeasuredTruth* measured) {
   Json json = {{"task", arguments.task},
                {"vehicles", arguments.vehicles},
                {"duration_s", tube.duration_s},
@@ -220,6 +288,7 @@ Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube) {
   }
   json["slices"] = std::move(slices);
   json["one_radius"] = verdict_json(tube.one_radius);
+  if (measured != nullptr) json["measured"] = measured_json(*measured, tube);
   json["at"] = std::move(at);
   return json;
 }
@@ -249,6 +318,7 @@ void print_local_tube(const Json& tube) {
           number(b["rate"]), number(b["amplitude"]), number(b["edges"]), number(b["impulse"]),
           number(b["slices"]));
     }
+    if (tube.contains("measured")) print_measured(tube["measured"]);
   } else {
     fmt::print("  {}\n", tube["why"].get<std::string>());
   }

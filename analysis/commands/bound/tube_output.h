@@ -6,6 +6,7 @@
 
 #include "analysis/commands/bound/disturbance_input.h"
 #include "analysis/commands/shared/tracking_input.h"
+#include "analysis/tracking/measured_truth.h"
 #include "analysis/tracking/tube/local_tube.h"
 
 namespace swarmcert::analysis {
@@ -22,14 +23,22 @@ struct TubeArguments {
 /// Declares --task, --vehicles, --duration, --lag-interval.
 void declare_tube(CLI::App& app, TubeArguments& arguments);
 
+/// What the flights of --from say that --truth leaves out, for vehicles of `kind`.
+/// @throws UsageError where --truth is missing; files::InputError where the file is not of that model, or has too few
+///   flights for the level.
+MeasuredTruth load_measured_truth(const DisturbanceArguments& disturbance, const std::string& kind,
+                                  double level);
+
 /// Reads the network and the truth that `disturbance` names and looks for the tube, with progress.
-/// @param estimates whose velocity_error and position_error are known; nothing else of it is read.
+/// @param measured null: the truth is only declared. @param estimates whose velocity_error and position_error are known; nothing else of it is read.
 /// @throws UsageError where network, truth or task are missing or make no sense; files::InputError for bad files.
 LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
                           const Tracking& tracking, const stability::DisturbanceSource& estimates,
-                          const CommonOptions& common, std::vector<std::string>& inputs);
+                          const MeasuredTruth* measured, const CommonOptions& common,
+                          std::vector<std::string>& inputs);
 
-files::Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube);
+files::Json local_tube_json(const TubeArguments& arguments, const LocalTube& tube,
+                            const MeasuredTruth* measured);
 void print_local_tube(const files::Json& tube);
 /// Errors allowed over time, per vehicle, inside the radius.
 void add_local_tube_plot(Report& report, const LocalTube& tube, const files::Json& json);

@@ -143,14 +143,32 @@ files::Json largest_json(const residuals::ErrorOfFlight& error, const std::funct
           {"variation", axes(largest.variation)}, {"impulse", axes(largest.impulse)}};
 }
 
-/// flights[].learning_error and flights[].velocity_error, from which bound --coverage makes its promise, and the
+files::Json places_json(const std::vector<residuals::PlaceResidual>& places) {
+  files::Json cells = files::Json::array();
+  for (const residuals::PlaceResidual& place : places) {
+    cells.push_back({{"cell", place.cell},
+                     {"records", place.records},
+                     {"least", {place.least_N[0], place.least_N[1], place.least_N[2]}},
+                     {"largest", {place.largest_N[0], place.largest_N[1], place.largest_N[2]}}});
+  }
+  return cells;
+}
+
+files::Json place_grid_json() {
+  using Grid = residuals::PlaceGrid;
+  return {{"lowest_m", Grid::kLowest_m}, {"height_step_m", Grid::kHeightStep_m},
+          {"heights", Grid::kHeights},   {"lateral_step_m", Grid::kLateralStep_m},
+          {"laterals", Grid::kLateral},  {"mean_s", residuals::kPlaceMean_s}};
+}
+
+/// flights[].learning_error, flights[].velocity_error and flights[].residual_by_place, from which bound --coverage makes its promise, and the
 /// quantiles of the velocity's error over all windows.
 void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& result) {
   const std::vector<residuals::FlightError> all = residuals::flight_errors(inputs, jobs);
   std::map<std::string, const residuals::FlightError*> errors;
   for (const residuals::FlightError& error : all) errors[error.path] = &error;
   for (files::Json& flight : result["flights"]) {
-    flight["learning_error"] = flight["velocity_error"] = nullptr;
+    flight["learning_error"] = flight["velocity_error"] = flight["residual_by_place"] = nullptr;
     const auto found = errors.find(flight["file"].get<std::string>());
     if (found == errors.end()) continue;
     // As in the errors of the flight.
@@ -159,9 +177,13 @@ void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& r
       return k == 3 || !flight["rmse"][kNames[k]].is_null();
     };
     flight["learning_error"] = largest_json(found->second->force, is_judged);
+    // A tube needs all axes.
+    if (is_judged(0) && is_judged(1) && is_judged(2))
+      flight["residual_by_place"] = places_json(found->second->places);
     if (!found->second->velocity.windows.empty())
       flight["velocity_error"] = largest_json(found->second->velocity, [](int) { return true; });
   }
+  result["place_grid"] = place_grid_json();
   const std::optional<residuals::VelocityError> velocity = residuals::velocity_error(all);
   result["velocity_error"] = velocity ? json_of(*velocity) : files::Json();
 }

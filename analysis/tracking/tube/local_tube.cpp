@@ -84,7 +84,7 @@ LocalTube tube_of_loop(const stability::TrackingSetup& tracking, const stability
                        const LocalTubeOptions& options, bool is_sampled) {
   LocalTube result;
   const Scene scene(tracking, truth, network, task, vehicles, network_age_s(tracking.gains, is_sampled),
-                    kSlice_s, is_sampled, options.estimates, options.motor_lag_s);
+                    kSlice_s, is_sampled, options.estimates, options.motor_lag_s, options.residual);
   result.why = scene.refusal();
   result.is_sampled = is_sampled;
   result.estimates = options.estimates;

@@ -20,6 +20,8 @@ struct LocalTubeOptions {
   EstimateErrors estimates;
   /// Where the constant lag of each vehicle's motors lies, s, positive; missing: as the truth says, or as stated.
   std::optional<Interval> motor_lag_s;
+  /// What acts beside the truth's effects, measured in flights; null: nothing does.
+  const ResidualEnvelope* residual = nullptr;
   int nodes = 100;  ///< boxes of branch and bound per local constant
   /// Steps done, of how many; what is being done. From any thread.
   std::function<void(int done, int total, const std::string& what)> progress;
@@ -59,6 +61,8 @@ struct LocalTube {
   std::vector<Deviations> slices;        ///< errors of every vehicle slice by slice, likewise
   double slice_s = 0, duration_s = 0;
   bool cancelled = false;
+  /// Cells of the residual that vehicles in the tube can reach, and those of them that no flight was in; 0 without one.
+  int residual_cells = 0, residual_cells_without_flights = 0;
   std::vector<stability::Assumption> assumptions;
 };
 

@@ -103,9 +103,10 @@ double network_age_s(const stability::Gains& gains, bool is_sampled) {
 Scene::Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
              double longest_slice_s, bool is_sampled, const EstimateErrors& estimates,
-             const std::optional<Interval>& motor_lag_s)
+             const std::optional<Interval>& motor_lag_s, const ResidualEnvelope* residual)
     : tracking_(tracking),
       network_age_s_(network_age_s),
+      residual_(residual),
       motor_lag_s_(motor_lag_s ? *motor_lag_s : Interval(tracking.gains.motor_lag_s)),
       learned_(network, tracking.model.kind, vehicles - 1),
       truth_(truth, tracking.plant.largest_thrust_N),
@@ -197,8 +198,16 @@ TruthForce::Rest Scene::rest(const Stretch& stretch, const Deviations& deviation
   const double tau_s = motor_lag_s_.lower;
   const double thrust_rate_N_s =
       tau_s > 0 ? up(2 * tracking_.plant.largest_thrust_N / tau_s) : std::numeric_limits<double>::infinity();
-  return truth_.rest(widened(own[0], up(network_age_s_ * own[3].mag())), velocity, acceleration_m_s2,
-                     thrust_rate_N_s);
+  TruthForce::Rest rest = truth_.rest(widened(own[0], up(network_age_s_ * own[3].mag())), velocity,
+                                      acceleration_m_s2, thrust_rate_N_s);
+  if (residual_ == nullptr) return rest;
+  const std::vector<Offset> reach = offsets(states, states);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Interval residual_N = residual_->over(reach, k);
+    rest.force_N[k] += residual_N;
+    rest.abrupt_N[k] = up(rest.abrupt_N[k] + up(residual_N.upper - residual_N.lower));
+  }
+  return rest;
 }
 
 TruthSizes Scene::truth_sizes(const Stretch& stretch, const Deviations& deviations) const {

@@ -10,6 +10,7 @@
 #include "analysis/tracking/tube/hold_error.h"
 #include "analysis/tracking/tube/learned_force.h"
 #include "analysis/tracking/tube/motion.h"
+#include "analysis/tracking/tube/residual_envelope.h"
 #include "analysis/tracking/tube/truth_force.h"
 
 namespace swarmcert::analysis {
@@ -57,15 +58,17 @@ class Scene {
   /// @param is_sampled see error_loops().
   /// @param motor_lag_s see error_loops().
   /// @param estimates what is wrong with what every vehicle knows of itself and is told by others.
+  /// @param residual what acts beside the truth's effects, where not null; must outlive this.
   /// @throws files::InputError as LearnedForce.
   Scene(const stability::TrackingSetup& tracking, const stability::Model& truth,
         const files::Network& network, const stability::Task& task, int vehicles, double network_age_s,
         double longest_slice_s = kSlice_s, bool is_sampled = false, const EstimateErrors& estimates = {},
-        const std::optional<Interval>& motor_lag_s = {});
+        const std::optional<Interval>& motor_lag_s = {}, const ResidualEnvelope* residual = nullptr);
 
   const stability::TrackingSetup& tracking() const { return tracking_; }
   const LearnedForce& learned() const { return learned_; }
   const TruthForce& truth() const { return truth_; }
+  const ResidualEnvelope* residual() const { return residual_; }  ///< null: there is none
   const Motion& motion() const { return motion_; }
   const ErrorLoops& loops() const { return loops_; }
   double network_age_s() const { return network_age_s_; }
@@ -87,6 +90,7 @@ class Scene {
   /// @param are_seen `states` are what the network was given.
   std::vector<Offset> offsets(const std::vector<Interval>& states, const std::vector<Interval>& all,
                               bool are_seen = false) const;
+  /// The residual, which may change at any rate, included.
   TruthForce::Rest rest(const Stretch& stretch, const Deviations& deviations, double acceleration_m_s2) const;
   TruthSizes truth_sizes(const Stretch& stretch, const Deviations& deviations) const;
   std::vector<TruthSizes> truth_sizes(const Radii& radii) const;  ///< of every stretch
@@ -127,6 +131,7 @@ class Scene {
 
   const stability::TrackingSetup& tracking_;
   double network_age_s_;
+  const ResidualEnvelope* residual_;
   Interval motor_lag_s_;
   LearnedForce learned_;
   TruthForce truth_;

@@ -283,7 +283,9 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
   const auto add = [&tube](const char* name, const char* status, const std::string& note) {
     tube.assumptions.push_back({name, status, note});
   };
-  add("the force is that of the declared truth", "assumed", "enclosed at every state of the tube");
+  add("the force is that of the declared truth", "assumed",
+      scene.residual() == nullptr ? "enclosed at every state of the tube"
+                                  : "and a residual within what flights measured by the neighbour's place");
   if (scene.loops().is_sampled()) {
     add("sampled position loop, axes apart, first-order lags", "assumed",
         fmt::format("the hold of the command over {:.3g} s and the integrator's steps are in the bounds; the "
@@ -331,6 +333,26 @@ void add_assumptions(const Scene& scene, const ThrustUse& thrust, bool near, Loc
       "within 0.9 m along each axis, where none fades");
 }
 
+/// Which cells of the residual vehicles can meet.
+void count_residual_cells(const Scene& scene, LocalTube& tube) {
+  if (scene.residual() == nullptr) return;
+  const std::vector<ResidualEnvelope::Cell>& cells = scene.residual()->cells;
+  std::vector<char> is_reached(cells.size(), 0);
+  const Motion& motion = scene.motion();
+  for (const std::vector<int>& of_vehicle : motion.stretch_of) {
+    for (std::size_t n = 0; n < of_vehicle.size(); ++n) {
+      const std::vector<Interval> states =
+          scene.states(motion.stretches[static_cast<std::size_t>(of_vehicle[n])], tube.slices[n]);
+      for (const std::size_t cell : scene.residual()->reached(scene.offsets(states, states)))
+        is_reached[cell] = 1;
+    }
+  }
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    tube.residual_cells += is_reached[i];
+    if (cells[i].flights == 0) tube.residual_cells_without_flights += is_reached[i];
+  }
+}
+
 }  // namespace
 
 void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants, LocalTube& tube) {
@@ -352,6 +374,7 @@ void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants
     add_slices(history, static_cast<std::size_t>(i), tube.slices);
     tube.bounds.push_back(bounds_of(scene, tube, all, i, constants, lag));
   }
+  count_residual_cells(scene, tube);
   add_assumptions(scene, thrust_use(scene.tracking().plant, all), neighbours_are_near(scene, deviations),
                   tube);
 }
