@@ -20,7 +20,7 @@ namespace swarmcert::tests {
 /// is random; predictions reach the controller late. Errors of the estimates switch between plus and minus their bounds
 /// at random rates, each on its own, or stand still. Where an interval is given, the motors of each vehicle have a
 /// random lag in each flight. Behind one lag, rotors start anywhere between the weight and what the first prediction
-/// asks for.
+/// asks for. Where a residual is given, it acts beside the truth.
 class AxesFlight {
  public:
   /// Called with the time, the vehicle, e and e'.
@@ -29,8 +29,10 @@ class AxesFlight {
   AxesFlight(const stability::TrackingSetup& tracking, const stability::Model& truth,
              const files::Network& network, const stability::Task& task, int vehicles,
              bool is_sampled = false, const analysis::EstimateErrors& estimates = {},
-             const std::optional<Interval>& motor_lag_s = {})
-      : estimates_(estimates),
+             const std::optional<Interval>& motor_lag_s = {},
+             const analysis::ResidualEnvelope* residual = nullptr)
+      : residual_(residual),
+        estimates_(estimates),
         motor_lag_s_(motor_lag_s),
         gains_(tracking.gains),
         task_(task),
@@ -91,7 +93,9 @@ class AxesFlight {
         std::vector<Vehicle> result(x.size());
         for (int i = 0; i < vehicles_; ++i) {
           const auto at = static_cast<std::size_t>(i);
-          const Eigen::Vector3d force = forces_.truth(forces_.at(state(x, i, time_s), vehicles_ - 1));
+          const std::vector<double> met = state(x, i, time_s);
+          const Eigen::Vector3d force =
+              forces_.truth(forces_.at(met, vehicles_ - 1)) + residual_at(met, i, time_s);
           const double learned = period_s > 0
                                      ? acting[at]
                                      : forces_.learned(forces_.at(state(x, i, time_s, true), vehicles_ - 1));
@@ -167,6 +171,22 @@ class AxesFlight {
     return std::fmod(s.rate_1_s * time_s + s.phase, 2) < 1 ? size : -size;
   }
 
+  /// One end of the residual's range along each axis where the vehicle is; ends change at random times.
+  Eigen::Vector3d residual_at(const std::vector<double>& state, int vehicle, double time_s) const {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    if (residual_ == nullptr) return force;
+    std::vector<analysis::Offset> offsets(static_cast<std::size_t>(vehicles_ - 1));
+    for (std::size_t n = 0; n < offsets.size(); ++n)
+      for (std::size_t k = 0; k < 3; ++k) offsets[n][k] = state[n * analysis::kPerNeighbour + k];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Interval range = residual_->over(offsets, k);
+      const Switching& s = switching_[static_cast<std::size_t>(vehicle)][k];
+      force[static_cast<int>(k)] =
+          std::fmod(s.rate_1_s * time_s + s.phase, 2) < 1 ? range.lower : range.upper;
+    }
+    return force;
+  }
+
   /// What the law is told of an axis.
   Axis estimated(Axis a, int vehicle, std::size_t k, double time_s) const {
     a[0] += estimate_error(vehicle, k, time_s);
@@ -229,6 +249,7 @@ class AxesFlight {
     double rate_1_s = 0, phase = 0;
   };
 
+  const analysis::ResidualEnvelope* residual_;
   analysis::EstimateErrors estimates_;
   std::optional<Interval> motor_lag_s_;
   std::vector<std::array<Switching, 6>> switching_;  ///< per vehicle and quantity

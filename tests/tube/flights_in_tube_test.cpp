@@ -20,8 +20,8 @@ struct Campaign {
 
 /// Flies the swap of two vehicles with random errors of the estimates, starts of the rotors, times of prediction and
 /// lags of each vehicle's motors in the sampled loop of the gains that flew.
-Campaign fly_in_tube(int flights, const EstimateErrors& estimates,
-                     const std::optional<Interval>& motor_lag_s) {
+Campaign fly_in_tube(int flights, const EstimateErrors& estimates, const std::optional<Interval>& motor_lag_s,
+                     const ResidualEnvelope* residual = nullptr) {
   const files::Network network = tests::demo_network();
   const stability::Model truth = tests::truth_model();
   const auto task = stability::make_task("swap", {2, 4.5, 0});
@@ -30,11 +30,12 @@ Campaign fly_in_tube(int flights, const EstimateErrors& estimates,
   options.estimates = estimates;
   options.motor_lag_s = motor_lag_s;
   options.nodes = 1;
+  options.residual = residual;
   const LocalTube tube = local_tube(loop, truth, network, *task, 2, options);
   Campaign campaign;
   EXPECT_TRUE(tube.proved && tube.is_sampled) << tube.why;
   if (!tube.proved) return campaign;
-  tests::AxesFlight flight(loop, truth, network, *task, 2, true, estimates, motor_lag_s);
+  tests::AxesFlight flight(loop, truth, network, *task, 2, true, estimates, motor_lag_s, residual);
   files::Random random(2026);
   const double radius_z_m = tube.tube.radius_m(2);
   for (int i = 0; i < flights; ++i) {
@@ -73,6 +74,25 @@ void stay_inside(int flights, double nearest, double share_z,
 
 TEST(FlightsInTube, NoneOfTwoHundredWithRandomLagsOfTheirMotorsLeavesIt) {
   stay_inside(200, 0.6, 0.2, kLags_s);
+}
+
+TEST(FlightsInTube, NoneOfAHundredWithAResidualThatJumpsBetweenTheEndsOfItsRangesLeavesIt) {
+  ResidualEnvelope residual;
+  residual.lowest_m = -1;
+  residual.height_step_m = 0.1;
+  residual.lateral_step_m = 0.05;
+  residual.heights = 20;
+  residual.laterals = 12;
+  residual.cells.resize(residual.at(residual.heights, 0) + 1);
+  for (std::size_t i = 0; i < residual.cells.size(); ++i) {
+    const double middle_N = 0.0002 * static_cast<double>(i % 5);
+    residual.cells[i].force_N.fill({middle_N - 0.0005, middle_N + 0.0005});
+  }
+  const int flights = 100;
+  const Campaign campaign = fly_in_tube(flights, {}, {}, &residual);
+  EXPECT_EQ(campaign.looks, flights * 4500L * 2 * 3);
+  EXPECT_EQ(campaign.outside, 0);
+  EXPECT_GT(campaign.nearest, 0.5);
 }
 
 TEST(FlightsInTube, NoneOfTenThousandWithRandomLagsLeavesIt_slow) { stay_inside(10000, 0.7, 0.25, kLags_s); }
