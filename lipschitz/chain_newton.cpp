@@ -20,6 +20,8 @@ class ChainSlack {
   explicit ChainSlack(const std::vector<MatrixXd>& stages) : stages_(stages) {
     begin_ = {0, stages.front().cols()};
     for (std::size_t k = 0; k + 1 < stages.size(); ++k) begin_.push_back(begin_.back() + stages[k].rows());
+    first_gram_ = MatrixXd::Zero(stages.front().rows(), stages.front().rows());
+    add_lower_gram(first_gram_, 1, stages.front());
     last_gram_ = stages.back().transpose() * stages.back();
   }
 
@@ -32,73 +34,92 @@ class ChainSlack {
   Index place(std::size_t k) const { return 1 + begin_[k] - inputs(); }
   /// M_k, from block k - 1 to block k.
   const MatrixXd& stage(std::size_t k) const { return stages_[k - 1]; }
+  const MatrixXd& first_gram() const { return first_gram_; }  ///< M_1 M_1', its lower triangle
   const MatrixXd& last_gram() const { return last_gram_; }
 
  private:
   const std::vector<MatrixXd>& stages_;
   std::vector<Index> begin_;
-  MatrixXd last_gram_;
+  MatrixXd first_gram_, last_gram_;
 };
 
-/// S = L D L' with unit lower bidiagonal L.
+/// S by block elimination: D_0 = rho I, D_k = 2 T_k - T_k G_k T_k (less the last Gram matrix in the last block) with
+/// G_k = M_k D_{k-1}^-1 M_k'. Entries belong to block k; those of block 0 are empty.
 struct ChainFactor {
-  std::vector<MatrixXd> inverse;  ///< D_k^-1
-  std::vector<MatrixXd> left;     ///< W_k, of block row k of L left of the diagonal; the first is empty
-  double log_determinant = 0;     ///< of S
+  std::vector<MatrixXd> lower;  ///< L_k with D_k = L_k L_k'; what is above its diagonal means nothing
+  std::vector<MatrixXd> half;   ///< B_k = M_k L_{k-1}^-T; empty for k = 1, where it is M_1 / sqrt(rho)
+  std::vector<MatrixXd> gram;   ///< lower triangle of G_k = B_k B_k'
+  double log_determinant = 0;   ///< of S
 };
 
 /// Nothing if S(y) is not safely positive definite.
 std::optional<ChainFactor> factorise(const ChainSlack& chain, const VectorXd& y) {
   ChainFactor result;
   if (!(y(0) > 0)) return std::nullopt;
-  result.inverse.push_back(MatrixXd::Identity(chain.inputs(), chain.inputs()) / y(0));
-  result.left.emplace_back();
+  result.lower.resize(1);
+  result.half.resize(1);
+  result.gram.resize(1);
   result.log_determinant = static_cast<double>(chain.inputs()) * std::log(y(0));
   for (std::size_t k = 1; k < chain.blocks(); ++k) {
     const auto t = y.segment(chain.place(k), chain.width(k));
-    const MatrixXd off = -(t.asDiagonal() * chain.stage(k));
-    MatrixXd left = MatrixXd::Zero(off.rows(), off.cols());
-    if (k == 1)
-      left = off / y(0);
-    else
-      add_product(left, off, result.inverse.back());
-    MatrixXd d = (2.0 * t).asDiagonal();
+    MatrixXd half, gram;
+    if (k == 1) {
+      gram = chain.first_gram() / y(0);
+    } else {
+      half = chain.stage(k);
+      divide_by_lower_transposed(half, result.lower.back());
+      gram = MatrixXd::Zero(half.rows(), half.rows());
+      add_lower_gram(gram, 1, half);
+    }
+    MatrixXd d = -(t.asDiagonal() * gram * t.asDiagonal());
+    d.diagonal() += 2.0 * t;
     if (k + 1 == chain.blocks()) d -= chain.last_gram();
-    add_product_transposed(d, -left, off);
     if (!cholesky_in_place(d)) return std::nullopt;
     result.log_determinant += 2 * d.diagonal().array().log().sum();
-    invert_from_cholesky(d);
-    result.inverse.push_back(std::move(d));
-    result.left.push_back(std::move(left));
+    result.lower.push_back(std::move(d));
+    result.half.push_back(std::move(half));
+    result.gram.push_back(std::move(gram));
   }
   return result;
 }
 
-/// The blocks of Y = S^-1 on the diagonal and left of it.
+/// The blocks of Y = S^-1 on the diagonal but the first, and W_k = -T_k M_k D_{k-1}^-1 for k > 1, of which L in
+/// S = L D L' consists.
 struct InverseBlocks {
   std::vector<MatrixXd> diagonal, left;
 };
 
-InverseBlocks inverse_blocks(const ChainFactor& factor) {
-  const std::size_t blocks = factor.inverse.size();
+InverseBlocks inverse_blocks(const ChainSlack& chain, const ChainFactor& factor, const VectorXd& y) {
+  const std::size_t blocks = chain.blocks();
   InverseBlocks result;
-  result.diagonal = factor.inverse;
+  result.diagonal.resize(blocks);
   result.left.resize(blocks);
-  for (std::size_t k = blocks; --k > 0;) {  // Y_k,k-1 = - Y_kk W_k, Y_k-1,k-1 = D_k-1^-1 - W_k' Y_k,k-1
-    result.left[k] = MatrixXd::Zero(factor.left[k].rows(), factor.left[k].cols());
-    add_product(result.left[k], -result.diagonal[k], factor.left[k]);
-    add_transposed_product(result.diagonal[k - 1], -factor.left[k], result.left[k]);
+  for (std::size_t k = 1; k < blocks; ++k) result.diagonal[k] = inverse_from_cholesky(factor.lower[k]);
+  for (std::size_t k = blocks; --k > 1;) {  // Y_k-1,k-1 = D_k-1^-1 + W_k' Y_kk W_k
+    result.left[k] = -(y.segment(chain.place(k), chain.width(k)).asDiagonal() * factor.half[k]);
+    divide_by_lower(result.left[k], factor.lower[k - 1]);
+    MatrixXd through = MatrixXd::Zero(result.left[k].rows(), result.left[k].cols());
+    add_product(through, result.diagonal[k], result.left[k]);
+    add_symmetric_product_transposed(result.diagonal[k - 1], result.left[k], through);
   }
   return result;
 }
 
-/// The gradient of log det S.
-VectorXd gradient(const ChainSlack& chain, const InverseBlocks& y) {
+/// The gradient of log det S. Y_kk is what the log determinant changes by with D_k, all later blocks included.
+VectorXd gradient(const ChainSlack& chain, const ChainFactor& factor, const InverseBlocks& inverse,
+                  const VectorXd& y) {
   VectorXd result(1 + chain.size() - chain.inputs());
-  result(0) = y.diagonal[0].trace();
-  for (std::size_t k = 1; k < chain.blocks(); ++k)
-    result.segment(chain.place(k), chain.width(k)) =
-        2.0 * (y.diagonal[k].diagonal() - chain.stage(k).cwiseProduct(y.left[k]).rowwise().sum());
+  for (std::size_t k = 1; k < chain.blocks(); ++k) {
+    const auto t = y.segment(chain.place(k), chain.width(k));
+    const MatrixXd& y_k = inverse.diagonal[k];
+    // The row sums of Y_kk T G_k, element by element, of G_k's lower triangle.
+    const MatrixXd lower = y_k.cwiseProduct(factor.gram[k].triangularView<Eigen::Lower>().toDenseMatrix());
+    VectorXd through = lower * t + lower.transpose() * t;
+    through -= lower.diagonal().cwiseProduct(t);
+    result.segment(chain.place(k), chain.width(k)) = 2.0 * (y_k.diagonal() - through);
+    if (k == 1)  // tr Y_00 = (inputs + tr(T_1 Y_11 T_1 G_1)) / rho
+      result(0) = (static_cast<double>(chain.inputs()) + t.dot(through)) / y(0);
+  }
   return result;
 }
 
@@ -115,18 +136,24 @@ MatrixXd times_a_transposed(const ChainSlack& chain, std::size_t from, const Mat
 /// The negative Hessian of log det S, its lower triangle: H_ij = tr(Y A_i Y A_j) =
 /// 2 (a_i' Y a_j)(e_i' Y e_j) + 2 (a_i' Y e_j)(e_i' Y a_j) for neurons i and j.
 /// Less than that if it has to stop.
-MatrixXd hessian(const ChainSlack& chain, const ChainFactor& factor, const InverseBlocks& blocks,
-                 const Stop& stop) {
+MatrixXd hessian(const ChainSlack& chain, const VectorXd& y, const InverseBlocks& blocks, const Stop& stop) {
   const Index size = chain.size();
   MatrixXd h(1 + size - chain.inputs(), 1 + size - chain.inputs());
+  // W_1, and Y_00 = I / rho + W_1' Y_11 W_1.
+  const VectorXd scale = -y.segment(chain.place(1), chain.width(1)) / y(0);
+  const MatrixXd first = scale.asDiagonal() * chain.stage(1);
+  MatrixXd first_diagonal = MatrixXd::Identity(chain.inputs(), chain.inputs()) / y(0);
+  MatrixXd through = MatrixXd::Zero(first.rows(), first.cols());
+  add_product(through, blocks.diagonal[1], first);
+  add_transposed_product(first_diagonal, first, through);
   // Columns of Y of the block at hand, from its row on; those of the block before follow from them.
   MatrixXd column = blocks.diagonal.back();
   for (std::size_t j = chain.blocks(); --j > 0 && !stop.now();) {
     const Index above = chain.width(j - 1), rows = size - chain.begin(j - 1), width = chain.width(j);
     MatrixXd before(rows, above);
-    before.topRows(above) = blocks.diagonal[j - 1];
+    before.topRows(above) = j == 1 ? first_diagonal : blocks.diagonal[j - 1];
     before.bottomRows(rows - above).setZero();
-    add_product(before.bottomRows(rows - above), -column, factor.left[j]);
+    add_product(before.bottomRows(rows - above), -column, j == 1 ? first : blocks.left[j]);
     MatrixXd here(rows, width);
     here.topRows(above) = before.middleRows(above, width).transpose();
     here.bottomRows(rows - above) = column;
@@ -198,7 +225,7 @@ VectorXd layerwise_start(const ChainSlack& chain) {
 /// A point with what is known of S there.
 struct PathPoint {
   VectorXd y;
-  ChainFactor factor;
+  double log_determinant = 0;  ///< of S
   InverseBlocks blocks;
   VectorXd log_gradient;  ///< of log det S
 };
@@ -207,9 +234,9 @@ std::optional<PathPoint> path_point(const ChainSlack& chain, VectorXd y) {
   std::optional<ChainFactor> factor = factorise(chain, y);
   if (!factor) return std::nullopt;
   PathPoint point;
-  point.blocks = inverse_blocks(*factor);
-  point.log_gradient = gradient(chain, point.blocks);
-  point.factor = std::move(*factor);
+  point.blocks = inverse_blocks(chain, *factor, y);
+  point.log_gradient = gradient(chain, *factor, point.blocks, y);
+  point.log_determinant = factor->log_determinant;
   point.y = std::move(y);
   return point;
 }
@@ -225,7 +252,7 @@ class Centring {
     r(0) += 1 / mu_;
     return r;
   }
-  double value(const PathPoint& at) const { return at.y(0) / mu_ - at.factor.log_determinant; }
+  double value(const PathPoint& at) const { return at.y(0) / mu_ - at.log_determinant; }
   /// The norm of the residual by the inverse of Newton's matrix, about the distance from the path.
   double distance(const VectorXd& r) const {
     return std::sqrt(std::max(0.0, scale_ * r.dot(newton_.solve(r))));
@@ -317,8 +344,8 @@ VectorXd extrapolated(const std::vector<PathEstimate>& path, std::size_t points,
 /// extrapolated point is near enough to the path. Nothing if no alpha will do.
 std::optional<PathPoint> follow(const ChainSlack& chain, const NewtonMatrix& newton,
                                 const std::vector<PathEstimate>& path, double& reach, const Stop& stop) {
-  constexpr double kLeastStep = 0.02, kFarthest = 4, kShorter = 0.8, kNear = 0.05;
-  for (double alpha = 1 - (1 - reach) / 2; alpha > kLeastStep; alpha *= kShorter) {
+  constexpr double kLeastStep = 0.02, kFarthest = 2, kLonger = 1.5, kShorter = 0.8, kNear = 0.05;
+  for (double alpha = std::min(1 - (1 - reach) / 2, kLonger * reach); alpha > kLeastStep; alpha *= kShorter) {
     // What S has near its boundary shrinks with mu, and its part of Newton's matrix grows with the square.
     const double mu = path.back().mu * (1 - alpha);
     const Centring centring(chain, newton, mu, (1 - alpha) * (1 - alpha));
@@ -356,7 +383,7 @@ InteriorPointResult minimise_chain(const std::vector<MatrixXd>& stages, const In
   std::vector<PathEstimate> path;
   constexpr std::size_t kMostPoints = 3;
   for (; result.iterations < options.max_iterations; ++result.iterations) {
-    MatrixXd matrix = hessian(chain, at->factor, at->blocks, options.stop);
+    MatrixXd matrix = hessian(chain, at->y, at->blocks, options.stop);
     if (options.stop.now()) break;
     const NewtonMatrix newton(std::move(matrix));
     result.stop = LipSdpStop::kNumericalLimit;

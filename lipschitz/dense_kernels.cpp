@@ -90,6 +90,24 @@ void add_transposed_product(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const Matri
   multiply(CblasTrans, CblasNoTrans, c, a, b);
 }
 
+void add_lower_gram(Eigen::Ref<MatrixXd> c, double factor, const Eigen::Ref<const MatrixXd>& a) {
+  if (c.size() == 0 || a.cols() == 0) return;
+  const auto turn = blas_turn();
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, static_cast<int>(a.rows()), static_cast<int>(a.cols()),
+              factor, a.data(), static_cast<int>(a.outerStride()), 1.0, c.data(),
+              static_cast<int>(c.outerStride()));
+}
+
+void add_symmetric_product_transposed(Eigen::Ref<MatrixXd> c, const Eigen::Ref<const MatrixXd>& a,
+                                      const Eigen::Ref<const MatrixXd>& b) {
+  constexpr Eigen::Index kPanel = 96;
+  for (Eigen::Index from = 0; from < c.cols(); from += kPanel) {
+    const Eigen::Index width = std::min(kPanel, c.cols() - from), below = c.rows() - from;
+    add_transposed_product(c.block(from, from, below, width), a.rightCols(below), b.middleCols(from, width));
+  }
+  c.triangularView<Eigen::StrictlyUpper>() = c.transpose();
+}
+
 bool cholesky_in_place(Eigen::Ref<MatrixXd> x) {
   const int n = static_cast<int>(x.rows()), stride = static_cast<int>(x.outerStride());
   int info = 0;

@@ -30,6 +30,14 @@ void add_product_transposed(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<cons
 void add_transposed_product(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::MatrixXd>& a,
                             const Eigen::Ref<const Eigen::MatrixXd>& b);
 
+/// C += factor A A', its lower triangle.
+void add_lower_gram(Eigen::Ref<Eigen::MatrixXd> c, double factor, const Eigen::Ref<const Eigen::MatrixXd>& a);
+
+/// C += A' B for symmetric C and A' B, of which half is computed.
+void add_symmetric_product_transposed(Eigen::Ref<Eigen::MatrixXd> c,
+                                      const Eigen::Ref<const Eigen::MatrixXd>& a,
+                                      const Eigen::Ref<const Eigen::MatrixXd>& b);
+
 /// L with X = L L' for a symmetric X (its lower triangle is read), zeros above the diagonal. Empty if the
 /// factorisation breaks down, so X is not safely positive definite.
 Eigen::MatrixXd cholesky(const Eigen::MatrixXd& x);
