@@ -1212,6 +1212,8 @@ def proves_in_double(layers, boxes, proof, gram, moving, weight, rho):
 
 def conflicts_in_double(text):
     """As conflicts_in(), of a text that is written as certify writes it."""
+    if not isinstance(text, str):
+        raise ValueError("not text")
     words = text.split(" ") if text else []
     if len(words) % 4:
         raise ValueError("a conflict lacks words")

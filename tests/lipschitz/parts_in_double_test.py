@@ -80,6 +80,17 @@ def holds_in_fractions(layers, boxes, text, gram, moving, weight, rho, multiplie
     return checker.tree_fails(hidden, fractions, text, proves) == ""
 
 
+def refuses_conflicts_that_are_no_text():
+    """As fractions do, which decide then: an empty list is no empty text."""
+    assert checker.conflicts_in_double("") == []
+    for no_text in ([], {}, None, 0, ["0+ 1- 0x1p-1 0x1p-1"]):
+        try:
+            checker.conflicts_in_double(no_text)
+        except ValueError:
+            continue
+        raise AssertionError(f"{no_text!r} was taken for conflicts")
+
+
 def with_rho(arguments, rho):
     return (*arguments[:6], rho, *arguments[7:])
 
@@ -150,6 +161,7 @@ def bounds_contain_the_neurons(generator):
 
 def main():
     generator = random.Random(31)
+    refuses_conflicts_that_are_no_text()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for file, sizes in (("cube", [3, 8, 8, 2]), ("tiny", [2, 5, 4, 1]), ("phi", [3, 8, 6, 2]), ("rho", [2, 6, 1])):

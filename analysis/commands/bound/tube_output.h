@@ -30,7 +30,8 @@ MeasuredTruth load_measured_truth(const DisturbanceArguments& disturbance, const
                                   double level);
 
 /// Reads the network and the truth that `disturbance` names and looks for the tube, with progress.
-/// @param measured null: the truth is only declared. @param estimates whose velocity_error and position_error are known; nothing else of it is read.
+/// @param measured null: the truth is only declared.
+/// @param estimates whose velocity_error and position_error are known; nothing else of it is read.
 /// @throws UsageError where network, truth or task are missing or make no sense; files::InputError for bad files.
 LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArguments& disturbance,
                           const Tracking& tracking, const stability::DisturbanceSource& estimates,
