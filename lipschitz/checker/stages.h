@@ -17,8 +17,9 @@ namespace swarmcert::check {
 /// phi and the first of rho, which no activation separates, are one stage: their product.
 /// An activation s of slopes in [0, b] is b times one of slopes in [0, 1]: the stage behind it is multiplied by b. ReLU
 /// has b = 1.
-/// @throws std::domain_error if an activation of `function` sorts, or is not monotone: see bent_chain(); std::out_of_range or
-///   std::invalid_argument if NET has no such function or block, or `scale` has not one number per input.
+/// @throws std::domain_error if an activation of `function` sorts, or is not monotone: see bent_chain();
+///   std::out_of_range or std::invalid_argument if NET has no such function or block, or `scale` has
+///   not one number per input.
 std::vector<Matrix> stages(const files::Network& network, const std::string& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});
 

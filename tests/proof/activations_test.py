@@ -242,7 +242,8 @@ def sorting_layers_have_products_only(folder, generator):
                lambda certificate: certificate.update(statement=relu["statement"])]
     ops = ["groupsort:2", "groupsort:4", "maxmin:halves", "maxmin:pairs"]
     changes += [lambda certificate, op=op: certificate.update(with_activations_again(certificate, op))
-                for op in ops + ["relu", "tanh", "groupsort:1", "groupsort:3", "groupsort:02", "groupsort:65", "maxmin"]]
+                for op in ops + ["relu", "tanh", "groupsort:1", "groupsort:3", "groupsort:02", "groupsort:65",
+                                 "maxmin"]]
     for op in ops:
         certificate = certify(net, "--activation", op)
         assert certificate["bounds"][0]["upper_method"] == "product"

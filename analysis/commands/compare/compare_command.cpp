@@ -161,8 +161,8 @@ files::Json place_grid_json() {
           {"laterals", Grid::kLateral},  {"mean_s", residuals::kPlaceMean_s}};
 }
 
-/// flights[].learning_error, flights[].velocity_error and flights[].residual_by_place, from which bound --coverage makes
-/// its promise, and the quantiles of the velocity's error over all windows.
+/// flights[].learning_error, flights[].velocity_error and flights[].residual_by_place, from which bound --coverage
+/// makes its promise, and the quantiles of the velocity's error over all windows.
 void add_flight_errors(const residuals::Inputs& inputs, int jobs, files::Json& result) {
   const std::vector<residuals::FlightError> all = residuals::flight_errors(inputs, jobs);
   std::map<std::string, const residuals::FlightError*> errors;

@@ -4,8 +4,8 @@ Import ListNotations.
 From Swarmcert Require Import Exponential.
 Open Scope R_scope.
 
-(** Sorting acts on the whole layer: in groups of k numbers side by side, or as the larger and the smaller of two, of one
-    number in each half of the layer or of neighbours; the larger ones come first. *)
+(** Sorting acts on the whole layer: in groups of k numbers side by side, or as the larger and the smaller of two, of
+    one number in each half of the layer or of neighbours; the larger ones come first. *)
 Inductive sorting := Groups (k : nat) | Halves | Pairs.
 Inductive activation := Relu | Tanh | Sigmoid | Softplus | Elu | Selu | Silu | Gelu | Sorted (s : sorting).
 

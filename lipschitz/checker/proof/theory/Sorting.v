@@ -45,7 +45,8 @@ Lemma length_firstn_same (k : nat) (u v : list R) : length u = length v -> lengt
 Proof. intros H. now rewrite !firstn_length, H. Qed.
 Lemma length_skipn_same (k : nat) (u v : list R) : length u = length v -> length (skipn k u) = length (skipn k v).
 Proof. intros H. now rewrite !skipn_length, H. Qed.
-Lemma apart_split k u v : length u = length v -> apart u v = apart (firstn k u) (firstn k v) + apart (skipn k u) (skipn k v).
+Lemma apart_split k u v : length u = length v ->
+  apart u v = apart (firstn k u) (firstn k v) + apart (skipn k u) (skipn k v).
 Proof. intros H. rewrite <- apart_app by now apply length_firstn_same. now rewrite !firstn_skipn. Qed.
 Lemma groups_contract n k u v : length u = length v -> apart (sorted_groups n k u) (sorted_groups n k v) <= apart u v.
 Proof.
