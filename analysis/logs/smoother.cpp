@@ -9,7 +9,7 @@ namespace swarmcert::logs {
 
 namespace {
 
-/// Coefficients of the polynomial of that degree in tau that fits the sums below by least squares.
+/// The coefficient of tau^power of the least-squares polynomial that has these normal equations.
 template <int Degree>
 double fitted_coefficient(const Eigen::Matrix4d& normal, const Eigen::Vector4d& right, int power) {
   using Matrix = Eigen::Matrix<double, Degree + 1, Degree + 1>;

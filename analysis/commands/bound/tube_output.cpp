@@ -215,14 +215,17 @@ Json measured_json(const MeasuredTruth& measured, const LocalTube& tube) {
       {"like_them",
        "a flight whose residual is one more draw of what these flights' were drawn from: same vehicles, task "
        "and model"},
-      {"rests_on", "forces are seen as their mean over mean_s; neighbours as they were logged"}};
+      {"rests_on",
+       fmt::format(
+           "forces are seen as their mean over {:g} s, so that faster ones are in no range; neighbours "
+           "are where the logs show them",
+           measured.mean_s)}};
 }
 
 void print_measured(const Json& measured) {
   fmt::print(
-      "  a further flight like the {} that were compared keeps it with probability {:g} ({:.3f} to {:.3f} "
-      "for "
-      "these flights, 90 %)\n",
+      "  a further flight like the {} that were compared keeps it with probability {:g} "
+      "({:.3f} to {:.3f} for these flights, 90 %)\n",
       measured["flights"].get<int>() + measured["shape_flights"].get<int>(), measured["level"].get<double>(),
       measured["interval"][0].get<double>(), measured["interval"][1].get<double>());
   fmt::print(
@@ -232,6 +235,7 @@ void print_measured(const Json& measured) {
              measured["cells_in_tube_without_flights"].get<int>(), measured["cells_in_tube"].get<int>(),
              measured["elsewhere"].get<std::string>());
   fmt::print("  like them: {}\n", measured["like_them"].get<std::string>());
+  fmt::print("  rests on: {}\n", measured["rests_on"].get<std::string>());
 }
 
 }  // namespace

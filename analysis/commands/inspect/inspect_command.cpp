@@ -165,9 +165,9 @@ struct Seen {
   std::vector<InspectedLog> logs;  ///< empty without --report
 };
 
-/// A file that was taken for a log: read, or why it cannot be.
+/// A file that may be a log: what was read of it, or why it cannot be read.
 struct LogRead {
-  bool is_log = false;
+  bool is_log = false;  ///< else nothing but `error` says anything
   logs::Log log;
   files::Json json;  ///< what `inspect` says of it
   LogOutcome outcome;
@@ -319,11 +319,11 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
   const bool in_table = paths.size() > options.files.size();
   std::vector<std::string> readable;
   Seen seen;
-  LogsInOrder logs(paths, options, common.jobs);
+  LogsInOrder in_order(paths, options, common.jobs);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const std::string& path = paths[i];
     try {
-      LogRead log = logs.next(i);
+      LogRead log = in_order.next(i);
       if (log.error) std::rethrow_exception(log.error);
       found.push_back(log.is_log ? show_log(std::move(log), options, common, in_table, seen)
                                  : inspect_other(path, options, common));

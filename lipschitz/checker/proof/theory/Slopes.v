@@ -215,6 +215,20 @@ Lemma real_with_slopes {A} c (hidden : list A) u :
 Proof. induction hidden as [|h hidden IH]; simpl; auto. now rewrite real_mul, IH. Qed.
 Lemma with_slopes_times {A} c (hidden : list A) a u : with_slopes_R c hidden (a * u) = a * with_slopes_R c hidden u.
 Proof. induction hidden as [|h hidden IH]; simpl; auto. rewrite IH. ring. Qed.
+(** One layer and what follows it: `step` lengthens no difference by more than c. *)
+Lemma layer_bound (step : list R -> list R) c w k u : 0 <= c -> 0 <= w ->
+  (forall p q, length p = length q -> norm (minus (step p) (step q)) <= c * norm (minus p q)) ->
+  norm_bound_of k u -> length (snd k) = length (fst k) -> forall x y,
+  w * norm (minus (step (affine (fst (real_layer k)) (snd (real_layer k)) x))
+                  (step (affine (fst (real_layer k)) (snd (real_layer k)) y))) <= c * (u * w) * norm (minus x y).
+Proof.
+  intros Hc W Hs Hu L x y. pose proof (affine_bound k u x y Hu L) as B.
+  set (p := affine _ _ x) in *. set (q := affine _ _ y) in *.
+  assert (length p = length q) as E.
+  { unfold p, q, real_layer. simpl. rewrite !length_affine; auto; rewrite !map_length; apply L. }
+  replace (c * (u * w) * norm (minus x y)) with (w * (c * (u * norm (minus x y)))) by ring.
+  apply Rmult_le_compat_l; auto. eapply Rle_trans; [now apply Hs|]. now apply Rmult_le_compat_l.
+Qed.
 Lemma network_bound f c hs l us : 0 <= c -> slopes f (- c) c -> Forall2 norm_bound_of (hs ++ [l]) us ->
   (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
   let g := network (map (fun k => (f, real_layer k)) hs) (real_layer l) in
@@ -222,17 +236,12 @@ Lemma network_bound f c hs l us : 0 <= c -> slopes f (- c) c -> Forall2 norm_bou
 Proof.
   intros Hc S. revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
   - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
-  - inversion H as [|? u ? us' Hu Hus]; subst. pose proof (affine_bound k u x y Hu (L _ (or_introl eq_refl))) as B.
-    unfold real_layer in B. simpl in B. set (p := affine _ _ x) in *. set (q := affine _ _ y) in *.
-    assert (length p = length q) as E.
-    { unfold p, q. rewrite !length_affine; auto; rewrite !map_length; apply L; auto. }
+  - inversion H as [|? u ? us' Hu Hus]; subst.
     eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite with_slopes_times.
-    set (w := with_slopes_R c hs (product_R us')).
-    assert (0 <= w) as W by (apply with_slopes_nonneg; auto; eapply product_nonneg; eauto).
-    replace (c * (u * w) * norm (minus x y)) with (w * (c * (u * norm (minus x y)))) by ring.
-    apply Rmult_le_compat_l; auto. apply Rle_trans with (c * norm (minus p q)); [|now apply Rmult_le_compat_l].
-    unfold norm. rewrite <- (sqrt_square c) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
-    apply sqrt_le_1_alt. now apply slopes_contract.
+    apply (layer_bound (map f) c _ k u); auto.
+    + apply with_slopes_nonneg; auto. eapply product_nonneg; eauto.
+    + intros p q E. unfold norm. rewrite <- (sqrt_square c) at 1 by auto. rewrite <- sqrt_mult_alt by nra.
+      apply sqrt_le_1_alt. now apply slopes_contract.
 Qed.
 Lemma sorting_bound s hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
   (forall k, In k (hs ++ [l]) -> length (snd k) = length (fst k)) -> forall x y,
@@ -241,15 +250,11 @@ Lemma sorting_bound s hs l us : Forall2 norm_bound_of (hs ++ [l]) us ->
 Proof.
   revert us. induction hs as [|k hs IH]; intros us H L x y; simpl in *.
   - inversion H as [|? u ? us' Hu Hus]; subst. inversion Hus; subst. simpl. rewrite Rmult_1_r. apply affine_bound; auto.
-  - inversion H as [|? u ? us' Hu Hus]; subst. pose proof (affine_bound k u x y Hu (L _ (or_introl eq_refl))) as B.
-    unfold real_layer in B. simpl in B. set (p := affine _ _ x) in *. set (q := affine _ _ y) in *.
-    assert (length p = length q) as E.
-    { unfold p, q. rewrite !length_affine; auto; rewrite !map_length; apply L; auto. }
+  - inversion H as [|? u ? us' Hu Hus]; subst.
     eapply Rle_trans; [apply (IH us'); auto|]. simpl. rewrite with_slopes_times.
-    set (w := with_slopes_R 1 hs (product_R us')).
-    assert (0 <= w) as W by (apply with_slopes_nonneg; [lra|]; eapply product_nonneg; eauto).
-    replace (1 * (u * w) * norm (minus x y)) with (w * (u * norm (minus x y))) by ring.
-    apply Rmult_le_compat_l; auto. eapply Rle_trans; [|exact B]. apply norm_le. now apply sorting_contracts.
+    apply (layer_bound (sort_layer s) 1 _ k u); auto; [lra| |].
+    + apply with_slopes_nonneg; [lra|]. eapply product_nonneg; eauto.
+    + intros p q E. rewrite Rmult_1_l. apply norm_le. now apply sorting_contracts.
 Qed.
 Lemma part_bound ps accepted p v : Forall (holds ps) accepted -> fits_part (part_at ps p) = true ->
   norm_of ps accepted p = Some v -> 0 <= real v /\ forall x y,
