@@ -30,11 +30,6 @@ struct Enclosure {
   UpperBound upper;
 };
 
-/// The smaller of two upper bounds on the same quantity is an upper bound.
-constexpr UpperBound tighter(UpperBound a, UpperBound b) { return a.value() <= b.value() ? a : b; }
-/// The larger of two lower bounds on the same quantity is a lower bound.
-constexpr LowerBound tighter(LowerBound a, LowerBound b) { return a.value() >= b.value() ? a : b; }
-
 /// What can be said of a claim. Anything that was not settled is inconclusive.
 enum class Verdict { kProved, kRefuted, kInconclusive };
 

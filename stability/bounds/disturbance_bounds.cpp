@@ -89,11 +89,6 @@ std::string DisturbanceBounds::which() const {
   return "amplitude and rate";
 }
 
-double impulse_gain_after(const AxisLoop& loop, Channel channel, double after_s) {
-  const TransferFunction y = impulse_transfer(loop, channel);
-  return is_stable(y) ? FadingResponse(y)(after_s) : kInfinity;
-}
-
 double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double amplitude_N, double rate_N_s,
                                 int nodes) {
   const GainNorms gains = continuous_norms(loop, channel);

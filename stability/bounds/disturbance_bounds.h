@@ -97,9 +97,6 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
 double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double amplitude_N, double rate_N_s,
                                 int nodes = 6000);
 
-/// sup |h'(t)| over t >= after_s, m per N s: what is left of an impulse of one newton second.
-double impulse_gain_after(const AxisLoop& loop, Channel channel, double after_s);
-
 /// A staircase f_hat, updated every period and late by a latency, differs from its source by at most
 /// (period + latency) sup|f_hat'|: split f = continuous part + staircase part and bound the latter by its amplitude.
 /// @return m: |h'|_1 (1/rate_hz + latency_s) rate_of_f_hat_N_s

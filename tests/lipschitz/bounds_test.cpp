@@ -21,10 +21,5 @@ TEST(BoundTypes, UpperLowerAndEstimateCannotBeMixedUp) {
   static_assert(std::is_copy_assignable_v<UpperBound>, "the checks above can fail");
 }
 
-TEST(BoundTypes, TighterIsTheSmallerUpperAndTheLargerLower) {
-  EXPECT_EQ(tighter(UpperBound(2), UpperBound(3)).value(), 2);
-  EXPECT_EQ(tighter(LowerBound(2), LowerBound(3)).value(), 3);
-}
-
 }  // namespace
 }  // namespace swarmcert::lipschitz
