@@ -31,6 +31,18 @@ void add_order(files::NetworkArguments& arguments, const std::string& text) {
   if (order.empty()) throw UsageError("--order names no layer: give them as in fc1,fc2,fc3");
 }
 
+constexpr const char* kHalvesOrPairs =
+    "maxmin:halves compares number i with number i of the layer's second half, maxmin:pairs neighbours; the "
+    "larger ones come first";
+
+void set_activation(files::NetworkArguments& arguments, const std::string& name) {
+  if (!files::is_activation(name))
+    throw UsageError("--activation " + name +
+                     ": is none of those whose slopes are known: " + files::activations() +
+                     (name == "maxmin" ? std::string("; ") + kHalvesOrPairs + " in both" : ""));
+  arguments.activation = name;
+}
+
 }  // namespace
 
 bool CommonOptions::prints_text() const { return json != "-" && host() == nullptr; }
@@ -46,6 +58,14 @@ void declare_order(CLI::App& app, files::NetworkArguments& arguments) {
       ->allow_extra_args(false);
 }
 
+void declare_activation(CLI::App& app, files::NetworkArguments& arguments) {
+  app.add_option_function<std::string>(
+      "--activation", [&arguments](const std::string& name) { set_activation(arguments, name); },
+      "Between the layers, which a state dict does not tell (default: relu). Others than ReLU can be "
+      "certified and checked: " +
+          files::activations() + ". " + kHalvesOrPairs + "; groupsort sorts upwards");
+}
+
 void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   auto* file =
       app.add_option("NET", arguments.file, "network.toml, or a weight file that holds one plain network");
@@ -56,12 +76,7 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   phi->needs(rho)->excludes(file);
   rho->needs(phi)->excludes(file);
   app.add_option("--key", arguments.key, "Key of the state dict inside a nested checkpoint, e.g. model");
-  app.add_option("--activation", arguments.activation,
-                 "Between the layers, which a state dict does not tell (default: relu). Others than ReLU "
-                 "can be certified and checked: " +
-                     files::activations() +
-                     ". maxmin:halves compares number i with number i of the layer's second half, "
-                     "maxmin:pairs neighbours; the larger ones come first; groupsort sorts upwards");
+  declare_activation(app, arguments);
   declare_order(app, arguments);
 }
 
@@ -72,13 +87,6 @@ files::Network load_net(const files::NetworkArguments& arguments) {
 }
 
 files::Network load_any_net(const files::NetworkArguments& arguments) {
-  if (!arguments.activation.empty() && !files::is_activation(arguments.activation))
-    throw UsageError("--activation " + arguments.activation +
-                     ": is none of those whose slopes are known: " + files::activations() +
-                     (arguments.activation == "maxmin"
-                          ? "; maxmin:halves compares number i with number i of the layer's second half, "
-                            "maxmin:pairs neighbours; the larger ones come first in both"
-                          : ""));
   if (host() != nullptr && host()->network) {
     return arguments.activation.empty() ? *host()->network
                                         : files::with_activation(*host()->network, arguments.activation);

@@ -51,6 +51,10 @@ struct UsageError : std::runtime_error {
 /// Declares --order, for weight files that do not tell the order of their layers; part of declare_network().
 void declare_order(CLI::App& app, files::NetworkArguments& arguments);
 
+/// Declares --activation, for weight files that do not tell it; part of declare_network(). Unknown names are usage
+/// errors.
+void declare_activation(CLI::App& app, files::NetworkArguments& arguments);
+
 /// Declares NET: a positional FILE, or --phi with --rho, --key and --order.
 void declare_network(CLI::App& app, files::NetworkArguments& arguments);
 

@@ -166,6 +166,9 @@ TEST_F(CertifiedChain, InspectShowsTheActivationAfterEveryLayerButTheLast) {
   ASSERT_EQ(layers.size(), 4u);
   for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(layers[k]["activation"], "relu");
   EXPECT_TRUE(layers[3]["activation"].is_null());
+  const std::string inspect = "inspect net.pth --order head,steep,turn,tail --activation ";
+  expect(inspect + "tanh", 0, {"1 -> 2, tanh", "2 -> 2, tanh"});
+  expect(inspect + "mish", 2, {"--activation mish", "silu"});
 }
 
 TEST_F(CertifiedChain, WhatIsForReluRefusesASmoothActivation) {

@@ -1,7 +1,7 @@
 """Whether intervals of 90 % hold the truth in nine of ten cases: thrust ratio, drag and motor lag, fitted together to
 flights of the foreign simulator, from still air to gusts as large as the effects.
 
-Usage: foreign_coverage.py TOOL MODEL FOLDER [--cases N] [--gusts N,N,...]
+Usage: foreign_coverage.py TOOL MODEL FOLDER [--cases N] [--gusts N,N,...] [--first-seed N]
 Prints the held share of each parameter and gust. Exits 1 where all of the quiet flights are outside of LEAST_OF_ALL ..
 MOST_OF_ALL, or a parameter is held in less than LEAST_HELD of the quiet or of the loud ones.
 """
@@ -61,12 +61,13 @@ def main():
     parser.add_argument("folder")
     parser.add_argument("--cases", type=int, default=12, help="flights for each gust")
     parser.add_argument("--gusts", default="0,0.003,0.005,0.01,0.02")
+    parser.add_argument("--first-seed", type=int, default=7000)
     options = parser.parse_args()
     quiet, loud = collections.defaultdict(list), collections.defaultdict(list)
     for number, gust_N in enumerate(float(x) for x in options.gusts.split(",")):
         of_gust = collections.defaultdict(list)
         for case in range(options.cases):
-            parameters = fitted(options, gust_N, 7000 + 100 * number + case)
+            parameters = fitted(options, gust_N, options.first_seed + number * max(100, options.cases) + case)
             for name, truth in TRUTHS.items():
                 lower, upper = parameters[name]["interval_90"]
                 of_gust[name].append(lower <= truth <= upper)

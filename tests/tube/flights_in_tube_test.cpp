@@ -95,7 +95,7 @@ TEST(FlightsInTube, NoneOfAHundredWithAResidualThatJumpsBetweenTheEndsOfItsRange
   EXPECT_GT(campaign.nearest, 0.5);
 }
 
-TEST(FlightsInTube, NoneOfTenThousandWithRandomLagsLeavesIt_slow) { stay_inside(10000, 0.7, 0.25, kLags_s); }
+TEST(FlightsInTube, NoneOfTenThousandWithRandomLagsLeavesIt_slow) { stay_inside(10000, 0.7, 0.2, kLags_s); }
 
 }  // namespace
 }  // namespace swarmcert::analysis

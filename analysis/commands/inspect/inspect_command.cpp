@@ -31,7 +31,7 @@ namespace {
 
 struct InspectOptions {
   std::vector<std::string> files;
-  files::NetworkArguments network;  ///< key and order, of every weight file
+  files::NetworkArguments network;  ///< key, activation and order, of every weight file
   std::string csv;
   std::string columns, columns_draft, report;
   double t0_s = -std::numeric_limits<double>::infinity();
@@ -386,6 +386,7 @@ Command inspect_command() {
                    "is listed to be filled in");
         app.add_option("--key", options->network.key,
                        "Key of the state dict inside a nested checkpoint, e.g. model");
+        declare_activation(app, options->network);
         declare_order(app, options->network);
         return [options](const CommonOptions& common) { return run_inspect(*options, common); };
       }};
