@@ -6,15 +6,15 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "analysis/identification/candidates.h"
 #include "analysis/identification/whitening.h"
-#include "analysis/residuals/comparison.h"
 
 namespace swarmcert::identification {
+
+struct Passes;
 
 struct Block {
   Eigen::VectorXd gram;  ///< packed upper triangle of G, column by column
@@ -58,10 +58,13 @@ Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& colu
 /// The columns of `candidates`, without any flight.
 Grams columns_of(std::vector<Candidate> candidates);
 
-/// Condenses flights. The result does not depend on `jobs`.
-/// @param noise whitens columns and residual where it is not null.
-Grams block_grams(const residuals::Inputs& inputs, const std::string& kind, std::vector<Candidate> candidates,
-                  const std::vector<int>& which, int jobs, const residuals::Progress& progress,
-                  const Noise* noise = nullptr);
+/// Whether the columns of a pass are asked for again later on, so that Passes::memory keeps them.
+enum class Kept { kNo, kYes };
+
+/// Condenses flights. The result does not depend on the number of threads.
+Grams block_grams(const Passes& passes, std::vector<Candidate> candidates, Kept kept = Kept::kNo);
+
+/// As block_grams(), of columns and a residual that are whitened.
+Grams whitened_grams(const Passes& passes, std::vector<Candidate> candidates, const Noise& noise);
 
 }  // namespace swarmcert::identification

@@ -116,8 +116,7 @@ Selected select(const Passes& passes, std::vector<Candidate> candidates,
   Selected result;
   std::set<std::string> named;
   for (int round = 0; round < kMostRounds; ++round) {
-    result.grams =
-        block_grams(passes.inputs, passes.kind, candidates, passes.flights, passes.jobs, passes.progress);
+    result.grams = block_grams(passes, candidates, Kept::kYes);
     const Selection selection(result.grams);
     if (!selection.is_sound()) return result;
     result.members = selection.select(names);

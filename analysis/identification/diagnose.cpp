@@ -8,6 +8,7 @@
 #include <set>
 
 #include "analysis/identification/closed_loop.h"
+#include "analysis/identification/column_memory.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/swinging_load.h"
 #include "analysis/identification/torque_balance.h"
@@ -71,7 +72,8 @@ void name_what_halves(const Passes& all, const Passes& passes, Diagnosis& result
   std::vector<Candidate> candidates;
   for (const char* const name : {"thrust_ratio", "battery", "constant_force"})
     candidates.push_back(candidate(name, *left.model_of(passes.kind), covered));
-  const Grams grams = block_grams(left, passes.kind, candidates, flights, passes.jobs, [](int, int) {});
+  const Grams grams =
+      block_grams({left, passes.kind, flights, passes.records, passes.jobs, [](int, int) {}}, candidates);
   const Selection selection(grams);
   if (!selection.is_sound()) return;
   const double before = selection.mean_square({});
@@ -175,8 +177,9 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   const bool is_excerpt = covered.blocks > most_searched;
   const Coverage seen = is_excerpt ? coverage(searched, kind, which, jobs) : covered;
   result.searched_blocks = seen.blocks;
-  const Passes all = {is_excerpt ? inputs : searched, kind, which, covered.records, jobs, progress};
-  const Passes passes = {searched, kind, which, seen.records, jobs, progress};
+  const auto memory = std::make_shared<ColumnMemory>(which.size(), seen.records);
+  const Passes passes = {searched, kind, which, seen.records, jobs, progress, memory};
+  const Passes all = is_excerpt ? Passes{inputs, kind, which, covered.records, jobs, progress} : passes;
   Explained explained = explain(passes, seen);
   Settled& settled = explained.settled;
   const Selected& selected = settled.selected;
@@ -232,7 +235,7 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
     beside = specs_of(fit_effects(inputs, kind, others, which, jobs, progress));
   for (const std::string& name : names) candidates.push_back(candidate_to_fit(passes, name, covered, beside));
   Selected selected;
-  selected.grams = block_grams(inputs, kind, candidates, which, jobs, progress);
+  selected.grams = block_grams(passes, candidates);
   const Selection selection(selected.grams);
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < names.size(); ++i) {

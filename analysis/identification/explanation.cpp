@@ -382,8 +382,7 @@ std::optional<std::pair<double, double>> fit_to_all(const Passes& all, const Pas
     members.push_back({static_cast<int>(candidates.size()), 0});
     candidates.push_back(effect.candidate);
   }
-  const Grams grams =
-      block_grams(all.inputs, all.kind, std::move(candidates), all.flights, all.jobs, all.progress);
+  const Grams grams = block_grams(all, std::move(candidates));
   const Selection selection(grams);
   const std::vector<Finding> found = findings(selection, members);
   for (std::size_t i = 0; i < found.size(); ++i) {

@@ -7,7 +7,6 @@
 
 #include "analysis/identification/column_run.h"
 #include "analysis/identification/covariance.h"
-#include "nn/base/parallel.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -23,32 +22,51 @@ struct Moments {
   bool follows = false;  ///< the block before it, of the same track
 };
 
+/// Rows of one block: the columns as flown, as set points ask for them, and the residual.
+struct BlockRows {
+  Eigen::MatrixXd x, z;
+  Eigen::VectorXd r;
+  Eigen::Index count = 0;
+};
+
 /// @param mix [columns x unknowns]: what is fitted, as sums of columns.
-bool add_track(const residuals::Inputs& inputs, const Track& track, const Grams& columns,
+bool add_track(const Passes& passes, const ModelledTrack& modelled, const Grams& columns,
                const Eigen::MatrixXd& mix, std::vector<Moments>& blocks) {
+  const Track& track = modelled.track;
   if (track.targets.size() != track.instants.size()) return false;
-  const stability::Model model = inputs.model_for(track);
-  const std::vector<Eigen::Vector3d> r = residuals::force_residual(model, inputs.kinds, inputs.rules, track);
-  const std::vector<stability::Instant> wanted = as_commanded(track, model.mass_kg);
-  const TrackBlocks cut = cut_into_blocks(track);
-  ColumnRun actual(columns, inputs, model, track), commanded(columns, inputs, model, track);
-  const std::size_t first = blocks.size();
-  const Eigen::Index n = mix.cols();
-  for (const TrackBlock& block : cut.blocks)
-    blocks.push_back({Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n),
-                      Eigen::VectorXd::Zero(n), block.follows});
+  const std::vector<stability::Instant> wanted = as_commanded(track, modelled.model.mass_kg);
+  ColumnRun actual(columns, passes.inputs, modelled.model, track),
+      commanded(columns, passes.inputs, modelled.model, track);
+  BlockRows rows;
+  int current = -1;
+  const auto close = [&] {
+    if (current < 0) return;
+    const Eigen::MatrixXd x = rows.x * mix, z = rows.z * mix;
+    blocks.push_back({z.transpose() * x, x.transpose() * x, z.transpose() * rows.r, x.transpose() * rows.r,
+                      modelled.cut.blocks[static_cast<std::size_t>(current)].follows});
+  };
   for (std::size_t i = 0; i < track.instants.size(); ++i) {
     const bool restart = track.restarts[i] != 0;
     const Eigen::Matrix3Xd& all = actual.advance(track.instants[i], restart);
     const Eigen::Matrix3Xd& wanted_all = commanded.advance(wanted[i], restart);
-    if (cut.of_record[i] < 0) continue;
-    const Eigen::Matrix3Xd x = all * mix, z = wanted_all * mix;
-    Moments& to = blocks[first + static_cast<std::size_t>(cut.of_record[i])];
-    to.zx.noalias() += z.transpose() * x;
-    to.xx.noalias() += x.transpose() * x;
-    to.zr.noalias() += z.transpose() * r[i];
-    to.xr.noalias() += x.transpose() * r[i];
+    const int block = modelled.cut.of_record[i];
+    if (block < 0) continue;
+    if (block != current) {
+      close();
+      current = block;
+      const Eigen::Index size =
+          Eigen::Index(3) * modelled.cut.blocks[static_cast<std::size_t>(block)].records;
+      rows.x.resize(size, columns.columns);
+      rows.z.resize(size, columns.columns);
+      rows.r.resize(size);
+      rows.count = 0;
+    }
+    rows.x.middleRows<3>(rows.count) = all;
+    rows.z.middleRows<3>(rows.count) = wanted_all;
+    rows.r.segment<3>(rows.count) = modelled.residual_N[i];
+    rows.count += 3;
   }
+  close();
   return true;
 }
 
@@ -58,13 +76,8 @@ std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& colu
   const Eigen::Index n = mix.cols();
   std::vector<std::vector<Moments>> pieces(passes.flights.size());
   std::vector<char> complete(passes.flights.size(), 1);
-  files::parallel_for(static_cast<int>(passes.flights.size()), passes.jobs, [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
-    std::vector<std::string> problems;
-    for (const Track& track : passes.inputs.load(static_cast<std::size_t>(passes.flights[k]), problems)) {
-      if (track.position_only || track.kind != passes.kind) continue;
-      if (!add_track(passes.inputs, track, columns, mix, pieces[k])) complete[k] = 0;
-    }
+  over_modelled_tracks(passes, [&](std::size_t k, const ModelledTrack& track) {
+    if (!add_track(passes, track, columns, mix, pieces[k])) complete[k] = 0;
   });
   if (n == 0 || std::find(complete.begin(), complete.end(), 0) != complete.end()) return {};
   Moments sum{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n),

@@ -160,7 +160,7 @@ void KindFit::step(bool moves) {
   Grams grams;
   std::map<std::string, Sum> sums;
   for (const auto& [vehicle, flights] : flights_of_) {
-    grams = block_grams(of_vehicle(vehicle), kind_, candidates, flights, jobs_, [](int, int) {});
+    grams = block_grams({of_vehicle(vehicle), kind_, flights, 0, jobs_, [](int, int) {}}, candidates);
     Sum sum;
     for (const Block& block : grams.blocks) {
       if (sum.gram.size() == 0) {

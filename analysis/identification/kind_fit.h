@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/identification/block_grams.h"
+#include "analysis/residuals/comparison.h"
 
 namespace swarmcert::identification {
 

@@ -104,8 +104,8 @@ class Refinement {
   Point evaluate(const std::vector<std::vector<double>>& thetas) const {
     std::vector<Candidate> around = candidates_;
     const std::vector<double> widths = add_neighbours(thetas, around);
-    const Grams full = block_grams(passes_.inputs, passes_.kind, around, passes_.flights, passes_.jobs,
-                                   passes_.progress, noise_);
+    const Grams full =
+        noise_ == nullptr ? block_grams(passes_, around) : whitened_grams(passes_, around, *noise_);
     Members members;
     for (int m = 0; m < static_cast<int>(around.size()); ++m) members.push_back({m, 0});
     const Selection selection(full);

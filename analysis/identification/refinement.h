@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "analysis/identification/findings.h"
+#include "analysis/identification/passes.h"
 
 namespace swarmcert::identification {
 
@@ -13,16 +14,6 @@ struct Refined {
   std::vector<double> coefficients, theta;
   /// 90 %, from the jackknife of coefficients and free shapes together; equal ends where a number was held.
   std::vector<Interval> linear_intervals, shape_intervals;
-};
-
-/// What a pass over the flights needs to know.
-struct Passes {
-  const residuals::Inputs& inputs;
-  std::string kind;
-  std::vector<int> flights;  ///< indices into inputs.found.flights
-  std::size_t records = 0;
-  int jobs = 0;
-  residuals::Progress progress;
 };
 
 /// Refines `members` of `grams` jointly. Derivatives with respect to shapes are differences of columns; steps are

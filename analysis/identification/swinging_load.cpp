@@ -107,8 +107,8 @@ class PendulumSearch {
   const std::vector<double>& best() const { return load_.thetas[static_cast<std::size_t>(member_.theta)]; }
 
   void condense() {
-    grams_ = block_grams(inputs_, passes_.kind, {fixed_[0], fixed_[1], load_}, flights_, passes_.jobs,
-                         passes_.progress);
+    const Passes beside = {inputs_, passes_.kind, flights_, passes_.records, passes_.jobs, passes_.progress};
+    grams_ = block_grams(beside, {fixed_[0], fixed_[1], load_});
     member_ = Selection(grams_).best_theta(kFixedLoad, kLoad);
   }
 

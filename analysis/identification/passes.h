@@ -1,0 +1,45 @@
+/// @file What a pass over the flights needs to know, and the tracks that it goes along.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/identification/column_run.h"
+#include "analysis/residuals/comparison.h"
+
+namespace swarmcert::identification {
+
+class ColumnMemory;
+
+struct Passes {
+  const residuals::Inputs& inputs;
+  std::string kind;
+  std::vector<int> flights;  ///< indices into inputs.found.flights
+  std::size_t records = 0;
+  int jobs = 0;
+  residuals::Progress progress;
+  /// Of these flights and models; null where every pass makes its columns anew.
+  std::shared_ptr<ColumnMemory> memory = nullptr;
+};
+
+/// A track under its model.
+struct ModelledTrack {
+  residuals::Track track;
+  stability::Model model;
+  std::vector<Eigen::Vector3d> residual_N;  ///< one per record, see residuals::force_residual()
+  TrackBlocks cut;
+};
+
+/// The tracks of vehicles of `kind` in a flight, without those that are known by their position only.
+/// @param flight index into inputs.found.flights
+std::vector<ModelledTrack> modelled_tracks(const residuals::Inputs& inputs, const std::string& kind,
+                                           int flight);
+
+/// Calls use(k, track) for each track of passes.flights[k], several flights at a time, then ended(), if there is one.
+void over_modelled_tracks(const Passes& passes,
+                          const std::function<void(std::size_t k, const ModelledTrack& track)>& use,
+                          const std::function<void()>& ended = nullptr);
+
+}  // namespace swarmcert::identification
