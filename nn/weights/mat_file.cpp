@@ -1,16 +1,13 @@
 #include "nn/weights/mat_file.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <cstring>
-#include <map>
-#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "nn/base/input_error.h"
-#include "nn/weights/named_arrays.h"
+#include "nn/weights/inflate.h"
+#include "nn/weights/mat73.h"
 #include "nn/weights/tensors.h"
 
 namespace swarmcert::files {
@@ -19,10 +16,10 @@ namespace {
 // MATLAB, "MAT-File Format", Level 5: types of data elements and classes of arrays.
 constexpr std::uint32_t kInt8 = 1, kUint8 = 2, kInt16 = 3, kUint16 = 4, kInt32 = 5, kUint32 = 6, kSingle = 7,
                         kDouble = 9, kInt64 = 12, kUint64 = 13, kMatrix = 14, kCompressed = 15;
-constexpr std::uint32_t kCellClass = 1, kDoubleClass = 6, kSingleClass = 7, kLastNumericClass = 15;
+constexpr std::uint32_t kCellClass = 1, kStructClass = 2, kDoubleClass = 6, kSingleClass = 7,
+                        kLastNumericClass = 15;
 constexpr std::uint32_t kComplexFlag = 0x800;
 constexpr std::size_t kHeader_bytes = 128;
-constexpr std::size_t kMostCells = 4096;
 constexpr std::uint64_t kMostDecompressed_bytes = std::uint64_t{1} << 27;
 constexpr char kSaveAgain[] =
     "save in MATLAB with save('net.mat', 'weights', '-v7'), or with scipy.io.savemat";
@@ -31,14 +28,6 @@ struct MatElement {
   std::uint32_t type = 0;
   std::string_view data;
   std::size_t offset = 0;
-};
-
-struct MatVariable {
-  std::string name;
-  bool is_numeric = false;
-  std::optional<NamedArray> array;  ///< of a numeric one
-  std::vector<NamedArray> cells;    ///< of a cell array of numeric ones
-  bool is_cell = false;
 };
 
 /// Elements that follow one another in a piece of the file, or of what a piece of it decompresses to.
@@ -113,9 +102,9 @@ class MatReader {
       if (element.type == kCompressed) {
         const std::string inflated = decompressed(element);
         MatElements inner(inflated, element.offset, path_);
-        variables.push_back(variable(inner.expect(kMatrix, "contents"), 0));
+        variables.push_back(variable(inner.expect(kMatrix, "contents"), MatInside::kFile));
       } else if (element.type == kMatrix) {
-        variables.push_back(variable(element, 0));
+        variables.push_back(variable(element, MatInside::kFile));
       } else {
         elements.refuse(element.offset, "an element is no array");
       }
@@ -132,29 +121,16 @@ class MatReader {
 
   /// At most what the largest network needs, however much the file claims.
   std::string decompressed(const MatElement& element) {
-    std::string result;
-    z_stream stream{};
-    if (inflateInit(&stream) != Z_OK) refuse(element.offset, "", "cannot be decompressed");
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(element.data.data()));
-    stream.avail_in = static_cast<uInt>(element.data.size());
-    std::vector<char> buffer(std::size_t{1} << 16);
-    int status = Z_OK;
-    while (status == Z_OK && result.size() <= room_bytes_) {
-      stream.next_out = reinterpret_cast<Bytef*>(buffer.data());
-      stream.avail_out = static_cast<uInt>(buffer.size());
-      status = inflate(&stream, Z_NO_FLUSH);
-      result.append(buffer.data(), buffer.size() - stream.avail_out);
-    }
-    inflateEnd(&stream);
-    if (result.size() > room_bytes_)
+    std::optional<std::string> result = inflated(element.data, room_bytes_);
+    if (!result) refuse(element.offset, "", "its compressed data are damaged", kCopyAgain);
+    if (result->size() > room_bytes_)
       refuse(element.offset, "", "decompresses to more than 128 MiB",
              "save without compression: save(..., '-v6')");
-    if (status != Z_STREAM_END) refuse(element.offset, "", "its compressed data are damaged", kCopyAgain);
-    room_bytes_ -= result.size();
-    return result;
+    room_bytes_ -= result->size();
+    return std::move(*result);
   }
 
-  MatVariable variable(const MatElement& matrix, int depth) {
+  MatVariable variable(const MatElement& matrix, MatInside inside) {
     MatVariable result;
     if (matrix.data.empty()) return result;
     MatElements parts(matrix.data, matrix.offset + 8, path_);
@@ -165,12 +141,14 @@ class MatReader {
     const std::uint32_t array_class = word & 0xff;
     const std::vector<std::uint64_t> shape = sizes(parts.expect(kInt32, "size"));
     result.name = std::string(parts.expect(kInt8, "name").data);
-    if (array_class == kCellClass && depth == 0) {
+    if (array_class == kCellClass && inside != MatInside::kCell) {
       result.is_cell = true;
       read_cells(parts, shape, result);
+    } else if (array_class == kStructClass && inside == MatInside::kFile && *element_count(shape) == 1) {
+      result.is_struct = true;
+      read_fields(parts, result);
     } else if (array_class >= kDoubleClass && array_class <= kLastNumericClass) {
       if ((word & kComplexFlag) != 0) refuse(matrix.offset, in_quotes(result.name), "holds complex numbers");
-      result.is_numeric = true;
       result.array = numbers(parts.expect(0, "numbers"), shape, result.name);
       result.array->is_float32 = array_class == kSingleClass;
     }
@@ -195,7 +173,7 @@ class MatReader {
     if (count > kMostCells) refuse(0, in_quotes(result.name), "has more than 4096 cells");
     for (std::uint64_t k = 0; k < count; ++k) {
       const MatElement element = parts.expect(kMatrix, "cells");
-      MatVariable cell = variable(element, 1);
+      MatVariable cell = variable(element, MatInside::kCell);
       if (!cell.array)
         refuse(element.offset, in_quotes(result.name),
                "cell " + std::to_string(k + 1) + " is no numeric array");
@@ -203,7 +181,23 @@ class MatReader {
     }
   }
 
-  /// The file lists columns first.
+  /// The names have the same length, filled with zeros.
+  void read_fields(MatElements& parts, MatVariable& result) {
+    std::vector<double> lengths;
+    append_values<std::int32_t>(parts.expect(kInt32, "length of names").data, lengths);
+    const MatElement names = parts.expect(kInt8, "names of fields");
+    const auto length = lengths.size() == 1 && lengths[0] >= 1 ? static_cast<std::size_t>(lengths[0]) : 0;
+    if (length == 0 || names.data.size() / length > kMostCells)
+      refuse(names.offset, in_quotes(result.name), "the names of its fields are damaged", kCopyAgain);
+    for (std::size_t at = 0; at + length <= names.data.size(); at += length) {
+      MatVariable field = variable(parts.expect(kMatrix, "fields"), MatInside::kStruct);
+      const std::string_view name = names.data.substr(at, length);
+      field.name = std::string(name.substr(0, name.find('\0')));
+      if (field.array) field.array->name = field.name;
+      result.fields.push_back(std::move(field));
+    }
+  }
+
   NamedArray numbers(const MatElement& element, const std::vector<std::uint64_t>& shape,
                      const std::string& name) const {
     std::vector<double> listed;
@@ -241,13 +235,7 @@ class MatReader {
       refuse(element.offset, in_quotes(name),
              "holds " + std::to_string(listed.size()) + " numbers for the shape " + shape_text(shape),
              kCopyAgain);
-    NamedArray array{name, shape, std::move(listed), false};
-    if (shape.size() != 2) return array;
-    const std::vector<double> columns = std::move(array.numbers);
-    array.numbers.clear();
-    for (std::uint64_t i = 0; i < shape[0]; ++i)
-      for (std::uint64_t j = 0; j < shape[1]; ++j) array.numbers.push_back(columns[j * shape[0] + i]);
-    return array;
+    return {name, shape, rows_first(std::move(listed), shape), false};
   }
 
   const std::string& bytes_;
@@ -255,41 +243,36 @@ class MatReader {
   std::uint64_t room_bytes_ = kMostDecompressed_bytes;
 };
 
-}  // namespace
-
-bool looks_like_hdf5(const std::string& bytes) {
-  constexpr std::string_view kSignature("\x89HDF\r\n\x1a\n", 8);
-  for (std::size_t at = 0; at < bytes.size(); at = std::max<std::size_t>(512, 2 * at))
-    if (bytes.compare(at, kSignature.size(), kSignature) == 0) return true;
-  return false;
-}
-
-bool looks_like_mat(const std::string& bytes) {
-  return bytes.size() >= kHeader_bytes && bytes.compare(0, 7, "MATLAB ") == 0 &&
-         (bytes.compare(126, 2, "IM") == 0 || bytes.compare(126, 2, "MI") == 0);
-}
-
-Weights parse_mat(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
-  if (bytes.compare(0, 10, "MATLAB 7.3") == 0 || looks_like_hdf5(bytes))
-    throw InputError({path, "offset 0", "", "", "is a MAT file of version 7.3 (HDF5), which is not read",
-                      "load it in MATLAB, then save('net.mat', 'weights', '-v7')"});
-  if (bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
-    throw InputError({path, "offset 124", "", "", "is a MAT file of another version than 5", kSaveAgain});
+std::vector<MatVariable> variables_of(const std::string& bytes, const std::string& path) {
   if (bytes.compare(126, 2, "IM") != 0)
     throw InputError({path, "offset 126", "", "", "the numbers are not little-endian", kSaveAgain});
+  if (bytes.compare(124, 2, std::string("\0\2", 2)) == 0) return mat73_variables(bytes, path);
+  if (bytes.compare(124, 2, std::string("\0\1", 2)) != 0)
+    throw InputError(
+        {path, "offset 124", "", "", "is a MAT file of another version than 5 and 7.3", kSaveAgain});
+  return MatReader(bytes, path).run();
+}
+
+bool are_weights(const MatVariable& variable) { return variable.name == "weights" || variable.name == "W"; }
+
+bool holds_layers(const MatVariable& variable) {
+  return variable.array.has_value() || (variable.is_cell && are_weights(variable));
+}
+
+Weights network_of_variables(std::vector<MatVariable>& variables, const std::string& path,
+                             const std::vector<std::string>& order) {
   std::vector<NamedArray> cells, arrays;
   std::string left_out;
   const auto leave_out = [&left_out](const std::string& name) {
     left_out += (left_out.empty() ? "" : ", ") + in_quotes(name);
   };
   bool has_weights = false;
-  for (MatVariable& variable : MatReader(bytes, path).run()) {
-    const bool are_weights = variable.name == "weights" || variable.name == "W";
+  for (MatVariable& variable : variables) {
     const bool are_biases = variable.name == "biases" || variable.name == "bias" || variable.name == "b";
-    if (variable.is_cell && (are_weights || are_biases)) {
-      has_weights = has_weights || are_weights;
+    if (variable.is_cell && (are_weights(variable) || are_biases)) {
+      has_weights = has_weights || !are_biases;
       for (std::size_t k = 0; k < variable.cells.size(); ++k) {
-        variable.cells[k].name = "layer" + std::to_string(k + 1) + (are_weights ? ".weight" : ".bias");
+        variable.cells[k].name = "layer" + std::to_string(k + 1) + (are_biases ? ".bias" : ".weight");
         cells.push_back(std::move(variable.cells[k]));
       }
     } else if (variable.array) {
@@ -305,6 +288,37 @@ Weights parse_mat(const std::string& bytes, const std::string& path, const std::
         {path, "", "", "", "holds neither a cell array \"weights\" nor numeric matrices", kSaveAgain});
   Weights weights = network_of_arrays(has_weights ? cells : arrays, path, order);
   if (!left_out.empty()) weights.notes.push_back("other variables are left out: " + left_out);
+  return weights;
+}
+
+}  // namespace
+
+std::vector<double> rows_first(std::vector<double> columns_first, const std::vector<std::uint64_t>& shape) {
+  if (shape.size() != 2) return columns_first;
+  std::vector<double> numbers;
+  numbers.reserve(columns_first.size());
+  for (std::uint64_t i = 0; i < shape[0]; ++i)
+    for (std::uint64_t j = 0; j < shape[1]; ++j) numbers.push_back(columns_first[j * shape[0] + i]);
+  return numbers;
+}
+
+bool looks_like_mat(const std::string& bytes) {
+  return bytes.size() >= kHeader_bytes && bytes.compare(0, 7, "MATLAB ") == 0 &&
+         (bytes.compare(126, 2, "IM") == 0 || bytes.compare(126, 2, "MI") == 0);
+}
+
+Weights parse_mat(const std::string& bytes, const std::string& path, const std::vector<std::string>& order) {
+  std::vector<MatVariable> variables = variables_of(bytes, path);
+  std::string structure;
+  const auto is_single = [](const MatVariable& variable) { return variable.is_struct; };
+  if (std::none_of(variables.begin(), variables.end(), holds_layers) &&
+      std::count_if(variables.begin(), variables.end(), is_single) == 1) {
+    MatVariable only = std::move(*std::find_if(variables.begin(), variables.end(), is_single));
+    structure = only.name;
+    variables = std::move(only.fields);
+  }
+  Weights weights = network_of_variables(variables, path, order);
+  if (!structure.empty()) weights.notes.push_back("the network is the struct " + in_quotes(structure));
   return weights;
 }
 

@@ -1,7 +1,9 @@
 #include "nn/weights/weights.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <string_view>
 
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
@@ -16,6 +18,14 @@
 
 namespace swarmcert::files {
 namespace {
+
+/// HDF5's signature may lie at offset 0, 512, 1024, 2048, ...
+bool looks_like_hdf5(const std::string& bytes) {
+  constexpr std::string_view kSignature("\x89HDF\r\n\x1a\n", 8);
+  for (std::size_t at = 0; at < bytes.size(); at = std::max<std::size_t>(512, 2 * at))
+    if (bytes.compare(at, kSignature.size(), kSignature) == 0) return true;
+  return false;
+}
 
 [[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
   std::string what =

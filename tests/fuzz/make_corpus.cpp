@@ -10,6 +10,7 @@
 #include "logs/mcap_writer.h"
 #include "logs/rosbag_writer.h"
 #include "logs/ulog_writer.h"
+#include "nn/hdf5_writer.h"
 #include "nn/onnx_writer.h"
 #include "nn/pth_writer.h"
 #include "nn/weights/safetensors.h"
@@ -73,6 +74,7 @@ void add_weights(Corpus& corpus, const std::string& data) {
   corpus.add(with_key(0, small_legacy()));
   const swarmcert::files::Weights weights = swarmcert::files::parse_weights(small_zip(), "small");
   corpus.add(with_key(0, swarmcert::files::safetensors_bytes(weights)));
+  corpus.add(with_key(0, small_mat73()));
 
   OnnxModel model;
   model.nodes = {onnx_node("Gemm", {"x", "w", "b"}, {"h"}, {onnx_integer("transB", 1)}),

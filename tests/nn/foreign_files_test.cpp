@@ -1,5 +1,5 @@
-/// Files that PyTorch, onnx, SciPy and NumPy wrote (files/make_files.py), with what these programs compute from them;
-/// .nnet files by hand; and damaged ones.
+/// Files that PyTorch, onnx, SciPy, NumPy and h5py wrote (files/make_files.py, make_mat_files.py), with what these
+/// programs compute from them; .nnet files by hand; and damaged ones.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -47,7 +47,7 @@ TEST(ForeignFiles, GiveWhatTheProgramsThatWroteThemCompute) {
     EXPECT_GT(largest, 0.01) << name << " is not compared with anything but 0";
   }
   EXPECT_EQ(formats, (std::set<std::string>{".mat", ".npz", ".onnx", ".pth"}));
-  EXPECT_EQ(expected.size(), 15u);
+  EXPECT_EQ(expected.size(), 19u);
 }
 
 TEST(ForeignFiles, WhatWasComputedOrAssumedIsSaid) {
@@ -66,6 +66,10 @@ TEST(ForeignFiles, WhatWasComputedOrAssumedIsSaid) {
   EXPECT_TRUE(says(notes_of("torch_image.onnx"), "batch normalization in inference is folded"));
   EXPECT_TRUE(says(notes_of("torch_series.onnx"), "one layer"));
   EXPECT_TRUE(says(notes_of("onnx_digits.onnx"), "Softmax is left out"));
+  EXPECT_TRUE(says(notes_of("h5py_struct.mat"), "the network is the struct \"net\""));
+  EXPECT_TRUE(says(notes_of("scipy_struct.mat"), "the network is the struct \"net\""));
+  EXPECT_EQ(load_weights(foreign("h5py_struct.mat")).precision, Precision::kFloat32);
+  EXPECT_EQ(notes_of("h5py_cells.mat"), "other variables are left out: \"comment\"\n");
   EXPECT_EQ(notes_of("onnx_acas.onnx"), "");
 }
 
@@ -150,24 +154,14 @@ TEST(MatFile, OtherVersionsAreRefusedWithTheCallThatMendsThem) {
   const std::string good = read_file(foreign("scipy_weights.mat"));
   std::string newer = good;
   newer[125] = '\3';
-  EXPECT_TRUE(is_refused(newer, {"another version than 5", "-v7"}));
+  EXPECT_TRUE(is_refused(newer, {"another version than 5 and 7.3", "-v7"}));
   std::string big_endian = good;
   big_endian.replace(126, 2, "MI");
   EXPECT_TRUE(is_refused(big_endian, {"not little-endian"}));
 }
 
-// "MATLAB MAT-File Versions": -v7.3 puts 512 bytes of text and version 0x0200 before an HDF5 file.
-TEST(MatFile, Hdf5IsRefusedWithTheCallThatMendsIt) {
+TEST(Hdf5, OtherFilesThanMatlabsAreRefusedWithAFormatThatIsRead) {
   const std::string hdf5 = std::string("\x89HDF\r\n\x1a\n", 8) + std::string(100, '\0');
-  std::string head = "MATLAB 7.3 MAT-file, Platform: GLNXA64";
-  head.resize(124, ' ');
-  head += std::string("\0\2IM", 4);
-  head.resize(512, '\0');
-  const std::vector<std::string> by_matlab{"version 7.3 (HDF5)", "load it in MATLAB", "-v7'"};
-  EXPECT_TRUE(is_refused(head + hdf5, by_matlab));
-  std::string renamed = head;  // by MATLAB's own users: only the signature tells it then
-  renamed.replace(0, 38, "MATLAB 5.0 MAT-file, by somebody else ");
-  EXPECT_TRUE(is_refused(renamed + hdf5, by_matlab));
   EXPECT_TRUE(is_refused(hdf5, {"HDF5", "ONNX", "numpy.savez"}));
   EXPECT_TRUE(is_refused(std::string(1024, '#') + hdf5, {"HDF5", "numpy.savez"}));
   EXPECT_TRUE(is_refused(std::string(700, '#') + hdf5, {"is neither"}));  // no offset of HDF5
@@ -211,7 +205,8 @@ TEST(ForeignFiles, EveryTruncationAndManyFlippedBitsAreRefusedOrGiveASoundNetwor
     }
   };
   for (const char* const name :
-       {"onnx_digits.onnx", "scipy_weights.mat", "scipy_biases.mat", "numpy_list.npz"}) {
+       {"onnx_digits.onnx", "scipy_weights.mat", "scipy_biases.mat", "scipy_struct.mat", "numpy_list.npz",
+        "h5py_cells.mat", "h5py_chunked.mat", "h5py_struct.mat"}) {
     const std::string good = read_file(foreign(name));
     for (std::size_t size = 0; size < good.size(); size += 3) try_to_load(good.substr(0, size));
     for (std::size_t bit = 0; bit < 8 * good.size(); bit += 5) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "hdf5_writer.h"
 #include "nn/weights/safetensors.h"
 #include "nn/weights/weights.h"
 #include "pth_writer.h"
@@ -68,7 +69,10 @@ struct Sample {
 };
 std::vector<Sample> samples() {
   const Weights small = parse_weights(small_zip(), "small");
-  return {{"zip", small_zip()}, {"legacy", small_legacy()}, {"safetensors", safetensors_bytes(small)}};
+  return {{"zip", small_zip()},
+          {"legacy", small_legacy()},
+          {"safetensors", safetensors_bytes(small)},
+          {"mat 7.3", small_mat73()}};
 }
 
 TEST(HostileFile, EveryTruncationIsRefused) {

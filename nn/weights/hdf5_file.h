@@ -1,0 +1,134 @@
+/// @file HDF5, as far as MATLAB's -v7.3 files use it: the superblock, object headers and attributes. From the
+/// "HDF5 File Format Specification", version 3.0. Not the library: it is too large to stand behind files of unknown
+/// origin. Checksums of object headers are not compared.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace swarmcert::files {
+
+/// An address that leads nowhere.
+inline constexpr std::uint64_t kNoAddress = ~std::uint64_t{0};
+
+/// What mends a file that uses more of HDF5 than is read here.
+inline constexpr char kSaveAsVersion7[] = "load it in MATLAB, then save('net.mat', 'weights', '-v7')";
+
+/// A piece of a file, read from front to back. Whatever lies beyond its end is refused.
+class Hdf5Piece {
+ public:
+  /// @param data, path  must outlive the piece. @param offset  of `data` in the file.
+  Hdf5Piece(std::string_view data, std::size_t offset, const std::string& path)
+      : data_(data), offset_(offset), path_(&path) {}
+
+  std::size_t left() const { return data_.size() - at_; }
+  std::size_t offset() const { return offset_ + at_; }
+
+  /// The next `size` bytes; an unsigned number of `size` <= 8 bytes, the lowest first.
+  std::string_view take(std::uint64_t size);
+  std::uint64_t number(std::size_t size);
+  Hdf5Piece piece(std::uint64_t size);
+  void skip(std::uint64_t size) { take(size); }
+  /// Bytes up to a multiple of 8 of what was taken since the beginning.
+  void skip_padding();
+
+  /// @throws InputError unless the next bytes are `signature`.
+  void expect(std::string_view signature);
+  /// @throws InputError unless `number` is `expected`; what mends it is to save the file in an older version.
+  void require(const char* field, std::uint64_t number, std::uint64_t expected) const;
+  [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
+                           const std::string& mend) const;
+
+ private:
+  std::string_view data_;
+  std::size_t offset_;
+  const std::string* path_;
+  std::size_t at_ = 0;
+};
+
+/// Types of header messages.
+enum class Hdf5Kind : std::uint16_t {
+  kDataspace = 0x1,
+  kLinkInfo = 0x2,
+  kDatatype = 0x3,
+  kLink = 0x6,
+  kExternalFiles = 0x7,
+  kLayout = 0x8,
+  kFilters = 0xb,
+  kAttribute = 0xc,
+  kContinuation = 0x10,
+  kSymbolTable = 0x11,
+  kAttributeInfo = 0x15
+};
+
+struct Hdf5Message {
+  Hdf5Kind kind;
+  bool is_shared = false;  ///< its contents lie elsewhere
+  Hdf5Piece contents;
+};
+
+/// A group or a dataset: what its object header says.
+struct Hdf5Object {
+  std::size_t offset = 0;
+  std::vector<Hdf5Message> messages;
+
+  /// The contents of the only message of this kind, or nothing.
+  /// @throws InputError if there are two, or if it is shared.
+  std::optional<Hdf5Piece> find(Hdf5Kind kind) const;
+};
+
+/// A node of a B-tree of version 1.
+struct Hdf5TreeNode {
+  std::uint64_t level = 0;  ///< 0: its children are no nodes
+  std::uint64_t count = 0;  ///< of children
+  Hdf5Piece entries;        ///< keys and children
+};
+
+/// A whole file in memory. Everything that follows an address counts against two limits, so that references to the
+/// same place cost no more than a large network does.
+class Hdf5File {
+ public:
+  /// @param bytes, path  must outlive the file. @param start  where the superblock lies; addresses count from there.
+  /// @throws InputError unless this is a superblock of version 0, 2 or 3 with addresses and lengths of 8 bytes.
+  Hdf5File(const std::string& bytes, std::size_t start, const std::string& path);
+
+  std::uint64_t root() const { return root_; }
+  std::size_t size_bytes() const { return bytes_.size(); }
+
+  /// @throws InputError if these bytes are not in the file.
+  Hdf5Piece at(std::uint64_t address, std::uint64_t size) const;
+  /// From `address` to the end of the file.
+  Hdf5Piece from(std::uint64_t address) const;
+
+  /// @throws InputError unless a header of version 1 or 2 is at `address`.
+  Hdf5Object object(std::uint64_t address);
+
+  /// @param type  0 of groups, 1 of chunks. @param parent_level  of the node that leads here; nothing: none.
+  /// @throws InputError unless the node is one level below its parent, so that no cycle is followed.
+  Hdf5TreeNode tree_node(std::uint64_t address, std::uint64_t type,
+                         std::optional<std::uint64_t> parent_level) const;
+
+  /// One entry of any table: at most a million in a file. @param piece  for the message.
+  void count_entry(const Hdf5Piece& piece);
+  /// `size` bytes of numbers that are read: at most 128 MiB in a file.
+  void count_bytes(std::uint64_t size, const Hdf5Piece& piece);
+
+ private:
+  std::uint64_t symbol_table_root(Hdf5Piece& piece);
+  std::uint64_t plain_root(Hdf5Piece& piece);
+  void read_messages(Hdf5Piece block, int version, int header_flags, Hdf5Object& object,
+                     std::vector<Hdf5Piece>& continuations);
+
+  const std::string& bytes_;
+  std::size_t start_;
+  const std::string& path_;
+  std::uint64_t root_ = 0;
+  std::uint64_t entries_ = 0;
+  std::uint64_t read_bytes_ = 0;
+};
+
+}  // namespace swarmcert::files
