@@ -447,89 +447,272 @@ def integers_of(value):
     return result
 
 
-def read_onnx(data, order):
-    def tensor(message):
+class OnnxNode:
+    """`attributes`: fields of each by name. `parts`: the nodes that this one stands for."""
+
+    def __init__(self, kind, inputs, outputs, attributes, parts=()):
+        self.kind, self.inputs, self.outputs, self.attributes, self.parts = kind, inputs, outputs, attributes, parts
+
+    @staticmethod
+    def of(message):
         fields = list(protobuf(message))
-        shape = [d for n, v in fields if n == 1 for d in integers_of(v)]
-        kind = next(v for n, v in fields if n == 2)
-        name = next((v.decode() for n, v in fields if n == 8), "")
+        attributes = [list(protobuf(v)) for n, v in fields if n == 5]
+        return OnnxNode(next(v.decode() for n, v in fields if n == 4), [v.decode() for n, v in fields if n == 1],
+                        [v.decode() for n, v in fields if n == 2],
+                        {next(v.decode() for n, v in a if n == 1): a for a in attributes})
+
+    def integer(self, name, otherwise):
+        fields = self.attributes.get(name)
+        return otherwise if fields is None else next((signed(v) for n, v in fields if n == 3), 0)
+
+    def integers(self, name):
+        return [signed(k) for n, v in self.attributes.get(name, []) if n == 8 for k in integers_of(v)]
+
+    def has_only(self, number_, name, values):
+        """Whether the attribute is left out or its field `number_` has one of `values`."""
+        return all(v in values for n, v in self.attributes.get(name, []) if n == number_)
+
+
+def signed(value):
+    return value - 2 ** 64 if value >= 2 ** 63 else value
+
+
+class OnnxTensor:
+    def __init__(self, message):
+        fields = list(protobuf(message))
+        self.shape = [d for n, v in fields if n == 1 for d in integers_of(v)]
+        self.kind = {1: "float32", 7: "int64", 11: "float64"}.get(next(v for n, v in fields if n == 2))
+        self.name = next((v.decode() for n, v in fields if n == 8), "")
         raw = next((v for n, v in fields if n in (4, 9, 10)), b"")
-        return name, shape, kind, raw
-    graph = next(v for n, v in protobuf(data) if n == 7)
-    stored, tensors, names, activations, users, is_open = {}, [], set(), set(), {}, False
-    precision = None
+        if self.kind == "int64":
+            packed = [signed(k) for n, v in fields if n == 7 for k in integers_of(v)]
+            self.numbers = packed or list(struct.unpack(f"<{len(raw) // 8}q", raw))
+        else:
+            self.numbers = unpack(self.kind, raw) if self.kind else []
+        require_input(not self.kind or len(self.numbers) == math.prod(self.shape), "a tensor contradicts its shape")
 
-    def add(name, part, source, is_transposed):
-        nonlocal precision
-        _, shape, kind, raw = source
-        precision = {1: "float32", 11: "float64"}[kind]
-        numbers = unpack(precision, raw)
-        if is_transposed:
-            rows, columns = shape
-            shape, numbers = [columns, rows], [numbers[i * columns + j] for j in range(columns) for i in range(rows)]
-        if part == "bias" and len(shape) == 2:
-            shape = shape[1:]
-        tensors.append((f"{name}.{part}", shape, numbers))
 
-    def layer_name(weight):
+def group_from(node, takers):
+    """The nodes that compute one activation together and of which `node` is the first, the last one behind them."""
+    if len(node.inputs) == 0 or len(node.outputs) == 0:
+        return []
+    x, y = node.inputs[0], node.outputs[0]
+    if node.kind == "Sigmoid" and [n.kind for n in takers.get(y, [])] == ["Mul"]:
+        (product,) = takers[y]
+        return [node, product] if sorted(product.inputs) == sorted([x, y]) else []
+    if node.kind == "Split" and len(node.outputs) == 2 and len(set(node.outputs)) == 2:
+        pair = takers.get(y, [])
+        if takers.get(node.outputs[1], []) != pair or any(sorted(n.inputs) != sorted(node.outputs) for n in pair):
+            return []
+    elif node.kind == "ReduceMax":
+        pair = takers[x]
+    else:
+        return []
+    larger, smaller = ("Max", "Min") if node.kind == "Split" else ("ReduceMax", "ReduceMin")
+    pair = sorted(pair, key=lambda n: n.kind)
+    if [n.kind for n in pair] != [larger, smaller] or any(n.inputs[0] != x for n in pair) and node.kind != "Split":
+        return []
+    results = [n.outputs[0] for n in pair]
+    both = takers.get(results[0], []) + takers.get(results[1], [])
+    if len(both) != 2 or both[0] is not both[1] or both[0].kind != "Concat" or both[0].inputs != results:
+        return []
+    return [node] * (node.kind == "Split") + pair + both[:1]
+
+
+def with_groups_joined(nodes):
+    """Each group as one node in the place of its last one: "Swish", "MaxMin" of halves, "PairsMaxMin". What else takes
+    a value from inside of a group takes one that is not known any more, and is refused."""
+    takers = {}
+    for node in nodes:
+        for name in set(node.inputs):
+            takers.setdefault(name, []).append(node)
+    groups = {id(group[-1]): group for group in (group_from(node, takers) for node in nodes) if group}
+    inner = {id(node) for group in groups.values() for node in group}
+    for node in nodes:
+        if id(node) in groups:
+            group = groups[id(node)]
+            kind = {"Sigmoid": "Swish", "Split": "MaxMin", "ReduceMax": "PairsMaxMin"}[group[0].kind]
+            yield OnnxNode(kind, group[0].inputs[:1], node.outputs, {}, group)
+        elif id(node) not in inner:
+            yield node
+
+
+class OnnxChain:
+    """Linear layers with one activation between them, which take one another's results."""
+
+    def __init__(self, stored, value, shape):
+        """`shape` of the input; its last size is None where the file leaves it open."""
+        self.stored, self.value, self.shape = stored, value, shape
+        self.layers = []  # [name, rows of the stored matrix, biases]
+        self.kinds, self.activations, self.is_activated = set(), set(), False
+        self.order = None  # in which the next layer takes what is sorted, where it is another
+
+    def follow(self, node):
+        if node.kind == "Constant":
+            self.stored[node.outputs[0]] = OnnxTensor(next(v for n, v in node.attributes["value"] if n == 5))
+            return
+        if node.kind == "Identity" and node.inputs[0] in self.stored:
+            self.stored[node.outputs[0]] = self.stored[node.inputs[0]]
+            return
+        require_input(node.inputs.count(self.value) == 1 and all(
+            name in ("", self.value) or name in self.stored for name in node.inputs),
+            f"ONNX's {node.kind} does not take the value before it, or takes another one")
+        activation = {"Celu": "elu", "Swish": "silu"}.get(node.kind, node.kind.lower())  # with their alpha, 1
+        require_input(node.has_only(2, "alpha", [b"\0\0\x80?"]) and node.has_only(2, "beta", [b"\0\0\x80?"])
+                      and node.has_only(4, "approximate", [b"none"]),
+                      "this checker reads no factors of Gemm or Elu and no approximate Gelu")
+        if node.kind in ("Gemm", "MatMul"):
+            self.linear(node)
+        elif node.kind == "Add":
+            self.add(self.stored[next(name for name in node.inputs if name != self.value)])
+        elif node.kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Celu", "Gelu", "Swish"):
+            self.activate(activation)
+        elif node.kind in ("Reshape", "Flatten"):
+            self.reshape(node)
+        elif node.kind in ("MaxMin", "PairsMaxMin", "TopK"):
+            {"MaxMin": self.halves, "PairsMaxMin": self.pairs, "TopK": self.groups}[node.kind](node)
+        else:
+            require_input(node.kind == "Identity", f"this checker does not read ONNX's {node.kind}")
+        self.value = node.outputs[0]
+
+    def linear(self, node):
+        require_input(node.inputs[0] == self.value and not node.integer("transA", 0), "a value is no input of a layer")
+        weight = self.stored[node.inputs[1]]
+        require_input(len(weight.shape) == 2 and (not self.layers or self.is_activated), "no chain of linear layers")
+        first, second = weight.shape
+        rows = [weight.numbers[i * second:(i + 1) * second] for i in range(first)]
+        if node.kind == "MatMul" or node.integer("transB", 0) == 0:
+            rows = [list(column) for column in zip(*rows)]
+        sizes = self.shape[:-1] + [len(rows[0]) if self.shape[-1] is None else self.shape[-1]]
+        require_input(math.prod(sizes) == sizes[-1] == len(rows[0]), "a layer takes no single row of numbers")
+        if self.order is not None:
+            rows = [[row[k] for k in self.order] for row in rows]
+        self.kinds.add(weight.kind)
+        self.layers.append([self.layer_name(node.inputs[1]), rows, None])
+        self.shape, self.is_activated, self.order = sizes[:-1] + [len(rows)], False, None
+        if len(node.inputs) == 3 and node.inputs[2]:
+            self.add(self.stored[node.inputs[2]])
+
+    def add(self, bias):
+        require_input(self.layers and not self.is_activated and self.layers[-1][2] is None
+                      and bias.shape in ([self.shape[-1]], [1, self.shape[-1]])
+                      and math.prod(self.shape) == self.shape[-1], "adds where no layer takes a bias")
+        self.kinds.add(bias.kind)
+        self.layers[-1][2] = bias.numbers
+
+    def activate(self, activation):
+        require_input(self.layers and not self.is_activated, "an activation does not follow a linear layer")
+        self.activations.add(activation)
+        require_input(len(self.activations) == 1, "this checker reads ONNX models with one activation")
+        self.is_activated = True
+
+    def layer_name(self, weight):
+        names = [name for name, _, _ in self.layers]
         name = weight[:-7] if weight.endswith(".weight") and len(weight) > 7 else weight
         while not name or name in names:
             name = f"layer{len(names) + 1}" + (f"_{name}" if name else "")
-        names.add(name)
         return name
-    for number_, value in protobuf(graph):
-        if number_ == 5:
-            t = tensor(value)
-            stored[t[0]] = t
-    graph_nodes = [list(protobuf(value)) for number_, value in protobuf(graph) if number_ == 1]
-    for fields in graph_nodes:
-        for name in (v.decode() for n, v in fields if n == 1):
-            users[name] = users.get(name, 0) + 1
-    sigmoid_of = {}  # what a Sigmoid gives, by what it takes, where only a product with the latter takes it: SiLU
-    for fields in graph_nodes:
-        inputs = [v.decode() for n, v in fields if n == 1]
-        output = next(v.decode() for n, v in fields if n == 2)
-        kind = next(v.decode() for n, v in fields if n == 4)
-        attributes = {}
-        for n, v in fields:
-            if n == 5:
-                a = dict(protobuf(v))
-                attributes[a[1].decode()] = a
-        if kind == "Constant":
-            stored[output] = (output,) + tensor(attributes["value"][5])[1:]
-        elif kind == "Identity" and inputs[0] in stored:
-            stored[output] = (output,) + stored[inputs[0]][1:]
-        elif kind in ("Gemm", "MatMul"):
-            current, is_open = layer_name(stored[inputs[1]][0]), False
-            add(current, "weight", stored[inputs[1]], kind == "MatMul" or attributes.get("transB", {}).get(3, 0) == 0)
-            if len(inputs) == 3 and inputs[2]:
-                add(current, "bias", stored[inputs[2]], False)
-        elif kind == "Add":
-            add(current, "bias", stored[inputs[0] if inputs[0] in stored else inputs[1]], False)
-        elif kind == "Sigmoid" and users[inputs[0]] == 2 and users.get(output) == 1:
-            sigmoid_of[inputs[0]] = output
-        elif kind == "Mul" and len(inputs) == 2 and sigmoid_of.get(inputs[0], sigmoid_of.get(inputs[1])) in inputs:
-            sigmoid_of.clear()
-            activations.add("silu")
-            is_open = True
-        elif kind in ("Relu", "Tanh", "Sigmoid", "Softplus", "Elu", "Celu", "Gelu", "Swish"):
-            if attributes.get("approximate", {}).get(4, b"none") != b"none":
-                raise ValueError("this checker does not read the approximate Gelu")
-            activations.add({"Celu": "elu", "Swish": "silu"}.get(kind, kind.lower()))  # with their alpha, 1
-            is_open = True
-        elif kind != "Identity":
-            raise ValueError(f"this checker does not read ONNX's {kind}")
-        if any(attributes.get(factor, {}).get(2) not in (None, b"\0\0\x80?") for factor in ("alpha", "beta")):
-            raise ValueError("this checker does not read factors of Gemm or Elu")
-    if len(activations) > 1 or sigmoid_of:
-        raise ValueError("this checker reads ONNX models with one activation")
-    if is_open:  # what ends in an activation is followed by the identity
-        size = [shape[0] for name, shape, _ in tensors if name.endswith(".weight")][-1]
-        tensors.append((f"{layer_name('')}.weight", [size, size],
-                        [float(i == j) for i in range(size) for j in range(size)]))
-    result = Weights(tensors, precision, data, "evaluation", order)
+
+    def integers_at(self, node, k, attribute):
+        """What older operator sets hold in an attribute, newer ones in input `k`."""
+        if attribute in node.attributes:
+            return node.integers(attribute)
+        return self.stored[node.inputs[k]].numbers if k < len(node.inputs) and node.inputs[k] else []
+
+    def reshape(self, node):
+        require_input(None not in self.shape and node.inputs[0] == self.value, "reshapes what has no known shape")
+        count = math.prod(self.shape)
+        if node.kind == "Flatten":
+            axis = node.integer("axis", 1)
+            require_input(-len(self.shape) <= axis <= len(self.shape), "flattens at no axis")
+            front = math.prod(self.shape[:axis])
+            self.shape = [front, count // front]
+            return
+        sizes = list(self.stored[node.inputs[1]].numbers)
+        require_input(not node.integer("allowzero", 0), "reshapes to a size of 0")
+        for k, size in enumerate(sizes):
+            if size == 0:
+                require_input(k < len(self.shape), "reshapes to a size that is not there")
+                sizes[k] = self.shape[k]
+        if sizes.count(-1) == 1:
+            sizes[sizes.index(-1)] = count // -math.prod(sizes)
+        require_input(len(sizes) >= 1 and min(sizes) > 0 and math.prod(sizes) == count, "reshapes to another size")
+        self.shape = sizes
+
+    def is_last_axis(self, axis, shape):
+        """Whether the whole value lies along this axis."""
+        return axis in (-1, len(shape) - 1) and math.prod(shape) == shape[-1]
+
+    def halves(self, node):
+        split, concat, size = node.parts[0], node.parts[-1], self.shape[-1]
+        require_input(self.is_last_axis(split.integer("axis", 0), self.shape)
+                      and self.is_last_axis(concat.integer("axis", 0), self.shape) and size % 2 == 0
+                      and self.integers_at(split, 1, "split") in ([], [size // 2] * 2), "is no MaxMin of halves")
+        self.activate("maxmin:halves")
+
+    def pairs(self, node):
+        larger, smaller, concat = node.parts
+        for reduced in (larger, smaller):
+            require_input(len(self.shape) >= 2 and reduced.integer("keepdims", 1) == 0 and self.shape[-1] == 2
+                          and self.integers_at(reduced, 1, "axes") in ([-1], [len(self.shape) - 1]),
+                          "is no MaxMin of pairs")
+        require_input(self.is_last_axis(concat.integer("axis", 0), self.shape[:-1]), "is no MaxMin of pairs")
+        self.shape = self.shape[:-2] + [2 * self.shape[-2]]
+        self.activate("maxmin:pairs")
+
+    def groups(self, node):
+        size, count = self.shape[-1], math.prod(self.shape)
+        sizes = [node.integer("k", 0)] if "k" in node.attributes else self.integers_at(node, 1, "k")
+        require_input(node.inputs[0] == self.value and node.integer("axis", -1) in (-1, len(self.shape) - 1)
+                      and sizes == [size] and node.integer("sorted", 1) == 1 and 2 <= size <= 64,
+                      "TopK does not sort groups of 2 to 64 numbers")
+        self.activate(f"groupsort:{size}")
+        if node.integer("largest", 1) != 0:
+            self.order = [k - k % size + size - 1 - k % size for k in range(count)]
+
+
+def input_shape(message):
+    """Of a ValueInfoProto; without one, a row of any size."""
+    def inside(data, numbers):
+        found = [data]
+        for number_ in numbers:
+            found = [v for part in found for n, v in protobuf(part) if n == number_]
+        return found
+    sizes = [next((v for n, v in protobuf(d) if n == 1), None) for d in inside(message, [2, 1, 2, 1])] or [1, None]
+    if len(sizes) > 1 and sizes[0] is None:
+        sizes[0] = 1
+    require_input(None not in sizes[:-1], "the model leaves open more than the size of the batch")
+    return sizes
+
+
+def read_onnx(data, order):
+    graph = list(protobuf(next(v for n, v in protobuf(data) if n == 7)))
+    tensors = [OnnxTensor(value) for n, value in graph if n == 5]
+    nodes = [OnnxNode.of(value) for n, value in graph if n == 1]
+    named = lambda number_: [(next(v.decode() for n, v in protobuf(value) if n == 1), value)
+                             for m, value in graph if m == number_]
+    stored = {tensor.name: tensor for tensor in tensors}
+    inputs = [(name, value) for name, value in named(11) if name not in stored]
+    require_input(len(inputs) == 1, "the graph has not one input")
+    names = [inputs[0][0]] + list(stored) + [name for node in nodes for name in node.outputs if name]
+    require_input(len(stored) == len(tensors) and len(set(names)) == len(names), "two values have the same name")
+    chain = OnnxChain(stored, inputs[0][0], input_shape(inputs[0][1]))
+    for node in with_groups_joined(nodes):
+        chain.follow(node)
+    require_input([name for name, _ in named(12)] == [chain.value], "the chain does not end at the graph's output")
+    if chain.is_activated:  # what ends in an activation is followed by the identity
+        size = len(chain.layers[-1][1])
+        which = chain.order or range(size)
+        chain.layers.append([chain.layer_name(""), [[float(which[i] == j) for j in range(size)] for i in range(size)],
+                             None])
+    parts = []
+    for name, rows, biases in chain.layers:
+        parts.append((f"{name}.weight", [len(rows), len(rows[0])], [x for row in rows for x in row]))
+        parts += [] if biases is None else [(f"{name}.bias", [len(biases)], biases)]
+    require_input(chain.kinds <= {"float32", "float64"}, "weights are neither float32 nor float64")
+    result = Weights(parts, "float64" if "float64" in chain.kinds else "float32", data, "evaluation", order)
     if len(result.layers) > 1:
-        (result.activation,) = activations
+        (result.activation,) = chain.activations
     return result
 
 

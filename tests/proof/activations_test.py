@@ -14,6 +14,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from fractions import Fraction
 from pathlib import Path
 
@@ -386,6 +387,69 @@ def onnx_files_state_their_activation(folder, generator):
         assert done.returncode == 3 and "node" in done.stderr, done
 
 
+def decided(certificate, net):
+    """The exit code of the three checkers, which must agree."""
+    done = check(certificate, net)
+    path = Path(net).parent / "checked.json"
+    others = [run(SWARMCERT, "check", path, net),
+              run(sys.executable, SOURCE / "tests/lipschitz/check_certificate.py", path, net)]
+    assert [other.returncode for other in others] == [done.returncode] * 2, (done, others)
+    return done.returncode
+
+
+def onnx_files_state_what_they_sort(folder, generator):
+    """MaxMin and GroupSort as groups of nodes: what certify writes is accepted by all; other chains, weights and
+    smaller bounds are refused by all; groups that compute something else cannot be read by any."""
+    network = weight_files.layers([3, 4, 8, 2], generator)
+    net = folder / "sorting.onnx"
+    ops = "maxmin:halves", "maxmin:pairs", "groupsort:2", "groupsort:4", "descending:4"
+    forms = Counter()
+    for op in ops:
+        net.write_bytes(weight_files.onnx(network, op))
+        certificate, stated = certify(net), op.replace("descending", "groupsort")
+        chain = [step["op"] for step in certificate["network"]["weights"]["network"]["chain"]]
+        assert chain == ["linear", stated, "linear", stated, "linear"], chain
+        assert decided(certificate, net) == 0
+        for other in {*ops[:4], "relu", "tanh"} - {stated}:
+            forms[decided(with_activations_again(certificate, other), net)] += 1
+        smaller = copy.deepcopy(certificate)
+        with_upper(smaller["bounds"][0], math.nextafter(smaller["bounds"][0]["upper"], 0))
+        forms[decided(smaller, net)] += 1
+        changed = [(name, [list(row) for row in rows], biases) for name, rows, biases in network]
+        changed[1][1][0][0] *= 1.5
+        net.write_bytes(weight_files.onnx(changed, op))
+        forms[decided(certificate, net)] += 1
+        certificate["network"]["weights"]["network"]["sha256"] = hashlib.sha256(net.read_bytes()).hexdigest()
+        forms[decided(certificate, net)] += 1
+    assert forms == {1: 8 * len(ops)}, forms
+
+    def with_(kind, inputs=None, **others):
+        return {kind: lambda old, attributes: (inputs or old, {**attributes, **others})}
+    for op, change in (
+            ("maxmin:halves", with_("Split", axis=0)), ("maxmin:halves", with_("Concat", axis=0)),
+            ("maxmin:halves", with_("Concat", ["d0", "c0"])), ("maxmin:halves", with_("Min", ["p0", "p0"])),
+            ("maxmin:pairs", with_("ReduceMax", keepdims=1)), ("maxmin:pairs", with_("ReduceMin", axes=[1])),
+            ("maxmin:pairs", with_("Concat", axis=0)), ("groupsort:4", with_("TopK", axis=1)),
+            ("groupsort:4", with_("TopK", sorted=0)), ("groupsort:4", with_("TopK", ["r0", "size1"], k=3))):
+        net.write_bytes(weight_files.onnx(network, op, change=change))
+        assert decided(certificate, net) == 3, (op, change)
+
+
+def weights_behind_a_descending_sort_are_those_behind_an_ascending_one(folder, generator):
+    """Which takes them in another order."""
+    network = weight_files.layers([3, 4, 8, 2], generator)
+    turned = network[:1] + [(name, [[row[k - k % 4 + 3 - k % 4] for k in range(len(row))] for row in rows], biases)
+                            for name, rows, biases in network[1:]]
+    net, terms = folder / "order.onnx", []
+    for op, layers_ in ("descending:4", network), ("groupsort:4", turned):
+        net.write_bytes(weight_files.onnx(layers_, op))
+        read = second.read_weights(net)
+        assert [layer.weights for layer in read.layers] == [sum(rows, []) for _, rows, _ in turned]
+        text = check(certify(net), net, "--coq").stdout
+        terms.append([line for line in text.splitlines() if hashlib.sha256(net.read_bytes()).hexdigest() not in line])
+    assert terms[0] == terms[1] and len(terms[0]) > 10
+
+
 def main():
     generator = random.Random(11)
     with tempfile.TemporaryDirectory() as name:
@@ -397,7 +461,9 @@ def main():
                       functions_that_are_not_monotone_have_an_inequality_of_their_own, refuses_what_only_relu_has,
                       products_count_the_activations, sorting_layers_have_products_only,
                       each_part_has_its_own_activation,
-                      terms_that_stand_still_must_be_relu, onnx_files_state_their_activation):
+                      terms_that_stand_still_must_be_relu, onnx_files_state_their_activation,
+                      onnx_files_state_what_they_sort,
+                      weights_behind_a_descending_sort_are_those_behind_an_ascending_one):
             claim(folder, generator)
             print(claim.__name__.replace("_", " "))
 

@@ -116,8 +116,49 @@ def field(number, value):
     return varint(number << 3 | 2) + varint(len(value)) + value
 
 
-def onnx(network, activation="Relu", first=None, attributes=b""):
-    """`first`: another activation than `activation` behind the first layer."""
+def integers(name, values):
+    """A stored tensor of int64."""
+    stored = struct.pack(f"<{len(values)}q", *values)
+    return field(5, field(1, len(values)) + field(2, 7) + field(8, name) + field(9, stored))
+
+
+def node(kind, inputs, outputs, **attributes):
+    """Attributes are an integer or a list of them."""
+    message = b"".join(field(1, i) for i in inputs) + b"".join(field(2, o) for o in outputs) + field(4, kind)
+    for name, value in attributes.items():
+        numbers = [varint(v % 2 ** 64) for v in (value if isinstance(value, list) else [value])]
+        listed = isinstance(value, list)
+        message += field(5, field(1, name) + b"".join(varint((8 if listed else 3) << 3) + n for n in numbers)
+                         + field(20, 7 if listed else 2))
+    return field(1, message)
+
+
+def sorting(op, k, current, width, change):
+    """The nodes of one layer that is sorted, as PyTorch exports them, and the name of their result; `change` gives
+    other arguments of single nodes, by their kind."""
+    def made(kind, inputs, outputs, **attributes):
+        inputs, attributes = change.get(kind, lambda i, a: (i, a))(inputs, attributes)
+        return node(kind, inputs, outputs, **attributes)
+    name, _, size = op.partition(":")
+    own = [f"{letter}{k}" for letter in "pqcdirs"]
+    p, q, c, d, i, r, s = own
+    if size == "halves":
+        nodes = integers(f"half{k}", [width // 2] * 2) + made("Split", [current, f"half{k}"], [p, q], axis=1)
+        nodes += made("Max", [p, q], [c]) + made("Min", [p, q], [d])
+        return nodes + made("Concat", [c, d], [f"h{k}"], axis=-1), f"h{k}"
+    group = 2 if size == "pairs" else int(size)
+    nodes = integers(f"groups{k}", [1, -1, group]) + made("Reshape", [current, f"groups{k}"], [r])
+    if size == "pairs":
+        nodes += made("ReduceMax", [r], [c], axes=[-1], keepdims=0) + made("ReduceMin", [r], [d], axes=[2], keepdims=0)
+        return nodes + made("Concat", [c, d], [f"h{k}"], axis=1), f"h{k}"
+    nodes += integers(f"size{k}", [group]) + integers(f"flat{k}", [1, -1])
+    nodes += made("TopK", [r, f"size{k}"], [s, i], axis=-1, largest=int(name == "descending"))
+    return nodes + made("Reshape", [s, f"flat{k}"], [f"h{k}"]), f"h{k}"
+
+
+def onnx(network, activation="Relu", first=None, attributes=b"", change={}):
+    """`activation` by its node, or MaxMin and GroupSort by their name in chains, and "descending:SIZE".
+    `first`: another activation than `activation` behind the first layer."""
     graph, current = b"", "x"
     for k, (name, rows, biases) in enumerate(network):
         weights = [f"{name}.weight", f"{name}.bias"]
@@ -127,17 +168,19 @@ def onnx(network, activation="Relu", first=None, attributes=b""):
                        + field(9, raw(as_stored)))
         graph += field(5, field(1, len(biases)) + field(2, 1) + field(8, weights[1]) + field(9, raw(biases)))
         if k % 2 == 0:
-            node = b"".join(field(1, i) for i in [current] + weights) + field(2, f"y{k}") + field(4, "Gemm")
-            graph += field(1, node + field(5, field(1, "transB") + field(3, 1) + field(20, 2)))
+            graph += node("Gemm", [current] + weights, [f"y{k}"], transB=1)
         else:
-            graph += field(1, field(1, current) + field(1, weights[0]) + field(2, f"m{k}") + field(4, "MatMul"))
-            graph += field(1, field(1, f"m{k}") + field(1, weights[1]) + field(2, f"y{k}") + field(4, "Add"))
+            graph += node("MatMul", [current, weights[0]], [f"m{k}"]) + node("Add", [f"m{k}", weights[1]], [f"y{k}"])
         current = f"y{k}"
-        if k + 1 < len(network) and activation == "SiLU":  # as PyTorch exports it
-            graph += field(1, field(1, current) + field(2, f"s{k}") + field(4, "Sigmoid"))
-            graph += field(1, field(1, current) + field(1, f"s{k}") + field(2, f"h{k}") + field(4, "Mul"))
+        if k + 1 == len(network):
+            continue
+        if ":" in activation:
+            nodes, current = sorting(activation, k, current, len(rows), change)
+            graph += nodes
+        elif activation == "SiLU":  # as PyTorch exports it
+            graph += node("Sigmoid", [current], [f"s{k}"]) + node("Mul", [current, f"s{k}"], [f"h{k}"])
             current = f"h{k}"
-        elif k + 1 < len(network):
+        else:
             graph += field(1, field(1, current) + field(2, f"h{k}")
                            + field(4, first if first and k == 0 else activation) + attributes)
             current = f"h{k}"

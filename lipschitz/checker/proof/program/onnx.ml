@@ -1,11 +1,15 @@
-(* ONNX models that are a chain of linear layers with one activation between them. *)
+(* ONNX models that are a chain of linear layers with one activation between them: of every number, or MaxMin and
+   GroupSort as exporters write them, in several nodes. *)
 
 open Refusal
 
-type stored = { name : string; shape : int list; kind : int; raw : string }
-type attribute = { number : float option; word : string; tensor : stored option }
-type node = { op : string; inputs : string list; output : string; attributes : (string * attribute) list }
-type affine = { weight : stored; transposed : bool; mutable bias : stored option }
+type stored = { name : string; shape : int list; kind : int; raw : string; integers : int list }
+type attribute = { number : float option; word : string; tensor : stored option; listed : int list }
+(* `parts`: the nodes that this one stands for. *)
+type node = { op : string; inputs : string list; outputs : string list; attributes : (string * attribute) list;
+              parts : node list }
+(* Column k of the weights takes number `order.(k)` of the layer before; no order: number k. *)
+type affine = { weight : stored; transposed : bool; order : int array option; mutable bias : stored option }
 
 (* Field 1, the IR version, and the tag of another field of a model. *)
 let looks_like bytes =
@@ -18,6 +22,16 @@ let texts path number fields = List.map (Protobuf.bytes path) (all number fields
 let text path number fields = match List.rev (texts path number fields) with t :: _ -> t | [] -> ""
 let integer path number fields = match List.rev (all number fields) with
   | Protobuf.Number n :: _ -> Int64.to_int n | [] -> 0 | _ -> bad_input "%s: a number of another type" path
+
+(* min_int where a number is beyond the range of sizes. *)
+let small n = if Int64.compare n (-0x7FFFFFFFL) > 0 && Int64.compare n 0x7FFFFFFFL < 0 then Int64.to_int n else min_int
+
+let int64s path fields =
+  let of_raw raw = List.init (String.length raw / 8) (fun k -> small (String.get_int64_le raw (8 * k))) in
+  List.concat_map (fun (number, value) -> match number, value with
+      | 7, value -> List.map small (Protobuf.integers path value)
+      | 9, Protobuf.Bytes raw -> of_raw raw
+      | _ -> []) fields
 
 let tensor path message =
   let fields = Protobuf.fields path message in
@@ -38,7 +52,7 @@ let tensor path message =
       bad_input "%s: %s is too large" path (shown name) else product * n) 1 shape in
   if width > 0 && String.length raw <> count * width then bad_input
       "%s: %s holds another number of numbers than its shape" path (shown name);
-  { name; shape; kind; raw }
+  { name; shape; kind; raw; integers = if kind = 7 then int64s path fields else [] }
 
 let attribute path message =
   let fields = Protobuf.fields path message in
@@ -47,22 +61,38 @@ let attribute path message =
     | _, Protobuf.Number n :: _ -> Some (Int64.to_float n)
     | _ -> None in
   let tensor = match texts path 5 fields with t :: _ -> Some (tensor path t) | [] -> None in
-  text path 1 fields, { number; word = text path 4 fields; tensor }
+  let listed = List.concat_map (Protobuf.integers path) (all 8 fields) in
+  text path 1 fields, { number; word = text path 4 fields; tensor; listed = List.map small listed }
 
 let node path message =
   let fields = Protobuf.fields path message in
   let domain = text path 7 fields in
   if domain <> "" && domain <> "ai.onnx" then bad_input "%s: a node is of an operator set that cannot be read" path;
   match texts path 2 fields with
-  | [ output ] -> { op = text path 4 fields; inputs = texts path 1 fields; output;
-      attributes = List.map (attribute path) (texts path 5 fields) }
-  | _ -> bad_input "%s: a node has not exactly one output" path
+  | [] -> bad_input "%s: a node has no output" path
+  | outputs -> { op = text path 4 fields; inputs = texts path 1 fields; outputs;
+                 attributes = List.map (attribute path) (texts path 5 fields); parts = [] }
+
+let refuse_node path node what = bad_input "%s: node %s: %s" path (shown node.op) what
+let output node = List.hd node.outputs
+let integer_of node name otherwise = match List.assoc_opt name node.attributes with
+  | Some { number = Some x; _ } -> if Float.abs x < 0x1p31 then int_of_float x else min_int
+  | Some _ -> 0
+  | None -> otherwise
 
 type state = {
   mutable layers : affine list;
   mutable is_activated : bool;
   mutable activation : Proved.activation option;
+  mutable shape : int list;  (* of the value; the last size is 0 where the file leaves that of the input open *)
+  mutable order : int array option;  (* in which the next layer takes what is sorted, where it is another *)
 }
+
+let size shape = List.fold_left ( * ) 1 shape
+let last shape = List.nth shape (List.length shape - 1)
+let rec but_last = function [] | [ _ ] -> [] | x :: rest -> x :: but_last rest
+(* Whether the whole value lies along this axis. *)
+let is_last_axis axis shape = (axis = -1 || axis = List.length shape - 1) && size (but_last shape) = 1
 
 (* Only with the parameters that the activations have here. Selu has float32 constants, with which it is 3e-9 steeper
    than with the decimals of the statement: another function. *)
@@ -81,30 +111,118 @@ let activation_of node =
   | "Gelu" when is_exact -> Some Gelu
   | _ -> None
 
-(* Exporters write SiLU as the product of x and Sigmoid(x). *)
-let rec with_products_joined = function
-  | { op = "Sigmoid"; inputs = [ x ]; output = s; _ } :: { op = "Mul"; inputs = [ a; b ]; output; _ } :: rest
-    when (a = x && b = s) || (a = s && b = x) ->
-    { op = "Swish"; inputs = [ x ]; output; attributes = [] } :: with_products_joined rest
-  | node :: rest -> node :: with_products_joined rest
+(* Exporters write SiLU as the product of x and Sigmoid(x), MaxMin as Split, Max, Min and Concat of halves, or as
+   ReduceMax, ReduceMin and Concat of pairs. Each group becomes one node. What else takes a value from inside of it
+   takes one that is not known any more, and is refused. *)
+let rec with_groups_joined nodes =
+  let joined op first last parts rest =
+    { op; inputs = [ List.hd first.inputs ]; outputs = last.outputs; attributes = []; parts }
+    :: with_groups_joined rest in
+  let take a b c d = (a = c && b = d) || (a = d && b = c) in
+  match nodes with
+  | ({ op = "Sigmoid"; inputs = [ x ]; outputs = [ s ]; _ } as first)
+    :: ({ op = "Mul"; inputs = [ a; b ]; outputs = [ _ ]; _ } as last) :: rest when take a b x s ->
+    joined "Swish" first last [] rest
+  | ({ op = "Split"; inputs = _ :: _; outputs = [ p; q ]; _ } as split)
+    :: { op = one; inputs = [ a; b ]; outputs = [ c ]; _ } :: { op = two; inputs = [ a'; b' ]; outputs = [ d ]; _ }
+    :: ({ op = "Concat"; inputs = [ e; f ]; outputs = [ _ ]; _ } as concat) :: rest
+    when p <> q && take a b p q && take a' b' p q
+         && ((one = "Max" && two = "Min" && e = c && f = d) || (one = "Min" && two = "Max" && e = d && f = c)) ->
+    joined "MaxMin" split concat [ split; concat ] rest
+  | ({ op = one; inputs = r :: _; outputs = [ c ]; _ } as first)
+    :: ({ op = two; inputs = r' :: _; outputs = [ d ]; _ } as second)
+    :: ({ op = "Concat"; inputs = [ e; f ]; outputs = [ _ ]; _ } as concat) :: rest
+    when r = r' && ((one = "ReduceMax" && two = "ReduceMin" && e = c && f = d)
+                    || (one = "ReduceMin" && two = "ReduceMax" && e = d && f = c)) ->
+    joined "PairsMaxMin" first concat [ first; second; concat ] rest
+  | node :: rest -> node :: with_groups_joined rest
   | [] -> []
 
+(* "Reshape" and "Flatten": the sizes of the same numbers. *)
+let reshaped path stored shape node =
+  let refuse what = refuse_node path node what in
+  if last shape = 0 then refuse "reshapes what has no known shape";
+  let count = size shape in
+  let sizes = match node.op, node.inputs with
+    | "Flatten", _ ->
+      let axis = integer_of node "axis" 1 and rank = List.length shape in
+      let axis = if axis < 0 then axis + rank else axis in
+      if axis < 0 || axis > rank then refuse "flattens at no axis";
+      let front = size (List.filteri (fun k _ -> k < axis) shape) in
+      [ front; count / front ]
+    | _, [ _; sizes ] when integer_of node "allowzero" 0 = 0 ->
+      let kept k n = if n <> 0 then n else match List.nth_opt shape k with
+          | Some n -> n | None -> refuse "reshapes to a size that is not there" in
+      let sizes = List.mapi kept (stored sizes).integers in
+      let known = List.fold_left (fun product n -> if n = -1 then product else
+                                     if n < 1 || product > Weights.most_numbers / n
+                                     then refuse "reshapes to another size" else product * n) 1 sizes in
+      (match List.filter (( = ) (-1)) sizes with
+       | [] -> sizes
+       | [ _ ] -> List.map (fun n -> if n = -1 then count / known else n) sizes
+       | _ -> refuse "leaves two sizes open")
+    | _ -> refuse "reshapes to a size of 0" in
+  if sizes = [] || size sizes <> count then refuse "reshapes to another size";
+  sizes
+
+(* What a node that sorts a layer is, the shape of its result, and the order of its numbers where it is another. *)
+let sorting path stored shape node =
+  let refuse what = refuse_node path node what in
+  let integers node k name = match List.assoc_opt name node.attributes, List.nth_opt node.inputs k with
+    | Some { listed; _ }, _ -> listed
+    | None, Some input when input <> "" -> (stored input).integers
+    | None, _ -> [] in
+  let n = last shape and rank = List.length shape in
+  match node.op, node.parts with
+  | "MaxMin", [ split; concat ] ->
+    if not (is_last_axis (integer_of split "axis" 0) shape && is_last_axis (integer_of concat "axis" 0) shape)
+    || n mod 2 <> 0 || not (List.mem (integers split 1 "split") [ []; [ n / 2; n / 2 ] ])
+    then refuse "is no MaxMin of halves";
+    Proved.Halves, shape, None
+  | "PairsMaxMin", [ first; second; concat ] ->
+    let of_pairs node = integer_of node "keepdims" 1 = 0
+                        && List.mem (integers node 1 "axes") [ [ -1 ]; [ rank - 1 ] ] in
+    if not (rank >= 2 && n = 2 && of_pairs first && of_pairs second
+            && is_last_axis (integer_of concat "axis" 0) (but_last shape))
+    then refuse "is no MaxMin of pairs";
+    Proved.Pairs, but_last (but_last shape) @ [ 2 * last (but_last shape) ], None
+  | _ ->
+    let sizes = match List.assoc_opt "k" node.attributes with
+      | Some _ -> [ integer_of node "k" 0 ] | None -> integers node 1 "k" in
+    if not (List.mem (integer_of node "axis" (-1)) [ -1; rank - 1 ] && sizes = [ n ] && integer_of node "sorted" 1 = 1
+            && n >= 2 && n <= 64) then refuse "does not sort groups of 2 to 64 numbers";
+    let largest_first k = k - k mod n + n - 1 - k mod n in
+    Proved.Groups n, shape,
+    if integer_of node "largest" 1 = 0 then None else Some (Array.init (size shape) largest_first)
+
 let follow path kept state current node =
-  let refuse what = bad_input "%s: node %s: %s" path (shown node.op) what in
-  let keep tensor =
-    if Hashtbl.mem kept node.output then refuse "stores a tensor twice";
-    Hashtbl.add kept node.output { tensor with name = node.output } in
+  let refuse what = refuse_node path node what in
+  let result = output node in
+  let keep tensor = Hashtbl.add kept result { tensor with name = result } in
   let stored name = match Hashtbl.find_opt kept name with Some t -> t | None -> refuse "lacks its weights or biases" in
   let number name otherwise = match List.assoc_opt name node.attributes with
     | None -> otherwise | Some { number = Some x; _ } -> x | Some _ -> -1. in
-  let start weight transposed =
+  let start (weight : stored) transposed =
     if state.layers <> [] && not state.is_activated then refuse "two linear layers without an activation between them";
+    let inputs, outputs = match weight.shape with
+      | [ a; b ] -> if transposed then a, b else b, a | _ -> refuse "its weights are no matrix" in
+    let sizes = but_last state.shape @ [ if last state.shape = 0 then inputs else last state.shape ] in
+    if size (but_last sizes) <> 1 || last sizes <> inputs then refuse "takes no single row of numbers that fits";
+    state.layers <- { weight; transposed; order = state.order; bias = None } :: state.layers;
+    state.shape <- but_last sizes @ [ outputs ];
     state.is_activated <- false;
-    state.layers <- { weight; transposed; bias = None } :: state.layers in
-  let add_bias bias = match state.layers with
-    | ({ bias = None; _ } as layer) :: _ when not state.is_activated ->
+    state.order <- None in
+  let add_bias (bias : stored) = match state.layers with
+    | ({ bias = None; _ } as layer) :: _ when not state.is_activated && size (but_last state.shape) = 1 ->
       layer.bias <- Some (match bias.shape with [ 1; n ] -> { bias with shape = [ n ] } | _ -> bias)
     | _ -> refuse "adds where no layer takes a bias" in
+  let activate activation =
+    if state.layers = [] || state.is_activated then refuse "does not follow a linear layer";
+    if state.activation <> None && state.activation <> Some activation then
+      refuse "is another activation than that before it";
+    state.activation <- Some activation;
+    state.is_activated <- true in
+  if node.op <> "TopK" && List.length node.outputs <> 1 then refuse "has not exactly one output";
   match node.op, node.inputs with
   | "Constant", [] ->
     (match List.assoc_opt "value" node.attributes with
@@ -123,15 +241,17 @@ let follow path kept state current node =
      | "MatMul", [ first; weight ] when first = current -> start (stored weight) true
      | "Add", [ a; b ] -> add_bias (stored (if a = current then b else a))
      | "Identity", [ _ ] -> ()
-     | _, [ _ ] when activation_of node <> None ->
-       if state.layers = [] || state.is_activated then refuse "does not follow a linear layer";
-       let activation = activation_of node in
-       if state.activation <> None && state.activation <> activation then
-         refuse "is another activation than that before it";
-       state.activation <- activation;
-       state.is_activated <- true
-     | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Identity or an activation that is known");
-    node.output
+     | ("Reshape" | "Flatten"), first :: _ when first = current ->
+       state.shape <- reshaped path stored state.shape node
+     | ("MaxMin" | "PairsMaxMin" | "TopK"), first :: _ when first = current ->
+       let sorting, shape, order = sorting path stored state.shape node in
+       activate (Proved.Sorted sorting);
+       state.shape <- shape;
+       state.order <- order
+     | _, [ _ ] when activation_of node <> None -> activate (Option.get (activation_of node))
+     | _ -> refuse "is not Gemm, MatMul of the input with weights, Add, Reshape, Flatten, Identity, MaxMin, TopK or an \
+                    activation that is known");
+    result
 
 let layer_name names k weight =
   let name = if String.length weight > 7 && Weights.ends_with ".weight" weight then
@@ -142,14 +262,35 @@ let layer_name names k weight =
   let name = free name in
   Hashtbl.add names name (); name
 
-let declared tensor name transposed =
+let declared ?order (tensor : stored) name transposed =
   let kind = match tensor.kind with 1 -> "float32" | 11 -> "float64" | n -> Printf.sprintf "data type %d" n in
   let at k = Weights.number_at kind tensor.raw 0 k in
+  let taken k = match order with Some order -> order.(k) | None -> k in
   match tensor.shape with
   | [ rows; columns ] when transposed ->
-    let numbers () = Array.init (rows * columns) (fun k -> at ((k mod rows) * columns + k / rows)) in
+    let numbers () = Array.init (rows * columns) (fun k -> at (taken (k mod rows) * columns + k / rows)) in
     { Weights.tensor = name; shape = [ columns; rows ]; kind; numbers }
-  | shape -> { Weights.tensor = name; shape; kind; numbers = (fun () -> Array.init (List.fold_left ( * ) 1 shape) at) }
+  | [ _; columns ] as shape ->
+    let numbers () = Array.init (size shape) (fun k -> at (k - k mod columns + taken (k mod columns))) in
+    { Weights.tensor = name; shape; kind; numbers }
+  | shape -> { Weights.tensor = name; shape; kind; numbers = (fun () -> Array.init (size shape) at) }
+
+(* Of the graph's input. Without one it is a row of any size; the first size is that of the batch. *)
+let input_shape path message =
+  let parts number messages = List.concat_map (fun m -> texts path number (Protobuf.fields path m)) messages in
+  let sizes = List.map (fun d -> integer path 1 (Protobuf.fields path d))
+      (parts 1 (parts 2 (parts 1 (parts 2 [ message ])))) in
+  let sizes = match sizes with [] -> [ 1; 0 ] | 0 :: (_ :: _ as rest) -> 1 :: rest | sizes -> sizes in
+  let product = List.fold_left (fun product n -> if n < 0 || product * max n 1 > Weights.most_numbers then
+                                   Weights.most_numbers + 1 else product * max n 1) 1 sizes in
+  if List.length sizes > 8 || product > Weights.most_numbers || List.mem 0 (but_last sizes) then
+    bad_input "%s: the shape of the input is unknown or too large" path;
+  sizes
+
+let require_single_names path names =
+  let names = List.filter (( <> ) "") names in
+  if List.length (List.sort_uniq compare names) <> List.length names then
+    bad_input "%s: two values have the same name" path
 
 let read path bytes ~order =
   let graph = match texts path 7 (Protobuf.fields path bytes) with
@@ -161,19 +302,23 @@ let read path bytes ~order =
       if Hashtbl.mem kept t.name then bad_input "%s: %s appears twice" path (shown t.name);
       Hashtbl.add kept t.name t) (texts path 5 graph);
   let name_of message = text path 1 (Protobuf.fields path message) in
-  let inputs = List.filter (fun name -> not (Hashtbl.mem kept name)) (List.map name_of (texts path 11 graph)) in
+  let inputs = List.filter (fun m -> not (Hashtbl.mem kept (name_of m))) (texts path 11 graph) in
   let input = match inputs with [ one ] -> one | _ -> bad_input "%s: the graph has not one input" path in
   let nodes = List.map (node path) (texts path 1 graph) in
   if List.length nodes > 10_000 then bad_input "%s: the graph has more than 10000 nodes" path;
-  let state = { layers = []; is_activated = false; activation = None } in
-  let last = List.fold_left (follow path kept state) input (with_products_joined nodes) in
-  if List.map name_of (texts path 12 graph) <> [ last ] then bad_input
+  require_single_names path
+    (name_of input :: Hashtbl.fold (fun name _ names -> name :: names) kept []
+     @ List.concat_map (fun node -> node.outputs) nodes);
+  let state = { layers = []; is_activated = false; activation = None; shape = input_shape path input; order = None } in
+  let constants, others = List.partition (fun node -> node.op = "Constant") nodes in
+  let end_of_chain = List.fold_left (follow path kept state) (name_of input) (constants @ with_groups_joined others) in
+  if List.map name_of (texts path 12 graph) <> [ end_of_chain ] then bad_input
       "%s: the graph's output is not where its chain of nodes ends" path;
   if state.layers = [] || state.is_activated then bad_input "%s: has no linear layer, or ends in an activation" path;
   let names = Hashtbl.create 16 in
   let tensors = List.concat (List.mapi (fun k layer ->
       let name = layer_name names k layer.weight.name in
-      declared layer.weight (name ^ ".weight") layer.transposed
+      declared ?order:layer.order layer.weight (name ^ ".weight") layer.transposed
       :: (match layer.bias with Some b -> [ declared b (name ^ ".bias") false ] | None -> []))
           (List.rev state.layers)) in
   Weights.assemble ?activation:state.activation ~path ~sha256:(Sha256.to_hex (Sha256.string bytes))
