@@ -52,7 +52,10 @@ class OnnxModelReader {
       if (std::exchange(has_graph, true)) refuse(field.offset, "graph", "appears twice");
       read_graph(field);
     }
-    if (!has_graph) refuse(0, "graph", "is missing");
+    if (!has_graph)
+      refuse(0, "graph", "is missing, so this is no ONNX model",
+             "a SavedModel of TensorFlow is converted: python -m tf2onnx.convert --saved-model FOLDER "
+             "--output net.onnx");
     choose_input();
     return std::move(model_);
   }

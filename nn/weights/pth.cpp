@@ -97,6 +97,9 @@ std::string top_folder(const ZipArchive& archive, const std::string& path) {
       return name.substr(0, slash + 1);
     }
   }
+  if (archive.has("model.weights.h5"))
+    throw InputError({path, "", "model.weights.h5", "", "the archive is a Keras model, which is not read",
+                      "export it to ONNX: model.export('net.onnx', format='onnx')"});
   throw InputError({path, "", "", "",
                     "the zip archive has no <folder>/data.pkl, so torch.save did not write it",
                     "save it with torch.save(model.state_dict(), ...)"});

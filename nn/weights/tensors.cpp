@@ -78,6 +78,9 @@ class Assembler {
         {"weight_hh_l0", "a recurrent layer", kOnlyLinear},
     };
     for (std::size_t i = 0; i < tensors_.size(); ++i) {
+      if (tensors_[i].name == "n_averaged")
+        refuse(i, shape_text(tensors_[i].shape), "is the count of an AveragedModel, not a weight",
+               "save the average itself: torch.save(averaged.module.state_dict(), ...)");
       for (const Hint& hint : kHints) {
         std::string layer;
         if (is_part(i, hint.ending, layer))

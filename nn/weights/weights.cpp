@@ -39,6 +39,9 @@ bool looks_like_hdf5(const std::string& bytes) {
   } else if (bytes.compare(0, 24, "version https://git-lfs.") == 0) {
     what = "is a Git LFS pointer, not the file itself";
     mend = "fetch it: git lfs pull";
+  } else if (bytes.compare(std::min<std::size_t>(4, bytes.size()), 4, "TFL3") == 0) {
+    what = "is a TensorFlow Lite model (.tflite), which is not read";
+    mend = "convert it to ONNX: python -m tf2onnx.convert --tflite net.tflite --output net.onnx";
   } else if (looks_like_hdf5(bytes)) {
     what = "is an HDF5 file (.h5, .hdf5), which is not read";
     mend = "export the model to ONNX, or write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez";

@@ -85,6 +85,8 @@ TEST(PthRefusal, NamesTensorsThatAreNotPartOfALayer) {
   EXPECT_TRUE(pth_is_refused(tensors, {"bn.running_mean = [3]", "batch normalisation"}));
   tensors.back().name = "fc3.bias";
   EXPECT_TRUE(pth_is_refused(tensors, {"fc3.bias = [3]", "neither the weight nor the bias"}));
+  tensors.back() = {"n_averaged", "3", 1, {}, {}};
+  EXPECT_TRUE(pth_is_refused(tensors, {"n_averaged", "AveragedModel", "averaged.module.state_dict()"}));
 }
 
 TEST(PthRefusal, TensorsThatAppearTwice) {
@@ -146,6 +148,12 @@ TEST(PthRefusal, FilesOfOtherKinds) {
       pth_is_refused("version https://git-lfs.github.com/spec/v1\n", {"Git LFS pointer", "git lfs pull"}));
   EXPECT_TRUE(pth_is_refused(zip({{"word/document.xml", "x"}}), {"data.pkl", "torch.save did not write it"}));
   EXPECT_TRUE(pth_is_refused(zip({}), {"data.pkl"}));
+  EXPECT_TRUE(pth_is_refused(zip({{"config.json", "{}"}, {"model.weights.h5", "x"}}),
+                             {"model.weights.h5", "a Keras model", "export it to ONNX"}));
+  EXPECT_TRUE(pth_is_refused(std::string("\x1c\0\0\0TFL3", 8) + std::string(40, '\0'),
+                             {"TensorFlow Lite", "tf2onnx.convert --tflite"}));
+  const std::string saved_model("\x8\1\x12\4\x8\1\x12\0", 8);
+  EXPECT_TRUE(pth_is_refused(saved_model, {"graph", "no ONNX model", "tf2onnx.convert --saved-model"}));
 }
 
 TEST(PthRefusal, ThingsThatAreNotStateDicts) {

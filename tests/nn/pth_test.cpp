@@ -114,6 +114,28 @@ TEST(Pth, LayersFollowTheFileNotTheirNames) {
   EXPECT_EQ(weights.layers[1].name, "a.output");
 }
 
+TEST(Pth, PrefixesOfWrappersStayInTheNamesOfLayers) {
+  std::vector<TensorSpec> tensors = small_tensors();
+  for (TensorSpec& tensor : tensors)
+    tensor.name = "module._orig_mod." + tensor.name;  // DataParallel, compile
+  const Weights weights = parse_weights(zip_file(tensors, small_storages<float>()), "wrapped");
+  EXPECT_EQ(weights.layers[0].name, "module._orig_mod.fc1");
+  EXPECT_EQ(weights.layers[1].weights, kSecond);
+}
+
+TEST(Pth, ACheckpointWithItsOptimizerNamesTheStateDictsInIt) {
+  // As torch.save writes {"model": ..., "optimizer": ...}: the optimizer numbers its parameters.
+  const std::string model = state_dict_op(small_tensors(), false);
+  const std::string moments = "}" + text_op("exp_avg") + tensor_op(small_tensors()[0], false) + "s";
+  const std::string optimizer = "}(" + text_op("state") + "}" + std::string("K\0", 2) + moments + "s" +
+                                text_op("param_groups") + "]}" + text_op("lr") + "G" + std::string(8, '\0') +
+                                "sau";
+  const std::string checkpoint = "}(" + text_op("model") + model + text_op("optimizer") + optimizer + "u";
+  const std::string bytes = zip_file(pickle(checkpoint), small_storages<float>());
+  expect_small_network(parse_weights(bytes, "checkpoint", "model"));
+  EXPECT_TRUE(refuses([&] { parse_weights(bytes, "checkpoint"); }, {"--key", "\"model\""}));
+}
+
 TEST(Pth, NestedCheckpointsAreReachedByKey) {
   const std::string state = state_dict_op(small_tensors(), false);
   const std::string checkpoint = "}(" + text_op("epoch") + "K\7" + text_op("lr") + "G" +
